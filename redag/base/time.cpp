@@ -1,0 +1,114 @@
+#include "redag/base/time.hpp"
+
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace redag {
+namespace {
+
+struct Unit {
+  std::string_view name;
+  Duration nanoseconds;
+};
+
+// Longest first, so that format_duration() finds the largest unit that fits. "\xC2\xB5" and "\xCE\xBC" are the two
+// code points people type for micro.
+constexpr std::array kUnits = {
+    Unit{"h", 3600 * kSecond},       Unit{"min", 60 * kSecond},       Unit{"s", kSecond},
+    Unit{"ms", kMillisecond},        Unit{"us", kMicrosecond},        Unit{"ns", kNanosecond},
+    Unit{"\xC2\xB5s", kMicrosecond}, Unit{"\xCE\xBCs", kMicrosecond},
+};
+
+const Unit *find_unit(std::string_view name) {
+  for (const Unit &unit : kUnits) {
+    if (unit.name == name) return &unit;
+  }
+  return nullptr;
+}
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+}  // namespace
+
+Result<Duration> parse_duration(std::string_view text) {
+  const auto fail = [&](std::string_view why) {
+    return make_error(fmt::format("'{}' is not a duration: {}", text, why), "write a number and a unit, as in 5ms");
+  };
+  std::string_view rest = text;
+  const bool negative = rest.starts_with('-');
+  if (negative) rest.remove_prefix(1);
+
+  // The digits are gathered into one integer and the decimal point is remembered, so that no rounding can happen.
+  __int128 digits = 0;
+  __int128 scale = 1;
+  std::size_t used = 0;
+  bool any_digit = false;
+  bool after_point = false;
+  for (; used < rest.size(); ++used) {
+    const char c = rest[used];
+    if (c == '.' && !after_point) {
+      after_point = true;
+    } else if (is_digit(c)) {
+      any_digit = true;
+      if (digits > __int128{kMaxDuration} * 10) return fail("it is too large");
+      digits = digits * 10 + (c - '0');
+      if (after_point) scale *= 10;
+      if (scale > __int128{kMaxDuration}) return fail("it has too many decimals");
+    } else {
+      break;
+    }
+  }
+  if (!any_digit) return fail("it does not begin with a number");
+
+  std::string_view unit_name = rest.substr(used);
+  while (unit_name.starts_with(' ')) unit_name.remove_prefix(1);
+  if (unit_name.empty()) {
+    if (digits == 0) return Duration{0};
+    return fail("it has no unit (ns, us, ms, s, min, h)");
+  }
+  const Unit *unit = find_unit(unit_name);
+  if (unit == nullptr) return fail(fmt::format("unknown unit '{}' (ns, us, ms, s, min, h)", unit_name));
+
+  const __int128 scaled = digits * unit->nanoseconds;
+  if (scaled % scale != 0) return fail("it is not a whole number of nanoseconds");
+  const __int128 value = scaled / scale;
+  if (value > __int128{kMaxDuration}) return fail("it is too large");
+  return static_cast<Duration>(negative ? -value : value);
+}
+
+std::string format_duration(Duration duration) {
+  if (duration == 0) return "0s";
+  const bool negative = duration < 0;
+  const auto magnitude = negative ? -static_cast<__int128>(duration) : static_cast<__int128>(duration);
+  std::string best;
+  for (const Unit &unit : kUnits) {
+    if (unit.nanoseconds > kSecond || !(unit.name[0] >= 'a' && unit.name[0] <= 'z')) continue;
+    const auto whole = static_cast<std::int64_t>(magnitude / unit.nanoseconds);
+    auto fraction = static_cast<std::int64_t>(magnitude % unit.nanoseconds);
+    std::string text = fmt::format("{}", whole);
+    if (fraction != 0) {
+      std::string decimals;
+      for (Duration place = unit.nanoseconds / 10; fraction != 0; place /= 10) {
+        decimals += static_cast<char>('0' + fraction / place);
+        fraction %= place;
+      }
+      text += "." + decimals;
+    }
+    text += unit.name;
+    if (best.empty() || text.size() < best.size()) best = text;
+  }
+  return negative ? "-" + best : best;
+}
+
+std::string humanize_duration(Duration duration) {
+  const double magnitude = std::fabs(static_cast<double>(duration));
+  for (const Unit &unit : kUnits) {
+    if (unit.nanoseconds > kSecond || magnitude < static_cast<double>(unit.nanoseconds)) continue;
+    return fmt::format("{:.4g}{}", static_cast<double>(duration) / static_cast<double>(unit.nanoseconds), unit.name);
+  }
+  return "0s";
+}
+
+}  // namespace redag

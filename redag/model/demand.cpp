@@ -1,0 +1,44 @@
+#include "redag/model/demand.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "redag/base/rng.hpp"
+
+namespace redag {
+namespace {
+
+// Two streams per task, so that adding jitter to a workload leaves its execution times as they were.
+Rng job_rng(std::uint64_t seed, TaskId id, std::uint32_t number, unsigned stream) {
+  return Rng::stream(seed, std::uint64_t{id.value} * 2 + stream, number);
+}
+
+}  // namespace
+
+Duration execution_time(const Task &task, TaskId id, std::uint32_t number, std::uint64_t seed) {
+  using Kind = ExecutionTime::Kind;
+  const ExecutionTime &model = task.execution;
+  if (model.kind == Kind::Constant) return task.wcet;
+  Rng rng = job_rng(seed, id, number, 0);
+  switch (model.kind) {
+    case Kind::Uniform: return std::max<Duration>(1, rng.uniform(task.bcet, task.wcet));
+    case Kind::Normal: {
+      const double drawn = static_cast<double>(model.mean) + static_cast<double>(model.stddev) * rng.normal();
+      const double bounded =
+          std::clamp(std::round(drawn), static_cast<double>(task.bcet), static_cast<double>(task.wcet));
+      return std::clamp<Duration>(static_cast<Duration>(bounded), std::max<Duration>(1, task.bcet), task.wcet);
+    }
+    case Kind::Empirical: {
+      const auto last = static_cast<std::int64_t>(model.samples.size()) - 1;
+      return std::max<Duration>(1, model.samples[static_cast<std::size_t>(rng.uniform(0, last))]);
+    }
+    case Kind::Constant: break;
+  }
+  return task.wcet;
+}
+
+Duration release_jitter(const Task &task, TaskId id, std::uint32_t number, std::uint64_t seed) {
+  return task.jitter == 0 ? 0 : job_rng(seed, id, number, 1).uniform(0, task.jitter);
+}
+
+}  // namespace redag

@@ -1,0 +1,59 @@
+// The vocabulary of every trace: what can happen to a job. A stream of events is in decision order, and its times never
+// decrease; what was measured more exactly than the decision stands in `value`.
+#pragma once
+
+#include <cstdint>
+
+#include "redag/base/ids.hpp"
+#include "redag/base/time.hpp"
+
+namespace redag {
+
+// Life of a job:
+//   Released -> Ready -> Dispatched -> Finished | Aborted
+//   Dispatched -> Preempted -> Resumed -> ... -> Finished | Aborted
+//   Released -> Skipped, Released -> Ready -> Skipped
+// Where a platform preempts for real, a job can also end while Preempted (the operating system ran it meanwhile).
+enum class JobEventKind : std::uint8_t {
+  Released,    // value: nominal release r, the point on the timer's grid (data tasks: the last predecessor's finish)
+  Ready,       // precedence resolved; value: origin, the earliest source release whose data this job carries
+  Deferred,    // would have been dispatched, but its DAG is at max_active; at most once a job
+  Dispatched,  // decision: start on `worker`; value: absolute deadline
+  Started,     // the body began on `worker` (reported by the driver, not by the scheduler); value: same as time
+  Preempted,   // lost `worker` to a higher-priority job
+  Resumed,     // goes on, on `worker`
+  Finished,    // value: finish f as measured
+  Skipped,     // never started; see reason
+  Aborted,     // started and ended without a result; see reason; value: when, as measured
+};
+
+enum class Reason : std::uint8_t {
+  None,
+  Overrun,     // Skipped: not started when its task's next job was released
+  Precedence,  // Skipped: not ready when its task's next job was released
+  QueueFull,   // Skipped: `queue_depth` jobs of its task were waiting
+  DagFull,     // Skipped: `max_pending` jobs of its DAG were waiting
+  Removed,     // Skipped: its DAG was removed
+  Exception,   // Aborted: the body threw
+  Budget,      // Aborted: cut off at its budget
+};
+
+/// 32 bytes, trivially copyable: what the rings hold.
+struct JobEvent {
+  Time time = 0;
+  std::int64_t value = 0;
+  TaskId task;
+  std::uint32_t job = 0;  // number of the job within its task, from 0
+  std::uint32_t worker = WorkerId::kNoneValue;
+  JobEventKind kind = JobEventKind::Released;
+  Reason reason = Reason::None;
+  std::uint16_t reserved = 0;
+
+  friend bool operator==(const JobEvent &, const JobEvent &) = default;
+};
+static_assert(sizeof(JobEvent) == 32);
+
+[[nodiscard]] const char *to_string(JobEventKind kind);
+[[nodiscard]] const char *to_string(Reason reason);
+
+}  // namespace redag

@@ -1,0 +1,129 @@
+// The model of section 3 of docs/model.md: a workload is a platform, a policy and DAGs of tasks. Plain values: no
+// behaviour, no validation (see validate.hpp), no text form (see workload_yaml.hpp).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "redag/base/ids.hpp"
+#include "redag/base/time.hpp"
+
+namespace redag {
+
+enum class Criticality : std::uint8_t { Low, Normal, High };
+
+/// What releases a task's jobs.
+enum class Activation : std::uint8_t {
+  Timer,  // job k at offset + k * period
+  Data,   // when every predecessor has completed once more since this task's last job (AND-join)
+};
+
+/// What happens to releases that find earlier jobs of the same task unfinished.
+enum class Overrun : std::uint8_t {
+  Skip,   // at most one job waits; the next release replaces (skips) one that has not started
+  Queue,  // up to `queue_depth` ready jobs wait, oldest first; a release beyond that is skipped
+};
+
+/// How long a synthetic job executes, in processor time.
+struct ExecutionTime {
+  enum class Kind : std::uint8_t {
+    Constant,   // always `wcet`
+    Uniform,    // [bcet, wcet]
+    Normal,     // mean, stddev; truncated to [bcet, wcet]
+    Empirical,  // one of `samples`, equally likely
+  };
+  Kind kind = Kind::Constant;
+  Duration mean = 0;
+  Duration stddev = 0;
+  std::vector<Duration> samples;
+
+  friend bool operator==(const ExecutionTime &, const ExecutionTime &) = default;
+};
+
+/// tau_i = (C_i, T_i, D_i, chi_i) of the paper (eq. task_tuple), and what a real callback needs besides.
+struct Task {
+  std::string name;
+  Duration wcet = 0;      // C_i, > 0
+  Duration bcet = 0;      // shortest execution, <= wcet
+  Duration period = 0;    // T_i; of a data task: the largest period among its predecessors
+  Duration deadline = 0;  // D_i, relative to the release
+  Duration offset = 0;    // first release (timer tasks)
+  Duration jitter = 0;    // a release happens up to this much after its point on the grid (timer tasks)
+  Duration region = 0;    // longest stretch without a preemption point (cooperative mode); 0: the whole job
+  Duration budget = 0;    // processor time after which a job is cut off; 0: none
+  Criticality criticality = Criticality::Normal;
+  Activation activation = Activation::Timer;
+  Overrun overrun = Overrun::Skip;
+  std::uint32_t queue_depth = 1;            // for Overrun::Queue, >= 1
+  std::optional<int> priority;              // for PolicyKind::Fixed; larger is more urgent
+  std::string group;                        // jobs of one group never overlap; empty: no group; shared by all DAGs
+  std::vector<std::uint32_t> predecessors;  // positions in the same DAG
+  ExecutionTime execution;
+
+  friend bool operator==(const Task &, const Task &) = default;
+};
+
+/// G_k = (V_k, E_k) (eq. dag). Tasks are in no particular order; the edges are acyclic.
+struct Dag {
+  std::string name;
+  std::vector<Task> tasks;
+  std::uint32_t max_active = 0;   // jobs started and not finished at any time; 0: no bound
+  std::uint32_t max_pending = 0;  // jobs released and not started at any time; 0: no bound
+  Duration deadline = 0;          // end to end, from a source's release to a sink's finish; 0: none
+  Criticality criticality = Criticality::Normal;
+
+  friend bool operator==(const Dag &, const Dag &) = default;
+};
+
+enum class PolicyKind : std::uint8_t { RateMonotonic, DeadlineMonotonic, Fixed, Edf, Fifo, ChainAware };
+
+/// What can interrupt a running job. See docs/model.md.
+enum class PreemptionMode : std::uint8_t { None, Cooperative, Os, Auto };
+
+struct Platform {
+  std::uint32_t workers = 1;  // m: jobs that execute at the same time
+  PreemptionMode preemption = PreemptionMode::Auto;
+
+  friend bool operator==(const Platform &, const Platform &) = default;
+};
+
+struct Workload {
+  std::string name;
+  Platform platform;
+  PolicyKind policy = PolicyKind::RateMonotonic;
+  std::vector<Dag> dags;
+
+  /// Tasks of all DAGs together; TaskIds run from 0 to this, DAG by DAG.
+  [[nodiscard]] std::size_t task_count() const;
+
+  /// U = sum C_i / T_i (eq. utilization).
+  [[nodiscard]] double utilization() const;
+
+  friend bool operator==(const Workload &, const Workload &) = default;
+};
+
+/// One row per TaskId: where the task stands in its workload. Valid while the workload is unchanged.
+struct TaskRef {
+  DagId dag;
+  std::uint32_t index = 0;  // position in the DAG
+  const Task *task = nullptr;
+};
+
+[[nodiscard]] std::vector<TaskRef> flatten(const Workload &workload);
+
+/// Positions in a topological order: result[i] is the rank of task i; ties by position. Requires acyclic edges.
+[[nodiscard]] std::vector<std::uint32_t> topological_ranks(const Dag &dag);
+
+/// Gives every data task the largest period among its predecessors (in topological order), and the deadline to go with
+/// it where none is set (0). Requires acyclic edges.
+void inherit_periods(Dag &dag);
+
+[[nodiscard]] const char *to_string(Criticality value);
+[[nodiscard]] const char *to_string(Activation value);
+[[nodiscard]] const char *to_string(PolicyKind value);
+[[nodiscard]] const char *to_string(PreemptionMode value);
+
+}  // namespace redag
