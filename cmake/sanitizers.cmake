@@ -1,0 +1,6 @@
+# REDAG_SANITIZE=address,undefined or thread: applied to everything, the library included.
+set(REDAG_SANITIZE "" CACHE STRING "Sanitizers, as in -fsanitize=<value>")
+if(REDAG_SANITIZE)
+  add_compile_options(-fsanitize=${REDAG_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${REDAG_SANITIZE})
+endif()
