@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <numbers>
 
+#include "redag/base/int128.hpp"
+
 namespace redag {
 
 /// One step of SplitMix64; also a good mixing function for building seeds out of several numbers.
@@ -56,7 +58,7 @@ class Rng {
   constexpr std::int64_t uniform(std::int64_t low, std::int64_t high) {
     const auto span = static_cast<std::uint64_t>(high) - static_cast<std::uint64_t>(low) + 1;
     if (span == 0) return static_cast<std::int64_t>((*this)());
-    const auto scaled = static_cast<unsigned __int128>((*this)()) * span;
+    const auto scaled = static_cast<Uint128>((*this)()) * span;
     return static_cast<std::int64_t>(static_cast<std::uint64_t>(low) + static_cast<std::uint64_t>(scaled >> 64U));
   }
 

@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "redag/base/int128.hpp"
+
 namespace redag {
 namespace {
 
@@ -41,8 +43,8 @@ Result<Duration> parse_duration(std::string_view text) {
   if (negative) rest.remove_prefix(1);
 
   // The digits are gathered into one integer and the decimal point is remembered, so that no rounding can happen.
-  __int128 digits = 0;
-  __int128 scale = 1;
+  Int128 digits = 0;
+  Int128 scale = 1;
   std::size_t used = 0;
   bool any_digit = false;
   bool after_point = false;
@@ -52,10 +54,10 @@ Result<Duration> parse_duration(std::string_view text) {
       after_point = true;
     } else if (is_digit(c)) {
       any_digit = true;
-      if (digits > __int128{kMaxDuration} * 10) return fail("it is too large");
+      if (digits > Int128{kMaxDuration} * 10) return fail("it is too large");
       digits = digits * 10 + (c - '0');
       if (after_point) scale *= 10;
-      if (scale > __int128{kMaxDuration}) return fail("it has too many decimals");
+      if (scale > Int128{kMaxDuration}) return fail("it has too many decimals");
     } else {
       break;
     }
@@ -71,17 +73,17 @@ Result<Duration> parse_duration(std::string_view text) {
   const Unit *unit = find_unit(unit_name);
   if (unit == nullptr) return fail(fmt::format("unknown unit '{}' (ns, us, ms, s, min, h)", unit_name));
 
-  const __int128 scaled = digits * unit->nanoseconds;
+  const Int128 scaled = digits * unit->nanoseconds;
   if (scaled % scale != 0) return fail("it is not a whole number of nanoseconds");
-  const __int128 value = scaled / scale;
-  if (value > __int128{kMaxDuration}) return fail("it is too large");
+  const Int128 value = scaled / scale;
+  if (value > Int128{kMaxDuration}) return fail("it is too large");
   return static_cast<Duration>(negative ? -value : value);
 }
 
 std::string format_duration(Duration duration) {
   if (duration == 0) return "0s";
   const bool negative = duration < 0;
-  const auto magnitude = negative ? -static_cast<__int128>(duration) : static_cast<__int128>(duration);
+  const auto magnitude = negative ? -static_cast<Int128>(duration) : static_cast<Int128>(duration);
   std::string best;
   for (const Unit &unit : kUnits) {
     if (unit.nanoseconds > kSecond || !(unit.name[0] >= 'a' && unit.name[0] <= 'z')) continue;
