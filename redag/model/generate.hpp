@@ -1,0 +1,94 @@
+// Random workloads from a seed: for experiments and as the source of property tests. The same options and seed give
+// the same workload on every machine. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "redag/base/result.hpp"
+#include "redag/model/workload.hpp"
+
+namespace redag {
+
+/// How the total utilization is shared among the tasks; both draw uniformly from what the bound allows.
+enum class UtilizationMethod : std::uint8_t {
+  Drs,             // Dirichlet-Rescale (Griffin, Bate, Davis, RTSS 2020)
+  UUniFastDiscard  // Davis, Burns, RTSS 2009; fails where almost every draw breaks the bound
+};
+
+enum class PeriodModel : std::uint8_t {
+  LogUniform,  // [period_min, period_max], multiples of period_granularity (Emberson, Stafford, Davis, WATERS 2010)
+  Harmonic,    // period_min * 2^k up to period_max, equally likely
+  Automotive,  // 1 to 1000 ms with the shares of Kramer, Ziegenbein, Hamann, WATERS 2015, less the angle-synchronous
+  Robot,       // 1000 to 1 Hz, the rates common in ROS; the shares are our choice
+};
+
+enum class DagShape : std::uint8_t {
+  Layered,      // every task but those of the first layer has a predecessor in the layer before
+  ErdosRenyi,   // each of the n (n - 1) / 2 forward edges with edge_probability
+  ForkJoin,     // one source, parallel tasks, one sink
+  Chain,        // one after the other
+  Independent,  // no edges
+};
+
+enum class RateScope : std::uint8_t {
+  PerDag,   // one period and offset for all timer tasks of a DAG
+  PerTask,  // each timer task draws its own
+};
+
+/// Shares and ratios are in [0, 1]; ranges include both ends.
+struct GenerateOptions {
+  std::uint32_t dags = 2;
+  std::uint32_t min_tasks = 3;  // per DAG
+  std::uint32_t max_tasks = 8;
+  std::uint32_t workers = 2;
+  PreemptionMode preemption = PreemptionMode::Auto;
+  PolicyKind policy = PolicyKind::RateMonotonic;
+
+  double utilization = 1.0;           // of all tasks together
+  double max_task_utilization = 1.0;  // of one task
+  UtilizationMethod method = UtilizationMethod::Drs;
+
+  PeriodModel periods = PeriodModel::LogUniform;
+  Duration period_min = 5 * kMillisecond;  // LogUniform, Harmonic
+  Duration period_max = 500 * kMillisecond;
+  Duration period_granularity = kMillisecond;
+  RateScope rates = RateScope::PerDag;
+  double deadline_min = 1.0;  // deadline / period, uniform; never below the wcet
+  double deadline_max = 1.0;
+
+  DagShape shape = DagShape::Layered;
+  double edge_probability = 0.3;  // Layered: of further edges between neighbouring layers; ErdosRenyi: of each edge
+  double data_share = 1.0;        // of the tasks with predecessors: activated by data
+
+  double bcet_min = 1.0;  // bcet / wcet, uniform; below 1 the execution time is uniform in [bcet, wcet]
+  double bcet_max = 1.0;
+  double jitter = 0.0;               // of a timer task: uniform in [0, jitter * period]
+  bool offsets = false;              // timer tasks start anywhere in their first period
+  std::uint32_t max_active_min = 0;  // of a DAG; 0: no bound
+  std::uint32_t max_active_max = 0;
+  std::uint32_t groups = 0;  // exclusive groups across the workload
+  double group_share = 0.0;  // of the tasks: in one of the groups
+  double queue_share = 0.0;  // of the tasks: overrun queue, depth 1 to queue_depth
+  std::uint32_t queue_depth = 3;
+  double high_share = 0.0;  // of the DAGs: criticality high
+  double low_share = 0.0;   // of the DAGs: criticality low
+};
+
+/// Errors: options out of range, each with a message; UUniFastDiscard that found no vector. The workload passes
+/// validate() without errors; its utilization is the target within rounding (each wcet to a nanosecond, at least 1).
+[[nodiscard]] Result<Workload> generate(const GenerateOptions &options, std::uint64_t seed);
+
+[[nodiscard]] const char *to_string(UtilizationMethod value);
+[[nodiscard]] const char *to_string(PeriodModel value);
+[[nodiscard]] const char *to_string(DagShape value);
+[[nodiscard]] const char *to_string(RateScope value);
+
+/// The reverse of to_string(); nothing for an unknown name.
+[[nodiscard]] std::optional<UtilizationMethod> utilization_method_from_string(std::string_view name);
+[[nodiscard]] std::optional<PeriodModel> period_model_from_string(std::string_view name);
+[[nodiscard]] std::optional<DagShape> dag_shape_from_string(std::string_view name);
+[[nodiscard]] std::optional<RateScope> rate_scope_from_string(std::string_view name);
+
+}  // namespace redag

@@ -1,0 +1,90 @@
+// The rules that a workload must keep, each stated once: for workloads built in C++ and, through workload_yaml.hpp,
+// for files. Rules about text (units, unknown keys, names that do not resolve) belong to the reader. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "redag/base/ids.hpp"
+#include "redag/base/result.hpp"
+#include "redag/model/workload.hpp"
+
+namespace redag {
+
+inline constexpr std::uint32_t kMaxWorkers = 4096;
+inline constexpr std::uint32_t kMaxQueueDepth = 65536;
+
+/// What a workload is made of; the text is the key of the file format.
+enum class Field : std::uint8_t {
+  Name,
+  Platform,
+  Workers,
+  Preemption,
+  Policy,
+  Dags,
+  Tasks,
+  MaxActive,
+  MaxPending,
+  Criticality,
+  Wcet,
+  Bcet,
+  Period,
+  Deadline,
+  Offset,
+  Jitter,
+  Region,
+  Budget,
+  Activation,
+  Overrun,
+  Priority,
+  Group,
+  After,
+  Execution,
+};
+
+inline constexpr std::size_t kFieldCount = 24;
+
+[[nodiscard]] const char *to_string(Field field);
+
+/// A set of fields, one bit each.
+class FieldSet {
+ public:
+  constexpr FieldSet() = default;
+  constexpr FieldSet(Field field) : bits_(1U << static_cast<unsigned>(field)) {}
+
+  [[nodiscard]] constexpr bool intersects(FieldSet other) const { return (bits_ & other.bits_) != 0; }
+  constexpr FieldSet &operator|=(FieldSet other) {
+    bits_ |= other.bits_;
+    return *this;
+  }
+  friend constexpr FieldSet operator|(FieldSet a, FieldSet b) { return a |= b; }
+  friend constexpr FieldSet operator|(Field a, Field b) { return FieldSet(a) | FieldSet(b); }
+
+ private:
+  std::uint32_t bits_ = 0;
+};
+
+/// One broken rule and the place in the workload to change.
+struct Finding {
+  static constexpr std::uint32_t kNone = UINT32_MAX;
+
+  Severity severity = Severity::Error;
+  DagId dag;                   // none: about the workload
+  std::uint32_t task = kNone;  // position in the DAG; none: about the DAG
+  Field field = Field::Name;   // to point at
+  std::uint32_t item = kNone;  // position in `predecessors` or `samples`
+  FieldSet involves;           // everything the rule looked at
+  std::string message;
+  std::string hint;
+};
+
+/// Every broken rule, in the order of the workload. Linear in its size. Never crashes, whatever the workload holds.
+[[nodiscard]] std::vector<Finding> find_mistakes(const Workload &workload);
+
+/// find_mistakes() as messages without a place: errors and warnings; empty for a flawless workload.
+[[nodiscard]] Diagnostics validate(const Workload &workload);
+
+[[nodiscard]] bool has_errors(const Diagnostics &diagnostics);
+
+}  // namespace redag

@@ -1,0 +1,35 @@
+// The text form of a workload (docs/workload_format.md): reading with every mistake reported at its line, and writing.
+// The rules about values are in validate.hpp. Pure functions, except for the file that is read or written.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "redag/base/result.hpp"
+#include "redag/model/workload.hpp"
+
+namespace redag {
+
+struct LoadedWorkload {
+  Workload workload;
+  Diagnostics warnings;
+};
+
+/// Longest text that is read, in bytes.
+inline constexpr std::size_t kMaxWorkloadBytes = std::size_t{256} << 20U;
+
+/// Reads and validates a file. Errors: all mistakes, by line (with the warnings among them), or why the file cannot be
+/// read.
+[[nodiscard]] Result<LoadedWorkload> load_workload(const std::filesystem::path &path);
+
+/// The same for text that is already in memory; `file_name` is what the diagnostics call it.
+[[nodiscard]] Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_name);
+
+/// parse_workload(to_yaml(w)) gives w again. Requires that validate(w) has no errors.
+[[nodiscard]] std::string to_yaml(const Workload &workload);
+
+/// Writes to_yaml(workload). Errors: those of validate(), or why the file cannot be written.
+[[nodiscard]] Result<void> save_workload(const Workload &workload, const std::filesystem::path &path);
+
+}  // namespace redag
