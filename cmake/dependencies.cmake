@@ -1,0 +1,24 @@
+# Every package that is looked for, by whichever CMakeLists.txt is the top one: imported targets are seen from that folder
+# and those below it only. tools/bootstrap installs them all.
+find_package(fmt REQUIRED)
+find_package(yaml-cpp REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(tl-expected REQUIRED)
+find_package(Threads REQUIRED)
+find_package(CLI11 REQUIRED)
+# yaml-cpp 0.8 renamed its target.
+if(TARGET yaml-cpp::yaml-cpp)
+  set(redag_yaml_cpp yaml-cpp::yaml-cpp)
+else()
+  set(redag_yaml_cpp yaml-cpp)
+endif()
+
+if(REDAG_BUILD_TESTS)
+  find_package(GTest REQUIRED)
+  find_package(rapidcheck REQUIRED)
+  find_package(Python3 REQUIRED COMPONENTS Interpreter)
+  include(GoogleTest)
+endif()
+if(REDAG_BUILD_BENCHMARKS)
+  find_package(benchmark REQUIRED)
+endif()
