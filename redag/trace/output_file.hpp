@@ -1,0 +1,49 @@
+// A file that appears whole or not at all: written under a temporary name beside its place and renamed by commit().
+// Every error (unwritable directory, full disk) is kept and reported by commit(). Not thread-safe.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "redag/base/result.hpp"
+
+namespace redag::trace {
+
+class OutputFile {
+ public:
+  /// Opens "<path>.tmp.<pid>"; the directory must exist.
+  [[nodiscard]] static Result<OutputFile> create(std::string path);
+
+  OutputFile(OutputFile &&other) noexcept;
+  OutputFile &operator=(OutputFile &&) = delete;
+  OutputFile(const OutputFile &) = delete;
+  OutputFile &operator=(const OutputFile &) = delete;
+  /// Without commit() the temporary file is removed and `path` is as it was.
+  ~OutputFile();
+
+  /// Appends, buffered. After an error does nothing.
+  void write(std::string_view text);
+
+  /// Flushes and takes the final name, replacing what was there.
+  [[nodiscard]] Result<void> commit();
+
+ private:
+  OutputFile(std::string path, std::string temporary, int descriptor);
+
+  void flush();
+
+  std::string path_;
+  std::string temporary_;
+  int descriptor_ = -1;
+  int error_ = 0;  // errno of the first failure
+  std::string buffer_;
+};
+
+/// The whole of a file, for readers of our formats. Errors name the file.
+[[nodiscard]] Result<std::string> read_file(const std::string &path);
+
+/// One error at a line of a file.
+[[nodiscard]] tl::unexpected<Diagnostics> file_error(const std::string &file, int line, std::string message,
+                                                     std::string hint = {});
+
+}  // namespace redag::trace

@@ -1,0 +1,56 @@
+#include "redag/trace/trace.hpp"
+
+#include <sched.h>
+#include <sys/utsname.h>
+
+#include <fstream>
+
+namespace redag::trace {
+namespace {
+
+// The first "model name" of /proc/cpuinfo; empty where there is none (most ARM kernels).
+std::string processor_name() {
+  std::ifstream file("/proc/cpuinfo");
+  std::string line;
+  while (std::getline(file, line)) {
+    if (line.rfind("model name", 0) != 0) continue;
+    const std::size_t text = line.find_first_not_of(": \t", line.find(':'));
+    return text == std::string::npos ? std::string() : line.substr(text);
+  }
+  return {};
+}
+
+}  // namespace
+
+const char *to_string(Driver driver) { return driver == Driver::Simulator ? "simulator" : "threads"; }
+
+const char *preemption_name(sched::Preemption mode) {
+  switch (mode) {
+    case sched::Preemption::None: return "none";
+    case sched::Preemption::Cooperative: return "cooperative";
+    case sched::Preemption::Full: return "full";
+  }
+  return "?";
+}
+
+Machine this_machine() {
+  Machine machine;
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  if (sched_getaffinity(0, sizeof set, &set) == 0) machine.cpus = static_cast<std::uint32_t>(CPU_COUNT(&set));
+  utsname name{};
+  if (uname(&name) == 0) machine.kernel = std::string(name.sysname) + " " + name.release + " " + name.machine;
+  machine.model = processor_name();
+  return machine;
+}
+
+std::string task_name(const Workload &workload, TaskId task) {
+  std::size_t index = task.value;
+  for (const Dag &dag : workload.dags) {
+    if (index < dag.tasks.size()) return dag.name + "." + dag.tasks[index].name;
+    index -= dag.tasks.size();
+  }
+  return task.valid() ? "task " + std::to_string(task.value) : "no task";
+}
+
+}  // namespace redag::trace

@@ -1,0 +1,61 @@
+// A run, as it is kept: what happened (events, in decision order) and what a reader must know to judge it (RunInfo).
+// Plain values; see events_file.hpp for the text form and docs/results_format.md for the files.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "redag/base/time.hpp"
+#include "redag/model/job_event.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/sched/scheduler.hpp"
+
+namespace redag::trace {
+
+/// What moved time forward.
+enum class Driver : std::uint8_t {
+  Simulator,  // virtual time: exact, and equal for equal seeds
+  Threads,    // a real clock: stamps have noise, and decisions follow each other within nanoseconds
+};
+
+/// The machine of a real-time run; defaults where nobody looked.
+struct Machine {
+  std::uint32_t cpus = 0;  // processors the run could use; 0: unknown
+  std::string kernel;      // "Linux 6.1.0-rt7 x86_64"
+  std::string model;       // processor's name
+
+  friend bool operator==(const Machine &, const Machine &) = default;
+};
+
+struct RunInfo {
+  Workload workload;           // task ids of the events index this
+  std::string executor;        // "redag", "mte", "ste", ...
+  sched::Config config;        // what the scheduler was told
+  std::string preemption;      // mode that really ran: "none", "cooperative", "os", "full"
+  std::string preemption_why;  // why that one; empty: it was asked for
+  Driver driver = Driver::Simulator;
+  std::uint64_t seed = 0;
+  Time start = 0;                 // origin of the release grid: job k of a timer is released at start + offset + k * T
+  Time end = 0;                   // horizon: nothing is released at or after it; jobs may finish later
+  Duration warm_up = 0;           // jobs released before start + warm_up are not counted
+  std::uint64_t lost_events = 0;  // dropped by full rings: the stream has holes if > 0
+  std::string overheads;          // what the driver added to execution; empty: nothing (the model's ideal machine)
+  Machine machine;
+};
+
+struct Trace {
+  RunInfo info;
+  std::vector<JobEvent> events;
+};
+
+[[nodiscard]] const char *to_string(Driver driver);
+[[nodiscard]] const char *preemption_name(sched::Preemption mode);
+
+/// This machine's Machine, as far as the operating system tells.
+[[nodiscard]] Machine this_machine();
+
+/// "control.ekf": DAG and task by name; "task 17" if there is no such task.
+[[nodiscard]] std::string task_name(const Workload &workload, TaskId task);
+
+}  // namespace redag::trace
