@@ -1,8 +1,8 @@
 // The scheduler's interface: events in, decisions out. An implementation is a value: no thread, no clock, no I/O, and
 // after construction no allocation (except in add_dag/remove_dag). Not thread-safe: the driver serialises the calls.
 //
-// A driver reports what happened (release, complete, preemption_point), any number at one instant, and then asks for the
-// decisions with dispatch(). Releases and completions of one instant are so decided together.
+// A driver reports what happened (release, complete, preemption_point), any number at one instant, and then asks for
+// the decisions with dispatch(). Releases and completions of one instant are so decided together.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +24,8 @@ struct Config {
   std::uint32_t workers = 1;  // m
   Preemption preemption = Preemption::None;
   PolicyKind policy = PolicyKind::RateMonotonic;
-  // Full preemption on an operating system: number of distinct priority levels it has for us (0: as many as tasks). Where
-  // tasks outnumber levels, tasks that share a level do not preempt each other.
+  // Full preemption on an operating system: number of distinct priority levels it has for us (0: as many as tasks).
+  // Where tasks outnumber levels, tasks that share a level do not preempt each other.
   std::uint32_t levels = 0;
   // Full preemption on threads: jobs that can be started and unfinished at once (0: no bound).
   std::uint32_t max_started = 0;
@@ -39,8 +39,8 @@ struct Dispatch {
   TaskId task;
   std::uint32_t number = 0;  // of the job within its task
   WorkerId worker;
-  JobSlot over;           // the job that loses the worker (Full), or is suspended under this one (Cooperative); or none
-  bool resume = false;    // the job had started before
+  JobSlot over;         // the job that loses the worker (Full), or is suspended under this one (Cooperative); or none
+  bool resume = false;  // the job had started before
   std::uint32_t level = 0;  // priority level at which it runs, 0 the most urgent; inherited priority included
 };
 

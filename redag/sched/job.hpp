@@ -1,0 +1,57 @@
+// A live job as the scheduler keeps it: one slot of the job table. Slots are reused; nothing here outlives the job.
+#pragma once
+
+#include <cstdint>
+
+#include "redag/base/ids.hpp"
+#include "redag/base/time.hpp"
+
+namespace redag::sched {
+
+inline constexpr std::uint32_t kNil = 0xffffffff;  // no slot, in the links of intrusive containers
+
+// Free -> Waiting -> Ready -> Running <-> Suspended -> Free;  Waiting, Ready -> Free (skipped).
+enum class JobState : std::uint8_t {
+  Free,       // the slot holds no job
+  Waiting,    // released; predecessors incomplete
+  Ready,      // not started; in the ready queue, or parked at a gate that is full
+  Running,    // has a worker
+  Suspended,  // started, lost its worker: in the ready queue (Full) or under another job on its worker (Cooperative)
+};
+
+struct Job {
+  TaskId task;
+  std::uint32_t number = 0;
+  Time release = 0;
+  Time ready = 0;
+  Time origin = 0;
+
+  // Order among jobs: (key, rank, sequence), smallest first. For static policies key is the rank, or a more urgent
+  // job's rank that was inherited.
+  std::int64_t key = 0;
+  std::uint32_t rank = 0;
+  std::uint64_t sequence = 0;  // order in which jobs became ready
+
+  // Links of the one container that the job is in: ready queue or a gate's heap.
+  std::uint32_t next = kNil;
+  std::uint32_t previous = kNil;
+  std::uint32_t child = kNil;
+  std::uint32_t parked_at = kNil;  // gate, or kNil
+
+  std::uint32_t task_next = kNil;  // next unstarted job of the same task
+  std::uint32_t under = kNil;      // Cooperative: the job suspended below this one
+  WorkerId worker;                 // where it runs, or ran last
+  JobState state = JobState::Free;
+  bool deferred = false;
+
+  [[nodiscard]] bool started() const { return state == JobState::Running || state == JobState::Suspended; }
+};
+
+/// The total order of jobs: does `a` come before `b`?
+[[nodiscard]] inline bool before(const Job &a, const Job &b) {
+  if (a.key != b.key) return a.key < b.key;
+  if (a.rank != b.rank) return a.rank < b.rank;
+  return a.sequence < b.sequence;
+}
+
+}  // namespace redag::sched

@@ -1,0 +1,80 @@
+#include "redag/sched/policy.hpp"
+
+#include <algorithm>
+#include <array>
+#include <tuple>
+
+namespace redag::sched {
+namespace {
+
+// What a policy sorts by, smallest first; where these are equal, the common order (DAG, topological, file) decides.
+using PolicyKey = std::array<std::int64_t, 4>;
+
+PolicyKey policy_key(PolicyKind policy, const Dag &dag, const Task &task, std::int64_t dag_index, Duration dag_period,
+                     std::int64_t topological_rank) {
+  switch (policy) {
+    case PolicyKind::RateMonotonic: return {task.period};
+    case PolicyKind::DeadlineMonotonic: return {task.deadline};
+    case PolicyKind::Fixed: return {-std::int64_t{task.priority.value_or(0)}};
+    // PiCAS (Choi, Xiang, Kim, RTAS 2021): the chain first, and within it downstream first, so that an instance is
+    // finished before the next one starts.
+    case PolicyKind::ChainAware:
+      return {-static_cast<std::int64_t>(dag.criticality), dag_period, dag_index, -topological_rank};
+    case PolicyKind::Edf:
+    case PolicyKind::Fifo: break;
+  }
+  return {};
+}
+
+struct Entry {
+  PolicyKey key{};
+  std::uint32_t dag = 0;
+  std::uint32_t topological_rank = 0;
+  std::uint32_t task = 0;  // TaskId; follows the order in the file
+};
+
+std::vector<Entry> sorted_entries(std::span<const Dag> dags, PolicyKind policy) {
+  std::vector<Entry> entries;
+  std::uint32_t id = 0;
+  for (std::uint32_t d = 0; d < dags.size(); ++d) {
+    const Dag &dag = dags[d];
+    const std::vector<std::uint32_t> topological = topological_ranks(dag);
+    Duration shortest = kNever;
+    for (const Task &task : dag.tasks) shortest = std::min(shortest, task.period);
+    for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+      entries.push_back(
+          Entry{policy_key(policy, dag, dag.tasks[i], d, shortest, topological[i]), d, topological[i], id++});
+    }
+  }
+  std::sort(entries.begin(), entries.end(), [](const Entry &a, const Entry &b) {
+    return std::tie(a.key, a.dag, a.topological_rank, a.task) < std::tie(b.key, b.dag, b.topological_rank, b.task);
+  });
+  return entries;
+}
+
+}  // namespace
+
+std::vector<Priority> assign_priorities(std::span<const Dag> dags, PolicyKind policy, std::uint32_t levels) {
+  const std::vector<Entry> entries = sorted_entries(dags, policy);
+  std::vector<Priority> priorities(entries.size());
+
+  const bool own_levels = levels == 0 || levels >= entries.size() || !is_static(policy);
+  std::uint32_t classes = 0;  // runs of entries with equal keys
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    if (i == 0 || entries[i].key != entries[i - 1].key) ++classes;
+  }
+
+  std::uint32_t class_index = 0;
+  for (std::uint32_t rank = 0; rank < entries.size(); ++rank) {
+    if (rank > 0 && entries[rank].key != entries[rank - 1].key) ++class_index;
+    std::uint32_t level = rank;
+    if (!own_levels) {
+      level =
+          classes <= levels ? class_index : static_cast<std::uint32_t>(std::uint64_t{class_index} * levels / classes);
+    }
+    priorities[entries[rank].task] = Priority{rank, level};
+  }
+  return priorities;
+}
+
+}  // namespace redag::sched

@@ -1,0 +1,32 @@
+// Priorities: the total order of docs/model.md turned into numbers. A task's rank is its place in the order of its
+// policy (0 first); its level is the rank as the platform can tell it apart.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "redag/model/workload.hpp"
+
+namespace redag::sched {
+
+struct Priority {
+  std::uint32_t rank = 0;   // unique; for edf and fifo it breaks ties between jobs
+  std::uint32_t level = 0;  // not decreasing with rank; a job preempts another only from a smaller level
+
+  friend bool operator==(const Priority &, const Priority &) = default;
+};
+
+/// Policies whose order of two jobs depends on their tasks alone.
+[[nodiscard]] constexpr bool is_static(PolicyKind policy) {
+  return policy != PolicyKind::Edf && policy != PolicyKind::Fifo;
+}
+
+/// One Priority per TaskId (DAG by DAG). `levels`: how many the platform has, 0 for no limit. With enough levels every
+/// task has its own. With fewer, tasks that the policy ranks equal (the same period, say) share one first; if that is
+/// not enough, neighbours share, spread evenly. Policies without static priorities give every task a level of its own.
+/// O(n log n). Requires acyclic DAGs with periods and deadlines set.
+[[nodiscard]] std::vector<Priority> assign_priorities(std::span<const Dag> dags, PolicyKind policy,
+                                                      std::uint32_t levels = 0);
+
+}  // namespace redag::sched

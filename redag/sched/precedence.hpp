@@ -1,0 +1,71 @@
+// Precedence inside DAGs: which predecessor's data a task has not consumed yet. Knows edges and nothing of jobs' lives,
+// workers or priorities.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "redag/model/workload.hpp"
+
+namespace redag::sched {
+
+class Precedence {
+ public:
+  /// Appends the DAG's tasks and edges; TaskIds go on where they stopped. Allocates.
+  void add_dag(const Dag &dag);
+
+  /// `task` has a new job, released at `release`. Data too old for it is discarded.
+  /// Returns whether all its predecessors have fresh data.
+  bool on_release(TaskId task, Time release);
+
+  /// The waiting or newly released job of `task` takes its predecessors' data. Returns the earliest origin among them.
+  /// Requires at least one predecessor.
+  Time consume(TaskId task);
+
+  /// The job that consumed last was skipped before it started: its data is fresh again.
+  void give_back(TaskId task);
+
+  /// A job of `task`, released at `release` with data from `origin`, completed. Calls on_fresh(successor) for each
+  /// successor all of whose predecessors now have fresh data.
+  template <class OnFresh>
+  void on_complete(TaskId task, Time release, Time origin, OnFresh on_fresh) {
+    const Node node = nodes_[task.value];
+    for (std::uint32_t i = node.first_successor; i < node.last_successor; ++i) {
+      Edge &edge = edges_[successors_[i]];
+      Node &successor = nodes_[edge.to.value];
+      if (edge.aligned && release < successor.last_release) continue;  // late data of an earlier period
+      if (!edge.fresh) ++successor.fresh;
+      edge.fresh = true;
+      edge.release = release;
+      edge.origin = origin;
+      if (successor.fresh == successor.last_edge - successor.first_edge) on_fresh(edge.to);
+    }
+  }
+
+  [[nodiscard]] bool has_predecessors(TaskId task) const {
+    return nodes_[task.value].first_edge != nodes_[task.value].last_edge;
+  }
+
+ private:
+  struct Edge {
+    TaskId to;
+    bool aligned = false;  // timer to timer, same period and offset: job k waits for job k
+    bool fresh = false;    // completed since `to` last consumed
+    Time release = 0;      // of the predecessor's job that completed last
+    Time origin = 0;
+  };
+  struct Node {
+    std::uint32_t first_edge = 0;  // edges into the task: [first_edge, last_edge)
+    std::uint32_t last_edge = 0;
+    std::uint32_t first_successor = 0;  // edges out of it: successors_[first_successor .. last_successor)
+    std::uint32_t last_successor = 0;
+    std::uint32_t fresh = 0;  // edges into the task with fresh data
+    Time last_release = 0;
+  };
+
+  std::vector<Node> nodes_;
+  std::vector<Edge> edges_;
+  std::vector<std::uint32_t> successors_;
+};
+
+}  // namespace redag::sched

@@ -1,0 +1,279 @@
+#include "redag/sched/priority_scheduler.hpp"
+
+#include "redag/base/check.hpp"
+
+namespace redag::sched {
+
+PriorityScheduler::PriorityScheduler(const Workload &workload, const Config &config)
+    : Lifecycle(config), static_(is_static(config.policy)), workers_(config.workers), free_workers_(config.workers) {
+  REDAG_CHECK(config.workers > 0, "a platform has at least one worker");
+  REDAG_CHECK(config.levels == 0 || static_, "limited levels need a static policy");
+  open_workers_.reserve(config.workers);
+  for (std::uint32_t w = 0; w < config.workers; ++w) free_workers_.set(w);
+  load(workload);
+}
+
+// ---- decisions ----
+
+Step PriorityScheduler::dispatch(Time now) {
+  begin(now);
+  for (std::uint32_t best = top(); best != kNil; best = top()) {
+    Place place;
+    if (!find_place(jobs_[best], place)) break;
+    if (park_if_not_eligible(best)) continue;
+    run(best, place);
+  }
+  close_open_workers();
+  return step();
+}
+
+void PriorityScheduler::preemption_point(JobSlot job, Time now) {
+  REDAG_CHECK(config_.preemption == Preemption::Cooperative, "preemption points are for cooperative preemption");
+  begin(now);
+  REDAG_CHECK(jobs_[job.value].state == JobState::Running, "a preemption point of a job that does not run");
+  open(jobs_[job.value].worker.value);
+}
+
+bool PriorityScheduler::outranked(JobSlot job) const {
+  return config_.preemption == Preemption::Cooperative && top() != kNil && outranks(jobs_[top()], jobs_[job.value]);
+}
+
+// Where could `job`, the first in the ready queue, run now?
+bool PriorityScheduler::find_place(const Job &job, Place &place) const {
+  if (!free_workers_.empty()) {
+    const bool last_is_free = job.worker.valid() && workers_[job.worker.value].stack == kNil;
+    place = Place{last_is_free ? job.worker : WorkerId(free_workers_.first()), kNil};
+    return true;
+  }
+  if (config_.preemption == Preemption::None) return false;
+  const std::uint32_t victim = least_urgent_running();
+  if (victim == kNil || !outranks(job, jobs_[victim])) return false;
+  place = Place{jobs_[victim].worker, victim};
+  return true;
+}
+
+// The job that would give way first: of all running ones (Full), or of those on top of an open worker (Cooperative).
+std::uint32_t PriorityScheduler::least_urgent_running() const {
+  std::uint32_t least = kNil;
+  const auto consider = [&](std::uint32_t slot) {
+    if (least == kNil || before(jobs_[least], jobs_[slot])) least = slot;
+  };
+  if (config_.preemption == Preemption::Full) {
+    for (const Worker &worker : workers_) consider(worker.running);
+  } else {
+    for (const std::uint32_t w : open_workers_) {
+      if (workers_[w].open) consider(workers_[w].stack);
+    }
+  }
+  return least;
+}
+
+bool PriorityScheduler::outranks(const Job &a, const Job &b) const {
+  if (static_) return level_of(a) < level_of(b);
+  return config_.policy == PolicyKind::Edf && before(a, b);
+}
+
+std::uint32_t PriorityScheduler::level_of(const Job &job) const {
+  return static_ ? level_of_rank_[static_cast<std::size_t>(job.key)] : 0;
+}
+
+void PriorityScheduler::run(std::uint32_t slot, const Place &place) {
+  const bool resumes = jobs_[slot].started();
+  if (resumes) {
+    remove(slot);
+  } else {
+    dequeue(slot);
+    const TaskGates &passed = task_gates_[jobs_[slot].task.value];
+    for (std::uint32_t i = 0; i < passed.count; ++i) {
+      ++gates_[passed.gates[i]].used;
+      gates_[passed.gates[i]].holder = slot;
+    }
+  }
+  make_way(place);
+  jobs_[slot].under = config_.preemption == Preemption::Cooperative ? place.victim : kNil;
+  const std::uint32_t level = level_of(jobs_[slot]);
+  resumes ? resume(slot, place.worker, place.victim, level) : start(slot, place.worker, place.victim, level);
+  Worker &worker = workers_[place.worker.value];
+  worker.running = slot;
+  worker.stack = slot;
+  worker.open = false;
+}
+
+void PriorityScheduler::make_way(const Place &place) {
+  if (place.victim == kNil) {
+    free_workers_.clear(place.worker.value);
+    return;
+  }
+  // A job under an ended one (Cooperative) is suspended already.
+  if (jobs_[place.victim].state == JobState::Running) suspend(place.victim);
+  if (config_.preemption == Preemption::Full) push(place.victim);
+}
+
+// Workers where a decision was due and no other job came on top: a suspended job goes on.
+void PriorityScheduler::close_open_workers() {
+  for (const std::uint32_t w : open_workers_) {
+    Worker &worker = workers_[w];
+    if (!worker.open) continue;
+    worker.open = false;
+    if (jobs_[worker.stack].state != JobState::Suspended) continue;
+    worker.running = worker.stack;
+    resume(worker.stack, WorkerId(w), kNil, level_of(jobs_[worker.stack]));
+  }
+  open_workers_.clear();
+}
+
+// ---- eligibility ----
+
+// The job could have a worker: does it find a gate full? The gates are tried in the order task, DAG, group, threads.
+bool PriorityScheduler::park_if_not_eligible(std::uint32_t slot) {
+  Job &job = jobs_[slot];
+  if (job.started()) return false;
+  const TaskGates &to_pass = task_gates_[job.task.value];
+  std::uint32_t full = 0;
+  while (full < to_pass.count && gates_[to_pass.gates[full]].used < gates_[to_pass.gates[full]].capacity) ++full;
+  if (full == to_pass.count) return false;
+
+  Gate &gate = gates_[to_pass.gates[full]];
+  dequeue(slot);
+  gate.parked.push(jobs_, slot);
+  job.parked_at = to_pass.gates[full];
+  if (to_pass.kinds[full] == GateKind::Dag) defer(slot);
+  if (to_pass.kinds[full] == GateKind::Group) inherit(gate.holder, job);
+  // Others may now use what this job would have used elsewhere.
+  for (std::uint32_t i = 0; i < to_pass.count; ++i) replenish(gates_[to_pass.gates[i]]);
+  return true;
+}
+
+// Priority inheritance (Sha, Rajkumar, Lehoczky, IEEE TC 39(9), 1990). One step is enough: a job that holds waits for
+// none.
+void PriorityScheduler::inherit(std::uint32_t holder_slot, const Job &waiter) {
+  Job &holder = jobs_[holder_slot];
+  if (config_.policy == PolicyKind::Fifo || holder.key <= waiter.key) return;
+  const bool is_queued = holder.state == JobState::Suspended && config_.preemption == Preemption::Full;
+  if (is_queued) remove(holder_slot);
+  const std::uint32_t old_level = level_of(holder);
+  holder.key = waiter.key;
+  if (is_queued) push(holder_slot);
+  if (holder.state == JobState::Running && level_of(holder) != old_level) change_level(holder_slot, level_of(holder));
+}
+
+void PriorityScheduler::on_ready(std::uint32_t slot) { enqueue(slot); }
+
+void PriorityScheduler::on_withdrawn(std::uint32_t slot) {
+  Job &job = jobs_[slot];
+  if (job.parked_at != kNil) {
+    gates_[job.parked_at].parked.remove(jobs_, slot);
+    job.parked_at = kNil;
+    return;
+  }
+  dequeue(slot);
+  const TaskGates &to_pass = task_gates_[job.task.value];
+  for (std::uint32_t i = 0; i < to_pass.count; ++i) replenish(gates_[to_pass.gates[i]]);
+}
+
+void PriorityScheduler::on_end(std::uint32_t slot) {
+  const Job &job = jobs_[slot];
+  Worker &worker = workers_[job.worker.value];
+  if (job.state == JobState::Suspended) {
+    // Threads: the operating system ran it although we counted it as preempted.
+    REDAG_CHECK(config_.preemption == Preemption::Full, "a job ended that is suspended under another");
+    remove(slot);
+  } else {
+    worker.running = kNil;
+    worker.stack = job.under;
+    if (worker.stack == kNil) {
+      worker.open = false;
+      free_workers_.set(job.worker.value);
+    } else {
+      open(job.worker.value);
+    }
+  }
+  const TaskGates &held = task_gates_[job.task.value];
+  for (std::uint32_t i = 0; i < held.count; ++i) {
+    --gates_[held.gates[i]].used;
+    replenish(gates_[held.gates[i]]);
+  }
+}
+
+void PriorityScheduler::open(std::uint32_t worker) {
+  if (workers_[worker].open) return;
+  workers_[worker].open = true;
+  open_workers_.push_back(worker);
+}
+
+// Moves parked jobs to the ready queue, as many as could pass.
+void PriorityScheduler::replenish(Gate &gate) {
+  while (gate.parked.top() != kNil && gate.queued < gate.capacity - gate.used) {
+    const std::uint32_t slot = gate.parked.top();
+    gate.parked.remove(jobs_, slot);
+    jobs_[slot].parked_at = kNil;
+    enqueue(slot);
+  }
+}
+
+// ---- the ready queue ----
+
+void PriorityScheduler::push(std::uint32_t slot) { static_ ? levels_.push(jobs_, slot) : heap_.push(jobs_, slot); }
+
+void PriorityScheduler::remove(std::uint32_t slot) {
+  static_ ? levels_.remove(jobs_, slot) : heap_.remove(jobs_, slot);
+}
+
+void PriorityScheduler::enqueue(std::uint32_t slot) {
+  push(slot);
+  const TaskGates &to_pass = task_gates_[jobs_[slot].task.value];
+  for (std::uint32_t i = 0; i < to_pass.count; ++i) ++gates_[to_pass.gates[i]].queued;
+}
+
+void PriorityScheduler::dequeue(std::uint32_t slot) {
+  remove(slot);
+  const TaskGates &to_pass = task_gates_[jobs_[slot].task.value];
+  for (std::uint32_t i = 0; i < to_pass.count; ++i) --gates_[to_pass.gates[i]].queued;
+}
+
+// Gates, levels and the ready queue are built anew; parked jobs go back to the ready queue and find their gates again.
+void PriorityScheduler::on_reconfigured() {
+  level_of_rank_.resize(tasks_.size());
+  for (const TaskState &task : tasks_) level_of_rank_[task.priority.rank] = task.priority.level;
+  levels_ = LevelQueue(static_ ? tasks_.size() : 0);
+  heap_ = HeapQueue();
+
+  gates_.clear();
+  task_gates_.assign(tasks_.size(), TaskGates{});
+  std::vector<std::uint32_t> dag_gates(dag_states_.size(), kNil);
+  std::vector<std::uint32_t> group_gates(group_count(), kNil);
+  std::uint32_t threads_gate = kNil;
+  const auto pass = [&](TaskGates &list, GateKind kind, std::uint32_t &gate, std::uint32_t capacity) {
+    if (gate == kNil) {
+      gate = static_cast<std::uint32_t>(gates_.size());
+      gates_.push_back(Gate{capacity, 0, 0, kNil, {}});
+    }
+    list.kinds[list.count] = kind;
+    list.gates[list.count++] = gate;
+  };
+  for (std::size_t t = 0; t < tasks_.size(); ++t) {
+    const TaskState &task = tasks_[t];
+    TaskGates &list = task_gates_[t];
+    std::uint32_t own = kNil;
+    pass(list, GateKind::Task, own, 1);
+    const std::uint32_t max_active = dag_states_[task.dag.value].max_active;
+    if (max_active > 0) pass(list, GateKind::Dag, dag_gates[task.dag.value], max_active);
+    if (task.group != kNil) pass(list, GateKind::Group, group_gates[task.group], 1);
+    if (config_.max_started > 0) pass(list, GateKind::Threads, threads_gate, config_.max_started);
+  }
+
+  for (std::uint32_t slot = 0; slot < jobs_.size(); ++slot) {
+    Job &job = jobs_[slot];
+    job.parked_at = kNil;
+    if (job.state == JobState::Ready) enqueue(slot);
+    if (!job.started()) continue;
+    if (job.state == JobState::Suspended && config_.preemption == Preemption::Full) push(slot);
+    const TaskGates &held = task_gates_[job.task.value];
+    for (std::uint32_t i = 0; i < held.count; ++i) {
+      ++gates_[held.gates[i]].used;
+      gates_[held.gates[i]].holder = slot;
+    }
+  }
+}
+
+}  // namespace redag::sched

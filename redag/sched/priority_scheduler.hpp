@@ -1,0 +1,88 @@
+// ReDAG-RT's scheduler: one global order over all ready jobs of all DAGs (eqs. rm_priority and dispatch), per-DAG
+// bounds, exclusive groups, preemption. Semantics: docs/model.md. A value: no thread, no clock, no I/O; not
+// thread-safe.
+//
+// Each decision costs O(1) for static policies (O(log n) for edf and fifo), plus O(m) where a victim must be found.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "redag/sched/lifecycle.hpp"
+#include "redag/sched/ready_queue.hpp"
+
+namespace redag::sched {
+
+class PriorityScheduler final : public Lifecycle {
+ public:
+  /// Requires config.workers > 0, valid DAGs with periods and deadlines set (inherit_periods), and a static policy
+  /// where levels are limited.
+  PriorityScheduler(const Workload &workload, const Config &config);
+
+  void preemption_point(JobSlot job, Time now) override;
+  Step dispatch(Time now) override;
+  [[nodiscard]] bool outranked(JobSlot job) const override;
+
+ private:
+  // What a job must pass to start, and holds until it ends: its task, its DAG, its group, and the platform's threads. A
+  // job that finds a gate full is parked there, out of the ready queue. Invariant: jobs are parked only while the
+  // queued ones could use up the gate: parked.empty() || queued >= capacity - used.
+  struct Gate {
+    std::uint32_t capacity = 1;
+    std::uint32_t used = 0;       // jobs started and unfinished
+    std::uint32_t queued = 0;     // jobs in the ready queue, not started
+    std::uint32_t holder = kNil;  // group: the job that holds it
+    HeapQueue parked;
+  };
+  enum class GateKind : std::uint8_t { Task, Dag, Group, Threads };
+  struct TaskGates {
+    std::array<std::uint32_t, 4> gates{};
+    std::array<GateKind, 4> kinds{};
+    std::uint32_t count = 0;
+  };
+  struct Worker {
+    std::uint32_t running = kNil;  // the job that executes; kNil while the worker is free or awaits a decision
+    std::uint32_t stack = kNil;    // Cooperative: the topmost started job, running or suspended
+    bool open = false;  // Cooperative: a decision is due: a nested job ended, or a preemption point was reached
+  };
+  struct Place {
+    WorkerId worker;
+    std::uint32_t victim = kNil;  // the job that must give way
+  };
+
+  void on_ready(std::uint32_t slot) override;
+  void on_withdrawn(std::uint32_t slot) override;
+  void on_end(std::uint32_t slot) override;
+  void on_reconfigured() override;
+
+  [[nodiscard]] bool find_place(const Job &job, Place &place) const;
+  [[nodiscard]] std::uint32_t least_urgent_running() const;
+  [[nodiscard]] bool outranks(const Job &a, const Job &b) const;
+  [[nodiscard]] std::uint32_t level_of(const Job &job) const;
+  void run(std::uint32_t slot, const Place &place);
+  void make_way(const Place &place);
+  bool park_if_not_eligible(std::uint32_t slot);
+  void inherit(std::uint32_t holder, const Job &waiter);
+  void close_open_workers();
+
+  void push(std::uint32_t slot);
+  void remove(std::uint32_t slot);
+  [[nodiscard]] std::uint32_t top() const { return static_ ? levels_.top() : heap_.top(); }
+  void enqueue(std::uint32_t slot);
+  void dequeue(std::uint32_t slot);
+  void replenish(Gate &gate);
+  void open(std::uint32_t worker);
+
+  bool static_;
+  LevelQueue levels_;  // the ready queue of static policies; otherwise heap_
+  HeapQueue heap_;
+  std::vector<std::uint32_t> level_of_rank_;
+  std::vector<Gate> gates_;
+  std::vector<TaskGates> task_gates_;
+  std::vector<Worker> workers_;
+  LevelBitmap free_workers_;
+  std::vector<std::uint32_t> open_workers_;
+};
+
+}  // namespace redag::sched

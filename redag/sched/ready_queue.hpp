@@ -1,0 +1,164 @@
+// Ready queues: the jobs that could run, most urgent first. Two of them behind one set of operations: LevelQueue for
+// static priorities, O(1) by a bitmap; HeapQueue for any order, O(log n) amortised. Both are intrusive (links live in
+// Job), so nothing is allocated after construction. They hold slots; the jobs themselves are passed in.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "redag/sched/job.hpp"
+
+namespace redag::sched {
+
+/// A set of small integers with an O(1) minimum: 64-ary tree of words, three levels for 262,144 members.
+class LevelBitmap {
+ public:
+  explicit LevelBitmap(std::size_t size = 0) {
+    do {
+      size = (size + 63) / 64;
+      words_.emplace_back(size == 0 ? 1 : size, 0);
+    } while (size > 1);
+  }
+
+  void set(std::uint32_t index) {
+    for (auto &layer : words_) {
+      std::uint64_t &word = layer[index >> 6U];
+      const bool was_empty = word == 0;
+      word |= std::uint64_t{1} << (index & 63U);
+      if (!was_empty) return;
+      index >>= 6U;
+    }
+  }
+
+  void clear(std::uint32_t index) {
+    for (auto &layer : words_) {
+      std::uint64_t &word = layer[index >> 6U];
+      word &= ~(std::uint64_t{1} << (index & 63U));
+      if (word != 0) return;
+      index >>= 6U;
+    }
+  }
+
+  [[nodiscard]] bool empty() const { return words_.back()[0] == 0; }
+
+  /// The smallest member. Requires !empty().
+  [[nodiscard]] std::uint32_t first() const {
+    std::uint32_t index = 0;
+    for (auto layer = words_.rbegin(); layer != words_.rend(); ++layer) {
+      index = (index << 6U) | static_cast<std::uint32_t>(std::countr_zero((*layer)[index]));
+    }
+    return index;
+  }
+
+ private:
+  std::vector<std::vector<std::uint64_t>> words_;  // [0] the leaves, last the root
+};
+
+/// FIFO per level, a bitmap over levels. A job's level is its key, in [0, levels).
+class LevelQueue {
+ public:
+  explicit LevelQueue(std::size_t levels = 0) : bitmap_(levels), lists_(levels) {}
+
+  void push(std::span<Job> jobs, std::uint32_t slot) {
+    Job &job = jobs[slot];
+    List &list = lists_[static_cast<std::size_t>(job.key)];
+    // Within a level: the total order, which nearly always means at the end.
+    std::uint32_t after = list.tail;
+    while (after != kNil && before(job, jobs[after])) after = jobs[after].previous;
+    job.previous = after;
+    job.next = after == kNil ? list.head : jobs[after].next;
+    (after == kNil ? list.head : jobs[after].next) = slot;
+    (job.next == kNil ? list.tail : jobs[job.next].previous) = slot;
+    bitmap_.set(static_cast<std::uint32_t>(job.key));
+  }
+
+  void remove(std::span<Job> jobs, std::uint32_t slot) {
+    Job &job = jobs[slot];
+    List &list = lists_[static_cast<std::size_t>(job.key)];
+    (job.previous == kNil ? list.head : jobs[job.previous].next) = job.next;
+    (job.next == kNil ? list.tail : jobs[job.next].previous) = job.previous;
+    job.next = job.previous = kNil;
+    if (list.head == kNil) bitmap_.clear(static_cast<std::uint32_t>(job.key));
+  }
+
+  /// The first job's slot, or kNil.
+  [[nodiscard]] std::uint32_t top() const { return bitmap_.empty() ? kNil : lists_[bitmap_.first()].head; }
+
+ private:
+  struct List {
+    std::uint32_t head = kNil;
+    std::uint32_t tail = kNil;
+  };
+  LevelBitmap bitmap_;
+  std::vector<List> lists_;
+};
+
+/// Pairing heap by before(). Fredman, Sedgewick, Sleator, Tarjan, Algorithmica 1 (1986).
+class HeapQueue {
+ public:
+  void push(std::span<Job> jobs, std::uint32_t slot) {
+    jobs[slot].child = jobs[slot].next = jobs[slot].previous = kNil;
+    root_ = root_ == kNil ? slot : meld(jobs, root_, slot);
+  }
+
+  void remove(std::span<Job> jobs, std::uint32_t slot) {
+    Job &job = jobs[slot];
+    const std::uint32_t rest = merge_pairs(jobs, job.child);
+    if (slot == root_) {
+      root_ = rest;
+    } else {
+      // `previous` is the left sibling, or the parent of a first child.
+      Job &left = jobs[job.previous];
+      (left.child == slot ? left.child : left.next) = job.next;
+      if (job.next != kNil) jobs[job.next].previous = job.previous;
+      if (rest != kNil) root_ = meld(jobs, root_, rest);
+    }
+    job.child = job.next = job.previous = kNil;
+  }
+
+  [[nodiscard]] std::uint32_t top() const { return root_; }
+
+ private:
+  // Both are roots without siblings; the one that comes later becomes the other's first child.
+  static std::uint32_t meld(std::span<Job> jobs, std::uint32_t a, std::uint32_t b) {
+    if (before(jobs[b], jobs[a])) std::swap(a, b);
+    jobs[b].next = jobs[a].child;
+    jobs[b].previous = a;
+    if (jobs[a].child != kNil) jobs[jobs[a].child].previous = b;
+    jobs[a].child = b;
+    return a;
+  }
+
+  // Two passes: siblings are melded in pairs from the left, the pairs from the right.
+  static std::uint32_t merge_pairs(std::span<Job> jobs, std::uint32_t first) {
+    std::uint32_t pairs = kNil;  // stack of melded pairs, linked by `previous`
+    while (first != kNil) {
+      const std::uint32_t a = first;
+      const std::uint32_t b = jobs[a].next;
+      first = b == kNil ? kNil : jobs[b].next;
+      jobs[a].next = jobs[a].previous = kNil;
+      std::uint32_t pair = a;
+      if (b != kNil) {
+        jobs[b].next = jobs[b].previous = kNil;
+        pair = meld(jobs, a, b);
+      }
+      jobs[pair].previous = pairs;
+      pairs = pair;
+    }
+    std::uint32_t root = kNil;
+    while (pairs != kNil) {
+      const std::uint32_t below = jobs[pairs].previous;
+      jobs[pairs].previous = kNil;
+      root = root == kNil ? pairs : meld(jobs, root, pairs);
+      pairs = below;
+    }
+    return root;
+  }
+
+  std::uint32_t root_ = kNil;
+};
+
+}  // namespace redag::sched
