@@ -11,7 +11,7 @@ namespace redag::detail {
 
 }  // namespace redag::detail
 
-#define REDAG_CHECK(condition, message)                                                             \
-  (static_cast<bool>(condition)                                                                     \
-       ? static_cast<void>(0)                                                                       \
+#define REDAG_CHECK(condition, message) \
+  (static_cast<bool>(condition)         \
+       ? static_cast<void>(0)           \
        : ::redag::detail::check_failed(#condition, message, ::std::source_location::current()))
