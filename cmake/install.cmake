@@ -20,6 +20,7 @@ if(TARGET redag_cli)
 endif()
 
 install(EXPORT redag_targets NAMESPACE redag:: DESTINATION ${package_dir})
+get_target_property(library_type redag TYPE)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/redag-config.cmake.in
   ${CMAKE_CURRENT_BINARY_DIR}/redag-config.cmake INSTALL_DESTINATION ${package_dir})
 # Before 1.0 a new minor version may break what uses the old one.

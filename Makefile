@@ -1,0 +1,66 @@
+# The front door: each target does one everyday thing from a fresh clone on. What it runs is plain CMake and the scripts
+# of tools/; nothing is built here that `cmake --preset` could not build.
+.DEFAULT_GOAL := help
+.PHONY: help demo test bench lint format asan tsan install clean
+PREFIX ?= /usr/local
+
+# ThreadSanitizer of older compilers cannot start where a kernel randomises much of the address space
+# (vm.mmap_rnd_bits > 28): run it without, where that is permitted.
+NO_RANDOMISATION := $(shell setarch -R true 2>/dev/null && echo setarch -R)
+
+help: ## this list
+	@grep -E '^[a-z]+: .*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+): .*## (.*)/  make \1\t\2/' | expand -t 18
+
+demo: ## build the program and compare the executors on one workload; pages and figures go to results/demo/
+	@tools/bootstrap run
+	cmake --preset release
+	cmake --build --preset release
+	build/release/bin/redag compare workloads/contention.yaml --out results/demo
+
+test: ## build everything and run all tests
+	@tools/bootstrap test
+	cmake --preset dev
+	cmake --build --preset dev
+	ctest --preset dev
+
+bench: ## build and run the benchmarks; JSON goes to results/bench/
+	@tools/bootstrap bench
+	cmake --preset bench
+	cmake --build --preset bench
+	@mkdir -p results/bench
+	@for program in build/bench/benchmarks/bench_*; do \
+	  test -x "$$program" || continue; \
+	  "$$program" --benchmark_out=results/bench/$$(basename "$$program").json --benchmark_out_format=json || exit 1; \
+	done
+
+lint: ## layers, formatting, and clang-tidy on the files that differ from the last commit or the main branch
+	@tools/bootstrap lint
+	tools/check_layers
+	tools/format --check
+	cmake --preset dev
+	tools/tidy
+
+format: ## rewrite all C++ files as .clang-format says
+	@tools/bootstrap lint
+	tools/format
+
+asan: ## all tests under AddressSanitizer and UndefinedBehaviorSanitizer
+	@tools/bootstrap test
+	cmake --preset asan-ubsan
+	cmake --build --preset asan-ubsan
+	ctest --preset asan-ubsan
+
+tsan: ## the tests of what has threads, under ThreadSanitizer
+	@tools/bootstrap test
+	cmake --preset tsan
+	$(NO_RANDOMISATION) cmake --build --preset tsan
+	$(NO_RANDOMISATION) ctest --preset tsan
+
+install: ## install library, headers and program to PREFIX (default /usr/local)
+	@tools/bootstrap run
+	cmake --preset release
+	cmake --build --preset release
+	cmake --install build/release --prefix $(PREFIX)
+
+clean: ## remove what the targets above built; results/ stays
+	rm -rf build/dev build/release build/bench build/asan-ubsan build/tsan
