@@ -1,0 +1,249 @@
+#include "redag/sim/simulator.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+#include "redag/base/check.hpp"
+#include "redag/base/int128.hpp"
+#include "redag/model/demand.hpp"
+
+namespace redag::sim {
+namespace {
+
+// The timer tasks' next releases, a binary heap by (time, task). Every timer has exactly one entry at any time.
+class ReleaseQueue {
+ public:
+  struct Entry {
+    Time time = 0;     // when the release is seen
+    Time nominal = 0;  // its point on the grid
+    TaskId task;
+    std::uint32_t number = 0;
+  };
+
+  void push(const Entry &entry) {
+    heap_.push_back(entry);
+    std::push_heap(heap_.begin(), heap_.end(), later);
+  }
+  [[nodiscard]] Time next_time() const { return heap_.empty() ? kNever : heap_.front().time; }
+  [[nodiscard]] const Entry &top() const { return heap_.front(); }
+
+  /// Replaces the first entry; cheaper than removing and adding.
+  void replace_top(const Entry &entry) {
+    std::size_t hole = 0;
+    for (std::size_t child = 1; child < heap_.size(); child = 2 * hole + 1) {
+      if (child + 1 < heap_.size() && later(heap_[child], heap_[child + 1])) ++child;
+      if (!later(entry, heap_[child])) break;
+      heap_[hole] = heap_[child];
+      hole = child;
+    }
+    heap_[hole] = entry;
+  }
+
+ private:
+  static bool later(const Entry &a, const Entry &b) {
+    return a.time != b.time ? a.time > b.time : a.task.value > b.task.value;
+  }
+  std::vector<Entry> heap_;
+};
+
+class Simulation {
+ public:
+  Simulation(const Workload &workload, sched::Scheduler &scheduler, std::uint32_t workers, const Options &options,
+             const EventSink &sink)
+      : scheduler_(scheduler), options_(options), sink_(sink), tasks_(flatten(workload)), processors_(workers) {
+    for (std::size_t i = 0; i < tasks_.size(); ++i) {
+      const Task &task = *tasks_[i].task;
+      has_regions_ = has_regions_ || task.region > 0;
+      if (task.activation != Activation::Timer || task.offset >= options.horizon) continue;
+      const TaskId id(i);
+      releases_.push({task.offset + jitter(task, id, 0), task.offset, id, 0});
+    }
+  }
+
+  Result run() {
+    bool goes_on = true;
+    while (goes_on) {
+      const Time next = std::min(releases_.next_time(), next_processor_event());
+      if (next > options_.horizon || (next == options_.horizon && next_processor_event() > next)) break;
+      now_ = next;
+      complete_jobs();
+      release_jobs();
+      if (has_regions_) reach_preemption_points();
+      goes_on = carry_out(scheduler_.dispatch(now_));
+    }
+    result_.end = goes_on ? options_.horizon : now_;
+    return result_;
+  }
+
+ private:
+  // A job's progress, by slot; valid while the job is started.
+  struct Progress {
+    Duration left = 0;      // processor time until it ends, overheads included
+    Duration executed = 0;  // so far
+    Duration lead = 0;      // overheads, which come before the body and hold no preemption point
+    Duration region = 0;
+    bool cut_off = false;  // ends at its budget
+  };
+  struct Processor {
+    JobSlot job;
+    Time since = 0;        // when the job got (or regained) the processor
+    Time finish = kNever;  // if nothing intervenes
+    Time point = kNever;   // the next preemption point that matters
+  };
+
+  [[nodiscard]] Time next_processor_event() const {
+    Time next = kNever;
+    for (const Processor &processor : processors_) next = std::min({next, processor.finish, processor.point});
+    return next;
+  }
+
+  void complete_jobs() {
+    for (Processor &processor : processors_) {
+      if (processor.finish > now_) continue;
+      const JobSlot job = processor.job;
+      const bool cut_off = progress_[job.value].cut_off;
+      processor = Processor{};
+      ++result_.finished;
+      scheduler_.complete(job, now_, cut_off ? sched::Outcome::BudgetExceeded : sched::Outcome::Finished);
+    }
+  }
+
+  void release_jobs() {
+    while (releases_.next_time() <= now_ && now_ < options_.horizon) {
+      const ReleaseQueue::Entry released = releases_.top();
+      const Task &task = *tasks_[released.task.value].task;
+      ++result_.released;
+      scheduler_.release(released.task, released.nominal, now_);
+      const std::uint32_t number = released.number + 1;
+      const Duration gap = options_.gap ? options_.gap(task, released.task, number) : 0;
+      const Time nominal = released.nominal + task.period + gap;
+      // A job never overtakes the one before it, however large the jitter.
+      const Time seen = std::max(now_, nominal + jitter(task, released.task, number));
+      releases_.replace_top({nominal < options_.horizon ? seen : kNever, nominal, released.task, number});
+    }
+  }
+
+  // Jobs that stand at a multiple of their region, where that matters.
+  void reach_preemption_points() {
+    for (Processor &processor : processors_) {
+      if (!processor.job.valid() || !scheduler_.outranked(processor.job)) continue;
+      const Progress &progress = progress_[processor.job.value];
+      const Duration body = progress.executed + (now_ - processor.since) - progress.lead;
+      if (progress.region > 0 && body > 0 && body % progress.region == 0) {
+        scheduler_.preemption_point(processor.job, now_);
+      }
+    }
+  }
+
+  bool carry_out(const sched::Step &step) {
+    for (const sched::Dispatch &dispatch : step.dispatches) {
+      if (dispatch.over.valid()) take_processor(dispatch.over);
+      give_processor(dispatch);
+    }
+    if (has_regions_) plan_preemption_points();
+    return sink_(step.events);
+  }
+
+  void take_processor(JobSlot job) {
+    for (Processor &processor : processors_) {
+      if (processor.job != job) continue;
+      Progress &progress = progress_[job.value];
+      progress.executed += now_ - processor.since;
+      progress.left = processor.finish - now_;
+      processor = Processor{};
+    }
+  }
+
+  void give_processor(const sched::Dispatch &dispatch) {
+    Processor &processor = processors_[dispatch.worker.value];
+    if (dispatch.resume && processor.job == dispatch.job) return;  // it runs already; only its level changed
+    REDAG_CHECK(!processor.job.valid(), "the scheduler gave a processor to two jobs");
+    if (dispatch.job.value >= progress_.size()) progress_.resize(dispatch.job.value + 1);
+    Progress &progress = progress_[dispatch.job.value];
+    if (dispatch.resume) {
+      progress.left += options_.overheads.preempt;
+      progress.lead += options_.overheads.preempt;
+    } else {
+      progress = begin_job(dispatch);
+    }
+    processor = Processor{dispatch.job, now_, now_ + progress.left, kNever};
+  }
+
+  Progress begin_job(const sched::Dispatch &dispatch) const {
+    const Task &task = *tasks_[dispatch.task.value].task;
+    Duration demand = options_.demand ? options_.demand(task, dispatch.task, dispatch.number)
+                                      : execution_time(task, dispatch.task, dispatch.number, options_.seed);
+    REDAG_CHECK(demand > 0, "a job executes for a positive time");
+    Progress progress;
+    progress.cut_off = task.budget > 0 && demand > task.budget;
+    if (progress.cut_off) demand = task.budget;
+    progress.lead = options_.overheads.release + options_.overheads.dispatch;
+    progress.left = demand + progress.lead;
+    progress.region = task.region;
+    return progress;
+  }
+
+  // Only a job that another one outranks has a preemption point worth an event.
+  void plan_preemption_points() {
+    for (Processor &processor : processors_) {
+      processor.point = kNever;
+      if (!processor.job.valid()) continue;
+      const Progress &progress = progress_[processor.job.value];
+      if (progress.region == 0 || !scheduler_.outranked(processor.job)) continue;
+      const Duration body = progress.executed + (now_ - processor.since) - progress.lead;
+      const Duration next_body = body < 0 ? progress.region : (body / progress.region + 1) * progress.region;
+      const Time point = now_ + (next_body - body);
+      if (point < processor.finish) processor.point = point;
+    }
+  }
+
+  [[nodiscard]] Duration jitter(const Task &task, TaskId id, std::uint32_t number) const {
+    return options_.jitter ? options_.jitter(task, id, number) : release_jitter(task, id, number, options_.seed);
+  }
+
+  sched::Scheduler &scheduler_;
+  const Options &options_;
+  const EventSink &sink_;
+  std::vector<TaskRef> tasks_;
+  std::vector<Processor> processors_;
+  std::vector<Progress> progress_;
+  ReleaseQueue releases_;
+  Result result_;
+  Time now_ = 0;
+  bool has_regions_ = false;
+};
+
+}  // namespace
+
+Result simulate(const Workload &workload, sched::Scheduler &scheduler, std::uint32_t workers, const Options &options,
+                const EventSink &sink) {
+  return Simulation(workload, scheduler, workers, options, sink).run();
+}
+
+sched::Config simulated_config(const Workload &workload) {
+  sched::Config config;
+  config.workers = workload.platform.workers;
+  config.policy = workload.policy;
+  switch (workload.platform.preemption) {
+    case PreemptionMode::None: config.preemption = sched::Preemption::None; break;
+    case PreemptionMode::Cooperative: config.preemption = sched::Preemption::Cooperative; break;
+    case PreemptionMode::Os:
+    case PreemptionMode::Auto: config.preemption = sched::Preemption::Full; break;
+  }
+  return config;
+}
+
+std::optional<Duration> hyperperiod(const Workload &workload, Duration limit) {
+  Int128 result = 1;
+  for (const Dag &dag : workload.dags) {
+    for (const Task &task : dag.tasks) {
+      if (task.activation != Activation::Timer) continue;
+      result = result / std::gcd(static_cast<Duration>(result), task.period) * task.period;
+      if (result > limit) return std::nullopt;
+    }
+  }
+  return static_cast<Duration>(result);
+}
+
+}  // namespace redag::sim

@@ -1,0 +1,56 @@
+// Driver 1: a scheduler in virtual time. Discrete events in integer nanoseconds; the same workload, options and seed
+// give the same events, bit for bit, on every machine. Works with any sched::Scheduler. Single-threaded.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+
+#include "redag/model/job_event.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/sched/scheduler.hpp"
+
+namespace redag::sim {
+
+/// Processor time that the platform takes, charged to the job it is spent for. Default: none.
+struct Overheads {
+  Duration release = 0;   // handling a release: added to the released job's demand
+  Duration dispatch = 0;  // starting a job: spent on its worker before the body
+  Duration preempt = 0;   // each resumption after a preemption: spent on the worker before going on
+};
+
+struct Options {
+  Duration horizon = kSecond;  // releases happen in [0, horizon); jobs unfinished at the horizon are in flight
+  std::uint64_t seed = 1;      // of execution times and jitter (redag/model/demand.hpp)
+  Overheads overheads;
+  /// Execution time of a job, before overheads; default: execution_time() of redag/model/demand.hpp.
+  std::function<Duration(const Task &, TaskId, std::uint32_t number)> demand;
+  /// Release of a job of a timer task after its nominal time; default: release_jitter().
+  std::function<Duration(const Task &, TaskId, std::uint32_t number)> jitter;
+  /// Gap added to the period before the next release, for sporadic tasks (>= 0); default: none, strictly periodic.
+  std::function<Duration(const Task &, TaskId, std::uint32_t number)> gap;
+};
+
+/// Receives the events in decision order, a batch an instant. Return false to end the simulation.
+using EventSink = std::function<bool(std::span<const JobEvent>)>;
+
+struct Result {
+  std::uint64_t released = 0;
+  std::uint64_t finished = 0;
+  Time end = 0;  // the horizon, or where the sink ended the simulation
+};
+
+/// Simulates `workload` under `scheduler`, which must be fresh and built from the same workload.
+/// Order within one instant: completions by worker, releases by TaskId, preemption points by worker, then the
+/// decisions.
+Result simulate(const Workload &workload, sched::Scheduler &scheduler, std::uint32_t workers, const Options &options,
+                const EventSink &sink);
+
+/// The scheduler config that the simulator uses for a workload: `os` and `auto` mean full preemption.
+[[nodiscard]] sched::Config simulated_config(const Workload &workload);
+
+/// Least common multiple of the timer tasks' periods, or nothing if it exceeds `limit`.
+[[nodiscard]] std::optional<Duration> hyperperiod(const Workload &workload, Duration limit = kMaxDuration);
+
+}  // namespace redag::sim
