@@ -1,0 +1,55 @@
+// Shared by the parts of the trace checker: what they look at, and where they report. Internal to metrics/.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "redag/metrics/check_report.hpp"
+#include "redag/metrics/replay.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag::metrics {
+
+class CheckContext {
+ public:
+  CheckContext(const trace::RunInfo &run, const Replay &state, const RuleSet &rules, CheckReport &out)
+      : info(run), replay(state), rules_(rules), report_(out) {}
+
+  const trace::RunInfo &info;
+  const Replay &replay;
+
+  /// Where the checker is.
+  void at(std::size_t event, Time time) {
+    event_ = event;
+    time_ = time;
+  }
+  [[nodiscard]] Time now() const { return time_; }
+
+  /// Counts one test of `rule`; unless `holds`, reports a violation. `explain` is called only then and returns a
+  /// string.
+  template <class Explain>
+  void expect(Rule rule, bool holds, TaskId task, std::uint32_t number, Explain explain) {
+    if (!rules_.contains(rule)) return;
+    ++report_.checks_by_rule[static_cast<std::size_t>(rule)];
+    if (!holds) report(rule, job_name(task, number), explain());
+  }
+
+  [[nodiscard]] std::string job_name(TaskId task, std::uint32_t number) const {
+    return trace::task_name(info.workload, task) + "#" + std::to_string(number);
+  }
+
+ private:
+  void report(Rule rule, std::string job, std::string text) {
+    ++report_.violation_count;
+    ++report_.violations_by_rule[static_cast<std::size_t>(rule)];
+    if (report_.violations.size() >= CheckReport::kMaxKept) return;
+    report_.violations.push_back(Violation{rule, time_, event_, std::move(job), std::move(text)});
+  }
+
+  RuleSet rules_;
+  CheckReport &report_;
+  std::size_t event_ = 0;
+  Time time_ = 0;
+};
+
+}  // namespace redag::metrics

@@ -1,0 +1,239 @@
+#include "redag/metrics/check_dispatch.hpp"
+
+#include <algorithm>
+
+#include "redag/model/demand.hpp"
+
+namespace redag::metrics {
+
+using sched::Preemption;
+using State = LiveJob::State;
+
+void DispatchRules::before(const JobEvent &event) {
+  const LiveJob *job = context_.replay.find(event.task, event.job);
+  if (job == nullptr) return;  // the replay reports it
+  switch (event.kind) {
+    case JobEventKind::Dispatched: dispatched(event, *job); break;
+    case JobEventKind::Deferred: deferred(event); break;
+    case JobEventKind::Preempted: preempted(event, *job); break;
+    case JobEventKind::Resumed: resumed(event, *job); break;
+    case JobEventKind::Finished:
+    case JobEventKind::Aborted: ended(event, *job); break;
+    default: break;
+  }
+}
+
+void DispatchRules::dispatched(const JobEvent &event, const LiveJob &job) {
+  context_.expect(Rule::Deadline, event.value == job.deadline, event.task, event.job, [&] {
+    return "its deadline is " + format_duration(event.value) + ", expected r + D = " + format_duration(job.deadline);
+  });
+  check_bounds(event);
+  check_place(event, job);
+  if (job.state == State::Ready) check_choice(job, job.own);
+}
+
+void DispatchRules::check_bounds(const JobEvent &event) {
+  const Replay &replay = context_.replay;
+  const DagId dag_id = replay.dag_of(event.task);
+  const Dag &dag = context_.info.workload.dags[dag_id.value];
+  context_.expect(Rule::TaskOverlap, replay.task_active(event.task) == 0, event.task, event.job,
+                  [] { return std::string("another job of its task has started and not ended"); });
+  const auto jobs = replay.jobs_of(event.task);
+  const auto first = std::find_if(jobs.begin(), jobs.end(), [](const LiveJob &j) { return j.state == State::Ready; });
+  context_.expect(Rule::TaskOverlap, first == jobs.end() || first->number == event.job, event.task, event.job,
+                  [&] { return "job " + std::to_string(first->number) + " of its task was released earlier"; });
+  if (dag.max_active > 0) {
+    context_.expect(Rule::MaxActive, replay.active(dag_id) < dag.max_active, event.task, event.job, [&] {
+      return "DAG " + dag.name + " has " + std::to_string(replay.active(dag_id)) + " jobs started, at most " +
+             std::to_string(dag.max_active) + " allowed";
+    });
+  }
+  if (context_.info.config.max_started > 0) {
+    context_.expect(Rule::MaxActive, replay.started() < context_.info.config.max_started, event.task, event.job,
+                    [] { return std::string("max_started jobs had started"); });
+  }
+  const std::uint32_t group = replay.group_of(event.task);
+  if (group != Replay::kNoGroup) {
+    context_.expect(Rule::Group, replay.group_active(group) == 0, event.task, event.job, [&] {
+      return "another job of group " + replay.task(event.task).group + " has started and not ended";
+    });
+  }
+}
+
+// Cooperative: on a free worker, or on top of a suspended job that it outranks if no worker is free.
+void DispatchRules::check_place(const JobEvent &event, const LiveJob &job) {
+  const Replay &replay = context_.replay;
+  if (mode() != Preemption::Cooperative || event.worker >= replay.worker_count()) return;
+  const auto stack = replay.stack(event.worker);
+  if (stack.empty()) return;
+  const LiveJob *below = replay.find(stack.back().task, stack.back().number);
+  if (below == nullptr) return;
+  context_.expect(Rule::Preemption, replay.preempts(job.own, replay.inherited(*below)), event.task, event.job,
+                  [&] { return "it runs on top of " + name(stack.back()) + ", which it does not outrank"; });
+  context_.expect(Rule::Priority, replay.free_workers() == 0, event.task, event.job,
+                  [&] { return "it runs on top of " + name(stack.back()) + " although a worker is free"; });
+}
+
+// Whoever gets a worker must be the most urgent of those who could.
+void DispatchRules::check_choice(const LiveJob &chosen, const Urgency &urgency) {
+  const Replay &replay = context_.replay;
+  const auto complain = [&](const Replay::JobRef &waiting) {
+    complaints_.push_back(Complaint{waiting, Replay::JobRef{chosen.task, chosen.number}, 0});
+  };
+  context_.expect(Rule::Priority, true, chosen.task, chosen.number, [] { return std::string(); });
+  const auto &eligible = replay.eligible();
+  // A resumed job (Cooperative) keeps its worker unless it is outranked by level.
+  const bool goes_on = mode() == Preemption::Cooperative && chosen.state == State::Suspended;
+  if (!eligible.empty()) {
+    const Replay::Waiter &best = *eligible.begin();
+    const bool is_itself = best.task == chosen.task && best.number == chosen.number;
+    const bool outranks = goes_on ? replay.preempts(best.urgency, urgency) : best.urgency < urgency;
+    if (!is_itself && outranks) complain(Replay::JobRef{best.task, best.number});
+  }
+  if (mode() != Preemption::Full) return;
+  const LiveJob *suspended = most_urgent_suspended();
+  if (suspended == nullptr || (suspended->task == chosen.task && suspended->number == chosen.number)) return;
+  if (replay.inherited(*suspended) < urgency) complain(Replay::JobRef{suspended->task, suspended->number});
+}
+
+void DispatchRules::deferred(const JobEvent &event) {
+  const Replay &replay = context_.replay;
+  const DagId dag_id = replay.dag_of(event.task);
+  const Dag &dag = context_.info.workload.dags[dag_id.value];
+  const bool at_bound = dag.max_active > 0 && replay.active(dag_id) >= dag.max_active;
+  context_.expect(Rule::Deferral, at_bound, event.task, event.job,
+                  [&] { return "deferred although DAG " + dag.name + " is below max_active"; });
+  context_.expect(Rule::Deferral, replay.task_active(event.task) == 0, event.task, event.job,
+                  [] { return std::string("deferred although its own task keeps it from running"); });
+}
+
+void DispatchRules::preempted(const JobEvent &event, const LiveJob &job) {
+  context_.expect(Rule::Preemption, mode() != Preemption::None, event.task, event.job,
+                  [] { return std::string("preempted on a platform without preemption"); });
+  evictions_.push_back(Eviction{Replay::JobRef{event.task, event.job}, job.worker});
+  if (mode() != Preemption::Cooperative || !exact()) return;
+  const Duration region = context_.replay.task(event.task).region;
+  const Duration executed = job.executed + (event.time - job.on_worker_since);
+  context_.expect(Rule::Preemption, region > 0 && executed % region == 0, event.task, event.job, [&] {
+    return "preempted after " + format_duration(executed) + " of execution, not at a preemption point (region " +
+           format_duration(region) + ")";
+  });
+}
+
+void DispatchRules::resumed(const JobEvent &event, const LiveJob &job) {
+  context_.expect(Rule::Preemption, mode() != Preemption::None, event.task, event.job,
+                  [] { return std::string("resumed on a platform without preemption"); });
+  if (job.state == State::Suspended) check_choice(job, job.raised);
+}
+
+void DispatchRules::ended(const JobEvent &event, const LiveJob &job) {
+  // Real preemption: the operating system may run a job that the scheduler counts as preempted.
+  const bool may_end_suspended = context_.info.driver == trace::Driver::Threads && mode() == Preemption::Full;
+  context_.expect(Rule::Life, job.state != State::Suspended || may_end_suspended, event.task, event.job,
+                  [] { return std::string("it ended while it was preempted"); });
+  context_.expect(Rule::Life, event.value >= job.release && event.value <= event.time, event.task, event.job,
+                  [&] { return "it ended at " + format_duration(event.value) + ", which cannot be"; });
+  if (context_.info.driver != trace::Driver::Simulator || job.state != State::Running) return;
+  const Task &task = context_.replay.task(event.task);
+  const Duration demand = execution_time(task, event.task, event.job, context_.info.seed);
+  const bool cut_off = event.kind == JobEventKind::Aborted && event.reason == Reason::Budget;
+  if (event.kind == JobEventKind::Aborted && !cut_off) return;
+  context_.expect(Rule::Execution, !cut_off || (task.budget > 0 && demand > task.budget), event.task, event.job,
+                  [&] { return "cut off although it needs " + format_duration(demand); });
+  const Duration expected = cut_off ? task.budget : demand;
+  const Duration executed = job.executed + (event.value - job.on_worker_since);
+  context_.expect(Rule::Execution, exact() ? executed == expected : executed >= expected, event.task, event.job, [&] {
+    return "it executed for " + format_duration(executed) + ", expected " + format_duration(expected);
+  });
+}
+
+void DispatchRules::end_of_instant() {
+  for (const Complaint &complaint : complaints_) {
+    const LiveJob *waiting = context_.replay.find(complaint.waiting.task, complaint.waiting.number);
+    const bool void_now = waiting != nullptr && waiting->state == State::Running;
+    context_.expect(Rule::Priority, void_now, complaint.waiting.task, complaint.waiting.number,
+                    [&] { return "it was eligible and more urgent, but " + name(complaint.chosen) + " was chosen"; });
+  }
+  complaints_.clear();
+  check_evictions();
+  check_free_workers();
+  if (mode() == Preemption::Full) check_running();
+}
+
+// Who preempted must outrank whom it preempted.
+void DispatchRules::check_evictions() {
+  const Replay &replay = context_.replay;
+  for (const Eviction &eviction : evictions_) {
+    const LiveJob *job = replay.find(eviction.job.task, eviction.job.number);
+    if (job == nullptr || job->state != State::Suspended || eviction.worker >= replay.worker_count()) continue;
+    const LiveJob *by = replay.running(eviction.worker);
+    context_.expect(Rule::Preemption, by != nullptr && replay.preempts(by->raised, replay.inherited(*job)),
+                    eviction.job.task, eviction.job.number, [&] {
+                      return by == nullptr ? std::string("preempted by nobody")
+                                           : "preempted by " + context_.job_name(by->task, by->number) +
+                                                 ", which does not outrank it";
+                    });
+  }
+  evictions_.clear();
+}
+
+void DispatchRules::check_free_workers() {
+  const Replay &replay = context_.replay;
+  if (mode() == Preemption::Cooperative) {
+    for (std::uint32_t w = 0; w < replay.worker_count(); ++w) {
+      const auto stack = replay.stack(w);
+      if (stack.empty()) continue;
+      context_.expect(Rule::WorkConservation, replay.running(w) != nullptr, stack.back().task, stack.back().number,
+                      [&] { return "it is suspended, and nothing runs on its worker"; });
+    }
+  }
+  if (replay.free_workers() == 0) return;
+  const auto &eligible = replay.eligible();
+  const Replay::Waiter waiter = eligible.empty() ? Replay::Waiter{} : *eligible.begin();
+  context_.expect(Rule::WorkConservation, eligible.empty(), waiter.task, waiter.number,
+                  [] { return std::string("it is eligible, and a worker is free"); });
+  const auto suspended = replay.suspended();
+  const Replay::JobRef preempted_job = suspended.empty() ? Replay::JobRef{} : suspended.front();
+  context_.expect(Rule::WorkConservation, suspended.empty(), preempted_job.task, preempted_job.number,
+                  [] { return std::string("it is preempted, and a worker is free"); });
+  const auto &owed = replay.owed_deferral();
+  const TaskId undeferred = owed.empty() ? TaskId() : *owed.begin();
+  context_.expect(Rule::Deferral, owed.empty(), undeferred, 0, [] {
+    return std::string("its first ready job is kept from a free worker by max_active alone and was not deferred");
+  });
+}
+
+// Full: nobody who waits outranks anybody who runs.
+void DispatchRules::check_running() {
+  const Replay &replay = context_.replay;
+  const LiveJob *least = nullptr;
+  for (std::uint32_t w = 0; w < replay.worker_count(); ++w) {
+    const LiveJob *job = replay.running(w);
+    if (job != nullptr && (least == nullptr || least->raised < job->raised)) least = job;
+  }
+  if (least == nullptr) return;
+  const auto judge = [&](const Urgency &urgency, TaskId task, std::uint32_t number) {
+    context_.expect(Rule::Priority, !replay.preempts(urgency, least->raised), task, number, [&] {
+      return "it waits while " + context_.job_name(least->task, least->number) + ", which is less urgent, runs";
+    });
+  };
+  const auto &eligible = replay.eligible();
+  if (!eligible.empty()) judge(eligible.begin()->urgency, eligible.begin()->task, eligible.begin()->number);
+  const LiveJob *suspended = most_urgent_suspended();
+  if (suspended != nullptr) judge(replay.inherited(*suspended), suspended->task, suspended->number);
+}
+
+const LiveJob *DispatchRules::most_urgent_suspended() const {
+  const LiveJob *best = nullptr;
+  Urgency best_urgency;
+  for (const Replay::JobRef &ref : context_.replay.suspended()) {
+    const LiveJob *job = context_.replay.find(ref.task, ref.number);
+    const Urgency urgency = context_.replay.inherited(*job);
+    if (best != nullptr && best_urgency <= urgency) continue;
+    best = job;
+    best_urgency = urgency;
+  }
+  return best;
+}
+
+}  // namespace redag::metrics

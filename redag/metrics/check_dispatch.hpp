@@ -1,0 +1,56 @@
+// The checker's rules about decisions: bounds, groups, workers, preemption, priority, work conservation, deferral and
+// execution. Sees each event before the replay applies it. Internal to metrics/.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "redag/metrics/check_context.hpp"
+
+namespace redag::metrics {
+
+class DispatchRules {
+ public:
+  explicit DispatchRules(CheckContext &context) : context_(context) {}
+
+  void before(const JobEvent &event);
+  /// Time is about to move on.
+  void end_of_instant();
+
+ private:
+  // `waiting` was eligible when `chosen` got a worker that it outranked it for. Void if it starts in the same instant.
+  struct Complaint {
+    Replay::JobRef waiting;
+    Replay::JobRef chosen;
+    std::size_t event = 0;
+  };
+  struct Eviction {
+    Replay::JobRef job;
+    std::uint32_t worker = 0;
+  };
+
+  void dispatched(const JobEvent &event, const LiveJob &job);
+  void check_bounds(const JobEvent &event);
+  void check_place(const JobEvent &event, const LiveJob &job);
+  void check_choice(const LiveJob &chosen, const Urgency &urgency);
+  void deferred(const JobEvent &event);
+  void preempted(const JobEvent &event, const LiveJob &job);
+  void resumed(const JobEvent &event, const LiveJob &job);
+  void ended(const JobEvent &event, const LiveJob &job);
+  void check_evictions();
+  void check_free_workers();
+  void check_running();
+  [[nodiscard]] const LiveJob *most_urgent_suspended() const;
+  [[nodiscard]] std::string name(const Replay::JobRef &job) const { return context_.job_name(job.task, job.number); }
+  [[nodiscard]] sched::Preemption mode() const { return context_.info.config.preemption; }
+  [[nodiscard]] bool exact() const {
+    return context_.info.driver == trace::Driver::Simulator && context_.info.overheads.empty();
+  }
+
+  CheckContext &context_;
+  std::vector<Complaint> complaints_;
+  std::vector<Eviction> evictions_;
+};
+
+}  // namespace redag::metrics

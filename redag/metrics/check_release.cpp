@@ -1,0 +1,242 @@
+#include "redag/metrics/check_release.hpp"
+
+#include <algorithm>
+
+namespace redag::metrics {
+namespace {
+
+bool is_aligned(const Task &from, const Task &to) {
+  return from.activation == Activation::Timer && to.activation == Activation::Timer && from.period == to.period &&
+         from.offset == to.offset;
+}
+
+std::string expected_and_got(const char *what, std::int64_t expected, std::int64_t got) {
+  return std::string(what) + " is " + format_duration(got) + ", expected " + format_duration(expected);
+}
+
+}  // namespace
+
+ReleaseRules::ReleaseRules(CheckContext &context) : context_(context) {
+  const Workload &workload = context.info.workload;
+  tasks_.resize(workload.task_count());
+  removed_.resize(workload.dags.size(), false);
+  std::size_t first = 0;
+  for (const Dag &dag : workload.dags) {
+    for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+      tasks_[first + i].timer = dag.tasks[i].activation == Activation::Timer;
+      for (const std::uint32_t p : dag.tasks[i].predecessors) {
+        const auto edge = static_cast<std::uint32_t>(edges_.size());
+        tasks_[first + i].in.push_back(edge);
+        tasks_[first + p].out.push_back(edge);
+        edges_.push_back(Edge{TaskId(first + p), TaskId(first + i), is_aligned(dag.tasks[p], dag.tasks[i])});
+      }
+    }
+    first += dag.tasks.size();
+  }
+}
+
+void ReleaseRules::before(const JobEvent &event) {
+  const LiveJob *job = context_.replay.find(event.task, event.job);
+  switch (event.kind) {
+    case JobEventKind::Released: released(event); break;
+    case JobEventKind::Ready:
+      if (job != nullptr) ready(event, *job);
+      break;
+    case JobEventKind::Skipped: skipped(event, job); break;
+    case JobEventKind::Finished:
+      if (job != nullptr) finished(event, *job);
+      break;
+    default: break;
+  }
+}
+
+void ReleaseRules::released(const JobEvent &event) {
+  TaskState &task = tasks_[event.task.value];
+  const std::uint32_t expected = task.next_number;
+  context_.expect(Rule::Life, event.job == expected, event.task, event.job,
+                  [&] { return "the task's next job has number " + std::to_string(expected); });
+  task.next_number = event.job + 1;
+  touch(event.task);
+  expect_skips(event);
+  task.timer ? check_grid(event) : check_data_release(event);
+}
+
+void ReleaseRules::check_grid(const JobEvent &event) {
+  const Task &task = context_.replay.task(event.task);
+  const Time nominal = context_.info.start + task.offset + static_cast<Time>(event.job) * task.period;
+  context_.expect(Rule::Grid, event.value == nominal, event.task, event.job,
+                  [&] { return expected_and_got("its release", nominal, event.value); });
+  // Only the simulator keeps to the jitter it was given; a real timer can be as late as the machine likes.
+  const bool exact = context_.info.driver == trace::Driver::Simulator;
+  const bool in_time = event.time >= event.value && (!exact || event.time <= event.value + task.jitter);
+  context_.expect(Rule::Grid, in_time, event.task, event.job, [&] {
+    return "it was released at " + format_duration(event.time) + " for " + format_duration(event.value) +
+           ", outside its jitter of " + format_duration(task.jitter);
+  });
+}
+
+void ReleaseRules::check_data_release(const JobEvent &event) {
+  TaskState &task = tasks_[event.task.value];
+  const TaskId absent = missing(task, event.value);
+  context_.expect(Rule::Precedence, !absent.valid(), event.task, event.job, [&] {
+    return "released although " + trace::task_name(context_.info.workload, absent) +
+           " has not completed since the task's last release";
+  });
+  Time finish = 0;
+  Time decided = 0;
+  for (const std::uint32_t edge : task.in) {
+    finish = std::max(finish, edges_[edge].finish);
+    decided = std::max(decided, edges_[edge].finish_decided);
+  }
+  context_.expect(Rule::Precedence, event.value == finish || event.value == decided, event.task, event.job, [&] {
+    return expected_and_got("its release", finish, event.value) + ", when its last predecessor finished";
+  });
+  task.data_origin = consume(task);
+}
+
+// docs/model.md, "Overrun and admission", in its order. The skips must follow within the instant.
+void ReleaseRules::expect_skips(const JobEvent &event) {
+  const Task &task = context_.replay.task(event.task);
+  const DagId dag_id = context_.replay.dag_of(event.task);
+  const Dag &dag = context_.info.workload.dags[dag_id.value];
+  std::uint32_t pending = context_.replay.pending(dag_id);
+  std::uint32_t ready_jobs = 0;
+  for (const LiveJob &job : context_.replay.jobs_of(event.task)) {
+    if (job.state == LiveJob::State::Waiting) {
+      expected_skips_.push_back(ExpectedSkip{event.task, job.number, Reason::Precedence});
+      --pending;
+    } else if (job.state == LiveJob::State::Ready && task.overrun == Overrun::Skip) {
+      expected_skips_.push_back(ExpectedSkip{event.task, job.number, Reason::Overrun});
+      --pending;
+    } else if (job.state == LiveJob::State::Ready) {
+      ++ready_jobs;
+    }
+  }
+  if (task.overrun == Overrun::Queue && ready_jobs >= task.queue_depth) {
+    expected_skips_.push_back(ExpectedSkip{event.task, event.job, Reason::QueueFull});
+  } else if (dag.max_pending > 0 && pending >= dag.max_pending) {
+    expected_skips_.push_back(ExpectedSkip{event.task, event.job, Reason::DagFull});
+  }
+}
+
+void ReleaseRules::ready(const JobEvent &event, const LiveJob &job) {
+  TaskState &task = tasks_[event.task.value];
+  const bool refused = std::any_of(expected_skips_.begin(), expected_skips_.end(), [&](const ExpectedSkip &skip) {
+    return skip.task == event.task && skip.number == event.job;
+  });
+  context_.expect(Rule::Admission, !refused, event.task, event.job,
+                  [] { return std::string("it became ready although it had to be skipped"); });
+  Time origin = job.release;
+  if (!task.timer) {
+    origin = task.data_origin;
+  } else if (!task.in.empty()) {
+    const TaskId absent = missing(task, job.release);
+    context_.expect(Rule::Precedence, !absent.valid(), event.task, event.job, [&] {
+      return "ready although " + trace::task_name(context_.info.workload, absent) + " has no fresh data for it";
+    });
+    origin = consume(task);
+  }
+  context_.expect(Rule::Precedence, event.value == origin, event.task, event.job,
+                  [&] { return expected_and_got("its origin", origin, event.value); });
+}
+
+void ReleaseRules::skipped(const JobEvent &event, const LiveJob *job) {
+  if (event.reason == Reason::Removed) removed_[context_.replay.dag_of(event.task).value] = true;
+  TaskState &task = tasks_[event.task.value];
+  if (job != nullptr && job->state == LiveJob::State::Ready && task.timer) {
+    // Nobody used its data.
+    for (const std::uint32_t edge : task.in) edges_[edge].fresh = true;
+    touch(event.task);
+  }
+  if (event.reason == Reason::Removed) return;
+  const auto expected = std::find_if(expected_skips_.begin(), expected_skips_.end(), [&](const ExpectedSkip &skip) {
+    return skip.task == event.task && skip.number == event.job;
+  });
+  context_.expect(Rule::Admission, expected != expected_skips_.end(), event.task, event.job,
+                  [&] { return std::string("skipped (") + to_string(event.reason) + ") without a cause"; });
+  if (expected == expected_skips_.end()) return;
+  const Reason reason = expected->reason;
+  context_.expect(Rule::Admission, event.reason == reason, event.task, event.job, [&] {
+    return std::string("skipped as ") + to_string(event.reason) + ", but the reason is " + to_string(reason);
+  });
+  expected_skips_.erase(expected);
+}
+
+void ReleaseRules::finished(const JobEvent &event, const LiveJob &job) {
+  for (const std::uint32_t index : tasks_[event.task.value].out) {
+    Edge &edge = edges_[index];
+    edge.fresh = true;
+    edge.release = job.release;
+    edge.origin = job.origin;
+    edge.finish = event.value;
+    edge.finish_decided = event.time;
+    touch(edge.to);
+  }
+}
+
+void ReleaseRules::end_of_instant() {
+  for (const ExpectedSkip &skip : expected_skips_) {
+    context_.expect(Rule::Admission, false, skip.task, skip.number,
+                    [&] { return std::string("it had to be skipped (") + to_string(skip.reason) + ")"; });
+  }
+  expected_skips_.clear();
+  for (const TaskId id : touched_) {
+    tasks_[id.value].touched = false;
+    if (!removed_[context_.replay.dag_of(id).value]) check_nothing_is_owed(id);
+  }
+  touched_.clear();
+}
+
+// A job that could be released (data) or ready (waiting) must be so in the same instant.
+void ReleaseRules::check_nothing_is_owed(TaskId id) {
+  TaskState &task = tasks_[id.value];
+  if (!task.timer) {
+    const bool owed = !missing(task, 0).valid();
+    context_.expect(Rule::Precedence, !owed, id, task.next_number,
+                    [] { return std::string("not released although every predecessor has completed"); });
+    if (owed) consume(task);
+  }
+  for (const LiveJob &job : context_.replay.jobs_of(id)) {
+    if (job.state != LiveJob::State::Waiting) continue;
+    const bool owed = !task.timer || !missing(task, job.release).valid();
+    context_.expect(Rule::Precedence, !owed, id, job.number,
+                    [] { return std::string("not ready although every predecessor has fresh data"); });
+  }
+}
+
+void ReleaseRules::end_of_trace() {
+  if (context_.info.driver != trace::Driver::Simulator) return;
+  for (std::size_t t = 0; t < tasks_.size(); ++t) {
+    const TaskId id(t);
+    if (!tasks_[t].timer || removed_[context_.replay.dag_of(id).value]) continue;
+    const Task &task = context_.replay.task(id);
+    const std::uint32_t next = tasks_[t].next_number;
+    const Time due = context_.info.start + task.offset + static_cast<Time>(next) * task.period;
+    context_.expect(Rule::Grid, due + task.jitter >= context_.info.end, id, next,
+                    [&] { return "it was never released; due at " + format_duration(due); });
+  }
+}
+
+void ReleaseRules::touch(TaskId id) {
+  if (tasks_[id.value].touched) return;
+  tasks_[id.value].touched = true;
+  touched_.push_back(id);
+}
+
+TaskId ReleaseRules::missing(const TaskState &task, Time release) const {
+  for (const std::uint32_t edge : task.in) {
+    if (!is_fresh(edges_[edge], release)) return edges_[edge].from;
+  }
+  return TaskId::none();
+}
+
+Time ReleaseRules::consume(const TaskState &task) {
+  Time origin = kNever;
+  for (const std::uint32_t edge : task.in) {
+    edges_[edge].fresh = false;
+    origin = std::min(origin, edges_[edge].origin);
+  }
+  return origin;
+}
+
+}  // namespace redag::metrics

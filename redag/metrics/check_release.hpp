@@ -1,0 +1,71 @@
+// The checker's rules about releases: the timer grid, precedence, overrun and admission. Sees each event before the
+// replay applies it. Internal to metrics/.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "redag/metrics/check_context.hpp"
+
+namespace redag::metrics {
+
+class ReleaseRules {
+ public:
+  explicit ReleaseRules(CheckContext &context);
+
+  void before(const JobEvent &event);
+  /// Time is about to move on.
+  void end_of_instant();
+  void end_of_trace();
+
+ private:
+  struct Edge {
+    TaskId from;
+    TaskId to;
+    bool aligned = false;  // timer to timer, same period and offset: only data of the same period or later counts
+    bool fresh = false;    // completed since `to` last consumed
+    Time release = 0;      // of the job that completed last
+    Time origin = 0;
+    Time finish = 0;          // as measured
+    Time finish_decided = 0;  // when the scheduler heard of it
+  };
+  struct TaskState {
+    bool timer = true;
+    std::vector<std::uint32_t> in;   // edges
+    std::vector<std::uint32_t> out;  // edges
+    std::uint32_t next_number = 0;
+    Time data_origin = 0;  // of the data job released last
+    bool touched = false;
+  };
+  struct ExpectedSkip {
+    TaskId task;
+    std::uint32_t number = 0;
+    Reason reason = Reason::None;
+  };
+
+  void released(const JobEvent &event);
+  void check_grid(const JobEvent &event);
+  void check_data_release(const JobEvent &event);
+  void expect_skips(const JobEvent &event);
+  void ready(const JobEvent &event, const LiveJob &job);
+  void skipped(const JobEvent &event, const LiveJob *job);
+  void finished(const JobEvent &event, const LiveJob &job);
+  void check_nothing_is_owed(TaskId id);
+  void touch(TaskId id);
+
+  [[nodiscard]] bool is_fresh(const Edge &edge, Time release) const {
+    return edge.fresh && (!edge.aligned || edge.release >= release);
+  }
+  /// The first predecessor without fresh data for a job released at `release`; none() if there is no such.
+  [[nodiscard]] TaskId missing(const TaskState &task, Time release) const;
+  Time consume(const TaskState &task);
+
+  CheckContext &context_;
+  std::vector<Edge> edges_;
+  std::vector<TaskState> tasks_;
+  std::vector<bool> removed_;  // per DAG
+  std::vector<ExpectedSkip> expected_skips_;
+  std::vector<TaskId> touched_;
+};
+
+}  // namespace redag::metrics

@@ -1,0 +1,60 @@
+#include "redag/metrics/check_report.hpp"
+
+#include <algorithm>
+
+namespace redag::metrics {
+
+const char *to_string(Rule rule) {
+  switch (rule) {
+    case Rule::Stream: return "stream";
+    case Rule::Life: return "life";
+    case Rule::Conservation: return "conservation";
+    case Rule::Grid: return "grid";
+    case Rule::Precedence: return "precedence";
+    case Rule::Admission: return "admission";
+    case Rule::Deadline: return "deadline";
+    case Rule::TaskOverlap: return "task_overlap";
+    case Rule::MaxActive: return "max_active";
+    case Rule::Group: return "group";
+    case Rule::Worker: return "worker";
+    case Rule::Preemption: return "preemption";
+    case Rule::Priority: return "priority";
+    case Rule::WorkConservation: return "work_conservation";
+    case Rule::Deferral: return "deferral";
+    case Rule::Execution: return "execution";
+  }
+  return "?";
+}
+
+RuleSet RuleSet::all() { return {}; }
+
+RuleSet RuleSet::wait_set() {
+  return all()
+      .without(Rule::Priority)
+      .without(Rule::WorkConservation)
+      .without(Rule::Deferral)
+      .without(Rule::Preemption)
+      .without(Rule::MaxActive);
+}
+
+RuleSet RuleSet::without(Rule rule) const {
+  RuleSet rest = *this;
+  rest.bits_ &= ~(1U << static_cast<unsigned>(rule));
+  return rest;
+}
+
+std::string Violation::to_string() const {
+  std::string line = format_duration(time) + " ";
+  if (!job.empty()) line += job + ": ";
+  return line + redag::metrics::to_string(rule) + ": " + text + " (event " + std::to_string(event) + ")";
+}
+
+std::string CheckReport::to_string(std::size_t at_most) const {
+  std::string text;
+  const std::size_t shown = std::min(at_most, violations.size());
+  for (std::size_t i = 0; i < shown; ++i) text += violations[i].to_string() + "\n";
+  if (violation_count > shown) text += "and " + std::to_string(violation_count - shown) + " more\n";
+  return text;
+}
+
+}  // namespace redag::metrics

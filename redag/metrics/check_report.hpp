@@ -1,0 +1,82 @@
+// What the trace checker found: violations by rule, and how often each rule was put to the test (a rule that was never
+// tested proves nothing). Plain values.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "redag/base/ids.hpp"
+#include "redag/base/time.hpp"
+
+namespace redag::metrics {
+
+/// The rules of docs/model.md that a trace can be held to.
+enum class Rule : std::uint8_t {
+  Stream,            // times never decrease, ids exist, nothing is lost
+  Life,              // state transitions, numbers from 0 upwards, no job twice
+  Conservation,      // released = finished + skipped + aborted + in flight, for every task
+  Grid,              // timer job k is released for start + offset + k * T, and none is left out
+  Precedence,        // ready exactly when every predecessor has fresh data; data jobs released then
+  Admission,         // skipped exactly when, and for the reason that, the model says
+  Deadline,          // absolute deadline = r + D
+  TaskOverlap,       // jobs of one task never overlap and start in order of release
+  MaxActive,         // a DAG has at most max_active jobs started and unfinished; all together max_started
+  Group,             // jobs of one group never overlap
+  Worker,            // a worker runs one job at a time; suspended jobs go on in LIFO order (cooperative)
+  Preemption,        // only in modes that have it, at preemption points, by more urgent jobs
+  Priority,          // no eligible job waits while a less urgent one is chosen or (full) runs
+  WorkConservation,  // no worker is free while an eligible job waits
+  Deferral,          // deferred exactly when max_active alone kept the job from a worker that it could have had
+  Execution,         // simulator: a job held a worker for exactly its execution time
+};
+inline constexpr std::size_t kRuleCount = 16;
+
+[[nodiscard]] const char *to_string(Rule rule);
+
+/// Which rules a trace is held to.
+class RuleSet {
+ public:
+  /// Everything: ReDAG-RT's own executors.
+  [[nodiscard]] static RuleSet all();
+  /// Models of rclcpp's wait-set executors: without Priority, WorkConservation, Deferral, Preemption and MaxActive,
+  /// which those do not have.
+  [[nodiscard]] static RuleSet wait_set();
+
+  [[nodiscard]] RuleSet without(Rule rule) const;
+  [[nodiscard]] bool contains(Rule rule) const { return ((bits_ >> static_cast<unsigned>(rule)) & 1U) != 0; }
+
+ private:
+  std::uint32_t bits_ = (1U << kRuleCount) - 1;
+};
+
+struct Violation {
+  Rule rule = Rule::Stream;
+  Time time = 0;
+  std::size_t event = 0;  // index of the event at which it was seen
+  std::string job;        // "control.ekf#12"
+  std::string text;
+
+  /// "12.5ms control.ekf#12: priority: ..."
+  [[nodiscard]] std::string to_string() const;
+};
+
+struct CheckReport {
+  /// Violations kept with their text; the others are only counted.
+  static constexpr std::size_t kMaxKept = 200;
+
+  std::vector<Violation> violations;
+  std::uint64_t violation_count = 0;
+  std::array<std::uint64_t, kRuleCount> violations_by_rule{};
+  std::array<std::uint64_t, kRuleCount> checks_by_rule{};
+
+  [[nodiscard]] bool ok() const { return violation_count == 0; }
+  [[nodiscard]] std::uint64_t checks(Rule rule) const { return checks_by_rule[static_cast<std::size_t>(rule)]; }
+  [[nodiscard]] std::uint64_t violated(Rule rule) const { return violations_by_rule[static_cast<std::size_t>(rule)]; }
+  /// The first `at_most` violations, one a line, and how many more there are.
+  [[nodiscard]] std::string to_string(std::size_t at_most = 10) const;
+};
+
+}  // namespace redag::metrics

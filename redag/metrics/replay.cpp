@@ -1,0 +1,285 @@
+#include "redag/metrics/replay.hpp"
+
+#include <algorithm>
+#include <unordered_map>
+
+namespace redag::metrics {
+
+using State = LiveJob::State;
+
+Replay::Replay(const Workload &workload, const sched::Config &config)
+    : config_(config),
+      priorities_(sched::assign_priorities(workload.dags, config.policy, config.levels)),
+      workers_(config.workers),
+      free_workers_(config.workers) {
+  level_of_rank_.resize(priorities_.size());
+  for (const sched::Priority &priority : priorities_) level_of_rank_[priority.rank] = priority.level;
+  std::unordered_map<std::string, std::uint32_t> group_ids;
+  for (const Dag &dag : workload.dags) {
+    Shared shared;
+    shared.capacity = dag.max_active;
+    for (const redag::Task &task : dag.tasks) {
+      TaskState state;
+      state.task = &task;
+      state.dag = DagId(dags_.size());
+      const TaskId id(tasks_.size());
+      if (!task.group.empty()) {
+        state.group = group_ids.try_emplace(task.group, static_cast<std::uint32_t>(groups_.size())).first->second;
+        if (state.group == groups_.size()) groups_.push_back(Shared{0, 0, 1, {}});
+        groups_[state.group].tasks.push_back(id);
+      }
+      shared.tasks.push_back(id);
+      tasks_.push_back(std::move(state));
+    }
+    dags_.push_back(std::move(shared));
+  }
+}
+
+LiveJob *Replay::find_mutable(TaskId task, std::uint32_t number) {
+  for (LiveJob &job : tasks_[task.value].live) {
+    if (job.number == number) return &job;
+  }
+  return nullptr;
+}
+
+const LiveJob *Replay::find(TaskId task, std::uint32_t number) const {
+  for (const LiveJob &job : tasks_[task.value].live) {
+    if (job.number == number) return &job;
+  }
+  return nullptr;
+}
+
+const char *Replay::apply(const JobEvent &event) {
+  if (event.kind == JobEventKind::Released) {
+    if (find(event.task, event.job) != nullptr) return "it was released before";
+    LiveJob job;
+    job.task = event.task;
+    job.number = event.job;
+    job.release = event.value;
+    job.deadline = event.value + task(event.task).deadline;
+    tasks_[event.task.value].live.push_back(job);
+    ++dags_[dag_of(event.task).value].pending;
+    return nullptr;
+  }
+  LiveJob *job = find_mutable(event.task, event.job);
+  return job == nullptr ? "no such job is released and not ended" : apply_to(*job, event);
+}
+
+const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
+  const State before = job.state;
+  const char *problem = nullptr;
+  switch (event.kind) {
+    case JobEventKind::Released: break;
+    case JobEventKind::Ready:
+      if (before != State::Waiting) return "it was ready before";
+      job.origin = event.value;
+      job.own = urgency_of(job);
+      job.raised = job.own;
+      move_to(job, State::Ready);
+      return nullptr;
+    case JobEventKind::Deferred:
+      if (before != State::Ready) return "only a ready job can be deferred";
+      if (job.deferred) return "it was deferred before";
+      job.deferred = true;
+      refresh(job.task);
+      return nullptr;
+    case JobEventKind::Dispatched:
+      if (job.started()) return "it had started before";
+      if (before == State::Waiting) {
+        problem = "it was dispatched before it was ready";
+        job.own = urgency_of(job);
+        job.raised = job.own;
+      }
+      if (const char *worker_problem = take_worker(job, event)) problem = worker_problem;
+      move_to(job, State::Running);
+      return problem;
+    case JobEventKind::Started:
+      if (!job.started()) return "its body began before it was dispatched";
+      if (job.body_began) return "its body began twice";
+      job.body_began = true;
+      return nullptr;
+    case JobEventKind::Preempted:
+      if (before != State::Running) return "only a running job can be preempted";
+      job.executed += event.time - job.on_worker_since;
+      if (config_.preemption == sched::Preemption::Full) {
+        problem = leave_worker(job);
+        suspended_.push_back(JobRef{job.task, job.number});
+      }
+      move_to(job, State::Suspended);
+      return problem;
+    case JobEventKind::Resumed:
+      if (before != State::Suspended) return "only a preempted job can be resumed";
+      problem = take_worker(job, event);
+      move_to(job, State::Running);
+      return problem;
+    case JobEventKind::Finished:
+    case JobEventKind::Aborted:
+      if (!job.started()) problem = "it ended without having started";
+      if (before == State::Running) job.executed += event.value - job.on_worker_since;
+      if (job.started()) {
+        if (const char *worker_problem = leave_worker(job)) problem = worker_problem;
+      }
+      erase(event.task, event.job);
+      return problem;
+    case JobEventKind::Skipped:
+      if (job.started()) {
+        problem = "a job that has started cannot be skipped";
+        leave_worker(job);
+      }
+      erase(event.task, event.job);
+      return problem;
+  }
+  return "unknown kind of event";
+}
+
+// Puts the job on the event's worker; a resumed one leaves where it waited.
+const char *Replay::take_worker(LiveJob &job, const JobEvent &event) {
+  const JobRef ref{job.task, job.number};
+  std::erase(suspended_, ref);
+  job.on_worker_since = event.time;
+  if (event.worker >= workers_.size()) return "there is no such worker";
+  std::vector<JobRef> &stack = workers_[event.worker];
+  if (job.state == State::Suspended && !stack.empty() && stack.back() == ref) return nullptr;  // Cooperative: goes on
+
+  const char *problem = nullptr;
+  if (job.state == State::Suspended && config_.preemption == sched::Preemption::Cooperative) {
+    problem = "a suspended job goes on only where it was suspended, when what ran on top of it has ended";
+    leave_worker(job);
+  }
+  if (running(event.worker) != nullptr) problem = "the worker runs another job";
+  if (stack.empty()) --free_workers_;
+  stack.push_back(ref);
+  job.worker = event.worker;
+  return problem;
+}
+
+const char *Replay::leave_worker(const LiveJob &job) {
+  const JobRef ref{job.task, job.number};
+  const char *problem = nullptr;
+  for (std::vector<JobRef> &stack : workers_) {
+    const auto found = std::find(stack.begin(), stack.end(), ref);
+    if (found == stack.end()) continue;
+    if (found + 1 != stack.end()) problem = "it ended under a job that runs on top of it";
+    stack.erase(found);
+    if (stack.empty()) ++free_workers_;
+    return problem;
+  }
+  std::erase(suspended_, ref);
+  return nullptr;
+}
+
+// All counts follow the state; nothing else changes them.
+void Replay::move_to(LiveJob &job, State state) {
+  const bool was_started = job.started();
+  const bool was_ended = job.state == State::Ended;
+  job.state = state;
+  const bool is_pending_now = state == State::Waiting || state == State::Ready;
+  TaskState &task = tasks_[job.task.value];
+  Shared &dag = dags_[task.dag.value];
+  if (!was_started && !was_ended && !is_pending_now) --dag.pending;
+  if (was_started == job.started()) {
+    refresh(job.task);
+    return;
+  }
+  const auto step = [&](std::uint32_t &count) { count = job.started() ? count + 1 : count - 1; };
+  step(task.active);
+  step(dag.active);
+  step(started_);
+  if (task.group != kNoGroup) step(groups_[task.group].active);
+  refresh_sharers(job.task);
+}
+
+void Replay::erase(TaskId task, std::uint32_t number) {
+  move_to(*find_mutable(task, number), State::Ended);
+  std::erase_if(tasks_[task.value].live, [](const LiveJob &job) { return job.state == State::Ended; });
+  refresh(task);
+}
+
+Replay::Gate Replay::gate_of(const TaskState &task, const LiveJob *&first) const {
+  for (const LiveJob &job : task.live) {
+    if (job.state != State::Ready) continue;
+    first = &job;
+    break;
+  }
+  if (first == nullptr) return Gate::NoJob;
+  if (task.active > 0) return Gate::Task;
+  const Shared &dag = dags_[task.dag.value];
+  if (dag.capacity > 0 && dag.active >= dag.capacity) return Gate::Dag;
+  return task.group != kNoGroup && groups_[task.group].active > 0 ? Gate::Group : Gate::Open;
+}
+
+void Replay::refresh(TaskId id) {
+  TaskState &task = tasks_[id.value];
+  const LiveJob *first = nullptr;
+  const Gate gate = gate_of(task, first);
+  const Waiter waiter = first == nullptr ? Waiter{} : Waiter{first->own, id, first->number};
+  if (task.gate == Gate::Open && (gate != Gate::Open || waiter != task.waiter)) eligible_.erase(task.waiter);
+  if (gate == Gate::Open && (task.gate != Gate::Open || waiter != task.waiter)) eligible_.insert(waiter);
+  const bool group_is_free = task.group == kNoGroup || groups_[task.group].active == 0;
+  if (gate == Gate::Dag && group_is_free && !first->deferred) {
+    owed_deferral_.insert(id);
+  } else {
+    owed_deferral_.erase(id);
+  }
+  task.gate = gate;
+  task.waiter = waiter;
+  if (gate != Gate::Group || config_.policy == PolicyKind::Fifo) return;
+  for (const TaskId sharer : groups_[task.group].tasks) {
+    for (LiveJob &job : tasks_[sharer.value].live) {
+      if (job.started()) job.raised = std::min(job.raised, first->own);
+    }
+  }
+}
+
+// A job started or ended: what its task, DAG and group keep waiting may have changed.
+void Replay::refresh_sharers(TaskId id) {
+  refresh(id);
+  const TaskState &task = tasks_[id.value];
+  const Shared &dag = dags_[task.dag.value];
+  if (dag.capacity > 0) {
+    for (const TaskId sharer : dag.tasks) refresh(sharer);
+  }
+  if (task.group != kNoGroup) {
+    for (const TaskId sharer : groups_[task.group].tasks) refresh(sharer);
+  }
+}
+
+Urgency Replay::urgency_of(const LiveJob &job) {
+  const std::uint32_t rank = priorities_[job.task.value].rank;
+  const std::uint64_t sequence = next_sequence_++;
+  switch (config_.policy) {
+    case PolicyKind::Edf: return Urgency{job.deadline, rank, sequence};
+    case PolicyKind::Fifo: return Urgency{static_cast<std::int64_t>(sequence), rank, sequence};
+    default: return Urgency{rank, rank, sequence};
+  }
+}
+
+const LiveJob *Replay::running(std::uint32_t worker) const {
+  const std::vector<JobRef> &stack = workers_[worker];
+  if (stack.empty()) return nullptr;
+  const LiveJob *top = find(stack.back().task, stack.back().number);
+  return top != nullptr && top->state == State::Running ? top : nullptr;
+}
+
+Urgency Replay::inherited(const LiveJob &job) const {
+  Urgency urgency = job.own;
+  const std::uint32_t group = group_of(job.task);
+  if (group == kNoGroup || !job.started() || config_.policy == PolicyKind::Fifo) return urgency;
+  for (const TaskId sharer : groups_[group].tasks) {
+    const TaskState &task = tasks_[sharer.value];
+    if (task.gate == Gate::Group) urgency.key = std::min(urgency.key, task.waiter.urgency.key);
+  }
+  return urgency;
+}
+
+bool Replay::preempts(const Urgency &urgency, const Urgency &running) const {
+  switch (config_.policy) {
+    case PolicyKind::Edf: return urgency < running;
+    case PolicyKind::Fifo: return false;  // who became ready later never preempts
+    default:
+      return level_of_rank_[static_cast<std::size_t>(urgency.key)] <
+             level_of_rank_[static_cast<std::size_t>(running.key)];
+  }
+}
+
+}  // namespace redag::metrics

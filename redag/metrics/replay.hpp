@@ -1,0 +1,152 @@
+// The state of a run as its events tell it: which job is where, what each worker does, which ready jobs are eligible
+// and how urgent they are (docs/model.md). Written from the model, not from the scheduler, so that the trace checker
+// does not repeat the scheduler's mistakes. Policy ranks come from sched::assign_priorities. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "redag/model/job_event.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/sched/policy.hpp"
+#include "redag/sched/scheduler.hpp"
+
+namespace redag::metrics {
+
+/// Place in the total order of jobs; smaller is more urgent. `key`: rank of the task (static policies), absolute
+/// deadline (edf), order of readiness (fifo).
+struct Urgency {
+  std::int64_t key = 0;
+  std::uint32_t rank = 0;
+  std::uint64_t sequence = 0;  // order of readiness
+
+  friend auto operator<=>(const Urgency &, const Urgency &) = default;
+};
+
+struct LiveJob {
+  // Waiting -> Ready -> Running <-> Suspended -> Ended; Waiting, Ready -> Ended.
+  enum class State : std::uint8_t { Waiting, Ready, Running, Suspended, Ended };
+
+  TaskId task;
+  std::uint32_t number = 0;
+  State state = State::Waiting;
+  bool deferred = false;
+  bool body_began = false;  // a Started event was seen
+  std::uint32_t worker = WorkerId::kNoneValue;
+  Time release = 0;
+  Time deadline = 0;
+  Time origin = 0;
+  Urgency own;
+  Urgency raised;  // own, or the most urgent job that ever waited for its group while it held it
+  Time on_worker_since = 0;
+  Duration executed = 0;  // until the last event that changed its state
+
+  [[nodiscard]] bool started() const { return state == State::Running || state == State::Suspended; }
+};
+
+class Replay {
+ public:
+  struct JobRef {
+    TaskId task;
+    std::uint32_t number = 0;
+    friend bool operator==(const JobRef &, const JobRef &) = default;
+  };
+  struct Waiter {
+    Urgency urgency;
+    TaskId task;
+    std::uint32_t number = 0;
+    friend auto operator<=>(const Waiter &, const Waiter &) = default;
+  };
+  static constexpr std::uint32_t kNoGroup = 0xffffffff;
+
+  /// `workload` must outlive the replay.
+  Replay(const Workload &workload, const sched::Config &config);
+
+  /// Moves on by one event. Returns null, or what is wrong with it; the state then follows the event as far as that
+  /// makes sense, so that one mistake is not reported for ever. Requires a task of the workload.
+  const char *apply(const JobEvent &event);
+
+  [[nodiscard]] const LiveJob *find(TaskId task, std::uint32_t number) const;
+  /// Jobs released and not ended, in order of release.
+  [[nodiscard]] std::span<const LiveJob> jobs_of(TaskId task) const { return tasks_[task.value].live; }
+  [[nodiscard]] const Task &task(TaskId id) const { return *tasks_[id.value].task; }
+  [[nodiscard]] DagId dag_of(TaskId id) const { return tasks_[id.value].dag; }
+  [[nodiscard]] std::uint32_t group_of(TaskId id) const { return tasks_[id.value].group; }
+  [[nodiscard]] std::size_t task_count() const { return tasks_.size(); }
+
+  // Jobs started and unfinished; pending: released and not started.
+  [[nodiscard]] std::uint32_t active(DagId dag) const { return dags_[dag.value].active; }
+  [[nodiscard]] std::uint32_t pending(DagId dag) const { return dags_[dag.value].pending; }
+  [[nodiscard]] std::uint32_t task_active(TaskId id) const { return tasks_[id.value].active; }
+  [[nodiscard]] std::uint32_t group_active(std::uint32_t group) const { return groups_[group].active; }
+  [[nodiscard]] std::uint32_t started() const { return started_; }
+
+  /// Jobs on a worker, the suspended ones (Cooperative) below.
+  [[nodiscard]] std::span<const JobRef> stack(std::uint32_t worker) const { return workers_[worker]; }
+  [[nodiscard]] std::uint32_t worker_count() const { return static_cast<std::uint32_t>(workers_.size()); }
+  [[nodiscard]] std::uint32_t free_workers() const { return free_workers_; }
+  /// The job that executes on a worker; null if none.
+  [[nodiscard]] const LiveJob *running(std::uint32_t worker) const;
+  /// Full preemption: started jobs that have no worker.
+  [[nodiscard]] std::span<const JobRef> suspended() const { return suspended_; }
+
+  /// Eligible jobs, most urgent first; at most one a task. Empty while `max_started` jobs have started.
+  [[nodiscard]] const std::set<Waiter> &eligible() const { return at_thread_limit() ? none_ : eligible_; }
+  /// Tasks whose first ready job waits for its DAG's max_active alone and has not been counted as deferred.
+  [[nodiscard]] const std::set<TaskId> &owed_deferral() const { return owed_deferral_; }
+
+  /// Urgency with what the job inherits from those that wait for its group now.
+  [[nodiscard]] Urgency inherited(const LiveJob &job) const;
+  /// May a job this urgent take the worker of one that is `running` so urgent?
+  [[nodiscard]] bool preempts(const Urgency &urgency, const Urgency &running) const;
+
+ private:
+  enum class Gate : std::uint8_t { NoJob, Task, Dag, Group, Open };
+  struct TaskState {
+    const redag::Task *task = nullptr;
+    DagId dag;
+    std::uint32_t group = kNoGroup;
+    std::uint32_t active = 0;
+    std::vector<LiveJob> live;
+    Gate gate = Gate::NoJob;  // what keeps the first ready job from being eligible
+    Waiter waiter;            // that job, where gate is not NoJob
+  };
+  struct Shared {  // a DAG or a group
+    std::uint32_t active = 0;
+    std::uint32_t pending = 0;
+    std::uint32_t capacity = 0;  // 0: no bound
+    std::vector<TaskId> tasks;
+  };
+
+  LiveJob *find_mutable(TaskId task, std::uint32_t number);
+  const char *apply_to(LiveJob &job, const JobEvent &event);
+  const char *take_worker(LiveJob &job, const JobEvent &event);
+  const char *leave_worker(const LiveJob &job);
+  void move_to(LiveJob &job, LiveJob::State state);
+  void erase(TaskId task, std::uint32_t number);
+  void refresh(TaskId task);
+  void refresh_sharers(TaskId task);
+  [[nodiscard]] Gate gate_of(const TaskState &task, const LiveJob *&first) const;
+  [[nodiscard]] Urgency urgency_of(const LiveJob &job);
+  [[nodiscard]] bool at_thread_limit() const { return config_.max_started > 0 && started_ >= config_.max_started; }
+
+  sched::Config config_;
+  std::vector<sched::Priority> priorities_;
+  std::vector<std::uint32_t> level_of_rank_;
+  std::vector<TaskState> tasks_;
+  std::vector<Shared> dags_;
+  std::vector<Shared> groups_;
+  std::vector<std::vector<JobRef>> workers_;
+  std::vector<JobRef> suspended_;
+  std::set<Waiter> eligible_;
+  std::set<TaskId> owed_deferral_;
+  const std::set<Waiter> none_;
+  std::uint32_t free_workers_ = 0;
+  std::uint32_t started_ = 0;
+  std::uint64_t next_sequence_ = 0;
+};
+
+}  // namespace redag::metrics

@@ -1,0 +1,17 @@
+// Holds a trace to docs/model.md: replays the events and reports every place where they say something that the model
+// forbids. Independent of the scheduler's code; near-linear in the number of events. Pure function.
+//
+// Simultaneous events: several decisions can share one time. A choice against an eligible job counts as a violation
+// only if that job has still not started when time moves on; states (free workers, priorities) are judged when time
+// moves on.
+#pragma once
+
+#include "redag/metrics/check_report.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag::metrics {
+
+/// A trace with lost events has holes: that is its one violation, and nothing else is checked.
+[[nodiscard]] CheckReport check_trace(const trace::Trace &trace, const RuleSet &rules = RuleSet::all());
+
+}  // namespace redag::metrics
