@@ -22,6 +22,10 @@ if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
 endif()
 
+# Messages name files as the repository does, whichever machine built them.
+cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH repository)
+add_compile_options(-fmacro-prefix-map=${repository}/=)
+
 include(GNUInstallDirs)
 include(${CMAKE_CURRENT_LIST_DIR}/warnings.cmake)
 include(${CMAKE_CURRENT_LIST_DIR}/sanitizers.cmake)

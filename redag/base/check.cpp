@@ -5,10 +5,10 @@
 
 namespace redag::detail {
 
-void check_failed(const char *condition, const char *message, std::source_location where) noexcept {
+void check_failed(const char *condition, const char *message, const char *file, int line) noexcept {
   std::fprintf(stderr,
-               "%s:%u: internal error: %s [%s]\nThis is a bug in ReDAG-RT; please report it with the workload.\n",
-               where.file_name(), static_cast<unsigned>(where.line()), message, condition);
+               "%s:%d: internal error: %s [%s]\nThis is a bug in ReDAG-RT; please report it with the workload.\n", file,
+               line, message, condition);
   std::fflush(stderr);
   std::abort();
 }

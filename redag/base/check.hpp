@@ -2,16 +2,14 @@
 // worse than one that stops and says where.
 #pragma once
 
-#include <source_location>
-
 namespace redag::detail {
 
 /// Prints the condition and its place to standard error and aborts.
-[[noreturn]] void check_failed(const char *condition, const char *message, std::source_location where) noexcept;
+[[noreturn]] void check_failed(const char *condition, const char *message, const char *file, int line) noexcept;
 
 }  // namespace redag::detail
 
-#define REDAG_CHECK(condition, message) \
-  (static_cast<bool>(condition)         \
-       ? static_cast<void>(0)           \
-       : ::redag::detail::check_failed(#condition, message, ::std::source_location::current()))
+// __FILE__ and not std::source_location: clang 14 has none with GCC's standard library.
+#define REDAG_CHECK(condition, message)                \
+  (static_cast<bool>(condition) ? static_cast<void>(0) \
+                                : ::redag::detail::check_failed(#condition, message, __FILE__, __LINE__))
