@@ -59,11 +59,12 @@ class FieldSet {
     return *this;
   }
   friend constexpr FieldSet operator|(FieldSet a, FieldSet b) { return a |= b; }
-  friend constexpr FieldSet operator|(Field a, Field b) { return FieldSet(a) | FieldSet(b); }
 
  private:
   std::uint32_t bits_ = 0;
 };
+
+[[nodiscard]] constexpr FieldSet operator|(Field a, Field b) { return FieldSet(a) | FieldSet(b); }
 
 /// One broken rule and the place in the workload to change.
 struct Finding {

@@ -1,0 +1,117 @@
+#include "redag/model/generate_utilization.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "redag/base/check.hpp"
+
+namespace redag::generation {
+namespace {
+
+using Vector = std::vector<double>;
+
+double sum(const Vector &values) { return std::accumulate(values.begin(), values.end(), 0.0); }
+
+/// Uniform on the standard simplex: the flat Dirichlet distribution.
+Vector draw_simplex(std::size_t count, Rng &rng) {
+  Vector point(count);
+  for (double &x : point) x = -std::log(1.0 - rng.uniform01());
+  const double total = sum(point);
+  for (double &x : point) x /= total;
+  return point;
+}
+
+/// The points of the simplex with x >= violated form a smaller simplex; this maps it onto the whole, as often as the
+/// point stays inside. One application is x -> (x - v) / (1 - sum v), a dilation about v / sum v, so p of them have a
+/// closed form.
+void expand(Vector &point, const Vector &violated) {
+  const double total = sum(violated);
+  const double scale = 1.0 - total;
+  double power = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < point.size(); ++i) {
+    const double centre = violated[i] / total;
+    if (point[i] < centre) power = std::min(power, std::log(1.0 - point[i] / centre) / std::log(scale));
+  }
+  // The largest whole power strictly inside; a point that is the centre itself moves nowhere, and one step says so.
+  power = std::isfinite(power) ? std::max(1.0, std::ceil(power) - 1.0) : 1.0;
+  const double factor = std::pow(scale, power);
+  for (std::size_t i = 0; i < point.size(); ++i) {
+    const double centre = violated[i] / total;
+    point[i] = centre + (point[i] - centre) / factor;
+  }
+}
+
+/// Moves `point` until it keeps the limits. False if rounding errors, which every step magnifies, grow too large.
+bool rescale(Vector &point, const Vector &limits) {
+  constexpr int kMaxRescales = 1000;
+  constexpr double kEpsilon = 1e-9;
+  Vector violated(point.size());
+  for (int round = 0; round < kMaxRescales; ++round) {
+    bool any = false;
+    for (std::size_t i = 0; i < point.size(); ++i) {
+      const bool over = point[i] > limits[i];
+      violated[i] = over ? limits[i] : 0.0;
+      any = any || over;
+    }
+    if (!any) return std::all_of(point.begin(), point.end(), [](double x) { return x >= 0; });
+    expand(point, violated);
+    const double total = sum(point);
+    if (!(std::abs(total - 1.0) < kEpsilon)) return false;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::optional<Vector> drs(double total, const Vector &upper, Rng &rng) {
+  REDAG_CHECK(total > 0 && !upper.empty(), "there is something to share");
+  Vector limits(upper.size());
+  std::transform(upper.begin(), upper.end(), limits.begin(), [total](double u) { return std::min(1.0, u / total); });
+  const double slack = sum(limits) - 1.0;
+  constexpr double kNoChoice = 1e-12;
+  if (slack <= kNoChoice) {
+    if (slack < -kNoChoice) return std::nullopt;
+    for (double &x : limits) x *= total;
+    return limits;  // every task at its bound
+  }
+  // Where the bounds are tight (sum of limits below 2) the simplex of the slacks limit - x is the smaller one: draw
+  // those.
+  const bool draw_slacks = slack < 1.0;
+  Vector bounds = limits;
+  if (draw_slacks) {
+    for (double &x : bounds) x /= slack;
+  }
+  constexpr int kAttempts = 1000;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    Vector point = draw_simplex(upper.size(), rng);
+    if (!rescale(point, bounds)) continue;
+    for (std::size_t i = 0; i < point.size(); ++i) {
+      const double share = draw_slacks ? limits[i] - slack * point[i] : point[i];
+      point[i] = std::clamp(share * total, 0.0, upper[i]);
+    }
+    return point;
+  }
+  return std::nullopt;
+}
+
+std::optional<Vector> uunifast_discard(std::size_t count, double total, double bound, int attempts, Rng &rng) {
+  REDAG_CHECK(count > 0, "there is something to share");
+  Vector values(count);
+  for (int attempt = 0; attempt < attempts; ++attempt) {
+    double rest = total;
+    bool kept = true;
+    for (std::size_t i = 0; i + 1 < count && kept; ++i) {
+      const double next = rest * std::pow(rng.uniform01(), 1.0 / static_cast<double>(count - i - 1));
+      values[i] = rest - next;
+      kept = values[i] <= bound;
+      rest = next;
+    }
+    values.back() = rest;
+    if (kept && rest <= bound) return values;
+  }
+  return std::nullopt;
+}
+
+}  // namespace redag::generation

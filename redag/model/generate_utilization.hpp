@@ -1,0 +1,22 @@
+// Vectors of utilizations with a given sum and a bound for each, for generate.cpp. Pure, given the generator.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "redag/base/rng.hpp"
+
+namespace redag::generation {
+
+/// Uniform over {u : sum u = total, 0 <= u_i <= upper_i}: Dirichlet-Rescale, D. Griffin, I. Bate, R. Davis, "Generating
+/// Utilization Vectors for the Systematic Evaluation of Schedulability Tests", RTSS 2020. Requires total > 0 and
+/// total <= sum upper. Nothing if rounding defeated every attempt.
+[[nodiscard]] std::optional<std::vector<double>> drs(double total, const std::vector<double> &upper, Rng &rng);
+
+/// Uniform over {u : sum u = total, 0 <= u_i <= bound}: UUniFast (E. Bini, G. Buttazzo, RTS 30, 2005) until a vector
+/// keeps the bound (R. Davis, A. Burns, RTSS 2009). Nothing after `attempts` without one.
+[[nodiscard]] std::optional<std::vector<double>> uunifast_discard(std::size_t count, double total, double bound,
+                                                                  int attempts, Rng &rng);
+
+}  // namespace redag::generation

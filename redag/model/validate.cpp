@@ -1,0 +1,378 @@
+#include "redag/model/validate.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace redag {
+namespace {
+
+constexpr std::array<const char *, kFieldCount> kFieldNames = {
+    "name",        "platform",    "workers",    "preemption", "policy",   "dags",     "tasks",  "max_active",
+    "max_pending", "criticality", "wcet",       "bcet",       "period",   "deadline", "offset", "jitter",
+    "region",      "budget",      "activation", "overrun",    "priority", "group",    "after",  "execution"};
+
+struct DurationRule {
+  Field field;
+  Duration Task::*member;
+  Duration smallest;
+};
+
+constexpr std::array kDurationRules = {
+    DurationRule{Field::Wcet, &Task::wcet, 1},     DurationRule{Field::Bcet, &Task::bcet, 0},
+    DurationRule{Field::Period, &Task::period, 1}, DurationRule{Field::Deadline, &Task::deadline, 1},
+    DurationRule{Field::Offset, &Task::offset, 0}, DurationRule{Field::Jitter, &Task::jitter, 0},
+    DurationRule{Field::Region, &Task::region, 0}, DurationRule{Field::Budget, &Task::budget, 0},
+};
+
+/// Collects findings about one workload; the place is set as the walk goes.
+class Checker {
+ public:
+  explicit Checker(const Workload &workload) : workload_(workload) {}
+
+  std::vector<Finding> run() {
+    check_platform();
+    if (workload_.dags.empty()) error(Field::Dags, Field::Dags, "the workload has no DAGs", "add one under 'dags:'");
+    check_dag_names();
+    for (std::size_t d = 0; d < workload_.dags.size(); ++d) check_dag(DagId(d));
+    dag_ = DagId::none();
+    check_load();
+    return std::move(findings_);
+  }
+
+ private:
+  Finding &add(Severity severity, Field at, FieldSet involves, std::string message, std::string hint) {
+    involves |= at;
+    return findings_.emplace_back(
+        Finding{severity, dag_, task_, at, Finding::kNone, involves, std::move(message), std::move(hint)});
+  }
+  Finding &error(Field at, FieldSet involves, std::string message, std::string hint = {}) {
+    return add(Severity::Error, at, involves, std::move(message), std::move(hint));
+  }
+  Finding &warning(Field at, FieldSet involves, std::string message, std::string hint = {}) {
+    return add(Severity::Warning, at, involves, std::move(message), std::move(hint));
+  }
+
+  void check_platform() {
+    const Platform &platform = workload_.platform;
+    if (platform.workers < 1 || platform.workers > kMaxWorkers) {
+      error(Field::Workers, {}, fmt::format("workers must be from 1 to {}, not {}", kMaxWorkers, platform.workers));
+    }
+    const bool dynamic = workload_.policy == PolicyKind::Edf || workload_.policy == PolicyKind::Fifo;
+    if (platform.preemption == PreemptionMode::Os && dynamic) {
+      error(Field::Preemption, Field::Policy,
+            fmt::format("preemption 'os' needs a static policy, and '{}' is not one", to_string(workload_.policy)),
+            "use cooperative or none, or another policy");
+    }
+    const auto has_priority = [](const Dag &dag) {
+      return std::any_of(dag.tasks.begin(), dag.tasks.end(),
+                         [](const Task &task) { return task.priority.has_value(); });
+    };
+    if (workload_.policy == PolicyKind::Fixed &&
+        std::none_of(workload_.dags.begin(), workload_.dags.end(), has_priority)) {
+      warning(Field::Policy, Field::Priority, "policy 'fixed', but no task has a priority", "give tasks a 'priority'");
+    }
+  }
+
+  // Names are printed in one-line messages and tables.
+  void check_name(const std::string &name, std::string_view what) {
+    if (name.empty()) {
+      error(Field::Name, {}, fmt::format("a {} has no name", what), "add 'name:'");
+    } else if (std::any_of(name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; })) {
+      error(Field::Name, {}, fmt::format("the name of a {} contains a control character", what));
+    }
+  }
+
+  void check_dag_names() {
+    std::unordered_map<std::string_view, std::size_t> seen;
+    for (std::size_t d = 0; d < workload_.dags.size(); ++d) {
+      dag_ = DagId(d);
+      const std::string &name = workload_.dags[d].name;
+      check_name(name, "DAG");
+      if (!name.empty() && !seen.emplace(name, d).second) {
+        error(Field::Name, {}, fmt::format("there is another DAG '{}'", name), "names of DAGs are unique");
+      }
+    }
+    dag_ = DagId::none();
+  }
+
+  void check_dag(DagId id) {
+    dag_ = id;
+    const Dag &dag = workload_.dags[id.value];
+    if (dag.deadline < 0 || dag.deadline > kMaxDuration) {
+      error(Field::Deadline, {}, fmt::format("deadline of DAG '{}' is negative or too large", dag.name));
+    }
+    if (dag.tasks.empty()) error(Field::Tasks, {}, fmt::format("DAG '{}' has no tasks", dag.name));
+    std::unordered_map<std::string_view, std::size_t> seen;
+    seen.reserve(dag.tasks.size());
+    bool sound_edges = true;
+    for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {
+      task_ = i;
+      const Task &task = dag.tasks[i];
+      check_name(task.name, "task");
+      if (!task.name.empty() && !seen.emplace(task.name, i).second) {
+        error(Field::Name, {}, fmt::format("there is another task '{}' in DAG '{}'", task.name, dag.name),
+              "names of tasks are unique in their DAG");
+      }
+      check_durations(task);
+      check_execution(task);
+      check_activation(task);
+      check_options(task);
+      sound_edges = check_edges(dag, task, i) && sound_edges;
+    }
+    task_ = Finding::kNone;
+    const bool acyclic = check_cycles(dag);
+    if (sound_edges && acyclic) check_inherited_periods(dag);
+  }
+
+  void check_durations(const Task &task) {
+    for (const DurationRule &rule : kDurationRules) {
+      const Duration value = task.*rule.member;
+      const char *name = to_string(rule.field);
+      // A data task's period is check_inherited_periods()' business.
+      if (rule.field == Field::Period && task.activation == Activation::Data) continue;
+      if (rule.field == Field::Period && value == 0) {
+        error(rule.field, {}, fmt::format("timer task '{}' has no period", task.name),
+              "give it or its DAG a 'period', or 'activation: data'");
+      } else if (value < rule.smallest) {
+        error(rule.field, rule.field == Field::Deadline ? FieldSet(Field::Period) : FieldSet(),
+              fmt::format("{} of task '{}' must {}, not {}", name, task.name,
+                          rule.smallest == 0 ? "not be negative" : "be greater than zero", format_duration(value)));
+      } else if (value > kMaxDuration) {
+        error(rule.field, {}, fmt::format("{} of task '{}' is too large", name, task.name));
+      }
+    }
+    check_against_wcet(task);
+    if (task.activation == Activation::Timer && task.period > 0 && task.jitter > task.period) {
+      error(Field::Jitter, Field::Period,
+            fmt::format("jitter {} of task '{}' exceeds its period {}", format_duration(task.jitter), task.name,
+                        format_duration(task.period)),
+            "a release would overtake the one before");
+    }
+  }
+
+  void check_against_wcet(const Task &task) {
+    const std::string wcet = format_duration(task.wcet);
+    if (task.bcet > task.wcet) {
+      error(Field::Bcet, Field::Wcet,
+            fmt::format("bcet {} of task '{}' exceeds its wcet {}", format_duration(task.bcet), task.name, wcet));
+    }
+    if (task.deadline > 0 && task.wcet > task.deadline) {
+      warning(
+          Field::Wcet, Field::Deadline | Field::Period,
+          fmt::format("wcet {} of task '{}' exceeds its deadline {}", wcet, task.name, format_duration(task.deadline)),
+          "it misses whenever it runs that long");
+    } else if (task.period > 0 && task.wcet > task.period) {
+      warning(Field::Wcet, Field::Period,
+              fmt::format("wcet {} of task '{}' exceeds its period {}", wcet, task.name, format_duration(task.period)));
+    }
+    if (task.budget > 0 && task.budget < task.wcet) {
+      warning(Field::Budget, Field::Wcet,
+              fmt::format("budget {} of task '{}' is below its wcet {}", format_duration(task.budget), task.name, wcet),
+              "jobs within the wcet are cut off");
+    }
+  }
+
+  void check_execution(const Task &task) {
+    using Kind = ExecutionTime::Kind;
+    const ExecutionTime &model = task.execution;
+    const FieldSet bounds = Field::Wcet | Field::Bcet;
+    if (model.kind == Kind::Normal) {
+      if (model.mean < task.bcet || model.mean > task.wcet || model.mean <= 0) {
+        error(Field::Execution, bounds,
+              fmt::format("mean {} of task '{}' is not between its bcet and wcet", format_duration(model.mean),
+                          task.name));
+      }
+      if (model.stddev < 0 || model.stddev > kMaxDuration) {
+        error(Field::Execution, {}, fmt::format("stddev of task '{}' is negative or too large", task.name));
+      }
+    }
+    if (model.kind != Kind::Empirical) return;
+    if (model.samples.empty()) {
+      error(Field::Execution, {}, fmt::format("task '{}' has no execution-time samples", task.name));
+    }
+    for (std::size_t i = 0; i < model.samples.size(); ++i) {
+      const Duration sample = model.samples[i];
+      if (sample > 0 && sample >= task.bcet && sample <= task.wcet) continue;
+      error(Field::Execution, bounds,
+            fmt::format("sample {} of task '{}' is not between its bcet and wcet", format_duration(sample), task.name))
+          .item = static_cast<std::uint32_t>(i);
+    }
+  }
+
+  void check_activation(const Task &task) {
+    if (task.activation == Activation::Timer) return;
+    if (task.predecessors.empty()) {
+      error(Field::Activation, Field::After, fmt::format("data task '{}' has no predecessor", task.name),
+            "name them with 'after:', or use 'activation: timer'");
+    }
+    for (const auto &[field, value] : {std::pair{Field::Offset, task.offset}, std::pair{Field::Jitter, task.jitter}}) {
+      if (value == 0) continue;
+      error(field, Field::Activation, fmt::format("data task '{}' has a {}", task.name, to_string(field)),
+            "only timer tasks have one: its predecessors release it");
+    }
+  }
+
+  void check_options(const Task &task) {
+    if (task.overrun == Overrun::Queue && (task.queue_depth < 1 || task.queue_depth > kMaxQueueDepth)) {
+      error(Field::Overrun, {},
+            fmt::format("queue depth of task '{}' must be from 1 to {}, not {}", task.name, kMaxQueueDepth,
+                        task.queue_depth));
+    }
+    if (task.priority && workload_.policy != PolicyKind::Fixed) {
+      warning(Field::Priority, Field::Policy,
+              fmt::format("policy '{}' ignores the priority of task '{}'", to_string(workload_.policy), task.name),
+              "use 'policy: fixed', or remove it");
+    }
+  }
+
+  bool check_edges(const Dag &dag, const Task &task, std::uint32_t index) {
+    bool sound = task.activation == Activation::Timer || !task.predecessors.empty();
+    std::vector<std::uint32_t> seen;
+    for (std::uint32_t k = 0; k < task.predecessors.size(); ++k) {
+      const std::uint32_t p = task.predecessors[k];
+      std::string message;
+      if (p >= dag.tasks.size()) {
+        message = fmt::format("predecessor {} of task '{}' does not exist", p, task.name);
+      } else if (p == index) {
+        message = fmt::format("task '{}' is its own predecessor", task.name);
+      }
+      if (message.empty()) {
+        seen.push_back(p);
+        continue;
+      }
+      sound = false;
+      error(Field::After, {}, std::move(message)).item = k;
+    }
+    std::sort(seen.begin(), seen.end());
+    if (std::adjacent_find(seen.begin(), seen.end()) == seen.end()) return sound;
+    report_duplicate_edges(dag, task);
+    return false;
+  }
+
+  void report_duplicate_edges(const Dag &dag, const Task &task) {
+    std::unordered_map<std::uint32_t, std::uint32_t> first;
+    for (std::uint32_t k = 0; k < task.predecessors.size(); ++k) {
+      const std::uint32_t p = task.predecessors[k];
+      if (p >= dag.tasks.size() || first.emplace(p, k).second) continue;
+      error(Field::After, {}, fmt::format("task '{}' names predecessor '{}' twice", task.name, dag.tasks[p].name))
+          .item = k;
+    }
+  }
+
+  // Depth-first search along predecessors, without recursion; an edge back to the current path closes a cycle. One
+  // finding for every such edge, up to a bound that keeps the report readable.
+  bool check_cycles(const Dag &dag) {
+    enum class Mark : std::uint8_t { New, OnPath, Done };
+    struct Step {
+      std::uint32_t task;
+      std::uint32_t next = 0;  // position in its predecessors
+    };
+    constexpr std::size_t kMostReported = 10;
+    std::vector<Mark> marks(dag.tasks.size(), Mark::New);
+    std::vector<Step> path;
+    std::size_t cycles = 0;
+    for (std::uint32_t root = 0; root < dag.tasks.size(); ++root) {
+      if (marks[root] != Mark::New) continue;
+      path.push_back({root});
+      marks[root] = Mark::OnPath;
+      while (!path.empty()) {
+        Step &top = path.back();
+        const auto &predecessors = dag.tasks[top.task].predecessors;
+        if (top.next == predecessors.size()) {
+          marks[top.task] = Mark::Done;
+          path.pop_back();
+          continue;
+        }
+        const std::uint32_t p = predecessors[top.next++];
+        if (p >= dag.tasks.size() || p == top.task) continue;  // reported as edges
+        if (marks[p] == Mark::OnPath && cycles++ < kMostReported) {
+          auto start = std::find_if(path.begin(), path.end(), [p](const Step &step) { return step.task == p; });
+          std::vector<std::uint32_t> cycle;
+          for (; start != path.end(); ++start) cycle.push_back(start->task);
+          report_cycle(dag, std::move(cycle));
+        } else if (marks[p] == Mark::New) {
+          marks[p] = Mark::OnPath;
+          path.push_back({p});
+        }
+      }
+    }
+    return cycles == 0;
+  }
+
+  // `cycle` runs against the edges: each is a successor of the next.
+  void report_cycle(const Dag &dag, std::vector<std::uint32_t> cycle) {
+    constexpr std::size_t kMostNamed = 12;
+    std::reverse(cycle.begin(), cycle.end());
+    std::rotate(cycle.begin(), std::min_element(cycle.begin(), cycle.end()), cycle.end());
+    std::string names;
+    for (std::size_t i = 0; i < cycle.size() && i < kMostNamed; ++i) names += dag.tasks[cycle[i]].name + " -> ";
+    if (cycle.size() > kMostNamed) names += fmt::format("({} more) -> ", cycle.size() - kMostNamed);
+    task_ = cycle.front();
+    error(Field::After, {}, fmt::format("cycle in DAG '{}': {}{}", dag.name, names, dag.tasks[cycle.front()].name),
+          "a task cannot wait for itself");
+    task_ = Finding::kNone;
+  }
+
+  // Only on acyclic DAGs without unsound edges: elsewhere there is nothing to inherit.
+  void check_inherited_periods(const Dag &dag) {
+    for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {
+      const Task &task = dag.tasks[i];
+      if (task.activation != Activation::Data) continue;
+      Duration largest = 0;
+      for (const std::uint32_t p : task.predecessors) largest = std::max(largest, dag.tasks[p].period);
+      if (task.period == largest) continue;
+      task_ = i;
+      error(Field::Period, Field::After,
+            fmt::format("period {} of data task '{}' is not the largest of its predecessors', {}",
+                        format_duration(task.period), task.name, format_duration(largest)),
+            "call inherit_periods()");
+    }
+    task_ = Finding::kNone;
+  }
+
+  void check_load() {
+    double utilization = 0;
+    for (const Dag &dag : workload_.dags) {
+      for (const Task &task : dag.tasks) {
+        if (task.period > 0) utilization += static_cast<double>(task.wcet) / static_cast<double>(task.period);
+      }
+    }
+    constexpr double kRounding = 1e-9;
+    if (utilization <= static_cast<double>(workload_.platform.workers) * (1 + kRounding)) return;
+    warning(Field::Workers, Field::Wcet | Field::Period,
+            fmt::format("utilization {:.4g} exceeds the {} worker{}", utilization, workload_.platform.workers,
+                        workload_.platform.workers == 1 ? "" : "s"),
+            "no schedule meets every deadline if jobs run for their wcet");
+  }
+
+  const Workload &workload_;
+  DagId dag_;
+  std::uint32_t task_ = Finding::kNone;
+  std::vector<Finding> findings_;
+};
+
+}  // namespace
+
+const char *to_string(Field field) { return kFieldNames[static_cast<std::size_t>(field)]; }
+
+std::vector<Finding> find_mistakes(const Workload &workload) { return Checker(workload).run(); }
+
+Diagnostics validate(const Workload &workload) {
+  Diagnostics diagnostics;
+  for (Finding &finding : find_mistakes(workload)) {
+    diagnostics.push_back(Diagnostic{finding.severity, {}, 0, 0, std::move(finding.message), std::move(finding.hint)});
+  }
+  return diagnostics;
+}
+
+bool has_errors(const Diagnostics &diagnostics) {
+  return std::any_of(diagnostics.begin(), diagnostics.end(),
+                     [](const Diagnostic &diagnostic) { return diagnostic.severity == Severity::Error; });
+}
+
+}  // namespace redag

@@ -1,0 +1,566 @@
+#include "redag/model/workload_yaml.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <optional>
+#include <span>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "redag/model/validate.hpp"
+#include "redag/model/workload_yaml_nearest.hpp"
+#include "redag/model/workload_yaml_tree.hpp"
+
+namespace redag {
+namespace {
+
+using yaml::Node;
+
+constexpr std::array kTopFields = {Field::Name, Field::Platform, Field::Policy, Field::Dags};
+constexpr std::array kPlatformFields = {Field::Workers, Field::Preemption};
+constexpr std::array kDagFields = {Field::Name,       Field::Period,      Field::Deadline, Field::MaxActive,
+                                   Field::MaxPending, Field::Criticality, Field::Tasks};
+constexpr std::array kTaskFields = {Field::Name,     Field::Wcet,    Field::Bcet,        Field::Period,
+                                    Field::Deadline, Field::Offset,  Field::Jitter,      Field::Region,
+                                    Field::Budget,   Field::Group,   Field::Criticality, Field::Activation,
+                                    Field::After,    Field::Overrun, Field::Priority,    Field::Execution};
+
+constexpr std::array kCriticalities = {Criticality::Low, Criticality::Normal, Criticality::High};
+constexpr std::array kActivations = {Activation::Timer, Activation::Data};
+constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic,
+                                  PolicyKind::Fixed,         PolicyKind::Edf,
+                                  PolicyKind::Fifo,          PolicyKind::ChainAware};
+constexpr std::array kPreemptionModes = {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os,
+                                         PreemptionMode::Auto};
+
+/// A map of the file and which of its values could not be read. Findings that look at those are not repeated.
+struct Part {
+  const Node *node = nullptr;
+  FieldSet broken;
+};
+
+struct TaskPart : Part {
+  std::vector<const Node *> edges;  // beside Task::predecessors
+};
+
+struct DagPart : Part {
+  std::vector<TaskPart> tasks;
+};
+
+const Node *find(const Node &map, std::string_view key) {
+  for (std::size_t i = 0; i + 1 < map.children.size(); i += 2) {
+    if (map.children[i].text == key) return &map.children[i + 1];
+  }
+  return nullptr;
+}
+
+const Node *find(const Part &part, Field field) { return find(*part.node, to_string(field)); }
+
+std::vector<std::string_view> names_of(std::span<const Field> fields) {
+  std::vector<std::string_view> names;
+  for (const Field field : fields) names.emplace_back(to_string(field));
+  return names;
+}
+
+/// One file on its way to a workload: reads the tree, gathers every mistake, then lets validate.hpp look at the whole.
+class Reader {
+ public:
+  Reader(const Node &root, std::string file) : file_(std::move(file)) { root_.node = &root; }
+
+  Result<LoadedWorkload> run() {
+    read_top();
+    if (structure_known_) {
+      inherit();
+      report(find_mistakes(workload_));
+    }
+    std::stable_sort(diagnostics_.begin(), diagnostics_.end(), [](const Diagnostic &a, const Diagnostic &b) {
+      return std::tie(a.line, a.column) < std::tie(b.line, b.column);
+    });
+    if (has_errors(diagnostics_)) return tl::unexpected<Diagnostics>(std::move(diagnostics_));
+    return LoadedWorkload{std::move(workload_), std::move(diagnostics_)};
+  }
+
+ private:
+  // --- mistakes ---
+
+  void error(const Node &at, std::string message, std::string hint = {}) {
+    diagnostics_.push_back(Diagnostic{Severity::Error, file_, at.line, at.column, std::move(message), std::move(hint)});
+  }
+
+  void wrong_type(const Node &at, std::string_view key, std::string_view expected) {
+    error(at, fmt::format("{} must be {}, not {}", key, expected, yaml::describe(at)));
+  }
+
+  std::string did_you_mean(std::string_view name, const std::vector<std::string_view> &candidates,
+                           std::string_view else_say) {
+    // Many wrong names among many candidates would take quadratic time: after some thousands, no more hints.
+    if (candidates.size() > comparisons_left_) return std::string(else_say);
+    comparisons_left_ -= candidates.size();
+    const std::string_view best = yaml::nearest(name, candidates);
+    return best.empty() ? std::string(else_say) : fmt::format("did you mean '{}'?", best);
+  }
+
+  // --- maps and values ---
+
+  /// False if the node is not a map. Reports unknown, repeated and odd keys.
+  bool check_map(const Node &node, std::string_view what, const std::vector<std::string_view> &keys) {
+    if (node.kind != Node::Kind::Map) {
+      wrong_type(node, what, fmt::format("a map of {}", fmt::join(keys, ", ")));
+      return false;
+    }
+    std::vector<std::string_view> seen;
+    for (std::size_t i = 0; i + 1 < node.children.size(); i += 2) {
+      const Node &key = node.children[i];
+      if (key.kind != Node::Kind::Scalar) {
+        error(key, fmt::format("a key must be a name, not {}", yaml::describe(key)));
+      } else if (std::find(keys.begin(), keys.end(), key.text) == keys.end()) {
+        error(key, fmt::format("unknown key {} in {}", yaml::describe(key), what),
+              did_you_mean(key.text, keys, fmt::format("known: {}", fmt::join(keys, ", "))));
+      } else if (std::find(seen.begin(), seen.end(), key.text) != seen.end()) {
+        error(key, fmt::format("key '{}' is given twice", key.text));
+      } else {
+        seen.push_back(key.text);
+      }
+    }
+    return true;
+  }
+
+  std::optional<Duration> duration(const Node &node, std::string_view key) {
+    if (node.kind != Node::Kind::Scalar) {
+      wrong_type(node, key, "a duration such as 5ms");
+      return std::nullopt;
+    }
+    Result<Duration> value = parse_duration(node.text);
+    if (value) return *value;
+    for (const Diagnostic &why : value.error()) error(node, fmt::format("{}: {}", key, why.message), why.hint);
+    return std::nullopt;
+  }
+
+  template <class Integer>
+  std::optional<Integer> integer(const Node &node, std::string_view key, Integer smallest) {
+    Integer value = 0;
+    if (node.kind == Node::Kind::Scalar && !node.quoted) {
+      const char *end = node.text.data() + node.text.size();
+      const auto [used, code] = std::from_chars(node.text.data(), end, value);
+      if (code == std::errc() && used == end && value >= smallest) return value;
+    }
+    wrong_type(node, key, fmt::format("a whole number from {} to {}", smallest, std::numeric_limits<Integer>::max()));
+    return std::nullopt;
+  }
+
+  std::optional<std::string> text(const Node &node, std::string_view key) {
+    if (node.kind == Node::Kind::Scalar && !node.text.empty()) return node.text;
+    wrong_type(node, key, "a name");
+    return std::nullopt;
+  }
+
+  template <class Enum>
+  std::optional<Enum> one_of(const Node &node, std::string_view key, std::span<const Enum> values) {
+    std::vector<std::string_view> names;
+    for (const Enum value : values) {
+      names.emplace_back(to_string(value));
+      if (node.kind == Node::Kind::Scalar && node.text == names.back()) return value;
+    }
+    unknown_choice(node, key, names);
+    return std::nullopt;
+  }
+
+  void unknown_choice(const Node &node, std::string_view key, const std::vector<std::string_view> &names) {
+    wrong_type(node, key, fmt::format("one of {}", fmt::join(names, ", ")));
+    if (node.kind == Node::Kind::Scalar) diagnostics_.back().hint = did_you_mean(node.text, names, "");
+  }
+
+  /// Reads `field` of `part` with `read` into `out`, if it is there; remembers a failure.
+  template <class T, class Read>
+  void take(Part &part, Field field, T &out, Read read) {
+    const Node *node = find(part, field);
+    if (node == nullptr) return;
+    if (auto value = read(*node, to_string(field))) {
+      out = std::move(*value);
+    } else {
+      part.broken |= field;
+    }
+  }
+
+  void take_text(Part &part, Field field, std::string &out) {
+    take(part, field, out, [this](const Node &node, std::string_view key) { return text(node, key); });
+  }
+  void take_duration(Part &part, Field field, Duration &out) {
+    take(part, field, out, [this](const Node &node, std::string_view key) { return duration(node, key); });
+  }
+  /// For durations where 0 in the model means "not given".
+  void take_positive_duration(Part &part, Field field, Duration &out) {
+    take(part, field, out, [this](const Node &node, std::string_view key) {
+      std::optional<Duration> value = duration(node, key);
+      if (value && *value <= 0) {
+        error(node, fmt::format("{} must be greater than zero, not {}", key, yaml::describe(node)));
+        value.reset();
+      }
+      return value;
+    });
+  }
+  void take_count(Part &part, Field field, std::uint32_t &out) {
+    take(part, field, out,
+         [this](const Node &node, std::string_view key) { return integer<std::uint32_t>(node, key, 1); });
+  }
+  template <class Enum, std::size_t N>
+  void take_enum(Part &part, Field field, Enum &out, const std::array<Enum, N> &values) {
+    take(part, field, out,
+         [&](const Node &node, std::string_view key) { return one_of(node, key, std::span<const Enum>(values)); });
+  }
+
+  /// The items of a list that may be absent or null (then validate.hpp says what is missing).
+  const std::vector<Node> *take_list(Part &part, Field field) {
+    const Node *node = find(part, field);
+    if (node == nullptr || node->kind == Node::Kind::Null) return nullptr;
+    if (node->kind == Node::Kind::Sequence) return &node->children;
+    wrong_type(*node, to_string(field), "a list");
+    part.broken |= field;
+    return nullptr;
+  }
+
+  // --- the parts of a workload ---
+
+  void read_top() {
+    if (root_.node->kind == Node::Kind::Null) {
+      error(Node{}, "there is no workload in it", "the smallest has a DAG with one task: see docs/workload_format.md");
+      return;
+    }
+    if (!check_map(*root_.node, "a workload", names_of(kTopFields))) return;
+    structure_known_ = true;
+    take_text(root_, Field::Name, workload_.name);
+    take_enum(root_, Field::Policy, workload_.policy, kPolicies);
+    read_platform();
+    const std::vector<Node> *dags = take_list(root_, Field::Dags);
+    if (dags == nullptr) return;
+    workload_.dags.resize(dags->size());
+    dags_.resize(dags->size());
+    for (std::size_t d = 0; d < dags->size(); ++d) read_dag((*dags)[d], workload_.dags[d], dags_[d]);
+  }
+
+  void read_platform() {
+    platform_.node = find(root_, Field::Platform);
+    if (platform_.node == nullptr) return;
+    if (!check_map(*platform_.node, "platform", names_of(kPlatformFields))) {
+      root_.broken |= Field::Workers | Field::Preemption;
+      return;
+    }
+    take_count(platform_, Field::Workers, workload_.platform.workers);
+    take_enum(platform_, Field::Preemption, workload_.platform.preemption, kPreemptionModes);
+    root_.broken |= platform_.broken;
+  }
+
+  void read_dag(const Node &node, Dag &dag, DagPart &part) {
+    part.node = &node;
+    if (!check_map(node, "a DAG", names_of(kDagFields))) {
+      for (const Field field : kDagFields) part.broken |= field;
+      return;
+    }
+    take_text(part, Field::Name, dag.name);
+    Duration period = 0;
+    take_positive_duration(part, Field::Period, period);
+    take_positive_duration(part, Field::Deadline, dag.deadline);
+    take_count(part, Field::MaxActive, dag.max_active);
+    take_count(part, Field::MaxPending, dag.max_pending);
+    take_enum(part, Field::Criticality, dag.criticality, kCriticalities);
+    const std::vector<Node> *tasks = take_list(part, Field::Tasks);
+    if (tasks == nullptr) return;
+    dag.tasks.resize(tasks->size());
+    part.tasks.resize(tasks->size());
+    for (std::size_t i = 0; i < tasks->size(); ++i) {
+      dag.tasks[i].criticality = dag.criticality;
+      read_task((*tasks)[i], dag.tasks[i], part.tasks[i]);
+      take_period(dag.tasks[i], part.tasks[i], period, part.broken);
+    }
+    read_edges(dag, part);
+  }
+
+  void read_task(const Node &node, Task &task, TaskPart &part) {
+    part.node = &node;
+    if (!check_map(node, "a task", names_of(kTaskFields))) {
+      for (const Field field : kTaskFields) part.broken |= field;
+      return;
+    }
+    take_text(part, Field::Name, task.name);
+    take_duration(part, Field::Wcet, task.wcet);
+    take_duration(part, Field::Bcet, task.bcet);
+    take_positive_duration(part, Field::Deadline, task.deadline);
+    take_duration(part, Field::Offset, task.offset);
+    take_duration(part, Field::Jitter, task.jitter);
+    take_duration(part, Field::Region, task.region);
+    take_duration(part, Field::Budget, task.budget);
+    take_text(part, Field::Group, task.group);
+    take_enum(part, Field::Criticality, task.criticality, kCriticalities);
+    take_enum(part, Field::Activation, task.activation, kActivations);
+    take(part, Field::Priority, task.priority, [this](const Node &value, std::string_view key) {
+      return integer<int>(value, key, std::numeric_limits<int>::min());
+    });
+    take_overrun(task, part);
+    if (find(part, Field::Bcet) != nullptr) task.execution.kind = ExecutionTime::Kind::Uniform;
+    take(part, Field::Execution, task.execution,
+         [this](const Node &value, std::string_view) { return execution(value); });
+    if (find(part, Field::Wcet) == nullptr) {
+      error(node, fmt::format("task '{}' has no wcet", task.name), "add 'wcet:', the longest execution time");
+      part.broken |= Field::Wcet;
+    }
+  }
+
+  void take_period(Task &task, TaskPart &part, Duration inherited, FieldSet dag_broken) {
+    const Node *given = part.node->kind == Node::Kind::Map ? find(part, Field::Period) : nullptr;
+    if (part.broken.intersects(Field::Activation)) part.broken |= Field::Period;
+    if (task.activation == Activation::Data) {
+      if (given == nullptr) return;
+      error(*given, fmt::format("data task '{}' has a period", task.name),
+            "it inherits the largest of its predecessors': remove it, or use 'activation: timer'");
+      part.broken |= Field::Period;
+    } else if (given != nullptr) {
+      take_duration(part, Field::Period, task.period);
+    } else {
+      task.period = inherited;
+      if (dag_broken.intersects(Field::Period)) part.broken |= Field::Period;
+    }
+  }
+
+  void take_overrun(Task &task, TaskPart &part) {
+    const Node *node = find(part, Field::Overrun);
+    if (node == nullptr || (node->kind == Node::Kind::Scalar && node->text == "skip")) return;
+    if (node->kind == Node::Kind::Scalar && node->text == "queue") {
+      task.overrun = Overrun::Queue;
+    } else if (node->kind == Node::Kind::Map) {
+      task.overrun = Overrun::Queue;
+      check_map(*node, "overrun", {"queue"});
+      const Node *depth = find(*node, "queue");
+      if (depth == nullptr) {
+        error(*node, "overrun has no queue depth", "write {queue: 3}");
+      } else if (const auto value = integer<std::uint32_t>(*depth, "queue", 1)) {
+        task.queue_depth = *value;
+        return;
+      }
+      part.broken |= Field::Overrun;
+    } else {
+      unknown_choice(*node, "overrun", {"skip", "queue", "{queue: N}"});
+      part.broken |= Field::Overrun;
+    }
+  }
+
+  std::optional<ExecutionTime> execution(const Node &node) {
+    using Kind = ExecutionTime::Kind;
+    ExecutionTime model;
+    if (node.kind == Node::Kind::Scalar && (node.text == "constant" || node.text == "uniform")) {
+      model.kind = node.text == "constant" ? Kind::Constant : Kind::Uniform;
+      return model;
+    }
+    if (node.kind != Node::Kind::Map) {
+      unknown_choice(node, "execution",
+                     {"constant", "uniform", "{normal: {mean, stddev}}", "{empirical: [durations]}"});
+      return std::nullopt;
+    }
+    check_map(node, "execution", {"normal", "empirical"});
+    const Node *normal = find(node, "normal");
+    const Node *empirical = find(node, "empirical");
+    if ((normal == nullptr) == (empirical == nullptr)) {
+      error(node, "execution must have one of normal, empirical");
+      return std::nullopt;
+    }
+    return normal != nullptr ? normal_execution(*normal) : empirical_execution(*empirical);
+  }
+
+  std::optional<ExecutionTime> normal_execution(const Node &node) {
+    if (!check_map(node, "normal", {"mean", "stddev"})) return std::nullopt;
+    std::array<std::optional<Duration>, 2> values;
+    constexpr std::array<std::string_view, 2> kKeys = {"mean", "stddev"};
+    for (std::size_t i = 0; i < kKeys.size(); ++i) {
+      if (const Node *value = find(node, kKeys[i])) {
+        values[i] = duration(*value, kKeys[i]);
+      } else {
+        error(node, fmt::format("normal has no {}", kKeys[i]));
+      }
+    }
+    if (!values[0] || !values[1]) return std::nullopt;
+    return ExecutionTime{ExecutionTime::Kind::Normal, *values[0], *values[1], {}};
+  }
+
+  std::optional<ExecutionTime> empirical_execution(const Node &node) {
+    if (node.kind != Node::Kind::Sequence) {
+      wrong_type(node, "empirical", "a list of durations");
+      return std::nullopt;
+    }
+    ExecutionTime model{ExecutionTime::Kind::Empirical, 0, 0, {}};
+    for (const Node &item : node.children) {
+      if (const auto sample = duration(item, "empirical")) model.samples.push_back(*sample);
+    }
+    if (model.samples.size() != node.children.size()) return std::nullopt;
+    return model;
+  }
+
+  /// Names become positions once all tasks of the DAG are known.
+  void read_edges(Dag &dag, DagPart &part) {
+    std::unordered_map<std::string_view, std::uint32_t> positions;
+    std::vector<std::string_view> names;
+    positions.reserve(dag.tasks.size());
+    for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {
+      names.emplace_back(dag.tasks[i].name);
+      positions.emplace(dag.tasks[i].name, i);
+    }
+    for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {
+      TaskPart &task = part.tasks[i];
+      const Node *after = task.node->kind == Node::Kind::Map ? find(task, Field::After) : nullptr;
+      if (after == nullptr) continue;
+      const bool list = after->kind == Node::Kind::Sequence;
+      for (const Node &item : list ? std::span<const Node>(after->children) : std::span<const Node>(after, 1)) {
+        read_edge(item, dag, i, task, positions, names);
+      }
+    }
+  }
+
+  void read_edge(const Node &item, Dag &dag, std::uint32_t index, TaskPart &part,
+                 const std::unordered_map<std::string_view, std::uint32_t> &positions,
+                 const std::vector<std::string_view> &names) {
+    if (const auto name = text(item, "after")) {
+      const auto found = positions.find(*name);
+      if (found != positions.end()) {
+        dag.tasks[index].predecessors.push_back(found->second);
+        part.edges.push_back(&item);
+        return;
+      }
+      error(item, fmt::format("there is no task {} in DAG '{}'", yaml::describe(item), dag.name),
+            did_you_mean(*name, names, "'after' names tasks of the same DAG"));
+    }
+    part.broken |= Field::After;
+  }
+
+  // --- the workload as a whole ---
+
+  /// Periods of data tasks and deadlines that are not given. A DAG whose edges are wrong has none to inherit.
+  void inherit() {
+    std::vector<bool> unsound(workload_.dags.size(), false);
+    for (const Finding &finding : find_mistakes(workload_)) {
+      const bool structural = finding.field == Field::After || finding.field == Field::Activation;
+      if (finding.dag.valid() && structural) unsound[finding.dag.value] = true;
+    }
+    for (std::size_t d = 0; d < workload_.dags.size(); ++d) {
+      Dag &dag = workload_.dags[d];
+      std::vector<std::uint32_t> order(dag.tasks.size());
+      if (!unsound[d]) {
+        const std::vector<std::uint32_t> ranks = topological_ranks(dag);
+        for (std::uint32_t i = 0; i < ranks.size(); ++i) order[ranks[i]] = i;
+        mark_unknown_periods(dag, dags_[d], order);
+        inherit_periods(dag);
+        continue;
+      }
+      for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {
+        Task &task = dag.tasks[i];
+        if (task.activation == Activation::Data) dags_[d].tasks[i].broken |= Field::Period;
+        mark_unknown_deadline(task, dags_[d].tasks[i]);
+        if (task.deadline == 0) task.deadline = task.period;
+      }
+    }
+  }
+
+  static void mark_unknown_periods(const Dag &dag, DagPart &part, const std::vector<std::uint32_t> &order) {
+    for (const std::uint32_t i : order) {
+      const Task &task = dag.tasks[i];
+      const auto unknown = [&](std::uint32_t p) { return part.tasks[p].broken.intersects(Field::Period); };
+      if (task.activation == Activation::Data &&
+          (part.tasks[i].broken.intersects(Field::After) ||
+           std::any_of(task.predecessors.begin(), task.predecessors.end(), unknown))) {
+        part.tasks[i].broken |= Field::Period;
+      }
+      mark_unknown_deadline(task, part.tasks[i]);
+    }
+  }
+
+  static void mark_unknown_deadline(const Task &task, TaskPart &part) {
+    if (task.deadline == 0 && part.broken.intersects(Field::Period)) part.broken |= Field::Deadline;
+  }
+
+  void report(std::vector<Finding> findings) {
+    FieldSet broken = root_.broken;
+    for (const DagPart &dag : dags_) {
+      broken |= dag.broken;
+      for (const TaskPart &task : dag.tasks) broken |= task.broken;
+    }
+    for (Finding &finding : findings) {
+      const Part *part = &root_;
+      FieldSet unknown = broken;  // what is said about the whole workload looks at all of it
+      if (finding.dag.valid()) {
+        const DagPart &dag = dags_[finding.dag.value];
+        part = finding.task == Finding::kNone ? static_cast<const Part *>(&dag) : &dag.tasks[finding.task];
+        unknown = part->broken;
+        if (finding.field == Field::Priority) unknown |= root_.broken;
+      }
+      if (finding.involves.intersects(unknown)) continue;
+      const Node &at = place(finding, *part);
+      diagnostics_.push_back(
+          Diagnostic{finding.severity, file_, at.line, at.column, std::move(finding.message), std::move(finding.hint)});
+    }
+  }
+
+  const Node &place(const Finding &finding, const Part &part) const {
+    const bool of_platform = finding.field == Field::Workers || finding.field == Field::Preemption;
+    const Part &holder = of_platform && platform_.node != nullptr ? platform_ : part;
+    const Node *value = holder.node->kind == Node::Kind::Map ? find(holder, finding.field) : nullptr;
+    if (value == nullptr) return *part.node;
+    if (finding.item == Finding::kNone) return *value;
+    if (finding.field == Field::After) return *dags_[finding.dag.value].tasks[finding.task].edges[finding.item];
+    const Node *samples = find(*value, "empirical");
+    return samples == nullptr ? *value : samples->children[finding.item];
+  }
+
+  std::string file_;
+  Part root_;
+  Part platform_;
+  std::vector<DagPart> dags_;
+  Workload workload_;
+  Diagnostics diagnostics_;
+  bool structure_known_ = false;
+  std::size_t comparisons_left_ = 200'000;
+};
+
+Result<std::string> read_file(const std::filesystem::path &path) {
+  const auto fail = [&](std::string why) {
+    return tl::unexpected<Diagnostics>(
+        Diagnostics{Diagnostic{Severity::Error, path.string(), 0, 0, std::move(why), {}}});
+  };
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) return fail("is a directory, not a workload file");
+  errno = 0;
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) return fail(fmt::format("cannot open: {}", std::strerror(errno)));
+  std::string text;
+  std::array<char, 65536> buffer{};
+  while (stream.read(buffer.data(), buffer.size()), stream.gcount() > 0) {
+    text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
+    if (text.size() > kMaxWorkloadBytes) break;
+  }
+  if (stream.bad()) return fail(fmt::format("cannot read: {}", std::strerror(errno)));
+  return text;
+}
+
+}  // namespace
+
+Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_name) {
+  if (text.size() > kMaxWorkloadBytes) {
+    return tl::unexpected<Diagnostics>(Diagnostics{
+        Diagnostic{Severity::Error, file_name, 0, 0, fmt::format("larger than {} MiB", kMaxWorkloadBytes >> 20U), {}}});
+  }
+  const Result<Node> root = yaml::parse(text, file_name);
+  if (!root) return tl::unexpected<Diagnostics>(root.error());
+  return Reader(*root, std::move(file_name)).run();
+}
+
+Result<LoadedWorkload> load_workload(const std::filesystem::path &path) {
+  const Result<std::string> text = read_file(path);
+  if (!text) return tl::unexpected<Diagnostics>(text.error());
+  return parse_workload(*text, path.string());
+}
+
+}  // namespace redag

@@ -1,0 +1,38 @@
+#include "redag/model/workload_yaml_nearest.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+namespace redag::yaml {
+
+std::size_t edit_distance(std::string_view a, std::string_view b, std::size_t limit) {
+  const std::size_t longer = std::max(a.size(), b.size());
+  if (longer - std::min(a.size(), b.size()) > limit) return limit + 1;
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return std::min(row.back(), limit + 1);
+}
+
+std::string_view nearest(std::string_view name, const std::vector<std::string_view> &candidates) {
+  std::size_t limit = std::min<std::size_t>(name.size() / 2, 3);
+  std::string_view best;
+  for (const std::string_view candidate : candidates) {
+    const std::size_t distance = edit_distance(name, candidate, limit);
+    if (distance > limit) continue;
+    best = candidate;
+    if (distance <= 1) break;
+    limit = distance - 1;
+  }
+  return best;
+}
+
+}  // namespace redag::yaml

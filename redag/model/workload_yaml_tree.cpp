@@ -1,0 +1,199 @@
+#include "redag/model/workload_yaml_tree.hpp"
+
+#include <istream>
+#include <optional>
+#include <streambuf>
+#include <utility>
+
+#include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/exceptions.h>
+#include <yaml-cpp/parser.h>
+
+#include "redag/base/check.hpp"
+
+namespace redag::yaml {
+namespace {
+
+/// Thrown through yaml-cpp to stop it at the first construct that is not allowed.
+struct Rejected {
+  YAML::Mark mark;
+  std::string message;
+  std::string hint;
+};
+
+tl::unexpected<Diagnostics> error_at(const std::string &file, int line, int column, std::string message,
+                                     std::string hint) {
+  return tl::unexpected<Diagnostics>(
+      Diagnostics{Diagnostic{Severity::Error, file, line, column, std::move(message), std::move(hint)}});
+}
+
+class TreeBuilder : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark & /*mark*/) override {}
+  void OnDocumentEnd() override {}
+
+  void OnNull(const YAML::Mark &mark, YAML::anchor_t anchor) override {
+    refuse_extras(mark, anchor, "");
+    add(Node::Kind::Null, mark);
+  }
+
+  void OnAlias(const YAML::Mark &mark, YAML::anchor_t /*anchor*/) override { refuse_alias(mark); }
+
+  void OnScalar(const YAML::Mark &mark, const std::string &tag, YAML::anchor_t anchor,
+                const std::string &value) override {
+    refuse_extras(mark, anchor, tag);
+    Node &node = add(Node::Kind::Scalar, mark);
+    node.text = value;
+    node.quoted = tag == "!";
+  }
+
+  void OnSequenceStart(const YAML::Mark &mark, const std::string &tag, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value /*style*/) override {
+    refuse_extras(mark, anchor, tag);
+    open(Node::Kind::Sequence, mark);
+  }
+  void OnSequenceEnd() override { close(); }
+
+  void OnMapStart(const YAML::Mark &mark, const std::string &tag, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value /*style*/) override {
+    refuse_extras(mark, anchor, tag);
+    open(Node::Kind::Map, mark);
+  }
+  void OnMapEnd() override { close(); }
+
+  [[nodiscard]] Node take_root() { return std::move(root_); }
+
+ private:
+  [[noreturn]] static void refuse_alias(const YAML::Mark &mark) {
+    throw Rejected{mark, "aliases and anchors (* and &) are not read", "write the values out"};
+  }
+
+  static void refuse_extras(const YAML::Mark &mark, YAML::anchor_t anchor, const std::string &tag) {
+    if (anchor != YAML::NullAnchor) refuse_alias(mark);
+    // yaml-cpp gives "?" to plain and "!" to quoted scalars that have no tag.
+    if (!tag.empty() && tag != "?" && tag != "!") {
+      throw Rejected{mark, fmt::format("tags (here '{}') are not read", tag), "leave the tag out"};
+    }
+  }
+
+  // The pointers in open_ stay valid: only the innermost open node's children grow.
+  Node &add(Node::Kind kind, const YAML::Mark &mark) {
+    Node *node = &root_;
+    if (!open_.empty()) node = &open_.back()->children.emplace_back();
+    node->kind = kind;
+    node->line = mark.line + 1;
+    node->column = mark.column + 1;
+    return *node;
+  }
+
+  void open(Node::Kind kind, const YAML::Mark &mark) {
+    if (open_.size() >= kMaxDepth) {
+      throw Rejected{mark, fmt::format("nested more than {} levels deep", kMaxDepth), "a workload needs seven"};
+    }
+    open_.push_back(&add(kind, mark));
+  }
+
+  void close() {
+    REDAG_CHECK(!open_.empty(), "yaml-cpp closes only what it opened");
+    open_.pop_back();
+  }
+
+  Node root_;
+  std::vector<Node *> open_;
+};
+
+/// Length of the UTF-8 sequence at `i`, 0 if there is none (overlong forms, surrogates and beyond U+10FFFF included).
+std::size_t utf8_length(std::string_view text, std::size_t i) {
+  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
+  const unsigned lead = byte(i);
+  if (lead < 0x80) return 1;
+  const std::size_t length = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
+  if (lead < 0xC2 || lead > 0xF4 || i + length > text.size()) return 0;
+  for (std::size_t k = 1; k < length; ++k) {
+    if ((byte(i + k) & 0xC0U) != 0x80) return 0;
+  }
+  const unsigned second = byte(i + 1);
+  if (lead == 0xE0 && second < 0xA0) return 0;
+  if (lead == 0xED && second > 0x9F) return 0;
+  if (lead == 0xF0 && second < 0x90) return 0;
+  if (lead == 0xF4 && second > 0x8F) return 0;
+  return length;
+}
+
+struct BadCharacter {
+  int line;
+  int column;
+  std::string message;
+  std::string hint;
+};
+
+// yaml-cpp guesses other encodings, and takes the character 4 for the end of the file.
+std::optional<BadCharacter> find_bad_character(std::string_view text) {
+  int line = 1;
+  std::size_t line_start = 0;
+  for (std::size_t i = 0; i < text.size();) {
+    const auto c = static_cast<unsigned char>(text[i]);
+    const auto column = static_cast<int>(i - line_start) + 1;
+    const std::size_t length = utf8_length(text, i);
+    if (length == 0) return BadCharacter{line, column, fmt::format("byte 0x{:02x} is not UTF-8", c), "save as UTF-8"};
+    if (c == '\n') {
+      ++line;
+      line_start = i + 1;
+    } else if ((c < 0x20 && c != '\t' && c != '\r') || c == 0x7F) {
+      return BadCharacter{line, column, fmt::format("control character 0x{:02x}", c), "is this a text file?"};
+    }
+    i += length;
+  }
+  return std::nullopt;
+}
+
+/// A stream over text that is already in memory.
+class ViewBuffer : public std::streambuf {
+ public:
+  explicit ViewBuffer(std::string_view text) {
+    char *begin = const_cast<char *>(text.data());  // a get area is never written to
+    setg(begin, begin, begin + text.size());
+  }
+};
+
+}  // namespace
+
+Result<Node> parse(std::string_view text, const std::string &file) {
+  if (const auto bad = find_bad_character(text)) {
+    return error_at(file, bad->line, bad->column, bad->message, bad->hint);
+  }
+  try {
+    ViewBuffer buffer(text);
+    std::istream stream(&buffer);
+    YAML::Parser parser(stream);
+    TreeBuilder builder;
+    if (!parser.HandleNextDocument(builder)) return Node{};
+    TreeBuilder rest;
+    if (parser.HandleNextDocument(rest)) {
+      const Node second = rest.take_root();
+      return error_at(file, second.line, second.column, "a second document", "one workload a file");
+    }
+    return builder.take_root();
+  } catch (const Rejected &rejected) {
+    return error_at(file, rejected.mark.line + 1, rejected.mark.column + 1, rejected.message, rejected.hint);
+  } catch (const YAML::Exception &exception) {
+    return error_at(file, exception.mark.line + 1, exception.mark.column + 1, "not YAML: " + exception.msg, "");
+  }
+}
+
+std::string describe(const Node &node) {
+  constexpr std::size_t kLongest = 60;
+  switch (node.kind) {
+    case Node::Kind::Null: return "nothing";
+    case Node::Kind::Sequence: return "a list";
+    case Node::Kind::Map: return "a map";
+    case Node::Kind::Scalar: break;
+  }
+  if (node.text.size() <= kLongest) return "'" + node.text + "'";
+  std::size_t cut = kLongest;
+  while (cut > 0 && (static_cast<unsigned char>(node.text[cut]) & 0xC0U) == 0x80) --cut;  // whole characters
+  return "'" + node.text.substr(0, cut) + "...'";
+}
+
+}  // namespace redag::yaml

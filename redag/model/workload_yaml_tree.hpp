@@ -1,0 +1,35 @@
+// YAML text as a tree of nodes that know their place, for workload_yaml.cpp only. Built from yaml-cpp's events rather
+// than its Node, because Node loses the place of keys, merges duplicate keys and follows aliases. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "redag/base/result.hpp"
+
+namespace redag::yaml {
+
+struct Node {
+  enum class Kind : std::uint8_t { Null, Scalar, Sequence, Map };
+
+  Kind kind = Kind::Null;
+  bool quoted = false;  // a scalar in quotes is text, never a number
+  int line = 0;         // from 1
+  int column = 0;
+  std::string text;            // of a scalar
+  std::vector<Node> children;  // of a sequence: the items; of a map: key, value, key, value, ...
+};
+
+/// Deepest nesting that is read; a workload needs seven levels.
+inline constexpr std::size_t kMaxDepth = 32;
+
+/// The one document in `text`. Errors: not UTF-8, control characters, YAML syntax, aliases, anchors and tags, more than
+/// one document, nesting beyond kMaxDepth. A text without a document gives a Null node.
+[[nodiscard]] Result<Node> parse(std::string_view text, const std::string &file);
+
+/// "a map", "a list", "'5ms'": for messages.
+[[nodiscard]] std::string describe(const Node &node);
+
+}  // namespace redag::yaml
