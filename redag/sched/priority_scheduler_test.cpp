@@ -1,0 +1,275 @@
+#include "redag/sched/priority_scheduler.hpp"
+
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "redag/base/rng.hpp"
+#include "redag/testing/allocation_counter.hpp"
+#include "redag/testing/manual_workers.hpp"
+#include "redag/testing/timeline.hpp"
+
+namespace redag::sched {
+namespace {
+
+using redag::testing::make_dag;
+using redag::testing::make_workload;
+using redag::testing::ManualWorkers;
+
+ManualWorkers drive(const Workload &workload, Preemption preemption, std::uint32_t levels = 0,
+                    std::uint32_t max_started = 0) {
+  const Config config{workload.platform.workers, preemption, workload.policy, levels, max_started};
+  return {workload, std::make_unique<PriorityScheduler>(workload, config), config.workers};
+}
+
+std::size_t count(const ManualWorkers &workers, JobEventKind kind) {
+  std::size_t found = 0;
+  for (const JobEvent &event : workers.events()) found += event.kind == kind ? 1U : 0U;
+  return found;
+}
+
+TEST(PriorityScheduler, ReleasesOfOneInstantAreDecidedTogether) {
+  const Workload workload = make_workload({make_dag("a", {{"slow", 20}, {"fast", 10}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("slow").release("fast").decide();
+  EXPECT_EQ(workers.running(), "fast");
+}
+
+TEST(PriorityScheduler, DispatchWithoutEventsDecidesNothing) {
+  const Workload workload = make_workload({make_dag("a", {{"t", 10}})}, 1);
+  PriorityScheduler scheduler(workload, {});
+  scheduler.release(TaskId(0), 0, 0);
+  EXPECT_EQ(scheduler.dispatch(0).dispatches.size(), 1U);
+  const Step again = scheduler.dispatch(5);
+  EXPECT_TRUE(again.dispatches.empty());
+  EXPECT_TRUE(again.events.empty());
+}
+
+TEST(PriorityScheduler, PreemptsTheLeastUrgentAndResumesItOnAnyWorker) {
+  const Workload workload = make_workload({make_dag("a", {{"low", 30}, {"mid", 20}, {"high", 10}})}, 2);
+  ManualWorkers workers = drive(workload, Preemption::Full);
+  workers.release("low").release("mid").decide();
+  EXPECT_EQ(workers.running(), "mid low");
+  workers.at(1).release("high").decide();
+  EXPECT_EQ(workers.running(), "mid high");
+  EXPECT_EQ(workers.suspended(), "low");
+  workers.at(2).finish("mid").decide();
+  EXPECT_EQ(workers.running(), "low high");
+}
+
+TEST(PriorityScheduler, ATiedLevelDoesNotPreempt) {
+  const Workload workload = make_workload({make_dag("a", {{"second", 10}, {"first", 10}, {"third", 30}})}, 1);
+  for (const std::uint32_t levels : {0U, 2U}) {
+    ManualWorkers workers = drive(workload, Preemption::Full, levels);
+    workers.release("first").decide();
+    workers.at(1).release("second").decide();  // earlier in the total order, of the same period
+    EXPECT_EQ(workers.running(), levels == 0 ? "second" : "first");
+  }
+}
+
+TEST(PriorityScheduler, MoreStartedJobsThanThreadsIsImpossible) {
+  const Workload workload = make_workload({make_dag("a", {{"low", 30}, {"mid", 20}, {"high", 10}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::Full, 0, 2);
+  workers.release("low").decide();
+  workers.at(1).release("mid").decide();
+  workers.at(2).release("high").decide();
+  EXPECT_EQ(workers.running(), "mid") << "there is no third thread";
+  workers.at(3).finish("mid").decide();
+  EXPECT_EQ(workers.running(), "high");
+  EXPECT_EQ(workers.suspended(), "low");
+}
+
+TEST(PriorityScheduler, AJobMayEndWhileItCountsAsPreempted) {
+  const Workload workload = make_workload({make_dag("a", {{"low", 30}, {"high", 10}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::Full);
+  workers.release("low").decide();
+  workers.at(1).release("high").decide();
+  workers.at(2).finish("low").decide();
+  EXPECT_EQ(workers.running(), "high");
+  EXPECT_EQ(workers.suspended(), "");
+  workers.at(3).finish("high").decide();
+  EXPECT_EQ(workers.running(), "-");
+}
+
+TEST(PriorityScheduler, CooperativeJobsNestInOrder) {
+  const Workload workload = make_workload({make_dag("a", {{"low", 40}, {"mid", 30}, {"high", 20}, {"top", 10}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::Cooperative);
+  workers.release("low").decide();
+  workers.at(1).release("mid").release("high").decide();
+  EXPECT_EQ(workers.running(), "low") << "only a preemption point gives way";
+  workers.at(2).preemption_point("low").decide();
+  EXPECT_EQ(workers.running(), "high");
+  workers.at(3).release("top").decide();
+  workers.at(4).preemption_point("high").decide();
+  EXPECT_EQ(workers.running(), "top");
+  workers.at(5).finish("top").decide();
+  EXPECT_EQ(workers.running(), "high");
+  workers.at(6).finish("high").decide();
+  EXPECT_EQ(workers.running(), "mid") << "more urgent than the suspended job";
+  workers.at(7).finish("mid").decide();
+  EXPECT_EQ(workers.running(), "low");
+}
+
+TEST(PriorityScheduler, APreemptionPointWithoutNeedChangesNothing) {
+  const Workload workload = make_workload({make_dag("a", {{"low", 40}, {"high", 20}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::Cooperative);
+  workers.release("high").decide();
+  workers.at(1).release("low").decide();
+  const std::size_t before_point = workers.events().size();
+  workers.at(2).preemption_point("high").decide();
+  EXPECT_EQ(workers.running(), "high");
+  EXPECT_EQ(workers.events().size(), before_point);
+}
+
+TEST(PriorityScheduler, JobKWaitsForJobKWherePeriodsAreEqual) {
+  const Workload workload = make_workload({make_dag("a", {{"first", 10}, {"second", 10, 1, {0}}})}, 2);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("first").release("second").decide();
+  EXPECT_EQ(workers.running(), "first -");
+  workers.at(10 * kMillisecond).release("first").release("second").decide();  // job 0 of `first` still runs
+  workers.at(11 * kMillisecond).finish("first").decide();
+  EXPECT_EQ(workers.running(), "first -") << "data of job 0 is too old for job 1 of `second`";
+  workers.at(12 * kMillisecond).finish("first").decide();
+  EXPECT_EQ(workers.running(), "second -");
+  EXPECT_EQ(workers.accounting("second").skipped, 1U);
+}
+
+TEST(PriorityScheduler, DataOfAJobThatNeverStartedIsFreshAgain) {
+  const Workload workload =
+      make_workload({make_dag("a", {{"source", 40}, {"sink", 20, 1, {0}}}), make_dag("b", {{"hog", 10}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("source").release("sink").decide();
+  workers.at(1).release("hog").finish("source").decide();
+  EXPECT_EQ(workers.running(), "hog");
+  workers.at(20 * kMillisecond).release("sink").decide();  // the ready job of `sink` is skipped, its data is not lost
+  workers.at(21 * kMillisecond).finish("hog").decide();
+  EXPECT_EQ(workers.running(), "sink");
+  EXPECT_EQ(workers.accounting("sink").skipped, 1U);
+}
+
+TEST(PriorityScheduler, AnAbortedJobReleasesNoSuccessor) {
+  const Workload workload = make_workload({make_dag("a", {{"source", 40}, {"sink", 0, 1, {0}}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("source").decide();
+  workers.at(1).finish("source", Outcome::Threw).decide();
+  EXPECT_EQ(workers.accounting("sink").released, 0U);
+  EXPECT_EQ(workers.accounting("source").aborted, 1U);
+}
+
+TEST(PriorityScheduler, PendingBoundRefusesReleases) {
+  Workload workload = make_workload({make_dag("a", {{"x", 10}, {"y", 20}, {"z", 30}})}, 1);
+  workload.dags[0].max_pending = 1;
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("x").decide();
+  workers.at(1).release("y").release("z").decide();
+  EXPECT_EQ(workers.accounting("z").skipped, 1U);
+  EXPECT_EQ(workers.events().back().reason, Reason::DagFull);
+}
+
+TEST(PriorityScheduler, ADeferralIsCountedOnceAJob) {
+  const Workload workload = make_workload({make_dag("a", {{"x", 10}, {"y", 20}}, 1), make_dag("b", {{"z", 30}})}, 2);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("x").release("y").decide();
+  workers.at(1).release("z").decide();
+  EXPECT_EQ(workers.running(), "x z");
+  workers.at(2).finish("z").decide();
+  EXPECT_EQ(count(workers, JobEventKind::Deferred), 1U);
+  EXPECT_EQ(workers.accounting("y").deferred, 1U);
+}
+
+// The job that waits for a group must not keep the place of its DAG from another job.
+TEST(PriorityScheduler, AJobThatWaitsHoldsNothing) {
+  const Workload workload = make_workload(
+      {make_dag("a", {{"x", 10, 1, {}, "g"}, {"y", 20}}, 1), make_dag("b", {{"holder", 30, 1, {}, "g"}})}, 2);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("holder").decide();
+  workers.at(1).release("x").release("y").decide();
+  EXPECT_EQ(workers.running(), "holder y");
+  workers.at(2).finish("holder").decide();
+  EXPECT_EQ(workers.running(), "- y") << "now x waits for its DAG";
+  workers.at(3).finish("y").decide();
+  EXPECT_EQ(workers.running(), "x -");
+}
+
+TEST(PriorityScheduler, DagsComeAndGo) {
+  const Workload workload = make_workload({make_dag("a", {{"x", 20}, {"y", 30}}, 1)}, 1);
+  ManualWorkers workers = drive(workload, Preemption::Full);
+  workers.release("x").release("y").decide();
+  const DagId added = workers.at(1).add_dag(make_dag("b", {{"urgent", 10}, {"data", 0, 1, {0}}}));
+  workers.release("urgent").decide();
+  EXPECT_EQ(workers.running(), "urgent");
+  workers.at(2).finish("urgent").decide();
+  EXPECT_EQ(workers.running(), "data");
+  workers.scheduler().remove_dag(added, 3);
+  workers.at(3).release("urgent").decide();
+  EXPECT_EQ(workers.running(), "data") << "what has started ends as usual";
+  EXPECT_EQ(workers.accounting("urgent").released, 1U);
+  workers.at(4).finish("data").decide();
+  EXPECT_EQ(workers.running(), "x");
+  workers.at(5).finish("x").decide();
+  EXPECT_EQ(workers.running(), "y");
+}
+
+TEST(PriorityScheduler, RemovalSkipsWhatHasNotStarted) {
+  const Workload workload = make_workload({make_dag("a", {{"x", 20}}), make_dag("b", {{"y", 30}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("x").release("y").decide();
+  workers.scheduler().remove_dag(DagId(1), 1);
+  workers.at(1).finish("x").decide();
+  EXPECT_EQ(workers.running(), "-");
+  EXPECT_EQ(workers.accounting("y"), (Accounting{1, 0, 1, 0, 0}));
+}
+
+TEST(PriorityScheduler, EdfAndFifoOrderJobs) {
+  Workload workload = make_workload({make_dag("a", {{"late", 10}, {"soon", 50, 1, {}, "", 0, 5}, {"long", 100}})}, 1);
+  for (const PolicyKind policy : {PolicyKind::Edf, PolicyKind::Fifo}) {
+    workload.policy = policy;
+    ManualWorkers workers = drive(workload, Preemption::Full);
+    workers.release("long").decide();
+    workers.at(1).release("late").decide();
+    workers.at(2).release("soon").decide();
+    EXPECT_EQ(workers.running(), policy == PolicyKind::Edf ? "soon" : "long");
+    workers.at(3).finish(policy == PolicyKind::Edf ? "soon" : "long").decide();
+    EXPECT_EQ(workers.running(), "late");
+  }
+}
+
+// After construction nothing is allocated, whatever happens: thousands of random events, bounds, groups, queues,
+// preemption.
+TEST(PriorityScheduler, AllocatesNothingInSteadyState) {
+  for (const Preemption preemption : {Preemption::None, Preemption::Cooperative, Preemption::Full}) {
+    for (const PolicyKind policy : {PolicyKind::RateMonotonic, PolicyKind::Edf, PolicyKind::Fifo}) {
+      std::vector<Dag> dags;
+      for (int d = 0; d < 10; ++d) {
+        dags.push_back(make_dag("d", {{"a", 5 + d, 1, {}, "g"}, {"b", 50, 1, {0}}, {"c", 0, 1, {0, 1}}, {"e", 7}},
+                                1U + static_cast<std::uint32_t>(d) % 3));
+        dags.back().tasks[3].overrun = Overrun::Queue;
+        dags.back().tasks[3].queue_depth = 3;
+        dags.back().max_pending = 3;
+      }
+      const Workload workload = make_workload(dags, 4, PreemptionMode::None, policy);
+      PriorityScheduler scheduler(workload, {4, preemption, policy, 0, 0});
+      Rng rng(1);
+      std::vector<JobSlot> running(4);
+      const std::uint64_t before_run = redag::testing::allocation_count();
+      for (Time now = 0; now < 20'000; ++now) {
+        const auto dag = static_cast<std::uint32_t>(rng.uniform(0, 9));
+        const auto task = static_cast<std::uint32_t>(rng.uniform(0, 2));
+        scheduler.release(TaskId(4 * dag + (task == 2 ? 3 : task)), now, now);
+        JobSlot &some = running[static_cast<std::size_t>(rng.uniform(0, 3))];
+        if (some.valid() && rng.uniform01() < 0.5) {
+          scheduler.complete(some, now, Outcome::Finished);
+          some = JobSlot();
+        } else if (some.valid() && preemption == Preemption::Cooperative) {
+          scheduler.preemption_point(some, now);
+        }
+        for (const Dispatch &dispatch : scheduler.dispatch(now).dispatches)
+          running[dispatch.worker.value] = dispatch.job;
+      }
+      EXPECT_EQ(redag::testing::allocation_count(), before_run);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace redag::sched
