@@ -1,0 +1,460 @@
+#include "redag/testing/reference_scheduler.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+#include "redag/base/check.hpp"
+#include "redag/sched/policy.hpp"
+
+namespace redag::testing {
+
+using sched::Accounting;
+using sched::Dispatch;
+using sched::Outcome;
+using sched::Preemption;
+using sched::Step;
+
+ReferenceScheduler::ReferenceScheduler(const Workload &workload, const sched::Config &config)
+    : config_(config), workers_(config.workers) {
+  for (const Dag &dag : workload.dags) add_tasks(dag);
+  rank_tasks();
+}
+
+// ---- tasks and their order ------------------------------------------------------------------------------------------
+
+void ReferenceScheduler::add_tasks(const Dag &dag) {
+  const std::size_t first = tasks_.size();
+  const std::vector<std::uint32_t> topological = topological_ranks(dag);
+  for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+    TaskState state;
+    state.task = dag.tasks[i];
+    state.dag = dags_.size();
+    state.topological = topological[i];
+    for (const std::uint32_t p : dag.tasks[i].predecessors) state.predecessors.push_back(first + p);
+    state.inputs.resize(state.predecessors.size());
+    tasks_.push_back(state);
+  }
+  dags_.push_back(DagState{dag, false});
+}
+
+// The table of docs/model.md, "Priority", and its ties.
+bool ReferenceScheduler::task_before(const TaskState &a, const TaskState &b) const {
+  const auto smallest_period = [this](const TaskState &state) {
+    Duration smallest = kNever;
+    for (const Task &task : dags_[state.dag].dag.tasks) smallest = std::min(smallest, task.period);
+    return smallest;
+  };
+  switch (config_.policy) {
+    case PolicyKind::RateMonotonic:
+      if (a.task.period != b.task.period) return a.task.period < b.task.period;
+      break;
+    case PolicyKind::DeadlineMonotonic:
+      if (a.task.deadline != b.task.deadline) return a.task.deadline < b.task.deadline;
+      break;
+    case PolicyKind::Fixed:
+      if (a.task.priority.value_or(0) != b.task.priority.value_or(0)) {
+        return a.task.priority.value_or(0) > b.task.priority.value_or(0);
+      }
+      break;
+    case PolicyKind::ChainAware:
+      if (dags_[a.dag].dag.criticality != dags_[b.dag].dag.criticality) {
+        return dags_[a.dag].dag.criticality > dags_[b.dag].dag.criticality;
+      }
+      if (smallest_period(a) != smallest_period(b)) return smallest_period(a) < smallest_period(b);
+      if (a.dag != b.dag) return a.dag < b.dag;
+      return a.topological > b.topological;
+    case PolicyKind::Edf:
+    case PolicyKind::Fifo: break;
+  }
+  return std::tie(a.dag, a.topological) < std::tie(b.dag, b.topological);
+}
+
+void ReferenceScheduler::rank_tasks() {
+  std::vector<Dag> dags;
+  for (const DagState &state : dags_) dags.push_back(state.dag);
+  const auto priorities = sched::assign_priorities(dags, config_.policy, config_.levels);
+  for (std::size_t i = 0; i < tasks_.size(); ++i) {
+    tasks_[i].level = priorities[i].level;
+    tasks_[i].rank = 0;
+    for (const TaskState &other : tasks_) {
+      if (task_before(other, tasks_[i])) ++tasks_[i].rank;
+    }
+  }
+}
+
+bool ReferenceScheduler::same_phase(const TaskState &predecessor, const TaskState &successor) const {
+  return predecessor.task.activation == Activation::Timer && successor.task.activation == Activation::Timer &&
+         predecessor.task.period == successor.task.period && predecessor.task.offset == successor.task.offset;
+}
+
+// ---- releases and completions ---------------------------------------------------------------------------------------
+
+void ReferenceScheduler::release(TaskId task, Time nominal, Time now) {
+  TaskState &state = tasks_[task.value];
+  REDAG_CHECK(state.task.activation == Activation::Timer, "data tasks are released by their predecessors");
+  if (dags_[state.dag].removed) return;
+  create_job(task.value, nominal, now, {});
+}
+
+// "Overrun and admission", for timer and data tasks alike.
+void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, const std::vector<Data> &consumed) {
+  TaskState &state = tasks_[task];
+  const std::size_t job = jobs_.size();
+  jobs_.emplace_back();
+  jobs_[job].task = task;
+  jobs_[job].number = state.next_number++;
+  jobs_[job].release = release;
+  jobs_[job].consumed = consumed;
+  ++state.count.released;
+  emit(JobEventKind::Released, job, now, release, WorkerId::kNoneValue);
+
+  for (const std::size_t other : jobs_of(task, State::Waiting)) {
+    if (other != job) skip(other, now, Reason::Precedence);
+  }
+  if (state.task.overrun == Overrun::Skip) {
+    for (const std::size_t other : jobs_of(task, State::Ready)) skip(other, now, Reason::Overrun);
+  } else if (jobs_of(task, State::Ready).size() >= state.task.queue_depth) {
+    skip(job, now, Reason::QueueFull);
+    return;
+  }
+  std::size_t pending = 0;
+  for (const Job &other : jobs_) {
+    const bool waits = other.state == State::Waiting || other.state == State::Ready;
+    if (waits && tasks_[other.task].dag == state.dag && &other != &jobs_[job]) ++pending;
+  }
+  const std::uint32_t bound = dags_[state.dag].dag.max_pending;
+  if (bound != 0 && pending >= bound) {
+    skip(job, now, Reason::DagFull);
+    return;
+  }
+  resolve(job, now);
+}
+
+// "Readiness": makes a waiting job ready if it can be.
+void ReferenceScheduler::resolve(std::size_t job, Time now) {
+  Job &j = jobs_[job];
+  TaskState &state = tasks_[j.task];
+  if (state.task.activation == Activation::Timer) {
+    for (std::size_t i = 0; i < state.inputs.size(); ++i) {
+      Data &input = state.inputs[i];
+      if (same_phase(tasks_[state.predecessors[i]], state) && input.release < j.release) input.fresh = false;
+    }
+    if (!std::all_of(state.inputs.begin(), state.inputs.end(), [](const Data &d) { return d.fresh; })) return;
+    j.consumed = state.inputs;
+    for (Data &input : state.inputs) input.fresh = false;
+  }
+  j.origin = j.consumed.empty() ? j.release : kNever;
+  for (const Data &data : j.consumed) j.origin = std::min(j.origin, data.origin);
+  j.state = State::Ready;
+  j.ready_order = ready_count_++;
+  emit(JobEventKind::Ready, job, now, j.origin, WorkerId::kNoneValue);
+}
+
+void ReferenceScheduler::skip(std::size_t job, Time now, Reason reason) {
+  Job &j = jobs_[job];
+  TaskState &state = tasks_[j.task];
+  if (j.state == State::Ready && state.task.activation == Activation::Timer) {
+    // Nobody used its data: fresh again, unless newer data has come.
+    for (std::size_t i = 0; i < j.consumed.size(); ++i) {
+      if (!state.inputs[i].fresh) state.inputs[i] = j.consumed[i];
+    }
+  }
+  j.state = State::Done;
+  ++state.count.skipped;
+  emit(JobEventKind::Skipped, job, now, 0, WorkerId::kNoneValue, reason);
+}
+
+void ReferenceScheduler::complete(JobSlot slot, Time now, Outcome outcome) {
+  const std::size_t job = slot.value;
+  Job &j = jobs_[job];
+  const bool suspended_by_force = j.state == State::Suspended && config_.preemption == Preemption::Full;
+  REDAG_CHECK(j.state == State::Running || suspended_by_force, "only a job that runs can end");
+  if (j.state == State::Running) workers_[j.worker].pop_back();
+  j.state = State::Done;
+  if (outcome == Outcome::Finished) {
+    ++tasks_[j.task].count.finished;
+    emit(JobEventKind::Finished, job, now, now, j.worker);
+    deliver(job, now);
+  } else {
+    ++tasks_[j.task].count.aborted;
+    const Reason reason = outcome == Outcome::Threw ? Reason::Exception : Reason::Budget;
+    emit(JobEventKind::Aborted, job, now, now, j.worker, reason);
+  }
+}
+
+void ReferenceScheduler::deliver(std::size_t job, Time now) {
+  const std::size_t producer = jobs_[job].task;
+  if (dags_[tasks_[producer].dag].removed) return;
+  const Data data{true, jobs_[job].release, jobs_[job].origin};
+  for (std::size_t s = 0; s < tasks_.size(); ++s) {
+    TaskState &state = tasks_[s];
+    const auto input = std::find(state.predecessors.begin(), state.predecessors.end(), producer);
+    if (input == state.predecessors.end()) continue;
+    state.inputs[static_cast<std::size_t>(input - state.predecessors.begin())] = data;
+    if (state.task.activation == Activation::Timer) {
+      for (const std::size_t waiting : jobs_of(s, State::Waiting)) resolve(waiting, now);
+    } else if (std::all_of(state.inputs.begin(), state.inputs.end(), [](const Data &d) { return d.fresh; })) {
+      const std::vector<Data> consumed = state.inputs;
+      for (Data &d : state.inputs) d.fresh = false;
+      create_job(s, now, now, consumed);
+    }
+  }
+}
+
+void ReferenceScheduler::preemption_point(JobSlot job, Time /*now*/) {
+  if (config_.preemption == Preemption::Cooperative) jobs_[job.value].at_point = true;
+}
+
+// ---- who may run ----------------------------------------------------------------------------------------------------
+
+bool ReferenceScheduler::started(const Job &job) const {
+  return job.state == State::Running || job.state == State::Suspended;
+}
+
+std::vector<std::size_t> ReferenceScheduler::jobs_of(std::size_t task, State state) const {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < jobs_.size(); ++i) {
+    if (jobs_[i].task == task && jobs_[i].state == state) found.push_back(i);
+  }
+  return found;
+}
+
+bool ReferenceScheduler::task_busy(const Job &job) const {
+  return std::any_of(jobs_.begin(), jobs_.end(), [&](const Job &o) { return o.task == job.task && started(o); });
+}
+
+bool ReferenceScheduler::dag_at_bound(const Job &job) const {
+  const std::size_t dag = tasks_[job.task].dag;
+  const std::uint32_t bound = dags_[dag].dag.max_active;
+  const auto active =
+      std::count_if(jobs_.begin(), jobs_.end(), [&](const Job &o) { return tasks_[o.task].dag == dag && started(o); });
+  return bound != 0 && active >= static_cast<std::ptrdiff_t>(bound);
+}
+
+std::size_t ReferenceScheduler::group_holder(const Job &job) const {
+  const std::string &group = tasks_[job.task].task.group;
+  if (group.empty()) return kNone;
+  for (std::size_t i = 0; i < jobs_.size(); ++i) {
+    if (started(jobs_[i]) && tasks_[jobs_[i].task].task.group == group) return i;
+  }
+  return kNone;
+}
+
+// ---- the order of jobs ----------------------------------------------------------------------------------------------
+
+/// The job whose priority `job` has.
+const ReferenceScheduler::Job &ReferenceScheduler::effective(std::size_t job) const {
+  const std::size_t heir_of = jobs_[job].heir_of;
+  return jobs_[heir_of == kNone ? job : heir_of];
+}
+
+bool ReferenceScheduler::key_before(const Job &a, const Job &b) const {
+  const TaskState &ta = tasks_[a.task];
+  const TaskState &tb = tasks_[b.task];
+  if (config_.policy == PolicyKind::Edf) {
+    const Time da = a.release + ta.task.deadline;
+    const Time db = b.release + tb.task.deadline;
+    if (da != db) return da < db;
+  }
+  if (config_.policy == PolicyKind::Fifo && a.ready_order != b.ready_order) return a.ready_order < b.ready_order;
+  return std::tie(ta.rank, a.number) < std::tie(tb.rank, b.number);
+}
+
+bool ReferenceScheduler::shares_levels() const {
+  return config_.preemption == Preemption::Full && sched::is_static(config_.policy);
+}
+
+std::uint32_t ReferenceScheduler::level_of(std::size_t job) const {
+  return std::min(tasks_[jobs_[job].task].level, tasks_[effective(job).task].level);
+}
+
+/// Does `a` take the worker of `b`, which has started?
+bool ReferenceScheduler::outranks(std::size_t a, std::size_t b) const {
+  if (shares_levels()) return level_of(a) < level_of(b);
+  return key_before(effective(a), effective(b));
+}
+
+/// At one level what has started goes first: to start another instead would be a preemption within the level.
+bool ReferenceScheduler::considered_before(std::size_t a, std::size_t b) const {
+  if (shares_levels()) {
+    const auto kind = [this](std::size_t j) {
+      return jobs_[j].state == State::Running ? 0 : jobs_[j].state == State::Suspended ? 1 : 2;
+    };
+    if (level_of(a) != level_of(b)) return level_of(a) < level_of(b);
+    if (kind(a) != kind(b)) return kind(a) < kind(b);
+  }
+  return key_before(effective(a), effective(b));
+}
+
+// ---- dispatch -------------------------------------------------------------------------------------------------------
+
+Step ReferenceScheduler::dispatch(Time now) {
+  dispatches_.clear();
+  // Inheritance counts from the instant at which the waiting job comes, so a walk that finds one is made again.
+  for (;;) {
+    const std::vector<Job> jobs = jobs_;
+    const std::vector<Stack> workers = workers_;
+    const std::vector<JobEvent> events = events_;
+    std::vector<std::size_t> heirs;
+    if (try_dispatch(now)) break;
+    for (const Job &job : jobs_) heirs.push_back(job.heir_of);
+    jobs_ = jobs;
+    for (std::size_t i = 0; i < jobs_.size(); ++i) jobs_[i].heir_of = heirs[i];
+    workers_ = workers;
+    events_ = events;
+    dispatches_.clear();
+  }
+  for (Job &job : jobs_) job.at_point = false;
+  step_events_.swap(events_);
+  events_.clear();
+  return Step{dispatches_, step_events_};
+}
+
+bool ReferenceScheduler::try_dispatch(Time now) {
+  std::vector<std::size_t> candidates;
+  for (std::size_t i = 0; i < jobs_.size(); ++i) {
+    const bool resumable = jobs_[i].state == State::Suspended && config_.preemption == Preemption::Full;
+    if (jobs_[i].state == State::Ready || resumable) candidates.push_back(i);
+  }
+  std::sort(candidates.begin(), candidates.end(),
+            [this](std::size_t a, std::size_t b) { return considered_before(a, b); });
+  for (const std::size_t job : candidates) {
+    const std::uint32_t worker = worker_for(job);
+    if (worker == WorkerId::kNoneValue) continue;
+    bool inherited = false;
+    if (jobs_[job].state == State::Suspended || can_start(job, now, inherited)) place(job, worker, now);
+    if (inherited) return false;
+  }
+  if (config_.preemption == Preemption::Cooperative) resume_uncovered(now);
+  return true;
+}
+
+/// The worker that is available to `job`: its own of before, the lowest free one, or that of the least urgent job that
+/// it may interrupt.
+std::uint32_t ReferenceScheduler::worker_for(std::size_t job) const {
+  const std::uint32_t before = jobs_[job].worker;
+  if (before != WorkerId::kNoneValue && workers_[before].empty()) return before;
+  for (std::uint32_t w = 0; w < workers_.size(); ++w) {
+    if (workers_[w].empty()) return w;
+  }
+  if (config_.preemption == Preemption::None) return WorkerId::kNoneValue;
+  std::uint32_t best = WorkerId::kNoneValue;
+  for (std::uint32_t w = 0; w < workers_.size(); ++w) {
+    const std::size_t top = workers_[w].back();
+    const bool available =
+        config_.preemption == Preemption::Full || jobs_[top].state == State::Suspended || jobs_[top].at_point;
+    if (!available || !outranks(job, top)) continue;
+    if (best == WorkerId::kNoneValue || considered_before(workers_[best].back(), top)) best = w;
+  }
+  return best;
+}
+
+bool ReferenceScheduler::can_start(std::size_t job, Time now, bool &inherited) {
+  Job &j = jobs_[job];
+  const auto all_started = std::count_if(jobs_.begin(), jobs_.end(), [this](const Job &o) { return started(o); });
+  if (config_.max_started != 0 && config_.preemption == Preemption::Full &&
+      all_started >= static_cast<std::ptrdiff_t>(config_.max_started)) {
+    return false;
+  }
+  if (task_busy(j)) return false;
+  if (dag_at_bound(j)) {
+    if (!j.deferred) {
+      j.deferred = true;
+      emit(JobEventKind::Deferred, job, now, 0, WorkerId::kNoneValue);
+    }
+    return false;
+  }
+  const std::size_t holder = group_holder(j);
+  if (holder == kNone) return true;
+  if (key_before(j, effective(holder))) {
+    jobs_[holder].heir_of = job;
+    inherited = true;
+  }
+  return false;
+}
+
+void ReferenceScheduler::place(std::size_t job, std::uint32_t worker, Time now) {
+  Job &j = jobs_[job];
+  Dispatch decision{JobSlot(job), TaskId(j.task), j.number, WorkerId(worker), JobSlot::none(), false, level_of(job)};
+  Stack &stack = workers_[worker];
+  if (!stack.empty()) {
+    Job &under = jobs_[stack.back()];
+    decision.over = JobSlot(stack.back());
+    if (under.state == State::Running) emit(JobEventKind::Preempted, stack.back(), now, 0, worker);
+    under.state = State::Suspended;
+    if (config_.preemption == Preemption::Full) stack.pop_back();
+  }
+  decision.resume = j.state == State::Suspended;
+  j.state = State::Running;
+  j.worker = worker;
+  stack.push_back(job);
+  const Time deadline = j.release + tasks_[j.task].task.deadline;
+  emit(decision.resume ? JobEventKind::Resumed : JobEventKind::Dispatched, job, now, decision.resume ? 0 : deadline,
+       worker);
+  dispatches_.push_back(decision);
+}
+
+/// Cooperative: a suspended job with nothing on top of it goes on.
+void ReferenceScheduler::resume_uncovered(Time now) {
+  for (std::uint32_t w = 0; w < workers_.size(); ++w) {
+    if (workers_[w].empty()) continue;
+    const std::size_t top = workers_[w].back();
+    if (jobs_[top].state != State::Suspended) continue;
+    jobs_[top].state = State::Running;
+    emit(JobEventKind::Resumed, top, now, 0, w);
+    dispatches_.push_back(Dispatch{JobSlot(top), TaskId(jobs_[top].task), jobs_[top].number, WorkerId(w),
+                                   JobSlot::none(), true, level_of(top)});
+  }
+}
+
+bool ReferenceScheduler::outranked(JobSlot job) const {
+  if (config_.preemption != Preemption::Cooperative || jobs_[job.value].state != State::Running) return false;
+  ReferenceScheduler copy = *this;
+  copy.preemption_point(job, 0);
+  const Step step = copy.dispatch(0);
+  return std::any_of(step.dispatches.begin(), step.dispatches.end(),
+                     [job](const Dispatch &d) { return d.over == job; });
+}
+
+// ---- reconfiguration and counts -------------------------------------------------------------------------------------
+
+DagId ReferenceScheduler::add_dag(const Dag &dag, Time /*now*/) {
+  add_tasks(dag);
+  rank_tasks();
+  return DagId(dags_.size() - 1);
+}
+
+void ReferenceScheduler::remove_dag(DagId dag, Time now) {
+  if (dags_[dag.value].removed) return;
+  for (std::size_t task = 0; task < tasks_.size(); ++task) {
+    if (tasks_[task].dag != dag.value) continue;
+    for (std::size_t job = 0; job < jobs_.size(); ++job) {
+      const bool waits = jobs_[job].state == State::Waiting || jobs_[job].state == State::Ready;
+      if (jobs_[job].task == task && waits) skip(job, now, Reason::Removed);
+    }
+  }
+  dags_[dag.value].removed = true;
+}
+
+Accounting ReferenceScheduler::accounting(TaskId task) const {
+  Accounting count = tasks_[task.value].count;
+  for (const Job &job : jobs_) {
+    if (job.task == task.value && job.deferred) ++count.deferred;
+  }
+  return count;
+}
+
+void ReferenceScheduler::emit(JobEventKind kind, std::size_t job, Time now, std::int64_t value, std::uint32_t worker,
+                              Reason reason) {
+  JobEvent event;
+  event.time = now;
+  event.value = value;
+  event.task = TaskId(jobs_[job].task);
+  event.job = jobs_[job].number;
+  event.worker = worker;
+  event.kind = kind;
+  event.reason = reason;
+  events_.push_back(event);
+}
+
+}  // namespace redag::testing

@@ -1,0 +1,117 @@
+// docs/model.md written down a second time, as plainly as possible: at each dispatch() every live job is looked at,
+// sorted by the total order and decided. For tests: what PriorityScheduler decides must equal this. It shares with the
+// library's scheduler the interface and assign_priorities() (for levels only), nothing else. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "redag/sched/scheduler.hpp"
+
+namespace redag::testing {
+
+class ReferenceScheduler final : public sched::Scheduler {
+ public:
+  ReferenceScheduler(const Workload &workload, const sched::Config &config);
+
+  void release(TaskId task, Time nominal, Time now) override;
+  void complete(JobSlot job, Time now, sched::Outcome outcome) override;
+  void preemption_point(JobSlot job, Time now) override;
+  sched::Step dispatch(Time now) override;
+  [[nodiscard]] bool outranked(JobSlot job) const override;
+  DagId add_dag(const Dag &dag, Time now) override;
+  void remove_dag(DagId dag, Time now) override;
+  [[nodiscard]] sched::Accounting accounting(TaskId task) const override;
+
+ private:
+  static constexpr std::size_t kNone = SIZE_MAX;
+
+  /// What a completed job left for one successor.
+  struct Data {
+    bool fresh = false;
+    Time release = 0;  // r of the job that wrote it
+    Time origin = 0;
+  };
+
+  struct TaskState {
+    Task task;
+    std::size_t dag = 0;
+    std::vector<std::size_t> predecessors;  // tasks of the workload
+    std::uint32_t topological = 0;
+    std::vector<Data> inputs;  // one for each predecessor
+    std::uint32_t next_number = 0;
+    std::uint32_t rank = 0;
+    std::uint32_t level = 0;
+    sched::Accounting count;
+  };
+
+  struct DagState {
+    Dag dag;
+    bool removed = false;
+  };
+
+  /// Waiting -> Ready -> Running -> Done; Running <-> Suspended; Waiting, Ready -> Done (skipped).
+  enum class State : std::uint8_t { Waiting, Ready, Running, Suspended, Done };
+
+  /// Jobs stay in `jobs_` for ever; a slot is a position in it.
+  struct Job {
+    std::size_t task = 0;
+    std::uint32_t number = 0;
+    State state = State::Waiting;
+    Time release = 0;
+    Time origin = 0;
+    std::uint64_t ready_order = 0;
+    std::uint32_t worker = WorkerId::kNoneValue;
+    bool deferred = false;
+    bool at_point = false;        // until the next dispatch
+    std::size_t heir_of = kNone;  // job whose priority this one has inherited
+    std::vector<Data> consumed;   // parallel to the task's predecessors
+  };
+
+  /// A worker's jobs, the lowest first; only the last one can be running.
+  using Stack = std::vector<std::size_t>;
+
+  void add_tasks(const Dag &dag);
+  void rank_tasks();
+  [[nodiscard]] bool task_before(const TaskState &a, const TaskState &b) const;
+  [[nodiscard]] bool same_phase(const TaskState &predecessor, const TaskState &successor) const;
+
+  void create_job(std::size_t task, Time release, Time now, const std::vector<Data> &consumed);
+  void resolve(std::size_t job, Time now);
+  void deliver(std::size_t job, Time now);
+  void skip(std::size_t job, Time now, Reason reason);
+
+  [[nodiscard]] bool started(const Job &job) const;
+  [[nodiscard]] std::vector<std::size_t> jobs_of(std::size_t task, State state) const;
+  [[nodiscard]] bool task_busy(const Job &job) const;
+  [[nodiscard]] bool dag_at_bound(const Job &job) const;
+  [[nodiscard]] std::size_t group_holder(const Job &job) const;
+
+  [[nodiscard]] const Job &effective(std::size_t job) const;
+  [[nodiscard]] bool key_before(const Job &a, const Job &b) const;
+  [[nodiscard]] bool shares_levels() const;
+  [[nodiscard]] std::uint32_t level_of(std::size_t job) const;
+  [[nodiscard]] bool outranks(std::size_t a, std::size_t b) const;
+  [[nodiscard]] bool considered_before(std::size_t a, std::size_t b) const;
+
+  /// One walk over the candidates. False: a job inherited a priority, which the walk has not taken into account.
+  [[nodiscard]] bool try_dispatch(Time now);
+  [[nodiscard]] std::uint32_t worker_for(std::size_t job) const;
+  [[nodiscard]] bool can_start(std::size_t job, Time now, bool &inherited);
+  void place(std::size_t job, std::uint32_t worker, Time now);
+  void resume_uncovered(Time now);
+  void emit(JobEventKind kind, std::size_t job, Time now, std::int64_t value, std::uint32_t worker,
+            Reason reason = Reason::None);
+
+  sched::Config config_;
+  std::vector<DagState> dags_;
+  std::vector<TaskState> tasks_;
+  std::vector<Job> jobs_;
+  std::vector<Stack> workers_;
+  std::uint64_t ready_count_ = 0;
+  std::vector<JobEvent> events_;
+  std::vector<sched::Dispatch> dispatches_;
+  std::vector<JobEvent> step_events_;
+};
+
+}  // namespace redag::testing
