@@ -1,0 +1,83 @@
+#include "redag/base/time.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+namespace redag {
+namespace {
+
+TEST(ParseDuration, ReadsEveryUnit) {
+  EXPECT_EQ(parse_duration("250ns"), 250);
+  EXPECT_EQ(parse_duration("3us"), 3 * kMicrosecond);
+  EXPECT_EQ(parse_duration("3\xC2\xB5s"), 3 * kMicrosecond);
+  EXPECT_EQ(parse_duration("3\xCE\xBCs"), 3 * kMicrosecond);
+  EXPECT_EQ(parse_duration("1.5ms"), 1'500'000);
+  EXPECT_EQ(parse_duration("2s"), 2 * kSecond);
+  EXPECT_EQ(parse_duration("1min"), 60 * kSecond);
+  EXPECT_EQ(parse_duration("1h"), 3600 * kSecond);
+  EXPECT_EQ(parse_duration("5 ms"), 5 * kMillisecond);
+}
+
+TEST(ParseDuration, ZeroNeedsNoUnitAndMinusIsRead) {
+  EXPECT_EQ(parse_duration("0"), 0);
+  EXPECT_EQ(parse_duration("-5ms"), -5 * kMillisecond);
+}
+
+TEST(ParseDuration, LimitsAreExact) {
+  EXPECT_EQ(parse_duration("4611686018427387903ns"), kMaxDuration);
+  EXPECT_FALSE(parse_duration("4611686018427387904ns"));
+}
+
+struct Refused {
+  const char *text;
+  const char *why;
+};
+
+class ParseDurationRefuses : public testing::TestWithParam<Refused> {};
+
+TEST_P(ParseDurationRefuses, WithAReason) {
+  const Result<Duration> result = parse_duration(GetParam().text);
+  ASSERT_FALSE(result);
+  EXPECT_NE(to_string(result.error()).find(GetParam().why), std::string::npos) << to_string(result.error());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, ParseDurationRefuses,
+    testing::Values(Refused{"", "does not begin with a number"}, Refused{"ms", "does not begin with a number"},
+                    Refused{".", "does not begin with a number"}, Refused{"--5ms", "does not begin with a number"},
+                    Refused{"5", "it has no unit"}, Refused{"5.0", "it has no unit"},
+                    Refused{"5 parsec", "unknown unit"}, Refused{"5MS", "unknown unit"},
+                    Refused{"1e3ms", "unknown unit"}, Refused{"5ms ", "unknown unit"},
+                    Refused{"1.2.3ms", "unknown unit"}, Refused{"nan", "does not begin"},
+                    Refused{"0.5ns", "not a whole number of nanoseconds"},
+                    Refused{"1.0000001ms", "not a whole number of nanoseconds"},
+                    Refused{"0.00000000000000000000001s", "too many decimals"},
+                    Refused{"99999999999999999999999999h", "too large"}, Refused{"200000000min", "too large"}));
+
+RC_GTEST_PROP(FormatDuration, ParsesBackToTheSameValue, ()) {
+  const auto value = *rc::gen::inRange<Duration>(-kMaxDuration, kMaxDuration);
+  RC_ASSERT(parse_duration(format_duration(value)) == value);
+}
+
+RC_GTEST_PROP(ParseDuration, NeverCrashesOnText, (const std::string &text)) {
+  const Result<Duration> result = parse_duration(text);
+  RC_ASSERT(result.has_value() || result.error().size() == 1);
+}
+
+TEST(FormatDuration, IsShort) {
+  EXPECT_EQ(format_duration(0), "0s");
+  EXPECT_EQ(format_duration(1'500'000), "1.5ms");
+  EXPECT_EQ(format_duration(20 * kMillisecond), "20ms");
+  EXPECT_EQ(format_duration(-3), "-3ns");
+  EXPECT_EQ(format_duration(kSecond), "1s");
+}
+
+TEST(HumanizeDuration, RoundsToFourDigits) {
+  EXPECT_EQ(humanize_duration(12'345'678), "12.35ms");
+  EXPECT_EQ(humanize_duration(-12'345'678), "-12.35ms");
+  EXPECT_EQ(humanize_duration(0), "0s");
+  EXPECT_EQ(humanize_duration(999), "999ns");
+}
+
+}  // namespace
+}  // namespace redag
