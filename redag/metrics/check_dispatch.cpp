@@ -78,7 +78,7 @@ void DispatchRules::check_place(const JobEvent &event, const LiveJob &job) {
 void DispatchRules::check_choice(const LiveJob &chosen, const Urgency &urgency) {
   const Replay &replay = context_.replay;
   const auto complain = [&](const Replay::JobRef &waiting) {
-    complaints_.push_back(Complaint{waiting, Replay::JobRef{chosen.task, chosen.number}, 0});
+    complaints_.push_back(Complaint{waiting, Replay::JobRef{chosen.task, chosen.number}});
   };
   context_.expect(Rule::Priority, true, chosen.task, chosen.number, [] { return std::string(); });
   const auto &eligible = replay.eligible();
@@ -167,12 +167,14 @@ void DispatchRules::check_evictions() {
     const LiveJob *job = replay.find(eviction.job.task, eviction.job.number);
     if (job == nullptr || job->state != State::Suspended || eviction.worker >= replay.worker_count()) continue;
     const LiveJob *by = replay.running(eviction.worker);
-    context_.expect(Rule::Preemption, by != nullptr && replay.preempts(by->raised, replay.inherited(*job)),
-                    eviction.job.task, eviction.job.number, [&] {
-                      return by == nullptr ? std::string("preempted by nobody")
-                                           : "preempted by " + context_.job_name(by->task, by->number) +
-                                                 ", which does not outrank it";
-                    });
+    // Where levels are shared, the job may inherit from one that was looked at only after the preemption: so its own
+    // level decides, and what it inherits only in the total order.
+    const bool outranked =
+        by != nullptr && replay.preempts(by->raised, job->own) && by->raised < replay.inherited(*job);
+    context_.expect(Rule::Preemption, outranked, eviction.job.task, eviction.job.number, [&] {
+      return by == nullptr ? std::string("preempted by nobody")
+                           : "preempted by " + context_.job_name(by->task, by->number) + ", which does not outrank it";
+    });
   }
   evictions_.clear();
 }

@@ -23,7 +23,6 @@ class DispatchRules {
   struct Complaint {
     Replay::JobRef waiting;
     Replay::JobRef chosen;
-    std::size_t event = 0;
   };
   struct Eviction {
     Replay::JobRef job;
