@@ -1,0 +1,36 @@
+// A mutex whose owner inherits the priority of the most urgent thread that waits for it (PTHREAD_PRIO_INHERIT): a
+// preempted low-priority owner delays a high-priority waiter by its critical section only. BasicLockable and Lockable,
+// for std::lock_guard and std::unique_lock. Use it for data that callbacks of different rates share.
+#pragma once
+
+#include <pthread.h>
+
+#include "redag/base/check.hpp"
+
+namespace redag {
+
+class PiMutex {
+ public:
+  PiMutex() {
+    pthread_mutexattr_t attributes;
+    REDAG_CHECK(pthread_mutexattr_init(&attributes) == 0, "no mutex attributes");
+    REDAG_CHECK(pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT) == 0, "no priority inheritance");
+    REDAG_CHECK(pthread_mutex_init(&mutex_, &attributes) == 0, "the kernel has no priority-inheriting futexes");
+    pthread_mutexattr_destroy(&attributes);
+  }
+  ~PiMutex() { pthread_mutex_destroy(&mutex_); }
+
+  PiMutex(const PiMutex &) = delete;
+  PiMutex &operator=(const PiMutex &) = delete;
+
+  void lock() noexcept { REDAG_CHECK(pthread_mutex_lock(&mutex_) == 0, "a mutex cannot be locked"); }
+  [[nodiscard]] bool try_lock() noexcept { return pthread_mutex_trylock(&mutex_) == 0; }
+  void unlock() noexcept {
+    REDAG_CHECK(pthread_mutex_unlock(&mutex_) == 0, "a mutex is unlocked by who does not own it");
+  }
+
+ private:
+  pthread_mutex_t mutex_;
+};
+
+}  // namespace redag

@@ -1,0 +1,24 @@
+// The clocks of the threaded runtime, in nanoseconds. Any thread; async-signal-safe.
+#pragma once
+
+#include <ctime>
+
+#include "redag/base/time.hpp"
+
+namespace redag::runtime {
+
+namespace detail {
+inline Time read_clock(clockid_t clock) noexcept {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return static_cast<Time>(now.tv_sec) * kSecond + now.tv_nsec;
+}
+}  // namespace detail
+
+/// CLOCK_MONOTONIC: never set back, the same on every processor.
+[[nodiscard]] inline Time monotonic_now() noexcept { return detail::read_clock(CLOCK_MONOTONIC); }
+
+/// Processor time of the calling thread: stands still while it sleeps or is preempted. A system call.
+[[nodiscard]] inline Duration thread_cpu_now() noexcept { return detail::read_clock(CLOCK_THREAD_CPUTIME_ID); }
+
+}  // namespace redag::runtime

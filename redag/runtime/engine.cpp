@@ -1,0 +1,305 @@
+#include "redag/runtime/engine.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <array>
+#include <thread>
+#include <utility>
+
+#include "redag/base/check.hpp"
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/engine_parts.hpp"
+#include "redag/runtime/preemption_point.hpp"
+#include "redag/runtime/threads.hpp"
+
+namespace redag::runtime {
+
+using sched::Dispatch;
+using sched::Outcome;
+using sched::Preemption;
+
+Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options)
+    : options_(std::move(options)),
+      scheduler_(std::move(scheduler)),
+      first_tasks_{TaskId(0)},
+      decisions_(options_.trace_capacity) {
+  const sched::Config &config = options_.config;
+  REDAG_CHECK(!os() || config.max_started >= config.workers, "os: a thread for every processor, at least");
+  const std::uint32_t count = os() ? config.max_started : config.workers;
+  idle_.reserve(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    threads_.push_back(std::make_unique<Thread>(i, options_.trace_capacity));
+  }
+}
+
+Engine::~Engine() {
+  halt();
+  join();
+}
+
+Time Engine::now() const noexcept {
+  const Time origin = origin_.load(std::memory_order_relaxed);
+  return origin == kNever ? 0 : monotonic_now() - origin;
+}
+
+// ---- threads ----
+
+Result<void> Engine::start() {
+  std::vector<int> cpus = options_.cpus;
+  if (os() && cpus.empty()) {
+    // The kernel runs the m most urgent threads only if it has exactly m processors to choose for; the last ones,
+    // because the first ones serve most interrupts.
+    const std::vector<int> usable = usable_cpus();
+    const std::size_t workers = options_.config.workers;
+    if (workers <= usable.size()) cpus.assign(usable.end() - static_cast<std::ptrdiff_t>(workers), usable.end());
+  }
+  for (auto &thread : threads_) {
+    thread->priority = realtime() ? options_.band.top_job : 0;
+    thread->setup = ThreadSetup{options_.name + "-" + std::to_string(thread->index), thread->priority, cpus};
+    thread->handle = std::thread([this, &self = *thread] { main(self); });
+  }
+  Result<void> result;
+  for (auto &thread : threads_) {
+    thread->ready.wait();
+    if (result && !thread->setup_result) result = thread->setup_result;
+  }
+  if (!result) {
+    halt();
+    join();
+    return result;
+  }
+  Locked locked(*this);
+  if (os()) {
+    for (auto thread = threads_.rbegin(); thread != threads_.rend(); ++thread) idle_.push_back(thread->get());
+  }
+  return result;
+}
+
+void Engine::main(Thread &self) noexcept {
+  self.setup_result = set_up_this_thread(self.setup);
+  const bool usable = self.setup_result.has_value();
+  self.ready.set();
+  while (usable) {
+    if (self.has_mail.load(std::memory_order_acquire)) {
+      const Assignment first = self.mail;
+      self.has_mail.store(false, std::memory_order_relaxed);
+      // A job that was dispatched to this very thread when the last one ended needs no wake-up.
+      Next next{Next::Kind::Start, first};
+      while (next.kind == Next::Kind::Start) next = run(self, next.assignment, JobSlot());
+      continue;
+    }
+    if (exit_.load(std::memory_order_acquire)) return;
+    self.parker.park();
+  }
+}
+
+void Engine::join() {
+  exit_.store(true, std::memory_order_release);
+  for (auto &thread : threads_) thread->parker.unpark();
+  for (auto &thread : threads_) {
+    if (thread->handle.joinable()) thread->handle.join();
+  }
+}
+
+bool Engine::in_body() const noexcept {
+  const RunningJob *job = RunningJob::current();
+  return job != nullptr && job->engine == this;
+}
+
+// ---- jobs, on their threads ----
+
+// Runs a job to its end, on top of `below` if that is one. Returns what this thread is to do next.
+Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot below) noexcept {
+  const Job &job = assignment.job;
+  const Time begun = now();
+  if (options_.trace_capacity > 0) {
+    self.events.push(
+        JobEvent{begun, begun, job.task, job.number, job.worker.value, JobEventKind::Started, Reason::None, 0});
+  }
+  RunningJob running{this, self.index,           &self.outranked, job.slot, assignment.entry->budget, thread_cpu_now(),
+                     0,    RunningJob::current()};
+  RunningJob::set_current(&running);
+  const Outcome outcome = call(assignment);
+  RunningJob::set_current(running.below);
+  return finish(self, assignment, outcome, running.cpu_time(), below);
+}
+
+Outcome Engine::call(const Assignment &assignment) {
+  try {
+    return assignment.entry->body(assignment.job);
+  } catch (const BudgetExceeded &) {
+    return Outcome::BudgetExceeded;
+  } catch (...) {
+    if (options_.on_exception) options_.on_exception(assignment.job, std::current_exception());
+    return Outcome::Threw;
+  }
+}
+
+Engine::Next Engine::finish(Thread &self, const Assignment &assignment, Outcome outcome, Duration used, JobSlot below) {
+  Body doomed;  // of a removed task; destroyed without the lock
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  TaskEntry &entry = *assignment.entry;
+  entry.count(used);
+  entry.busy = false;
+  if (entry.removed) doomed.swap(entry.body);
+  self.stack.pop_back();
+  --unfinished_;
+  scheduler_->complete(assignment.job.slot, at, outcome);
+  const Next next = decide(locked, at, &self, below);
+  if (unfinished_ == 0 && halted_at_ != kNever) idle_event_.set();
+  return next;
+}
+
+void RunningJob::reach_preemption_point() { engine->preemption_point(*this); }
+
+void Engine::preemption_point(RunningJob &job) {
+  Thread &self = *threads_[job.thread];
+  Next next;
+  {
+    const Time at = now();
+    Locked locked(*this);
+    withdraw_if_halting();
+    if (!scheduler_->outranked(job.slot)) return;
+    scheduler_->preemption_point(job.slot, at);
+    next = decide(locked, at, &self, job.slot);
+  }
+  if (next.kind != Next::Kind::Start) return;
+  const Duration before = thread_cpu_now();
+  while (next.kind == Next::Kind::Start) next = run(self, next.assignment, job.slot);
+  REDAG_CHECK(next.kind == Next::Kind::Resume, "a suspended job was not resumed");
+  job.cpu_on_top += thread_cpu_now() - before;
+}
+
+// ---- events from outside ----
+
+void Engine::release(std::span<const Release> releases) {
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  if (halted_at_ != kNever) return;
+  for (const Release &release : releases) scheduler_->release(release.task, release.nominal, at);
+  decide(locked, at, nullptr, JobSlot());
+}
+
+void Engine::release(TaskId task, Time nominal) {
+  const Release one{task, nominal};
+  release(std::span(&one, 1));
+}
+
+void Engine::bind(const Workload &workload, std::vector<Body> bodies) {
+  REDAG_CHECK(bodies.size() == workload.task_count(), "every task needs a body");
+  Locked locked(*this);
+  std::size_t first = 0;
+  for (const Dag &dag : workload.dags) {
+    register_dag(dag, std::span(bodies).subspan(first, dag.tasks.size()));
+    first += dag.tasks.size();
+  }
+}
+
+AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
+  REDAG_CHECK(bodies.size() == dag.tasks.size(), "every task needs a body");
+  Locked locked(*this);
+  const TaskId first = first_tasks_.back();
+  const Time at = now();
+  const DagId id = scheduler_->add_dag(dag, at);
+  register_dag(dag, bodies);
+  REDAG_CHECK(id.value + 2 == first_tasks_.size(), "the scheduler numbers DAGs differently");
+  if (halted_at_ != kNever) {
+    scheduler_->remove_dag(id, at);  // nothing starts any more
+  }
+  decide(locked, at, nullptr, JobSlot());
+  return AddedDag{id, first};
+}
+
+void Engine::remove_dag(DagId dag) {
+  std::vector<Body> doomed;  // destroyed without the lock: destructors are the user's code
+  Locked locked(*this);
+  REDAG_CHECK(dag.value + 1 < first_tasks_.size(), "removal of a DAG that does not exist");
+  withdraw_if_halting();
+  for (std::uint32_t t = first_tasks_[dag.value].value; t < first_tasks_[dag.value + 1].value; ++t) {
+    TaskEntry &entry = tasks_[t];
+    entry.removed = true;
+    if (!entry.busy) doomed.push_back(std::exchange(entry.body, nullptr));
+  }
+  const Time at = now();
+  scheduler_->remove_dag(dag, at);
+  decide(locked, at, nullptr, JobSlot());
+}
+
+void Engine::register_dag(const Dag &dag, std::span<Body> bodies) {
+  for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+    tasks_.emplace_back(std::move(bodies[i]), dag.tasks[i].wcet, dag.tasks[i].budget);
+  }
+  first_tasks_.push_back(TaskId(tasks_.size()));
+  // Jobs of one task do not overlap: no stack is deeper than there are tasks.
+  for (auto &thread : threads_) thread->stack.reserve(tasks_.size());
+}
+
+// ---- the end ----
+
+// The first to take the lock after halt() takes away what has not started. Those skips are the engine's, not the
+// model's: they are not recorded, and the jobs count as in flight.
+void Engine::withdraw_if_halting() {
+  if (halted_at_ != kNever || !halting_.load(std::memory_order_acquire)) return;
+  halted_at_ = now();
+  for (std::size_t dag = 0; dag + 1 < first_tasks_.size(); ++dag) scheduler_->remove_dag(DagId(dag), halted_at_);
+  const sched::Step step = scheduler_->dispatch(halted_at_);
+  for (const JobEvent &event : step.events) {
+    if (event.kind == JobEventKind::Skipped) ++tasks_[event.task.value].withdrawn;
+  }
+  REDAG_CHECK(step.dispatches.empty(), "a job was started after the end");
+}
+
+bool Engine::wait_idle(Time deadline) {
+  {
+    Locked locked(*this);
+    withdraw_if_halting();
+    REDAG_CHECK(halted_at_ != kNever, "wait_idle() is for after halt()");
+    if (unfinished_ == 0) return true;
+  }
+  return idle_event_.wait_until(deadline);
+}
+
+// ---- what can be asked ----
+
+Time Engine::halted_at() const {
+  const std::lock_guard guard(lock_);
+  return halted_at_;
+}
+
+std::vector<Job> Engine::started() const {
+  const std::lock_guard guard(lock_);
+  std::vector<Job> jobs;
+  for (const auto &thread : threads_) jobs.insert(jobs.end(), thread->stack.begin(), thread->stack.end());
+  return jobs;
+}
+
+void Engine::drain(std::vector<JobEvent> &out, bool last) {
+  decisions_.drain(merge_.decisions());
+  for (auto &thread : threads_) thread->events.drain(merge_.started());
+  merge_.merge(out, last);
+}
+
+std::uint64_t Engine::lost_events() const {
+  if (options_.trace_capacity == 0) return 0;
+  std::uint64_t lost = decisions_.dropped();
+  for (const auto &thread : threads_) lost += thread->events.dropped();
+  return lost;
+}
+
+sched::Accounting Engine::accounting(TaskId task) const {
+  const std::lock_guard guard(lock_);
+  sched::Accounting accounting = scheduler_->accounting(task);
+  accounting.skipped -= tasks_[task.value].withdrawn;
+  return accounting;
+}
+
+Usage Engine::usage(TaskId task) const {
+  const std::lock_guard guard(lock_);
+  return tasks_[task.value].usage;
+}
+
+}  // namespace redag::runtime

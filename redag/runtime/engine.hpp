@@ -1,0 +1,170 @@
+// The threaded runtime: owns worker threads, the lock around the scheduler, and the rings of events; carries out what
+// the scheduler decides, and decides nothing. Who releases jobs (release timer, rclcpp) and what jobs do (bodies) is
+// given from outside.
+//
+// Threads: any thread, also a body, may call anything but start(), join() and drain(); drain() is for one thread at a
+// time; halt() is async-signal-safe. No lock is held while a body runs.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "redag/base/pi_mutex.hpp"
+#include "redag/base/result.hpp"
+#include "redag/runtime/event_merge.hpp"
+#include "redag/runtime/mode.hpp"
+#include "redag/runtime/parker.hpp"
+#include "redag/runtime/running_job.hpp"
+#include "redag/sched/scheduler.hpp"
+#include "redag/trace/ring.hpp"
+
+namespace redag::runtime {
+
+/// What a body is told.
+struct Job {
+  TaskId task;
+  std::uint32_t number = 0;  // within its task, from 0
+  JobSlot slot;
+  WorkerId worker;  // with `os`: the processor it was given first
+};
+
+/// Runs one job. What it throws becomes Outcome::Threw, or BudgetExceeded if it is redag::BudgetExceeded.
+using Body = std::function<sched::Outcome(const Job &)>;
+
+/// Told of every exception that left a body, on the worker's thread, before the job counts as ended. Must not throw.
+using ExceptionHandler = std::function<void(const Job &, std::exception_ptr)>;
+
+struct Release {
+  TaskId task;
+  Time nominal = 0;
+};
+
+struct EngineOptions {
+  std::string name = "redag";      // prefix of the threads' names
+  sched::Config config;            // what the scheduler was built with; Full means `os`: threads = max_started
+  PriorityBand band;               // os, or realtime_threads
+  bool realtime_threads = false;   // none, cooperative: all workers at SCHED_FIFO band.top_job
+  std::vector<int> cpus;           // worker threads run there only; empty: anywhere, with `os` on m processors
+  std::size_t trace_capacity = 0;  // events the rings hold between two drain(); 0: no events
+  ExceptionHandler on_exception;   // empty: exceptions are only counted
+};
+
+/// Processor time of a task's jobs that ended.
+struct Usage {
+  std::uint64_t jobs = 0;
+  Duration total = 0;
+  Duration longest = 0;
+  std::uint64_t over_wcet = 0;
+  std::uint64_t over_budget = 0;
+};
+
+struct AddedDag {
+  DagId dag;
+  TaskId first_task;  // the others follow
+};
+
+class Engine {
+ public:
+  Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options);
+  ~Engine();  // halts and joins: waits for the bodies that run
+  Engine(const Engine &) = delete;
+  Engine &operator=(const Engine &) = delete;
+
+  /// Gives the tasks that the scheduler was built with their bodies, in TaskId order. Before start().
+  void bind(const Workload &workload, std::vector<Body> bodies);
+
+  /// Creates the threads; they wait for jobs. Error: what the system refused, with a hint. Once.
+  [[nodiscard]] Result<void> start();
+
+  /// Sets the origin of all times that the scheduler sees (CLOCK_MONOTONIC). Until then now() is 0. Before any release.
+  void set_origin(Time monotonic) noexcept { origin_.store(monotonic, std::memory_order_relaxed); }
+  [[nodiscard]] Time now() const noexcept;
+
+  /// Jobs of timer tasks are released, all at this instant; decisions are carried out before it returns.
+  void release(std::span<const Release> releases);
+  void release(TaskId task, Time nominal);
+
+  /// Reconfiguration while running; bodies in the DAG's task order. Allocates under the lock.
+  AddedDag add_dag(const Dag &dag, std::vector<Body> bodies);
+  /// Jobs that have not started are skipped. A body is destroyed as soon as its last job has ended.
+  void remove_dag(DagId dag);
+
+  /// No job starts from now on; jobs that have started go on. What was released and has not started stays in flight.
+  void halt() noexcept { halting_.store(true, std::memory_order_release); }
+  [[nodiscard]] bool halting() const noexcept { return halting_.load(std::memory_order_acquire); }
+  /// After halt(): waits until no started job is left. False: not by `deadline` (CLOCK_MONOTONIC); see started().
+  [[nodiscard]] bool wait_idle(Time deadline);
+  [[nodiscard]] Time halted_at() const;  // on the origin's clock; kNever before
+  /// Jobs that have started and not ended.
+  [[nodiscard]] std::vector<Job> started() const;
+  /// Ends the threads; waits for the bodies that run. Not from a body.
+  void join();
+
+  /// Appends the events since the last call, merged into one stream whose times do not decrease. `last`: nothing
+  /// follows.
+  void drain(std::vector<JobEvent> &out, bool last = false);
+  [[nodiscard]] std::uint64_t lost_events() const;
+
+  [[nodiscard]] sched::Accounting accounting(TaskId task) const;
+  [[nodiscard]] Usage usage(TaskId task) const;
+  /// Priority changes that the system refused while running (rights were taken away).
+  [[nodiscard]] std::uint64_t refused_priorities() const noexcept { return refused_priorities_.load(); }
+  /// Is the calling thread inside one of this engine's bodies?
+  [[nodiscard]] bool in_body() const noexcept;
+  [[nodiscard]] std::uint32_t thread_count() const { return static_cast<std::uint32_t>(threads_.size()); }
+  [[nodiscard]] const EngineOptions &options() const { return options_; }
+
+ private:
+  friend struct RunningJob;
+  struct Thread;
+  struct TaskEntry;
+  struct Assignment;
+  struct Next;
+  class Locked;
+
+  void main(Thread &self) noexcept;
+  Next run(Thread &self, const Assignment &assignment, JobSlot below) noexcept;
+  sched::Outcome call(const Assignment &assignment);
+  Next finish(Thread &self, const Assignment &assignment, sched::Outcome outcome, Duration used, JobSlot below);
+  void preemption_point(RunningJob &job);
+
+  // Under the lock.
+  Next decide(Locked &locked, Time now, Thread *self, JobSlot below);
+  Next place_on_workers(Locked &locked, const sched::Step &step, Thread *self, JobSlot below);
+  Next place_on_pool(Locked &locked, const sched::Step &step, Thread *self);
+  Assignment assign(Thread &thread, const sched::Dispatch &dispatch);
+  void hand(Locked &locked, Thread &thread, const Assignment &assignment);
+  void set_level(Thread &thread, std::uint32_t level);
+  void refresh_outranked();
+  void register_dag(const Dag &dag, std::span<Body> bodies);
+  void withdraw_if_halting();
+
+  [[nodiscard]] bool os() const { return options_.config.preemption == sched::Preemption::Full; }
+  [[nodiscard]] bool realtime() const { return os() || options_.realtime_threads; }
+
+  EngineOptions options_;
+  std::unique_ptr<sched::Scheduler> scheduler_;
+  mutable PiMutex lock_;  // guards the scheduler and everything below that says so
+  std::vector<std::unique_ptr<Thread>> threads_;
+  std::vector<Thread *> idle_;       // lock: os, threads without a job
+  std::deque<TaskEntry> tasks_;      // lock; entries stay where they are
+  std::vector<TaskId> first_tasks_;  // lock: of each DAG, and one past the last
+  std::uint32_t unfinished_ = 0;     // lock: jobs dispatched and not ended
+  Time halted_at_ = kNever;          // lock
+  trace::Ring decisions_;            // written under the lock
+  EventMerge merge_;                 // drain() only
+  Event idle_event_;
+  std::atomic<Time> origin_{kNever};
+  std::atomic<bool> halting_{false};
+  std::atomic<bool> exit_{false};
+  std::atomic<std::uint64_t> refused_priorities_{0};
+};
+
+}  // namespace redag::runtime

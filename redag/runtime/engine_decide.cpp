@@ -1,0 +1,112 @@
+// How the engine carries out the scheduler's decisions. Everything here runs under the engine's lock, allocates nothing
+// and looks nothing up by name.
+#include <algorithm>
+
+#include "redag/base/check.hpp"
+#include "redag/runtime/engine_parts.hpp"
+
+namespace redag::runtime {
+
+using sched::Dispatch;
+
+// `self`: the calling thread, if it has just lost its job and can take another; `below`: the job suspended on it.
+Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot below) {
+  const sched::Step step = scheduler_->dispatch(now);
+  if (options_.trace_capacity > 0) {
+    for (const JobEvent &event : step.events) decisions_.push(event);
+  }
+  const Next next = os() ? place_on_pool(locked, step, self) : place_on_workers(locked, step, self, below);
+  if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
+  return next;
+}
+
+// none, cooperative: thread w is worker w.
+Engine::Next Engine::place_on_workers(Locked &locked, const sched::Step &step, Thread *self, JobSlot below) {
+  Next next;
+  for (const Dispatch &dispatch : step.dispatches) {
+    Thread &thread = *threads_[dispatch.worker.value];
+    if (dispatch.resume) {
+      // Other than that of the job below, these are changes of level: nothing to do without levels.
+      if (&thread == self && dispatch.job == below) next.kind = Next::Kind::Resume;
+      continue;
+    }
+    const Assignment assignment = assign(thread, dispatch);
+    if (&thread == self) {
+      next = Next{Next::Kind::Start, assignment};
+    } else {
+      hand(locked, thread, assignment);
+    }
+  }
+  return next;
+}
+
+// os: any idle thread will do; the kernel decides what really runs, by priority. Of the jobs to start the calling
+// thread takes the most urgent one, so that none of those it then wakes preempts it under the lock. Nothing is done to
+// a job that is preempted: whoever outranks it has a higher priority.
+Engine::Next Engine::place_on_pool(Locked &locked, const sched::Step &step, Thread *self) {
+  const Dispatch *own = nullptr;
+  if (self != nullptr) {
+    for (const Dispatch &dispatch : step.dispatches) {
+      if (!dispatch.resume && (own == nullptr || dispatch.level < own->level)) own = &dispatch;
+    }
+  }
+  Next next;
+  if (own != nullptr) {
+    set_level(*self, own->level);
+    next = Next{Next::Kind::Start, assign(*self, *own)};
+  } else if (self != nullptr) {
+    idle_.push_back(self);
+  }
+  for (const Dispatch &dispatch : step.dispatches) {
+    if (&dispatch == own) continue;
+    if (dispatch.resume) {
+      const auto runs_it = [&](const auto &t) { return !t->stack.empty() && t->stack.back().slot == dispatch.job; };
+      const auto thread = std::find_if(threads_.begin(), threads_.end(), runs_it);
+      REDAG_CHECK(thread != threads_.end(), "a job goes on that no thread has");
+      set_level(**thread, dispatch.level);
+      continue;
+    }
+    REDAG_CHECK(!idle_.empty(), "more jobs started than there are threads");
+    Thread &thread = *idle_.back();
+    idle_.pop_back();
+    set_level(thread, dispatch.level);
+    hand(locked, thread, assign(thread, dispatch));
+  }
+  return next;
+}
+
+Engine::Assignment Engine::assign(Thread &thread, const Dispatch &dispatch) {
+  TaskEntry &entry = tasks_[dispatch.task.value];
+  REDAG_CHECK(!entry.busy, "two jobs of one task at a time");
+  entry.busy = true;
+  ++unfinished_;
+  const Job job{dispatch.task, dispatch.number, dispatch.job, dispatch.worker};
+  thread.stack.push_back(job);
+  return Assignment{job, &entry};
+}
+
+void Engine::hand(Locked &locked, Thread &thread, const Assignment &assignment) {
+  REDAG_CHECK(!thread.has_mail.load(std::memory_order_relaxed), "a worker was given two jobs");
+  thread.mail = assignment;
+  thread.has_mail.store(true, std::memory_order_release);
+  locked.wake(thread);
+}
+
+void Engine::set_level(Thread &thread, std::uint32_t level) {
+  const int priority = options_.band.of_level(level);
+  if (thread.priority == priority) return;
+  thread.priority = priority;
+  if (!set_fifo_priority(thread.handle.native_handle(), priority)) {
+    refused_priorities_.fetch_add(1, std::memory_order_relaxed);
+  }
+}
+
+// Lets preemption points cost one load while there is nothing to do.
+void Engine::refresh_outranked() {
+  for (auto &thread : threads_) {
+    const bool outranked = !thread->stack.empty() && scheduler_->outranked(thread->stack.back().slot);
+    thread->outranked.store(outranked, std::memory_order_relaxed);
+  }
+}
+
+}  // namespace redag::runtime

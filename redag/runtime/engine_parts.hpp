@@ -1,0 +1,95 @@
+// The engine's own types: its threads, its tasks, its lock. For engine*.cpp only.
+#pragma once
+
+#include <array>
+#include <thread>
+
+#include "redag/runtime/engine.hpp"
+#include "redag/runtime/threads.hpp"
+
+namespace redag::runtime {
+
+struct Engine::TaskEntry {
+  TaskEntry(Body its_body, Duration its_wcet, Duration its_budget)
+      : body(std::move(its_body)), wcet(its_wcet), budget(its_budget) {}
+
+  void count(Duration used) {
+    ++usage.jobs;
+    usage.total += used;
+    usage.longest = std::max(usage.longest, used);
+    if (wcet > 0 && used > wcet) ++usage.over_wcet;
+    if (budget > 0 && used > budget) ++usage.over_budget;
+  }
+
+  Body body;
+  Duration wcet;
+  Duration budget;
+  Usage usage;
+  std::uint64_t withdrawn = 0;  // jobs taken away at the end
+  bool busy = false;            // a job of it has started and not ended
+  bool removed = false;
+};
+
+struct Engine::Assignment {
+  Job job;
+  TaskEntry *entry = nullptr;  // stays where it is; its body is not touched while `busy`
+};
+
+/// What a thread does after a decision.
+struct Engine::Next {
+  enum class Kind : std::uint8_t {
+    Nothing,  // waits for mail
+    Start,    // runs `assignment`
+    Resume,   // returns to the job below
+  };
+  Kind kind = Kind::Nothing;
+  Assignment assignment;
+};
+
+struct alignas(64) Engine::Thread {
+  Thread(std::uint32_t its_index, std::size_t trace_capacity) : index(its_index), events(trace_capacity) {}
+
+  std::uint32_t index;  // none, cooperative: the worker's number
+  Parker parker;
+  // Written under the lock by whoever dispatches, while the thread has no job; read by the thread without it.
+  Assignment mail;
+  std::atomic<bool> has_mail{false};
+  std::atomic<bool> outranked{false};  // written under the lock
+  std::vector<Job> stack;              // lock: the jobs started here, the running one last
+  int priority = 0;                    // lock: SCHED_FIFO priority it has now; 0: not real-time
+  trace::Ring events;                  // Started; written by the thread
+
+  ThreadSetup setup;
+  Result<void> setup_result;
+  Event ready;
+  std::thread handle;
+};
+
+/// Holds the engine's lock, and wakes after it. Real-time threads are woken under the lock instead: one that were
+/// preempted between its decision and the wake-up would leave an urgent job asleep, and only as the lock's owner is it
+/// raised when the next decision is due.
+class Engine::Locked {
+ public:
+  explicit Locked(Engine &engine) : engine_(engine) { engine_.lock_.lock(); }
+  ~Locked() {
+    engine_.lock_.unlock();
+    for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
+  }
+  Locked(const Locked &) = delete;
+  Locked &operator=(const Locked &) = delete;
+
+  void wake(Thread &thread) {
+    if (engine_.realtime() || count_ == late_.size()) {
+      thread.parker.unpark();
+    } else {
+      late_[count_++] = &thread;
+    }
+  }
+
+ private:
+  Engine &engine_;
+  std::array<Thread *, 32> late_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace redag::runtime

@@ -1,0 +1,43 @@
+#include "redag/runtime/event_merge.hpp"
+
+#include <algorithm>
+
+namespace redag::runtime {
+namespace {
+
+bool ends(const JobEvent &event) { return event.kind == JobEventKind::Finished || event.kind == JobEventKind::Aborted; }
+
+bool same_job(const JobEvent &a, const JobEvent &b) { return a.task == b.task && a.job == b.job; }
+
+}  // namespace
+
+void EventMerge::merge(std::vector<JobEvent> &out, bool last) {
+  std::stable_sort(started_.begin(), started_.end(),
+                   [](const JobEvent &a, const JobEvent &b) { return a.time < b.time; });
+  auto next = started_.begin();
+  for (const JobEvent &decision : decisions_) {
+    for (; next != started_.end() && next->time < decision.time; ++next) append(out, *next);
+    // Of equal times a decision comes first, except that a job begins before it ends.
+    if (ends(decision)) {
+      const auto begun = std::find_if(next, started_.end(), [&](const JobEvent &e) { return same_job(e, decision); });
+      if (begun != started_.end()) {
+        std::rotate(next, begun, begun + 1);
+        append(out, *next++);
+      }
+    }
+    append(out, decision);
+  }
+  decisions_.clear();
+  if (last) {
+    for (; next != started_.end(); ++next) append(out, *next);
+  }
+  started_.erase(started_.begin(), next);
+}
+
+void EventMerge::append(std::vector<JobEvent> &out, JobEvent event) {
+  latest_ = std::max(latest_, event.time);
+  event.time = latest_;
+  out.push_back(event);
+}
+
+}  // namespace redag::runtime

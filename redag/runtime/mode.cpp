@@ -1,0 +1,80 @@
+#include "redag/runtime/mode.hpp"
+
+#include <fmt/format.h>
+#include <sched.h>
+
+#include "redag/runtime/threads.hpp"
+
+namespace redag::runtime {
+namespace {
+
+// From the top: 9 priorities for the kernel's own threads (migration, watchdog, interrupt threads that were raised),
+// one for the release timer, then some room for the user's own urgent threads above the jobs.
+constexpr int kKernelRoom = 9;
+constexpr int kUserRoom = 9;
+
+bool is_static(PolicyKind policy) { return policy != PolicyKind::Edf && policy != PolicyKind::Fifo; }
+
+}  // namespace
+
+PriorityBand probe_priority_band() {
+  const int timer = available_fifo_priority(sched_get_priority_max(SCHED_FIFO) - kKernelRoom);
+  if (timer < 2) return {};  // one for the timer and one for jobs at least
+  return PriorityBand{timer > 4 * kUserRoom ? timer - kUserRoom - 1 : timer - 1, timer};
+}
+
+Result<Mode> resolve_mode(PreemptionMode wanted, PolicyKind policy, const PriorityBand &band) {
+  std::string obstacle;
+  if (!is_static(policy)) {
+    obstacle = fmt::format("policy {} orders jobs, not threads", to_string(policy));
+  } else if (band.top_job == 0) {
+    obstacle = "this process may not use SCHED_FIFO";
+  }
+  switch (wanted) {
+    case PreemptionMode::None:
+    case PreemptionMode::Cooperative: return Mode{wanted, {}};
+    case PreemptionMode::Os:
+      if (obstacle.empty()) return Mode{wanted, {}};
+      return make_error("preemption 'os' cannot be had: " + obstacle,
+                        is_static(policy) ? realtime_hint() : "use a static policy, or preemption: cooperative");
+    case PreemptionMode::Auto: break;
+  }
+  if (obstacle.empty()) return Mode{PreemptionMode::Os, "auto: this process may use SCHED_FIFO"};
+  return Mode{PreemptionMode::Cooperative, "auto: " + obstacle};
+}
+
+sched::Config make_config(const Mode &mode, std::uint32_t workers, PolicyKind policy, const PriorityBand &band,
+                          std::uint32_t threads) {
+  sched::Config config;
+  config.workers = workers;
+  config.policy = policy;
+  switch (mode.mode) {
+    case PreemptionMode::Os:
+      config.preemption = sched::Preemption::Full;
+      config.levels = band.levels();
+      config.max_started = threads;
+      break;
+    case PreemptionMode::Cooperative: config.preemption = sched::Preemption::Cooperative; break;
+    case PreemptionMode::None:
+    case PreemptionMode::Auto: config.preemption = sched::Preemption::None; break;
+  }
+  return config;
+}
+
+std::vector<std::string> mode_warnings(const Mode &mode, std::uint32_t workers, std::size_t cpus) {
+  std::vector<std::string> warnings;
+  if (workers > cpus) {
+    warnings.push_back(
+        fmt::format("{} workers share {} processor(s): jobs that run together slow each other down", workers, cpus));
+  }
+  const auto throttling = realtime_throttling();
+  if (mode.mode == PreemptionMode::Os && throttling) {
+    warnings.push_back(
+        fmt::format("real-time throttling is on: SCHED_FIFO threads get at most {} of every {} us of a busy processor "
+                    "('sysctl kernel.sched_rt_runtime_us=-1' lifts it)",
+                    throttling->runtime_us, throttling->period_us));
+  }
+  return warnings;
+}
+
+}  // namespace redag::runtime

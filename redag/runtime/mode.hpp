@@ -1,0 +1,43 @@
+// Which preemption mode a run can have on this machine, and why. Decides once, before threads exist.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "redag/base/result.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/sched/scheduler.hpp"
+
+namespace redag::runtime {
+
+struct Mode {
+  PreemptionMode mode = PreemptionMode::None;  // never Auto
+  std::string reason;                          // empty: it was asked for
+};
+
+/// SCHED_FIFO priorities: jobs have 1 to `top_job`, level 0 the top; the release timer is above all of them. The
+/// highest priorities are left to the kernel's own threads.
+struct PriorityBand {
+  int top_job = 0;  // 0: the process has no real-time rights
+  int timer = 0;
+
+  [[nodiscard]] std::uint32_t levels() const { return static_cast<std::uint32_t>(top_job); }
+  [[nodiscard]] int of_level(std::uint32_t level) const { return top_job - static_cast<int>(level); }
+};
+
+/// What the process may use; tried, not guessed.
+[[nodiscard]] PriorityBand probe_priority_band();
+
+/// `auto` becomes `os` where `band` and the policy allow it, else `cooperative`. Error: `os` was asked for and cannot
+/// be.
+[[nodiscard]] Result<Mode> resolve_mode(PreemptionMode wanted, PolicyKind policy, const PriorityBand &band);
+
+/// What the scheduler is to be told. `threads`: jobs that can be started at once, with os.
+[[nodiscard]] sched::Config make_config(const Mode &mode, std::uint32_t workers, PolicyKind policy,
+                                        const PriorityBand &band, std::uint32_t threads);
+
+/// What a user should know before trusting the figures: too few processors, real-time throttling.
+[[nodiscard]] std::vector<std::string> mode_warnings(const Mode &mode, std::uint32_t workers, std::size_t cpus);
+
+}  // namespace redag::runtime

@@ -1,0 +1,33 @@
+#include "redag/runtime/preemption_point.hpp"
+
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/running_job.hpp"
+
+namespace redag {
+namespace runtime {
+namespace {
+
+constinit thread_local RunningJob *current_job = nullptr;
+
+}  // namespace
+
+RunningJob *RunningJob::current() noexcept { return current_job; }
+void RunningJob::set_current(RunningJob *job) noexcept { current_job = job; }
+
+Duration RunningJob::cpu_time() const noexcept { return thread_cpu_now() - cpu_start - cpu_on_top; }
+
+}  // namespace runtime
+
+void preemption_point() {
+  runtime::RunningJob *job = runtime::RunningJob::current();
+  if (job == nullptr) return;
+  if (job->budget > 0 && job->cpu_time() > job->budget) throw BudgetExceeded{};
+  if (job->outranked->load(std::memory_order_relaxed)) job->reach_preemption_point();
+}
+
+Duration job_cpu_time() {
+  const runtime::RunningJob *job = runtime::RunningJob::current();
+  return job == nullptr ? 0 : job->cpu_time();
+}
+
+}  // namespace redag

@@ -1,0 +1,88 @@
+#include "redag/runtime/release_timer.hpp"
+
+#include <algorithm>
+#include <mutex>
+#include <utility>
+
+#include "redag/runtime/clock.hpp"
+
+namespace redag::runtime {
+namespace {
+
+constexpr std::size_t kBatch = 256;  // releases reported at once; more follow at once
+
+}  // namespace
+
+ReleaseTimer::ReleaseTimer(Sink sink, std::uint64_t seed) : sink_(std::move(sink)), heap_(seed) {
+  due_.reserve(kBatch);
+}
+
+ReleaseTimer::~ReleaseTimer() {
+  stop();
+  join();
+}
+
+void ReleaseTimer::add(const Dag &dag, TaskId first_task, Time base) {
+  {
+    const std::lock_guard guard(lock_);
+    for (std::size_t i = 0; i < dag.tasks.size(); ++i) heap_.add(dag.tasks[i], TaskId(first_task.value + i), base);
+  }
+  parker_.unpark();
+}
+
+void ReleaseTimer::remove(TaskId first_task, std::size_t count) {
+  const std::lock_guard guard(lock_);
+  heap_.remove(first_task, count);
+}
+
+Result<void> ReleaseTimer::start(Time origin, Time horizon, ThreadSetup setup) {
+  origin_ = origin;
+  horizon_ = horizon;
+  Result<void> result;
+  Event ready;
+  thread_ = std::thread([this, &setup, &result, &ready] {
+    result = set_up_this_thread(setup);
+    const bool usable = result.has_value();
+    ready.set();
+    if (usable) main();
+  });
+  ready.wait();
+  if (!result) join();
+  return result;
+}
+
+void ReleaseTimer::stop() noexcept {
+  stopping_.store(true, std::memory_order_release);
+  parker_.unpark();
+}
+
+void ReleaseTimer::join() {
+  if (thread_.joinable()) thread_.join();
+}
+
+void ReleaseTimer::main() noexcept {
+  for (;;) {
+    // Read before the clock: a stop that was seen here lies before `now`, so all that was due by then is reported.
+    const bool stopping = stopping_.load(std::memory_order_acquire);
+    const Time now = monotonic_now() - origin_;
+    Time next = kNever;
+    due_.clear();
+    {
+      const std::lock_guard guard(lock_);
+      heap_.pop_due(std::min(now, horizon_ - 1), due_);
+      next = heap_.next();
+    }
+    if (!due_.empty()) {
+      sink_(due_);
+      continue;
+    }
+    if (stopping) return;
+    if (next >= horizon_) {
+      parker_.park();
+    } else {
+      parker_.park_until(origin_ + next);
+    }
+  }
+}
+
+}  // namespace redag::runtime

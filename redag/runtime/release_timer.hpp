@@ -1,0 +1,58 @@
+// One thread that releases timer tasks on their grids: sleeps until the next release (absolute, CLOCK_MONOTONIC), and
+// reports all that are due as one instant. Makes no wake-ups while there is nothing to release. Owns its thread and a
+// ReleaseHeap. add(), remove(): any thread; stop(): async-signal-safe.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "redag/base/pi_mutex.hpp"
+#include "redag/base/result.hpp"
+#include "redag/runtime/parker.hpp"
+#include "redag/runtime/release_heap.hpp"
+#include "redag/runtime/threads.hpp"
+
+namespace redag::runtime {
+
+class ReleaseTimer {
+ public:
+  /// Called on the timer's thread, with no lock held.
+  using Sink = std::function<void(std::span<const Release>)>;
+
+  ReleaseTimer(Sink sink, std::uint64_t seed);
+  ~ReleaseTimer();  // stops and joins
+  ReleaseTimer(const ReleaseTimer &) = delete;
+  ReleaseTimer &operator=(const ReleaseTimer &) = delete;
+
+  /// `base`: on the clock whose zero is start()'s `origin`. Before or after start().
+  void add(const Dag &dag, TaskId first_task, Time base);
+  /// A release that is under way can still be reported.
+  void remove(TaskId first_task, std::size_t count);
+
+  /// Nothing is released at or after `horizon` (kNever: for ever). Error: the thread cannot be set up as asked.
+  [[nodiscard]] Result<void> start(Time origin, Time horizon, ThreadSetup setup);
+
+  /// No releases after this moment; what was due before is still reported.
+  void stop() noexcept;
+  /// Waits for the thread, after stop().
+  void join();
+
+ private:
+  void main() noexcept;
+
+  Sink sink_;
+  PiMutex lock_;
+  ReleaseHeap heap_;  // guarded by lock_
+  std::vector<Release> due_;
+  Parker parker_;
+  std::atomic<bool> stopping_{false};
+  Time origin_ = 0;
+  Time horizon_ = kNever;
+  std::thread thread_;
+};
+
+}  // namespace redag::runtime

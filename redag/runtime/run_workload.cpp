@@ -1,0 +1,171 @@
+#include "redag/runtime/run_workload.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/release_timer.hpp"
+#include "redag/runtime/synthetic.hpp"
+#include "redag/runtime/threads.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+
+namespace redag::runtime {
+namespace {
+
+constexpr Duration kStartMargin = 20 * kMillisecond;  // from the threads being ready to time 0
+constexpr Duration kCollectEvery = 100 * kMillisecond;
+constexpr std::size_t kMostThreads = 64;
+
+std::uint32_t pool_size(const Workload &workload, const RunOptions &options) {
+  const std::uint32_t workers = workload.platform.workers;
+  if (options.threads > 0) return std::max(options.threads, workers);
+  // Jobs of one task do not overlap: more threads than tasks would never be used.
+  return std::max(workers, static_cast<std::uint32_t>(std::min(workload.task_count(), kMostThreads)));
+}
+
+class Run {
+ public:
+  Run(const Workload &workload, const RunOptions &options) : workload_(workload), options_(options) {}
+
+  Result<RunResult> execute() {
+    return prepare().and_then([&] { return start(); }).map([&] {
+      collect_until_horizon();
+      finish();
+      return std::move(result_);
+    });
+  }
+
+ private:
+  Result<void> prepare() {
+    const PriorityBand band = probe_priority_band();
+    const auto wanted = options_.preemption.value_or(workload_.platform.preemption);
+    Result<Mode> mode = resolve_mode(wanted, workload_.policy, band);
+    if (!mode) return tl::unexpected(mode.error());
+    if (options_.realtime_threads && band.top_job == 0) {
+      return make_error("the workers cannot be SCHED_FIFO threads: this process may not", realtime_hint());
+    }
+    result_.mode = *mode;
+    const std::uint32_t workers = workload_.platform.workers;
+    const std::size_t cpus = options_.cpus.empty() ? usable_cpus().size() : options_.cpus.size();
+    result_.warnings = mode_warnings(*mode, workers, cpus);
+    if (options_.lock_memory) {
+      if (const Result<void> locked = redag::runtime::lock_memory(); !locked) {
+        result_.warnings.push_back(to_string(locked.error()));
+      }
+    }
+
+    EngineOptions engine;
+    engine.config = make_config(*mode, workers, workload_.policy, band, pool_size(workload_, options_));
+    engine.band = band;
+    engine.realtime_threads = options_.realtime_threads;
+    engine.cpus = options_.cpus;
+    engine.trace_capacity = options_.trace_capacity;
+    auto scheduler = options_.scheduler ? options_.scheduler(workload_, engine.config)
+                                        : std::make_unique<sched::PriorityScheduler>(workload_, engine.config);
+    engine_ = std::make_unique<Engine>(std::move(scheduler), std::move(engine));
+    engine_->bind(workload_, synthetic_bodies(workload_, options_.seed, give_up_));
+    timer_ = std::make_unique<ReleaseTimer>([this](auto releases) { engine_->release(releases); }, options_.seed);
+    TaskId first(0);
+    for (const Dag &dag : workload_.dags) {
+      timer_->add(dag, first, 0);
+      first = TaskId(first.value + dag.tasks.size());
+    }
+    return {};
+  }
+
+  Result<void> start() {
+    if (Result<void> started = engine_->start(); !started) return started;
+    origin_ = monotonic_now() + kStartMargin;
+    engine_->set_origin(origin_);
+    const bool realtime = options_.realtime_threads || result_.mode.mode == PreemptionMode::Os;
+    const ThreadSetup setup{"redag-timer", realtime ? engine_->options().band.timer : 0, {}};
+    return timer_->start(origin_, options_.duration, setup);
+  }
+
+  void collect_until_horizon() {
+    const Time end = origin_ + options_.duration;
+    Event never;
+    for (Time now = monotonic_now(); now < end; now = monotonic_now()) {
+      if (options_.stop != nullptr && options_.stop->load()) {
+        result_.stopped = true;
+        break;
+      }
+      never.wait_until(std::min(now + kCollectEvery, end));
+      engine_->drain(result_.trace.events);
+      if (options_.progress) options_.progress(engine_->now(), result_.trace.events.size());
+    }
+  }
+
+  void finish() {
+    end_ = result_.stopped ? std::clamp<Time>(engine_->now(), 0, options_.duration) : options_.duration;
+    timer_->stop();  // reports what was due until now
+    timer_->join();
+    engine_->halt();
+    if (!engine_->wait_idle(monotonic_now() + options_.drain_timeout)) {
+      for (const Job &job : engine_->started()) {
+        result_.unfinished.push_back(fmt::format("{} #{}", trace::task_name(workload_, job.task), job.number));
+      }
+      give_up_.store(true);
+    }
+    engine_->join();
+    describe();
+    cut();
+    for (std::size_t t = 0; t < workload_.task_count(); ++t) result_.usage.push_back(engine_->usage(TaskId(t)));
+  }
+
+  void describe() {
+    trace::RunInfo &info = result_.trace.info;
+    info.workload = workload_;
+    info.executor = options_.executor;
+    info.config = engine_->options().config;
+    info.preemption = to_string(result_.mode.mode);
+    info.preemption_why = result_.mode.reason;
+    info.driver = trace::Driver::Threads;
+    info.seed = options_.seed;
+    info.end = end_;
+    info.warm_up = options_.warm_up;
+    info.machine = trace::this_machine();
+    if (engine_->refused_priorities() > 0) {
+      result_.warnings.push_back(fmt::format("{} priority changes were refused", engine_->refused_priorities()));
+    }
+    if (!result_.unfinished.empty()) {
+      result_.warnings.push_back(fmt::format("not finished {} after the end: {}",
+                                             format_duration(options_.drain_timeout),
+                                             fmt::join(result_.unfinished, ", ")));
+    }
+  }
+
+  // The trace ends where the scheduler stopped deciding: what was started then is in flight, as in the simulator.
+  void cut() {
+    auto &events = result_.trace.events;
+    engine_->drain(events, true);
+    const Time end = engine_->halted_at();
+    const auto after = std::find_if(events.begin(), events.end(), [&](const JobEvent &e) { return e.time >= end; });
+    events.erase(after, events.end());
+    result_.trace.info.lost_events = engine_->lost_events();
+    if (result_.trace.info.lost_events > 0) {
+      result_.warnings.push_back(
+          fmt::format("{} events were lost: raise the trace capacity", result_.trace.info.lost_events));
+    }
+  }
+
+  const Workload &workload_;
+  const RunOptions &options_;
+  RunResult result_;
+  std::atomic<bool> give_up_{false};
+  std::unique_ptr<Engine> engine_;
+  std::unique_ptr<ReleaseTimer> timer_;  // after the engine: it ends first
+  Time origin_ = 0;
+  Time end_ = 0;
+};
+
+}  // namespace
+
+Result<RunResult> run_workload(const Workload &workload, const RunOptions &options) {
+  return Run(workload, options).execute();
+}
+
+}  // namespace redag::runtime

@@ -1,0 +1,54 @@
+// Runs a whole workload on real threads with synthetic bodies, and returns its trace: the real-time counterpart of
+// sim::simulate(). Blocks the calling thread, which collects events meanwhile and does no real-time work.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "redag/base/result.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/runtime/engine.hpp"
+#include "redag/sched/scheduler.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag::runtime {
+
+/// Makes the scheduler of a run: ours, or a model of another executor.
+using SchedulerFactory = std::function<std::unique_ptr<sched::Scheduler>(const Workload &, const sched::Config &)>;
+
+struct RunOptions {
+  Duration duration = 10 * kSecond;          // releases in [0, duration); the trace ends there
+  Duration warm_up = 0;                      // of it: noted in the trace, for the metrics to leave out
+  std::uint64_t seed = 1;                    // execution times and jitter
+  std::string executor = "redag";            // name for the trace
+  SchedulerFactory scheduler;                // empty: PriorityScheduler
+  std::optional<PreemptionMode> preemption;  // instead of the workload's
+  std::uint32_t threads = 0;      // os: jobs that can be started at once; 0: as many as there are tasks, at most 64
+  bool realtime_threads = false;  // none, cooperative: workers and release timer at SCHED_FIFO too
+  bool lock_memory = false;       // if it cannot be had, a warning says so
+  std::vector<int> cpus;          // processors of the workers; empty: os takes m of the usable ones
+  std::size_t trace_capacity = std::size_t{1} << 17;             // events between two collections
+  Duration drain_timeout = 5 * kSecond;                          // for started jobs to end after the horizon
+  const std::atomic<bool> *stop = nullptr;                       // ends the run early when set (Ctrl-C)
+  std::function<void(Time now, std::uint64_t events)> progress;  // about ten times a second
+};
+
+struct RunResult {
+  trace::Trace trace;  // from 0 to trace.info.end; jobs that had not ended by then are in flight
+  Mode mode;
+  std::vector<Usage> usage;             // by task
+  std::vector<std::string> unfinished;  // jobs that were told to give up after drain_timeout
+  std::vector<std::string> warnings;    // what a reader of the figures should know
+  bool stopped = false;                 // by `stop`
+};
+
+/// `workload` must be valid (validate()). Error: `os` or realtime_threads without the rights, threads that cannot be
+/// made.
+[[nodiscard]] Result<RunResult> run_workload(const Workload &workload, const RunOptions &options);
+
+}  // namespace redag::runtime

@@ -1,0 +1,31 @@
+// The job that a thread runs now, for preemption_point() and job_cpu_time(). Internal to the engine.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "redag/base/ids.hpp"
+#include "redag/base/time.hpp"
+
+namespace redag::runtime {
+
+class Engine;
+
+struct RunningJob {
+  Engine *engine = nullptr;
+  std::uint32_t thread = 0;                      // position among the engine's threads
+  const std::atomic<bool> *outranked = nullptr;  // set while a more urgent job could run on top
+  JobSlot slot;
+  Duration budget = 0;      // 0: none
+  Duration cpu_start = 0;   // of the thread, when the body began
+  Duration cpu_on_top = 0;  // used by jobs that ran on top of this one
+  RunningJob *below = nullptr;
+
+  void reach_preemption_point();
+  [[nodiscard]] Duration cpu_time() const noexcept;
+
+  static RunningJob *current() noexcept;
+  static void set_current(RunningJob *job) noexcept;
+};
+
+}  // namespace redag::runtime

@@ -1,0 +1,113 @@
+#include "redag/runtime/threads.hpp"
+
+#include <fmt/format.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <thread>
+
+namespace redag::runtime {
+namespace {
+
+std::string reason(int error) { return std::strerror(error); }
+
+std::optional<std::int64_t> read_number(const char *path) {
+  std::ifstream file(path);
+  std::int64_t value = 0;
+  if (!(file >> value)) return std::nullopt;
+  return value;
+}
+
+Result<void> pin(const ThreadSetup &setup) {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  for (const int cpu : setup.cpus) {
+    if (cpu < 0 || cpu >= CPU_SETSIZE) return make_error(fmt::format("there is no processor {}", cpu));
+    CPU_SET(static_cast<std::size_t>(cpu), &set);
+  }
+  const int error = pthread_setaffinity_np(pthread_self(), sizeof(set), &set);
+  if (error == 0) return {};
+  return make_error(fmt::format("thread '{}' cannot be pinned: {}", setup.name, reason(error)),
+                    fmt::format("usable processors are {}", fmt::join(usable_cpus(), ", ")));
+}
+
+}  // namespace
+
+Result<void> set_up_this_thread(const ThreadSetup &setup) {
+  pthread_setname_np(pthread_self(), setup.name.substr(0, 15).c_str());
+  prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
+  if (!setup.cpus.empty()) {
+    if (Result<void> pinned = pin(setup); !pinned) return pinned;
+  }
+  if (setup.fifo_priority > 0 && !set_fifo_priority(pthread_self(), setup.fifo_priority)) {
+    return make_error(fmt::format("thread '{}' cannot have SCHED_FIFO priority {}", setup.name, setup.fifo_priority),
+                      realtime_hint());
+  }
+  return {};
+}
+
+bool set_fifo_priority(pthread_t thread, int priority) noexcept {
+  sched_param parameters{};
+  parameters.sched_priority = priority;
+  return pthread_setschedparam(thread, SCHED_FIFO, &parameters) == 0;
+}
+
+int fifo_priority(pthread_t thread) noexcept {
+  int policy = 0;
+  sched_param parameters{};
+  if (pthread_getschedparam(thread, &policy, &parameters) != 0 || policy != SCHED_FIFO) return 0;
+  return parameters.sched_priority;
+}
+
+std::vector<int> usable_cpus() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  std::vector<int> cpus;
+  if (sched_getaffinity(0, sizeof(set), &set) != 0) return {0};
+  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+    if (CPU_ISSET(static_cast<std::size_t>(cpu), &set)) cpus.push_back(cpu);
+  }
+  return cpus;
+}
+
+int available_fifo_priority(int wanted) {
+  int found = 0;
+  std::thread([&] {
+    if (set_fifo_priority(pthread_self(), wanted)) {
+      found = wanted;
+      return;
+    }
+    rlimit limit{};
+    if (getrlimit(RLIMIT_RTPRIO, &limit) != 0 || limit.rlim_cur == 0) return;
+    const int allowed = limit.rlim_cur >= static_cast<rlim_t>(wanted) ? wanted : static_cast<int>(limit.rlim_cur);
+    if (set_fifo_priority(pthread_self(), allowed)) found = allowed;
+  }).join();
+  return found;
+}
+
+const char *realtime_hint() {
+  return "give the process real-time rights: 'setcap cap_sys_nice+ep <program>', or 'rtprio 90' for the user in "
+         "/etc/security/limits.conf (log in again), or in a container 'docker run --cap-add=SYS_NICE --ulimit "
+         "rtprio=90'";
+}
+
+Result<void> lock_memory() {
+  if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0) return {};
+  return make_error(
+      "memory cannot be locked: " + reason(errno),
+      "raise the limit: 'memlock unlimited' in /etc/security/limits.conf, or 'docker run --ulimit memlock=-1'");
+}
+
+std::optional<Throttling> realtime_throttling() {
+  const auto runtime = read_number("/proc/sys/kernel/sched_rt_runtime_us");
+  const auto period = read_number("/proc/sys/kernel/sched_rt_period_us");
+  if (!runtime || !period || *runtime < 0 || *runtime >= *period) return std::nullopt;
+  return Throttling{*runtime, *period};
+}
+
+}  // namespace redag::runtime

@@ -1,0 +1,54 @@
+// What the runtime asks of Linux for its threads: names, processors, SCHED_FIFO, timer slack, locked memory; and what
+// the process may ask for. No state of its own. Any thread.
+#pragma once
+
+#include <pthread.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "redag/base/result.hpp"
+
+namespace redag::runtime {
+
+/// How a thread of the runtime is set up.
+struct ThreadSetup {
+  std::string name;       // shown by top -H and ps; cut to 15 characters
+  int fifo_priority = 0;  // SCHED_FIFO, 1 to 99; 0: stays as it is created
+  std::vector<int> cpus;  // may run only there; empty: wherever the process may
+};
+
+/// Applies it to the calling thread, with a timer slack of 1 ns (the default of 50 us is most of an idle timer's
+/// lateness). Error: the first thing that the system refused.
+[[nodiscard]] Result<void> set_up_this_thread(const ThreadSetup &setup);
+
+/// False if the system refused.
+[[nodiscard]] bool set_fifo_priority(pthread_t thread, int priority) noexcept;
+
+/// SCHED_FIFO priority of a thread; 0 if it is scheduled otherwise.
+[[nodiscard]] int fifo_priority(pthread_t thread) noexcept;
+
+/// Processors that the calling thread may run on, ascending.
+[[nodiscard]] std::vector<int> usable_cpus();
+
+/// Highest SCHED_FIFO priority up to `wanted` that this process can really get; 0: none. Tried on a thread of its own,
+/// because rights come from several places (CAP_SYS_NICE, RLIMIT_RTPRIO, the cgroup's real-time share).
+[[nodiscard]] int available_fifo_priority(int wanted);
+
+/// How to get the right to use SCHED_FIFO.
+[[nodiscard]] const char *realtime_hint();
+
+/// Locks the process's memory, page by page as it is used (MCL_ONFAULT), so that the stacks of many threads do not all
+/// become resident. Error: RLIMIT_MEMLOCK or no right.
+[[nodiscard]] Result<void> lock_memory();
+
+/// Real-time throttling: what SCHED_FIFO threads may use of each `period_us`. None: unlimited or unknown.
+struct Throttling {
+  std::int64_t runtime_us = 0;
+  std::int64_t period_us = 0;
+};
+[[nodiscard]] std::optional<Throttling> realtime_throttling();
+
+}  // namespace redag::runtime
