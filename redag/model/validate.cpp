@@ -135,6 +135,8 @@ class Checker {
       const char *name = to_string(rule.field);
       // A data task's period is check_inherited_periods()' business.
       if (rule.field == Field::Period && task.activation == Activation::Data) continue;
+      // A deadline that was taken over from a bad period is not a second mistake.
+      if (rule.field == Field::Deadline && task.period <= 0 && value == task.period) continue;
       if (rule.field == Field::Period && value == 0) {
         error(rule.field, {}, fmt::format("timer task '{}' has no period", task.name),
               "give it or its DAG a 'period', or 'activation: data'");
@@ -157,7 +159,7 @@ class Checker {
 
   void check_against_wcet(const Task &task) {
     const std::string wcet = format_duration(task.wcet);
-    if (task.bcet > task.wcet) {
+    if (task.wcet > 0 && task.bcet > task.wcet) {
       error(Field::Bcet, Field::Wcet,
             fmt::format("bcet {} of task '{}' exceeds its wcet {}", format_duration(task.bcet), task.name, wcet));
     }
@@ -212,7 +214,7 @@ class Checker {
     }
     for (const auto &[field, value] : {std::pair{Field::Offset, task.offset}, std::pair{Field::Jitter, task.jitter}}) {
       if (value == 0) continue;
-      error(field, Field::Activation, fmt::format("data task '{}' has a {}", task.name, to_string(field)),
+      error(field, Field::Activation, fmt::format("data task '{}' has '{}'", task.name, to_string(field)),
             "only timer tasks have one: its predecessors release it");
     }
   }

@@ -46,6 +46,7 @@ class TreeBuilder : public YAML::EventHandler {
     Node &node = add(Node::Kind::Scalar, mark);
     node.text = value;
     node.quoted = tag == "!";
+    last_scalar_ = mark;
   }
 
   void OnSequenceStart(const YAML::Mark &mark, const std::string &tag, YAML::anchor_t anchor,
@@ -63,6 +64,7 @@ class TreeBuilder : public YAML::EventHandler {
   void OnMapEnd() override { close(); }
 
   [[nodiscard]] Node take_root() { return std::move(root_); }
+  [[nodiscard]] const YAML::Mark &last_scalar() const { return last_scalar_; }
 
  private:
   [[noreturn]] static void refuse_alias(const YAML::Mark &mark) {
@@ -101,6 +103,7 @@ class TreeBuilder : public YAML::EventHandler {
 
   Node root_;
   std::vector<Node *> open_;
+  YAML::Mark last_scalar_ = YAML::Mark::null_mark();
 };
 
 /// Length of the UTF-8 sequence at `i`, 0 if there is none (overlong forms, surrogates and beyond U+10FFFF included).
@@ -148,6 +151,24 @@ std::optional<BadCharacter> find_bad_character(std::string_view text) {
   return std::nullopt;
 }
 
+/// yaml-cpp lets a quoted text that is never closed run to the end of the file. It is then the last scalar.
+bool is_unclosed(std::string_view text, int position) {
+  if (position < 0 || static_cast<std::size_t>(position) >= text.size()) return false;
+  auto i = static_cast<std::size_t>(position);
+  const char quote = text[i];
+  if (quote != '"' && quote != '\'') return false;
+  for (++i; i < text.size(); ++i) {
+    if (quote == '"' && text[i] == '\\') {
+      ++i;
+    } else if (text[i] == quote) {
+      const bool doubled = quote == '\'' && i + 1 < text.size() && text[i + 1] == quote;
+      if (!doubled) return false;
+      ++i;
+    }
+  }
+  return true;
+}
+
 /// A stream over text that is already in memory.
 class ViewBuffer : public std::streambuf {
  public:
@@ -163,12 +184,17 @@ Result<Node> parse(std::string_view text, const std::string &file) {
   if (const auto bad = find_bad_character(text)) {
     return error_at(file, bad->line, bad->column, bad->message, bad->hint);
   }
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   try {
     ViewBuffer buffer(text);
     std::istream stream(&buffer);
     YAML::Parser parser(stream);
     TreeBuilder builder;
     if (!parser.HandleNextDocument(builder)) return Node{};
+    if (const YAML::Mark &mark = builder.last_scalar(); is_unclosed(text, mark.pos)) {
+      return error_at(file, mark.line + 1, mark.column + 1, "not YAML: the quote is never closed", "");
+    }
     TreeBuilder rest;
     if (parser.HandleNextDocument(rest)) {
       const Node second = rest.take_root();

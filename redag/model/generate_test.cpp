@@ -1,0 +1,241 @@
+#include "redag/model/generate.hpp"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <set>
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include "redag/model/generate_utilization.hpp"
+#include "redag/model/validate.hpp"
+
+namespace redag {
+namespace {
+
+GenerateOptions arbitrary_options() {
+  GenerateOptions o;
+  o.dags = *rc::gen::inRange(1U, 6U);
+  o.min_tasks = *rc::gen::inRange(1U, 8U);
+  o.max_tasks = o.min_tasks + *rc::gen::inRange(0U, 8U);
+  o.workers = *rc::gen::inRange(1U, 9U);
+  o.max_task_utilization = *rc::gen::element(0.3, 0.7, 1.0);
+  const double most = o.max_task_utilization * o.dags * o.min_tasks;
+  o.utilization = most * (*rc::gen::inRange(1, 101)) / 100.0;
+  o.periods =
+      *rc::gen::element(PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive, PeriodModel::Robot);
+  o.shape = *rc::gen::element(DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain,
+                              DagShape::Independent);
+  o.rates = *rc::gen::element(RateScope::PerDag, RateScope::PerTask);
+  o.policy = *rc::gen::element(PolicyKind::RateMonotonic, PolicyKind::Fixed, PolicyKind::Edf);
+  o.data_share = *rc::gen::element(0.0, 0.5, 1.0);
+  o.bcet_min = *rc::gen::element(0.0, 0.5, 1.0);
+  o.deadline_min = *rc::gen::element(0.2, 1.0);
+  o.jitter = *rc::gen::element(0.0, 0.1, 1.0);
+  o.offsets = *rc::gen::arbitrary<bool>();
+  o.max_active_max = *rc::gen::inRange(0U, 4U);
+  o.groups = 2;
+  o.group_share = 0.3;
+  o.queue_share = 0.5;
+  o.high_share = 0.2;
+  o.low_share = 0.2;
+  return o;
+}
+
+RC_GTEST_PROP(Generate, IsValidAndHasItsUtilization, (std::uint64_t seed)) {
+  const GenerateOptions options = arbitrary_options();
+  const Result<Workload> workload = generate(options, seed);
+  RC_ASSERT(workload.has_value());
+  RC_ASSERT(!has_errors(validate(*workload)));
+  RC_ASSERT(workload->dags.size() == options.dags);
+  // Rounding to a nanosecond costs at most one in the shortest period, 1 ms, for each task.
+  const double rounding = 1e-6 * static_cast<double>(workload->task_count()) + 1e-9;
+  RC_ASSERT(std::abs(workload->utilization() - options.utilization) <= rounding);
+  for (const Dag &dag : workload->dags) {
+    RC_ASSERT(dag.tasks.size() >= options.min_tasks && dag.tasks.size() <= options.max_tasks);
+    for (const Task &task : dag.tasks) {
+      const double share = static_cast<double>(task.wcet) / static_cast<double>(task.period);
+      RC_ASSERT(share <= options.max_task_utilization + 1e-6);
+    }
+  }
+}
+
+RC_GTEST_PROP(Generate, SameSeedSameWorkload, (std::uint64_t seed)) {
+  const GenerateOptions options = arbitrary_options();
+  RC_ASSERT(generate(options, seed).value() == generate(options, seed).value());
+}
+
+TEST(Generate, OtherSeedOtherWorkload) { EXPECT_NE(generate({}, 1).value().dags, generate({}, 2).value().dags); }
+
+TEST(Generate, AnOptionChangesOnlyWhatItIsAbout) {
+  GenerateOptions options;
+  Workload before = generate(options, 3).value();
+  options.jitter = 0.5;
+  Workload after = generate(options, 3).value();
+  EXPECT_NE(before, after);
+  for (Dag &dag : after.dags) {
+    for (Task &task : dag.tasks) task.jitter = 0;
+  }
+  EXPECT_EQ(before, after);
+}
+
+std::map<Duration, int> period_counts(PeriodModel model) {
+  GenerateOptions options;
+  options.dags = 2000;
+  options.min_tasks = options.max_tasks = 1;
+  options.periods = model;
+  std::map<Duration, int> counts;
+  for (const Dag &dag : generate(options, 5).value().dags) ++counts[dag.tasks[0].period];
+  return counts;
+}
+
+TEST(Generate, AutomotivePeriodsHaveTheirShares) {
+  auto counts = period_counts(PeriodModel::Automotive);
+  EXPECT_EQ(counts.size(), 9U);
+  EXPECT_NEAR(counts[10 * kMillisecond], 2000 * 25 / 85, 75);
+  EXPECT_NEAR(counts[20 * kMillisecond], 2000 * 25 / 85, 75);
+  EXPECT_NEAR(counts[100 * kMillisecond], 2000 * 20 / 85, 75);
+  EXPECT_NEAR(counts[1000 * kMillisecond], 2000 * 4 / 85, 40);
+}
+
+TEST(Generate, HarmonicPeriodsDivideEachOther) {
+  const auto counts = period_counts(PeriodModel::Harmonic);  // 5 ms to 500 ms
+  EXPECT_EQ(counts.size(), 7U);
+  EXPECT_EQ(counts.begin()->first, 5 * kMillisecond);
+  EXPECT_EQ(counts.rbegin()->first, 320 * kMillisecond);
+}
+
+TEST(Generate, LogUniformPeriodsAreEvenOverTheMagnitudes) {
+  int below_50 = 0;
+  for (const auto &[period, count] : period_counts(PeriodModel::LogUniform)) {
+    EXPECT_EQ(period % kMillisecond, 0);
+    EXPECT_GE(period, 5 * kMillisecond);
+    EXPECT_LE(period, 500 * kMillisecond);
+    if (period < 50 * kMillisecond) below_50 += count;
+  }
+  EXPECT_NEAR(below_50, 1000, 100);  // 5 to 50 is half of 5 to 500
+}
+
+TEST(Generate, ShapesAreWhatTheirNamesSay) {
+  const auto dag_of = [](DagShape shape) {
+    GenerateOptions options;
+    options.dags = 1;
+    options.min_tasks = options.max_tasks = 6;
+    options.shape = shape;
+    options.edge_probability = 1.0;
+    return generate(options, 1).value().dags.front();
+  };
+  const auto edges = [](const Dag &dag) {
+    return std::accumulate(dag.tasks.begin(), dag.tasks.end(), std::size_t{0},
+                           [](std::size_t n, const Task &task) { return n + task.predecessors.size(); });
+  };
+  EXPECT_EQ(edges(dag_of(DagShape::Independent)), 0U);
+  EXPECT_EQ(edges(dag_of(DagShape::Chain)), 5U);
+  EXPECT_EQ(edges(dag_of(DagShape::ErdosRenyi)), 15U);
+  const Dag fork_join = dag_of(DagShape::ForkJoin);
+  EXPECT_EQ(edges(fork_join), 8U);
+  EXPECT_EQ(fork_join.tasks.back().predecessors.size(), 4U);
+  const Dag layered = dag_of(DagShape::Layered);
+  EXPECT_GT(edges(layered), 0U);
+}
+
+TEST(Generate, RefusesOptionsWithAllReasons) {
+  GenerateOptions options;
+  options.dags = 0;
+  options.jitter = 2;
+  options.period_min = 0;
+  const auto refused = generate(options, 1);
+  ASSERT_FALSE(refused);
+  const std::string found = to_string(refused.error());
+  EXPECT_NE(found.find("dags must be at least 1"), std::string::npos) << found;
+  EXPECT_NE(found.find("jitter must be from 0 to 1, not 2"), std::string::npos) << found;
+  EXPECT_NE(found.find("period_min is below the granularity"), std::string::npos) << found;
+}
+
+TEST(Generate, SaysWhenDiscardingIsHopeless) {
+  GenerateOptions options;
+  options.min_tasks = options.max_tasks = 10;
+  options.dags = 4;
+  options.utilization = 38;
+  options.method = UtilizationMethod::UUniFastDiscard;
+  const auto refused = generate(options, 1);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(to_string(refused.error()).find("no vector of utilizations"), std::string::npos);
+  options.method = UtilizationMethod::Drs;
+  EXPECT_TRUE(generate(options, 1));
+}
+
+TEST(GenerateNames, GoBothWays) {
+  EXPECT_EQ(utilization_method_from_string("uunifast_discard"), UtilizationMethod::UUniFastDiscard);
+  EXPECT_EQ(period_model_from_string("automotive"), PeriodModel::Automotive);
+  EXPECT_EQ(dag_shape_from_string("erdos_renyi"), DagShape::ErdosRenyi);
+  EXPECT_EQ(rate_scope_from_string("per_task"), RateScope::PerTask);
+  EXPECT_EQ(dag_shape_from_string("circle"), std::nullopt);
+}
+
+// --- utilizations ---
+
+RC_GTEST_PROP(Drs, KeepsSumAndBounds, (std::uint64_t seed)) {
+  const auto count = *rc::gen::inRange<std::size_t>(1, 60);
+  std::vector<double> upper(count);
+  for (double &u : upper) u = *rc::gen::inRange(1, 101) / 100.0;
+  const double most = std::accumulate(upper.begin(), upper.end(), 0.0);
+  const double total = most * *rc::gen::inRange(1, 101) / 100.0;
+  Rng rng(seed);
+  const auto drawn = generation::drs(total, upper, rng);
+  RC_ASSERT(drawn.has_value());
+  RC_ASSERT(std::abs(std::accumulate(drawn->begin(), drawn->end(), 0.0) - total) <= 1e-7 * total);
+  for (std::size_t i = 0; i < count; ++i) RC_ASSERT((*drawn)[i] >= 0 && (*drawn)[i] <= upper[i]);
+}
+
+/// The largest difference between the empirical distributions of two samples (Kolmogorov-Smirnov).
+double largest_difference(std::vector<double> a, std::vector<double> b) {
+  std::sort(a.begin(), a.end());
+  std::sort(b.begin(), b.end());
+  double largest = 0;
+  std::size_t j = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    while (j < b.size() && b[j] <= a[i]) ++j;
+    const double below = static_cast<double>(j) / static_cast<double>(b.size());
+    largest = std::max(largest, std::abs(static_cast<double>(i + 1) / static_cast<double>(a.size()) - below));
+  }
+  return largest;
+}
+
+// Both are uniform over the same set, so every coordinate has the same distribution. Covers both ways that drs() takes:
+// 0.9 of 4 bounds of 0.4 is drawn by its slacks, 0.5 of 4 directly.
+class DrsAgainstDiscard : public testing::TestWithParam<double> {};
+
+TEST_P(DrsAgainstDiscard, HasTheSameDistribution) {
+  constexpr std::size_t kDraws = 20'000;
+  constexpr double kBound = 0.4;
+  const double total = GetParam();
+  Rng rng(17);
+  std::vector<double> by_drs;
+  std::vector<double> by_discarding;
+  for (std::size_t i = 0; i < kDraws; ++i) {
+    by_drs.push_back(generation::drs(total, std::vector<double>(4, kBound), rng).value()[0]);
+    by_discarding.push_back(generation::uunifast_discard(4, total, kBound, 100'000, rng).value()[0]);
+  }
+  // At the level 0.001 two samples of n differ by 1.95 * sqrt(2 / n) = 0.0195; the seed is fixed.
+  EXPECT_LT(largest_difference(by_drs, by_discarding), 0.0195);
+}
+
+INSTANTIATE_TEST_SUITE_P(Totals, DrsAgainstDiscard, testing::Values(0.5, 0.7, 0.9, 1.2));
+
+TEST(Drs, ReachesTheBoundsAndNoFurther) {
+  Rng rng(1);
+  EXPECT_EQ(generation::drs(1.0, {0.5, 0.5}, rng), (std::vector<double>{0.5, 0.5}));
+  EXPECT_EQ(generation::drs(1.1, {0.5, 0.5}, rng), std::nullopt);
+}
+
+TEST(Drs, ManyTasks) {
+  Rng rng(2);
+  const auto drawn = generation::drs(16, std::vector<double>(1000, 1.0), rng);
+  ASSERT_TRUE(drawn);
+  EXPECT_NEAR(std::accumulate(drawn->begin(), drawn->end(), 0.0), 16, 1e-6);
+}
+
+}  // namespace
+}  // namespace redag

@@ -1,0 +1,135 @@
+#include "redag/model/validate.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+namespace redag {
+namespace {
+
+Workload valid() {
+  Workload workload;
+  workload.dags.resize(1);
+  Dag &dag = workload.dags.front();
+  dag.name = "d";
+  dag.tasks.resize(2);
+  dag.tasks[0].name = "a";
+  dag.tasks[0].wcet = kMillisecond;
+  dag.tasks[0].period = 10 * kMillisecond;
+  dag.tasks[1].name = "b";
+  dag.tasks[1].wcet = kMillisecond;
+  dag.tasks[1].activation = Activation::Data;
+  dag.tasks[1].predecessors = {0};
+  inherit_periods(dag);
+  return workload;
+}
+
+TEST(Validate, AcceptsAValidWorkload) { EXPECT_EQ(to_string(validate(valid())), ""); }
+
+TEST(Validate, RefusesWhatOnlyCppCanBuild) {
+  Workload workload = valid();
+  workload.platform.workers = 0;
+  workload.dags[0].tasks[0].predecessors = {7};
+  workload.dags[0].tasks[0].wcet = kMaxDuration + 1;
+  workload.dags[0].deadline = -1;
+  const std::string found = to_string(validate(workload));
+  EXPECT_NE(found.find("workers must be from 1 to 4096, not 0"), std::string::npos) << found;
+  EXPECT_NE(found.find("predecessor 7 of task 'a' does not exist"), std::string::npos) << found;
+  EXPECT_NE(found.find("wcet of task 'a' is too large"), std::string::npos) << found;
+  EXPECT_NE(found.find("deadline of DAG 'd' is negative"), std::string::npos) << found;
+}
+
+TEST(Validate, WantsInheritedPeriods) {
+  Workload workload = valid();
+  workload.dags[0].tasks[1].period = 5 * kMillisecond;
+  const std::string found = to_string(validate(workload));
+  EXPECT_NE(found.find("period 5ms of data task 'b' is not the largest of its predecessors', 10ms"), std::string::npos)
+      << found;
+}
+
+TEST(Validate, NamesEveryCycle) {
+  Workload workload = valid();
+  Dag &dag = workload.dags[0];
+  const Task data = dag.tasks[1];
+  dag.tasks.clear();
+  const auto add = [&](const char *name, std::vector<std::uint32_t> predecessors) {
+    Task task = data;
+    task.name = name;
+    task.predecessors = std::move(predecessors);
+    dag.tasks.push_back(task);
+  };
+  add("a", {1});
+  add("b", {0});
+  add("c", {4});
+  add("d", {2});
+  add("e", {3});
+  add("free", {0});
+  const std::string found = to_string(validate(workload));
+  EXPECT_NE(found.find("a -> b -> a"), std::string::npos) << found;
+  EXPECT_NE(found.find("c -> d -> e -> c"), std::string::npos) << found;
+}
+
+TEST(Validate, ShortensALongCycle) {
+  Workload workload = valid();
+  Dag &dag = workload.dags[0];
+  constexpr std::uint32_t kCount = 100'000;
+  dag.tasks.assign(kCount, dag.tasks[1]);
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    dag.tasks[i].name = "t" + std::to_string(i);
+    dag.tasks[i].predecessors = {(i + kCount - 1) % kCount};
+  }
+  EXPECT_NE(to_string(validate(workload)).find("t11 -> (99988 more) -> t0"), std::string::npos);
+}
+
+TEST(Validate, PointsAtTheFieldAndTheItem) {
+  Workload workload = valid();
+  workload.dags[0].tasks[1].predecessors = {0, 1};
+  const std::vector<Finding> findings = find_mistakes(workload);
+  ASSERT_EQ(findings.size(), 1U);
+  EXPECT_EQ(findings[0].dag, DagId(0));
+  EXPECT_EQ(findings[0].task, 1U);
+  EXPECT_EQ(findings[0].field, Field::After);
+  EXPECT_EQ(findings[0].item, 1U);
+  EXPECT_TRUE(findings[0].involves.intersects(Field::After));
+}
+
+// Whatever is in the workload: no crash, and what passes has what everything else relies on.
+RC_GTEST_PROP(Validate, PassesOnlyWhatIsSound, ()) {
+  Workload workload = valid();
+  Dag &dag = workload.dags[0];
+  const auto number = [] {
+    return *rc::gen::oneOf(rc::gen::inRange<Duration>(-2, 20), rc::gen::arbitrary<Duration>(),
+                           rc::gen::element<Duration>(INT64_MIN, INT64_MAX, kMaxDuration));
+  };
+  dag.tasks.resize(*rc::gen::inRange<std::size_t>(0, 5));
+  for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+    Task &task = dag.tasks[i];
+    task.name = std::string(1, static_cast<char>('a' + i));
+    task.wcet = number();
+    task.bcet = number();
+    task.period = number();
+    task.deadline = number();
+    task.jitter = number();
+    task.offset = number();
+    task.activation = *rc::gen::element(Activation::Timer, Activation::Data);
+    task.execution.kind = *rc::gen::element(ExecutionTime::Kind::Constant, ExecutionTime::Kind::Normal);
+    task.execution.mean = number();
+    task.execution.stddev = number();
+    task.predecessors = *rc::gen::container<std::vector<std::uint32_t>>(rc::gen::inRange(0U, 6U));
+  }
+  if (*rc::gen::inRange(0, 2) == 0) {
+    for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {  // makes valid ones frequent enough to matter
+      dag.tasks[i] = valid().dags[0].tasks[0];
+      dag.tasks[i].name = std::string(1, static_cast<char>('a' + i));
+      if (i > 0) dag.tasks[i].predecessors = {*rc::gen::inRange(0U, i)};
+    }
+  }
+  if (has_errors(validate(workload))) return;
+  RC_ASSERT(topological_ranks(dag).size() == dag.tasks.size());
+  for (const Task &task : dag.tasks) {
+    RC_ASSERT(task.wcet > 0 && task.period > 0 && task.deadline > 0);
+    RC_ASSERT(task.bcet >= 0 && task.bcet <= task.wcet);
+  }
+}
+
+}  // namespace
+}  // namespace redag
