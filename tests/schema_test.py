@@ -1,0 +1,89 @@
+#!/usr/bin/env python3
+"""Every workload file satisfies docs/workload.schema.json, and the schema refuses what it should.
+
+Needs python3-jsonschema and python3-yaml. Run: python3 tests/schema_test.py
+"""
+
+import copy
+import json
+import pathlib
+import unittest
+
+import jsonschema
+import yaml
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+SCHEMA = json.loads((ROOT / "docs" / "workload.schema.json").read_text(encoding="utf-8"))
+TASK = {"name": "t", "wcet": "1ms", "period": "10ms"}
+
+
+def errors(document):
+    return [error.message for error in jsonschema.Draft7Validator(SCHEMA).iter_errors(document)]
+
+
+def with_task(**changes):
+    return {"dags": [{"name": "d", "tasks": [{**TASK, **changes}]}]}
+
+
+class SchemaTest(unittest.TestCase):
+    def test_is_a_schema(self):
+        jsonschema.Draft7Validator.check_schema(SCHEMA)
+
+    def test_shipped_workloads_satisfy_it(self):
+        files = sorted((ROOT / "workloads").rglob("*.yaml"))
+        self.assertGreaterEqual(len(files), 7)
+        for file in files:
+            with self.subTest(file=file.name):
+                self.assertEqual(errors(yaml.safe_load(file.read_text(encoding="utf-8"))), [])
+
+    def test_documented_example_satisfies_it(self):
+        text = (ROOT / "docs" / "workload_format.md").read_text(encoding="utf-8")
+        examples = [part.split("```")[0] for part in text.split("```yaml")[1:]]
+        self.assertTrue(examples)
+        for example in examples:
+            self.assertEqual(errors(yaml.safe_load(example)), [])
+
+    def test_accepts_every_form(self):
+        for changes in (
+            {"overrun": "skip"},
+            {"overrun": {"queue": 3}},
+            {"execution": {"normal": {"mean": "1ms", "stddev": "10us"}}},
+            {"execution": {"empirical": ["1ms", "0.5 ms"]}},
+            {"after": "a"},
+            {"after": ["a", "b"]},
+            {"offset": 0},
+            {"wcet": "1µs"},
+            {"wcet": ".5ms"},
+        ):
+            with self.subTest(changes=changes):
+                self.assertEqual(errors(with_task(**changes)), [])
+
+    def test_refuses(self):
+        for changes in (
+            {"wcet": 5},
+            {"wcet": "5"},
+            {"wcet": "-5ms"},
+            {"wcet": "5 parsec"},
+            {"wect": "5ms"},
+            {"overrun": "drop"},
+            {"overrun": {"queue": 0}},
+            {"execution": "normal"},
+            {"execution": {"normal": {"mean": "1ms"}}},
+            {"activation": "event"},
+            {"priority": "high"},
+            {"after": ["a", "a"]},
+        ):
+            with self.subTest(changes=changes):
+                self.assertNotEqual(errors(with_task(**changes)), [])
+
+    def test_refuses_incomplete_documents(self):
+        self.assertNotEqual(errors({}), [])
+        self.assertNotEqual(errors({"dags": []}), [])
+        for key in ("name", "tasks"):
+            document = copy.deepcopy(with_task())
+            del document["dags"][0][key]
+            self.assertNotEqual(errors(document), [], key)
+
+
+if __name__ == "__main__":
+    unittest.main()
