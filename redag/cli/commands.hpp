@@ -1,0 +1,26 @@
+// The subcommands. Each has one file, <name>_command.cpp, and one function that declares its options and returns what
+// to do once they are parsed.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+#include "redag/cli/console.hpp"
+
+namespace redag::cli {
+
+// Exit statuses: what a script can branch on.
+inline constexpr int kExitOk = 0;
+inline constexpr int kExitNo = 1;   // the command worked, and the answer is no
+inline constexpr int kExitBad = 2;  // bad input, bad usage, or a result that could not be written
+
+using Action = std::function<int(Console &)>;
+
+Action add_validate(CLI::App &app);
+Action add_generate(CLI::App &app);
+Action add_simulate(CLI::App &app);
+Action add_run(CLI::App &app);
+Action add_compare(CLI::App &app);
+Action add_check_trace(CLI::App &app);
+
+}  // namespace redag::cli

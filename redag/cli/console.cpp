@@ -1,0 +1,114 @@
+#include "redag/cli/console.hpp"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+
+namespace redag::cli {
+namespace {
+
+constexpr std::size_t kBufferSize = std::size_t{1} << 20U;
+
+StreamTraits traits_of(int descriptor) {
+  StreamTraits traits;
+  traits.terminal = isatty(descriptor) == 1;
+  if (!traits.terminal) return traits;
+  const char *no_color = std::getenv("NO_COLOR");  // https://no-color.org: present and not empty
+  const char *term = std::getenv("TERM");
+  traits.colour = (no_color == nullptr || *no_color == '\0') && term != nullptr && std::strcmp(term, "dumb") != 0;
+  winsize size{};
+  traits.width = ioctl(descriptor, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+  return traits;
+}
+
+const char *code_of(Tint tint) {
+  switch (tint) {
+    case Tint::Plain: break;
+    case Tint::Good: return "\033[32m";
+    case Tint::Bad: return "\033[31m";
+    case Tint::Caution: return "\033[33m";
+    case Tint::Faint: return "\033[2m";
+    case Tint::Strong: return "\033[1m";
+  }
+  return "";
+}
+
+// All of `text`; the errno of what went wrong, or 0.
+int write_all(int descriptor, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::string tinted(std::string_view text, Tint tint, bool colour) {
+  if (!colour || tint == Tint::Plain) return std::string(text);
+  return fmt::format("{}{}\033[0m", code_of(tint), text);
+}
+
+std::size_t display_width(std::string_view text) {
+  const auto starts_character = [](char c) { return (static_cast<unsigned char>(c) & 0xc0U) != 0x80U; };
+  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), starts_character));
+}
+
+Console::Console(int out, StreamTraits out_traits, int err, StreamTraits err_traits)
+    : out_(out), err_(err), out_traits_(out_traits), err_traits_(err_traits) {}
+
+Console::Console() : Console(STDOUT_FILENO, traits_of(STDOUT_FILENO), STDERR_FILENO, traits_of(STDERR_FILENO)) {}
+
+void Console::print(std::string_view text) {
+  buffer_.append(text);
+  if (buffer_.size() < kBufferSize) return;
+  write_out(buffer_);
+  buffer_.clear();
+}
+
+void Console::note(std::string_view text) { write_all(err_, text); }
+
+void Console::note(const Diagnostic &diagnostic) {
+  const bool is_error = diagnostic.severity == Severity::Error;
+  std::string text = diagnostic.to_string();
+  // Colour the word that says how bad it is, and nothing else: the place must stay clickable.
+  const std::string_view word = is_error ? "error:" : "warning:";
+  const std::size_t at = text.find(word, diagnostic.file.size());
+  if (err_traits_.colour && at != std::string::npos) {
+    text.replace(at, word.size(), tinted(word, is_error ? Tint::Bad : Tint::Caution, true));
+  }
+  note(text + "\n");
+}
+
+void Console::note(const Diagnostics &diagnostics) {
+  for (const Diagnostic &diagnostic : diagnostics) note(diagnostic);
+}
+
+void Console::warn(std::string_view message, std::string_view hint) {
+  note(Diagnostic{Severity::Warning, {}, 0, 0, std::string(message), std::string(hint)});
+}
+
+void Console::error(std::string_view message, std::string_view hint) {
+  note(Diagnostic{Severity::Error, {}, 0, 0, std::string(message), std::string(hint)});
+}
+
+void Console::write_out(std::string_view text) {
+  if (error_ == 0) error_ = write_all(out_, text);
+}
+
+bool Console::flush() {
+  write_out(buffer_);
+  buffer_.clear();
+  if (error_ == 0 || error_ == EPIPE) return true;
+  error(fmt::format("standard output: {}", std::strerror(error_)));
+  return false;
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,104 @@
+#include "redag/cli/files.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <system_error>
+
+#include "redag/trace/output_file.hpp"
+
+namespace redag::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<std::string> read_standard_input() {
+  std::string text;
+  std::string block(std::size_t{1} << 16U, '\0');
+  while (text.size() <= kMaxWorkloadBytes) {
+    const ssize_t count = ::read(STDIN_FILENO, block.data(), block.size());
+    if (count == 0) return text;
+    if (count > 0) {
+      text.append(block, 0, static_cast<std::size_t>(count));
+    } else if (errno != EINTR) {
+      return trace::file_error("<stdin>", 0, fmt::format("cannot read: {}", std::strerror(errno)));
+    }
+  }
+  return trace::file_error("<stdin>", 0, fmt::format("longer than {} bytes", kMaxWorkloadBytes));
+}
+
+// Devices, pipes: what cannot be replaced by a rename.
+Result<void> write_in_place(const std::string &path, std::string_view text) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE *)> file(std::fopen(path.c_str(), "we"), &std::fclose);
+  if (file != nullptr && std::fwrite(text.data(), 1, text.size(), file.get()) == text.size() &&
+      std::fflush(file.get()) == 0) {
+    return {};
+  }
+  return trace::file_error(path, 0, fmt::format("cannot write: {}", std::strerror(errno)));
+}
+
+// "007" of "mte_007".
+bool is_number(std::string_view text) {
+  return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+}  // namespace
+
+Result<LoadedWorkload> load_input(const std::string &path) {
+  if (path != "-") return load_workload(path);
+  Result<std::string> text = read_standard_input();
+  if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
+  return parse_workload(*text, "<stdin>");
+}
+
+Result<void> write_text(const std::string &path, std::string_view text) {
+  std::error_code ignored;
+  const fs::file_status status = fs::symlink_status(path, ignored);
+  if (fs::exists(status) && !fs::is_regular_file(status)) return write_in_place(path, text);
+  Result<trace::OutputFile> file = trace::OutputFile::create(path);
+  if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));
+  file->write(text);
+  return file->commit();
+}
+
+bool is_result_name(std::string_view name) {
+  // What a killed command left behind ends in ".tmp.<pid>".
+  if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
+    name = name.substr(0, at);
+  }
+  constexpr std::array<std::string_view, 10> kNames = {
+      "jobs.csv",        "summary.json",   "trace.json",      "events.txt",  "workload.yaml",
+      "comparison.json", "comparison.csv", "comparison.html", "report.html", "check.json"};
+  if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
+  // Folders of a comparison: one an executor, in it one a repetition; and what `generate` writes.
+  constexpr std::array<std::string_view, 5> kPrefixes = {"redag", "mte", "ste", "repetition-", "workload-"};
+  return std::any_of(kPrefixes.begin(), kPrefixes.end(),
+                     [&](std::string_view prefix) { return name.compare(0, prefix.size(), prefix) == 0; });
+}
+
+Result<void> prepare_folder(const std::string &path, bool force) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error) return trace::file_error(path, 0, fmt::format("cannot make the folder: {}", error.message()));
+  if (::access(path.c_str(), W_OK | X_OK) != 0) {
+    return trace::file_error(path, 0, fmt::format("cannot write into the folder: {}", std::strerror(errno)));
+  }
+  if (force) return {};
+  for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (is_result_name(name)) continue;
+    return trace::file_error(path, 0, fmt::format("the folder holds '{}', which is not a result of redag", name),
+                             "choose another folder, or say --force to write beside it");
+  }
+  if (error) return trace::file_error(path, 0, fmt::format("cannot list the folder: {}", error.message()));
+  return {};
+}
+
+}  // namespace redag::cli

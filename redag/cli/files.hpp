@@ -1,0 +1,27 @@
+// Files on behalf of commands: reading a workload ("-" is standard input), writing one text file, and result folders,
+// which are made when missing and never mixed with somebody else's files. Not thread-safe.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "redag/base/result.hpp"
+#include "redag/model/workload_yaml.hpp"
+
+namespace redag::cli {
+
+/// load_workload(), or the text on standard input if `path` is "-".
+[[nodiscard]] Result<LoadedWorkload> load_input(const std::string &path);
+
+/// Writes a whole file or nothing (trace::OutputFile); devices and pipes are written as they are.
+[[nodiscard]] Result<void> write_text(const std::string &path, std::string_view text);
+
+/// A folder that results can go to: made with its parents if missing. Error if it holds a file that this program does
+/// not write, by name (unless `force`), or cannot be made or written. Nothing is deleted.
+[[nodiscard]] Result<void> prepare_folder(const std::string &path, bool force);
+
+/// Is this the name of something that a command writes into a result folder?
+[[nodiscard]] bool is_result_name(std::string_view name);
+
+}  // namespace redag::cli

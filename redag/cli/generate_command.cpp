@@ -1,0 +1,178 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "redag/cli/commands.hpp"
+#include "redag/cli/files.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/model/generate.hpp"
+#include "redag/model/workload_yaml.hpp"
+
+namespace redag::cli {
+namespace {
+
+struct Options {
+  GenerateOptions generate;
+  std::uint64_t seed = 1;
+  std::string file;
+  std::string folder;
+  std::uint32_t count = 1;
+  bool force = false;
+};
+
+constexpr std::uint32_t kMaxCount = 1'000'000;
+
+template <class Value>
+Choices<Value> choices_of(std::initializer_list<Value> values) {
+  Choices<Value> choices;
+  for (const Value value : values) choices.emplace_back(to_string(value), value);
+  return choices;
+}
+
+void add_structure(CLI::App &app, GenerateOptions &g) {
+  const std::string group = "DAGs";
+  add_count(app, "--dags", g.dags, "DAGs")->group(group);
+  add_count(app, "--min-tasks", g.min_tasks, "Fewest tasks of a DAG")->group(group);
+  add_count(app, "--max-tasks", g.max_tasks, "Most tasks of a DAG")->group(group);
+  add_choice(
+      app, "--shape", g.shape,
+      choices_of({DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain, DagShape::Independent}),
+      "Edges")
+      ->default_str(to_string(g.shape))
+      ->group(group);
+  add_number(app, "--edge-probability", g.edge_probability, "Of each further edge (layered, erdos_renyi)")
+
+      ->group(group);
+  add_number(app, "--data-share", g.data_share, "Of the tasks with predecessors: released by data")
+
+      ->group(group);
+  add_count(app, "--max-active-min", g.max_active_min, "Least max_active of a DAG; 0: no bound")
+
+      ->group(group);
+  add_count(app, "--max-active-max", g.max_active_max, "Largest max_active of a DAG; 0: no bound")
+
+      ->group(group);
+  add_count(app, "--groups", g.groups, "Exclusive groups in the workload")->group(group);
+  add_number(app, "--group-share", g.group_share, "Of the tasks: in a group")->group(group);
+  add_number(app, "--queue-share", g.queue_share, "Of the tasks: overrun queue")->group(group);
+  add_count(app, "--queue-depth", g.queue_depth, "Largest queue_depth of those")->group(group);
+  add_number(app, "--high-share", g.high_share, "Of the DAGs: criticality high")->group(group);
+  add_number(app, "--low-share", g.low_share, "Of the DAGs: criticality low")->group(group);
+}
+
+void add_timing(CLI::App &app, GenerateOptions &g) {
+  const std::string group = "Time";
+  add_number(app, "--utilization", g.utilization, "Of all tasks together")->group(group);
+  add_number(app, "--max-task-utilization", g.max_task_utilization, "Of one task")->group(group);
+  add_choice(app, "--method", g.method, choices_of({UtilizationMethod::Drs, UtilizationMethod::UUniFastDiscard}),
+             "How the utilization is shared")
+      ->default_str(to_string(g.method))
+      ->group(group);
+  add_choice(app, "--periods", g.periods,
+             choices_of({PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive, PeriodModel::Robot}),
+             "Periods")
+      ->default_str(to_string(g.periods))
+      ->group(group);
+  add_duration(app, "--period-min", g.period_min, "Shortest period (log_uniform, harmonic)")->group(group);
+  add_duration(app, "--period-max", g.period_max, "Longest period (log_uniform, harmonic)")->group(group);
+  add_duration(app, "--period-granularity", g.period_granularity, "Periods are multiples of it (log_uniform)")
+      ->group(group);
+  add_choice(app, "--rates", g.rates, choices_of({RateScope::PerDag, RateScope::PerTask}), "Who draws a period")
+      ->default_str(to_string(g.rates))
+      ->group(group);
+  add_number(app, "--deadline-min", g.deadline_min, "Smallest deadline / period")->group(group);
+  add_number(app, "--deadline-max", g.deadline_max, "Largest deadline / period")->group(group);
+  add_number(app, "--bcet-min", g.bcet_min, "Smallest bcet / wcet")->group(group);
+  add_number(app, "--bcet-max", g.bcet_max, "Largest bcet / wcet")->group(group);
+  add_number(app, "--jitter", g.jitter, "Release jitter / period of timer tasks")->group(group);
+  app.add_flag("--offsets", g.offsets, "Timer tasks start anywhere in their first period")->group(group);
+}
+
+void add_platform(CLI::App &app, GenerateOptions &g) {
+  const std::string group = "Platform";
+  add_count(app, "--workers", g.workers, "Workers")->group(group);
+  add_choice(app, "--preemption", g.preemption, preemption_choices(), "Preemption")
+      ->default_str(to_string(g.preemption))
+      ->group(group);
+  add_choice(app, "--policy", g.policy, policy_choices(), "Policy")->default_str(to_string(g.policy))->group(group);
+}
+
+// The command that makes this one workload again, as a comment on top of it.
+std::string provenance(const CLI::App &app, std::uint64_t seed) {
+  std::string line = "# redag generate";
+  for (const CLI::Option *option : app.get_options()) {
+    const std::string name = option->get_name();
+    if (option->count() == 0 || name == "--seed" || name == "--count" || name == "--out" || name == "--force" ||
+        name == "--output") {
+      continue;
+    }
+    line += " " + name;
+    if (option->get_expected_min() > 0) line += " " + option->results().back();
+  }
+  return line + fmt::format(" --seed {}\n", seed);
+}
+
+int generate_workloads(const CLI::App &app, const Options &options, Console &console) {
+  if (options.count > 1 && options.folder.empty()) {
+    console.error("--count needs --out DIR: one file holds one workload");
+    return kExitBad;
+  }
+  if (options.count < 1 || options.count > kMaxCount) {
+    console.error(fmt::format("--count: {} is not within 1 and {}", options.count, kMaxCount));
+    return kExitBad;
+  }
+  if (!options.folder.empty() && !options.file.empty()) {
+    console.error("-o and --out exclude each other");
+    return kExitBad;
+  }
+  if (!options.folder.empty()) {
+    if (const Result<void> made = prepare_folder(options.folder, options.force); !made) {
+      console.note(made.error());
+      return kExitBad;
+    }
+  }
+  for (std::uint32_t i = 0; i < options.count; ++i) {
+    const std::uint64_t seed = options.seed + i;
+    const Result<Workload> workload = generate(options.generate, seed);
+    if (!workload) {
+      console.note(workload.error());
+      return kExitBad;
+    }
+    const std::string text = provenance(app, seed) + to_yaml(*workload);
+    if (options.folder.empty() && options.file.empty()) {
+      console.print(text);
+      continue;
+    }
+    const std::string file =
+        options.folder.empty() ? options.file : fmt::format("{}/workload-{}.yaml", options.folder, seed);
+    if (const Result<void> written = write_text(file, text); !written) {
+      console.note(written.error());
+      return kExitBad;
+    }
+  }
+  if (!options.folder.empty()) {
+    console.note(fmt::format("wrote {} workload{} to {}: seeds {} to {}\n", options.count,
+                             options.count == 1 ? "" : "s", options.folder, options.seed,
+                             options.seed + options.count - 1));
+  }
+  return kExitOk;
+}
+
+}  // namespace
+
+Action add_generate(CLI::App &app) {
+  auto options = std::make_shared<Options>();
+  add_count(app, "--seed", options->seed, "The same options and seed give the same workload everywhere");
+  app.add_option("-o,--output", options->file, "File to write; default: standard output")->type_name("FILE");
+  add_count(app, "--count", options->count, "Workloads to make, with seeds SEED, SEED+1, ...; needs --out")
+
+      ;
+  app.add_option("--out", options->folder, "Folder for workload-SEED.yaml files")->type_name("DIR");
+  app.add_flag("--force", options->force, "Write into a folder that holds other files");
+  add_structure(app, options->generate);
+  add_timing(app, options->generate);
+  add_platform(app, options->generate);
+  return [options, &app](Console &console) { return generate_workloads(app, *options, console); };
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,13 @@
+#include <csignal>
+#include <string>
+#include <vector>
+
+#include "redag/cli/console.hpp"
+#include "redag/cli/program.hpp"
+
+int main(int argc, char **argv) {
+  // A reader that goes away (`| head`) must not end a run before its files are written: writing says so instead.
+  std::signal(SIGPIPE, SIG_IGN);
+  redag::cli::Console console;
+  return redag::cli::run_program(std::vector<std::string>(argv + (argc > 0 ? 1 : 0), argv + argc), console);
+}

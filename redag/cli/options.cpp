@@ -1,0 +1,137 @@
+#include "redag/cli/options.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "redag/model/workload_yaml_nearest.hpp"
+
+namespace redag::cli {
+namespace {
+
+constexpr int kMaxCpu = 4095;  // more than any Linux of today has
+
+// A number at the start of `text`, which it is taken from.
+std::optional<int> take_number(std::string_view &text) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || value < 0 || value > kMaxCpu) return std::nullopt;
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return value;
+}
+
+template <class Number>
+CLI::Option *add_number_to(CLI::App &app, const std::string &name, Number &target, const std::string &help,
+                           const char *type, const char *kind) {
+  const auto set = [&target, name, kind](const std::string &text) {
+    Number value{};
+    const char *end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    const bool fits = error == std::errc{} && stop == end && std::isfinite(static_cast<double>(value));
+    if (!fits) reject(name, "'" + text + "' is not " + kind);
+    target = value;
+  };
+  return app.add_option_function<std::string>(name, set, help)->type_name(type)->default_str(fmt::format("{}", target));
+}
+
+template <class Target>
+CLI::Option *add_duration_to(CLI::App &app, const std::string &name, Target &target, const std::string &help,
+                             bool zero_allowed) {
+  const auto set = [&target, name, zero_allowed](const std::string &text) {
+    const Result<Duration> parsed = parse_duration(text);
+    if (!parsed) reject(name, parsed.error().front().message, parsed.error().front().hint);
+    if (*parsed < 0 || (*parsed == 0 && !zero_allowed)) {
+      reject(name, "'" + text + "' is not " + (zero_allowed ? "a duration that can be waited for" : "longer than 0"));
+    }
+    target = *parsed;
+  };
+  return app.add_option_function<std::string>(name, set, help)->type_name("DURATION");
+}
+
+}  // namespace
+
+void reject(const std::string &option, const std::string &message, const std::string &hint) {
+  // CLI11 puts the name before a ValidationError's message only if it has one.
+  throw CLI::ValidationError(option, message + (hint.empty() ? "" : " (" + hint + ")"));
+}
+
+CLI::Option *add_duration(CLI::App &app, const std::string &name, std::optional<Duration> &target,
+                          const std::string &help, bool zero_allowed) {
+  return add_duration_to(app, name, target, help, zero_allowed);
+}
+
+CLI::Option *add_duration(CLI::App &app, const std::string &name, Duration &target, const std::string &help,
+                          bool zero_allowed) {
+  return add_duration_to(app, name, target, help, zero_allowed)->default_str(format_duration(target));
+}
+
+CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint32_t &target, const std::string &help) {
+  return add_number_to(app, name, target, help, "N", "a whole number below 2^32");
+}
+
+CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint64_t &target, const std::string &help) {
+  return add_number_to(app, name, target, help, "N", "a whole number below 2^64");
+}
+
+CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, const std::string &help) {
+  return add_number_to(app, name, target, help, "X", "a number");
+}
+
+std::optional<std::vector<int>> parse_cpu_list(std::string_view text) {
+  std::vector<int> cpus;
+  while (true) {
+    const std::optional<int> first = take_number(text);
+    if (!first) return std::nullopt;
+    int last = *first;
+    if (!text.empty() && text.front() == '-') {
+      text.remove_prefix(1);
+      const std::optional<int> given = take_number(text);
+      if (!given || *given < *first) return std::nullopt;
+      last = *given;
+    }
+    for (int cpu = *first; cpu <= last; ++cpu) cpus.push_back(cpu);
+    if (text.empty()) break;
+    if (text.front() != ',') return std::nullopt;
+    text.remove_prefix(1);
+  }
+  std::sort(cpus.begin(), cpus.end());
+  cpus.erase(std::unique(cpus.begin(), cpus.end()), cpus.end());
+  return cpus;
+}
+
+std::string suggestion(std::string_view given, const std::vector<std::string> &candidates) {
+  const std::vector<std::string_view> views(candidates.begin(), candidates.end());
+  const std::string_view best = yaml::nearest(given, views);
+  if (!best.empty()) return "did you mean '" + std::string(best) + "'?";
+  std::string all;
+  for (const std::string &candidate : candidates) all += (all.empty() ? "one of " : ", ") + candidate;
+  return all;
+}
+
+const Choices<PolicyKind> &policy_choices() {
+  static const Choices<PolicyKind> choices = [] {
+    Choices<PolicyKind> all;
+    for (const PolicyKind kind : {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed,
+                                  PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::ChainAware}) {
+      all.emplace_back(to_string(kind), kind);
+    }
+    return all;
+  }();
+  return choices;
+}
+
+const Choices<PreemptionMode> &preemption_choices() {
+  static const Choices<PreemptionMode> choices = [] {
+    Choices<PreemptionMode> all;
+    for (const PreemptionMode mode :
+         {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os, PreemptionMode::Auto}) {
+      all.emplace_back(to_string(mode), mode);
+    }
+    return all;
+  }();
+  return choices;
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,127 @@
+#include "redag/cli/program.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <new>
+
+#include "redag/cli/commands.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/version.hpp"
+
+namespace redag::cli {
+namespace {
+
+struct Entry {
+  const char *name;
+  const char *summary;
+  Action (*add)(CLI::App &);
+  const char *examples;
+};
+
+constexpr std::array kCommands = {
+    Entry{"validate", "Check workload files and say what is wrong, line by line", add_validate,
+          "  redag validate cart.yaml\n"
+          "  redag validate --strict workloads/*.yaml\n"},
+    Entry{"generate", "Make random workloads from a seed", add_generate,
+          "  redag generate --dags 4 --utilization 1.6 --seed 7 -o random.yaml\n"
+          "  redag generate --periods robot --shape chain | redag validate -\n"
+          "  redag generate --count 100 --out sets/\n"},
+};
+
+std::vector<std::string> command_names() {
+  std::vector<std::string> names;
+  for (const Entry &entry : kCommands) names.emplace_back(entry.name);
+  return names;
+}
+
+// What CLI11 says about an argument that it does not know, with the nearest one that it does.
+std::string unknown_argument(const CLI::App &command) {
+  const std::vector<std::string> rest = command.remaining();
+  if (rest.empty()) return "too many arguments";
+  const std::string given = rest.front().substr(0, rest.front().find('='));
+  if (given.empty() || given.front() != '-') return fmt::format("unexpected argument '{}'", given);
+  std::vector<std::string> names;
+  for (const CLI::Option *option : command.get_options()) {
+    for (const std::string &name : option->get_lnames()) names.push_back("--" + name);
+  }
+  const std::string hint = suggestion(given, names);
+  const bool is_near = hint.compare(0, 3, "did") == 0;  // otherwise it lists every option there is
+  return fmt::format("unknown option '{}'{}", given, is_near ? " (" + hint + ")" : "");
+}
+
+int usage_error(Console &console, const std::string &message, const std::string &command) {
+  console.error(message);
+  console.note(fmt::format("'redag {}--help' explains the usage\n", command.empty() ? "" : command + " "));
+  return kExitBad;
+}
+
+// The subcommand that was named, or null.
+CLI::App *chosen(CLI::App &app) {
+  const auto parsed = app.get_subcommands();
+  return parsed.empty() ? nullptr : parsed.front();
+}
+
+int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
+  CLI::App app("Priority scheduling for many callback DAGs in one process: validate, simulate, run, compare.", "redag");
+  app.set_version_flag("--version", std::string("redag ") + kVersion);
+  app.require_subcommand(0, 1);
+  app.get_formatter()->column_width(34);
+  app.footer(
+      "'redag COMMAND --help' explains a command. Exit status: 0 fine, 1 the answer is no, 2 bad input or usage.");
+  std::vector<std::pair<CLI::App *, Action>> actions;
+  for (const Entry &entry : kCommands) {
+    CLI::App *command = app.add_subcommand(entry.name, entry.summary);
+    command->footer(std::string("Examples:\n") + entry.examples);
+    actions.emplace_back(command, entry.add(*command));
+  }
+
+  if (arguments.empty()) {
+    console.note(app.help());
+    return kExitBad;
+  }
+  const std::vector<std::string> names = command_names();
+  const std::string &first = arguments.front();
+  if (first.empty() || (first.front() != '-' && std::find(names.begin(), names.end(), first) == names.end())) {
+    return usage_error(console, fmt::format("unknown command '{}' ({})", first, suggestion(first, names)), "");
+  }
+
+  try {
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them last first
+  } catch (const CLI::CallForHelp &) {
+    CLI::App *command = chosen(app);
+    console.print(command != nullptr ? command->help("redag") : app.help());
+    return kExitOk;
+  } catch (const CLI::CallForVersion &version) {
+    console.print(std::string(version.what()) + "\n");
+    return kExitOk;
+  } catch (const CLI::ExtrasError &) {
+    CLI::App *command = chosen(app);
+    return usage_error(console, unknown_argument(command != nullptr ? *command : app),
+                       command != nullptr ? command->get_name() : "");
+  } catch (const CLI::ParseError &error) {
+    CLI::App *command = chosen(app);
+    return usage_error(console, error.what(), command != nullptr ? command->get_name() : "");
+  }
+  for (const auto &[command, action] : actions) {
+    if (command->parsed()) return action(console);
+  }
+  return usage_error(console, "no command given", "");
+}
+
+}  // namespace
+
+int run_program(const std::vector<std::string> &arguments, Console &console) {
+  int status = kExitBad;
+  try {
+    status = parse_and_run(arguments, console);
+  } catch (const std::bad_alloc &) {
+    console.error("out of memory");
+  }
+  if (!console.flush()) return kExitBad;
+  return status;
+}
+
+}  // namespace redag::cli

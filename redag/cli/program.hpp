@@ -1,0 +1,15 @@
+// The program `redag` as a function: which subcommand, usage errors, help. main.cpp gives it the process's arguments
+// and streams.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "redag/cli/console.hpp"
+
+namespace redag::cli {
+
+/// `arguments` without the program's name. Returns the exit status (commands.hpp); nothing is left unwritten.
+[[nodiscard]] int run_program(const std::vector<std::string> &arguments, Console &console);
+
+}  // namespace redag::cli

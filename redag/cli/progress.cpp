@@ -1,0 +1,48 @@
+#include "redag/cli/progress.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "redag/cli/table.hpp"
+
+namespace redag::cli {
+namespace {
+
+constexpr Duration kRedrawPeriod = 100 * kMillisecond;
+constexpr std::size_t kBarWidth = 20;
+
+Time now() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+std::string progress_line(std::string_view label, double done, std::string_view detail, std::size_t width) {
+  const double share = std::clamp(done, 0.0, 1.0);
+  const auto filled = static_cast<std::size_t>(share * static_cast<double>(kBarWidth));
+  const std::string bar = std::string(filled, '#') + std::string(kBarWidth - filled, ' ');
+  const std::string line =
+      fmt::format("{}{}[{}] {:3.0f} %  {}", label, label.empty() ? "" : " ", bar, 100 * share, detail);
+  return cut(line, width);
+}
+
+bool Progress::due() const { return console_.err_traits().terminal && now() - last_drawn_ >= kRedrawPeriod; }
+
+void Progress::draw(double done, std::string_view detail) {
+  if (!console_.err_traits().terminal) return;
+  last_drawn_ = now();
+  visible_ = true;
+  // One column stays free: a full last column wraps on some terminals.
+  const std::size_t width = console_.err_traits().width;
+  console_.note("\r\033[K" + progress_line(label_, done, detail, width > 1 ? width - 1 : 79));
+}
+
+void Progress::clear() {
+  if (visible_) console_.note("\r\033[K");
+  visible_ = false;
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,44 @@
+// A line on standard error that tells how far a long command is. Only on a terminal; redrawn at most ten times a
+// second; erased when done. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "redag/base/time.hpp"
+#include "redag/cli/console.hpp"
+
+namespace redag::cli {
+
+class Progress {
+ public:
+  explicit Progress(Console &console) : console_(console) {}
+  ~Progress() { clear(); }
+  Progress(const Progress &) = delete;
+  Progress &operator=(const Progress &) = delete;
+
+  /// What stands before the bar: "mte 2/3".
+  void set_label(std::string label) { label_ = std::move(label); }
+
+  /// Is it time to redraw? Cheap enough to ask often, but reads a clock.
+  [[nodiscard]] bool due() const;
+
+  /// `done` in [0, 1]; `detail` stands after the bar, cut to the terminal.
+  void draw(double done, std::string_view detail);
+
+  /// Takes the line away, so that other text can be written.
+  void clear();
+
+ private:
+  Console &console_;
+  std::string label_;
+  Time last_drawn_ = 0;
+  bool visible_ = false;
+};
+
+/// "label [#####     ]  50 %  detail", at most `width` columns.
+[[nodiscard]] std::string progress_line(std::string_view label, double done, std::string_view detail,
+                                        std::size_t width);
+
+}  // namespace redag::cli

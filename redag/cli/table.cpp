@@ -1,0 +1,123 @@
+#include "redag/cli/table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "redag/base/check.hpp"
+
+namespace redag::cli {
+namespace {
+
+constexpr std::size_t kGap = 2;          // between columns
+constexpr std::size_t kShortestCut = 8;  // a text column is not cut below this
+
+std::string padded(const std::string &text, std::size_t width, bool right) {
+  const std::size_t used = display_width(text);
+  const std::string space(width > used ? width - used : 0, ' ');
+  return right ? space + text : text + space;
+}
+
+}  // namespace
+
+std::string cut(std::string_view text, std::size_t width) {
+  if (display_width(text) <= width) return std::string(text);
+  if (width == 0) return {};
+  std::size_t bytes = 0;
+  for (std::size_t columns = 0; bytes < text.size(); ++bytes) {
+    const bool starts_character = (static_cast<unsigned char>(text[bytes]) & 0xc0U) != 0x80U;
+    if (starts_character && ++columns == width) break;
+  }
+  return std::string(text.substr(0, bytes)) + "…";
+}
+
+std::string format_percent(double ratio) {
+  if (!std::isfinite(ratio)) return "-";
+  // Never let a miss read as none: 3 of 100 000 is 0.003 %.
+  const double percent = 100 * ratio;
+  if (percent > 0 && percent < 0.05) return fmt::format("{:.2g} %", percent);
+  return fmt::format("{:.1f} %", percent);
+}
+
+std::string format_count(std::uint64_t count) {
+  std::string text = fmt::format("{}", count);
+  for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, " ");
+  return text;
+}
+
+void Table::add(std::vector<Cell> row) {
+  REDAG_CHECK(row.size() <= columns_.size(), "a row has more cells than the table has columns");
+  row.resize(columns_.size());
+  rows_.push_back(std::move(row));
+}
+
+// Widths of the columns in `shown`, from which those that do not fit were taken.
+std::vector<std::size_t> Table::fit(std::size_t width, std::vector<std::size_t> &shown) const {
+  std::vector<std::size_t> widths(columns_.size());
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    widths[i] = display_width(columns_[i].title);
+    for (const auto &row : rows_) widths[i] = std::max(widths[i], display_width(row[i].text));
+  }
+  const auto excess = [&]() -> std::size_t {
+    std::size_t total = kGap * (shown.size() - 1);
+    for (const std::size_t i : shown) total += widths[i];
+    return width > 0 && total > width ? total - width : 0;
+  };
+  const auto cut_widest_text = [&] {
+    const auto can_shrink = [&](std::size_t i) { return !columns_[i].number && widths[i] > kShortestCut; };
+    std::size_t widest = columns_.size();
+    for (const std::size_t i : shown) {
+      if (can_shrink(i) && (widest == columns_.size() || widths[i] > widths[widest])) widest = i;
+    }
+    if (widest == columns_.size()) return false;
+    --widths[widest];
+    return true;
+  };
+  while (excess() > 0 && cut_widest_text()) {
+  }
+  while (excess() > 0 && shown.size() > 1) {
+    const auto importance = [&](std::size_t a, std::size_t b) {
+      return columns_[a].importance < columns_[b].importance;
+    };
+    // min_element finds the first of equals; the last of them is to go.
+    shown.erase(std::prev(std::min_element(shown.rbegin(), shown.rend(), importance).base()));
+  }
+  return widths;
+}
+
+std::string Table::render(std::size_t width, bool colour) const {
+  std::vector<std::size_t> shown(columns_.size());
+  std::iota(shown.begin(), shown.end(), std::size_t{0});
+  const std::vector<std::size_t> widths = fit(width, shown);
+
+  std::string text;
+  const auto add_line = [&](const auto &cell_of) {
+    std::string line;
+    for (const std::size_t i : shown) {
+      const Cell cell = cell_of(i);
+      // Without colour nothing invisible stands at the end of a line.
+      const bool last = i == shown.back() && !columns_[i].number;
+      const std::string content = cut(cell.text, widths[i]);
+      if (i != shown.front()) line.append(kGap, ' ');
+      line += tinted(last ? content : padded(content, widths[i], columns_[i].number), cell.tint, colour);
+    }
+    text += line + "\n";
+  };
+  add_line([&](std::size_t i) { return Cell{columns_[i].title, Tint::Strong}; });
+  for (const auto &row : rows_) {
+    add_line([&](std::size_t i) { return row[i]; });
+  }
+  if (shown.size() < columns_.size()) {
+    std::string hidden;
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      if (std::find(shown.begin(), shown.end(), i) == shown.end())
+        hidden += (hidden.empty() ? "" : ", ") + columns_[i].title;
+    }
+    text += tinted(fmt::format("(no room for: {})", hidden), Tint::Faint, colour) + "\n";
+  }
+  return text;
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,97 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "redag/cli/commands.hpp"
+#include "redag/cli/files.hpp"
+#include "redag/cli/json.hpp"
+#include "redag/sim/simulator.hpp"
+
+namespace redag::cli {
+namespace {
+
+struct Options {
+  std::vector<std::string> files;
+  bool strict = false;
+  bool json = false;
+};
+
+struct Facts {
+  std::size_t dags = 0;
+  std::size_t tasks = 0;
+  std::size_t edges = 0;
+  double utilization = 0;
+  std::uint32_t workers = 0;
+  std::optional<Duration> hyperperiod;
+};
+
+Facts facts_of(const Workload &workload) {
+  Facts facts;
+  facts.dags = workload.dags.size();
+  facts.tasks = workload.task_count();
+  for (const TaskRef &ref : flatten(workload)) facts.edges += ref.task->predecessors.size();
+  facts.utilization = workload.utilization();
+  facts.workers = workload.platform.workers;
+  facts.hyperperiod = sim::hyperperiod(workload);
+  return facts;
+}
+
+std::string plural(std::size_t count, const char *noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
+std::string describe(const Facts &facts) {
+  return fmt::format("{}, {}, {}, utilization {:.3f} on {} ({:.1f} %), hyperperiod {}", plural(facts.dags, "DAG"),
+                     plural(facts.tasks, "task"), plural(facts.edges, "edge"), facts.utilization,
+                     plural(facts.workers, "worker"), 100 * facts.utilization / facts.workers,
+                     facts.hyperperiod ? format_duration(*facts.hyperperiod) : "beyond 146 years");
+}
+
+Json facts_json(const std::string &name, const Facts &facts) {
+  return Json{{"name", name},
+              {"dags", facts.dags},
+              {"tasks", facts.tasks},
+              {"edges", facts.edges},
+              {"utilization", facts.utilization},
+              {"workers", facts.workers},
+              {"hyperperiod_ns", facts.hyperperiod ? Json(*facts.hyperperiod) : Json()}};
+}
+
+int validate_files(const Options &options, Console &console) {
+  Json files = Json::array();
+  bool all_ok = true;
+  for (const std::string &file : options.files) {
+    const Result<LoadedWorkload> loaded = load_input(file);
+    const Diagnostics &found = loaded ? loaded->warnings : loaded.error();
+    const bool ok = loaded.has_value() && (found.empty() || !options.strict);
+    all_ok = all_ok && ok;
+    if (options.json) {
+      files.push_back(Json{{"file", file}, {"ok", ok}, {"diagnostics", diagnostics_json(found)}});
+      if (loaded) files.back()["workload"] = facts_json(loaded->workload.name, facts_of(loaded->workload));
+      continue;
+    }
+    console.note(found);
+    if (ok) {
+      const std::string verdict = tinted("ok", Tint::Good, console.out_traits().colour);
+      console.print(fmt::format("{}: {}: {}\n", file, verdict, describe(facts_of(loaded->workload))));
+    } else if (loaded) {
+      console.error(fmt::format("{}: {} not accepted by --strict", file, plural(found.size(), "warning")));
+    }
+  }
+  if (options.json) console.print(to_text(Json{{"schema", "redag.validate/1"}, {"ok", all_ok}, {"files", files}}));
+  return all_ok ? kExitOk : kExitBad;
+}
+
+}  // namespace
+
+Action add_validate(CLI::App &app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("FILE", options->files, "Workload files (YAML); - is standard input")->required();
+  app.add_flag("--strict", options->strict, "Take warnings for errors");
+  app.add_flag("--json", options->json, "Write the findings as one JSON document");
+  return [options](Console &console) { return validate_files(*options, console); };
+}
+
+}  // namespace redag::cli
