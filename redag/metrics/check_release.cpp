@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "redag/base/int128.hpp"
+
 namespace redag::metrics {
 namespace {
 
@@ -63,7 +65,9 @@ void ReleaseRules::released(const JobEvent &event) {
 
 void ReleaseRules::check_grid(const JobEvent &event) {
   const Task &task = context_.replay.task(event.task);
-  const Time nominal = context_.info.start + task.offset + static_cast<Time>(event.job) * task.period;
+  // Wide enough for any number that a damaged trace can hold.
+  const Int128 exact_nominal = Int128{context_.info.start} + task.offset + Int128{event.job} * task.period;
+  const Time nominal = static_cast<Time>(std::min(exact_nominal, Int128{kNever}));
   context_.expect(Rule::Grid, event.value == nominal, event.task, event.job,
                   [&] { return expected_and_got("its release", nominal, event.value); });
   // Only the simulator keeps to the jitter it was given; a real timer can be as late as the machine likes.
@@ -211,9 +215,9 @@ void ReleaseRules::end_of_trace() {
     if (!tasks_[t].timer || removed_[context_.replay.dag_of(id).value]) continue;
     const Task &task = context_.replay.task(id);
     const std::uint32_t next = tasks_[t].next_number;
-    const Time due = context_.info.start + task.offset + static_cast<Time>(next) * task.period;
+    const Int128 due = Int128{context_.info.start} + task.offset + Int128{next} * task.period;
     context_.expect(Rule::Grid, due + task.jitter >= context_.info.end, id, next,
-                    [&] { return "it was never released; due at " + format_duration(due); });
+                    [&] { return "it was never released; due at " + format_duration(static_cast<Time>(due)); });
   }
 }
 

@@ -1,0 +1,81 @@
+#include "redag/metrics/activity.hpp"
+
+#include <algorithm>
+
+namespace redag::metrics {
+
+Activity::Activity(const Workload &workload, const sched::Config &config, Time begin)
+    : replay_(workload, config),
+      begin_(begin),
+      peaks_(workload.dags.size(), 0),
+      busy_(config.workers, 0),
+      busy_since_(config.workers, kNever) {}
+
+void Activity::add(std::span<const JobEvent> events) {
+  for (const JobEvent &event : events) add(event);
+}
+
+void Activity::add(const JobEvent &event) {
+  if (event.task.value >= replay_.task_count() || event.kind == JobEventKind::Started) return;
+  if (any_ && event.time > time_) end_of_instant();
+  any_ = true;
+  time_ = std::max(time_, event.time);
+  replay_.apply(event);
+
+  if (event.kind == JobEventKind::Dispatched) {
+    std::uint32_t &peak = peaks_[replay_.dag_of(event.task).value];
+    peak = std::max(peak, replay_.active(replay_.dag_of(event.task)));
+    const std::uint32_t group = replay_.group_of(event.task);
+    if (group != Replay::kNoGroup && replay_.group_active(group) > 1) ++group_overlaps_;
+  }
+  if (event.worker >= busy_.size()) return;
+  Time &since = busy_since_[event.worker];
+  const bool is_busy = !replay_.stack(event.worker).empty();
+  if (is_busy && since == kNever) since = event.time;
+  if (!is_busy && since != kNever) {
+    busy_[event.worker] += measured(since, event.time);
+    since = kNever;
+  }
+}
+
+// Decisions of one instant belong together: only what is left of an inversion when time moves on has a length.
+void Activity::end_of_instant() {
+  const bool inverted = is_inverted();
+  if (inverted && inverted_since_ == kNever) inverted_since_ = time_;
+  if (!inverted) close_inversion(time_);
+}
+
+bool Activity::is_inverted() const {
+  const Urgency *least = nullptr;
+  for (std::uint32_t w = 0; w < replay_.worker_count(); ++w) {
+    const LiveJob *job = replay_.running(w);
+    if (job != nullptr && (least == nullptr || *least < job->own)) least = &job->own;
+  }
+  if (least == nullptr) return false;
+  if (!replay_.eligible().empty() && replay_.eligible().begin()->urgency < *least) return true;
+  return std::any_of(replay_.suspended().begin(), replay_.suspended().end(),
+                     [&](const Replay::JobRef &ref) { return replay_.find(ref.task, ref.number)->own < *least; });
+}
+
+Duration Activity::measured(Time from, Time to) const { return std::max<Duration>(0, to - std::max(from, begin_)); }
+
+void Activity::close_inversion(Time at) {
+  if (inverted_since_ == kNever) return;
+  const Duration length = measured(inverted_since_, at);
+  inverted_since_ = kNever;
+  if (length == 0) return;
+  ++inversions_.count;
+  inversions_.total += length;
+  inversions_.longest = std::max(inversions_.longest, length);
+}
+
+void Activity::finish(Time end) {
+  if (any_) end_of_instant();
+  close_inversion(end);
+  for (std::size_t w = 0; w < busy_.size(); ++w) {
+    if (busy_since_[w] != kNever) busy_[w] += measured(busy_since_[w], end);
+    busy_since_[w] = kNever;
+  }
+}
+
+}  // namespace redag::metrics

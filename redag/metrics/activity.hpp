@@ -1,0 +1,60 @@
+// What can only be seen across jobs: how many of a DAG are in progress, how busy workers are, priority inversion.
+// Incremental, one pass over the events. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "redag/metrics/replay.hpp"
+
+namespace redag::metrics {
+
+/// Times at which an eligible (or preempted) job waited while a job behind it in the policy's total order ran, each by
+/// its own priority: inherited priority does not hide an inversion. Overlapping ones are one.
+struct Inversions {
+  std::uint64_t count = 0;
+  Duration total = 0;
+  Duration longest = 0;
+
+  friend bool operator==(const Inversions &, const Inversions &) = default;
+};
+
+class Activity {
+ public:
+  /// Workers and inversions are measured from `begin` on; peaks from the first event. `workload` must outlive this.
+  Activity(const Workload &workload, const sched::Config &config, Time begin);
+
+  void add(std::span<const JobEvent> events);
+  /// Closes what is open at the end of the run. Call once.
+  void finish(Time end);
+
+  /// Most jobs of the DAG started and unfinished at any time.
+  [[nodiscard]] std::uint32_t peak_active(DagId dag) const { return peaks_[dag.value]; }
+  /// Jobs that started while another of their group was started and unfinished.
+  [[nodiscard]] std::uint64_t group_overlaps() const { return group_overlaps_; }
+  /// Time during which each worker held a job.
+  [[nodiscard]] const std::vector<Duration> &busy() const { return busy_; }
+  [[nodiscard]] Time last_time() const { return time_; }
+  [[nodiscard]] const Inversions &inversions() const { return inversions_; }
+
+ private:
+  void add(const JobEvent &event);
+  void end_of_instant();
+  [[nodiscard]] bool is_inverted() const;
+  [[nodiscard]] Duration measured(Time from, Time to) const;
+  void close_inversion(Time at);
+
+  Replay replay_;
+  Time begin_;
+  Time time_ = 0;
+  bool any_ = false;
+  Time inverted_since_ = kNever;
+  Inversions inversions_;
+  std::vector<std::uint32_t> peaks_;
+  std::uint64_t group_overlaps_ = 0;
+  std::vector<Duration> busy_;
+  std::vector<Time> busy_since_;
+};
+
+}  // namespace redag::metrics

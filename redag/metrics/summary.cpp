@@ -1,0 +1,162 @@
+#include "redag/metrics/summary.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace redag::metrics {
+namespace {
+
+double ratio(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+void append(std::vector<Duration> &to, const std::vector<Duration> &from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+// Counts only; distributions are made from the samples.
+void add_counts(JobStats &to, const JobStats &from) {
+  to.released += from.released;
+  to.finished += from.finished;
+  to.skipped += from.skipped;
+  to.aborted += from.aborted;
+  to.in_flight += from.in_flight;
+  to.deferred += from.deferred;
+  to.late += from.late;
+  to.overdue += from.overdue;
+  to.preemptions += from.preemptions;
+  for (std::size_t i = 0; i < kReasonCount; ++i) to.by_reason[i] += from.by_reason[i];
+  if (from.max_lateness) to.max_lateness = std::max(to.max_lateness.value_or(*from.max_lateness), *from.max_lateness);
+}
+
+}  // namespace
+
+double JobStats::miss_ratio() const { return ratio(late, released); }
+
+double JobStats::miss_ratio_with_lost() const { return ratio(late + skipped + aborted, released); }
+
+void Summarizer::Samples::append(const Samples &other) {
+  metrics::append(response, other.response);
+  metrics::append(response_from_ready, other.response_from_ready);
+  metrics::append(start_latency, other.start_latency);
+  metrics::append(on_worker, other.on_worker);
+}
+
+Summarizer::Summarizer(const trace::RunInfo &run)
+    : run_(run),
+      begin_(run.start + run.warm_up),
+      refs_(flatten(run.workload)),
+      is_sink_(refs_.size(), true),
+      stats_(refs_.size()),
+      samples_(refs_.size()),
+      end_to_end_(run.workload.dags.size()),
+      folder_(run.workload),
+      activity_(run.workload, run.config, begin_) {
+  for (std::size_t t = 0; t < refs_.size(); ++t) {
+    for (const std::uint32_t p : refs_[t].task->predecessors) is_sink_[t - refs_[t].index + p] = false;
+  }
+}
+
+void Summarizer::add(std::span<const JobEvent> events) {
+  activity_.add(events);
+  folder_.add(events);
+  for (const JobRecord &job : folder_.take_ended()) count(job);
+}
+
+void Summarizer::count(const JobRecord &job) {
+  if (job.release < begin_) return;
+  JobStats &stats = stats_[job.task.value];
+  ++stats.released;
+  if (job.deferred) ++stats.deferred;
+  stats.preemptions += job.preemptions;
+  Samples &samples = samples_[job.task.value];
+  if (job.has_started()) samples.start_latency.push_back(job.start - job.ready);
+  switch (job.outcome) {
+    case JobOutcome::InFlight: ++stats.in_flight; return;
+    case JobOutcome::Skipped:
+    case JobOutcome::Aborted:
+      ++(job.outcome == JobOutcome::Skipped ? stats.skipped : stats.aborted);
+      ++stats.by_reason[static_cast<std::size_t>(job.reason) % kReasonCount];
+      return;
+    case JobOutcome::Finished: break;
+  }
+  ++stats.finished;
+  if (job.lateness() > 0) ++stats.late;
+  stats.max_lateness = std::max(stats.max_lateness.value_or(job.lateness()), job.lateness());
+  samples.response.push_back(job.response());
+  samples.response_from_ready.push_back(job.response_from_ready());
+  samples.on_worker.push_back(job.on_worker);
+  if (is_sink_[job.task.value]) end_to_end_[refs_[job.task.value].dag.value].push_back(job.finish - job.origin);
+}
+
+void Summarizer::count_overdue(Time end) {
+  for (const JobRecord &job : folder_.in_flight()) {
+    count(job);
+    if (job.release < begin_ || !job.is_late(end)) continue;
+    ++stats_[job.task.value].late;
+    ++stats_[job.task.value].overdue;
+  }
+}
+
+void Summarizer::fill(JobStats &stats, Samples samples) {
+  stats.response = distribution_of(std::move(samples.response));
+  stats.response_from_ready = distribution_of(std::move(samples.response_from_ready));
+  stats.start_latency = distribution_of(std::move(samples.start_latency));
+  stats.on_worker = distribution_of(std::move(samples.on_worker));
+}
+
+Summary Summarizer::finish(Time end) {
+  activity_.finish(end);
+  count_overdue(end);
+
+  Summary summary;
+  summary.begin = begin_;
+  summary.end = end;
+  Samples all;
+  std::vector<Samples> of_dag(run_.workload.dags.size());
+  for (const Dag &dag : run_.workload.dags) {
+    DagSummary row;
+    row.name = dag.name;
+    row.max_active = dag.max_active;
+    row.end_to_end.deadline = dag.deadline;
+    summary.dags.push_back(std::move(row));
+  }
+  for (std::size_t t = 0; t < refs_.size(); ++t) {
+    const std::size_t d = refs_[t].dag.value;
+    add_counts(summary.dags[d].jobs, stats_[t]);
+    add_counts(summary.total, stats_[t]);
+    of_dag[d].append(samples_[t]);
+    all.append(samples_[t]);
+    fill(stats_[t], std::move(samples_[t]));
+    summary.tasks.push_back(TaskSummary{TaskId(t), summary.dags[d].name, refs_[t].task->name, stats_[t]});
+  }
+  for (std::size_t d = 0; d < summary.dags.size(); ++d) {
+    DagSummary &dag = summary.dags[d];
+    fill(dag.jobs, std::move(of_dag[d]));
+    for (const Duration response : end_to_end_[d]) {
+      if (dag.end_to_end.deadline > 0 && response > dag.end_to_end.deadline) ++dag.end_to_end.late;
+    }
+    dag.end_to_end.response = distribution_of(std::move(end_to_end_[d]));
+    dag.peak_active = activity_.peak_active(DagId(d));
+    if (dag.max_active > 0 && dag.peak_active > dag.max_active) summary.all_enforced = false;
+  }
+  fill(summary.total, std::move(all));
+  summary.inversions = activity_.inversions();
+  summary.group_overlaps = activity_.group_overlaps();
+  if (summary.group_overlaps > 0) summary.all_enforced = false;
+  // Jobs in progress at the end may have run on.
+  const Time last = std::max(end, activity_.last_time());
+  const double length = static_cast<double>(std::max<Duration>(1, last - begin_));
+  for (const Duration busy : activity_.busy()) summary.worker_busy.push_back(static_cast<double>(busy) / length);
+  summary.lost_events = run_.lost_events;
+  summary.ignored_events = folder_.ignored_events();
+  return summary;
+}
+
+Summary summarize(const trace::Trace &trace) {
+  Summarizer summarizer(trace.info);
+  summarizer.add(trace.events);
+  return summarizer.finish(trace.info.end);
+}
+
+}  // namespace redag::metrics

@@ -1,0 +1,118 @@
+// A run in numbers: per task, per DAG and in total (docs/model.md, "What is measured"). Incremental: Summarizer takes
+// events as they come and keeps 32 bytes per finished job for exact percentiles. Not thread-safe.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "redag/metrics/activity.hpp"
+#include "redag/metrics/distribution.hpp"
+#include "redag/metrics/jobs.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag::metrics {
+
+inline constexpr std::size_t kReasonCount = 8;
+
+/// Jobs of a task, of a DAG, or of all. Jobs released before the end of the warm-up are not in it.
+struct JobStats {
+  std::uint64_t released = 0;  // = finished + skipped + aborted + in_flight
+  std::uint64_t finished = 0;
+  std::uint64_t skipped = 0;
+  std::uint64_t aborted = 0;
+  std::uint64_t in_flight = 0;  // when the run ended
+  std::uint64_t deferred = 0;
+  std::uint64_t late = 0;                               // finished after the deadline, or overdue
+  std::uint64_t overdue = 0;                            // in flight with the deadline passed
+  std::array<std::uint64_t, kReasonCount> by_reason{};  // skipped and aborted, by Reason
+  std::uint64_t preemptions = 0;
+  std::optional<Duration> max_lateness;  // L_max over finished jobs; negative: the closest a job came to its deadline
+  Distribution response;                 // f - r, finished jobs
+  Distribution response_from_ready;      // f - ready
+  Distribution start_latency;            // start - ready
+  Distribution on_worker;                // time on a worker; execution time where nothing else could run there
+
+  /// MR = late / released (eq. miss_rate); 0 where nothing was released.
+  [[nodiscard]] double miss_ratio() const;
+  /// The same with skipped and aborted jobs counted as misses.
+  [[nodiscard]] double miss_ratio_with_lost() const;
+};
+
+/// From a source's release to a sink's finish, over the finished jobs of all sinks of a DAG.
+struct EndToEnd {
+  Duration deadline = 0;   // of the DAG; 0: none
+  std::uint64_t late = 0;  // jobs beyond it
+  Distribution response;   // f - origin
+};
+
+struct TaskSummary {
+  TaskId task;
+  std::string dag;
+  std::string name;
+  JobStats jobs;
+};
+
+struct DagSummary {
+  std::string name;
+  JobStats jobs;
+  EndToEnd end_to_end;
+  std::uint32_t max_active = 0;   // 0: no bound
+  std::uint32_t peak_active = 0;  // most jobs started and unfinished at any time, warm-up included
+};
+
+struct Summary {
+  std::vector<TaskSummary> tasks;
+  std::vector<DagSummary> dags;
+  JobStats total;
+  Time begin = 0;  // start + warm-up
+  Time end = 0;
+  Inversions inversions;
+  std::vector<double> worker_busy;  // share of [begin, end or the last event after it]
+  std::uint64_t group_overlaps = 0;
+  bool all_enforced = true;  // every peak_active is within max_active, and no group ever overlapped
+  std::uint64_t lost_events = 0;
+  std::uint64_t ignored_events = 0;  // of tasks or jobs that the stream does not know
+};
+
+class Summarizer {
+ public:
+  /// `run` must outlive this; its `end` is not used.
+  explicit Summarizer(const trace::RunInfo &run);
+
+  void add(std::span<const JobEvent> events);
+  /// The run ended at `end`. Call once.
+  [[nodiscard]] Summary finish(Time end);
+
+ private:
+  struct Samples {
+    std::vector<Duration> response;
+    std::vector<Duration> response_from_ready;
+    std::vector<Duration> start_latency;
+    std::vector<Duration> on_worker;
+
+    void append(const Samples &other);
+  };
+
+  void count(const JobRecord &job);
+  void count_overdue(Time end);
+  static void fill(JobStats &stats, Samples samples);
+
+  const trace::RunInfo &run_;
+  Time begin_;
+  std::vector<TaskRef> refs_;
+  std::vector<bool> is_sink_;
+  std::vector<JobStats> stats_;
+  std::vector<Samples> samples_;
+  std::vector<std::vector<Duration>> end_to_end_;
+  JobFolder folder_;
+  Activity activity_;
+};
+
+/// Of a whole trace.
+[[nodiscard]] Summary summarize(const trace::Trace &trace);
+
+}  // namespace redag::metrics

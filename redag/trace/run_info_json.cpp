@@ -1,0 +1,152 @@
+#include "redag/trace/run_info_json.hpp"
+
+#include <array>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "redag/model/validate.hpp"
+#include "redag/model/workload_yaml.hpp"
+#include "redag/trace/output_file.hpp"
+
+namespace redag::trace {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic,
+                                  PolicyKind::Fixed,         PolicyKind::Edf,
+                                  PolicyKind::Fifo,          PolicyKind::ChainAware};
+constexpr std::array kPreemptions = {sched::Preemption::None, sched::Preemption::Cooperative, sched::Preemption::Full};
+constexpr std::array kDrivers = {Driver::Simulator, Driver::Threads};
+
+// Thrown inside this file only; run_info_from_json() turns it into a Diagnostic.
+struct BadValue : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+const Json &member(const Json &object, const char *key) {
+  const auto found = object.find(key);
+  if (found == object.end()) throw BadValue(std::string("key '") + key + "' is missing");
+  return *found;
+}
+
+std::string text_of(const Json &object, const char *key) {
+  const Json &value = member(object, key);
+  if (!value.is_string()) throw BadValue(std::string("'") + key + "' must be a text");
+  return value.get<std::string>();
+}
+
+std::int64_t integer_of(const Json &object, const char *key, std::int64_t low, std::int64_t high) {
+  const Json &value = member(object, key);
+  const bool fits = value.is_number_integer() &&
+                    (!value.is_number_unsigned() ||
+                     value.get<std::uint64_t>() <= std::uint64_t{std::numeric_limits<std::int64_t>::max()});
+  if (!fits || value.get<std::int64_t>() < low || value.get<std::int64_t>() > high) {
+    throw BadValue(std::string("'") + key + "' must be a whole number from " + std::to_string(low) + " to " +
+                   std::to_string(high));
+  }
+  return value.get<std::int64_t>();
+}
+
+std::uint32_t small_of(const Json &object, const char *key, std::uint32_t low, std::uint32_t high) {
+  return static_cast<std::uint32_t>(integer_of(object, key, low, high));
+}
+
+std::uint64_t unsigned_of(const Json &object, const char *key) {
+  const Json &value = member(object, key);
+  if (!value.is_number_unsigned()) throw BadValue(std::string("'") + key + "' must be a whole number, not negative");
+  return value.get<std::uint64_t>();
+}
+
+template <class Values, class Name>
+auto one_of(const Values &values, Name name, const std::string &text, const char *key) {
+  for (const auto value : values) {
+    if (text == name(value)) return value;
+  }
+  throw BadValue(std::string("'") + key + "' cannot be '" + text + "'");
+}
+
+sched::Config config_from(const Json &json) {
+  constexpr std::uint32_t kAny = std::numeric_limits<std::uint32_t>::max();
+  sched::Config config;
+  config.workers = small_of(json, "workers", 1, kMaxWorkers);
+  config.preemption = one_of(kPreemptions, preemption_name, text_of(json, "preemption"), "preemption");
+  config.policy = one_of(
+      kPolicies, [](PolicyKind p) { return to_string(p); }, text_of(json, "policy"), "policy");
+  config.levels = small_of(json, "levels", 0, kAny);
+  config.max_started = small_of(json, "max_started", 0, kAny);
+  return config;
+}
+
+Machine machine_from(const Json &json) {
+  Machine machine;
+  machine.cpus = small_of(json, "cpus", 0, std::numeric_limits<std::uint32_t>::max());
+  machine.kernel = text_of(json, "kernel");
+  machine.model = text_of(json, "model");
+  return machine;
+}
+
+RunInfo info_from(const Json &json) {
+  RunInfo info;
+  info.executor = text_of(json, "executor");
+  info.config = config_from(member(json, "config"));
+  info.preemption = text_of(json, "preemption");
+  info.preemption_why = text_of(json, "preemption_why");
+  info.driver = one_of(
+      kDrivers, [](Driver d) { return to_string(d); }, text_of(json, "driver"), "driver");
+  info.seed = unsigned_of(json, "seed");
+  info.start = integer_of(json, "start_ns", -kMaxDuration, kMaxDuration);
+  info.end = integer_of(json, "end_ns", -kMaxDuration, kMaxDuration);
+  info.warm_up = integer_of(json, "warm_up_ns", 0, kMaxDuration);
+  info.lost_events = unsigned_of(json, "lost_events");
+  info.overheads = text_of(json, "overheads");
+  info.machine = machine_from(member(json, "machine"));
+  return info;
+}
+
+}  // namespace
+
+std::string run_info_to_json(const RunInfo &info) {
+  const sched::Config &config = info.config;
+  const Json json = {
+      {"executor", info.executor},
+      {"config",
+       {{"workers", config.workers},
+        {"preemption", preemption_name(config.preemption)},
+        {"policy", to_string(config.policy)},
+        {"levels", config.levels},
+        {"max_started", config.max_started}}},
+      {"preemption", info.preemption},
+      {"preemption_why", info.preemption_why},
+      {"driver", to_string(info.driver)},
+      {"seed", info.seed},
+      {"start_ns", info.start},
+      {"end_ns", info.end},
+      {"warm_up_ns", info.warm_up},
+      {"lost_events", info.lost_events},
+      {"overheads", info.overheads},
+      {"machine", {{"cpus", info.machine.cpus}, {"kernel", info.machine.kernel}, {"model", info.machine.model}}},
+      {"workload", to_yaml(info.workload)}};
+  // Texts from outside may not be UTF-8; a replaced character is better than no file.
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Result<RunInfo> run_info_from_json(std::string_view text, const std::string &file, int line) {
+  try {
+    const Json json = Json::parse(text);
+    if (!json.is_object()) return file_error(file, line, "the description of the run must be an object");
+    RunInfo info = info_from(json);
+    Result<LoadedWorkload> loaded = parse_workload(text_of(json, "workload"), file + " (workload)");
+    if (!loaded) return tl::unexpected<Diagnostics>(std::move(loaded.error()));
+    info.workload = std::move(loaded->workload);
+    return info;
+  } catch (const BadValue &error) {
+    return file_error(file, line, error.what());
+  } catch (const nlohmann::json::exception &error) {
+    return file_error(file, line, error.what());
+  }
+}
+
+}  // namespace redag::trace

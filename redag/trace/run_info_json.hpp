@@ -1,0 +1,19 @@
+// RunInfo as a JSON object: the "run" of events.jsonl and of summary.json. The workload stands in it as its YAML text.
+// Pure functions.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "redag/base/result.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag::trace {
+
+/// One line, without a line break. Requires that validate(info.workload) has no errors.
+[[nodiscard]] std::string run_info_to_json(const RunInfo &info);
+
+/// The reverse. Errors (missing or ill-typed keys, an invalid workload) name `file` and `line`.
+[[nodiscard]] Result<RunInfo> run_info_from_json(std::string_view text, const std::string &file, int line);
+
+}  // namespace redag::trace
