@@ -79,10 +79,8 @@ std::uint32_t PriorityScheduler::level_of(const Job &job) const {
 
 void PriorityScheduler::run(std::uint32_t slot, const Place &place) {
   const bool resumes = jobs_[slot].started();
-  if (resumes) {
-    remove(slot);
-  } else {
-    dequeue(slot);
+  remove(slot);
+  if (!resumes) {
     const TaskGates &passed = task_gates_[jobs_[slot].task.value];
     for (std::uint32_t i = 0; i < passed.count; ++i) {
       ++gates_[passed.gates[i]].used;
@@ -134,13 +132,13 @@ bool PriorityScheduler::park_if_not_eligible(std::uint32_t slot) {
   if (full == to_pass.count) return false;
 
   Gate &gate = gates_[to_pass.gates[full]];
-  dequeue(slot);
+  remove(slot);
   gate.parked.push(jobs_, slot);
   job.parked_at = to_pass.gates[full];
   if (to_pass.kinds[full] == GateKind::Dag) defer(slot);
   if (to_pass.kinds[full] == GateKind::Group) inherit(gate.holder, job);
   // Others may now use what this job would have used elsewhere.
-  for (std::uint32_t i = 0; i < to_pass.count; ++i) replenish(gates_[to_pass.gates[i]]);
+  for (std::uint32_t i = 0; i < to_pass.count; ++i) promote_one(gates_[to_pass.gates[i]]);
   return true;
 }
 
@@ -148,16 +146,18 @@ bool PriorityScheduler::park_if_not_eligible(std::uint32_t slot) {
 // none.
 void PriorityScheduler::inherit(std::uint32_t holder_slot, const Job &waiter) {
   Job &holder = jobs_[holder_slot];
-  if (config_.policy == PolicyKind::Fifo || holder.key <= waiter.key) return;
+  if (config_.policy == PolicyKind::Fifo || !before(waiter, holder)) return;
   const bool is_queued = holder.state == JobState::Suspended && config_.preemption == Preemption::Full;
   if (is_queued) remove(holder_slot);
   const std::uint32_t old_level = level_of(holder);
   holder.key = waiter.key;
+  holder.rank = waiter.rank;
+  holder.sequence = waiter.sequence;
   if (is_queued) push(holder_slot);
   if (holder.state == JobState::Running && level_of(holder) != old_level) change_level(holder_slot, level_of(holder));
 }
 
-void PriorityScheduler::on_ready(std::uint32_t slot) { enqueue(slot); }
+void PriorityScheduler::on_ready(std::uint32_t slot) { push(slot); }
 
 void PriorityScheduler::on_withdrawn(std::uint32_t slot) {
   Job &job = jobs_[slot];
@@ -166,9 +166,9 @@ void PriorityScheduler::on_withdrawn(std::uint32_t slot) {
     job.parked_at = kNil;
     return;
   }
-  dequeue(slot);
+  remove(slot);
   const TaskGates &to_pass = task_gates_[job.task.value];
-  for (std::uint32_t i = 0; i < to_pass.count; ++i) replenish(gates_[to_pass.gates[i]]);
+  for (std::uint32_t i = 0; i < to_pass.count; ++i) promote_one(gates_[to_pass.gates[i]]);
 }
 
 void PriorityScheduler::on_end(std::uint32_t slot) {
@@ -191,7 +191,7 @@ void PriorityScheduler::on_end(std::uint32_t slot) {
   const TaskGates &held = task_gates_[job.task.value];
   for (std::uint32_t i = 0; i < held.count; ++i) {
     --gates_[held.gates[i]].used;
-    replenish(gates_[held.gates[i]]);
+    promote_one(gates_[held.gates[i]]);
   }
 }
 
@@ -201,14 +201,14 @@ void PriorityScheduler::open(std::uint32_t worker) {
   open_workers_.push_back(worker);
 }
 
-// Moves parked jobs to the ready queue, as many as could pass.
-void PriorityScheduler::replenish(Gate &gate) {
-  while (gate.parked.top() != kNil && gate.queued < gate.capacity - gate.used) {
-    const std::uint32_t slot = gate.parked.top();
-    gate.parked.remove(jobs_, slot);
-    jobs_[slot].parked_at = kNil;
-    enqueue(slot);
-  }
+// Where there is room, the most urgent parked job goes back to the ready queue. Called once for each place that becomes
+// free, and for each queued job that could have used it and is gone.
+void PriorityScheduler::promote_one(Gate &gate) {
+  const std::uint32_t slot = gate.parked.top();
+  if (slot == kNil || gate.used == gate.capacity) return;
+  gate.parked.remove(jobs_, slot);
+  jobs_[slot].parked_at = kNil;
+  push(slot);
 }
 
 // ---- the ready queue ----
@@ -217,18 +217,6 @@ void PriorityScheduler::push(std::uint32_t slot) { static_ ? levels_.push(jobs_,
 
 void PriorityScheduler::remove(std::uint32_t slot) {
   static_ ? levels_.remove(jobs_, slot) : heap_.remove(jobs_, slot);
-}
-
-void PriorityScheduler::enqueue(std::uint32_t slot) {
-  push(slot);
-  const TaskGates &to_pass = task_gates_[jobs_[slot].task.value];
-  for (std::uint32_t i = 0; i < to_pass.count; ++i) ++gates_[to_pass.gates[i]].queued;
-}
-
-void PriorityScheduler::dequeue(std::uint32_t slot) {
-  remove(slot);
-  const TaskGates &to_pass = task_gates_[jobs_[slot].task.value];
-  for (std::uint32_t i = 0; i < to_pass.count; ++i) --gates_[to_pass.gates[i]].queued;
 }
 
 // Gates, levels and the ready queue are built anew; parked jobs go back to the ready queue and find their gates again.
@@ -246,7 +234,7 @@ void PriorityScheduler::on_reconfigured() {
   const auto pass = [&](TaskGates &list, GateKind kind, std::uint32_t &gate, std::uint32_t capacity) {
     if (gate == kNil) {
       gate = static_cast<std::uint32_t>(gates_.size());
-      gates_.push_back(Gate{capacity, 0, 0, kNil, {}});
+      gates_.push_back(Gate{capacity, 0, kNil, {}});
     }
     list.kinds[list.count] = kind;
     list.gates[list.count++] = gate;
@@ -265,8 +253,9 @@ void PriorityScheduler::on_reconfigured() {
   for (std::uint32_t slot = 0; slot < jobs_.size(); ++slot) {
     Job &job = jobs_[slot];
     job.parked_at = kNil;
-    if (job.state == JobState::Ready) enqueue(slot);
+    if (job.state == JobState::Ready) push(slot);
     if (!job.started()) continue;
+    if (job.state == JobState::Running) change_level(slot, level_of(job));
     if (job.state == JobState::Suspended && config_.preemption == Preemption::Full) push(slot);
     const TaskGates &held = task_gates_[job.task.value];
     for (std::uint32_t i = 0; i < held.count; ++i) {

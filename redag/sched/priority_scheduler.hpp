@@ -26,12 +26,11 @@ class PriorityScheduler final : public Lifecycle {
 
  private:
   // What a job must pass to start, and holds until it ends: its task, its DAG, its group, and the platform's threads. A
-  // job that finds a gate full is parked there, out of the ready queue. Invariant: jobs are parked only while the
-  // queued ones could use up the gate: parked.empty() || queued >= capacity - used.
+  // job that finds a gate full is parked there, out of the ready queue. Invariant: of all ready jobs that need the
+  // gate, the (capacity - used) most urgent ones are not parked there.
   struct Gate {
     std::uint32_t capacity = 1;
     std::uint32_t used = 0;       // jobs started and unfinished
-    std::uint32_t queued = 0;     // jobs in the ready queue, not started
     std::uint32_t holder = kNil;  // group: the job that holds it
     HeapQueue parked;
   };
@@ -69,9 +68,7 @@ class PriorityScheduler final : public Lifecycle {
   void push(std::uint32_t slot);
   void remove(std::uint32_t slot);
   [[nodiscard]] std::uint32_t top() const { return static_ ? levels_.top() : heap_.top(); }
-  void enqueue(std::uint32_t slot);
-  void dequeue(std::uint32_t slot);
-  void replenish(Gate &gate);
+  void promote_one(Gate &gate);
   void open(std::uint32_t worker);
 
   bool static_;

@@ -1,0 +1,147 @@
+#include "redag/testing/drivers.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "redag/base/rng.hpp"
+#include "redag/model/demand.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+#include "redag/sim/simulator.hpp"
+
+namespace redag::testing {
+namespace {
+
+trace::Trace empty_trace(const RunSpec &spec, trace::Driver driver) {
+  trace::Trace trace;
+  trace.info.workload = spec.workload;
+  trace.info.executor = spec.executor;
+  trace.info.config = config_of(spec);
+  trace.info.preemption = trace::preemption_name(spec.preemption);
+  trace.info.driver = driver;
+  trace.info.seed = spec.seed;
+  trace.info.end = spec.horizon;
+  return trace;
+}
+
+// The timer tasks' grid points before the horizon, in order of when they are seen.
+struct Arrival {
+  Time seen = 0;
+  Time nominal = 0;
+  TaskId task;
+};
+
+std::vector<Arrival> arrivals(const RunSpec &spec) {
+  std::vector<Arrival> found;
+  const std::vector<TaskRef> tasks = flatten(spec.workload);
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    const Task &task = *tasks[i].task;
+    if (task.activation != Activation::Timer) continue;
+    std::uint32_t number = 0;
+    Time seen = 0;
+    for (Time nominal = task.offset; nominal < spec.horizon; nominal += task.period) {
+      seen = std::max(seen, nominal + release_jitter(task, TaskId(i), number++, spec.seed));
+      found.push_back({seen, nominal, TaskId(i)});
+    }
+  }
+  std::stable_sort(found.begin(), found.end(), [](const Arrival &a, const Arrival &b) { return a.seen < b.seen; });
+  return found;
+}
+
+// Jobs that a driver has started, and what can happen to one of them at random.
+class RandomJobs {
+ public:
+  RandomJobs(sched::Scheduler &scheduler, sched::Preemption preemption, std::uint64_t seed)
+      : scheduler_(scheduler), preemption_(preemption), rng_(seed) {}
+
+  void carry_out(const sched::Step &step) {
+    for (const sched::Dispatch &dispatch : step.dispatches) {
+      for (Started &job : started_) {
+        if (dispatch.over.valid() && job.slot == dispatch.over) job.runs = false;
+      }
+      if (!dispatch.resume) {
+        started_.push_back({dispatch.job, true});
+        continue;
+      }
+      for (Started &job : started_) {
+        if (job.slot == dispatch.job) job.runs = true;
+      }
+    }
+  }
+
+  /// Ends a job, or brings one to a preemption point, or does nothing.
+  void something_happens(Time now) {
+    if (started_.empty()) return;
+    const auto choice = static_cast<std::size_t>(rng_.uniform(0, static_cast<std::int64_t>(started_.size()) - 1));
+    const Started job = started_[choice];
+    if (!job.runs && preemption_ != sched::Preemption::Full) return;
+    const double dice = rng_.uniform01();
+    if (job.runs && preemption_ == sched::Preemption::Cooperative && dice < 0.5) {
+      scheduler_.preemption_point(job.slot, now);
+      return;
+    }
+    started_.erase(started_.begin() + static_cast<std::ptrdiff_t>(choice));
+    scheduler_.complete(job.slot, now, dice > 0.97 ? sched::Outcome::Threw : sched::Outcome::Finished);
+  }
+
+  Rng &rng() { return rng_; }
+
+ private:
+  struct Started {
+    JobSlot slot;
+    bool runs = true;
+  };
+  sched::Scheduler &scheduler_;
+  sched::Preemption preemption_;
+  Rng rng_;
+  std::vector<Started> started_;
+};
+
+}  // namespace
+
+sched::Config config_of(const RunSpec &spec) {
+  return sched::Config{spec.workload.platform.workers, spec.preemption, spec.workload.policy, 0, 0};
+}
+
+trace::Trace SimulatorDriver::run(const RunSpec &spec) {
+  trace::Trace trace = empty_trace(spec, trace::Driver::Simulator);
+  sched::PriorityScheduler scheduler(spec.workload, trace.info.config);
+  sim::Options options;
+  options.horizon = spec.horizon;
+  options.seed = spec.seed;
+  sim::simulate(spec.workload, scheduler, trace.info.config.workers, options, [&](std::span<const JobEvent> batch) {
+    trace.events.insert(trace.events.end(), batch.begin(), batch.end());
+    return true;
+  });
+  return trace;
+}
+
+trace::Trace ManualDriver::run(const RunSpec &spec) {
+  trace::Trace trace = empty_trace(spec, trace::Driver::Threads);
+  sched::PriorityScheduler scheduler(spec.workload, trace.info.config);
+  RandomJobs jobs(scheduler, spec.preemption, spec.seed);
+  const auto decide = [&](Time instant) {
+    const sched::Step step = scheduler.dispatch(instant);
+    jobs.carry_out(step);
+    trace.events.insert(trace.events.end(), step.events.begin(), step.events.end());
+  };
+  Time now = 0;
+  // What happens at one instant is decided together, before time moves on.
+  const auto move_to = [&](Time later) {
+    if (later > now) decide(now);
+    now = later;
+  };
+  for (const Arrival &arrival : arrivals(spec)) {
+    // On average two things happen to jobs between two releases.
+    while (jobs.rng().uniform01() < 0.67) {
+      move_to(now + jobs.rng().uniform(0, std::max<Duration>(0, arrival.seen - now) / 2));
+      jobs.something_happens(now);
+    }
+    move_to(std::max(now, arrival.seen));
+    scheduler.release(arrival.task, arrival.nominal, now);
+  }
+  decide(now);
+  return trace;
+}
+
+}  // namespace redag::testing

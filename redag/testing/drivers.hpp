@@ -1,0 +1,39 @@
+// The drivers behind one interface, for suites that run the same workload on each of them.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "redag/sched/scheduler.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag::testing {
+
+struct RunSpec {
+  Workload workload;
+  std::string executor = "redag";  // as in redag/sched/executors.hpp
+  sched::Preemption preemption = sched::Preemption::None;
+  Duration horizon = kSecond;
+  std::uint64_t seed = 1;
+};
+
+/// Virtual time, redag/sim.
+struct SimulatorDriver {
+  static trace::Trace run(const RunSpec &spec);
+};
+
+/// Virtual time in which jobs end, and reach preemption points, at random and not when their execution time is over;
+/// with full preemption also while they count as preempted, as on a real machine. Releases are on the grid, some seen
+/// late.
+struct ManualDriver {
+  static trace::Trace run(const RunSpec &spec);
+};
+
+/// Real threads, redag/runtime. Full preemption needs real-time rights.
+struct ThreadsDriver {
+  static trace::Trace run(const RunSpec &spec);
+};
+
+[[nodiscard]] sched::Config config_of(const RunSpec &spec);
+
+}  // namespace redag::testing
