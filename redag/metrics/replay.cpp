@@ -267,7 +267,7 @@ Urgency Replay::inherited(const LiveJob &job) const {
   if (group == kNoGroup || !job.started() || config_.policy == PolicyKind::Fifo) return urgency;
   for (const TaskId sharer : groups_[group].tasks) {
     const TaskState &task = tasks_[sharer.value];
-    if (task.gate == Gate::Group) urgency.key = std::min(urgency.key, task.waiter.urgency.key);
+    if (task.gate == Gate::Group) urgency = std::min(urgency, task.waiter.urgency);
   }
   return urgency;
 }

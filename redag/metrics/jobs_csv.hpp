@@ -1,0 +1,29 @@
+// jobs.csv: a row per job, for spreadsheets and data frames. Columns: docs/results_format.md. Pure but for the file.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "redag/base/result.hpp"
+#include "redag/metrics/jobs.hpp"
+#include "redag/model/workload.hpp"
+
+namespace redag::metrics {
+
+/// The first line of the file.
+[[nodiscard]] std::string_view jobs_csv_header();
+
+[[nodiscard]] Result<void> write_jobs_csv(const std::string &path, const Workload &workload,
+                                          std::span<const JobRecord> jobs);
+
+/// Reads what write_jobs_csv() wrote; DAGs and tasks are looked up by name in `workload`. The derived columns are not
+/// read. Errors name file and line.
+[[nodiscard]] Result<std::vector<JobRecord>> read_jobs_csv(const std::string &path, const Workload &workload);
+
+/// The same for text in memory; `file` is what the errors call it.
+[[nodiscard]] Result<std::vector<JobRecord>> parse_jobs_csv(std::string_view text, const std::string &file,
+                                                            const Workload &workload);
+
+}  // namespace redag::metrics

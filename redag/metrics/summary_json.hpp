@@ -1,0 +1,18 @@
+// summary.json ("redag.summary/1"): everything in a Summary and the description of its run. Keys:
+// docs/results_format.md. Pure but for the file.
+#pragma once
+
+#include <string>
+
+#include "redag/base/result.hpp"
+#include "redag/metrics/summary.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag::metrics {
+
+/// Indented by two, ends with a line break; equal inputs give equal bytes.
+[[nodiscard]] std::string summary_to_json(const Summary &summary, const trace::RunInfo &run);
+
+[[nodiscard]] Result<void> write_summary(const std::string &path, const Summary &summary, const trace::RunInfo &run);
+
+}  // namespace redag::metrics
