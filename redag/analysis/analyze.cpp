@@ -1,0 +1,62 @@
+#include "redag/analysis/analyze.hpp"
+
+#include <algorithm>
+
+namespace redag::analysis {
+namespace {
+
+void keep_tightest(std::vector<Tightest> &best, const std::vector<ResponseBound> &found, const Method &method) {
+  for (std::size_t i = 0; i < found.size() && i < best.size(); ++i) {
+    if (!found[i].response || (best[i].response && *best[i].response <= *found[i].response)) continue;
+    best[i] = Tightest{found[i].response, &method, found[i]};
+  }
+}
+
+MethodReport run(const System &system, const Method &method) {
+  MethodReport report;
+  report.method = &method;
+  report.outcome = system.not_analysable.empty() ? method.apply(system) : NotApplicable{system.not_analysable};
+  if (const Bound *bound = report.bound()) {
+    report.verdict = verdict(system, *bound);
+    report.trusted = bound->unsound.empty();
+  }
+  return report;
+}
+
+// The tightest bounds together, as if one method had given them.
+Bound combine(const Report &report) {
+  Bound bound;
+  for (const Tightest &best : report.tasks) bound.tasks.push_back(best.bound);
+  for (const Tightest &best : report.dags) bound.dags.push_back(best.bound);
+  return bound;
+}
+
+}  // namespace
+
+Report analyze(const System &system, const std::vector<Method> &methods) {
+  Report report;
+  report.tasks.resize(system.tasks.size());
+  report.dags.resize(system.dags.size());
+  for (const Method &method : methods) {
+    report.methods.push_back(run(system, method));
+    const MethodReport &last = report.methods.back();
+    if (!last.trusted) continue;
+    keep_tightest(report.tasks, last.bound()->tasks, method);
+    keep_tightest(report.dags, last.bound()->dags, method);
+    if (last.bound()->accepts == true) report.by.push_back(&method);
+  }
+
+  if (verdict(system, combine(report)) == Verdict::Schedulable) {
+    for (const Tightest &best : report.tasks) {
+      if (best.method != nullptr && std::find(report.by.begin(), report.by.end(), best.method) == report.by.end()) {
+        report.by.push_back(best.method);
+      }
+    }
+  }
+  report.verdict = report.by.empty() ? Verdict::NotShown : Verdict::Schedulable;
+  return report;
+}
+
+Report analyze(const System &system) { return analyze(system, methods()); }
+
+}  // namespace redag::analysis

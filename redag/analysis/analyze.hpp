@@ -1,0 +1,41 @@
+// Every method on one system: which apply, why the others do not, and the tightest sound bound of each task and DAG
+// with the method that gave it. A pure function.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "redag/analysis/bound.hpp"
+
+namespace redag::analysis {
+
+struct MethodReport {
+  const Method *method = nullptr;
+  Outcome outcome;
+  Verdict verdict = Verdict::NotShown;
+  bool trusted = false;  // it applies and its numbers are sound here
+
+  [[nodiscard]] const Bound *bound() const { return std::get_if<Bound>(&outcome); }
+};
+
+/// The smallest trusted response bound; of equal ones the first in the order of methods().
+struct Tightest {
+  std::optional<Duration> response;
+  const Method *method = nullptr;  // null: no trusted method gave one
+  ResponseBound bound;
+};
+
+struct Report {
+  std::vector<MethodReport> methods;
+  std::vector<Tightest> tasks;  // by TaskId
+  std::vector<Tightest> dags;   // by DagId
+  Verdict verdict = Verdict::NotShown;
+  /// Who says so: methods that accept all, or those that gave the tightest bounds. Empty when NotShown.
+  std::vector<const Method *> by;
+};
+
+/// Runs methods(). Its cost is that of its dearest method; each states its own.
+[[nodiscard]] Report analyze(const System &system);
+[[nodiscard]] Report analyze(const System &system, const std::vector<Method> &methods);
+
+}  // namespace redag::analysis

@@ -1,0 +1,80 @@
+#include "redag/analysis/bound.hpp"
+
+#include <algorithm>
+
+namespace redag::analysis {
+
+Duration ResponseBound::sum(Term::Kind kind) const {
+  Duration total = 0;
+  for (const Term &term : terms) total += term.kind == kind ? term.amount : 0;
+  return total;
+}
+
+const char *to_string(Subject subject) {
+  switch (subject) {
+    case Subject::Task: return "task";
+    case Subject::Dag: return "dag";
+    case Subject::System: return "system";
+  }
+  return "?";
+}
+
+const char *to_string(Term::Kind kind) {
+  switch (kind) {
+    case Term::Kind::Own: return "own";
+    case Term::Kind::Earlier: return "earlier";
+    case Term::Kind::Blocking: return "blocking";
+    case Term::Kind::Interference: return "interference";
+    case Term::Kind::Jitter: return "jitter";
+    case Term::Kind::Overhead: return "overhead";
+  }
+  return "?";
+}
+
+const char *to_string(Verdict verdict) {
+  return verdict == Verdict::Schedulable ? "schedulable" : "not shown schedulable";
+}
+
+bool meets_deadline(const SystemTask &task, const ResponseBound &bound) {
+  return bound.response && *bound.response <= std::min(task.deadline, task.limit);
+}
+
+Verdict verdict(const System &system, const Bound &bound) {
+  if (bound.accepts) return *bound.accepts ? Verdict::Schedulable : Verdict::NotShown;
+  if (bound.tasks.size() != system.tasks.size() || bound.dags.size() != system.dags.size()) return Verdict::NotShown;
+  for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+    if (!meets_deadline(system.tasks[t], bound.tasks[t])) return Verdict::NotShown;
+  }
+  for (std::size_t d = 0; d < system.dags.size(); ++d) {
+    const Duration deadline = system.dags[d].deadline;
+    const std::optional<Duration> response = bound.dags[d].response;
+    if (deadline > 0 && (!response || *response > deadline)) return Verdict::NotShown;
+  }
+  return Verdict::Schedulable;
+}
+
+Bound from_units(const System &system, std::vector<ResponseBound> units) {
+  Bound bound;
+  bound.tasks.resize(system.tasks.size());
+  bound.dags.resize(system.dags.size());
+  for (std::size_t d = 0; d < system.dags.size(); ++d) {
+    const std::vector<std::uint32_t> &own = system.dags[d].units;
+    if (own.empty()) continue;
+    // The unit that ends last speaks for the DAG; one without a bound leaves it without.
+    const auto last = *std::max_element(own.begin(), own.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return units[a].response.value_or(kNever) < units[b].response.value_or(kNever);
+    });
+    bound.dags[d] = units[last];
+  }
+  for (std::size_t t = 0; t < system.tasks.size(); ++t) bound.tasks[t] = units[system.tasks[t].unit];
+  return bound;
+}
+
+const Method *find_method(std::string_view name) {
+  for (const Method &method : methods()) {
+    if (method.name == name) return &method;
+  }
+  return nullptr;
+}
+
+}  // namespace redag::analysis

@@ -1,0 +1,243 @@
+#include "redag/analysis/system.hpp"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/model/validate.hpp"
+#include "redag/sched/policy.hpp"
+
+namespace redag::analysis {
+namespace {
+
+class Compiler {
+ public:
+  Compiler(const Workload &workload, const AnalysisPlatform &platform) : workload_(workload) {
+    system_.platform = platform;
+    system_.policy = workload.policy;
+    system_.mode = platform.preemption;
+    const auto has_region = [](const Dag &dag) {
+      return std::any_of(dag.tasks.begin(), dag.tasks.end(), [](const Task &task) { return task.region > 0; });
+    };
+    if (platform.preemption == sched::Preemption::Cooperative &&
+        std::none_of(workload.dags.begin(), workload.dags.end(), has_region)) {
+      system_.mode = sched::Preemption::None;
+    }
+  }
+
+  System run() {
+    for (const Dag &dag : workload_.dags) add_dag(dag);
+    assign_ranks();
+    keep_shared_groups();
+    for (std::uint32_t d = 0; d < system_.dags.size(); ++d) form_units(d);
+    for (const SystemTask &task : system_.tasks) {
+      system_.utilization += static_cast<double>(task.wcet) / static_cast<double>(task.period);
+    }
+    const std::uint32_t threads = system_.platform.max_started;
+    if (system_.mode == sched::Preemption::Full && threads > 0 && threads < system_.tasks.size()) {
+      refuse("fewer threads than tasks: a job can wait for a thread that less urgent jobs hold");
+    }
+    return std::move(system_);
+  }
+
+ private:
+  void refuse(std::string reason) {
+    if (system_.not_analysable.empty()) system_.not_analysable = std::move(reason);
+  }
+
+  void add_dag(const Dag &dag) {
+    SystemDag compiled;
+    compiled.name = dag.name;
+    compiled.deadline = dag.deadline;
+    if (dag.max_active < dag.tasks.size()) compiled.max_active = dag.max_active;
+    const auto first = static_cast<std::uint32_t>(system_.tasks.size());
+    std::uint64_t waiting = 0;
+    for (const Task &task : dag.tasks) {
+      compiled.tasks.push_back(static_cast<std::uint32_t>(system_.tasks.size()));
+      system_.tasks.push_back(compile_task(dag, task, first));
+      waiting += task.overrun == Overrun::Queue ? task.queue_depth : 1;
+    }
+    for (std::uint32_t t = first; t < system_.tasks.size(); ++t) {
+      for (const std::uint32_t p : system_.tasks[t].predecessors) system_.tasks[p].successors.push_back(t);
+    }
+    if (dag.max_pending > 0 && dag.max_pending < waiting) {
+      refuse("DAG '" + dag.name + "': max_pending can refuse jobs although every deadline is met");
+    }
+    system_.dags.push_back(std::move(compiled));
+  }
+
+  SystemTask compile_task(const Dag &dag, const Task &task, std::uint32_t first) {
+    const AnalysisPlatform &platform = system_.platform;
+    SystemTask compiled;
+    compiled.name = dag.name + "/" + task.name;
+    compiled.dag = DagId(system_.dags.size());
+    // Who preempts pays for the resumption; a job preempts at most once, when it starts.
+    const Duration lead = add(platform.release_overhead, platform.dispatch_overhead);
+    compiled.overhead = system_.mode == sched::Preemption::None ? lead : add(lead, platform.preempt_overhead);
+    compiled.wcet = add(task.wcet, compiled.overhead);
+    compiled.period = task.period;
+    compiled.deadline = task.deadline;
+    compiled.jitter = task.jitter;
+    compiled.limit = task.overrun == Overrun::Queue ? multiply(task.period, task.queue_depth) : task.period;
+    compiled.data = task.activation == Activation::Data;
+    for (const std::uint32_t p : task.predecessors) compiled.predecessors.push_back(first + p);
+    if (!task.group.empty()) {
+      const auto next = static_cast<std::uint32_t>(group_ids_.size());
+      compiled.group = group_ids_.try_emplace(task.group, next).first->second;
+    }
+    if (system_.mode == sched::Preemption::None) {
+      compiled.region = compiled.last_region = compiled.wcet;
+    } else if (system_.mode == sched::Preemption::Cooperative) {
+      const bool whole = task.region == 0 || task.region >= task.wcet;
+      compiled.region = whole ? compiled.wcet : add(task.region, compiled.overhead);
+      // Preemption points are at multiples of the region that lie strictly inside the job.
+      compiled.last_region = whole ? add(task.wcet, lead) : (task.wcet - 1) % task.region + 1;
+    }
+    if (task.budget > 0 && task.budget < task.wcet) {
+      refuse("task '" + compiled.name + "': its budget is below its wcet, so jobs can be cut off");
+    }
+    return compiled;
+  }
+
+  void assign_ranks() {
+    const auto priorities = sched::assign_priorities(workload_.dags, workload_.policy, system_.platform.levels);
+    system_.by_rank.resize(priorities.size());
+    for (std::uint32_t t = 0; t < priorities.size(); ++t) {
+      system_.tasks[t].rank = priorities[t].rank;
+      system_.tasks[t].level = priorities[t].level;
+      system_.by_rank[priorities[t].rank] = t;
+    }
+  }
+
+  void keep_shared_groups() {
+    std::vector<std::vector<std::uint32_t>> members(group_ids_.size());
+    for (std::uint32_t t = 0; t < system_.tasks.size(); ++t) {
+      if (system_.tasks[t].group != kNoGroup) members[system_.tasks[t].group].push_back(t);
+    }
+    for (const std::vector<std::uint32_t> &group : members) {
+      const bool is_shared = group.size() > 1;
+      const auto id = static_cast<std::uint32_t>(system_.groups.size());
+      for (const std::uint32_t t : group) system_.tasks[t].group = is_shared ? id : kNoGroup;
+      if (is_shared) system_.groups.push_back(group);
+    }
+  }
+
+  // The tasks of a DAG, one list a unit, in topological order.
+  std::vector<std::vector<std::uint32_t>> split(std::uint32_t dag) const {
+    std::vector<std::uint32_t> order = system_.dags[dag].tasks;
+    if (order.empty()) return {};
+    const std::uint32_t first = order.front();
+    const std::vector<std::uint32_t> ranks = topological_ranks(workload_.dags[dag]);
+    std::sort(order.begin(), order.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return ranks[a - first] < ranks[b - first]; });
+    const bool edges = std::any_of(order.begin(), order.end(),
+                                   [&](std::uint32_t t) { return !system_.tasks[t].predecessors.empty(); });
+    if (edges && is_released_together(dag, order)) return {order};
+
+    // Connected parts: each task points at a representative.
+    std::vector<std::uint32_t> part(order.size());
+    std::iota(part.begin(), part.end(), 0);
+    const auto find = [&](std::uint32_t i) {
+      while (part[i] != i) i = part[i] = part[part[i]];
+      return i;
+    };
+    for (const std::uint32_t t : order) {
+      for (const std::uint32_t p : system_.tasks[t].predecessors) part[find(t - first)] = find(p - first);
+    }
+    std::map<std::uint32_t, std::vector<std::uint32_t>> parts;
+    for (const std::uint32_t t : order) parts[find(t - first)].push_back(t);
+    std::vector<std::vector<std::uint32_t>> lists;
+    for (auto &[representative, tasks] : parts) lists.push_back(std::move(tasks));
+    std::sort(lists.begin(), lists.end());
+    return lists;
+  }
+
+  [[nodiscard]] bool is_released_together(std::uint32_t dag, const std::vector<std::uint32_t> &tasks) const {
+    const std::uint32_t first = system_.dags[dag].tasks.front();
+    std::optional<Duration> offset;
+    for (const std::uint32_t t : tasks) {
+      const Task &task = workload_.dags[dag].tasks[t - first];
+      if (task.period != system_.tasks[tasks.front()].period) return false;
+      if (task.activation != Activation::Timer) continue;
+      if (offset && *offset != task.offset) return false;
+      offset = task.offset;
+    }
+    return offset.has_value();
+  }
+
+  void form_units(std::uint32_t dag) {
+    for (std::vector<std::uint32_t> &tasks : split(dag)) {
+      if (tasks.size() > 1 && !is_released_together(dag, tasks)) {
+        refuse("DAG '" + system_.dags[dag].name + "': edges join tasks of different periods or offsets");
+      }
+      const auto id = static_cast<std::uint32_t>(system_.units.size());
+      for (const std::uint32_t t : tasks) system_.tasks[t].unit = id;
+      system_.dags[dag].units.push_back(id);
+      system_.units.push_back(make_unit(DagId(dag), std::move(tasks)));
+    }
+  }
+
+  [[nodiscard]] Unit make_unit(DagId dag, std::vector<std::uint32_t> tasks) const {
+    const SystemTask &first = system_.tasks[tasks.front()];
+    Unit unit;
+    unit.dag = dag;
+    unit.period = first.period;
+    unit.deadline = first.deadline;
+    unit.limit = tasks.size() > 1 ? first.period : first.limit;
+    unit.first_rank = unit.last_rank = first.rank;
+    std::map<std::uint32_t, Duration> path;  // longest path that ends with the task
+    for (const std::uint32_t t : tasks) {
+      const SystemTask &task = system_.tasks[t];
+      unit.deadline = std::min(unit.deadline, task.deadline);
+      unit.jitter = std::max(unit.jitter, task.data ? 0 : task.jitter);
+      unit.volume = add(unit.volume, task.wcet);
+      unit.first_rank = std::min(unit.first_rank, task.rank);
+      unit.last_rank = std::max(unit.last_rank, task.rank);
+      unit.has_edges = unit.has_edges || !task.predecessors.empty();
+      Duration before = 0;
+      for (const std::uint32_t p : task.predecessors) before = std::max(before, path[p]);
+      path[t] = add(before, task.wcet);
+      unit.length = std::max(unit.length, path[t]);
+    }
+    const Duration end_to_end = system_.dags[dag.value].deadline;
+    if (end_to_end > 0) unit.deadline = std::min(unit.deadline, end_to_end);
+    unit.tasks = std::move(tasks);
+    return unit;
+  }
+
+  const Workload &workload_;
+  System system_;
+  std::map<std::string, std::uint32_t> group_ids_;
+};
+
+}  // namespace
+
+AnalysisPlatform platform_of(const Workload &workload) {
+  AnalysisPlatform platform;
+  platform.workers = workload.platform.workers;
+  switch (workload.platform.preemption) {
+    case PreemptionMode::None: platform.preemption = sched::Preemption::None; break;
+    case PreemptionMode::Cooperative: platform.preemption = sched::Preemption::Cooperative; break;
+    case PreemptionMode::Os:
+    case PreemptionMode::Auto: platform.preemption = sched::Preemption::Full; break;
+  }
+  return platform;
+}
+
+bool System::has_edges() const {
+  return std::any_of(units.begin(), units.end(), [](const Unit &unit) { return unit.has_edges; });
+}
+
+Result<System> compile(const Workload &workload, const AnalysisPlatform &platform) {
+  if (platform.workers == 0) return make_error("a platform has at least one worker");
+  if (std::min({platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead}) < 0) {
+    return make_error("an overhead is negative");
+  }
+  Workload complete = workload;
+  if (has_errors(validate(complete))) return tl::unexpected<Diagnostics>(validate(complete));
+  for (Dag &dag : complete.dags) inherit_periods(dag);
+  return Compiler(complete, platform).run();
+}
+
+}  // namespace redag::analysis

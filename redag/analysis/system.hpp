@@ -1,0 +1,104 @@
+// What the bounds see: a workload on a platform, compiled once into numbers. Execution times are charged with the
+// platform's overheads, priorities are those of sched::assign_priorities, and tasks joined by edges form one unit.
+// Plain values, immutable once compiled; safe to share among threads.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "redag/base/result.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/sched/scheduler.hpp"
+
+namespace redag::analysis {
+
+/// The platform as it really runs: what `auto` and `os` came to. Overheads are those of sim::Overheads.
+struct AnalysisPlatform {
+  std::uint32_t workers = 1;
+  sched::Preemption preemption = sched::Preemption::Full;
+  std::uint32_t levels = 0;       // distinct priority levels; 0: as many as tasks (sched::Config::levels)
+  std::uint32_t max_started = 0;  // jobs started and unfinished at once; 0: no bound (sched::Config::max_started)
+  Duration release_overhead = 0;  // each job, before its body
+  Duration dispatch_overhead = 0;
+  Duration preempt_overhead = 0;  // each resumption; charged to the job that preempted
+
+  friend bool operator==(const AnalysisPlatform &, const AnalysisPlatform &) = default;
+};
+
+/// As the simulator runs the workload: `os` and `auto` mean full preemption, no overheads.
+[[nodiscard]] AnalysisPlatform platform_of(const Workload &workload);
+
+inline constexpr std::uint32_t kNoGroup = 0xffffffff;
+
+/// One per TaskId.
+struct SystemTask {
+  std::string name;  // "dag/task"
+  DagId dag;
+  std::uint32_t unit = 0;
+  Duration wcet = 0;         // C as charged: overheads included
+  Duration overhead = 0;     // the part of `wcet` that is overhead
+  Duration period = 0;       // T, least distance of two nominal releases of the unit
+  Duration deadline = 0;     // D, from the task's own release
+  Duration jitter = 0;       // J
+  Duration limit = 0;        // response up to which no job of the task is skipped (T, or T * queue_depth)
+  Duration region = 0;       // longest stretch without a preemption point, overheads included; 0 with full preemption
+  Duration last_region = 0;  // stretch after the last preemption point when it executes for its wcet; 0 likewise
+  std::uint32_t rank = 0;    // place in the total order, 0 the most urgent
+  std::uint32_t level = 0;   // tasks of one level do not preempt each other
+  std::uint32_t group = kNoGroup;           // only groups that two or more tasks share
+  bool data = false;                        // released by its predecessors' completion
+  std::vector<std::uint32_t> predecessors;  // TaskIds
+  std::vector<std::uint32_t> successors;    // TaskIds
+};
+
+/// What is released as a whole: a task without edges, or tasks joined by edges, all of one rate and released together.
+/// A DAG with edges and one rate is one unit; otherwise each connected part of a DAG is one. The response time of a
+/// unit runs from its nominal release to the finish of its last task.
+struct Unit {
+  DagId dag;
+  std::vector<std::uint32_t> tasks;  // TaskIds in topological order
+  Duration period = 0;
+  Duration deadline = 0;         // least of its tasks and the DAG's end-to-end one: met, all of these are met
+  Duration jitter = 0;           // largest of its tasks
+  Duration limit = 0;            // least of its tasks; with edges never above the period
+  Duration volume = 0;           // sum of wcet
+  Duration length = 0;           // longest path
+  std::uint32_t first_rank = 0;  // most and least urgent of its tasks
+  std::uint32_t last_rank = 0;
+  bool has_edges = false;
+};
+
+struct SystemDag {
+  std::string name;
+  std::vector<std::uint32_t> units;
+  std::vector<std::uint32_t> tasks;  // TaskIds
+  std::uint32_t max_active = 0;      // 0: no bound; never more than it has tasks
+  Duration deadline = 0;             // end to end; 0: none
+};
+
+struct System {
+  AnalysisPlatform platform;
+  PolicyKind policy = PolicyKind::RateMonotonic;
+  std::vector<SystemTask> tasks;
+  std::vector<Unit> units;
+  std::vector<SystemDag> dags;
+  std::vector<std::uint32_t> by_rank;              // TaskIds, most urgent first
+  std::vector<std::vector<std::uint32_t>> groups;  // TaskIds of each group
+  double utilization = 0;                          // sum of wcet / period, overheads included; for people
+  /// Features that no bound covers (edges between rates, a budget below the wcet, a queue too small, ...): every method
+  /// answers NotApplicable with this.
+  std::string not_analysable;
+
+  /// The platform's mode, or None where it is cooperative and no task has a preemption point.
+  sched::Preemption mode = sched::Preemption::Full;
+
+  [[nodiscard]] bool has_edges() const;  // some unit has
+};
+
+/// Errors: what validate() calls an error, and a platform without workers or with negative overheads. Periods are
+/// inherited here if they are not yet. O(n log n + edges).
+[[nodiscard]] Result<System> compile(const Workload &workload, const AnalysisPlatform &platform);
+
+}  // namespace redag::analysis
