@@ -6,6 +6,8 @@
 #include "redag/base/rng.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/model/generate.hpp"
+#include "redag/runtime/mode.hpp"
+#include "redag/sched/policy.hpp"
 #include "redag/testing/drivers.hpp"
 
 namespace redag::testing {
@@ -77,6 +79,13 @@ class Conformance : public ::testing::TestWithParam<Combination> {
   }
 };
 
+// Real time is dear: few workloads, by default; together they still meet every feature.
+TEST_P(Conformance, Threads) {
+  const bool os = GetParam().preemption == sched::Preemption::Full;
+  if (os && !sched::is_static(GetParam().policy)) GTEST_SKIP() << "os preemption needs a static policy";
+  if (os && runtime::probe_priority_band().top_job == 0) GTEST_SKIP() << "no real-time rights";
+  check<ThreadsDriver>(4);
+}
 TEST_P(Conformance, Simulator) { check<SimulatorDriver>(400); }
 TEST_P(Conformance, ManualWorkers) { check<ManualDriver>(400); }
 

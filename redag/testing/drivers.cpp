@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
+#include "redag/base/check.hpp"
 #include "redag/base/rng.hpp"
 #include "redag/model/demand.hpp"
+#include "redag/runtime/run_workload.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag/sim/simulator.hpp"
 
@@ -142,6 +145,21 @@ trace::Trace ManualDriver::run(const RunSpec &spec) {
   }
   decide(now);
   return trace;
+}
+
+trace::Trace ThreadsDriver::run(const RunSpec &spec) {
+  runtime::RunOptions options;
+  options.duration = spec.horizon;
+  options.seed = spec.seed;
+  options.executor = spec.executor;
+  switch (spec.preemption) {
+    case sched::Preemption::None: options.preemption = PreemptionMode::None; break;
+    case sched::Preemption::Cooperative: options.preemption = PreemptionMode::Cooperative; break;
+    case sched::Preemption::Full: options.preemption = PreemptionMode::Os; break;
+  }
+  Result<runtime::RunResult> result = runtime::run_workload(spec.workload, options);
+  REDAG_CHECK(result.has_value(), "the workload could not be run on threads");
+  return std::move(result->trace);
 }
 
 }  // namespace redag::testing
