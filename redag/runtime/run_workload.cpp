@@ -95,7 +95,7 @@ class Run {
       }
       never.wait_until(std::min(now + kCollectEvery, end));
       engine_->drain(result_.trace.events);
-      if (options_.progress) options_.progress(engine_->now(), result_.trace.events.size());
+      if (options_.progress) options_.progress(engine_->now(), result_.trace.events);
     }
   }
 

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,10 +33,11 @@ struct RunOptions {
   bool realtime_threads = false;  // none, cooperative: workers and release timer at SCHED_FIFO too
   bool lock_memory = false;       // if it cannot be had, a warning says so
   std::vector<int> cpus;          // processors of the workers; empty: os takes m of the usable ones
-  std::size_t trace_capacity = std::size_t{1} << 17;             // events between two collections
-  Duration drain_timeout = 5 * kSecond;                          // for started jobs to end after the horizon
-  const std::atomic<bool> *stop = nullptr;                       // ends the run early when set (Ctrl-C)
-  std::function<void(Time now, std::uint64_t events)> progress;  // about ten times a second
+  std::size_t trace_capacity = std::size_t{1} << 17;  // events between two collections
+  Duration drain_timeout = 5 * kSecond;               // for started jobs to end after the horizon
+  const std::atomic<bool> *stop = nullptr;            // ends the run early when set (Ctrl-C)
+  /// About ten times a second, with all events so far. On the calling thread.
+  std::function<void(Time now, std::span<const JobEvent> events)> progress;
 };
 
 struct RunResult {
