@@ -26,6 +26,8 @@ struct Job {
   Time ready = 0;
   Time origin = 0;
 
+  TaskId priority_of;  // the task whose priority it has: its own, or that of a job from which it inherited
+
   // Order among jobs: (key, rank, sequence), smallest first. For static policies key is the rank, or a more urgent
   // job's rank that was inherited.
   std::int64_t key = 0;

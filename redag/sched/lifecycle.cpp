@@ -168,6 +168,7 @@ void Lifecycle::make_ready(std::uint32_t slot, Time origin) {
   job.ready = now_;
   job.origin = origin;
   job.sequence = next_sequence_++;
+  job.priority_of = job.task;
   job.rank = task.priority.rank;
   switch (config_.policy) {
     case PolicyKind::Edf: job.key = job.release + task.deadline; break;
@@ -232,7 +233,7 @@ void Lifecycle::prioritise() {
   for (std::size_t i = 0; i < tasks_.size(); ++i) tasks_[i].priority = priorities[i];
   for (Job &job : jobs_) {
     if (job.state == JobState::Free || job.state == JobState::Waiting) continue;
-    job.rank = tasks_[job.task.value].priority.rank;
+    job.rank = tasks_[job.priority_of.value].priority.rank;
     if (is_static(config_.policy)) job.key = job.rank;
   }
 }

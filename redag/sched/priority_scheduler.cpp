@@ -152,6 +152,7 @@ void PriorityScheduler::inherit(std::uint32_t holder_slot, const Job &waiter) {
   const std::uint32_t old_level = level_of(holder);
   holder.key = waiter.key;
   holder.rank = waiter.rank;
+  holder.priority_of = waiter.priority_of;
   holder.sequence = waiter.sequence;
   if (is_queued) push(holder_slot);
   if (holder.state == JobState::Running && level_of(holder) != old_level) change_level(holder_slot, level_of(holder));
