@@ -1,0 +1,46 @@
+// What workloads/contention.yaml says about itself.
+#include <gtest/gtest.h>
+
+#include "redag/metrics/summary.hpp"
+#include "redag/model/workload_yaml.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+#include "redag/sim/simulator.hpp"
+
+namespace redag {
+namespace {
+
+metrics::Summary simulate(PreemptionMode mode, PolicyKind policy) {
+  Workload workload = load_workload(REDAG_SOURCE_DIR "/workloads/contention.yaml").value().workload;
+  workload.platform.preemption = mode;
+  workload.policy = policy;
+  trace::RunInfo info;
+  info.workload = workload;
+  info.config = sim::simulated_config(workload);
+  sim::Options options;
+  options.horizon = 20 * kSecond;
+  info.end = options.horizon;
+  sched::PriorityScheduler scheduler(workload, info.config);
+  metrics::Summarizer summarizer(info);
+  const sim::Result result = sim::simulate(workload, scheduler, workload.platform.workers, options, [&](auto events) {
+    summarizer.add(events);
+    return true;
+  });
+  return summarizer.finish(result.end);
+}
+
+TEST(Contention, PreemptionLosesNothing) {
+  for (const PreemptionMode mode : {PreemptionMode::Os, PreemptionMode::Cooperative}) {
+    EXPECT_EQ(simulate(mode, PolicyKind::RateMonotonic).total.miss_ratio_with_lost(), 0.0) << to_string(mode);
+  }
+}
+
+TEST(Contention, RunToCompletionLosesATenthOfControl) {
+  for (const PolicyKind policy : {PolicyKind::RateMonotonic, PolicyKind::Fifo}) {
+    const metrics::Summary summary = simulate(PreemptionMode::None, policy);
+    EXPECT_EQ(summary.dags.front().name, "control");
+    EXPECT_GT(summary.dags.front().jobs.miss_ratio_with_lost(), 0.1) << to_string(policy);
+  }
+}
+
+}  // namespace
+}  // namespace redag
