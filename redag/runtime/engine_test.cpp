@@ -1,0 +1,352 @@
+#include "redag/runtime/engine.hpp"
+
+#include <gtest/gtest.h>
+
+#include <mutex>
+#include <thread>
+
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/preemption_point.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+#include "redag/testing/allocation_counter.hpp"
+
+namespace redag::runtime {
+namespace {
+
+using sched::Outcome;
+
+// One DAG of independent timer tasks; task t has priority t: the last one is the most urgent.
+Workload ladder(std::size_t tasks) {
+  Workload workload;
+  workload.policy = PolicyKind::Fixed;
+  workload.dags.emplace_back();
+  for (std::size_t t = 0; t < tasks; ++t) {
+    Task task;
+    task.name = "t" + std::to_string(t);
+    task.period = task.deadline = kSecond;
+    task.wcet = kSecond;
+    task.priority = static_cast<int>(t);
+    workload.dags[0].tasks.push_back(task);
+  }
+  return workload;
+}
+
+// An engine whose jobs write into one log: "+t" when a body begins, "-t" when it ends.
+class Bench {
+ public:
+  Bench(Workload workload, PreemptionMode mode, std::uint32_t workers) : workload_(std::move(workload)) {
+    const PriorityBand band = probe_priority_band();
+    EngineOptions options;
+    options.config = make_config(Mode{mode, {}}, workers, workload_.policy, band,
+                                 workers + static_cast<std::uint32_t>(workload_.task_count()));
+    options.band = band;
+    options.trace_capacity = 1 << 16;
+    options.on_exception = [this](const Job &, const std::exception_ptr &) { ++exceptions; };
+    engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload_, options.config), options);
+    bodies.resize(workload_.task_count(), [](const Job &) { return Outcome::Finished; });
+  }
+
+  void start() {
+    std::vector<Body> logging;
+    for (std::size_t t = 0; t < bodies.size(); ++t) {
+      logging.emplace_back([this, t](const Job &job) {
+        write("+" + std::to_string(t));
+        const Outcome outcome = bodies[t](job);
+        write("-" + std::to_string(t));
+        return outcome;
+      });
+    }
+    engine->bind(workload_, std::move(logging));
+    const Result<void> ready = engine->start();
+    ASSERT_TRUE(ready) << to_string(ready.error());
+    engine->set_origin(monotonic_now());
+  }
+
+  void release(std::initializer_list<std::size_t> tasks) {
+    std::vector<Release> batch;
+    for (const std::size_t t : tasks) batch.push_back(Release{TaskId(t), engine->now()});
+    engine->release(batch);
+  }
+
+  // Stops, and checks what must hold at the end of every run.
+  void finish() {
+    engine->halt();
+    ASSERT_TRUE(engine->wait_idle(kNever));
+    EXPECT_TRUE(engine->started().empty());
+    engine->join();
+    engine->drain(events, true);
+    EXPECT_EQ(engine->lost_events(), 0U);
+    std::vector<std::uint64_t> released(workload_.task_count());
+    Time time = 0;
+    for (const JobEvent &event : events) {
+      EXPECT_GE(event.time, time);
+      time = event.time;
+      if (event.kind == JobEventKind::Released) ++released[event.task.value];
+    }
+    for (std::size_t t = 0; t < workload_.task_count(); ++t) {
+      EXPECT_EQ(engine->accounting(TaskId(t)).released, released[t]);
+    }
+  }
+
+  std::string log() {
+    const std::lock_guard guard(mutex_);
+    return log_;
+  }
+  void write(const std::string &entry) {
+    const std::lock_guard guard(mutex_);
+    log_ += log_.empty() ? entry : " " + entry;
+  }
+
+  std::unique_ptr<Engine> engine;
+  std::vector<Body> bodies;
+  std::vector<JobEvent> events;
+  std::atomic<int> exceptions{0};
+
+ private:
+  Workload workload_;
+  PiMutex mutex_;  // jobs of several priorities take it
+  std::string log_;
+};
+
+class EngineInEveryMode : public ::testing::TestWithParam<PreemptionMode> {
+ protected:
+  void SetUp() override {
+    if (GetParam() == PreemptionMode::Os && probe_priority_band().top_job == 0) {
+      GTEST_SKIP() << "this process may not use SCHED_FIFO";
+    }
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Modes, EngineInEveryMode,
+                         ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os),
+                         [](const auto &instance) { return std::string(to_string(instance.param)); });
+
+TEST_P(EngineInEveryMode, OneWorkerTakesTheMostUrgentJobFirst) {
+  Bench bench(ladder(4), GetParam(), 1);
+  Event go;
+  Event done;
+  bench.bodies[3] = [&](const Job &) {
+    go.wait();
+    return Outcome::Finished;
+  };
+  bench.bodies[0] = [&](const Job &) {
+    done.set();
+    return Outcome::Finished;
+  };
+  bench.start();
+  bench.release({3});
+  bench.release({1, 0, 2});  // of one instant, and while the worker is busy
+  go.set();
+  done.wait();
+  bench.finish();
+  EXPECT_EQ(bench.log(), "+3 -3 +2 -2 +1 -1 +0 -0");
+}
+
+// The low job releases the high one and, where preemption is on, does not end before the high one has.
+TEST_P(EngineInEveryMode, AMoreUrgentJobStartsBeforeTheRunningOneEnds) {
+  Bench bench(ladder(2), GetParam(), 1);
+  std::atomic<bool> high_ended{false};
+  Event done;
+  bench.bodies[1] = [&](const Job &) {
+    high_ended = true;
+    if (GetParam() == PreemptionMode::None) done.set();
+    return Outcome::Finished;
+  };
+  bench.bodies[0] = [&](const Job &) {
+    bench.release({1});
+    while (GetParam() != PreemptionMode::None && !high_ended) preemption_point();
+    EXPECT_EQ(high_ended, GetParam() != PreemptionMode::None);
+    if (GetParam() != PreemptionMode::None) done.set();
+    return Outcome::Finished;
+  };
+  bench.start();
+  bench.release({0});
+  done.wait();
+  bench.finish();
+  EXPECT_EQ(bench.log(), GetParam() == PreemptionMode::None ? "+0 -0 +1 -1" : "+0 +1 -1 -0");
+}
+
+TEST_P(EngineInEveryMode, AfterAHaltNothingStartsAndWhatStartedEnds) {
+  Bench bench(ladder(3), GetParam(), 1);
+  Event begun;
+  Event go;
+  bench.bodies[2] = [&](const Job &) {
+    begun.set();
+    go.wait();
+    return Outcome::Finished;
+  };
+  bench.start();
+  bench.release({2});
+  begun.wait();
+  bench.release({0, 1});
+  bench.engine->halt();
+  EXPECT_FALSE(bench.engine->wait_idle(monotonic_now()));
+  ASSERT_EQ(bench.engine->started().size(), 1U);
+  EXPECT_EQ(bench.engine->started()[0].task, TaskId(2));
+  bench.release({0});  // ignored
+  go.set();
+  bench.finish();
+  EXPECT_EQ(bench.log(), "+2 -2");
+  EXPECT_EQ(bench.engine->accounting(TaskId(2)), (sched::Accounting{1, 1, 0, 0, 0}));
+  EXPECT_EQ(bench.engine->accounting(TaskId(0)).in_flight(), 1U);
+  EXPECT_EQ(bench.engine->accounting(TaskId(1)).in_flight(), 1U);
+}
+
+TEST_P(EngineInEveryMode, ExceptionsAbortTheJobAndNothingElse) {
+  Bench bench(ladder(2), GetParam(), 2);
+  Event done;
+  bench.bodies[1] = [](const Job &) -> Outcome { throw std::runtime_error("no"); };
+  bench.bodies[0] = [&](const Job &job) {
+    if (job.number == 1) done.set();
+    return Outcome::Finished;
+  };
+  bench.start();
+  bench.release({0, 1});
+  while (bench.engine->accounting(TaskId(1)).aborted == 0) std::this_thread::yield();
+  while (bench.engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+  bench.release({0});
+  done.wait();
+  bench.finish();
+  EXPECT_EQ(bench.exceptions, 1);
+  EXPECT_EQ(bench.engine->accounting(TaskId(1)), (sched::Accounting{1, 0, 0, 1, 0}));
+}
+
+TEST_P(EngineInEveryMode, ReleasesFromSeveralThreadsAndBodiesLoseNoJob) {
+  constexpr std::size_t kTasks = 12;
+  for (const std::uint32_t workers : {1U, 2U, 8U}) {
+    Bench bench(ladder(kTasks), GetParam(), workers);
+    std::atomic<std::uint64_t> ran{0};
+    for (std::size_t t = 0; t < kTasks; ++t) {
+      bench.bodies[t] = [&, t](const Job &job) -> Outcome {
+        ran.fetch_add(1);
+        for (int i = 0; i < 5; ++i) preemption_point();
+        if (t % 3 == 0 && job.number % 4 == 0) bench.release({(t + 7) % kTasks, (t + 5) % kTasks});
+        if (t % 5 == 0 && job.number % 16 == 3) throw std::logic_error("now and then");
+        return Outcome::Finished;
+      };
+    }
+    bench.start();
+    std::vector<std::thread> sources;
+    for (std::size_t s = 0; s < 3; ++s) {
+      sources.emplace_back([&, s] {
+        for (std::size_t i = 0; i < 1000; ++i) bench.release({(i + s) % kTasks, (3 * i + s) % kTasks});
+      });
+    }
+    for (std::thread &source : sources) source.join();
+    bench.finish();
+    std::uint64_t ended = 0;
+    for (std::size_t t = 0; t < kTasks; ++t) {
+      const sched::Accounting a = bench.engine->accounting(TaskId(t));
+      EXPECT_LE(a.in_flight(), 1U);
+      ended += a.finished + a.aborted;
+    }
+    EXPECT_EQ(ended, ran);
+  }
+}
+
+TEST_P(EngineInEveryMode, TheHotPathDoesNotAllocate) {
+  Bench bench(ladder(3), GetParam(), 1);
+  Event done;
+  std::uint64_t before = 0;
+  std::uint64_t after = 0;
+  constexpr std::uint32_t kJobs = 200;
+  std::vector<Body> bodies(3, [](const Job &) { return Outcome::Finished; });
+  // Each job releases the next one; the thread's allocations are counted from job 20 to the last.
+  bodies[0] = [&](const Job &job) {
+    preemption_point();
+    if (job.number == 20) before = testing::allocation_count();
+    if (job.number == kJobs) {
+      after = testing::allocation_count();
+      done.set();
+    } else {
+      bench.engine->release(TaskId(0), bench.engine->now());
+    }
+    return Outcome::Finished;
+  };
+  bench.engine->bind(ladder(3), bodies);
+  ASSERT_TRUE(bench.engine->start());
+  bench.engine->release(TaskId(0), 0);
+  done.wait();
+  bench.finish();
+  EXPECT_EQ(after, before);
+}
+
+TEST(Engine, NestedJobsRunOnOneThreadAndTheirTimeIsNotChargedToTheJobBelow) {
+  Bench bench(ladder(3), PreemptionMode::Cooperative, 1);
+  Event done;
+  std::thread::id thread;
+  const auto use = [](Duration demand) {
+    while (job_cpu_time() < demand) {
+    }
+  };
+  bench.bodies[0] = [&](const Job &) {
+    thread = std::this_thread::get_id();
+    bench.release({1});
+    preemption_point();
+    EXPECT_LT(job_cpu_time(), 10 * kMillisecond);
+    return Outcome::Finished;
+  };
+  bench.bodies[1] = [&](const Job &) {
+    EXPECT_EQ(std::this_thread::get_id(), thread);
+    bench.release({2});
+    preemption_point();
+    return Outcome::Finished;
+  };
+  bench.bodies[2] = [&](const Job &job) {
+    EXPECT_EQ(std::this_thread::get_id(), thread);
+    use(10 * kMillisecond);
+    if (job.number == 0) {
+      bench.release({2});
+    } else {
+      done.set();
+    }
+    return Outcome::Finished;
+  };
+  bench.start();
+  bench.release({0});
+  done.wait();
+  bench.finish();
+  // The second job of 2 runs on top of 1 when the first has ended, before 1 is resumed.
+  EXPECT_EQ(bench.log(), "+0 +1 +2 -2 +2 -2 -1 -0");
+  EXPECT_GE(bench.engine->usage(TaskId(2)).longest, 10 * kMillisecond);
+  EXPECT_LT(bench.engine->usage(TaskId(1)).longest, 10 * kMillisecond);
+}
+
+TEST(Engine, ABudgetEndsTheJobAtItsNextPreemptionPoint) {
+  Workload workload = ladder(1);
+  workload.dags[0].tasks[0].budget = kMillisecond;
+  Bench bench(workload, PreemptionMode::None, 1);
+  std::atomic<bool> caught{false};
+  bench.bodies[0] = [&](const Job &) {
+    try {
+      for (;;) preemption_point();
+    } catch (const std::exception &) {
+      caught = true;  // user code that swallows everything it knows
+    }
+    return Outcome::Finished;
+  };
+  bench.start();
+  bench.release({0});
+  while (bench.engine->accounting(TaskId(0)).aborted == 0) std::this_thread::yield();
+  bench.finish();
+  EXPECT_FALSE(caught);
+  EXPECT_EQ(bench.exceptions, 0);
+  EXPECT_EQ(bench.engine->usage(TaskId(0)).over_budget, 1U);
+}
+
+TEST(Engine, OutsideAJobPreemptionPointsDoNothing) {
+  preemption_point();
+  EXPECT_EQ(job_cpu_time(), 0);
+}
+
+TEST(Engine, AThreadThatCannotBeMadeAsAskedIsAnError) {
+  EngineOptions options;
+  options.config.workers = 2;
+  options.cpus = {1023};
+  Engine engine(std::make_unique<sched::PriorityScheduler>(Workload{}, options.config), options);
+  const Result<void> ready = engine.start();
+  ASSERT_FALSE(ready);
+  EXPECT_NE(ready.error()[0].message.find("cannot be pinned"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace redag::runtime

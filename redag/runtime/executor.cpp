@@ -1,0 +1,211 @@
+#include "redag/runtime/executor.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "redag/model/validate.hpp"
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/threads.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+
+namespace redag::runtime {
+namespace {
+
+constexpr Duration kStartMargin = kMillisecond;  // from the threads being ready to the first release
+constexpr std::uint32_t kSpareThreads = 16;
+
+void throw_if_bad(const Dag &dag, std::uint32_t workers, PolicyKind policy) {
+  Workload alone;
+  alone.name = dag.name;
+  alone.platform = Platform{workers, PreemptionMode::None};
+  alone.policy = policy;
+  alone.dags = {dag};
+  for (Task &task : alone.dags[0].tasks) task.wcet = std::max<Duration>(task.wcet, 1);  // may be unknown here
+  const Diagnostics findings = validate(alone);
+  if (has_errors(findings)) throw std::invalid_argument(to_string(findings));
+}
+
+}  // namespace
+
+Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
+  const PriorityBand band = probe_priority_band();
+  Result<Mode> mode = resolve_mode(options_.preemption, options_.policy, band);
+  if (!mode) throw std::runtime_error(to_string(mode.error()));
+  mode_ = *std::move(mode);
+
+  const std::size_t cpus = options_.cpus.empty() ? usable_cpus().size() : options_.cpus.size();
+  if (options_.workers == 0) options_.workers = static_cast<std::uint32_t>(cpus);
+  const std::uint32_t threads = options_.threads > 0 ? options_.threads : options_.workers + kSpareThreads;
+  warnings_ = mode_warnings(mode_, options_.workers, cpus);
+  if (options_.lock_memory) {
+    if (const Result<void> locked = redag::runtime::lock_memory(); !locked) {
+      warnings_.push_back(to_string(locked.error()));
+    }
+  }
+
+  EngineOptions engine;
+  engine.name = options_.name;
+  engine.config = make_config(mode_, options_.workers, options_.policy, band, std::max(threads, options_.workers));
+  engine.band = band;
+  engine.cpus = options_.cpus;
+  engine.trace_capacity = options_.trace_capacity;
+  engine.on_exception = [this](const Job &job, std::exception_ptr e) { on_exception(job, std::move(e)); };
+  auto scheduler = std::make_unique<sched::PriorityScheduler>(Workload{}, engine.config);
+  engine_ = std::make_unique<Engine>(std::move(scheduler), std::move(engine));
+  timer_ = std::make_unique<ReleaseTimer>([this](auto releases) { engine_->release(releases); }, 0);
+}
+
+Executor::~Executor() {
+  request_stop();
+  timer_->join();
+  engine_->join();
+}
+
+DagId Executor::add(DagBuilder builder) {
+  Dag &dag = builder.dag_;
+  for (const Task &task : dag.tasks) {
+    for (const std::uint32_t predecessor : task.predecessors) {
+      if (predecessor >= dag.tasks.size()) throw std::invalid_argument("a predecessor is of another DAG");
+    }
+  }
+  inherit_periods(dag);
+  throw_if_bad(dag, options_.workers, options_.policy);
+
+  std::vector<Body> bodies;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+    names.push_back(dag.tasks[i].name);
+    bodies.emplace_back([function = std::move(builder.bodies_[i])](const Job &) {
+      function();
+      return sched::Outcome::Finished;
+    });
+  }
+  const std::lock_guard guard(lock_);
+  const AddedDag ids = engine_->add_dag(dag, std::move(bodies));
+  dags_.push_back(Added{dag.name, std::move(names), ids.first_task});
+  timer_->add(dag, ids.first_task, running_ ? std::max<Time>(0, engine_->now()) : 0);
+  return ids.dag;
+}
+
+void Executor::remove(DagId dag) {
+  {
+    const std::lock_guard guard(lock_);
+    const Added &gone = added(dag);
+    timer_->remove(gone.first, gone.tasks.size());
+  }
+  engine_->remove_dag(dag);  // destroys bodies, which may own anything: not under our lock
+}
+
+// ---- the run ----
+
+void Executor::run() {
+  start();
+  wait();
+}
+
+void Executor::run_for(nanoseconds duration) {
+  start();
+  stop_.wait_until(monotonic_now() + std::min<Duration>(duration.count(), kMaxDuration / 2));
+  request_stop();
+  wait();
+}
+
+void Executor::start() {
+  if (started_.exchange(true)) throw std::logic_error("an Executor runs once");
+  if (const Result<void> ready = engine_->start(); !ready) throw std::runtime_error(to_string(ready.error()));
+  const std::lock_guard guard(lock_);
+  const Time origin = monotonic_now() + kStartMargin;
+  engine_->set_origin(origin);
+  running_ = true;
+  const int priority = mode_.mode == PreemptionMode::Os ? engine_->options().band.timer : 0;
+  const ThreadSetup setup{options_.name + "-timer", priority, {}};
+  if (const Result<void> ready = timer_->start(origin, kNever, setup); !ready) {
+    request_stop();
+    throw std::runtime_error(to_string(ready.error()));
+  }
+}
+
+void Executor::request_stop() noexcept {
+  engine_->halt();
+  timer_->stop();
+  stop_.set();
+}
+
+void Executor::wait() {
+  if (engine_->in_body()) throw std::logic_error("a body cannot wait for the end of its own executor");
+  if (!started_) throw std::logic_error("wait() before start()");
+  stop_.wait();
+  finish();
+  std::exception_ptr failure;
+  {
+    const std::lock_guard guard(lock_);
+    failure = std::exchange(failure_, nullptr);
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+void Executor::stop() {
+  request_stop();
+  if (started_ && !engine_->in_body()) finish();
+}
+
+void Executor::finish() {
+  const std::lock_guard guard(finishing_);
+  if (finished_) return;
+  timer_->join();
+  if (!engine_->wait_idle(monotonic_now() + options_.stop_timeout.count())) {
+    std::vector<std::string> names;
+    for (const Job &job : engine_->started()) names.push_back(task_name(job.task));
+    throw std::runtime_error(fmt::format("still running {} after the stop: {}",
+                                         format_duration(options_.stop_timeout.count()), fmt::join(names, ", ")));
+  }
+  engine_->join();
+  finished_ = true;
+}
+
+void Executor::on_exception(const Job &job, std::exception_ptr exception) {
+  if (options_.on_exception) {
+    const ExceptionInfo info{task_name(job.task), job.number, exception};
+    if (options_.on_exception(info) == OnException::Continue) return;
+  }
+  {
+    const std::lock_guard guard(lock_);
+    if (!failure_) failure_ = std::move(exception);
+  }
+  request_stop();
+}
+
+// ---- what can be asked ----
+
+void Executor::drain(std::vector<JobEvent> &events) { engine_->drain(events, finished_); }
+
+const Executor::Added &Executor::added(DagId dag) const {
+  if (dag.value >= dags_.size()) throw std::out_of_range("there is no such DAG");
+  return dags_[dag.value];
+}
+
+std::vector<TaskStats> Executor::stats(DagId dag) const {
+  const std::lock_guard guard(lock_);
+  const Added &of = added(dag);
+  std::vector<TaskStats> result;
+  for (std::size_t i = 0; i < of.tasks.size(); ++i) {
+    const TaskId task(of.first.value + i);
+    result.push_back(TaskStats{of.name + "." + of.tasks[i], engine_->accounting(task), engine_->usage(task)});
+  }
+  return result;
+}
+
+std::string Executor::task_name(TaskId task) const {
+  const std::lock_guard guard(lock_);
+  for (const Added &dag : dags_) {
+    if (task.value - dag.first.value < dag.tasks.size() && task.value >= dag.first.value) {
+      return dag.name + "." + dag.tasks[task.value - dag.first.value];
+    }
+  }
+  return fmt::format("task {}", task.value);
+}
+
+}  // namespace redag::runtime

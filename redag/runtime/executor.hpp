@@ -1,0 +1,125 @@
+// The C++ interface of the threaded runtime: DAGs of functions, executed in priority order until stopped. Owns an
+// engine and a release timer. Behaviour in every corner: docs/runtime.md.
+//
+// Threads: every member may be called from any thread and from a body, except where it says otherwise;
+// request_stop() also from a signal handler. An Executor runs once.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "redag/base/pi_mutex.hpp"
+#include "redag/runtime/dag_builder.hpp"
+#include "redag/runtime/engine.hpp"
+#include "redag/runtime/mode.hpp"
+#include "redag/runtime/release_timer.hpp"
+
+namespace redag::runtime {
+
+/// An exception that left a body.
+struct ExceptionInfo {
+  std::string task;  // "control.ekf"
+  std::uint32_t job = 0;
+  std::exception_ptr exception;
+};
+
+enum class OnException : std::uint8_t {
+  Stop,      // as request_stop(); run(), run_for() or wait() throws the first such exception
+  Continue,  // the job counts as aborted, it releases no successors, and nothing else happens
+};
+
+struct ExecutorOptions {
+  std::string name = "redag";
+  std::uint32_t workers = 0;  // jobs that execute at the same time; 0: one a usable processor
+  PreemptionMode preemption = PreemptionMode::Auto;
+  PolicyKind policy = PolicyKind::RateMonotonic;
+  std::uint32_t threads = 0;       // os: jobs that can be started and unfinished at once; 0: workers + 16
+  std::vector<int> cpus;           // processors for the workers; empty: os takes `workers` of the usable ones
+  bool lock_memory = false;        // if it cannot be had, warnings() says so
+  std::size_t trace_capacity = 0;  // events kept between two drain(); 0: none are recorded
+  nanoseconds stop_timeout = std::chrono::seconds(10);  // how long stopping waits for bodies to return
+  std::function<OnException(const ExceptionInfo &)>
+      on_exception;  // empty: Stop. On the worker's thread; must not throw
+};
+
+struct TaskStats {
+  std::string task;  // "control.ekf"
+  sched::Accounting jobs;
+  Usage usage;
+};
+
+class Executor {
+ public:
+  /// Throws std::runtime_error if preemption `os` is asked for and cannot be had; the text says how to get it.
+  explicit Executor(ExecutorOptions options = {});
+  /// Stops, and waits for the bodies that run, however long they take.
+  ~Executor();
+  Executor(const Executor &) = delete;
+  Executor &operator=(const Executor &) = delete;
+
+  /// Adds a DAG, before or while running; its release grid begins at the start, or now. Throws std::invalid_argument
+  /// with all mistakes if it is not valid.
+  DagId add(DagBuilder dag);
+  /// What has not started is skipped, what has started ends as usual; a body is destroyed once it no longer runs.
+  void remove(DagId dag);
+
+  /// start(), and wait(). Throws what start() and wait() throw.
+  void run();
+  /// As run(), for at most `duration`.
+  void run_for(nanoseconds duration);
+
+  /// Returns when all threads are ready. Throws std::runtime_error if the system refuses a thread, std::logic_error the
+  /// second time.
+  void start();
+  /// Waits until somebody stops the executor and all bodies have returned; then throws the exception that stopped it,
+  /// if one did. Throws std::runtime_error that names the bodies which run on after stop_timeout. Not from a body.
+  void wait();
+  /// request_stop(), and waits as wait() does, but throws no body's exception. From a body: request_stop() alone.
+  void stop();
+  /// No job starts from now on. Async-signal-safe.
+  void request_stop() noexcept;
+  [[nodiscard]] bool stopping() const noexcept { return engine_->halting(); }
+
+  /// Which preemption mode this is, and why.
+  [[nodiscard]] const Mode &mode() const { return mode_; }
+  [[nodiscard]] const std::vector<std::string> &warnings() const { return warnings_; }
+
+  /// Appends the events since the last call; times count from the start. One thread at a time.
+  void drain(std::vector<JobEvent> &events);
+  [[nodiscard]] std::uint64_t lost_events() const { return engine_->lost_events(); }
+  [[nodiscard]] std::vector<TaskStats> stats(DagId dag) const;
+  /// "control.ekf"
+  [[nodiscard]] std::string task_name(TaskId task) const;
+
+ private:
+  struct Added {
+    std::string name;
+    std::vector<std::string> tasks;
+    TaskId first;
+  };
+  void finish();
+  void on_exception(const Job &job, std::exception_ptr exception);
+  [[nodiscard]] const Added &added(DagId dag) const;
+
+  ExecutorOptions options_;
+  Mode mode_;
+  std::vector<std::string> warnings_;
+  std::unique_ptr<Engine> engine_;
+  std::unique_ptr<ReleaseTimer> timer_;
+  mutable PiMutex lock_;  // guards the three below
+  std::vector<Added> dags_;
+  std::exception_ptr failure_;  // the first that stopped us
+  bool running_ = false;
+  std::mutex finishing_;  // one thread at a time ends the run
+  std::atomic<bool> started_{false};
+  std::atomic<bool> finished_{false};
+  Event stop_;
+};
+
+}  // namespace redag::runtime

@@ -1,0 +1,268 @@
+#include "redag/runtime/executor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <thread>
+
+#include "redag/runtime/preemption_point.hpp"
+
+namespace redag::runtime {
+namespace {
+
+using namespace std::chrono_literals;
+
+ExecutorOptions one_worker(PreemptionMode mode = PreemptionMode::None) {
+  ExecutorOptions options;
+  options.workers = 1;
+  options.preemption = mode;
+  return options;
+}
+
+TEST(Executor, RunsAChainUntilABodyStopsIt) {
+  Executor executor(one_worker());
+  int imu_jobs = 0;
+  int ekf_jobs = 0;
+  DagBuilder control("control");
+  const TaskHandle imu = control.timer("imu", 1ms, [&] { ++imu_jobs; }, {.wcet = 300us});
+  control.data("ekf", {imu}, [&] {
+    if (++ekf_jobs == 5) executor.stop();  // from a body: asks, and returns
+  });
+  const DagId dag = executor.add(std::move(control));
+  executor.run();
+  EXPECT_EQ(ekf_jobs, 5);
+  EXPECT_GE(imu_jobs, 5);
+  const std::vector<TaskStats> stats = executor.stats(dag);
+  ASSERT_EQ(stats.size(), 2U);
+  EXPECT_EQ(stats[1].task, "control.ekf");
+  EXPECT_EQ(stats[1].jobs.finished, 5U);
+  EXPECT_EQ(stats[1].usage.jobs, 5U);
+}
+
+TEST(Executor, RunForEndsByItselfAndOnlyOnce) {
+  Executor executor(one_worker());
+  executor.run_for(5ms);
+  EXPECT_TRUE(executor.stopping());
+  EXPECT_THROW(executor.run(), std::logic_error);
+  executor.stop();
+}
+
+TEST(Executor, AnExceptionStopsItAndComesOutOfRun) {
+  Executor executor(one_worker());
+  DagBuilder dag("dag");
+  dag.timer("bad", 1ms, [] { throw std::out_of_range("sensor"); });
+  executor.add(std::move(dag));
+  EXPECT_THROW(executor.run(), std::out_of_range);
+}
+
+TEST(Executor, AHandlerCanLetItGoOn) {
+  ExecutorOptions options = one_worker();
+  int handled = 0;
+  options.on_exception = [&](const ExceptionInfo &info) {
+    EXPECT_EQ(info.task, "dag.bad");
+    EXPECT_THROW(std::rethrow_exception(info.exception), std::runtime_error);
+    ++handled;
+    return OnException::Continue;
+  };
+  Executor executor(options);
+  int successors = 0;
+  DagBuilder builder("dag");
+  int jobs = 0;
+  const TaskHandle bad = builder.timer("bad", 1ms, [&] {
+    if (++jobs == 4) executor.request_stop();
+    throw std::runtime_error("again");
+  });
+  builder.data("after", {bad}, [&] { ++successors; });
+  const DagId dag = executor.add(std::move(builder));
+  executor.run();
+  EXPECT_EQ(handled, 4);
+  EXPECT_EQ(successors, 0);
+  EXPECT_EQ(executor.stats(dag)[0].jobs.aborted, 4U);
+}
+
+TEST(Executor, RefusesABadDagWithEveryMistake) {
+  Executor executor(one_worker());
+  DagBuilder dag("dag");
+  dag.timer("a", 0ms, [] {});
+  dag.timer("a", -1ms, [] {});
+  try {
+    executor.add(std::move(dag));
+    FAIL() << "a DAG without periods was accepted";
+  } catch (const std::invalid_argument &error) {
+    EXPECT_NE(std::string(error.what()).find("period"), std::string::npos) << error.what();
+  }
+  DagBuilder empty("empty");
+  EXPECT_THROW(empty.timer("a", 1ms, nullptr), std::invalid_argument);
+}
+
+TEST(Executor, DagsComeAndGoWhileItRunsAlsoFromBodies) {
+  for (const PreemptionMode mode : {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Auto}) {
+    ExecutorOptions options;
+    options.workers = 2;
+    options.preemption = mode;
+    Executor executor(options);
+    std::atomic<int> visits{0};
+    auto owned = std::make_shared<int>(0);
+    int rounds = 0;
+    DagBuilder load("load");
+    for (int i = 0; i < 3; ++i) {
+      load.timer("spin" + std::to_string(i), 1ms, [] {
+        while (job_cpu_time() < 100 * kMicrosecond) preemption_point();
+      });
+    }
+    executor.add(std::move(load));
+    DagBuilder manager("manager");
+    DagId last;
+    manager.timer("manage", 1ms, [&] {
+      if (last.valid()) executor.remove(last);
+      if (++rounds == 30) return executor.stop();
+      DagBuilder visitor("visitor" + std::to_string(rounds));
+      const TaskHandle first = visitor.timer("first", 1ms, [&visits, owned] { ++visits; });
+      visitor.data("second", {first}, [&visits, owned] { ++visits; });
+      last = executor.add(std::move(visitor));
+    });
+    executor.add(std::move(manager));
+    executor.run();
+    EXPECT_EQ(rounds, 30);
+    EXPECT_EQ(owned.use_count(), 1) << "bodies of removed DAGs are destroyed";
+  }
+}
+
+TEST(Executor, ABodyThatRemovesItsOwnDagFinishes) {
+  Executor executor(one_worker());
+  auto owned = std::make_shared<int>(0);
+  DagId self;
+  DagBuilder dag("dag");
+  dag.timer("only", 1ms, [&executor, &self, owned] {
+    executor.remove(self);
+    EXPECT_GE(owned.use_count(), 2);  // what it captured is still there
+    executor.stop();
+  });
+  self = executor.add(std::move(dag));
+  executor.run();
+  EXPECT_EQ(executor.stats(self)[0].jobs.finished, 1U);
+  EXPECT_EQ(owned.use_count(), 1);
+}
+
+TEST(Executor, StopFromAnotherThreadWaitsForTheBodies) {
+  Executor executor(one_worker());
+  Event begun;
+  std::atomic<bool> ended{false};
+  DagBuilder dag("dag");
+  dag.timer("long", 1s, [&] {
+    begun.set();
+    while (!executor.stopping()) std::this_thread::yield();
+    ended = true;
+  });
+  executor.add(std::move(dag));
+  executor.start();
+  begun.wait();
+  executor.stop();
+  EXPECT_TRUE(ended);
+}
+
+TEST(Executor, ABodyThatDoesNotReturnIsNamed) {
+  ExecutorOptions options = one_worker();
+  options.stop_timeout = 1ms;
+  Event begun;
+  Event go;
+  Executor executor(options);
+  DagBuilder dag("dag");
+  dag.timer("stuck", 1s, [&] {
+    begun.set();
+    go.wait();
+  });
+  executor.add(std::move(dag));
+  executor.start();
+  begun.wait();
+  try {
+    executor.stop();
+    FAIL() << "stop() returned while a body was running";
+  } catch (const std::runtime_error &error) {
+    EXPECT_NE(std::string(error.what()).find("dag.stuck"), std::string::npos) << error.what();
+  }
+  go.set();
+}
+
+Executor *interrupted = nullptr;
+
+TEST(Executor, RequestStopWorksFromASignalHandler) {
+  Executor executor(one_worker());
+  interrupted = &executor;
+  auto *const old = std::signal(SIGUSR1, [](int) { interrupted->request_stop(); });
+  DagBuilder dag("dag");
+  dag.timer("raise", 1ms, [] { std::raise(SIGUSR1); });
+  executor.add(std::move(dag));
+  executor.run();
+  std::signal(SIGUSR1, old);
+  EXPECT_TRUE(executor.stopping());
+}
+
+TEST(Executor, OverrunsOfAssumedExecutionTimesAreCounted) {
+  Executor executor(one_worker());
+  DagBuilder builder("dag");
+  builder.timer("slow", 1s,
+                [&] {
+                  while (job_cpu_time() < kMillisecond) {
+                  }
+                  executor.stop();
+                },
+                {.wcet = 10us, .budget = 20us});
+  const DagId dag = executor.add(std::move(builder));
+  executor.run();
+  const TaskStats stats = executor.stats(dag)[0];
+  EXPECT_EQ(stats.jobs.finished, 1U);  // without a preemption point nothing cuts it off
+  EXPECT_EQ(stats.usage.over_wcet, 1U);
+  EXPECT_EQ(stats.usage.over_budget, 1U);
+}
+
+TEST(Executor, EventsCanBeDrainedWhileItRunsAndAfterwards) {
+  ExecutorOptions options = one_worker();
+  options.trace_capacity = 1024;
+  Executor executor(options);
+  int jobs = 0;
+  DagBuilder dag("dag");
+  dag.timer("tick", 1ms, [&] {
+    if (++jobs == 10) executor.stop();
+  });
+  executor.add(std::move(dag));
+  executor.start();
+  std::vector<JobEvent> events;
+  while (!executor.stopping()) {
+    executor.drain(events);
+    std::this_thread::yield();
+  }
+  executor.wait();
+  executor.drain(events);
+  EXPECT_EQ(
+      std::count_if(events.begin(), events.end(), [](const JobEvent &e) { return e.kind == JobEventKind::Started; }),
+      10);
+  EXPECT_EQ(executor.lost_events(), 0U);
+}
+
+TEST(Executor, OsIsRefusedForAPolicyThatDoesNotOrderThreads) {
+  ExecutorOptions options = one_worker(PreemptionMode::Os);
+  options.policy = PolicyKind::Edf;
+  EXPECT_THROW(Executor{options}, std::runtime_error);
+  options.preemption = PreemptionMode::Auto;
+  EXPECT_EQ(Executor(options).mode().mode, PreemptionMode::Cooperative);
+}
+
+TEST(Executor, IsDestroyedCleanlyInEveryState) {
+  { const Executor never_started; }
+  {
+    Executor stopped_before(one_worker());
+    stopped_before.stop();
+    stopped_before.run();
+  }
+  {
+    Executor running(one_worker());
+    DagBuilder dag("dag");
+    dag.timer("tick", 1ms, [] {});
+    running.add(std::move(dag));
+    running.start();
+  }
+}
+
+}  // namespace
+}  // namespace redag::runtime

@@ -1,0 +1,75 @@
+#include "redag/runtime/release_timer.hpp"
+
+#include <gtest/gtest.h>
+
+#include "redag/runtime/clock.hpp"
+
+namespace redag::runtime {
+namespace {
+
+Dag one_timer(Duration period) {
+  Dag dag;
+  dag.tasks.emplace_back();
+  dag.tasks[0].period = period;
+  return dag;
+}
+
+struct Collector {
+  std::vector<Release> releases;
+  Event enough;
+  std::size_t wanted = 0;
+
+  ReleaseTimer::Sink sink() {
+    return [this](std::span<const Release> batch) {
+      releases.insert(releases.end(), batch.begin(), batch.end());
+      if (wanted > 0 && releases.size() >= wanted) enough.set();
+    };
+  }
+};
+
+TEST(ReleaseTimer, ReportsExactlyTheGridUpToTheHorizon) {
+  Collector collector;
+  collector.wanted = 20;
+  ReleaseTimer timer(collector.sink(), 1);
+  timer.add(one_timer(kMillisecond), TaskId(0), 0);
+  ASSERT_TRUE(timer.start(monotonic_now(), 20 * kMillisecond, {}));
+  collector.enough.wait();
+  timer.stop();
+  timer.join();
+  ASSERT_EQ(collector.releases.size(), 20U);
+  for (std::size_t k = 0; k < 20; ++k) {
+    EXPECT_EQ(collector.releases[k].nominal, static_cast<Time>(k) * kMillisecond);
+  }
+}
+
+TEST(ReleaseTimer, AnEarlierReleaseAddedLaterWakesIt) {
+  Collector collector;
+  collector.wanted = 1;
+  ReleaseTimer timer(collector.sink(), 1);
+  const Time origin = monotonic_now();
+  ASSERT_TRUE(timer.start(origin, kNever, {}));  // nothing to do: sleeps for ever
+  timer.add(one_timer(3600 * kSecond), TaskId(4), monotonic_now() - origin);
+  collector.enough.wait();
+  timer.stop();
+  timer.join();
+  ASSERT_EQ(collector.releases.size(), 1U);
+  EXPECT_EQ(collector.releases[0].task, TaskId(4));
+}
+
+TEST(ReleaseTimer, WhatIsDueAtTheStopIsReported) {
+  Collector collector;
+  ReleaseTimer timer(collector.sink(), 1);
+  timer.add(one_timer(kMillisecond), TaskId(0), 0);
+  timer.stop();
+  ASSERT_TRUE(timer.start(monotonic_now() - 10 * kSecond, 10 * kSecond, {}));
+  timer.join();
+  EXPECT_EQ(collector.releases.size(), 10'000U);
+}
+
+TEST(ReleaseTimer, AThreadThatCannotBeSetUpIsAnError) {
+  ReleaseTimer timer([](auto) {}, 1);
+  EXPECT_FALSE(timer.start(0, kNever, ThreadSetup{"t", 0, {1023}}));
+}
+
+}  // namespace
+}  // namespace redag::runtime

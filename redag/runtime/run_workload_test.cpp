@@ -1,0 +1,153 @@
+#include "redag/runtime/run_workload.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "redag/metrics/trace_checker.hpp"
+#include "redag/runtime/mode.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+
+namespace redag::runtime {
+namespace {
+
+Task timer(std::string name, Duration period, Duration wcet) {
+  Task task;
+  task.name = std::move(name);
+  task.period = task.deadline = period;
+  task.wcet = task.bcet = wcet;
+  task.region = wcet / 10;
+  return task;
+}
+
+// Two DAGs: a fast chain and a slow one whose jobs are longer than the fast period.
+Workload two_rates(std::uint32_t workers, PreemptionMode mode) {
+  Workload workload;
+  workload.name = "two rates";
+  workload.platform = Platform{workers, mode};
+  Dag fast{"fast", {timer("sense", 10 * kMillisecond, 500 * kMicrosecond)}, 1, 0, 0, Criticality::High};
+  Task act = timer("act", 0, 300 * kMicrosecond);
+  act.deadline = 0;
+  act.activation = Activation::Data;
+  act.predecessors = {0};
+  fast.tasks.push_back(act);
+  Dag slow{"slow", {}, 0, 0, 0, Criticality::Low};
+  for (std::uint32_t i = 0; i < workers; ++i) {
+    slow.tasks.push_back(timer("slow" + std::to_string(i), 100 * kMillisecond, 30 * kMillisecond));
+  }
+  workload.dags = {fast, slow};
+  for (Dag &dag : workload.dags) inherit_periods(dag);
+  return workload;
+}
+
+RunResult run(const Workload &workload, RunOptions options) {
+  Result<RunResult> result = run_workload(workload, options);
+  if (!result) {
+    ADD_FAILURE() << to_string(result.error());
+    return {};
+  }
+  return *std::move(result);
+}
+
+void expect_lawful(const RunResult &result) {
+  const auto report = metrics::check_trace(result.trace);
+  EXPECT_TRUE(report.ok()) << report.to_string();
+}
+
+bool has_preemption(const RunResult &result) {
+  return std::any_of(result.trace.events.begin(), result.trace.events.end(),
+                     [](const JobEvent &e) { return e.kind == JobEventKind::Preempted; });
+}
+
+class EveryMode : public testing::TestWithParam<std::tuple<PreemptionMode, std::uint32_t>> {
+ protected:
+  void SetUp() override {
+    if (mode() == PreemptionMode::Os && probe_priority_band().top_job == 0) {
+      GTEST_SKIP() << "this process may not use SCHED_FIFO";
+    }
+  }
+  static PreemptionMode mode() { return std::get<0>(GetParam()); }
+  static std::uint32_t workers() { return std::get<1>(GetParam()); }
+};
+
+TEST_P(EveryMode, RunsAsTheModelSays) {
+  RunOptions options;
+  options.duration = 400 * kMillisecond;
+  const RunResult result = run(two_rates(workers(), mode()), options);
+  expect_lawful(result);
+  EXPECT_EQ(result.mode.mode, mode());
+  EXPECT_EQ(result.trace.info.lost_events, 0U);
+  EXPECT_TRUE(result.unfinished.empty());
+  // 40 grid points of the fast timer lie in [0, 400 ms): each is reported, however late.
+  const auto released = std::count_if(result.trace.events.begin(), result.trace.events.end(), [](const JobEvent &e) {
+    return e.kind == JobEventKind::Released && e.task == TaskId(0);
+  });
+  EXPECT_EQ(released, 40);
+  // On one worker the long job is in the way of the short ones: preemption shows, or is off.
+  if (workers() == 1) {
+    EXPECT_EQ(has_preemption(result), mode() != PreemptionMode::None);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, EveryMode,
+                         testing::Combine(testing::Values(PreemptionMode::None, PreemptionMode::Cooperative,
+                                                          PreemptionMode::Os),
+                                          testing::Values(1U, 2U, 8U)),
+                         [](const auto &instance) {
+                           return std::string(to_string(std::get<0>(instance.param))) + "_" +
+                                  std::to_string(std::get<1>(instance.param));
+                         });
+
+TEST(RunWorkload, StopsEarlyWhenAskedAndTheTraceIsStillLawful) {
+  std::atomic<bool> stop{false};
+  RunOptions options;
+  options.duration = 3600 * kSecond;
+  options.stop = &stop;
+  options.progress = [&](Time now, std::span<const JobEvent>) { stop = now > 50 * kMillisecond; };
+  const RunResult result = run(two_rates(1, PreemptionMode::None), options);
+  EXPECT_TRUE(result.stopped);
+  EXPECT_LT(result.trace.info.end, options.duration);
+  expect_lawful(result);
+}
+
+TEST(RunWorkload, JobsThatDoNotEndAreNamed) {
+  Workload workload = two_rates(1, PreemptionMode::None);
+  workload.dags[1].tasks[0].wcet = workload.dags[1].tasks[0].bcet = 3600 * kSecond;
+  RunOptions options;
+  options.duration = 20 * kMillisecond;
+  options.drain_timeout = kMillisecond;
+  const RunResult result = run(workload, options);
+  EXPECT_EQ(result.unfinished, std::vector<std::string>{"slow.slow0 #0"});
+  expect_lawful(result);
+}
+
+TEST(RunWorkload, ABudgetCutsAJobOff) {
+  Workload workload = two_rates(1, PreemptionMode::Cooperative);
+  workload.dags[1].tasks[0].budget = 2 * kMillisecond;
+  RunOptions options;
+  options.duration = 50 * kMillisecond;
+  const RunResult result = run(workload, options);
+  expect_lawful(result);
+  const auto cut = std::find_if(result.trace.events.begin(), result.trace.events.end(),
+                                [](const JobEvent &e) { return e.kind == JobEventKind::Aborted; });
+  ASSERT_NE(cut, result.trace.events.end());
+  EXPECT_EQ(cut->reason, Reason::Budget);
+  EXPECT_EQ(cut->task, TaskId(2));
+}
+
+TEST(RunWorkload, RealtimeThreadsAndAModelOfAnotherExecutorCanBeAskedFor) {
+  if (probe_priority_band().top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+  RunOptions options;
+  options.duration = 50 * kMillisecond;
+  options.realtime_threads = true;
+  bool asked = false;
+  options.scheduler = [&](const Workload &workload, const sched::Config &config) {
+    asked = true;
+    return std::make_unique<sched::PriorityScheduler>(workload, config);
+  };
+  expect_lawful(run(two_rates(2, PreemptionMode::None), options));
+  EXPECT_TRUE(asked);
+}
+
+}  // namespace
+}  // namespace redag::runtime

@@ -1,0 +1,90 @@
+#include "redag/runtime/threads.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/prctl.h>
+
+#include <thread>
+
+#include "redag/runtime/mode.hpp"
+
+namespace redag::runtime {
+namespace {
+
+TEST(Threads, SetUpGivesNameProcessorsAndTimerSlack) {
+  const int cpu = usable_cpus().back();
+  std::thread([&] {
+    const Result<void> done = set_up_this_thread(ThreadSetup{"a name that is too long", 0, {cpu}});
+    ASSERT_TRUE(done) << to_string(done.error());
+    char name[16] = {};
+    pthread_getname_np(pthread_self(), name, sizeof name);
+    EXPECT_STREQ(name, "a name that is ");
+    EXPECT_EQ(usable_cpus(), std::vector<int>{cpu});
+    EXPECT_EQ(prctl(PR_GET_TIMERSLACK), 1);
+    EXPECT_EQ(fifo_priority(pthread_self()), 0);
+  }).join();
+}
+
+TEST(Threads, AProcessorThatIsNotThereIsAnErrorWithAHint) {
+  std::thread([] {
+    const Result<void> done = set_up_this_thread(ThreadSetup{"t", 0, {1023}});
+    ASSERT_FALSE(done);
+    EXPECT_NE(done.error()[0].hint.find("usable processors"), std::string::npos);
+    EXPECT_FALSE(set_up_this_thread(ThreadSetup{"t", 0, {-1}}));
+  }).join();
+}
+
+TEST(Threads, FifoPriorityIsSetWhereItIsAvailable) {
+  const int priority = available_fifo_priority(7);
+  if (priority == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+  EXPECT_EQ(fifo_priority(pthread_self()), 0);  // tried on another thread
+  std::thread([&] {
+    ASSERT_TRUE(set_up_this_thread(ThreadSetup{"t", priority, {}}));
+    EXPECT_EQ(fifo_priority(pthread_self()), priority);
+  }).join();
+}
+
+constexpr PriorityBand kBand{80, 90};
+
+TEST(ResolveMode, AutoTakesOsWhereItCanAndSaysWhy) {
+  const auto with_rights = resolve_mode(PreemptionMode::Auto, PolicyKind::RateMonotonic, kBand);
+  ASSERT_TRUE(with_rights);
+  EXPECT_EQ(with_rights->mode, PreemptionMode::Os);
+  EXPECT_EQ(with_rights->reason, "auto: this process may use SCHED_FIFO");
+
+  const auto without = resolve_mode(PreemptionMode::Auto, PolicyKind::RateMonotonic, {});
+  ASSERT_TRUE(without);
+  EXPECT_EQ(without->mode, PreemptionMode::Cooperative);
+  EXPECT_EQ(without->reason, "auto: this process may not use SCHED_FIFO");
+
+  const auto dynamic = resolve_mode(PreemptionMode::Auto, PolicyKind::Edf, kBand);
+  ASSERT_TRUE(dynamic);
+  EXPECT_EQ(dynamic->mode, PreemptionMode::Cooperative);
+  EXPECT_EQ(dynamic->reason, "auto: policy edf orders jobs, not threads");
+}
+
+TEST(ResolveMode, OsWithoutRightsIsAnErrorThatSaysHowToGetThem) {
+  const auto refused = resolve_mode(PreemptionMode::Os, PolicyKind::RateMonotonic, {});
+  ASSERT_FALSE(refused);
+  for (const char *way : {"setcap cap_sys_nice", "limits.conf", "--cap-add=SYS_NICE"}) {
+    EXPECT_NE(refused.error()[0].hint.find(way), std::string::npos) << way;
+  }
+  const auto dynamic = resolve_mode(PreemptionMode::Os, PolicyKind::Fifo, kBand);
+  ASSERT_FALSE(dynamic);
+  EXPECT_NE(dynamic.error()[0].hint.find("static policy"), std::string::npos);
+  EXPECT_TRUE(resolve_mode(PreemptionMode::None, PolicyKind::Fifo, {}));
+}
+
+TEST(ResolveMode, TheMostUrgentLevelHasTheTopPriorityAndTheLastOneIsValid) {
+  EXPECT_EQ(kBand.of_level(0), 80);
+  EXPECT_EQ(kBand.of_level(kBand.levels() - 1), 1);
+  const PriorityBand band = probe_priority_band();
+  EXPECT_TRUE(band.top_job == 0 || band.timer > band.top_job);
+}
+
+TEST(ModeWarnings, TellOfTooFewProcessors) {
+  EXPECT_TRUE(mode_warnings(Mode{PreemptionMode::None, {}}, 2, 2).empty());
+  ASSERT_EQ(mode_warnings(Mode{PreemptionMode::None, {}}, 4, 2).size(), 1U);
+}
+
+}  // namespace
+}  // namespace redag::runtime
