@@ -160,6 +160,21 @@ void DispatchRules::end_of_instant() {
   if (mode() == Preemption::Full) check_running();
 }
 
+// A simulated job that runs when the run ends must have something left to do.
+void DispatchRules::end_of_trace() {
+  if (!exact()) return;
+  for (std::uint32_t w = 0; w < context_.replay.worker_count(); ++w) {
+    const LiveJob *job = context_.replay.running(w);
+    if (job == nullptr) continue;
+    const Task &task = context_.replay.task(job->task);
+    Duration demand = execution_time(task, job->task, job->number, context_.info.seed);
+    if (task.budget > 0) demand = std::min(demand, task.budget);
+    const Duration executed = job->executed + (context_.info.end - job->on_worker_since);
+    context_.expect(Rule::Execution, executed < demand, job->task, job->number,
+                    [&] { return "it never ended, although it needs only " + format_duration(demand); });
+  }
+}
+
 // Who preempted must outrank whom it preempted.
 void DispatchRules::check_evictions() {
   const Replay &replay = context_.replay;

@@ -17,6 +17,7 @@ class DispatchRules {
   void before(const JobEvent &event);
   /// Time is about to move on.
   void end_of_instant();
+  void end_of_trace();
 
  private:
   // `waiting` was eligible when `chosen` got a worker that it outranked it for. Void if it starts in the same instant.

@@ -28,6 +28,7 @@ class Checker {
     for (std::size_t i = 0; i < trace_.events.size(); ++i) step(i, trace_.events[i]);
     end_of_instant();
     releases_.end_of_trace();
+    decisions_.end_of_trace();
     check_conservation();
     return std::move(report_);
   }

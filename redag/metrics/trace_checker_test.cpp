@@ -1,0 +1,493 @@
+// Every rule with a trace that keeps it and at least one that breaks it, written by hand.
+#include "redag/metrics/trace_checker.hpp"
+
+#include <gtest/gtest.h>
+
+#include "redag/testing/timeline.hpp"
+#include "redag/testing/trace_builder.hpp"
+
+namespace redag::metrics {
+namespace {
+
+using testing::make_dag;
+using testing::make_workload;
+using testing::TraceBuilder;
+
+// The trace breaks `rule`; what else it breaks as a consequence does not matter.
+void expect_broken(const trace::Trace &trace, Rule rule) {
+  const CheckReport report = check_trace(trace);
+  EXPECT_GT(report.violated(rule), 0U) << "expected: " << to_string(rule) << "\n" << report.to_string();
+}
+
+void expect_kept(const trace::Trace &trace, Rule rule) {
+  const CheckReport report = check_trace(trace);
+  EXPECT_TRUE(report.ok()) << report.to_string();
+  EXPECT_GT(report.checks(rule), 0U) << to_string(rule) << " was never tested";
+}
+
+// hi: T 10, C 1; lo: T 20, C 4. One worker.
+Workload two_tasks(PreemptionMode preemption = PreemptionMode::None, std::uint32_t workers = 1) {
+  return make_workload({make_dag("a", {{"hi", 10, 1}}), make_dag("b", {{"lo", 20, 4}})}, workers, preemption);
+}
+
+TraceBuilder two_tasks_run() {
+  TraceBuilder t(two_tasks());
+  t.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("hi", 0, 0, 10);
+  t.at(1).finished("hi", 0, 0).dispatched("lo", 0, 0, 20).at(5).finished("lo", 0, 0);
+  return t;
+}
+
+TEST(CheckTrace, AcceptsAGoodRun) {
+  const CheckReport report = check_trace(two_tasks_run().until(10));
+  EXPECT_TRUE(report.ok()) << report.to_string();
+  EXPECT_EQ(report.to_string(), "");
+  for (const Rule rule : {Rule::Stream, Rule::Life, Rule::Conservation, Rule::Grid, Rule::Precedence, Rule::Deadline,
+                          Rule::TaskOverlap, Rule::Worker, Rule::Priority, Rule::WorkConservation, Rule::Execution}) {
+    EXPECT_GT(report.checks(rule), 0U) << to_string(rule);
+  }
+}
+
+TEST(CheckTrace, NamesTheJobTheTimeAndTheRule) {
+  trace::Trace trace = two_tasks_run().until(10);
+  trace.events[5].value -= kMillisecond;  // finish of hi#0, as measured
+  const CheckReport report = check_trace(trace);
+  ASSERT_FALSE(report.ok());
+  EXPECT_EQ(report.violations.front().to_string(), "1ms a.hi#0: execution: it executed for 0s, expected 1ms (event 5)");
+}
+
+TEST(CheckTrace, StreamTimesNeverDecrease) {
+  trace::Trace trace = two_tasks_run().until(10);
+  trace.events.back().time = 0;
+  expect_broken(trace, Rule::Stream);
+}
+
+TEST(CheckTrace, StreamWithLostEventsIsNotChecked) {
+  trace::Trace trace = two_tasks_run().until(10);
+  trace.info.lost_events = 3;
+  const CheckReport report = check_trace(trace);
+  EXPECT_EQ(report.violation_count, 1U);
+  EXPECT_EQ(report.violated(Rule::Stream), 1U);
+}
+
+TEST(CheckTrace, StreamKnowsItsTasks) {
+  trace::Trace trace = two_tasks_run().until(10);
+  trace.events.back().task = TaskId(7);
+  expect_broken(trace, Rule::Stream);
+}
+
+TEST(CheckTrace, StartedMayComeLateFromAnotherRing) {
+  TraceBuilder t(two_tasks());
+  t.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("hi", 0, 0, 10).started("hi", 0, 0);
+  t.at(1).finished("hi", 0, 0).dispatched("lo", 0, 0, 20).at(2).started("lo", 0, 0);
+  expect_kept(t.until(3), Rule::Life);
+  expect_broken(t.at(2).started("lo", 0, 0).until(3), Rule::Life);
+}
+
+TEST(CheckTrace, LifeOfEachJob) {
+  const trace::Trace good = two_tasks_run().until(10);
+  for (std::size_t i = 0; i < good.events.size(); ++i) {
+    trace::Trace doubled = good;
+    doubled.events.insert(doubled.events.begin() + static_cast<std::ptrdiff_t>(i), good.events[i]);
+    expect_broken(doubled, good.events[i].kind == JobEventKind::Dispatched ? Rule::Worker : Rule::Life);
+    trace::Trace renumbered = good;
+    ++renumbered.events[i].job;
+    EXPECT_FALSE(check_trace(renumbered).ok()) << i;
+    trace::Trace missing = good;
+    missing.events.erase(missing.events.begin() + static_cast<std::ptrdiff_t>(i));
+    EXPECT_FALSE(check_trace(missing).ok()) << i;
+  }
+}
+
+TEST(CheckTrace, ConservationCountsReleasesTwice) {
+  trace::Trace trace = two_tasks_run().until(10);
+  trace.events.push_back(trace.events.front());  // hi#0 again: released twice, ended once
+  expect_broken(trace, Rule::Life);
+  trace.events.insert(trace.events.begin(), trace.events.front());
+  expect_broken(trace, Rule::Conservation);
+}
+
+TEST(CheckTrace, GridOfTimers) {
+  TraceBuilder off_grid(two_tasks());
+  off_grid.at(2).released("hi", 0);
+  expect_broken(off_grid.until(3), Rule::Grid);
+
+  TraceBuilder late(two_tasks());  // for the right time, but later than its jitter
+  late.at(2).released_for("hi", 0, 0).ready("hi", 0, 0).dispatched("hi", 0, 0, 10);
+  expect_broken(late.until(3), Rule::Grid);
+  trace::Trace real = late.until(3);
+  real.info.driver = trace::Driver::Threads;  // a real timer may be late
+  EXPECT_EQ(check_trace(real).violated(Rule::Grid), 0U);
+
+  expect_broken(two_tasks_run().until(12), Rule::Grid);  // hi#1 of 10 ms is missing
+}
+
+// src (T 10, C 1) -> aligned (T 10, same grid), slower (T 20) and data.
+Workload diamond() {
+  return make_workload(
+      {make_dag("d", {{"src", 10, 1}, {"aligned", 10, 1, {0}}, {"slower", 20, 1, {0}}, {"data", 0, 1, {0}}})}, 1);
+}
+
+TraceBuilder diamond_start() {
+  TraceBuilder t(diamond());
+  t.at(0).arrives("src", 0).released("aligned", 0).released("slower", 0).dispatched("src", 0, 0, 10);
+  t.at(1).finished("src", 0, 0);
+  return t;
+}
+
+TEST(CheckTrace, PrecedenceResolvesWithFreshData) {
+  TraceBuilder t = diamond_start();
+  t.ready("aligned", 0, 0).ready("slower", 0, 0).released("data", 0).ready("data", 0, 0);
+  t.dispatched("aligned", 0, 0, 10).at(2).finished("aligned", 0, 0).dispatched("data", 0, 0, 11);
+  t.at(3).finished("data", 0, 0).dispatched("slower", 0, 0, 20).at(4).finished("slower", 0, 0);
+  expect_kept(t.until(10), Rule::Precedence);
+
+  // Next period: aligned#1 must wait for src#1.
+  t.at(10).arrives("src", 1).released("aligned", 1);
+  TraceBuilder stale = t;
+  expect_broken(stale.ready("aligned", 1, 0).dispatched("src", 1, 0, 20).until(11), Rule::Precedence);
+}
+
+TEST(CheckTrace, PrecedenceOwesReadiness) {
+  TraceBuilder t = diamond_start();
+  t.ready("aligned", 0, 0).released("data", 0).ready("data", 0, 0).dispatched("aligned", 0, 0, 10);
+  expect_broken(t.until(2), Rule::Precedence);  // slower#0 has its data
+}
+
+TEST(CheckTrace, PrecedenceOwesADataRelease) {
+  TraceBuilder t = diamond_start();
+  t.ready("aligned", 0, 0).ready("slower", 0, 0).dispatched("aligned", 0, 0, 10);
+  expect_broken(t.until(2), Rule::Precedence);
+}
+
+TEST(CheckTrace, PrecedenceChecksOriginAndReleaseOfDataJobs) {
+  TraceBuilder wrong_release = diamond_start();
+  wrong_release.ready("aligned", 0, 0).ready("slower", 0, 0).released_for("data", 0, 0).ready("data", 0, 0);
+  expect_broken(wrong_release.dispatched("aligned", 0, 0, 10).until(2), Rule::Precedence);
+  TraceBuilder wrong_origin = diamond_start();
+  wrong_origin.ready("aligned", 0, 0).ready("slower", 0, 0).released("data", 0).ready("data", 0, 1);
+  expect_broken(wrong_origin.dispatched("aligned", 0, 0, 10).until(2), Rule::Precedence);
+}
+
+TEST(CheckTrace, PrecedenceAbortedJobsReleaseNobody) {
+  TraceBuilder t(diamond());
+  t.at(0).arrives("src", 0).released("aligned", 0).released("slower", 0).dispatched("src", 0, 0, 10);
+  t.at(1).aborted("src", 0, 0, Reason::Exception);
+  expect_kept(t.until(5), Rule::Life);
+  expect_broken(t.released("data", 0).ready("data", 0, 0).dispatched("data", 0, 0, 11).until(2), Rule::Precedence);
+}
+
+// blocker: T 100, C 25, more urgent by its DAG's policy; victim: T 10.
+TraceBuilder overrun_run() {
+  Workload w = make_workload({make_dag("a", {{"blocker", 100, 25}}), make_dag("b", {{"victim", 10, 1, {}, "", 1}})}, 1);
+  TraceBuilder t(w);
+  t.at(0).arrives("blocker", 0).dispatched("blocker", 0, 0, 100).at(1).arrives("victim", 0);
+  t.at(11).released("victim", 1);
+  return t;
+}
+
+TEST(CheckTrace, AdmissionSkipsTheOldJob) {
+  TraceBuilder good = overrun_run();
+  good.skipped("victim", 0, Reason::Overrun).ready("victim", 1, 11);
+  expect_kept(good.until(15), Rule::Admission);
+
+  TraceBuilder wrong_reason = overrun_run();
+  expect_broken(wrong_reason.skipped("victim", 0, Reason::Precedence).ready("victim", 1, 11).until(15),
+                Rule::Admission);
+  TraceBuilder forgotten = overrun_run();
+  expect_broken(forgotten.ready("victim", 1, 11).until(15), Rule::Admission);
+  TraceBuilder wrong_job = overrun_run();
+  expect_broken(wrong_job.skipped("victim", 1, Reason::Overrun).until(15), Rule::Admission);
+  TraceBuilder groundless = two_tasks_run();
+  groundless.at(10).arrives("hi", 1).skipped("hi", 1, Reason::Overrun);
+  expect_broken(groundless.until(10), Rule::Admission);
+}
+
+TEST(CheckTrace, AdmissionSkipsWhatIsNotReady) {
+  TraceBuilder t(make_workload({make_dag("a", {{"src", 40, 1, {}, "", 39}, {"sink", 10, 1, {0}}})}, 1));
+  t.at(0).released("sink", 0).at(10).released("sink", 1);
+  TraceBuilder good = t;
+  expect_kept(good.skipped("sink", 0, Reason::Precedence).until(20), Rule::Admission);
+  expect_broken(t.skipped("sink", 0, Reason::Overrun).until(20), Rule::Admission);
+}
+
+TEST(CheckTrace, AdmissionQueues) {
+  Workload w = make_workload({make_dag("a", {{"blocker", 100, 45}}), make_dag("b", {{"q", 10, 1, {}, "", 1}})}, 1);
+  w.dags[1].tasks[0].overrun = Overrun::Queue;
+  w.dags[1].tasks[0].queue_depth = 2;
+  TraceBuilder t(w);
+  t.at(0).arrives("blocker", 0).dispatched("blocker", 0, 0, 100).at(1).arrives("q", 0).at(11).arrives("q", 1);
+  t.at(21).released("q", 2);
+  TraceBuilder good = t;
+  expect_kept(good.skipped("q", 2, Reason::QueueFull).until(30), Rule::Admission);
+  TraceBuilder too_many = t;
+  expect_broken(too_many.ready("q", 2, 21).until(30), Rule::Admission);
+  TraceBuilder early = t;  // one fewer waits than the queue holds
+  early.skipped("q", 2, Reason::QueueFull).at(31).released("q", 3).skipped("q", 0, Reason::Overrun);
+  expect_broken(early.until(40), Rule::Admission);
+}
+
+TEST(CheckTrace, AdmissionBoundsThePendingJobsOfADag) {
+  Workload w = make_workload(
+      {make_dag("a", {{"blocker", 100, 45}}), make_dag("b", {{"x", 50, 1, {}, "", 1}, {"y", 50, 1, {}, "", 2}})}, 1);
+  w.dags[1].max_pending = 1;
+  TraceBuilder t(w);
+  t.at(0).arrives("blocker", 0).dispatched("blocker", 0, 0, 100).at(1).arrives("x", 0).at(2).released("y", 0);
+  TraceBuilder good = t;
+  expect_kept(good.skipped("y", 0, Reason::DagFull).until(10), Rule::Admission);
+  expect_broken(t.ready("y", 0, 2).until(10), Rule::Admission);
+}
+
+TEST(CheckTrace, Deadline) {
+  trace::Trace trace = two_tasks_run().until(10);
+  trace.events[4].value += 1;
+  expect_broken(trace, Rule::Deadline);
+}
+
+TEST(CheckTrace, TaskOverlapAndOrder) {
+  Workload w = make_workload({make_dag("a", {{"t", 10, 15}})}, 2);
+  w.dags[0].tasks[0].overrun = Overrun::Queue;
+  w.dags[0].tasks[0].queue_depth = 5;
+  TraceBuilder t(w);
+  t.at(0).arrives("t", 0).dispatched("t", 0, 0, 10).at(10).arrives("t", 1);
+  TraceBuilder good = t;
+  expect_kept(good.at(15).finished("t", 0, 0).dispatched("t", 1, 0, 20).until(20), Rule::TaskOverlap);
+  TraceBuilder overlap = t;
+  expect_broken(overlap.dispatched("t", 1, 1, 20).until(12), Rule::TaskOverlap);
+  TraceBuilder overtaken = t;
+  overtaken.at(15).finished("t", 0, 0).dispatched("t", 1, 0, 20).at(20).arrives("t", 2).at(30).arrives("t", 3);
+  overtaken.finished("t", 1, 0).dispatched("t", 3, 0, 40);
+  expect_broken(overtaken.until(31), Rule::TaskOverlap);
+}
+
+// x and y of one DAG with max_active 1; z of another; two workers.
+TraceBuilder bounded() {
+  TraceBuilder t(make_workload({make_dag("a", {{"x", 10, 2}, {"y", 10, 2}}, 1), make_dag("b", {{"z", 20, 4}})}, 2));
+  t.at(0).arrives("x", 0).arrives("y", 0).arrives("z", 0).dispatched("x", 0, 0, 10);
+  return t;
+}
+
+TEST(CheckTrace, MaxActiveAndDeferral) {
+  TraceBuilder good = bounded();
+  good.deferred("y", 0).dispatched("z", 0, 1, 20).at(2).finished("x", 0, 0).dispatched("y", 0, 0, 10);
+  expect_kept(good.until(3), Rule::MaxActive);
+  expect_kept(good.until(3), Rule::Deferral);
+
+  TraceBuilder over = bounded();
+  expect_broken(over.dispatched("y", 0, 1, 10).until(1), Rule::MaxActive);
+
+  TraceBuilder groundless(two_tasks());
+  groundless.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("hi", 0, 0, 10).deferred("lo", 0);
+  expect_broken(groundless.until(1), Rule::Deferral);
+
+  TraceBuilder uncounted(make_workload({make_dag("a", {{"x", 10, 2}, {"y", 10, 2}}, 1)}, 2));
+  uncounted.at(0).arrives("x", 0).arrives("y", 0).dispatched("x", 0, 0, 10);
+  expect_broken(uncounted.until(1), Rule::Deferral);
+}
+
+TEST(CheckTrace, MaxStartedIsABoundToo) {
+  TraceBuilder t(make_workload({make_dag("a", {{"x", 10, 2}, {"y", 10, 2}})}, 2, PreemptionMode::Os));
+  t.at(0).arrives("x", 0).arrives("y", 0).dispatched("x", 0, 0, 10);
+  trace::Trace one = t.until(1);
+  one.info.config.max_started = 1;
+  expect_kept(one, Rule::MaxActive);
+  trace::Trace two = t.dispatched("y", 0, 1, 10).until(1);
+  two.info.config.max_started = 1;
+  expect_broken(two, Rule::MaxActive);
+}
+
+TEST(CheckTrace, GroupsExclude) {
+  const Workload w = make_workload({make_dag("a", {{"x", 10, 2, {}, "g"}}), make_dag("b", {{"y", 20, 2, {}, "g"}})}, 2);
+  TraceBuilder t(w);
+  t.at(0).arrives("x", 0).arrives("y", 0).dispatched("x", 0, 0, 10);
+  TraceBuilder good = t;
+  expect_kept(good.at(2).finished("x", 0, 0).dispatched("y", 0, 0, 20).until(3), Rule::Group);
+  expect_broken(t.dispatched("y", 0, 1, 20).until(1), Rule::Group);
+}
+
+TEST(CheckTrace, WorkersRunOneJobAtATime) {
+  TraceBuilder t(two_tasks());
+  t.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("hi", 0, 0, 10);
+  TraceBuilder twice = t;
+  expect_broken(twice.dispatched("lo", 0, 0, 20).until(1), Rule::Worker);
+  TraceBuilder nowhere = t;
+  expect_broken(nowhere.at(1).finished("hi", 0, 0).dispatched("lo", 0, 5, 20).until(2), Rule::Worker);
+}
+
+// lo runs from 0; hi comes at 5 (offset).
+TraceBuilder preemptive(PreemptionMode mode, Duration region_ms = 0) {
+  Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "", 5}}), make_dag("b", {{"lo", 20, 8}})}, 1, mode);
+  w.dags[1].tasks[0].region = region_ms * kMillisecond;
+  TraceBuilder t(w);
+  t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(5).arrives("hi", 0);
+  return t;
+}
+
+TEST(CheckTrace, FullPreemption) {
+  TraceBuilder good = preemptive(PreemptionMode::Os);
+  good.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).at(6).finished("hi", 0, 0).resumed("lo", 0, 0);
+  good.at(9).finished("lo", 0, 0);
+  expect_kept(good.until(10), Rule::Preemption);
+
+  expect_broken(preemptive(PreemptionMode::Os).until(6), Rule::Priority);  // hi waits
+  TraceBuilder nobody = preemptive(PreemptionMode::Os);
+  expect_broken(nobody.preempted("lo", 0, 0).until(6), Rule::WorkConservation);
+  TraceBuilder not_here = preemptive(PreemptionMode::None);
+  expect_broken(not_here.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).until(6), Rule::Preemption);
+  TraceBuilder forgotten = preemptive(PreemptionMode::Os);
+  forgotten.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).at(6).finished("hi", 0, 0);
+  expect_broken(forgotten.until(8), Rule::WorkConservation);
+  TraceBuilder ended = preemptive(PreemptionMode::Os);
+  ended.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).finished("lo", 0, 0);
+  expect_broken(ended.until(6), Rule::Life);
+}
+
+TEST(CheckTrace, OnlyTheMoreUrgentPreempt) {
+  TraceBuilder t(make_workload({make_dag("a", {{"hi", 10, 5}}), make_dag("b", {{"lo", 20, 4, {}, "", 2}})}, 1,
+                               PreemptionMode::Os));
+  t.at(0).arrives("hi", 0).dispatched("hi", 0, 0, 10).at(2).arrives("lo", 0);
+  t.preempted("hi", 0, 0).dispatched("lo", 0, 0, 22);
+  expect_broken(t.until(3), Rule::Preemption);
+  expect_broken(t.until(3), Rule::Priority);
+}
+
+TEST(CheckTrace, TasksThatShareALevelDoNotPreempt) {
+  TraceBuilder waits = preemptive(PreemptionMode::Os);
+  trace::Trace shared = waits.until(6);
+  shared.info.config.levels = 1;
+  expect_kept(shared, Rule::Priority);
+  trace::Trace preempts = waits.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).until(6);
+  preempts.info.config.levels = 1;
+  expect_broken(preempts, Rule::Preemption);
+}
+
+TEST(CheckTrace, CooperativePreemptionAtPointsAndLifo) {
+  TraceBuilder good = preemptive(PreemptionMode::Cooperative, 3);  // points at 3 and 6
+  good.at(6).preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).at(7).finished("hi", 0, 0).resumed("lo", 0, 0);
+  good.at(9).finished("lo", 0, 0);
+  expect_kept(good.until(10), Rule::Preemption);
+
+  TraceBuilder between = preemptive(PreemptionMode::Cooperative, 3);
+  expect_broken(between.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).until(6), Rule::Preemption);
+  TraceBuilder not_last = preemptive(PreemptionMode::Cooperative, 3);
+  not_last.at(6).preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).finished("lo", 0, 0);
+  expect_broken(not_last.until(7), Rule::Life);
+  TraceBuilder idle = preemptive(PreemptionMode::Cooperative, 3);
+  idle.at(6).preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).at(7).finished("hi", 0, 0);
+  expect_broken(idle.until(8), Rule::WorkConservation);
+}
+
+TEST(CheckTrace, CooperativeResumesOnlyBelowEverybodyElse) {
+  Workload w = make_workload(
+      {make_dag("a", {{"h1", 10, 2, {}, "", 5}, {"h2", 10, 2, {}, "", 6}}), make_dag("b", {{"lo", 20, 9}})}, 1,
+      PreemptionMode::Cooperative);
+  w.dags[1].tasks[0].region = 5 * kMillisecond;
+  TraceBuilder t(w);
+  t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(5).arrives("h1", 0);
+  t.preempted("lo", 0, 0).dispatched("h1", 0, 0, 15).at(6).arrives("h2", 0).at(7).finished("h1", 0, 0);
+  TraceBuilder good = t;
+  good.dispatched("h2", 0, 0, 16).at(9).finished("h2", 0, 0).resumed("lo", 0, 0);
+  expect_kept(good.until(10), Rule::Priority);
+  expect_broken(t.resumed("lo", 0, 0).until(8), Rule::Priority);
+}
+
+TEST(CheckTrace, CooperativePrefersAFreeWorker) {
+  Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "", 5}}), make_dag("b", {{"lo", 20, 8}})}, 2,
+                             PreemptionMode::Cooperative);
+  w.dags[1].tasks[0].region = 5 * kMillisecond;
+  TraceBuilder t(w);
+  t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(5).arrives("hi", 0);
+  expect_broken(t.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).until(6), Rule::Priority);
+}
+
+TEST(CheckTrace, PriorityOfTheChosen) {
+  TraceBuilder t(two_tasks());
+  t.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("lo", 0, 0, 20);
+  expect_broken(t.until(1), Rule::Priority);
+  EXPECT_TRUE(check_trace(t.until(1), RuleSet::wait_set()).ok());
+}
+
+TEST(CheckTrace, PriorityFollowsThePolicy) {
+  // hi has the smaller period, lo the earlier deadline and, at 2 ms, was ready first.
+  Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "", 2}}), make_dag("b", {{"lo", 20, 1, {}, "", 1, 5}}),
+                              make_dag("c", {{"first", 50, 3}})},
+                             1);
+  const auto run = [&](PolicyKind policy, const char *next, Time deadline) {
+    w.policy = policy;
+    TraceBuilder t(w);
+    t.at(0).arrives("first", 0).dispatched("first", 0, 0, 50).at(1).arrives("lo", 0).at(2).arrives("hi", 0);
+    t.at(3).finished("first", 0, 0).dispatched(next, 0, 0, deadline);
+    return check_trace(t.until(4)).violated(Rule::Priority) == 0;
+  };
+  EXPECT_TRUE(run(PolicyKind::RateMonotonic, "hi", 12));
+  EXPECT_FALSE(run(PolicyKind::RateMonotonic, "lo", 6));
+  for (const PolicyKind policy : {PolicyKind::DeadlineMonotonic, PolicyKind::Edf, PolicyKind::Fifo}) {
+    EXPECT_TRUE(run(policy, "lo", 6)) << to_string(policy);
+    EXPECT_FALSE(run(policy, "hi", 12)) << to_string(policy);
+  }
+}
+
+// lo holds the group that hi wants; mid must not run in between (one worker, full preemption).
+TEST(CheckTrace, PriorityIsInherited) {
+  const Workload w =
+      make_workload({make_dag("a", {{"hi", 10, 1, {}, "g", 1}}), make_dag("b", {{"mid", 15, 3, {}, "", 2}}),
+                     make_dag("c", {{"lo", 20, 4, {}, "g"}})},
+                    1, PreemptionMode::Os);
+  TraceBuilder t(w);
+  t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(1).arrives("hi", 0).at(2).arrives("mid", 0);
+  TraceBuilder good = t;
+  good.at(4).finished("lo", 0, 0).dispatched("hi", 0, 0, 11).at(5).finished("hi", 0, 0).dispatched("mid", 0, 0, 17);
+  expect_kept(good.until(6), Rule::Priority);
+  expect_broken(t.preempted("lo", 0, 0).dispatched("mid", 0, 0, 17).until(3), Rule::Priority);
+}
+
+TEST(CheckTrace, WorkIsConserved) {
+  TraceBuilder t(two_tasks());
+  expect_broken(t.at(0).arrives("hi", 0).arrives("lo", 0).until(1), Rule::WorkConservation);
+  EXPECT_TRUE(check_trace(t.until(1), RuleSet::wait_set()).ok());
+}
+
+TEST(CheckTrace, ExecutionIsWhatTheJobNeeds) {
+  TraceBuilder longer(two_tasks());
+  longer.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("hi", 0, 0, 10).at(2).finished("hi", 0, 0);
+  longer.dispatched("lo", 0, 0, 20);
+  expect_broken(longer.until(3), Rule::Execution);
+  trace::Trace with_overheads = longer.until(3);
+  with_overheads.info.overheads = "dispatch 1ms";
+  expect_kept(with_overheads, Rule::Execution);
+
+  TraceBuilder endless(two_tasks());
+  endless.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("hi", 0, 0, 10);
+  expect_broken(endless.until(5), Rule::Execution);
+
+  Workload w = two_tasks();
+  w.dags[1].tasks[0].budget = 3 * kMillisecond;
+  TraceBuilder cut(w);
+  cut.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("hi", 0, 0, 10).at(1).finished("hi", 0, 0);
+  cut.dispatched("lo", 0, 0, 20);
+  TraceBuilder good = cut;
+  expect_kept(good.at(4).aborted("lo", 0, 0, Reason::Budget).until(5), Rule::Execution);
+  expect_broken(cut.at(3).aborted("lo", 0, 0, Reason::Budget).until(5), Rule::Execution);
+}
+
+TEST(CheckTrace, RemovedDagsReleaseNothingMore) {
+  TraceBuilder t = diamond_start();
+  t.ready("aligned", 0, 0)
+      .ready("slower", 0, 0)
+      .released("data", 0)
+      .ready("data", 0, 0)
+      .dispatched("aligned", 0, 0, 10);
+  t.at(2).skipped("slower", 0, Reason::Removed).skipped("data", 0, Reason::Removed).finished("aligned", 0, 0);
+  expect_kept(t.until(50), Rule::Life);
+}
+
+TEST(CheckReport, CountsWhatItDoesNotKeep) {
+  trace::Trace trace = two_tasks_run().until(10);
+  for (int i = 0; i < 1000; ++i) trace.events.push_back(trace.events.back());
+  const CheckReport report = check_trace(trace);
+  EXPECT_EQ(report.violations.size(), CheckReport::kMaxKept);
+  EXPECT_EQ(report.violation_count, 1001U);  // and, once, conservation
+  EXPECT_NE(report.to_string(2).find("and 999 more"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace redag::metrics
