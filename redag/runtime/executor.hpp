@@ -40,12 +40,12 @@ struct ExecutorOptions {
   PreemptionMode preemption = PreemptionMode::Auto;
   PolicyKind policy = PolicyKind::RateMonotonic;
   std::uint32_t threads = 0;       // os: jobs that can be started and unfinished at once; 0: workers + 16
-  std::vector<int> cpus;           // processors for the workers; empty: os takes `workers` of the usable ones
+  std::vector<int> cpus{};         // processors for the workers; empty: os takes `workers` of the usable ones
   bool lock_memory = false;        // if it cannot be had, warnings() says so
   std::size_t trace_capacity = 0;  // events kept between two drain(); 0: none are recorded
   nanoseconds stop_timeout = std::chrono::seconds(10);  // how long stopping waits for bodies to return
-  std::function<OnException(const ExceptionInfo &)>
-      on_exception;  // empty: Stop. On the worker's thread; must not throw
+  // Called on the worker's thread; must not throw. Empty: Stop.
+  std::function<OnException(const ExceptionInfo &)> on_exception{};
 };
 
 struct TaskStats {

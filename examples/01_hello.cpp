@@ -1,0 +1,23 @@
+// The smallest program: one task every 100 ms, and a body that ends the run.
+#include <cstdio>
+
+#include "redag/runtime/executor.hpp"
+
+using namespace std::chrono_literals;
+using redag::runtime::DagBuilder;
+using redag::runtime::Executor;
+
+int main() {
+  Executor executor;
+  int jobs = 0;
+  DagBuilder greeter("greeter");
+  greeter.timer("hello", 100ms, [&] {
+    std::printf("hello %d\n", ++jobs);
+    if (jobs == 5) executor.stop();
+  });
+  executor.add(std::move(greeter));
+
+  const auto &mode = executor.mode();
+  std::printf("preemption: %s (%s)\n", redag::to_string(mode.mode), mode.reason.c_str());
+  executor.run();
+}

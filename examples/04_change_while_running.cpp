@@ -1,0 +1,39 @@
+// DAGs that come and go while others run, and Ctrl-C.
+#include <csignal>
+#include <cstdio>
+
+#include "redag/runtime/executor.hpp"
+
+using namespace std::chrono_literals;
+using namespace redag::runtime;
+
+namespace {
+Executor *running = nullptr;
+}
+
+int main() {
+  Executor executor;
+  running = &executor;
+  std::signal(SIGINT, [](int) { running->request_stop(); });
+
+  redag::DagId inspection;  // of the mode that is switched on and off
+  bool inspecting = false;
+  int seconds = 0;
+  DagBuilder supervisor("supervisor");
+  supervisor.timer("decide", 200ms, [&] {
+    if (inspecting) {
+      executor.remove(inspection);
+      std::puts("inspection off");
+    } else {
+      DagBuilder dag("inspection");
+      const TaskHandle camera = dag.timer("camera", 50ms, [] { std::puts("  picture"); });
+      dag.data("check", {camera}, [] { std::puts("  checked"); });
+      inspection = executor.add(std::move(dag));
+      std::puts("inspection on");
+    }
+    inspecting = !inspecting;
+    if (++seconds == 6) executor.stop();
+  });
+  executor.add(std::move(supervisor));
+  executor.run();
+}
