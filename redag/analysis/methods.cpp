@@ -1,9 +1,12 @@
 #include "redag/analysis/bound.hpp"
+#include "redag/analysis/response_time.hpp"
 
 namespace redag::analysis {
 
 const std::vector<Method> &methods() {
-  static const std::vector<Method> all = {};
+  static const std::vector<Method> all = {
+      rta_preemptive(), rta_nonpreemptive(), rta_deferred(), dag_one_worker_preemptive(), dag_one_worker_deferred(),
+  };
   return all;
 }
 

@@ -38,6 +38,11 @@ class Compiler {
     if (system_.mode == sched::Preemption::Full && threads > 0 && threads < system_.tasks.size()) {
       refuse("fewer threads than tasks: a job can wait for a thread that less urgent jobs hold");
     }
+    // With several workers the preempted job pays in its own time, which no interference divided by m covers.
+    if (system_.platform.workers > 1 && system_.mode != sched::Preemption::None &&
+        system_.platform.preempt_overhead > 0) {
+      refuse("a preemption overhead on several workers");
+    }
     return std::move(system_);
   }
 
@@ -234,10 +239,9 @@ Result<System> compile(const Workload &workload, const AnalysisPlatform &platfor
   if (std::min({platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead}) < 0) {
     return make_error("an overhead is negative");
   }
-  Workload complete = workload;
-  if (has_errors(validate(complete))) return tl::unexpected<Diagnostics>(validate(complete));
-  for (Dag &dag : complete.dags) inherit_periods(dag);
-  return Compiler(complete, platform).run();
+  Diagnostics mistakes = validate(workload);
+  if (has_errors(mistakes)) return tl::unexpected<Diagnostics>(std::move(mistakes));
+  return Compiler(workload, platform).run();
 }
 
 }  // namespace redag::analysis

@@ -22,7 +22,7 @@ struct AnalysisPlatform {
   std::uint32_t max_started = 0;  // jobs started and unfinished at once; 0: no bound (sched::Config::max_started)
   Duration release_overhead = 0;  // each job, before its body
   Duration dispatch_overhead = 0;
-  Duration preempt_overhead = 0;  // each resumption; charged to the job that preempted
+  Duration preempt_overhead = 0;  // each resumption; charged to the job that preempted (one worker only)
 
   friend bool operator==(const AnalysisPlatform &, const AnalysisPlatform &) = default;
 };
@@ -97,8 +97,8 @@ struct System {
   [[nodiscard]] bool has_edges() const;  // some unit has
 };
 
-/// Errors: what validate() calls an error, and a platform without workers or with negative overheads. Periods are
-/// inherited here if they are not yet. O(n log n + edges).
+/// Errors: what validate() calls an error (periods of data tasks must be set: inherit_periods()), a platform without
+/// workers or with negative overheads. O(n log n + edges).
 [[nodiscard]] Result<System> compile(const Workload &workload, const AnalysisPlatform &platform);
 
 }  // namespace redag::analysis

@@ -1,0 +1,177 @@
+#include "redag/analysis/global.hpp"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/sched/policy.hpp"
+
+namespace redag::analysis::global {
+namespace {
+
+std::optional<std::string> why_not_mode(const System &system, const Needs &needs) {
+  if (!needs.any_policy && !sched::is_static(system.policy)) {
+    return std::string("for static priorities; the policy is ") + to_string(system.policy);
+  }
+  if (system.mode == needs.mode) return std::nullopt;
+  return needs.mode == sched::Preemption::Full
+             ? "for full preemption; here jobs keep the worker until they end or reach a preemption point"
+             : "for jobs that run to completion; here they can be preempted";
+}
+
+std::optional<std::string> why_not_structure(const System &system, const Needs &needs) {
+  if (!needs.edges && system.has_edges()) return "tasks have predecessors: see the bounds for DAGs";
+  if (!needs.groups && !system.groups.empty()) return "exclusive groups: a worker can idle while a job waits";
+  for (const SystemDag &dag : system.dags) {
+    if (dag.max_active == 0) continue;
+    if (!needs.bounds) return "DAG '" + dag.name + "' has a max_active: a worker can idle while a job waits";
+    if (dag.units.size() > 1) return "DAG '" + dag.name + "': several of its parts share one max_active";
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> why_not_order(const System &system, const std::vector<GlobalUnit> &units) {
+  for (std::size_t i = 0; i + 1 < units.size(); ++i) {
+    const Unit &upper = system.units[units[i].unit];
+    const Unit &lower = system.units[units[i + 1].unit];
+    if (upper.last_rank > lower.first_rank) {
+      return "priorities of '" + system.dags[upper.dag.value].name + "' and '" + system.dags[lower.dag.value].name +
+             "' are interleaved";
+    }
+    const std::uint32_t upper_level = system.tasks[system.by_rank[upper.last_rank]].level;
+    const std::uint32_t lower_level = system.tasks[system.by_rank[lower.first_rank]].level;
+    if (system.mode == sched::Preemption::Full && upper_level == lower_level) {
+      return "'" + system.dags[upper.dag.value].name + "' and '" + system.dags[lower.dag.value].name +
+             "' share a priority level, so they do not preempt each other";
+    }
+  }
+  return std::nullopt;
+}
+
+// Times so small that no sum of workloads wraps and divide() is exact.
+bool fits(const std::vector<GlobalUnit> &units, std::uint32_t workers) {
+  Duration longest = 1;
+  for (const GlobalUnit &unit : units) longest = std::max(longest, unit.period);
+  const Int128 sum = Int128{longest} * 4 * workers * (static_cast<Duration>(units.size()) + 2);
+  return longest < (Duration{1} << 50U) && sum < (Int128{1} << 62U);
+}
+
+// The longest path's overhead, and the most tasks on any path.
+void measure_paths(const System &system, const Unit &unit, GlobalUnit &result) {
+  if (unit.tasks.size() == 1) {
+    result.path_overhead = system.tasks[unit.tasks.front()].overhead;
+    return;
+  }
+  struct Path {
+    Duration length = 0;
+    Duration overhead = 0;
+    std::uint32_t tasks = 0;
+  };
+  std::map<std::uint32_t, Path> paths;
+  for (const std::uint32_t t : unit.tasks) {
+    const SystemTask &task = system.tasks[t];
+    Path longest;
+    std::uint32_t most = 0;
+    for (const std::uint32_t p : task.predecessors) {
+      const Path &before = paths[p];
+      if (before.length > longest.length) longest = before;
+      most = std::max(most, before.tasks);
+    }
+    const Path path{add(longest.length, task.wcet), add(longest.overhead, task.overhead), most + 1};
+    if (path.length == unit.length) result.path_overhead = path.overhead;
+    result.path_tasks = std::max(result.path_tasks, path.tasks);
+    paths[t] = path;
+  }
+}
+
+GlobalUnit make_unit(const System &system, std::uint32_t id) {
+  const Unit &unit = system.units[id];
+  const SystemDag &dag = system.dags[unit.dag.value];
+  const std::uint32_t workers = system.platform.workers;
+  GlobalUnit result;
+  result.unit = id;
+  result.volume = unit.volume;
+  result.length = unit.length;
+  result.period = unit.period;
+  result.jitter = unit.jitter;
+  result.limit = std::min(unit.limit, unit.period);
+  result.rate = 1.0 / static_cast<double>(unit.period);
+  result.tasks = static_cast<std::uint32_t>(unit.tasks.size());
+  result.bound = dag.max_active > 0 && dag.max_active < result.tasks ? std::min(dag.max_active, workers) : 0;
+  result.width = std::min({workers, result.tasks, result.bound > 0 ? result.bound : result.tasks});
+  result.head = result.volume / result.width;
+  measure_paths(system, unit, result);
+  return result;
+}
+
+}  // namespace
+
+Units units_of(const System &system, const Needs &needs) {
+  Units result;
+  result.workers = system.platform.workers;
+  result.reason = why_not_mode(system, needs);
+  if (!result.reason) result.reason = why_not_structure(system, needs);
+  if (result.reason) return result;
+  result.units.reserve(system.units.size());
+  for (std::uint32_t u = 0; u < system.units.size(); ++u) result.units.push_back(make_unit(system, u));
+  std::sort(result.units.begin(), result.units.end(), [&](const GlobalUnit &a, const GlobalUnit &b) {
+    return system.units[a.unit].first_rank < system.units[b.unit].first_rank;
+  });
+  if (!needs.any_policy) result.reason = why_not_order(system, result.units);
+  if (!result.reason && !fits(result.units, result.workers)) result.reason = "periods too long for exact sums";
+  return result;
+}
+
+SharedTerms::SharedTerms(const System &system, const GlobalUnit &unit) : system_(system), unit_(unit) {}
+
+void SharedTerms::push(Term::Kind kind, const GlobalUnit &whose, Duration amount, std::int64_t jobs) {
+  const Unit &unit = system_.units[whose.unit];
+  const TaskId task = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
+  terms_.push_back(Term{kind, task, unit.dag, amount, jobs});
+}
+
+void SharedTerms::add_path() {
+  push(Term::Kind::Own, unit_, unit_.length - unit_.path_overhead, 1);
+  if (unit_.path_overhead > 0) push(Term::Kind::Overhead, unit_, unit_.path_overhead, 0);
+}
+
+void SharedTerms::add_jitter() {
+  if (unit_.jitter > 0) push(Term::Kind::Jitter, unit_, unit_.jitter, 0);
+}
+
+void SharedTerms::add(Term::Kind kind, const GlobalUnit &whose, Duration amount, std::int64_t jobs) {
+  if (amount != 0) push(kind, whose, amount, jobs);
+}
+
+void SharedTerms::add_share(Term::Kind kind, const GlobalUnit &whose, Duration numerator, Duration denominator,
+                            std::int64_t jobs) {
+  const Int128 common = Int128{denominator_} * denominator;
+  const Int128 sum = Int128{remainder_} * denominator + Int128{numerator} * denominator_;
+  const auto whole = static_cast<Duration>(sum / common);
+  // Kept small: at most two denominators meet, a max_active and the number of workers.
+  const auto rest = static_cast<Duration>(sum % common);
+  const Duration divisor = std::gcd(rest, static_cast<Duration>(common));
+  remainder_ = rest / divisor;
+  denominator_ = static_cast<Duration>(common) / divisor;
+  if (numerator != 0) push(kind, whose, whole, jobs);
+}
+
+Duration largest_remaining(const System &system, const std::vector<GlobalUnit> &units, std::size_t from,
+                           std::uint32_t count) {
+  std::vector<Duration> all;
+  std::vector<Duration> own;
+  for (std::size_t u = from; u < units.size(); ++u) {
+    own.clear();
+    for (const std::uint32_t t : system.units[units[u].unit].tasks) own.push_back(system.tasks[t].wcet - 1);
+    std::sort(own.begin(), own.end(), std::greater<>());
+    own.resize(std::min<std::size_t>(own.size(), units[u].width));
+    all.insert(all.end(), own.begin(), own.end());
+  }
+  std::sort(all.begin(), all.end(), std::greater<>());
+  Duration sum = 0;
+  for (std::size_t i = 0; i < all.size() && i < count; ++i) sum = add(sum, all[i]);
+  return sum;
+}
+
+}  // namespace redag::analysis::global

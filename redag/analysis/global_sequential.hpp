@@ -1,0 +1,45 @@
+// Response times of independent tasks under global scheduling on m workers: three fixed points and their methods.
+// Responses must stay within the period. Pure functions; the fixed points allocate nothing.
+#pragma once
+
+#include <span>
+
+#include "redag/analysis/bound.hpp"
+#include "redag/analysis/global.hpp"
+
+namespace redag::analysis {
+
+namespace global {
+
+/// Work of a sequential task in any window of length x when each job executes within `response` of its release:
+/// N C + min(C, x + R - C - N T), N = floor((x + R - C) / T), and never more than x. Bertogna, Cirinei, RTSS 2007,
+/// eq. 4.
+[[nodiscard]] inline Duration sequential_work(const GlobalUnit &task, Duration x) {
+  const Division jobs = divide(std::max<Duration>(0, x + task.response - task.volume), task);
+  return std::min(x, jobs.quotient * task.volume + std::min(task.volume, jobs.remainder));
+}
+
+/// Each fills in `response` of units[k] given those of the more urgent ones, units[0 .. k). False: above its limit, or
+/// `steps` ran out.
+[[nodiscard]] bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers);
+[[nodiscard]] bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers);
+/// `remaining`: sum of the m largest C - 1 of less urgent tasks.
+[[nodiscard]] bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
+                                                     Duration remaining);
+
+}  // namespace global
+
+/// R = C + floor(sum min(W_i(R), R - C + 1) / m) over more urgent tasks. M. Bertogna, M. Cirinei, RTSS 2007.
+[[nodiscard]] Method bertogna_cirinei();
+
+/// The same over all other tasks, for any work-conserving order (EDF, FIFO), with slack iteration. Ibid.
+[[nodiscard]] Method bertogna_cirinei_any();
+
+/// At most m - 1 tasks carry work into the window. N. Guan, M. Stigge, W. Yi, G. Yu, RTSS 2009. Only for R <= T: its
+/// extension to arbitrary deadlines is not safe (J. Huang, J.-J. Chen, RTNS 2015).
+[[nodiscard]] Method guan();
+
+/// S = floor((Delta + sum W_i(S + 1)) / m), R = S + C. Proof: docs/analysis.md, "Several workers".
+[[nodiscard]] Method sequential_nonpreemptive();
+
+}  // namespace redag::analysis

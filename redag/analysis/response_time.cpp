@@ -1,0 +1,121 @@
+#include "redag/analysis/response_time.hpp"
+
+#include "redag/analysis/one_worker.hpp"
+
+namespace redag::analysis {
+namespace {
+
+std::optional<std::string> why_not(const System &system, sched::Preemption mode, bool edges) {
+  if (auto reason = one_worker::why_not(system)) return reason;
+  if (edges && !system.has_edges()) return "no task has predecessors: see the bounds for independent tasks";
+  if (!edges && system.has_edges()) return "tasks have predecessors: see the bounds for DAGs";
+  if (system.mode == mode) return std::nullopt;
+  switch (mode) {
+    case sched::Preemption::None: return "for jobs that run to completion; here they can be preempted";
+    case sched::Preemption::Cooperative: return "for cooperative jobs with preemption points";
+    case sched::Preemption::Full: break;
+  }
+  return "for full preemption; here jobs keep the worker until they end or reach a preemption point";
+}
+
+Outcome independent_full(const System &system) {
+  if (auto reason = why_not(system, sched::Preemption::Full, false)) return NotApplicable{*reason};
+  return one_worker::bound_units(system, false);
+}
+
+Outcome independent_none(const System &system) {
+  if (auto reason = why_not(system, sched::Preemption::None, false)) return NotApplicable{*reason};
+  return one_worker::bound_units(system, true);
+}
+
+Outcome independent_cooperative(const System &system) {
+  if (auto reason = why_not(system, sched::Preemption::Cooperative, false)) return NotApplicable{*reason};
+  return one_worker::bound_units(system, true);
+}
+
+Outcome dags_full(const System &system) {
+  if (auto reason = why_not(system, sched::Preemption::Full, true)) return NotApplicable{*reason};
+  return one_worker::bound_units(system, false);
+}
+
+Outcome dags_deferred(const System &system) {
+  const auto mode =
+      system.mode == sched::Preemption::Full ? sched::Preemption::None : system.mode;  // None or Cooperative will do
+  if (auto reason = why_not(system, mode, true)) return NotApplicable{*reason};
+  return one_worker::bound_units(system, true);
+}
+
+}  // namespace
+
+Method rta_preemptive() {
+  Method method;
+  method.name = "rta_preemptive";
+  method.subject = Subject::Task;
+  method.cite =
+      "M. Joseph, P. Pandya, Finding response times in a real-time system, The Computer Journal 29(5), 1986; "
+      "K. Tindell, A. Burns, A. Wellings, An extendible approach for analysing fixed priority hard real-time tasks, "
+      "Real-Time Systems 6(2), 1994";
+  method.assumptions =
+      "one worker, full preemption, static priorities, no edges; any deadlines, release jitter, shared groups with "
+      "priority inheritance, shared levels";
+  method.complexity = "pseudo-polynomial; O(n) a step";
+  method.apply = independent_full;
+  return method;
+}
+
+Method rta_nonpreemptive() {
+  Method method;
+  method.name = "rta_nonpreemptive";
+  method.subject = Subject::Task;
+  method.cite =
+      "R. Davis, A. Burns, R. Bril, J. Lukkien, Controller Area Network (CAN) schedulability analysis: Refuted, "
+      "revisited and revised, Real-Time Systems 35(3), 2007";
+  method.assumptions =
+      "one worker, jobs run to completion, static priorities, no edges; any deadlines, release jitter, groups";
+  method.complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period";
+  method.apply = independent_none;
+  return method;
+}
+
+Method rta_deferred() {
+  Method method;
+  method.name = "rta_deferred";
+  method.subject = Subject::Task;
+  method.cite =
+      "R. Bril, J. Lukkien, W. Verhaegh, Worst-case response time analysis of real-time tasks under fixed-priority "
+      "scheduling with deferred preemption, Real-Time Systems 42, 2009";
+  method.assumptions =
+      "one worker, cooperative preemption points every `region`, static priorities, no edges, no shared groups; any "
+      "deadlines, release jitter, shared levels";
+  method.complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period";
+  method.apply = independent_cooperative;
+  return method;
+}
+
+Method dag_one_worker_preemptive() {
+  Method method;
+  method.name = "dag_one_worker_preemptive";
+  method.subject = Subject::Dag;
+  method.cite = "as rta_preemptive, with C = volume of the DAG (docs/analysis.md, \"DAGs on one worker\")";
+  method.assumptions =
+      "one worker, full preemption, static priorities; the tasks that edges join have one rate and one offset; R <= T "
+      "for DAGs; jitter, groups with inheritance, shared levels, max_active";
+  method.complexity = "pseudo-polynomial; O(n) a step";
+  method.apply = dags_full;
+  return method;
+}
+
+Method dag_one_worker_deferred() {
+  Method method;
+  method.name = "dag_one_worker_deferred";
+  method.subject = Subject::Dag;
+  method.cite = "as rta_deferred, with C = volume of the DAG (docs/analysis.md, \"DAGs on one worker\")";
+  method.assumptions =
+      "one worker, jobs run to completion or to a preemption point, static priorities; the tasks that edges join have "
+      "one rate and one offset; R <= T for DAGs; jitter, max_active; groups unless cooperative";
+  method.complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period";
+  method.apply = dags_deferred;
+  return method;
+}
+
+}  // namespace redag::analysis

@@ -1,0 +1,351 @@
+#include "redag/testing/bound_property.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <numeric>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "redag/sched/priority_scheduler.hpp"
+#include "redag/sim/simulator.hpp"
+
+namespace redag::testing {
+namespace {
+
+// How the jobs of one simulation come and how long they execute.
+struct Run {
+  std::uint64_t seed = 0;
+  std::vector<Duration> offsets;  // by unit
+  double full_demand = 1.0;       // share of jobs that execute for their wcet
+  double gap = 0.0;               // share of releases that come later than the period after the last
+  enum class Jitter : std::uint8_t { None, First, Largest, Random } jitter = Jitter::None;
+};
+
+Run draw_run(const analysis::System &system, std::uint32_t index, Rng &rng) {
+  Run run;
+  run.seed = rng();
+  const auto random_offsets = [&] {
+    for (const analysis::Unit &unit : system.units) run.offsets.push_back(rng.uniform(0, unit.period));
+  };
+  switch (index % 5) {
+    case 0:  // all at once
+      run.offsets.assign(system.units.size(), 0);
+      run.jitter = Run::Jitter::First;
+      break;
+    case 1: {  // less urgent jobs start an instant before one and all above it come, each as late as it may
+      const auto pivot = static_cast<std::uint32_t>(rng.uniform(0, static_cast<int>(system.tasks.size()) - 1));
+      Duration largest = 0;
+      for (const analysis::Unit &unit : system.units) largest = std::max(largest, unit.jitter);
+      for (const analysis::Unit &unit : system.units) {
+        run.offsets.push_back(unit.first_rank > pivot ? largest : largest + 1 - unit.jitter);
+      }
+      run.jitter = Run::Jitter::First;
+      break;
+    }
+    case 2:
+      random_offsets();
+      run.full_demand = 0.3;
+      run.gap = 0.3;
+      run.jitter = Run::Jitter::Random;
+      break;
+    case 3:
+      random_offsets();
+      run.full_demand = 0.9;
+      run.gap = 0.1;
+      run.jitter = Run::Jitter::Random;
+      break;
+    default:
+      random_offsets();
+      run.jitter = rng.uniform(0, 1) == 0 ? Run::Jitter::Largest : Run::Jitter::Random;
+      break;
+  }
+  return run;
+}
+
+// What a simulation showed.
+struct Observed {
+  std::vector<Duration> tasks;      // largest response, by TaskId
+  std::vector<Duration> dags;       // largest f - origin, by DagId
+  std::vector<std::uint64_t> lost;  // skipped or aborted, by TaskId
+  std::vector<std::uint64_t> finished;
+};
+
+class Observer {
+ public:
+  Observer(const analysis::System &system, Observed &observed) : system_(system), observed_(observed) {
+    live_.resize(system.tasks.size());
+  }
+
+  bool operator()(std::span<const JobEvent> events) {
+    for (const JobEvent &event : events) see(event);
+    return true;
+  }
+
+  // A job that has not ended by `end` has answered at least this late.
+  void finish(Time end) {
+    for (std::size_t t = 0; t < live_.size(); ++t) {
+      for (const Live &job : live_[t]) observe(TaskId(t), job, end);
+    }
+  }
+
+ private:
+  struct Live {
+    std::uint32_t number = 0;
+    Time release = 0;
+    Time origin = kNever;
+  };
+
+  void see(const JobEvent &event) {
+    std::vector<Live> &jobs = live_[event.task.value];
+    if (event.kind == JobEventKind::Released) {
+      jobs.push_back(Live{event.job, event.value, kNever});
+      return;
+    }
+    const auto job = std::find_if(jobs.begin(), jobs.end(), [&](const Live &live) { return live.number == event.job; });
+    switch (event.kind) {
+      case JobEventKind::Ready: job->origin = event.value; break;
+      case JobEventKind::Finished:
+        ++observed_.finished[event.task.value];
+        observe(event.task, *job, event.value);
+        jobs.erase(job);
+        break;
+      case JobEventKind::Skipped:
+      case JobEventKind::Aborted:
+        ++observed_.lost[event.task.value];
+        jobs.erase(job);
+        break;
+      default: break;
+    }
+  }
+
+  void observe(TaskId task, const Live &job, Time until) {
+    Duration &response = observed_.tasks[task.value];
+    response = std::max(response, until - job.release);
+    Duration &dag = observed_.dags[system_.tasks[task.value].dag.value];
+    if (job.origin != kNever) dag = std::max(dag, until - job.origin);
+  }
+
+  const analysis::System &system_;
+  Observed &observed_;
+  std::vector<std::vector<Live>> live_;
+};
+
+void simulate_run(const BoundCase &bound_case, const analysis::System &system, const Run &run, std::uint32_t periods,
+                  Observed &observed) {
+  Workload workload = bound_case.workload;
+  std::vector<std::uint32_t> unit_of;
+  Duration longest = 0;
+  for (Dag &dag : workload.dags) {
+    for (Task &task : dag.tasks) {
+      unit_of.push_back(system.tasks[unit_of.size()].unit);
+      if (task.activation == Activation::Timer) task.offset = run.offsets[unit_of.back()];
+      longest = std::max(longest, task.period);
+    }
+  }
+
+  sim::Options options;
+  const analysis::AnalysisPlatform &platform = bound_case.platform;
+  options.horizon = (periods + 1) * longest + 1;
+  options.overheads = {platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead};
+  options.demand = [&](const Task &task, TaskId id, std::uint32_t number) {
+    Rng rng = Rng::stream(run.seed, id.value, number);
+    return rng.uniform01() < run.full_demand ? task.wcet : rng.uniform(1, task.wcet);
+  };
+  options.gap = [&](const Task &task, TaskId id, std::uint32_t number) {
+    Rng rng = Rng::stream(run.seed + 1, unit_of[id.value], number);
+    return rng.uniform01() < run.gap ? rng.uniform(1, task.period) : 0;
+  };
+  options.jitter = [&](const Task &task, TaskId id, std::uint32_t number) -> Duration {
+    switch (run.jitter) {
+      case Run::Jitter::None: return 0;
+      case Run::Jitter::First: return number == 0 ? task.jitter : 0;
+      case Run::Jitter::Largest: return task.jitter;
+      case Run::Jitter::Random: break;
+    }
+    return Rng::stream(run.seed + 2, id.value, number).uniform(0, task.jitter);
+  };
+
+  sched::Config config;
+  config.workers = platform.workers;
+  config.preemption = platform.preemption;
+  config.policy = workload.policy;
+  config.levels = platform.levels;
+  config.max_started = platform.max_started;
+  sched::PriorityScheduler scheduler(workload, config);
+  Observer observer(system, observed);
+  const sim::Result result = sim::simulate(workload, scheduler, platform.workers, options,
+                                           [&observer](std::span<const JobEvent> events) { return observer(events); });
+  observer.finish(result.end);
+}
+
+// One workload against one bound.
+class Judge {
+ public:
+  Judge(const analysis::System &system, const analysis::Bound &bound, BoundPropertyResult &result,
+        std::vector<double> &ratios)
+      : system_(system), bound_(bound), result_(result), ratios_(ratios) {}
+
+  // Empty, or what is broken.
+  std::string judge(const Observed &observed) {
+    if (bound_.accepts) return judge_accepted(observed);
+    std::string broken;
+    for (std::size_t t = 0; t < bound_.tasks.size(); ++t) {
+      const analysis::SystemTask &task = system_.tasks[t];
+      if (!bound_.tasks[t].response) continue;
+      result_.jobs += observed.finished[t];
+      if (observed.lost[t] > 0 && *bound_.tasks[t].response <= task.limit) {
+        broken += fmt::format("{}: bounded by {}, and {} of its jobs were skipped\n", task.name,
+                              *bound_.tasks[t].response, observed.lost[t]);
+      }
+      const bool is_single = system_.units[task.unit].tasks.size() == 1;
+      compare(task.name, observed.tasks[t], *bound_.tasks[t].response, is_single, broken);
+    }
+    for (std::size_t d = 0; d < bound_.dags.size(); ++d) {
+      const analysis::SystemDag &dag = system_.dags[d];
+      if (bound_.dags[d].response) {
+        compare(dag.name, observed.dags[d], *bound_.dags[d].response, dag.units.size() < dag.tasks.size(), broken);
+      }
+    }
+    return broken;
+  }
+
+ private:
+  void compare(const std::string &name, Duration seen, Duration bound, bool count, std::string &broken) {
+    if (seen > bound) broken += fmt::format("{}: answered after {}, bound {}\n", name, seen, bound);
+    if (!count) return;
+    ++result_.bounds;
+    ratios_.push_back(static_cast<double>(seen) / static_cast<double>(bound));
+  }
+
+  std::string judge_accepted(const Observed &observed) {
+    if (!*bound_.accepts) return {};
+    ++result_.bounds;
+    std::string broken;
+    double worst = 0;
+    for (std::size_t t = 0; t < system_.tasks.size(); ++t) {
+      const analysis::SystemTask &task = system_.tasks[t];
+      result_.jobs += observed.finished[t];
+      worst = std::max(worst, static_cast<double>(observed.tasks[t]) / static_cast<double>(task.deadline));
+      if (observed.tasks[t] <= task.deadline && observed.lost[t] == 0) continue;
+      broken += fmt::format("{}: accepted with deadline {}, answered after {}, {} skipped\n", task.name, task.deadline,
+                            observed.tasks[t], observed.lost[t]);
+    }
+    for (std::size_t d = 0; d < system_.dags.size(); ++d) {
+      const Duration deadline = system_.dags[d].deadline;
+      if (deadline > 0 && observed.dags[d] > deadline) broken += system_.dags[d].name + ": end-to-end deadline\n";
+    }
+    ratios_.push_back(worst);
+    return broken;
+  }
+
+  const analysis::System &system_;
+  const analysis::Bound &bound_;
+  BoundPropertyResult &result_;
+  std::vector<double> &ratios_;
+};
+
+void check_one(const analysis::Method &method, const BoundGenerator &generator, const BoundPropertyOptions &options,
+               std::uint64_t seed, BoundPropertyResult &result, std::vector<double> &ratios) {
+  Rng rng(seed);
+  const BoundCase bound_case = generator(rng);
+  const auto system = analysis::compile(bound_case.workload, bound_case.platform);
+  ASSERT_TRUE(system) << to_string(system.error()) << describe(bound_case);
+  if (!system->not_analysable.empty()) {
+    ++result.not_applicable;
+    return;
+  }
+  const analysis::Outcome outcome = method.apply(*system);
+  const auto *bound = std::get_if<analysis::Bound>(&outcome);
+  if (bound == nullptr || (!bound->unsound.empty() && !options.include_unsound)) {
+    ++result.not_applicable;
+    return;
+  }
+  ++result.workloads;
+
+  Observed observed;
+  observed.tasks.resize(system->tasks.size());
+  observed.lost.resize(system->tasks.size());
+  observed.finished.resize(system->tasks.size());
+  observed.dags.resize(system->dags.size());
+  if (bound->accepts != false) {
+    for (std::uint32_t r = 0; r < options.runs; ++r) {
+      simulate_run(bound_case, *system, draw_run(*system, r, rng), options.periods, observed);
+    }
+  }
+  const std::string broken = Judge(*system, *bound, result, ratios).judge(observed);
+  if (broken.empty()) return;
+  if (result.violations++ == 0) {
+    result.first_violation =
+        fmt::format("{}: replay with REDAG_BOUND_SEED={}\n{}{}", method.name, seed, broken, describe(bound_case));
+  }
+}
+
+std::optional<std::uint64_t> environment(const char *name) {
+  const char *text = std::getenv(name);
+  if (text == nullptr) return std::nullopt;
+  return std::strtoull(text, nullptr, 10);
+}
+
+}  // namespace
+
+BoundPropertyResult check_bound(const analysis::Method &method, const BoundGenerator &generator,
+                                const BoundPropertyOptions &options) {
+  BoundPropertyResult result;
+  std::vector<double> ratios;
+  if (const auto seed = environment("REDAG_BOUND_SEED")) {
+    check_one(method, generator, options, *seed, result, ratios);
+  } else {
+    const std::uint64_t wanted = environment("REDAG_BOUND_WORKLOADS").value_or(options.workloads);
+    for (std::uint64_t i = 0; result.workloads < wanted && i < 20 * wanted; ++i) {
+      check_one(method, generator, options, mix(options.seed ^ mix(i)), result, ratios);
+      if (::testing::Test::HasFatalFailure()) return result;
+    }
+  }
+  if (!ratios.empty()) {
+    std::sort(ratios.begin(), ratios.end());
+    result.mean_ratio = std::accumulate(ratios.begin(), ratios.end(), 0.0) / static_cast<double>(ratios.size());
+    result.p95_ratio = ratios[(ratios.size() - 1) * 95 / 100];
+    result.max_ratio = ratios.back();
+  }
+  return result;
+}
+
+void expect_bound_holds(const analysis::Method &method, const BoundGenerator &generator,
+                        const BoundPropertyOptions &options) {
+  const BoundPropertyResult result = check_bound(method, generator, options);
+  fmt::print(
+      "[ figures  ] {}: {} workloads ({} not applicable), {} bounds, {} jobs, {} violations; observed/bound mean "
+      "{:.3f}, p95 {:.3f}, max {:.3f}\n",
+      method.name, result.workloads, result.not_applicable, result.bounds, result.jobs, result.violations,
+      result.mean_ratio, result.p95_ratio, result.max_ratio);
+  std::fflush(stdout);
+  EXPECT_EQ(result.violations, 0U) << result.first_violation;
+  EXPECT_GT(result.workloads, 0U) << method.name << " never applied";
+  EXPECT_GT(result.bounds, 0U) << method.name << " never gave a bound";
+}
+
+std::string describe(const BoundCase &bound_case) {
+  const analysis::AnalysisPlatform &platform = bound_case.platform;
+  std::string text =
+      fmt::format("m={} preemption={} policy={} levels={} overheads={}/{}/{}\n", platform.workers,
+                  static_cast<int>(platform.preemption), to_string(bound_case.workload.policy), platform.levels,
+                  platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead);
+  for (const Dag &dag : bound_case.workload.dags) {
+    text += fmt::format("dag {} max_active={} deadline={}\n", dag.name, dag.max_active, dag.deadline);
+    for (const Task &task : dag.tasks) {
+      text += fmt::format("  {} {} C={} T={} D={} J={} O={} region={} queue={} priority={} group='{}' after=[{}]\n",
+                          task.name, task.activation == Activation::Timer ? "timer" : "data", task.wcet, task.period,
+                          task.deadline, task.jitter, task.offset, task.region,
+                          task.overrun == Overrun::Queue ? task.queue_depth : 0, task.priority.value_or(0), task.group,
+                          fmt::join(task.predecessors, ","));
+    }
+  }
+  return text;
+}
+
+}  // namespace redag::testing
