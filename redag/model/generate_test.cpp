@@ -86,7 +86,8 @@ std::map<Duration, int> period_counts(PeriodModel model) {
   options.min_tasks = options.max_tasks = 1;
   options.periods = model;
   std::map<Duration, int> counts;
-  for (const Dag &dag : generate(options, 5).value().dags) ++counts[dag.tasks[0].period];
+  const Workload workload = generate(options, 5).value();
+  for (const Dag &dag : workload.dags) ++counts[dag.tasks[0].period];
   return counts;
 }
 

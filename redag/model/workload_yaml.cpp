@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -16,8 +15,8 @@
 #include <fmt/format.h>
 
 #include "redag/model/validate.hpp"
-#include "redag/model/workload_yaml_nearest.hpp"
 #include "redag/model/workload_yaml_tree.hpp"
+#include "redag/model/workload_yaml_values.hpp"
 
 namespace redag {
 namespace {
@@ -55,14 +54,7 @@ struct DagPart : Part {
   std::vector<TaskPart> tasks;
 };
 
-const Node *find(const Node &map, std::string_view key) {
-  for (std::size_t i = 0; i + 1 < map.children.size(); i += 2) {
-    if (map.children[i].text == key) return &map.children[i + 1];
-  }
-  return nullptr;
-}
-
-const Node *find(const Part &part, Field field) { return find(*part.node, to_string(field)); }
+const Node *find(const Part &part, Field field) { return yaml::find(*part.node, to_string(field)); }
 
 std::vector<std::string_view> names_of(std::span<const Field> fields) {
   std::vector<std::string_view> names;
@@ -71,9 +63,9 @@ std::vector<std::string_view> names_of(std::span<const Field> fields) {
 }
 
 /// One file on its way to a workload: reads the tree, gathers every mistake, then lets validate.hpp look at the whole.
-class Reader {
+class Reader : private yaml::ValueReader {
  public:
-  Reader(const Node &root, std::string file) : file_(std::move(file)) { root_.node = &root; }
+  Reader(const Node &root, std::string file) : ValueReader(std::move(file)) { root_.node = &root; }
 
   Result<LoadedWorkload> run() {
     read_top();
@@ -89,94 +81,7 @@ class Reader {
   }
 
  private:
-  // --- mistakes ---
-
-  void error(const Node &at, std::string message, std::string hint = {}) {
-    diagnostics_.push_back(Diagnostic{Severity::Error, file_, at.line, at.column, std::move(message), std::move(hint)});
-  }
-
-  void wrong_type(const Node &at, std::string_view key, std::string_view expected) {
-    error(at, fmt::format("{} must be {}, not {}", key, expected, yaml::describe(at)));
-  }
-
-  std::string did_you_mean(std::string_view name, const std::vector<std::string_view> &candidates,
-                           std::string_view else_say) {
-    // Many wrong names among many candidates would take quadratic time: after some thousands, no more hints.
-    if (candidates.size() > comparisons_left_) return std::string(else_say);
-    comparisons_left_ -= candidates.size();
-    const std::string_view best = yaml::nearest(name, candidates);
-    return best.empty() ? std::string(else_say) : fmt::format("did you mean '{}'?", best);
-  }
-
-  // --- maps and values ---
-
-  /// False if the node is not a map. Reports unknown, repeated and odd keys.
-  bool check_map(const Node &node, std::string_view what, const std::vector<std::string_view> &keys) {
-    if (node.kind != Node::Kind::Map) {
-      wrong_type(node, what, fmt::format("a map of {}", fmt::join(keys, ", ")));
-      return false;
-    }
-    std::vector<std::string_view> seen;
-    for (std::size_t i = 0; i + 1 < node.children.size(); i += 2) {
-      const Node &key = node.children[i];
-      if (key.kind != Node::Kind::Scalar) {
-        error(key, fmt::format("a key must be a name, not {}", yaml::describe(key)));
-      } else if (std::find(keys.begin(), keys.end(), key.text) == keys.end()) {
-        error(key, fmt::format("unknown key {} in {}", yaml::describe(key), what),
-              did_you_mean(key.text, keys, fmt::format("known: {}", fmt::join(keys, ", "))));
-      } else if (std::find(seen.begin(), seen.end(), key.text) != seen.end()) {
-        error(key, fmt::format("key '{}' is given twice", key.text));
-      } else {
-        seen.push_back(key.text);
-      }
-    }
-    return true;
-  }
-
-  std::optional<Duration> duration(const Node &node, std::string_view key) {
-    if (node.kind != Node::Kind::Scalar) {
-      wrong_type(node, key, "a duration such as 5ms");
-      return std::nullopt;
-    }
-    Result<Duration> value = parse_duration(node.text);
-    if (value) return *value;
-    for (const Diagnostic &why : value.error()) error(node, fmt::format("{}: {}", key, why.message), why.hint);
-    return std::nullopt;
-  }
-
-  template <class Integer>
-  std::optional<Integer> integer(const Node &node, std::string_view key, Integer smallest) {
-    Integer value = 0;
-    if (node.kind == Node::Kind::Scalar && !node.quoted) {
-      const char *end = node.text.data() + node.text.size();
-      const auto [used, code] = std::from_chars(node.text.data(), end, value);
-      if (code == std::errc() && used == end && value >= smallest) return value;
-    }
-    wrong_type(node, key, fmt::format("a whole number from {} to {}", smallest, std::numeric_limits<Integer>::max()));
-    return std::nullopt;
-  }
-
-  std::optional<std::string> text(const Node &node, std::string_view key) {
-    if (node.kind == Node::Kind::Scalar && !node.text.empty()) return node.text;
-    wrong_type(node, key, "a name");
-    return std::nullopt;
-  }
-
-  template <class Enum>
-  std::optional<Enum> one_of(const Node &node, std::string_view key, std::span<const Enum> values) {
-    std::vector<std::string_view> names;
-    for (const Enum value : values) {
-      names.emplace_back(to_string(value));
-      if (node.kind == Node::Kind::Scalar && node.text == names.back()) return value;
-    }
-    unknown_choice(node, key, names);
-    return std::nullopt;
-  }
-
-  void unknown_choice(const Node &node, std::string_view key, const std::vector<std::string_view> &names) {
-    wrong_type(node, key, fmt::format("one of {}", fmt::join(names, ", ")));
-    if (node.kind == Node::Kind::Scalar) diagnostics_.back().hint = did_you_mean(node.text, names, "");
-  }
+  // --- keys of a part ---
 
   /// Reads `field` of `part` with `read` into `out`, if it is there; remembers a failure.
   template <class T, class Read>
@@ -198,14 +103,7 @@ class Reader {
   }
   /// For durations where 0 in the model means "not given".
   void take_positive_duration(Part &part, Field field, Duration &out) {
-    take(part, field, out, [this](const Node &node, std::string_view key) {
-      std::optional<Duration> value = duration(node, key);
-      if (value && *value <= 0) {
-        error(node, fmt::format("{} must be greater than zero, not {}", key, yaml::describe(node)));
-        value.reset();
-      }
-      return value;
-    });
+    take(part, field, out, [this](const Node &node, std::string_view key) { return positive_duration(node, key); });
   }
   void take_count(Part &part, Field field, std::uint32_t &out) {
     take(part, field, out,
@@ -337,7 +235,7 @@ class Reader {
     } else if (node->kind == Node::Kind::Map) {
       task.overrun = Overrun::Queue;
       check_map(*node, "overrun", {"queue"});
-      const Node *depth = find(*node, "queue");
+      const Node *depth = yaml::find(*node, "queue");
       if (depth == nullptr) {
         error(*node, "overrun has no queue depth", "write {queue: 3}");
       } else if (const auto value = integer<std::uint32_t>(*depth, "queue", 1)) {
@@ -349,56 +247,6 @@ class Reader {
       unknown_choice(*node, "overrun", {"skip", "queue", "{queue: N}"});
       part.broken |= Field::Overrun;
     }
-  }
-
-  std::optional<ExecutionTime> execution(const Node &node) {
-    using Kind = ExecutionTime::Kind;
-    ExecutionTime model;
-    if (node.kind == Node::Kind::Scalar && (node.text == "constant" || node.text == "uniform")) {
-      model.kind = node.text == "constant" ? Kind::Constant : Kind::Uniform;
-      return model;
-    }
-    if (node.kind != Node::Kind::Map) {
-      unknown_choice(node, "execution",
-                     {"constant", "uniform", "{normal: {mean, stddev}}", "{empirical: [durations]}"});
-      return std::nullopt;
-    }
-    check_map(node, "execution", {"normal", "empirical"});
-    const Node *normal = find(node, "normal");
-    const Node *empirical = find(node, "empirical");
-    if ((normal == nullptr) == (empirical == nullptr)) {
-      error(node, "execution must have one of normal, empirical");
-      return std::nullopt;
-    }
-    return normal != nullptr ? normal_execution(*normal) : empirical_execution(*empirical);
-  }
-
-  std::optional<ExecutionTime> normal_execution(const Node &node) {
-    if (!check_map(node, "normal", {"mean", "stddev"})) return std::nullopt;
-    std::array<std::optional<Duration>, 2> values;
-    constexpr std::array<std::string_view, 2> kKeys = {"mean", "stddev"};
-    for (std::size_t i = 0; i < kKeys.size(); ++i) {
-      if (const Node *value = find(node, kKeys[i])) {
-        values[i] = duration(*value, kKeys[i]);
-      } else {
-        error(node, fmt::format("normal has no {}", kKeys[i]));
-      }
-    }
-    if (!values[0] || !values[1]) return std::nullopt;
-    return ExecutionTime{ExecutionTime::Kind::Normal, *values[0], *values[1], {}};
-  }
-
-  std::optional<ExecutionTime> empirical_execution(const Node &node) {
-    if (node.kind != Node::Kind::Sequence) {
-      wrong_type(node, "empirical", "a list of durations");
-      return std::nullopt;
-    }
-    ExecutionTime model{ExecutionTime::Kind::Empirical, 0, 0, {}};
-    for (const Node &item : node.children) {
-      if (const auto sample = duration(item, "empirical")) model.samples.push_back(*sample);
-    }
-    if (model.samples.size() != node.children.size()) return std::nullopt;
-    return model;
   }
 
   /// Names become positions once all tasks of the DAG are known.
@@ -511,18 +359,15 @@ class Reader {
     if (value == nullptr) return *part.node;
     if (finding.item == Finding::kNone) return *value;
     if (finding.field == Field::After) return *dags_[finding.dag.value].tasks[finding.task].edges[finding.item];
-    const Node *samples = find(*value, "empirical");
+    const Node *samples = yaml::find(*value, "empirical");
     return samples == nullptr ? *value : samples->children[finding.item];
   }
 
-  std::string file_;
   Part root_;
   Part platform_;
   std::vector<DagPart> dags_;
   Workload workload_;
-  Diagnostics diagnostics_;
   bool structure_known_ = false;
-  std::size_t comparisons_left_ = 200'000;
 };
 
 Result<std::string> read_file(const std::filesystem::path &path) {

@@ -1,0 +1,84 @@
+// Values of a YAML tree (durations, numbers, names, choices) for workload_yaml.cpp only, and the list of mistakes found
+// on the way. Knows types, not rules: those are in validate.hpp. Not thread-safe.
+#pragma once
+
+#include <charconv>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "redag/base/result.hpp"
+#include "redag/base/time.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/model/workload_yaml_tree.hpp"
+
+namespace redag::yaml {
+
+/// The value of `key`, the first if it is given twice; null if there is none.
+[[nodiscard]] const Node *find(const Node &map, std::string_view key);
+
+/// Each reading function gives nothing where it has reported a mistake. `key` names the value in messages.
+class ValueReader {
+ public:
+  explicit ValueReader(std::string file) : file_(std::move(file)) {}
+
+ protected:
+  void error(const Node &at, std::string message, std::string hint = {});
+  void wrong_type(const Node &at, std::string_view key, std::string_view expected);
+
+  /// "did you mean 'x'?", or `else_say` if nothing is near.
+  std::string did_you_mean(std::string_view name, const std::vector<std::string_view> &candidates,
+                           std::string_view else_say);
+
+  /// False if the node is not a map. Reports unknown, repeated and odd keys.
+  bool check_map(const Node &node, std::string_view what, const std::vector<std::string_view> &keys);
+
+  std::optional<Duration> duration(const Node &node, std::string_view key);
+  std::optional<Duration> positive_duration(const Node &node, std::string_view key);
+  std::optional<std::string> text(const Node &node, std::string_view key);
+  std::optional<ExecutionTime> execution(const Node &node);
+
+  template <class Integer>
+  std::optional<Integer> integer(const Node &node, std::string_view key, Integer smallest) {
+    Integer value = 0;
+    if (node.kind == Node::Kind::Scalar && !node.quoted) {
+      const char *end = node.text.data() + node.text.size();
+      const auto [used, code] = std::from_chars(node.text.data(), end, value);
+      if (code == std::errc() && used == end && value >= smallest) return value;
+    }
+    wrong_type(node, key,
+               "a whole number from " + std::to_string(smallest) + " to " +
+                   std::to_string(std::numeric_limits<Integer>::max()));
+    return std::nullopt;
+  }
+
+  /// Choices are written as to_string() writes them.
+  template <class Enum>
+  std::optional<Enum> one_of(const Node &node, std::string_view key, std::span<const Enum> values) {
+    std::vector<std::string_view> names;
+    for (const Enum value : values) {
+      names.emplace_back(to_string(value));
+      if (node.kind == Node::Kind::Scalar && node.text == names.back()) return value;
+    }
+    unknown_choice(node, key, names);
+    return std::nullopt;
+  }
+  void unknown_choice(const Node &node, std::string_view key, const std::vector<std::string_view> &names);
+
+  std::string file_;
+  Diagnostics diagnostics_;
+
+ private:
+  std::optional<ExecutionTime> normal_execution(const Node &node);
+  std::optional<ExecutionTime> empirical_execution(const Node &node);
+
+  // Many wrong names among many candidates would take quadratic time: after so many comparisons, no more hints.
+  std::size_t comparisons_left_ = 200'000;
+};
+
+}  // namespace redag::yaml
