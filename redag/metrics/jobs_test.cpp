@@ -1,0 +1,133 @@
+#include "redag/metrics/jobs.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "redag/metrics/jobs_csv.hpp"
+#include "redag/testing/timeline.hpp"
+#include "redag/testing/trace_builder.hpp"
+#include "redag/trace/output_file.hpp"
+
+namespace redag::metrics {
+namespace {
+
+using testing::make_dag;
+using testing::make_workload;
+using testing::TraceBuilder;
+constexpr Duration kMs = kMillisecond;
+
+// lo starts, is preempted by hi, and ends late; hi#1 is skipped, hi#2 aborted, lo#1 in flight.
+TraceBuilder example() {
+  Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "", 2}}), make_dag("b", {{"lo", 20, 4, {}, "", 0, 5}})},
+                             1, PreemptionMode::Os);
+  TraceBuilder t(w);
+  t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 5).at(1).started("lo", 0, 0).at(2).arrives("hi", 0);
+  t.preempted("lo", 0, 0).dispatched("hi", 0, 0, 12).at(5).finished("hi", 0, 0).resumed("lo", 0, 0);
+  t.at(7).finished("lo", 0, 0).at(12).released("hi", 1).skipped("hi", 1, Reason::DagFull);
+  t.at(20).arrives("lo", 1).at(22).released_for("hi", 2, 22).ready("hi", 2, 22).deferred("hi", 2);
+  t.at(23).dispatched("hi", 2, 0, 32).at(24).aborted("hi", 2, 0, Reason::Exception);
+  return t;
+}
+
+TEST(FoldJobs, TakesEveryTimeFromItsEvent) {
+  const trace::Trace trace = example().until(30);
+  const std::vector<JobRecord> jobs = fold_jobs(trace.info.workload, trace.events);
+  ASSERT_EQ(jobs.size(), 5U);
+
+  const JobRecord &lo = jobs[0];
+  EXPECT_EQ(lo.task, example().id("lo"));
+  EXPECT_EQ(lo.release, 0);
+  EXPECT_EQ(lo.start, 1 * kMs);  // Started, not Dispatched
+  EXPECT_EQ(lo.finish, 7 * kMs);
+  EXPECT_EQ(lo.deadline, 5 * kMs);
+  EXPECT_EQ(lo.on_worker, 4 * kMs);
+  EXPECT_EQ(lo.preemptions, 1U);
+  EXPECT_EQ(lo.lateness(), 2 * kMs);
+  EXPECT_TRUE(lo.is_late(30 * kMs));
+  EXPECT_EQ(lo.outcome, JobOutcome::Finished);
+
+  EXPECT_EQ(jobs[1].response(), 3 * kMs);  // hi#0
+  EXPECT_EQ(jobs[1].start, 2 * kMs);       // no Started: Dispatched
+  EXPECT_FALSE(jobs[1].is_late(30 * kMs));
+  EXPECT_EQ(jobs[2].outcome, JobOutcome::Skipped);
+  EXPECT_EQ(jobs[2].reason, Reason::DagFull);
+  EXPECT_FALSE(jobs[2].has_started());
+  EXPECT_EQ(jobs[2].ready, kNever);
+  EXPECT_EQ(jobs[3].outcome, JobOutcome::InFlight);  // lo#1, released before hi#2
+  EXPECT_TRUE(jobs[3].is_late(30 * kMs));
+  EXPECT_FALSE(jobs[3].is_late(25 * kMs));
+  EXPECT_EQ(jobs[4].outcome, JobOutcome::Aborted);
+  EXPECT_EQ(jobs[4].reason, Reason::Exception);
+  EXPECT_TRUE(jobs[4].deferred);
+}
+
+TEST(JobFolder, IsTheSameInAnyPortions) {
+  const trace::Trace trace = example().until(30);
+  const std::span<const JobEvent> events = trace.events;
+  JobFolder whole(trace.info.workload);
+  whole.add(events);
+  for (std::size_t cut = 0; cut <= events.size(); ++cut) {
+    JobFolder parts(trace.info.workload);
+    parts.add(events.first(cut));
+    std::vector<JobRecord> ended = parts.take_ended();
+    parts.add(events.subspan(cut));
+    const std::vector<JobRecord> rest = parts.take_ended();
+    ended.insert(ended.end(), rest.begin(), rest.end());
+    JobFolder again(trace.info.workload);
+    again.add(events);
+    EXPECT_EQ(ended, again.take_ended());
+    EXPECT_EQ(parts.in_flight(), whole.in_flight());
+  }
+}
+
+TEST(JobFolder, CountsWhatItCannotPlace) {
+  trace::Trace trace = example().until(30);
+  JobFolder folder(trace.info.workload);
+  trace.events[3].task = TaskId(99);
+  trace.events.back().job = 99;
+  folder.add(trace.events);
+  EXPECT_EQ(folder.ignored_events(), 2U);
+}
+
+TEST(JobsCsv, ReadsBackWhatItWrote) {
+  trace::Trace trace = example().until(30);
+  trace.info.workload.dags[0].name = "odd, \"name\"";
+  const std::vector<JobRecord> jobs = fold_jobs(trace.info.workload, trace.events);
+  const std::string path =
+      (std::filesystem::path(::testing::TempDir()) / ("redag_jobs." + std::to_string(::getpid()) + ".csv")).string();
+  ASSERT_TRUE(write_jobs_csv(path, trace.info.workload, jobs));
+  const auto read = read_jobs_csv(path, trace.info.workload);
+  ASSERT_TRUE(read) << to_string(read.error());
+  EXPECT_EQ(*read, jobs);
+  const std::string text = trace::read_file(path).value();
+  EXPECT_NE(text.find("\n0,b,lo,0,0,0,1000000,7000000,5000000,0,0,4000000,1,0,finished,none,7000000,7000000,2000000\n"),
+            std::string::npos)
+      << text;
+  std::filesystem::remove(path);
+}
+
+TEST(JobsCsv, MistakesAreReportedAtTheirLine) {
+  const Workload workload = example().until(30).info.workload;
+  const std::string header = std::string(jobs_csv_header()) + "\n";
+  const std::string good = "0,b,lo,0,0,0,1,7,5,0,0,4,1,0,finished,none,7,7,2\n";
+  ASSERT_TRUE(parse_jobs_csv(header + good, "jobs.csv", workload));
+  ASSERT_TRUE(parse_jobs_csv(header, "jobs.csv", workload));
+  EXPECT_FALSE(parse_jobs_csv("", "jobs.csv", workload));
+  EXPECT_FALSE(parse_jobs_csv("a,b\n" + good, "jobs.csv", workload));
+  for (const char *row :
+       {"0,b,lo\n", "0,b,nobody,0,0,0,1,7,5,0,0,4,1,0,finished,none,7,7,2\n",
+        "x,b,lo,0,0,0,1,7,5,0,0,4,1,0,finished,none,7,7,2\n", "0,b,lo,-1,0,0,1,7,5,0,0,4,1,0,finished,none,7,7,2\n",
+        "0,b,lo,0,0,0,1ms,7,5,0,0,4,1,0,finished,none,7,7,2\n", "0,b,lo,0,0,0,1,7,5,0,0,4,1,2,finished,none,7,7,2\n",
+        "0,b,lo,0,0,0,1,7,5,0,0,4,1,0,asleep,none,7,7,2\n", "0,b,lo,0,0,0,1,7,5,0,0,4,1,0,finished,why,7,7,2\n",
+        "0,\"b,lo,0\n"}) {
+    const auto result = parse_jobs_csv(header + good + row, "jobs.csv", workload);
+    ASSERT_FALSE(result) << row;
+    EXPECT_EQ(result.error().front().line, 3) << row;
+    EXPECT_EQ(result.error().front().file, "jobs.csv");
+  }
+}
+
+}  // namespace
+}  // namespace redag::metrics

@@ -1,0 +1,193 @@
+#include "redag/metrics/summary.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "redag/metrics/perfetto.hpp"
+#include "redag/metrics/summary_json.hpp"
+#include "redag/testing/timeline.hpp"
+#include "redag/testing/trace_builder.hpp"
+#include "redag/trace/output_file.hpp"
+
+namespace redag::metrics {
+namespace {
+
+using testing::make_dag;
+using testing::make_workload;
+using testing::TraceBuilder;
+constexpr Duration kMs = kMillisecond;
+
+TEST(Percentile, IsTheNearestRank) {
+  std::vector<Duration> values;
+  for (Duration v = 1; v <= 20; ++v) values.push_back(v);
+  EXPECT_EQ(percentile(values, 50), 10);
+  EXPECT_EQ(percentile(values, 95), 19);
+  EXPECT_EQ(percentile(values, 99), 20);
+  EXPECT_EQ(percentile(values, 100), 20);
+  EXPECT_EQ(percentile(values, 1), 1);
+  EXPECT_EQ(percentile({7}, 50), 7);
+}
+
+TEST(Distribution, OfFewValues) {
+  const Distribution d = distribution_of({30, 10, 20});
+  EXPECT_EQ(d.count, 3U);
+  EXPECT_DOUBLE_EQ(d.mean, 20.0);
+  EXPECT_EQ(d.min, 10);
+  EXPECT_EQ(d.p50, 20);
+  EXPECT_EQ(d.max, 30);
+  EXPECT_EQ(distribution_of({}), Distribution{});
+}
+
+// src -> sink (data) with end-to-end deadline 4 ms, bound 1; lo beside them on the same worker, without preemption.
+trace::Trace example() {
+  Dag chain = make_dag("chain", {{"src", 10, 1}, {"sink", 0, 2, {0}}}, 1);
+  chain.deadline = 4 * kMs;
+  TraceBuilder t(make_workload({chain, make_dag("b", {{"lo", 20, 6, {}, "", 0, 8}})}, 1));
+  t.at(0).arrives("src", 0).arrives("lo", 0).dispatched("src", 0, 0, 10);
+  t.at(1).finished("src", 0, 0).released("sink", 0).ready("sink", 0, 0).dispatched("sink", 0, 0, 11);
+  t.at(3).finished("sink", 0, 0).dispatched("lo", 0, 0, 8);
+  t.at(10).arrives("src", 1).at(11).finished("lo", 0, 0).dispatched("src", 1, 0, 20);
+  t.at(12).finished("src", 1, 0).released("sink", 1).ready("sink", 1, 10).dispatched("sink", 1, 0, 22);
+  t.at(15).finished("sink", 1, 0).at(20).arrives("src", 2).arrives("lo", 1).dispatched("src", 2, 0, 30);
+  t.at(21).aborted("src", 2, 0, Reason::Exception).dispatched("lo", 1, 0, 28);
+  t.at(30).released("src", 3).skipped("src", 3, Reason::DagFull);
+  return t.until(40);
+}
+
+TEST(Summary, CountsPerTaskDagAndTotal) {
+  const Summary s = summarize(example());
+  ASSERT_EQ(s.tasks.size(), 3U);
+  ASSERT_EQ(s.dags.size(), 2U);
+  const JobStats &src = s.tasks[0].jobs;
+  EXPECT_EQ(src.released, 4U);
+  EXPECT_EQ(src.finished, 2U);
+  EXPECT_EQ(src.aborted, 1U);
+  EXPECT_EQ(src.skipped, 1U);
+  EXPECT_EQ(src.by_reason[static_cast<std::size_t>(Reason::DagFull)], 1U);
+  EXPECT_EQ(src.by_reason[static_cast<std::size_t>(Reason::Exception)], 1U);
+  EXPECT_EQ(src.late, 0U);
+  EXPECT_DOUBLE_EQ(src.miss_ratio_with_lost(), 0.5);
+  EXPECT_EQ(src.response.max, 2 * kMs);
+  EXPECT_EQ(src.start_latency.max, 1 * kMs);
+
+  const JobStats &lo = s.tasks[2].jobs;
+  EXPECT_EQ(lo.late, 2U);  // one finished 3 ms late, one in flight since its deadline at 28
+  EXPECT_EQ(lo.overdue, 1U);
+  EXPECT_EQ(lo.in_flight, 1U);
+  EXPECT_DOUBLE_EQ(lo.miss_ratio(), 1.0);
+  EXPECT_EQ(lo.max_lateness, 3 * kMs);
+  EXPECT_EQ(lo.on_worker.max, 8 * kMs);
+
+  EXPECT_EQ(s.dags[0].jobs.released, 6U);
+  EXPECT_EQ(s.dags[0].jobs.response.count, 4U);
+  EXPECT_EQ(s.total.released, 8U);
+  EXPECT_EQ(s.total.released, s.total.finished + s.total.skipped + s.total.aborted + s.total.in_flight);
+  EXPECT_DOUBLE_EQ(s.total.miss_ratio(), 2.0 / 8.0);
+}
+
+TEST(Summary, EndToEndGoesBackToTheSource) {
+  const Summary s = summarize(example());
+  const EndToEnd &chain = s.dags[0].end_to_end;
+  EXPECT_EQ(chain.response.count, 2U);
+  EXPECT_EQ(chain.response.min, 3 * kMs);
+  EXPECT_EQ(chain.response.max, 5 * kMs);  // released at 10, finished at 15
+  EXPECT_EQ(chain.late, 1U);
+  EXPECT_EQ(s.dags[1].end_to_end.late, 0U);  // no deadline
+}
+
+TEST(Summary, BusyWorkersPeaksAndInversions) {
+  const Summary s = summarize(example());
+  ASSERT_EQ(s.worker_busy.size(), 1U);
+  EXPECT_DOUBLE_EQ(s.worker_busy[0], (15.0 + 20.0) / 40.0);
+  EXPECT_EQ(s.dags[0].peak_active, 1U);
+  EXPECT_TRUE(s.all_enforced);
+  // src#1 waited from 10 to 11 while lo ran.
+  EXPECT_EQ(s.inversions, (Inversions{1, 1 * kMs, 1 * kMs}));
+}
+
+TEST(Summary, WarmUpIsNotCounted) {
+  trace::Trace trace = example();
+  trace.info.warm_up = 10 * kMs;
+  const Summary s = summarize(trace);
+  EXPECT_EQ(s.total.released, 5U);  // src 1..3, sink 1, lo 1
+  EXPECT_EQ(s.begin, 10 * kMs);
+  EXPECT_DOUBLE_EQ(s.worker_busy[0], (5.0 + 20.0) / 30.0);
+}
+
+TEST(Summary, SaysWhenABoundWasBroken) {
+  TraceBuilder t(make_workload({make_dag("a", {{"x", 10, 2}, {"y", 10, 2}}, 1)}, 2));
+  t.at(0).arrives("x", 0).arrives("y", 0).dispatched("x", 0, 0, 10).dispatched("y", 0, 1, 10);
+  const Summary bound = summarize(t.until(1));
+  EXPECT_EQ(bound.dags[0].peak_active, 2U);
+  EXPECT_FALSE(bound.all_enforced);
+
+  TraceBuilder g(make_workload({make_dag("a", {{"x", 10, 2, {}, "g"}, {"y", 10, 2, {}, "g"}})}, 2));
+  g.at(0).arrives("x", 0).arrives("y", 0).dispatched("x", 0, 0, 10).dispatched("y", 0, 1, 10);
+  const Summary group = summarize(g.until(1));
+  EXPECT_EQ(group.group_overlaps, 1U);
+  EXPECT_FALSE(group.all_enforced);
+}
+
+TEST(SummaryJson, HasEverything) {
+  const trace::Trace trace = example();
+  const std::string text = summary_to_json(summarize(trace), trace.info);
+  EXPECT_EQ(text, summary_to_json(summarize(trace), trace.info));
+  const nlohmann::json json = nlohmann::json::parse(text);
+  EXPECT_EQ(json["format"], "redag.summary/1");
+  EXPECT_EQ(json["run"]["executor"], "redag");
+  EXPECT_EQ(json["total"]["released"], 8);
+  EXPECT_EQ(json["tasks"][2]["name"], "lo");
+  EXPECT_EQ(json["tasks"][2]["max_lateness_ns"], 3 * kMs);
+  EXPECT_EQ(json["tasks"][0]["lost_by_reason"]["dag_full"], 1);
+  EXPECT_EQ(json["dags"][0]["end_to_end"]["response"]["max_ns"], 5 * kMs);
+  EXPECT_EQ(json["inversions"]["count"], 1);
+  EXPECT_EQ(json["all_enforced"], true);
+}
+
+TEST(SummaryJson, UnwritablePlaceIsAnError) {
+  const trace::Trace trace = example();
+  EXPECT_FALSE(write_summary("/nonexistent/summary.json", summarize(trace), trace.info));
+  EXPECT_FALSE(write_perfetto("/nonexistent/trace.json", trace));
+}
+
+// What ui.perfetto.dev needs: valid JSON, slices that never overlap on a worker, spans that open and close.
+TEST(Perfetto, SlicesSpansAndMarkers) {
+  const trace::Trace trace = example();
+  const std::string path =
+      (std::filesystem::path(::testing::TempDir()) / ("redag_perfetto." + std::to_string(::getpid()))).string();
+  ASSERT_TRUE(write_perfetto(path, trace));
+  const nlohmann::json json = nlohmann::json::parse(trace::read_file(path).value());
+  std::filesystem::remove(path);
+
+  double busy = 0;
+  std::multiset<std::string> markers;
+  std::set<std::string> open;
+  std::size_t spans = 0;
+  std::size_t arrows = 0;
+  for (const auto &event : json["traceEvents"]) {
+    const std::string phase = event["ph"];
+    if (phase == "X") busy += event["dur"].get<double>();
+    if (phase == "i") markers.insert(event["name"].get<std::string>());
+    if (phase == "b") {
+      EXPECT_TRUE(open.insert(event["id"].get<std::string>()).second);
+    }
+    if (phase == "e") {
+      EXPECT_EQ(open.erase(event["id"].get<std::string>()), 1U);
+      ++spans;
+    }
+    if (phase == "s") ++arrows;
+  }
+  EXPECT_DOUBLE_EQ(busy, 35'000.0);  // us
+  EXPECT_EQ(spans, 8U);
+  EXPECT_TRUE(open.empty());
+  EXPECT_EQ(arrows, 2U);
+  EXPECT_EQ(markers.count("deadline missed"), 2U);
+  EXPECT_EQ(markers.count("skipped: dag_full"), 1U);
+}
+
+}  // namespace
+}  // namespace redag::metrics

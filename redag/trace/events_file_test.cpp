@@ -1,0 +1,168 @@
+#include "redag/trace/events_file.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "redag/base/rng.hpp"
+#include "redag/testing/timeline.hpp"
+#include "redag/trace/run_info_json.hpp"
+
+namespace redag::trace {
+namespace {
+
+namespace fs = std::filesystem;
+
+Trace example() {
+  Trace trace;
+  trace.info.workload = testing::make_workload({testing::make_dag("control", {{"imu", 5, 1}, {"ekf", 0, 1, {0}}}, 2),
+                                                testing::make_dag("map", {{"lidar", 100, 20, {}, "g"}})},
+                                               2, PreemptionMode::Cooperative, PolicyKind::Edf);
+  trace.info.executor = "redag";
+  trace.info.config = sched::Config{2, sched::Preemption::Cooperative, PolicyKind::Edf, 3, 7};
+  trace.info.preemption = "cooperative";
+  trace.info.preemption_why = "no rtprio: \"ulimit -r\" is 0\n";
+  trace.info.driver = Driver::Threads;
+  trace.info.seed = 0xffff'ffff'ffff'fff0ULL;
+  trace.info.start = 123'456'789'012'345;
+  trace.info.end = trace.info.start + kSecond;
+  trace.info.warm_up = 5;
+  trace.info.overheads = "dispatch 3us";
+  trace.info.machine = Machine{8, "Linux 6.1", "a processor"};
+  Rng rng(1);
+  for (int i = 0; i < 300; ++i) {
+    JobEvent event;
+    event.time = i;
+    event.value = rng.uniform(-kMaxDuration, kMaxDuration);
+    event.task = TaskId(static_cast<std::size_t>(rng.uniform(0, 2)));
+    event.job = static_cast<std::uint32_t>(rng());
+    event.worker = i % 3 == 0 ? WorkerId::kNoneValue : static_cast<std::uint32_t>(rng.uniform(0, 1));
+    event.kind = static_cast<JobEventKind>(rng.uniform(0, 9));
+    event.reason = static_cast<Reason>(rng.uniform(0, 7));
+    trace.events.push_back(event);
+  }
+  return trace;
+}
+
+class EventsFile : public ::testing::Test {
+ protected:
+  void TearDown() override { fs::remove(path_); }
+
+  std::string written(const Trace &trace) const {
+    const Result<void> result = write_trace(path_, trace);
+    EXPECT_TRUE(result) << (result ? "" : to_string(result.error()));
+    return read_file(path_).value();
+  }
+
+  std::string path_ = (fs::path(::testing::TempDir()) / ("redag_events." + std::to_string(::getpid()))).string();
+};
+
+TEST_F(EventsFile, ReadsBackEverything) {
+  const Trace before = example();
+  written(before);
+  const Result<Trace> after = read_trace(path_);
+  ASSERT_TRUE(after) << to_string(after.error());
+  EXPECT_EQ(after->events, before.events);
+  EXPECT_EQ(after->info.workload, before.info.workload);
+  EXPECT_EQ(run_info_to_json(after->info), run_info_to_json(before.info));
+  EXPECT_EQ(after->info.seed, before.info.seed);
+  EXPECT_EQ(after->info.end, before.info.end);
+  EXPECT_EQ(after->info.machine, before.info.machine);
+  EXPECT_EQ(after->info.preemption_why, before.info.preemption_why);
+}
+
+TEST_F(EventsFile, EndAndLossesAreKnownAtTheEnd) {
+  const Trace trace = example();
+  auto writer = EventsWriter::create(path_, trace.info);
+  ASSERT_TRUE(writer);
+  for (const JobEvent &event : trace.events) writer->add(std::span(&event, 1));
+  EXPECT_FALSE(fs::exists(path_));
+  ASSERT_TRUE(writer->commit(77, 5));
+  const Result<Trace> read = read_trace(path_);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->info.end, 77);
+  EXPECT_EQ(read->info.lost_events, 5U);
+  EXPECT_EQ(read->events, trace.events);
+}
+
+TEST_F(EventsFile, AnInvalidWorkloadIsNotWritten) {
+  Trace trace = example();
+  trace.info.workload.dags[0].tasks[0].wcet = -1;
+  EXPECT_FALSE(write_trace(path_, trace));
+  EXPECT_FALSE(fs::exists(path_));
+}
+
+TEST_F(EventsFile, MistakesAreReportedAtTheirLine) {
+  const std::string good = written(example());
+  const std::size_t second = good.find('\n') + 1;
+  const std::size_t third = good.find('\n', second) + 1;
+  const auto with_line = [&](const std::string &line) {
+    return parse_trace(good.substr(0, third) + line + "\n" + good.substr(third), "run.jsonl");
+  };
+  for (const char *line :
+       {"", "[", "[1,\"ready\",0,0,0,0,\"none\"", "[1,\"ready\",0,0,0,0,\"none\"]x",
+        "[1,\"sleeping\",0,0,0,0,\"none\"]", "[1,\"ready\",0,0,0,0,\"bored\"]", "[1,\"ready\",0,0,-2,0,\"none\"]",
+        "[1,\"ready\",-1,0,0,0,\"none\"]", "[1,\"ready\",0,0,0,9223372036854775807,\"none\"]",
+        "[99999999999999999999,\"ready\",0,0,0,0,\"none\"]", "[1.5,\"ready\",0,0,0,0,\"none\"]",
+        "[1,\"ready\",3,0,0,0,\"none\"]", "{\"events\":\"many\"}"}) {
+    const Result<Trace> result = with_line(line);
+    ASSERT_FALSE(result) << line;
+    EXPECT_EQ(result.error().front().file, "run.jsonl");
+    EXPECT_EQ(result.error().front().line, 3) << line;
+  }
+  EXPECT_TRUE(with_line("[1,\"ready\",2,0,-1,0,\"none\"]").error().front().message.find("were written") !=
+              std::string::npos);
+}
+
+TEST_F(EventsFile, WrongHeadersAreErrors) {
+  const std::string good = written(example());
+  EXPECT_FALSE(parse_trace("", "f"));
+  EXPECT_FALSE(parse_trace("\n", "f"));
+  EXPECT_FALSE(parse_trace("[]\n" + good, "f"));
+  EXPECT_FALSE(parse_trace("{\"format\":\"redag.events/2\"}\n", "f"));
+  for (const char *key :
+       {"executor", "config", "workers", "levels", "driver", "seed", "machine", "workload", "policy"}) {
+    std::string damaged = good;
+    damaged.replace(damaged.find("\"" + std::string(key) + "\""), 2, "\"X");
+    EXPECT_FALSE(parse_trace(damaged, "f")) << key;
+  }
+  std::string no_workers = good;
+  no_workers.replace(no_workers.find("\"workers\":2"), 11, "\"workers\":0");
+  EXPECT_FALSE(parse_trace(no_workers, "f"));
+}
+
+// Cut anywhere, or with any byte changed: an error or another valid trace, never a crash.
+TEST_F(EventsFile, SurvivesDamage) {
+  Trace small = example();
+  small.events.resize(20);
+  const std::string good = written(small);
+  for (std::size_t length = 0; length + 1 < good.size(); length += 7) {
+    EXPECT_FALSE(parse_trace(std::string_view(good).substr(0, length), "f")) << length;
+  }
+  Rng rng(3);
+  int refused = 0;
+  for (int round = 0; round < 400; ++round) {
+    std::string damaged = good;
+    damaged[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(good.size()) - 1))] =
+        static_cast<char>(rng.uniform(0, 255));
+    if (!parse_trace(damaged, "f")) ++refused;
+  }
+  EXPECT_GT(refused, 100);
+}
+
+TEST(TaskName, IsDagAndTask) {
+  const Trace trace = example();
+  EXPECT_EQ(task_name(trace.info.workload, TaskId(1)), "control.ekf");
+  EXPECT_EQ(task_name(trace.info.workload, TaskId(2)), "map.lidar");
+  EXPECT_EQ(task_name(trace.info.workload, TaskId(3)), "task 3");
+}
+
+TEST(ThisMachine, IsDescribed) {
+  const Machine machine = this_machine();
+  EXPECT_GT(machine.cpus, 0U);
+  EXPECT_NE(machine.kernel, "");
+}
+
+}  // namespace
+}  // namespace redag::trace
