@@ -270,19 +270,13 @@ std::uint32_t ReferenceScheduler::level_of(std::size_t job) const {
 
 /// Does `a` take the worker of `b`, which has started?
 bool ReferenceScheduler::outranks(std::size_t a, std::size_t b) const {
+  if (config_.policy == PolicyKind::Fifo) return false;  // what runs became ready earlier, or had to wait
   if (shares_levels()) return level_of(a) < level_of(b);
   return key_before(effective(a), effective(b));
 }
 
-/// At one level what has started goes first: to start another instead would be a preemption within the level.
+/// The total order decides who is looked at first, also among those that share a level.
 bool ReferenceScheduler::considered_before(std::size_t a, std::size_t b) const {
-  if (shares_levels()) {
-    const auto kind = [this](std::size_t j) {
-      return jobs_[j].state == State::Running ? 0 : jobs_[j].state == State::Suspended ? 1 : 2;
-    };
-    if (level_of(a) != level_of(b)) return level_of(a) < level_of(b);
-    if (kind(a) != kind(b)) return kind(a) < kind(b);
-  }
   return key_before(effective(a), effective(b));
 }
 
@@ -290,43 +284,36 @@ bool ReferenceScheduler::considered_before(std::size_t a, std::size_t b) const {
 
 Step ReferenceScheduler::dispatch(Time now) {
   dispatches_.clear();
-  // Inheritance counts from the instant at which the waiting job comes, so a walk that finds one is made again.
+  // One decision at a time; each can change the order, because a job that waits for a group hands on its priority.
+  std::vector<std::size_t> passed_over;
   for (;;) {
-    const std::vector<Job> jobs = jobs_;
-    const std::vector<Stack> workers = workers_;
-    const std::vector<JobEvent> events = events_;
-    std::vector<std::size_t> heirs;
-    if (try_dispatch(now)) break;
-    for (const Job &job : jobs_) heirs.push_back(job.heir_of);
-    jobs_ = jobs;
-    for (std::size_t i = 0; i < jobs_.size(); ++i) jobs_[i].heir_of = heirs[i];
-    workers_ = workers;
-    events_ = events;
-    dispatches_.clear();
+    const std::size_t job = first_candidate(passed_over);
+    if (job == kNone) break;
+    const std::uint32_t worker = worker_for(job);
+    if (worker == WorkerId::kNoneValue) break;
+    if (started(jobs_[job]) || can_start(job, now)) {
+      place(job, worker, now);
+    } else {
+      passed_over.push_back(job);
+    }
   }
+  if (config_.preemption == Preemption::Cooperative) resume_uncovered(now);
   for (Job &job : jobs_) job.at_point = false;
+  tell_levels();
   step_events_.swap(events_);
   events_.clear();
   return Step{dispatches_, step_events_};
 }
 
-bool ReferenceScheduler::try_dispatch(Time now) {
-  std::vector<std::size_t> candidates;
+std::size_t ReferenceScheduler::first_candidate(const std::vector<std::size_t> &passed_over) const {
+  std::size_t first = kNone;
   for (std::size_t i = 0; i < jobs_.size(); ++i) {
     const bool resumable = jobs_[i].state == State::Suspended && config_.preemption == Preemption::Full;
-    if (jobs_[i].state == State::Ready || resumable) candidates.push_back(i);
+    if (jobs_[i].state != State::Ready && !resumable) continue;
+    if (std::find(passed_over.begin(), passed_over.end(), i) != passed_over.end()) continue;
+    if (first == kNone || considered_before(i, first)) first = i;
   }
-  std::sort(candidates.begin(), candidates.end(),
-            [this](std::size_t a, std::size_t b) { return considered_before(a, b); });
-  for (const std::size_t job : candidates) {
-    const std::uint32_t worker = worker_for(job);
-    if (worker == WorkerId::kNoneValue) continue;
-    bool inherited = false;
-    if (jobs_[job].state == State::Suspended || can_start(job, now, inherited)) place(job, worker, now);
-    if (inherited) return false;
-  }
-  if (config_.preemption == Preemption::Cooperative) resume_uncovered(now);
-  return true;
+  return first;
 }
 
 /// The worker that is available to `job`: its own of before, the lowest free one, or that of the least urgent job that
@@ -349,28 +336,22 @@ std::uint32_t ReferenceScheduler::worker_for(std::size_t job) const {
   return best;
 }
 
-bool ReferenceScheduler::can_start(std::size_t job, Time now, bool &inherited) {
+/// `job` has a worker to go to. Is it eligible? If not: deferral and inheritance.
+bool ReferenceScheduler::can_start(std::size_t job, Time now) {
   Job &j = jobs_[job];
-  const auto all_started = std::count_if(jobs_.begin(), jobs_.end(), [this](const Job &o) { return started(o); });
-  if (config_.max_started != 0 && config_.preemption == Preemption::Full &&
-      all_started >= static_cast<std::ptrdiff_t>(config_.max_started)) {
-    return false;
-  }
   if (task_busy(j)) return false;
   if (dag_at_bound(j)) {
-    if (!j.deferred) {
-      j.deferred = true;
-      emit(JobEventKind::Deferred, job, now, 0, WorkerId::kNoneValue);
-    }
+    if (!j.deferred) emit(JobEventKind::Deferred, job, now, 0, WorkerId::kNoneValue);
+    j.deferred = true;
     return false;
   }
   const std::size_t holder = group_holder(j);
-  if (holder == kNone) return true;
-  if (key_before(j, effective(holder))) {
-    jobs_[holder].heir_of = job;
-    inherited = true;
+  if (holder != kNone) {
+    if (key_before(j, effective(holder))) jobs_[holder].heir_of = job;
+    return false;
   }
-  return false;
+  const auto all_started = std::count_if(jobs_.begin(), jobs_.end(), [this](const Job &o) { return started(o); });
+  return config_.max_started == 0 || all_started < static_cast<std::ptrdiff_t>(config_.max_started);
 }
 
 void ReferenceScheduler::place(std::size_t job, std::uint32_t worker, Time now) {
@@ -387,6 +368,7 @@ void ReferenceScheduler::place(std::size_t job, std::uint32_t worker, Time now) 
   decision.resume = j.state == State::Suspended;
   j.state = State::Running;
   j.worker = worker;
+  j.told_level = decision.level;
   stack.push_back(job);
   const Time deadline = j.release + tasks_[j.task].task.deadline;
   emit(decision.resume ? JobEventKind::Resumed : JobEventKind::Dispatched, job, now, decision.resume ? 0 : deadline,
@@ -401,9 +383,21 @@ void ReferenceScheduler::resume_uncovered(Time now) {
     const std::size_t top = workers_[w].back();
     if (jobs_[top].state != State::Suspended) continue;
     jobs_[top].state = State::Running;
+    jobs_[top].told_level = level_of(top);
     emit(JobEventKind::Resumed, top, now, 0, w);
     dispatches_.push_back(Dispatch{JobSlot(top), TaskId(jobs_[top].task), jobs_[top].number, WorkerId(w),
                                    JobSlot::none(), true, level_of(top)});
+  }
+}
+
+/// The driver has to know when a running job inherits a level.
+void ReferenceScheduler::tell_levels() {
+  for (std::size_t i = 0; i < jobs_.size(); ++i) {
+    Job &j = jobs_[i];
+    if (j.state != State::Running || j.told_level == level_of(i)) continue;
+    j.told_level = level_of(i);
+    dispatches_.push_back(
+        Dispatch{JobSlot(i), TaskId(j.task), j.number, WorkerId(j.worker), JobSlot::none(), true, j.told_level});
   }
 }
 

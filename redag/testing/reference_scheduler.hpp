@@ -63,9 +63,10 @@ class ReferenceScheduler final : public sched::Scheduler {
     std::uint64_t ready_order = 0;
     std::uint32_t worker = WorkerId::kNoneValue;
     bool deferred = false;
-    bool at_point = false;        // until the next dispatch
-    std::size_t heir_of = kNone;  // job whose priority this one has inherited
-    std::vector<Data> consumed;   // parallel to the task's predecessors
+    std::uint32_t told_level = UINT32_MAX;  // what the driver knows
+    bool at_point = false;                  // until the next dispatch
+    std::size_t heir_of = kNone;            // job whose priority this one has inherited
+    std::vector<Data> consumed;             // parallel to the task's predecessors
   };
 
   /// A worker's jobs, the lowest first; only the last one can be running.
@@ -94,12 +95,12 @@ class ReferenceScheduler final : public sched::Scheduler {
   [[nodiscard]] bool outranks(std::size_t a, std::size_t b) const;
   [[nodiscard]] bool considered_before(std::size_t a, std::size_t b) const;
 
-  /// One walk over the candidates. False: a job inherited a priority, which the walk has not taken into account.
-  [[nodiscard]] bool try_dispatch(Time now);
+  [[nodiscard]] std::size_t first_candidate(const std::vector<std::size_t> &passed_over) const;
   [[nodiscard]] std::uint32_t worker_for(std::size_t job) const;
-  [[nodiscard]] bool can_start(std::size_t job, Time now, bool &inherited);
+  [[nodiscard]] bool can_start(std::size_t job, Time now);
   void place(std::size_t job, std::uint32_t worker, Time now);
   void resume_uncovered(Time now);
+  void tell_levels();
   void emit(JobEventKind kind, std::size_t job, Time now, std::int64_t value, std::uint32_t worker,
             Reason reason = Reason::None);
 

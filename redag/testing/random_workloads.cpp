@@ -1,0 +1,143 @@
+#include "redag/testing/random_workloads.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+
+#include "redag/sched/policy.hpp"
+
+namespace redag::testing {
+namespace {
+
+bool chance(Rng &rng, double probability) { return rng.uniform01() < probability; }
+
+std::uint32_t between(Rng &rng, std::uint32_t low, std::uint32_t high) {
+  return static_cast<std::uint32_t>(rng.uniform(low, high));
+}
+
+// Few values, so that equal ones are common, and all multiples of one, so that releases coincide.
+Duration random_period(Rng &rng) {
+  constexpr std::array<Duration, 4> kPeriods{10 * kMicrosecond, 20 * kMicrosecond, 40 * kMicrosecond,
+                                             50 * kMicrosecond};
+  return kPeriods[between(rng, 0, kPeriods.size() - 1)];
+}
+
+Duration random_offset(Rng &rng) { return chance(rng, 0.7) ? 0 : 5 * kMicrosecond * rng.uniform(0, 3); }
+
+void add_edges(Rng &rng, Dag &dag, const RandomWorkloadLimits &limits) {
+  const bool mostly_data = chance(rng, 0.5);
+  // Edges go from earlier to later in `order`, which is not the order of the file.
+  std::vector<std::uint32_t> order(dag.tasks.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  for (std::size_t i = order.size(); i > 1; --i) {
+    std::swap(order[i - 1], order[between(rng, 0, static_cast<std::uint32_t>(i - 1))]);
+  }
+  const double density = rng.uniform01();
+  for (std::size_t to = 1; to < order.size(); ++to) {
+    Task &task = dag.tasks[order[to]];
+    for (std::size_t from = 0; from < to; ++from) {
+      if (chance(rng, density)) task.predecessors.push_back(order[from]);
+    }
+    const bool data = limits.data && !task.predecessors.empty() && chance(rng, mostly_data ? 0.9 : 0.2);
+    if (!data) continue;
+    task.activation = Activation::Data;
+    task.period = 0;
+    task.offset = 0;
+  }
+}
+
+Task random_task(Rng &rng, std::size_t index, const RandomWorkloadLimits &limits) {
+  constexpr std::array<const char *, 3> kGroups{"left", "right", "both"};
+  Task task;
+  task.name = fmt::format("t{}", index);
+  task.wcet = kMicrosecond * rng.uniform(1, 6);
+  task.bcet = chance(rng, 0.5) ? task.wcet : kMicrosecond;
+  if (task.bcet != task.wcet) task.execution.kind = ExecutionTime::Kind::Uniform;
+  if (chance(rng, 0.5)) task.region = kMicrosecond * rng.uniform(1, 3);
+  if (chance(rng, 0.4)) task.priority = static_cast<int>(rng.uniform(-2, 2));
+  if (limits.groups && chance(rng, 0.4)) task.group = kGroups[between(rng, 0, kGroups.size() - 1)];
+  if (limits.bounds && chance(rng, 0.3)) {
+    task.overrun = Overrun::Queue;
+    task.queue_depth = between(rng, 1, 3);
+  }
+  return task;
+}
+
+}  // namespace
+
+Dag random_dag(Rng &rng, const RandomWorkloadLimits &limits) {
+  Dag dag;
+  dag.name = fmt::format("d{}", between(rng, 0, 999'999));
+  if (limits.bounds && chance(rng, 0.5)) dag.max_active = between(rng, 1, 3);
+  if (limits.bounds && chance(rng, 0.3)) dag.max_pending = between(rng, 1, 4);
+  dag.criticality = static_cast<Criticality>(between(rng, 0, 2));
+  const bool one_rate = chance(rng, 0.5);
+  const Duration period = random_period(rng);
+  const Duration offset = random_offset(rng);
+  const std::uint32_t count = between(rng, 1, limits.max_tasks);
+  for (std::size_t i = 0; i < count; ++i) {
+    Task task = random_task(rng, i, limits);
+    task.period = one_rate ? period : random_period(rng);
+    task.offset = one_rate ? offset : random_offset(rng);
+    dag.tasks.push_back(task);
+  }
+  add_edges(rng, dag, limits);
+  inherit_periods(dag);
+  for (Task &task : dag.tasks) {
+    if (chance(rng, 0.3)) task.deadline = std::max(task.wcet, 10 * kMicrosecond * rng.uniform(1, 4));
+  }
+  return dag;
+}
+
+Workload random_workload(Rng &rng, const RandomWorkloadLimits &limits) {
+  Workload workload;
+  workload.name = "random";
+  workload.platform.workers = between(rng, 1, 3);
+  const std::uint32_t count = between(rng, 1, limits.max_dags);
+  for (std::size_t i = 0; i < count; ++i) {
+    workload.dags.push_back(random_dag(rng, limits));
+    workload.dags.back().name = fmt::format("d{}", i);
+  }
+  return workload;
+}
+
+sched::Config random_config(Rng &rng, PolicyKind policy, sched::Preemption preemption, std::size_t task_count) {
+  sched::Config config;
+  config.workers = between(rng, 1, 3);
+  config.policy = policy;
+  config.preemption = preemption;
+  if (preemption != sched::Preemption::Full) return config;
+  const auto tasks = static_cast<std::uint32_t>(task_count);
+  if (sched::is_static(policy) && chance(rng, 0.5)) config.levels = between(rng, 1, tasks);
+  if (chance(rng, 0.3)) config.max_started = config.workers + between(rng, 0, 2);
+  return config;
+}
+
+std::string describe(const Workload &workload, const sched::Config &config) {
+  std::string text =
+      fmt::format("{} workers, preemption {}, {}, {} levels, {} started at most\n", config.workers,
+                  static_cast<int>(config.preemption), to_string(config.policy), config.levels, config.max_started);
+  std::size_t id = 0;
+  for (const Dag &dag : workload.dags) {
+    text += fmt::format("dag {}: max_active {}, max_pending {}, criticality {}\n", dag.name, dag.max_active,
+                        dag.max_pending, to_string(dag.criticality));
+    for (const Task &task : dag.tasks) {
+      text +=
+          fmt::format("  task {}: {}, T {}, D {}, offset {}, after {{{}}}, group '{}', queue {}, priority {}\n", id++,
+                      to_string(task.activation), format_duration(task.period), format_duration(task.deadline),
+                      format_duration(task.offset), fmt::join(task.predecessors, ","), task.group,
+                      task.overrun == Overrun::Queue ? task.queue_depth : 0, task.priority.value_or(0));
+    }
+  }
+  return text;
+}
+
+rc::Gen<Workload> any_workload(const RandomWorkloadLimits &limits) {
+  return rc::gen::noShrink(rc::gen::map(rc::gen::arbitrary<std::uint64_t>(), [limits](std::uint64_t seed) {
+    Rng rng(seed);
+    return random_workload(rng, limits);
+  }));
+}
+
+}  // namespace redag::testing

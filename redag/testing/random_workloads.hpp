@@ -1,0 +1,41 @@
+// Small workloads that provoke: equal periods and deadlines, edges between rates, AND-joins, groups across DAGs, tight
+// bounds and queues, several tasks a level. For properties of schedulers; generate.hpp makes realistic ones. Pure
+// functions of their generator.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <rapidcheck.h>
+
+#include "redag/base/rng.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/sched/scheduler.hpp"
+
+namespace redag::testing {
+
+struct RandomWorkloadLimits {
+  std::uint32_t max_dags = 3;
+  std::uint32_t max_tasks = 4;  // per DAG
+  bool groups = true;
+  bool bounds = true;  // max_active, max_pending, queues
+  bool data = true;    // data tasks; otherwise all tasks are timers
+};
+
+/// A valid workload; times are a few microseconds.
+[[nodiscard]] Workload random_workload(Rng &rng, const RandomWorkloadLimits &limits = {});
+
+/// One more DAG like those of random_workload(), for add_dag.
+[[nodiscard]] Dag random_dag(Rng &rng, const RandomWorkloadLimits &limits = {});
+
+/// 1 to 3 workers; Full with a static policy has limited levels or threads every other time.
+[[nodiscard]] sched::Config random_config(Rng &rng, PolicyKind policy, sched::Preemption preemption,
+                                          std::size_t task_count);
+
+/// For people: one line a task.
+[[nodiscard]] std::string describe(const Workload &workload, const sched::Config &config);
+
+/// random_workload() for RapidCheck. A failing case is printed as its seed; it does not shrink.
+[[nodiscard]] rc::Gen<Workload> any_workload(const RandomWorkloadLimits &limits = {});
+
+}  // namespace redag::testing

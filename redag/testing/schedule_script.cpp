@@ -1,0 +1,296 @@
+#include "redag/testing/schedule_script.hpp"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <tuple>
+
+#include <fmt/format.h>
+
+#include "redag/sched/policy.hpp"
+#include "redag/testing/random_workloads.hpp"
+
+namespace redag::testing {
+namespace {
+
+using sched::Dispatch;
+using sched::Outcome;
+using sched::Preemption;
+using sched::Step;
+using Kind = ScriptStep::Kind;
+
+using JobKey = std::pair<std::uint32_t, std::uint32_t>;  // task, number
+
+std::string describe(const JobEvent &event) {
+  return fmt::format("    {:>8} task {} job {}: {} {} worker {} value {}\n", event.time, event.task.value, event.job,
+                     to_string(event.kind), event.reason == Reason::None ? "" : to_string(event.reason),
+                     static_cast<std::int32_t>(event.worker), event.value);
+}
+
+std::string describe(const std::vector<JobEvent> &events) {
+  std::string text;
+  for (const JobEvent &event : events) text += describe(event);
+  return text;
+}
+
+// Neighbours whose order means nothing, in one order.
+std::vector<JobEvent> normalised(const Step &step, const std::set<TaskId> &uncounted) {
+  std::vector<JobEvent> events;
+  for (const JobEvent &event : step.events) {
+    if (event.kind != JobEventKind::Deferred || uncounted.count(event.task) == 0) events.push_back(event);
+  }
+  const auto order_class = [](const JobEvent &event) {
+    if (event.kind == JobEventKind::Resumed) return 1;
+    return event.reason == Reason::Removed ? 2 : 0;
+  };
+  for (auto first = events.begin(); first != events.end();) {
+    const int its_class = order_class(*first);
+    const auto last = its_class == 0 ? first + 1 : std::find_if(first, events.end(), [&](const JobEvent &e) {
+      return order_class(e) != its_class;
+    });
+    std::sort(first, last, [](const JobEvent &a, const JobEvent &b) {
+      return std::tie(a.worker, a.task, a.job) < std::tie(b.worker, b.task, b.job);
+    });
+    first = last;
+  }
+  return events;
+}
+
+/// What a driver knows of one scheduler: its names for the jobs that have started.
+class Side {
+ public:
+  explicit Side(sched::Scheduler &scheduler) : scheduler_(&scheduler) {}
+
+  sched::Scheduler &operator*() const { return *scheduler_; }
+  sched::Scheduler *operator->() const { return scheduler_; }
+
+  std::vector<JobEvent> take(const Step &step, const std::set<TaskId> &uncounted) {
+    for (const Dispatch &d : step.dispatches) {
+      const JobKey key{d.task.value, d.number};
+      slots_[key] = d.job;
+      levels_[key] = d.level;
+    }
+    return normalised(step, uncounted);
+  }
+  [[nodiscard]] JobSlot slot(const JobKey &key) const { return slots_.at(key); }
+  [[nodiscard]] std::uint32_t level(const JobKey &key) const { return levels_.at(key); }
+
+ private:
+  sched::Scheduler *scheduler_;
+  std::map<JobKey, JobSlot> slots_;
+  std::map<JobKey, std::uint32_t> levels_;
+};
+
+class Run {
+ public:
+  Run(sched::Scheduler &tested, sched::Scheduler &expected, const Workload &workload, const sched::Config &config)
+      : tested_(tested), expected_(expected), config_(config) {
+    for (const Dag &dag : workload.dags) know(dag);
+  }
+
+  std::optional<std::string> step(const ScriptStep &step) {
+    switch (step.kind) {
+      case Kind::Advance: now_ += kMicrosecond * step.choice; break;
+      case Kind::Release: release(step.choice); break;
+      case Kind::Complete: complete(step.choice); break;
+      case Kind::PreemptionPoint: preemption_point(step.choice); break;
+      case Kind::Dispatch: return dispatch();
+      case Kind::AddDag: add_dag(step.choice); break;
+      case Kind::RemoveDag: remove_dag(step.choice); break;
+    }
+    return std::nullopt;
+  }
+
+  /// Two dispatches: the second must do nothing.
+  std::optional<std::string> dispatch() {
+    if (auto difference = dispatch_once()) return difference;
+    if (!tested_->dispatch(now_).events.empty()) return "a dispatch without an event decided something";
+    static_cast<void>(expected_->dispatch(now_));
+    return std::nullopt;
+  }
+
+ private:
+  enum class State : std::uint8_t { Running, Suspended };
+
+  void know(const Dag &dag) {
+    ++dag_count_;
+    for (const Task &task : dag.tasks) {
+      if (task.activation == Activation::Timer) timers_.push_back(TaskId(task_count_));
+      releases_.push_back(task.offset);
+      periods_.push_back(task.period);
+      if (dag.max_active > 0 && (!task.group.empty() || config_.max_started > 0))
+        uncounted_.insert(TaskId(task_count_));
+      ++task_count_;
+    }
+  }
+
+  // One of the timers that are due; a due one that is not chosen is late.
+  void release(std::uint8_t choice) {
+    std::vector<TaskId> due;
+    for (const TaskId task : timers_) {
+      if (releases_[task.value] <= now_) due.push_back(task);
+    }
+    if (due.empty()) return;
+    const TaskId task = due[choice % due.size()];
+    tested_->release(task, releases_[task.value], now_);
+    expected_->release(task, releases_[task.value], now_);
+    releases_[task.value] += periods_[task.value];
+  }
+
+  // Now and then, with full preemption, one that counts as preempted: the operating system ran it.
+  void complete(std::uint8_t choice) {
+    const bool any = config_.preemption == Preemption::Full && choice >= 240;
+    std::vector<JobKey> jobs;
+    for (const auto &[key, state] : jobs_) {
+      if (any || state == State::Running) jobs.push_back(key);
+    }
+    if (jobs.empty()) return;
+    const JobKey key = jobs[choice / 8U % jobs.size()];
+    const Outcome outcome = choice % 8 == 0   ? Outcome::Threw
+                            : choice % 8 == 1 ? Outcome::BudgetExceeded
+                                              : Outcome::Finished;
+    tested_->complete(tested_.slot(key), now_, outcome);
+    expected_->complete(expected_.slot(key), now_, outcome);
+    jobs_.erase(key);
+  }
+
+  void preemption_point(std::uint8_t choice) {
+    if (config_.preemption != Preemption::Cooperative) return;
+    std::vector<JobKey> jobs;
+    for (const auto &[key, state] : jobs_) {
+      if (state == State::Running) jobs.push_back(key);
+    }
+    if (jobs.empty()) return;
+    const JobKey key = jobs[choice % jobs.size()];
+    tested_->preemption_point(tested_.slot(key), now_);
+    expected_->preemption_point(expected_.slot(key), now_);
+  }
+
+  void add_dag(std::uint8_t choice) {
+    Rng rng(choice);
+    Dag dag = random_dag(rng);
+    for (Task &task : dag.tasks) task.offset += now_ / task.period * task.period;
+    static_cast<void>(tested_->add_dag(dag, now_));
+    static_cast<void>(expected_->add_dag(dag, now_));
+    know(dag);
+  }
+
+  void remove_dag(std::uint8_t choice) {
+    const DagId dag(choice % dag_count_);
+    tested_->remove_dag(dag, now_);
+    expected_->remove_dag(dag, now_);
+  }
+
+  std::optional<std::string> dispatch_once() {
+    const std::vector<JobEvent> actual = tested_.take(tested_->dispatch(now_), uncounted_);
+    const std::vector<JobEvent> wanted = expected_.take(expected_->dispatch(now_), uncounted_);
+    if (actual != wanted) {
+      return fmt::format("  decided:\n{}  expected:\n{}", describe(actual), describe(wanted));
+    }
+    for (const JobEvent &event : actual) follow(event);
+    for (std::size_t task = 0; task < task_count_; ++task) {
+      sched::Accounting actual_count = tested_->accounting(TaskId(task));
+      if (uncounted_.count(TaskId(task)) > 0) actual_count.deferred = expected_->accounting(TaskId(task)).deferred;
+      if (actual_count != expected_->accounting(TaskId(task))) {
+        return fmt::format("  different accounting of task {}", task);
+      }
+    }
+    return compare_running();
+  }
+
+  std::optional<std::string> compare_running() {
+    for (const auto &[key, state] : jobs_) {
+      if (state != State::Running) continue;
+      if (sched::is_static(config_.policy) && tested_.level(key) != expected_.level(key)) {
+        return fmt::format("  task {} job {} runs at level {}, expected {}", key.first, key.second, tested_.level(key),
+                           expected_.level(key));
+      }
+      // outranked() may answer yes too often (it does not look at bounds and groups), never no.
+      if (expected_->outranked(expected_.slot(key)) && !tested_->outranked(tested_.slot(key))) {
+        return fmt::format("  task {} job {} is outranked and does not know", key.first, key.second);
+      }
+    }
+    return std::nullopt;
+  }
+
+  void follow(const JobEvent &event) {
+    const JobKey key{event.task.value, event.job};
+    if (event.kind == JobEventKind::Dispatched || event.kind == JobEventKind::Resumed) jobs_[key] = State::Running;
+    if (event.kind == JobEventKind::Preempted) jobs_[key] = State::Suspended;
+  }
+
+  Side tested_;
+  Side expected_;
+  sched::Config config_;
+  Time now_ = 0;
+  std::size_t dag_count_ = 0;
+  std::size_t task_count_ = 0;
+  std::vector<TaskId> timers_;
+  std::set<TaskId> uncounted_;  // tasks whose deferrals are not compared
+  std::vector<Time> releases_;  // next one of each task
+  std::vector<Duration> periods_;
+  std::map<JobKey, State> jobs_;  // started and unfinished
+};
+
+const char *name_of(Kind kind) {
+  switch (kind) {
+    case Kind::Advance: return "advance";
+    case Kind::Release: return "release";
+    case Kind::Complete: return "complete";
+    case Kind::PreemptionPoint: return "point";
+    case Kind::Dispatch: return "dispatch";
+    case Kind::AddDag: return "add";
+    case Kind::RemoveDag: return "remove";
+  }
+  return "?";
+}
+
+}  // namespace
+
+Script random_script(std::uint64_t seed, std::size_t length, bool reconfigure) {
+  Rng rng = Rng::stream(seed, 1, 0);
+  Script script;
+  // The rates differ from script to script: some starve, some idle.
+  const double dispatch = 0.1 + 0.4 * rng.uniform01();
+  const double release = 0.3 + 0.5 * rng.uniform01();
+  const double point = 0.2 * rng.uniform01();
+  const double advance = 0.1 + 0.5 * rng.uniform01();
+  while (script.size() < length) {
+    ScriptStep step;
+    const double kind = rng.uniform01();
+    step.choice = static_cast<std::uint8_t>(rng.uniform(0, 255));
+    if (rng.uniform01() < dispatch) {
+      step.kind = Kind::Dispatch;
+    } else if (reconfigure && rng.uniform01() < 0.02) {
+      step.kind = rng.uniform01() < 0.5 ? Kind::AddDag : Kind::RemoveDag;
+    } else if (kind < release) {
+      step.kind = Kind::Release;
+    } else if (kind < release + point) {
+      step.kind = Kind::PreemptionPoint;
+    } else if (rng.uniform01() < advance) {
+      step = ScriptStep{Kind::Advance, static_cast<std::uint8_t>(rng.uniform(1, 60))};
+    } else {
+      step.kind = Kind::Complete;
+    }
+    script.push_back(step);
+  }
+  return script;
+}
+
+std::string describe(const Script &script) {
+  std::string text;
+  for (const ScriptStep &step : script) text += fmt::format("{}({}) ", name_of(step.kind), step.choice);
+  return text;
+}
+
+std::optional<std::string> find_difference(sched::Scheduler &tested, sched::Scheduler &expected,
+                                           const Workload &workload, const sched::Config &config,
+                                           const Script &script) {
+  Run run(tested, expected, workload, config);
+  for (const ScriptStep &step : script) {
+    if (auto difference = run.step(step)) return difference;
+  }
+  return run.dispatch();
+}
+
+}  // namespace redag::testing
