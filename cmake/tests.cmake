@@ -20,7 +20,8 @@ function(redag_add_test_program folder)
   set(program redag_${folder}_test)
   add_executable(${program} ${ARGN})
   target_link_libraries(${program} PRIVATE redag_testing GTest::gtest_main redag_warnings)
-  gtest_discover_tests(${program} TEST_PREFIX ${folder}. DISCOVERY_TIMEOUT 60
+  # Values would print as addresses, and rename the tests at every build.
+  gtest_discover_tests(${program} TEST_PREFIX ${folder}. NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60
     PROPERTIES LABELS ${folder} TIMEOUT 300)
 endfunction()
 
