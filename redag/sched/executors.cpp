@@ -1,0 +1,47 @@
+#include "redag/sched/executors.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "redag/base/check.hpp"
+#include "redag/sched/models/wait_set.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+
+namespace redag::sched {
+namespace {
+
+constexpr std::array<ExecutorKind, 3> kExecutors{{
+    {"redag", "ReDAG-RT: one priority order over all DAGs, per-DAG bounds, preemption", true, true, false},
+    {"mte", "model of rclcpp's MultiThreadedExecutor (Humble)", false, false, false},
+    {"ste", "model of rclcpp's SingleThreadedExecutor (Humble); one worker", false, false, true},
+}};
+
+}  // namespace
+
+std::span<const ExecutorKind> executors() { return kExecutors; }
+
+const ExecutorKind *find_executor(std::string_view name) {
+  const auto *found = std::find_if(kExecutors.begin(), kExecutors.end(),
+                                   [name](const ExecutorKind &kind) { return kind.name == name; });
+  return found == kExecutors.end() ? nullptr : found;
+}
+
+Config effective_config(const ExecutorKind &kind, Config config) {
+  if (!kind.preemptive) {
+    config.preemption = Preemption::None;
+    config.levels = 0;
+    config.max_started = 0;
+  }
+  if (kind.single_worker) config.workers = 1;
+  return config;
+}
+
+std::unique_ptr<Scheduler> make_scheduler(std::string_view name, const Workload &workload, const Config &config) {
+  const ExecutorKind *kind = find_executor(name);
+  REDAG_CHECK(kind != nullptr, "an executor of that name does not exist");
+  const Config effective = effective_config(*kind, config);
+  if (name == "redag") return std::make_unique<PriorityScheduler>(workload, effective);
+  return std::make_unique<WaitSetScheduler>(workload, effective);
+}
+
+}  // namespace redag::sched

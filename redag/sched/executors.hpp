@@ -1,0 +1,34 @@
+// The executors by name: the one place where drivers and the program get schedulers from.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "redag/sched/scheduler.hpp"
+
+namespace redag::sched {
+
+struct ExecutorKind {
+  std::string_view name;         // what a user writes
+  std::string_view description;  // one line
+  bool preemptive = false;       // knows the modes other than Preemption::None
+  bool bounds = false;           // keeps a DAG's max_active
+  bool single_worker = false;    // uses one worker, whatever the platform has
+};
+
+/// All of them, ours first.
+[[nodiscard]] std::span<const ExecutorKind> executors();
+
+/// nullptr for an unknown name.
+[[nodiscard]] const ExecutorKind *find_executor(std::string_view name);
+
+/// The configuration that the executor makes of `config`: a model of another executor has no preemption, levels or
+/// bound on threads, and "ste" has one worker.
+[[nodiscard]] Config effective_config(const ExecutorKind &kind, Config config);
+
+/// A scheduler for effective_config(). Requires a known name and what PriorityScheduler requires.
+[[nodiscard]] std::unique_ptr<Scheduler> make_scheduler(std::string_view name, const Workload &workload,
+                                                        const Config &config);
+
+}  // namespace redag::sched

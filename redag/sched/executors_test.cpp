@@ -1,0 +1,56 @@
+#include "redag/sched/executors.hpp"
+
+#include <gtest/gtest.h>
+
+namespace redag::sched {
+namespace {
+
+Workload two_timers() {
+  Task task;
+  task.wcet = 1;
+  task.period = task.deadline = 100;
+  Task faster = task;
+  faster.period = faster.deadline = 10;
+  Workload workload;
+  workload.dags.resize(1);
+  workload.dags[0].tasks = {task, faster};
+  return workload;
+}
+
+TEST(Executors, AreFoundByNameOursFirst) {
+  EXPECT_EQ(executors().front().name, "redag");
+  for (const ExecutorKind &kind : executors()) {
+    EXPECT_EQ(find_executor(kind.name), &kind);
+    EXPECT_FALSE(kind.description.empty());
+  }
+  EXPECT_EQ(find_executor("cfs"), nullptr);
+}
+
+TEST(Executors, AModelOfRclcppDoesNotPreempt) {
+  const Config config{4, Preemption::Full, PolicyKind::RateMonotonic, 3, 8};
+  const Config mte = effective_config(*find_executor("mte"), config);
+  EXPECT_EQ(mte.preemption, Preemption::None);
+  EXPECT_EQ(mte.workers, 4U);
+  EXPECT_EQ(mte.levels + mte.max_started, 0U);
+  EXPECT_EQ(effective_config(*find_executor("ste"), config).workers, 1U);
+  EXPECT_EQ(effective_config(*find_executor("redag"), config).preemption, Preemption::Full);
+}
+
+// The faster of two timers is the second one: only ours looks at the rates.
+TEST(Executors, MakeSchedulersThatDifferInWhoIsFirst) {
+  for (const ExecutorKind &kind : executors()) {
+    const auto scheduler = make_scheduler(kind.name, two_timers(), Config{});
+    scheduler->release(TaskId(0), 0, 0);
+    scheduler->release(TaskId(1), 0, 0);
+    const Step step = scheduler->dispatch(0);
+    ASSERT_EQ(step.dispatches.size(), 1U) << kind.name;
+    EXPECT_EQ(step.dispatches[0].task, TaskId(kind.name == "redag" ? 1 : 0)) << kind.name;
+  }
+}
+
+TEST(ExecutorsDeathTest, AnUnknownNameIsAMistakeOfTheCaller) {
+  EXPECT_DEATH(static_cast<void>(make_scheduler("cfs", two_timers(), Config{})), "does not exist");
+}
+
+}  // namespace
+}  // namespace redag::sched

@@ -1,0 +1,112 @@
+#include "redag/sched/models/wait_set.hpp"
+
+#include <algorithm>
+
+#include "redag/base/check.hpp"
+
+namespace redag::sched {
+
+WaitSetScheduler::WaitSetScheduler(const Workload &workload, const Config &config)
+    : Lifecycle(config), working_(config.workers, false) {
+  REDAG_CHECK(config.workers > 0, "an executor has at least one thread");
+  REDAG_CHECK(config.preemption == Preemption::None, "rclcpp's executors do not preempt");
+  load(workload);
+}
+
+void WaitSetScheduler::preemption_point(JobSlot /*job*/, Time /*now*/) {
+  REDAG_CHECK(false, "preemption points are for cooperative preemption");
+}
+
+// Executor::get_next_executable, by one free thread after the other: from the window, or else from a new one.
+Step WaitSetScheduler::dispatch(Time now) {
+  begin(now);
+  for (std::uint32_t worker = free_worker(); worker != kNil; worker = free_worker()) {
+    std::uint32_t slot = take();
+    if (slot == kNil && wait()) slot = take();
+    if (slot == kNil) break;
+    Entity &entity = entities_[jobs_[slot].task.value];
+    unlink(entity, slot);
+    busy_[entity.group] = true;
+    working_[worker] = true;
+    start(slot, WorkerId(worker), kNil, 0);
+  }
+  return step();
+}
+
+std::uint32_t WaitSetScheduler::free_worker() const {
+  const auto found = std::find(working_.begin(), working_.end(), false);
+  return found == working_.end() ? kNil : static_cast<std::uint32_t>(found - working_.begin());
+}
+
+// get_next_ready_executable: the first entity of the window whose group is free leaves the window. An entity whose job
+// was skipped meanwhile has nothing to take and leaves it too.
+std::uint32_t WaitSetScheduler::take() {
+  for (const std::uint32_t task : registration_) {
+    Entity &entity = entities_[task];
+    if (!entity.in_window || busy_[entity.group]) continue;
+    entity.in_window = false;
+    if (entity.first != kNil) return entity.first;
+  }
+  return kNil;
+}
+
+// wait_for_work: forgets the old window; the new one holds the ready entities of groups that are free. Returns whether
+// there are any; if not, the thread goes on waiting.
+bool WaitSetScheduler::wait() {
+  bool any = false;
+  for (Entity &entity : entities_) {
+    entity.in_window = entity.first != kNil && !busy_[entity.group];
+    any = any || entity.in_window;
+  }
+  return any;
+}
+
+void WaitSetScheduler::on_ready(std::uint32_t slot) {
+  Entity &entity = entities_[jobs_[slot].task.value];
+  jobs_[slot].task_next = kNil;
+  (entity.last == kNil ? entity.first : jobs_[entity.last].task_next) = slot;
+  entity.last = slot;
+}
+
+void WaitSetScheduler::on_withdrawn(std::uint32_t slot) { unlink(entities_[jobs_[slot].task.value], slot); }
+
+void WaitSetScheduler::on_end(std::uint32_t slot) {
+  busy_[entities_[jobs_[slot].task.value].group] = false;
+  working_[jobs_[slot].worker.value] = false;
+}
+
+void WaitSetScheduler::unlink(Entity &entity, std::uint32_t slot) {
+  std::uint32_t before = kNil;
+  for (std::uint32_t s = entity.first; s != slot; s = jobs_[s].task_next) before = s;
+  (before == kNil ? entity.first : jobs_[before].task_next) = jobs_[slot].task_next;
+  if (entity.last == slot) entity.last = before;
+}
+
+// Entities keep their jobs and their place in the window; the groups are numbered anew.
+void WaitSetScheduler::on_reconfigured() {
+  entities_.resize(tasks_.size());
+  registration_.clear();
+  for (const bool timers : {true, false}) {
+    for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
+      if (tasks_[t].timer == timers) registration_.push_back(t);
+    }
+  }
+  busy_.assign(tasks_.size() + group_count(), false);
+  for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
+    const std::uint32_t named = tasks_[t].group;
+    entities_[t].group = named == kNil ? t : static_cast<std::uint32_t>(tasks_.size()) + named;
+  }
+  for (const Job &job : jobs_) {
+    if (job.started()) busy_[entities_[job.task.value].group] = true;
+  }
+}
+
+std::unique_ptr<Scheduler> make_single_threaded(const Workload &workload) { return make_multi_threaded(workload, 1); }
+
+std::unique_ptr<Scheduler> make_multi_threaded(const Workload &workload, std::uint32_t workers) {
+  Config config;
+  config.workers = workers;
+  return std::make_unique<WaitSetScheduler>(workload, config);
+}
+
+}  // namespace redag::sched

@@ -1,0 +1,64 @@
+// Model of rclcpp's SingleThreadedExecutor and MultiThreadedExecutor as of ROS 2 Humble. Owns which ready job runs
+// next; a job's life is Lifecycle's. Not thread-safe.
+//
+// Modelled (rclcpp/src/rclcpp/executor.cpp and allocator_memory_strategy.hpp):
+// - A wait returns the set of ready entities (Executor::wait_for_work, collect_entities, remove_null_handles). Entities
+//   of an exclusive group that is busy are left out. This set is used up before the next wait: what becomes ready
+//   meanwhile is not seen (the processing window of Casini, Blass, Luetkebohle, Brandenburg, ECRTS 2019).
+// - From the set: timers first, then subscriptions (get_next_ready_executable_from_map), in the order of registration,
+//   each once; those whose group is busy are passed over and stay (get_next_timer, get_next_subscription).
+// - MultiThreadedExecutor::run: the threads take one entity each under a lock; a group is busy until its job ends.
+// Not modelled: what rcl_wait, the lock and waking a thread cost; services, clients, waitables; that groups are walked
+// in the order of their addresses, which is arbitrary (here: order of DAGs and tasks).
+//
+// A timer task is a timer, a data task a subscription. `group` is the callback group; a task without one is alone in a
+// group of its own, whereas in ROS 2 all callbacks of a node share its default group unless told otherwise. Bounds of
+// DAGs (max_active), priorities and preemption are unknown to these executors.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "redag/sched/lifecycle.hpp"
+
+namespace redag::sched {
+
+class WaitSetScheduler final : public Lifecycle {
+ public:
+  /// Requires config.workers > 0 and Preemption::None; 1 worker is the SingleThreadedExecutor.
+  WaitSetScheduler(const Workload &workload, const Config &config);
+
+  void preemption_point(JobSlot job, Time now) override;
+  Step dispatch(Time now) override;
+  [[nodiscard]] bool outranked(JobSlot /*job*/) const override { return false; }
+
+ private:
+  /// A task as rclcpp sees it: a timer or a subscription.
+  struct Entity {
+    std::uint32_t first = kNil;  // ready jobs, oldest first, linked by Job::task_next
+    std::uint32_t last = kNil;
+    std::uint32_t group = 0;  // position in busy_
+    bool in_window = false;
+  };
+
+  void on_ready(std::uint32_t slot) override;
+  void on_withdrawn(std::uint32_t slot) override;
+  void on_end(std::uint32_t slot) override;
+  void on_reconfigured() override;
+
+  [[nodiscard]] std::uint32_t free_worker() const;
+  std::uint32_t take();
+  bool wait();
+  void unlink(Entity &entity, std::uint32_t slot);
+
+  std::vector<Entity> entities_;             // by TaskId
+  std::vector<std::uint32_t> registration_;  // tasks in the order in which a window is searched
+  std::vector<bool> busy_;                   // callback groups: one for each task, then the named ones
+  std::vector<bool> working_;                // workers
+};
+
+[[nodiscard]] std::unique_ptr<Scheduler> make_single_threaded(const Workload &workload);
+[[nodiscard]] std::unique_ptr<Scheduler> make_multi_threaded(const Workload &workload, std::uint32_t workers);
+
+}  // namespace redag::sched
