@@ -54,7 +54,7 @@ bool fits(const std::vector<GlobalUnit> &units, std::uint32_t workers) {
   Duration longest = 1;
   for (const GlobalUnit &unit : units) longest = std::max(longest, unit.period);
   const Int128 sum = Int128{longest} * 4 * workers * (static_cast<Duration>(units.size()) + 2);
-  return longest < (Duration{1} << 50U) && sum < (Int128{1} << 62U);
+  return Int128{longest} * workers < (Int128{1} << 50U) && sum < (Int128{1} << 62U);
 }
 
 // The longest path's overhead, and the most tasks on any path.
@@ -96,11 +96,9 @@ GlobalUnit make_unit(const System &system, std::uint32_t id) {
   result.period = unit.period;
   result.jitter = unit.jitter;
   result.limit = std::min(unit.limit, unit.period);
-  result.rate = 1.0 / static_cast<double>(unit.period);
   result.tasks = static_cast<std::uint32_t>(unit.tasks.size());
   result.bound = dag.max_active > 0 && dag.max_active < result.tasks ? std::min(dag.max_active, workers) : 0;
-  result.width = std::min({workers, result.tasks, result.bound > 0 ? result.bound : result.tasks});
-  result.head = result.volume / result.width;
+  set_width(result, std::min({workers, result.tasks, result.bound > 0 ? result.bound : result.tasks}));
   measure_paths(system, unit, result);
   return result;
 }
@@ -121,6 +119,12 @@ Units units_of(const System &system, const Needs &needs) {
   if (!needs.any_policy) result.reason = why_not_order(system, result.units);
   if (!result.reason && !fits(result.units, result.workers)) result.reason = "periods too long for exact sums";
   return result;
+}
+
+void set_width(GlobalUnit &unit, std::uint32_t width) {
+  unit.width = width;
+  unit.turn = multiply(unit.period, width);
+  unit.rate = 1.0 / static_cast<double>(unit.turn);
 }
 
 SharedTerms::SharedTerms(const System &system, const GlobalUnit &unit) : system_(system), unit_(unit) {}

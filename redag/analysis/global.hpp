@@ -21,8 +21,8 @@ struct GlobalUnit {
   Duration jitter = 0;
   Duration limit = 0;            // responses above it count as none; never above the period
   Duration response = 0;         // of the bound at work, once known
-  Duration head = 0;             // least time in which it can execute its volume, floor(volume / width)
-  double rate = 0;               // 1 / period, see divide()
+  Duration turn = 0;             // width * period, see divide()
+  double rate = 0;               // 1 / turn
   std::uint32_t width = 1;       // jobs of it that can execute at once, never above the workers
   std::uint32_t bound = 0;       // max_active where it binds, or 0
   std::uint32_t tasks = 1;       // how many
@@ -49,20 +49,23 @@ struct Units {
 };
 [[nodiscard]] Units units_of(const System &system, const Needs &needs);
 
-/// Quotient and remainder by a period without a division instruction. Requires 0 <= value < 2^52, exact then.
+/// Lets at most `width` jobs of the unit execute at once.
+void set_width(GlobalUnit &unit, std::uint32_t width);
+
+/// Quotient and remainder by `turn` without a division instruction. Requires 0 <= value < 2^52, exact then.
 struct Division {
   Duration quotient = 0;
   Duration remainder = 0;
 };
 [[nodiscard]] inline Division divide(Duration value, const GlobalUnit &by) {
   auto quotient = static_cast<Duration>(static_cast<double>(value) * by.rate);
-  Duration remainder = value - quotient * by.period;
+  Duration remainder = value - quotient * by.turn;
   if (remainder < 0) {
     --quotient;
-    remainder += by.period;
-  } else if (remainder >= by.period) {
+    remainder += by.turn;
+  } else if (remainder >= by.turn) {
     ++quotient;
-    remainder -= by.period;
+    remainder -= by.turn;
   }
   return {quotient, remainder};
 }

@@ -254,7 +254,9 @@ bool refine_any(std::span<GlobalUnit> units, std::uint32_t workers, bool &change
 }
 
 Outcome apply_any(const System &system) {
-  global::Units view = global::units_of(system, {.edges = false, .any_policy = true});
+  // A job waits only while all workers execute others, whether those can be preempted or not.
+  const auto mode = system.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
+  global::Units view = global::units_of(system, {.mode = mode, .edges = false, .any_policy = true});
   if (view.reason) return NotApplicable{*view.reason};
   const std::span<GlobalUnit> units(view.units);
   for (GlobalUnit &unit : units) unit.response = unit.limit;  // as if; holds if every task keeps its limit
@@ -301,8 +303,8 @@ Method bertogna_cirinei_any() {
   Method method = bertogna_cirinei();
   method.name = "bertogna_cirinei_any";
   method.assumptions =
-      "m workers, full preemption, any work-conserving order (EDF, FIFO too), no edges, R <= T for all tasks; release "
-      "jitter; no shared groups";
+      "m workers, full preemption or none, any work-conserving order (EDF, FIFO too), no edges, R <= T for all tasks; "
+      "release jitter, shared levels; no shared groups";
   method.complexity = "pseudo-polynomial; O(n^2) a step, at most 50 rounds";
   method.apply = apply_any;
   return method;

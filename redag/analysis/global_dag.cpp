@@ -1,0 +1,260 @@
+#include "redag/analysis/global_dag.hpp"
+
+#include "redag/analysis/arithmetic.hpp"
+
+namespace redag::analysis {
+namespace global {
+namespace {
+
+// How often the waiting time of one window is tightened; every round gives a valid one.
+constexpr int kRounds = 8;
+
+// More work than the workers can do in a period; beyond it sums could wrap, and no response is within its limit.
+bool is_hopeless(const GlobalUnit &own, std::uint32_t workers) {
+  return own.volume > multiply(own.limit, workers) || own.length > own.limit;
+}
+
+// Least fixed point of a monotone `next` from `window` on; false above `stop`.
+template <class Next>
+bool grow(Duration &window, Duration stop, Next next) {
+  for (int steps = 0; window <= stop && steps < kMaxSteps; ++steps) {
+    const Duration grown = next(window);
+    if (grown <= window) return true;
+    window = grown;
+  }
+  return false;
+}
+
+// floor(a / b + c / d) for small divisors.
+Duration floor_of_sum(Duration a, Duration b, Duration c, Duration d) {
+  return a / b + c / d + (a % b * d + c % d * b) / (b * d);
+}
+
+// One window of dag_bounded(), with the works of the more urgent DAGs in it.
+class Window {
+ public:
+  Window(std::span<const GlobalUnit> more_urgent, const GlobalUnit &own, std::uint32_t workers, Duration blocking,
+         std::span<Duration> works)
+      : more_urgent_(more_urgent), own_(own), workers_(workers), blocking_(blocking), works_(works) {
+    // Others of its own that execute while the critical path waits and max_active is not reached.
+    own_width_ = own.bound > 0 ? own.bound - 1 : own.tasks - 1;
+    // The critical path need not be the longest one; with max_active that could matter, so all of the volume counts.
+    own_work_ = own.bound > 0 ? own.volume : own.volume - own.length;
+  }
+
+  Duration next(Duration window) {
+    sum_ = 0;
+    for (std::size_t i = 0; i < works_.size(); ++i) sum_ += works_[i] = dag_work(more_urgent_[i], window);
+    busy_ = busy_instants();
+    if (own_.bound == 0) return own_.length + busy_;
+    return own_.length + floor_of_sum(own_.volume - own_.length, own_.bound, others_in(busy_), workers_);
+  }
+
+  [[nodiscard]] Duration busy() const { return busy_; }
+
+ private:
+  // Work of others in so many instants: no DAG does more than its width in each.
+  [[nodiscard]] Duration others_in(Duration busy) const {
+    Duration sum = busy > 0 ? blocking_ : 0;
+    for (std::size_t i = 0; i < works_.size(); ++i) {
+      sum += std::min(works_[i], busy * static_cast<Duration>(more_urgent_[i].width));
+    }
+    return sum;
+  }
+
+  // At least the largest y with m y <= min(V, r y) + sum min(W_j, c_j y) + B.
+  [[nodiscard]] Duration busy_instants() const {
+    Duration busy = (own_work_ + sum_ + blocking_) / workers_;
+    for (int round = 0; round < kRounds && busy > 0; ++round) {
+      const Duration own = std::min(own_work_, own_width_ * busy);
+      const Duration tighter = (own + others_in(busy)) / workers_;
+      if (tighter >= busy) break;
+      busy = tighter;
+    }
+    return busy;
+  }
+
+  std::span<const GlobalUnit> more_urgent_;
+  const GlobalUnit &own_;
+  Duration workers_;
+  Duration blocking_;
+  std::span<Duration> works_;
+  Duration own_width_ = 0;
+  Duration own_work_ = 0;
+  Duration sum_ = 0;
+  Duration busy_ = 0;
+};
+
+}  // namespace
+
+bool melani_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
+  GlobalUnit &own = units[k];
+  if (is_hopeless(own, workers)) return false;
+  const auto more_urgent = units.first(k);
+  Duration window = own.length + (own.volume - own.length) / workers;
+  const bool found = grow(window, own.limit - own.jitter, [&](Duration x) {
+    Duration sum = own.volume - own.length;
+    for (const GlobalUnit &other : more_urgent) sum += dag_work(other, x);
+    return own.length + sum / static_cast<Duration>(workers);
+  });
+  own.response = window + own.jitter;
+  return found;
+}
+
+bool bounded_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration blocking,
+                      Waiting &waiting) {
+  GlobalUnit &own = units[k];
+  if (is_hopeless(own, workers) || blocking >= kUnbounded / 4) return false;
+  Window window(units.first(k), own, workers, blocking, std::span(waiting.works).first(k));
+  waiting.window = own.length;
+  const bool found = grow(waiting.window, own.limit - own.jitter, [&window](Duration x) { return window.next(x); });
+  waiting.busy = window.busy();
+  own.response = waiting.window + own.jitter;
+  return found;
+}
+
+Duration blocking_of(const System &system, const std::vector<GlobalUnit> &units, std::size_t k, std::uint32_t workers) {
+  const GlobalUnit &own = units[k];
+  const Duration first = largest_remaining(system, units, k + 1, workers);
+  const Duration later = workers > 1 ? largest_remaining(system, units, k + 1, workers - 1) : 0;
+  // While max_active is reached, less urgent jobs start; each end of a job of the DAG can lead to another wait.
+  const std::uint32_t ends = (own.bound > 0 ? own.tasks : own.path_tasks) - 1;
+  return add(first, multiply(later, ends));
+}
+
+}  // namespace global
+
+namespace {
+
+using global::GlobalUnit;
+using global::SharedTerms;
+
+template <class Respond, class Explain>
+Bound from_most_urgent(const System &system, const std::vector<GlobalUnit> &units, Respond respond, Explain explain) {
+  std::vector<ResponseBound> responses(system.units.size());
+  bool known = true;
+  for (std::size_t k = 0; k < units.size(); ++k) {
+    ResponseBound &response = responses[units[k].unit];
+    if (!known) {
+      response.absent = global::kMoreUrgent;
+    } else if (respond(k)) {
+      response.response = units[k].response;
+      SharedTerms terms(system, units[k]);
+      terms.add_path();
+      explain(k, terms);
+      terms.add_jitter();
+      response.terms = terms.take();
+    } else {
+      known = false;
+      response.absent = global::kExceedsLimit;
+    }
+  }
+  return from_units(system, std::move(responses));
+}
+
+Outcome apply_melani(const System &system) {
+  global::Units view = global::units_of(system, {});
+  if (view.reason) return NotApplicable{*view.reason};
+  for (GlobalUnit &unit : view.units) global::set_width(unit, view.workers);
+  const std::span<GlobalUnit> units(view.units);
+  const std::uint32_t m = view.workers;
+  return from_most_urgent(
+      system, view.units, [&](std::size_t k) { return global::melani_response(units, k, m); },
+      [&](std::size_t k, SharedTerms &terms) {
+        const GlobalUnit &own = units[k];
+        terms.add_share(Term::Kind::Own, own, own.volume - own.length, m);
+        for (const GlobalUnit &other : units.first(k)) {
+          terms.add_share(Term::Kind::Interference, other, global::dag_work(other, own.response - own.jitter), m);
+        }
+      });
+}
+
+// Shares of `waiting.busy` or, with max_active, of the sum that made the response; what tightening took away is taken
+// from the terms in their order, so that they add up.
+void explain_bounded(std::span<const GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration blocking,
+                     const global::Waiting &waiting, SharedTerms &terms) {
+  const GlobalUnit &own = units[k];
+  const auto at_most = [&](Duration work, Duration width) { return std::min(work, waiting.busy * width); };
+  Duration left = own.bound > 0 ? kUnbounded : multiply(waiting.busy, workers);
+  const auto share = [&](Term::Kind kind, const GlobalUnit &whose, Duration amount) {
+    const Duration taken = std::min(amount, left);
+    left -= taken;
+    terms.add_share(kind, whose, taken, workers);
+  };
+  for (std::size_t i = 0; i < k; ++i) {
+    share(Term::Kind::Interference, units[i], at_most(waiting.works[i], units[i].width));
+  }
+  if (waiting.busy > 0) share(Term::Kind::Blocking, own, blocking);
+  if (own.bound > 0) {
+    terms.add_share(Term::Kind::Own, own, own.volume - own.length, own.bound);
+  } else {
+    terms.add_share(Term::Kind::Own, own, left, workers);  // the rest is its own other tasks
+  }
+}
+
+Outcome apply_bounded(const System &system, sched::Preemption mode) {
+  global::Units view = global::units_of(system, {.mode = mode, .bounds = true});
+  if (view.reason) return NotApplicable{*view.reason};
+  const std::span<GlobalUnit> units(view.units);
+  global::Waiting waiting;
+  waiting.works.resize(units.size());
+  Duration blocking = 0;
+  return from_most_urgent(
+      system, view.units,
+      [&](std::size_t k) {
+        if (mode == sched::Preemption::None) blocking = global::blocking_of(system, view.units, k, view.workers);
+        return global::bounded_response(units, k, view.workers, blocking, waiting);
+      },
+      [&](std::size_t k, SharedTerms &terms) { explain_bounded(units, k, view.workers, blocking, waiting, terms); });
+}
+
+Outcome apply_preemptive(const System &system) { return apply_bounded(system, sched::Preemption::Full); }
+Outcome apply_nonpreemptive(const System &system) { return apply_bounded(system, sched::Preemption::None); }
+
+}  // namespace
+
+Method melani() {
+  Method method;
+  method.name = "melani";
+  method.subject = Subject::Dag;
+  method.cite =
+      "A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo, Response-time analysis of "
+      "conditional "
+      "DAG tasks in multiprocessor systems, ECRTS 2015";
+  method.assumptions =
+      "m workers, full preemption, static priorities that keep DAGs together, one rate a DAG, R <= T; release jitter; "
+      "no max_active, shared groups or levels";
+  method.complexity = "pseudo-polynomial; O(DAGs) a step";
+  method.apply = apply_melani;
+  return method;
+}
+
+Method dag_bounded() {
+  Method method;
+  method.name = "dag_bounded";
+  method.subject = Subject::Dag;
+  method.cite = "docs/analysis.md, \"Several workers\"; after A. Melani et al., ECRTS 2015";
+  method.assumptions =
+      "m workers, full preemption, static priorities that keep DAGs together, one rate a DAG, R <= T; release jitter, "
+      "max_active of DAGs in one part; no shared groups or levels";
+  method.complexity = "pseudo-polynomial; O(DAGs) a step";
+  method.apply = apply_preemptive;
+  return method;
+}
+
+Method dag_nonpreemptive() {
+  Method method;
+  method.name = "dag_nonpreemptive";
+  method.subject = Subject::Dag;
+  method.cite =
+      "docs/analysis.md, \"Several workers\"; after M. Serrano, A. Melani, M. Bertogna, E. Quinones, Response-time "
+      "analysis of DAG tasks under fixed priority scheduling with limited preemptions, DATE 2016";
+  method.assumptions =
+      "m workers, jobs run to completion, static priorities that keep DAGs together, one rate a DAG, R <= T; release "
+      "jitter, max_active of DAGs in one part; no shared groups";
+  method.complexity = "pseudo-polynomial; O(DAGs) a step";
+  method.apply = apply_nonpreemptive;
+  return method;
+}
+
+}  // namespace redag::analysis

@@ -1,0 +1,216 @@
+#include "redag/analysis/global_dag.hpp"
+
+#include <gtest/gtest.h>
+
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using testing::BoundCaseLimits;
+using testing::expect_bound_holds;
+
+BoundCaseLimits graphs(sched::Preemption preemption) {
+  BoundCaseLimits limits;
+  limits.preemption = preemption;
+  limits.max_workers = 4;
+  limits.edges = true;
+  limits.max_dags = 4;
+  limits.max_tasks = 8;
+  limits.jitter = limits.overheads = true;
+  limits.max_deadline = 1.5;
+  limits.min_utilization = 0.1;
+  limits.max_utilization = 0.7;
+  limits.min_period = 10;
+  limits.max_period = 120;
+  return limits;
+}
+
+BoundCaseLimits with_max_active(BoundCaseLimits limits) {
+  limits.caps = true;
+  return limits;
+}
+
+testing::BoundGenerator cases(const BoundCaseLimits &limits) {
+  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
+}
+
+TEST(BoundProperty, Melani) {
+  expect_bound_holds(melani(), cases(graphs(sched::Preemption::Full)), {.workloads = 2000});
+}
+
+TEST(BoundProperty, DagBounded) {
+  expect_bound_holds(dag_bounded(), cases(graphs(sched::Preemption::Full)), {.workloads = 1500});
+}
+
+TEST(BoundProperty, DagBoundedWithMaxActive) {
+  expect_bound_holds(dag_bounded(), cases(with_max_active(graphs(sched::Preemption::Full))), {.workloads = 2000});
+}
+
+TEST(BoundProperty, DagNonpreemptive) {
+  expect_bound_holds(dag_nonpreemptive(), cases(graphs(sched::Preemption::None)), {.workloads = 1500});
+}
+
+TEST(BoundProperty, DagNonpreemptiveWithMaxActive) {
+  expect_bound_holds(dag_nonpreemptive(), cases(with_max_active(graphs(sched::Preemption::None))), {.workloads = 2000});
+}
+
+Task make_task(std::string name, Duration wcet, Duration period, std::vector<std::uint32_t> after) {
+  Task task;
+  task.name = std::move(name);
+  task.wcet = task.bcet = wcet;
+  task.period = task.deadline = period;
+  task.predecessors = std::move(after);
+  if (!task.predecessors.empty()) task.activation = Activation::Data;
+  return task;
+}
+
+// Five stages of one task and two parallel ones, and below it a wide DAG whose tasks start whenever the upper DAG is
+// narrow. Counting blocking only once per preemption gives 44; the schedule takes 52.
+Workload narrow_and_wide() {
+  Workload workload;
+  workload.name = "narrow_and_wide";
+  workload.platform.workers = 2;
+  Dag narrow;
+  narrow.name = "narrow";
+  std::vector<std::uint32_t> before;
+  for (int stage = 0; stage < 5; ++stage) {
+    const auto first = static_cast<std::uint32_t>(narrow.tasks.size());
+    const std::string name = std::to_string(stage);
+    narrow.tasks.push_back(make_task("one" + name, 1, 200, before));
+    narrow.tasks.push_back(make_task("left" + name, 4, 200, {first}));
+    narrow.tasks.push_back(make_task("right" + name, 4, 200, {first}));
+    before = {first + 1, first + 2};
+  }
+  narrow.tasks.push_back(make_task("end", 1, 200, before));
+  Dag wide;
+  wide.name = "wide";
+  wide.tasks.push_back(make_task("begin", 1, 1000, {}));
+  for (int i = 0; i < 8; ++i) wide.tasks.push_back(make_task("part" + std::to_string(i), 8, 1000, {0}));
+  wide.tasks.push_back(make_task("end", 1, 1000, {1, 2, 3, 4, 5, 6, 7, 8}));
+  workload.dags = {narrow, wide};
+  return workload;
+}
+
+System compiled(const Workload &workload, sched::Preemption preemption) {
+  AnalysisPlatform platform;
+  platform.workers = workload.platform.workers;
+  platform.preemption = preemption;
+  return compile(workload, platform).value();
+}
+
+ResponseBound dag_response(const Method &method, const System &system, std::size_t dag) {
+  return std::get<Bound>(method.apply(system)).dags[dag];
+}
+
+TEST(GlobalDag, LessUrgentWorkStartsWheneverTheUpperDagIsNarrow) {
+  const System system = compiled(narrow_and_wide(), sched::Preemption::None);
+  EXPECT_EQ(system.units[0].length, 26);
+  EXPECT_EQ(system.units[0].volume, 46);
+  EXPECT_GE(dag_response(dag_nonpreemptive(), system, 0).response.value(), 52);
+}
+
+TEST(GlobalDag, AloneItIsGrahams) {
+  Workload workload = narrow_and_wide();
+  workload.dags.resize(1);
+  const System system = compiled(workload, sched::Preemption::Full);
+  EXPECT_EQ(dag_response(melani(), system, 0).response, 26 + (46 - 26) / 2);
+  EXPECT_EQ(dag_response(dag_bounded(), system, 0).response, 36);
+}
+
+TEST(GlobalDag, MaxActiveOfOneIsTheVolume) {
+  Workload workload = narrow_and_wide();
+  workload.dags.resize(1);
+  workload.dags[0].max_active = 1;
+  EXPECT_EQ(dag_response(dag_bounded(), compiled(workload, sched::Preemption::Full), 0).response, 46);
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(melani().apply(compiled(workload, sched::Preemption::Full))));
+}
+
+template <class Compare>
+std::uint64_t compare_all(const BoundCaseLimits &limits, int count, Compare compare) {
+  std::uint64_t compared = 0;
+  for (int i = 0; i < count; ++i) {
+    Rng rng(mix(static_cast<std::uint64_t>(i)));
+    const testing::BoundCase bound_case = random_bound_case(rng, limits);
+    const System system = compile(bound_case.workload, bound_case.platform).value();
+    if (system.not_analysable.empty() && compare(bound_case, system)) ++compared;
+  }
+  return compared;
+}
+
+TEST(GlobalDag, BoundedIsNeverAboveMelani) {
+  std::uint64_t smaller = 0;
+  const auto compared = compare_all(graphs(sched::Preemption::Full), 2000,
+                                    [&](const testing::BoundCase &bound_case, const System &system) {
+                                      const Outcome melanis = melani().apply(system);
+                                      const Outcome bounded = dag_bounded().apply(system);
+                                      if (!std::holds_alternative<Bound>(melanis)) return false;
+                                      for (std::size_t d = 0; d < system.dags.size(); ++d) {
+                                        const auto worse = std::get<Bound>(melanis).dags[d].response;
+                                        const auto better = std::get<Bound>(bounded).dags[d].response;
+                                        if (!worse) continue;
+                                        EXPECT_LE(better.value(), *worse) << describe(bound_case);
+                                        if (better.value() < *worse) ++smaller;
+                                      }
+                                      return true;
+                                    });
+  EXPECT_GT(compared, 1000U);
+  EXPECT_GT(smaller, 100U);
+}
+
+// On one worker a DAG's bound is that of a task with its volume, carried-in work included.
+TEST(GlobalDag, OneWorkerIsAtLeastTheVolume) {
+  BoundCaseLimits limits = graphs(sched::Preemption::Full);
+  limits.max_workers = 1;
+  const auto compared = compare_all(limits, 500, [](const testing::BoundCase &, const System &system) {
+    const Outcome outcome = dag_bounded().apply(system);
+    if (!std::holds_alternative<Bound>(outcome)) return false;
+    for (const Unit &unit : system.units) {
+      const ResponseBound &bound = std::get<Bound>(outcome).tasks[unit.tasks.front()];
+      EXPECT_GE(bound.response.value_or(kNever), unit.volume + unit.jitter);
+    }
+    return true;
+  });
+  EXPECT_GT(compared, 100U);
+}
+
+TEST(GlobalDag, MoreExecutionNeverShrinksABound) {
+  const auto compared = compare_all(
+      with_max_active(graphs(sched::Preemption::Full)), 1000,
+      [](const testing::BoundCase &bound_case, const System &system) {
+        const Outcome before = dag_bounded().apply(system);
+        if (!std::holds_alternative<Bound>(before)) return false;
+        Workload more = bound_case.workload;
+        Task &grown = more.dags[more.dags.size() / 2].tasks.back();
+        ++grown.wcet;
+        const auto larger = compile(more, bound_case.platform);
+        if (!larger) return false;  // above its deadline
+        const Outcome after = dag_bounded().apply(*larger);
+        for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+          const Duration grown_response = std::get<Bound>(after).tasks[t].response.value_or(kNever);
+          EXPECT_LE(std::get<Bound>(before).tasks[t].response.value_or(kNever), grown_response) << describe(bound_case);
+        }
+        return true;
+      });
+  EXPECT_GT(compared, 300U);
+}
+
+TEST(GlobalDag, TermsAddUp) {
+  for (const auto mode : {sched::Preemption::Full, sched::Preemption::None}) {
+    compare_all(with_max_active(graphs(mode)), 700, [](const testing::BoundCase &bound_case, const System &system) {
+      for (const Method &method : {melani(), dag_bounded(), dag_nonpreemptive()}) {
+        const Outcome outcome = method.apply(system);
+        if (!std::holds_alternative<Bound>(outcome)) continue;
+        for (const ResponseBound &bound : std::get<Bound>(outcome).dags) {
+          Duration sum = 0;
+          for (const Term &term : bound.terms) sum += term.amount;
+          EXPECT_EQ(sum, bound.response.value_or(0)) << method.name << describe(bound_case);
+        }
+      }
+      return true;
+    });
+  }
+}
+
+}  // namespace
+}  // namespace redag::analysis

@@ -1,0 +1,175 @@
+#include "redag/analysis/global_sequential.hpp"
+
+#include <gtest/gtest.h>
+
+#include <initializer_list>
+
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using testing::BoundCaseLimits;
+using testing::expect_bound_holds;
+
+BoundCaseLimits several_workers(sched::Preemption preemption) {
+  BoundCaseLimits limits;
+  limits.preemption = preemption;
+  limits.max_workers = 4;
+  limits.max_dags = 9;
+  limits.jitter = limits.queues = limits.overheads = true;
+  limits.max_deadline = 1.5;
+  limits.max_utilization = 0.8;
+  return limits;
+}
+
+testing::BoundGenerator cases(const BoundCaseLimits &limits) {
+  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
+}
+
+TEST(BoundProperty, BertognaCirinei) {
+  expect_bound_holds(bertogna_cirinei(), cases(several_workers(sched::Preemption::Full)), {.workloads = 2000});
+}
+
+TEST(BoundProperty, BertognaCirineiAnyOrder) {
+  BoundCaseLimits limits = several_workers(sched::Preemption::Full);
+  limits.policies = {PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::RateMonotonic};
+  limits.max_utilization = 0.6;
+  expect_bound_holds(bertogna_cirinei_any(), cases(limits), {.workloads = 1000});
+  limits.preemption = sched::Preemption::None;
+  limits.max_utilization = 0.4;
+  expect_bound_holds(bertogna_cirinei_any(), cases(limits), {.workloads = 1000});
+  limits.preemption = sched::Preemption::Full;
+  limits.policies = {PolicyKind::RateMonotonic, PolicyKind::Fixed};
+  limits.levels = true;
+  expect_bound_holds(bertogna_cirinei_any(), cases(limits), {.workloads = 1000});
+}
+
+TEST(BoundProperty, Guan) {
+  expect_bound_holds(guan(), cases(several_workers(sched::Preemption::Full)), {.workloads = 2000});
+}
+
+TEST(BoundProperty, SequentialNonpreemptive) {
+  expect_bound_holds(sequential_nonpreemptive(), cases(several_workers(sched::Preemption::None)), {.workloads = 2000});
+}
+
+struct Numbers {
+  Duration wcet;
+  Duration period;
+};
+
+Workload independent(std::uint32_t workers, std::initializer_list<Numbers> tasks) {
+  Workload workload;
+  workload.name = "w";
+  workload.platform.workers = workers;
+  workload.policy = PolicyKind::Fixed;
+  for (const Numbers &numbers : tasks) {
+    Task task;
+    task.name = "t";
+    task.wcet = task.bcet = numbers.wcet;
+    task.period = task.deadline = numbers.period;
+    task.priority = -static_cast<int>(workload.dags.size());
+    Dag dag;
+    dag.name = "d" + std::to_string(workload.dags.size());
+    dag.tasks.push_back(task);
+    workload.dags.push_back(dag);
+  }
+  return workload;
+}
+
+System compiled(const Workload &workload, sched::Preemption preemption) {
+  AnalysisPlatform platform;
+  platform.workers = workload.platform.workers;
+  platform.preemption = preemption;
+  return compile(workload, platform).value();
+}
+
+std::vector<std::optional<Duration>> responses(const Method &method, const System &system) {
+  std::vector<std::optional<Duration>> result;
+  const Outcome outcome = method.apply(system);
+  for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) result.push_back(bound.response);
+  return result;
+}
+
+// A longer period can hurt: with T_1 = 3 the third task answers in 12, with T_1 = 4 in 14 (B. Andersson, J. Jonsson).
+TEST(GlobalSequential, LongerPeriodsCanHurt) {
+  const System system = compiled(independent(2, {{2, 4}, {2, 4}, {7, 14}}), sched::Preemption::Full);
+  for (const Method &method : {guan(), bertogna_cirinei()}) {
+    EXPECT_GE(responses(method, system)[2].value_or(kNever), 14);
+  }
+}
+
+TEST(GlobalSequential, TheMostUrgentOfEachWorkerNeverWait) {
+  const System system = compiled(independent(3, {{4, 9}, {5, 9}, {6, 9}, {1, 90}}), sched::Preemption::Full);
+  for (const Method &method : {bertogna_cirinei(), guan()}) {
+    const auto found = responses(method, system);
+    EXPECT_EQ(found[0], 4);
+    EXPECT_EQ(found[1], 5);
+    EXPECT_EQ(found[2], 6);
+    EXPECT_GT(found[3].value(), 1);
+  }
+}
+
+// Without preemption even the most urgent wait for a job that has just started: m = 2, (1, 10), 2 x (20, 200).
+TEST(GlobalSequential, NonpreemptiveBlockingReachesTheMostUrgent) {
+  const System system = compiled(independent(2, {{1, 100}, {20, 200}, {20, 200}}), sched::Preemption::None);
+  const auto found = responses(sequential_nonpreemptive(), system);
+  EXPECT_EQ(found[0], 20);  // 19 left of either, then its own 1
+  const System short_period = compiled(independent(2, {{1, 10}, {20, 200}, {20, 200}}), sched::Preemption::None);
+  EXPECT_FALSE(responses(sequential_nonpreemptive(), short_period)[0]);
+}
+
+TEST(GlobalSequential, AnyOrderCoversEdf) {
+  Workload workload = independent(2, {{2, 10}, {3, 12}, {4, 15}});
+  workload.policy = PolicyKind::Edf;
+  const auto found = responses(bertogna_cirinei_any(), compiled(workload, sched::Preemption::Full));
+  ASSERT_EQ(found.size(), 3U);
+  for (const auto &response : found) EXPECT_TRUE(response.has_value());
+  EXPECT_FALSE(std::holds_alternative<Bound>(guan().apply(compiled(workload, sched::Preemption::Full))));
+}
+
+TEST(GlobalSequential, GuanIsNeverAboveBertognaCirinei) {
+  const BoundCaseLimits limits = several_workers(sched::Preemption::Full);
+  std::uint64_t smaller = 0;
+  for (std::uint64_t seed = 0; seed < 3000; ++seed) {
+    Rng rng(mix(seed));
+    const testing::BoundCase bound_case = random_bound_case(rng, limits);
+    const System system = compile(bound_case.workload, bound_case.platform).value();
+    if (!system.not_analysable.empty()) continue;
+    const Outcome guans = guan().apply(system);
+    const Outcome bertognas = bertogna_cirinei().apply(system);
+    if (!std::holds_alternative<Bound>(guans)) continue;
+    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+      const auto better = std::get<Bound>(guans).tasks[t].response;
+      const auto worse = std::get<Bound>(bertognas).tasks[t].response;
+      if (!worse) continue;
+      ASSERT_TRUE(better) << describe(bound_case);
+      ASSERT_LE(*better, *worse) << describe(bound_case);
+      if (*better < *worse) ++smaller;
+    }
+  }
+  EXPECT_GT(smaller, 100U);
+}
+
+TEST(GlobalSequential, TermsAddUp) {
+  BoundCaseLimits limits = several_workers(sched::Preemption::Full);
+  for (std::uint64_t seed = 0; seed < 1500; ++seed) {
+    Rng rng(mix(seed));
+    limits.preemption = seed % 3 == 0 ? sched::Preemption::None : sched::Preemption::Full;
+    const testing::BoundCase bound_case = random_bound_case(rng, limits);
+    const System system = compile(bound_case.workload, bound_case.platform).value();
+    for (const Method &method : {bertogna_cirinei(), bertogna_cirinei_any(), guan(), sequential_nonpreemptive()}) {
+      const Outcome outcome = method.apply(system);
+      if (!std::holds_alternative<Bound>(outcome)) continue;
+      for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) {
+        Duration sum = 0;
+        for (const Term &term : bound.terms) sum += term.amount;
+        ASSERT_EQ(sum, bound.response.value_or(0)) << method.name << describe(bound_case);
+        ASSERT_EQ(bound.absent.empty(), bound.response.has_value());
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace redag::analysis
