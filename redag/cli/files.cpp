@@ -12,6 +12,7 @@
 #include <memory>
 #include <system_error>
 
+#include "redag/cli/variant.hpp"
 #include "redag/trace/output_file.hpp"
 
 namespace redag::cli {
@@ -74,13 +75,18 @@ bool is_result_name(std::string_view name) {
     name = name.substr(0, at);
   }
   constexpr std::array<std::string_view, 10> kNames = {
-      "jobs.csv",        "summary.json",   "trace.json",      "events.txt",  "workload.yaml",
-      "comparison.json", "comparison.csv", "comparison.html", "report.html", "check.json"};
+      "jobs.csv",        "summary.json",   "trace.json",      "events.jsonl", "workload.yaml",
+      "comparison.json", "comparison.csv", "comparison.html", "report.html",  "check.json"};
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
   // Folders of a comparison: one an executor, in it one a repetition; and what `generate` writes.
-  constexpr std::array<std::string_view, 5> kPrefixes = {"redag", "mte", "ste", "repetition-", "workload-"};
-  return std::any_of(kPrefixes.begin(), kPrefixes.end(),
-                     [&](std::string_view prefix) { return name.compare(0, prefix.size(), prefix) == 0; });
+  const std::vector<std::string> &executors = variant_names();
+  if (std::find(executors.begin(), executors.end(), name) != executors.end()) return true;
+  const auto is_numbered = [name](std::string_view prefix, std::string_view suffix) {
+    return name.size() > prefix.size() + suffix.size() && name.substr(0, prefix.size()) == prefix &&
+           name.substr(name.size() - suffix.size()) == suffix &&
+           is_number(name.substr(prefix.size(), name.size() - prefix.size() - suffix.size()));
+  };
+  return is_numbered("repetition-", "") || is_numbered("workload-", ".yaml");
 }
 
 Result<void> prepare_folder(const std::string &path, bool force) {

@@ -29,6 +29,21 @@ constexpr std::array kCommands = {
           "  redag generate --dags 4 --utilization 1.6 --seed 7 -o random.yaml\n"
           "  redag generate --periods robot --shape chain | redag validate -\n"
           "  redag generate --count 100 --out sets/\n"},
+    Entry{"simulate", "Run a workload in virtual time: exact, and the same for the same seed", add_simulate,
+          "  redag simulate cart.yaml\n"
+          "  redag simulate cart.yaml --executor mte --duration 60s --json\n"
+          "  redag simulate cart.yaml --preemption none --workers 4 --out results/none\n"},
+    Entry{"run", "Run a workload on threads, with synthetic callbacks that take their time", add_run,
+          "  redag run cart.yaml --duration 10s\n"
+          "  sudo redag run cart.yaml --preemption os --affinity 2,3 --mlockall --out results/os\n"
+          "  redag run cart.yaml --executor ste --check || echo 'deadlines were missed'\n"},
+    Entry{"compare", "Run several executors on the same jobs and say how they differ", add_compare,
+          "  redag compare cart.yaml\n"
+          "  redag compare cart.yaml --executors redag-none,redag-os,mte,mte-fifo --repeat 5 --out results/cmp\n"
+          "  redag compare cart.yaml --simulate --duration 60s --json\n"},
+    Entry{"check-trace", "Hold recorded traces to the rules of the model", add_check_trace,
+          "  redag check-trace results/demo\n"
+          "  redag check-trace --json results/os/events.jsonl\n"},
 };
 
 std::vector<std::string> command_names() {

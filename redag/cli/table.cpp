@@ -66,7 +66,9 @@ std::vector<std::size_t> Table::fit(std::size_t width, std::vector<std::size_t> 
     return width > 0 && total > width ? total - width : 0;
   };
   const auto cut_widest_text = [&] {
-    const auto can_shrink = [&](std::size_t i) { return !columns_[i].number && widths[i] > kShortestCut; };
+    const auto can_shrink = [&](std::size_t i) {
+      return !columns_[i].number && !columns_[i].whole && widths[i] > kShortestCut;
+    };
     std::size_t widest = columns_.size();
     for (const std::size_t i : shown) {
       if (can_shrink(i) && (widest == columns_.size() || widths[i] > widths[widest])) widest = i;

@@ -14,6 +14,7 @@ struct Column {
   std::string title;
   bool number = false;      // right-aligned, never cut
   unsigned importance = 0;  // columns of lower importance go first; of equal ones the last
+  bool whole = false;       // never cut, though text
 };
 
 struct Cell {

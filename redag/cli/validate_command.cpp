@@ -80,7 +80,7 @@ int validate_files(const Options &options, Console &console) {
       console.error(fmt::format("{}: {} not accepted by --strict", file, plural(found.size(), "warning")));
     }
   }
-  if (options.json) console.print(to_text(Json{{"schema", "redag.validate/1"}, {"ok", all_ok}, {"files", files}}));
+  if (options.json) console.print(to_text(Json{{"format", "redag.validate/1"}, {"ok", all_ok}, {"files", files}}));
   return all_ok ? kExitOk : kExitBad;
 }
 

@@ -1,0 +1,219 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "redag/cli/commands.hpp"
+#include "redag/cli/comparison.hpp"
+#include "redag/cli/files.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/cli/run_arguments.hpp"
+#include "redag/cli/run_report.hpp"
+#include "redag/cli/signals.hpp"
+
+namespace redag::cli {
+namespace {
+
+constexpr Duration kThreadsDuration = 5 * kSecond;
+constexpr std::uint32_t kThreadsRepetitions = 3;
+constexpr std::uint32_t kMostRepetitions = 10'000;
+
+struct Options {
+  RunArguments run;
+  std::string executors = "redag,mte,ste";
+  std::uint32_t repeat = 0;  // 0: not given
+  bool simulate = false;
+};
+
+class Comparing {
+ public:
+  Comparing(const Options &options, const Workload &workload, const SessionOptions &session,
+            const std::vector<Variant> &variants, std::uint32_t repetitions, Console &console)
+      : options_(options),
+        workload_(workload),
+        session_(session),
+        repetitions_(repetitions),
+        console_(console),
+        progress_(console) {
+    for (const Variant &variant : variants) results_.push_back(ExecutorResults{variant, {}, {}, {}, 0, {}});
+  }
+
+  int run() {
+    if (!run_all()) return kExitBad;
+    progress_.clear();
+    const std::size_t done = rounds();
+    if (done == 0) {
+      console_.error("interrupted before every executor had run once: there is nothing to compare");
+      return kExitBad;
+    }
+    // Only whole rounds: every executor has as many repetitions as the others.
+    for (ExecutorResults &results : results_) results.repetitions.resize(done);
+    if (done < repetitions_) console_.warn(fmt::format("interrupted: {} of {} repetitions", done, repetitions_));
+    return report();
+  }
+
+ private:
+  // False: an error was printed.
+  bool run_all() {
+    const InterruptGuard guard;
+    session_.stop = &InterruptGuard::flag();
+    for (std::uint32_t repetition = 0; repetition < repetitions_; ++repetition) {
+      // Rotated, so that nobody always runs on the warmest or the quietest machine.
+      for (std::size_t i = 0; i < results_.size(); ++i) {
+        if (!run_one(results_[(i + repetition) % results_.size()], repetition)) return false;
+        if (InterruptGuard::interrupted()) return true;
+      }
+    }
+    return true;
+  }
+
+  bool run_one(ExecutorResults &results, std::uint32_t repetition) {
+    SessionOptions options = session_;
+    // Virtual time repeats itself exactly: only other jobs make another repetition.
+    if (options_.simulate) options.seed += repetition;
+    progress_.set_label(fmt::format("{} {}/{}", results.variant.name, repetition + 1, repetitions_));
+    const Result<Session> session =
+        run_session(workload_, results.variant, options, progress_hook(progress_, workload_, options.duration));
+    progress_.clear();
+    if (!session) {
+      console_.note(fmt::format("{}: ", results.variant.name));
+      console_.note(session.error());
+      return false;
+    }
+    if (session->stopped) return true;  // shorter than the others: not comparable
+    results.add(*session);
+    if (!session->check.ok()) {
+      console_.note(fmt::format("{}, repetition {}: ", results.variant.name, repetition + 1) +
+                    describe_check(session->check, console_.err_traits()));
+    }
+    return write(*session, results.variant, repetition);
+  }
+
+  bool write(const Session &session, const Variant &variant, std::uint32_t repetition) {
+    if (options_.run.folder.empty()) return true;
+    const std::string folder = fmt::format("{}/{}/repetition-{}", options_.run.folder, variant.name, repetition + 1);
+    if (const Result<void> made = prepare_folder(folder, options_.run.force); !made) {
+      console_.note(made.error());
+      return false;
+    }
+    const Diagnostics problems = write_session(session, folder);
+    console_.note(problems);
+    all_written_ = all_written_ && problems.empty();
+    return true;
+  }
+
+  [[nodiscard]] std::size_t rounds() const {
+    std::size_t least = results_.front().repetitions.size();
+    for (const ExecutorResults &results : results_) least = std::min(least, results.repetitions.size());
+    return least;
+  }
+
+  [[nodiscard]] Comparison comparison() {
+    Comparison comparison;
+    comparison.workload = workload_.name;
+    for (const Dag &dag : workload_.dags) comparison.dags.push_back(dag.name);
+    comparison.dags.emplace_back("total");
+    comparison.driver = session_.driver;
+    comparison.duration = session_.duration;
+    comparison.seed = session_.seed;
+    comparison.workers = workload_.platform.workers;
+    comparison.executors = results_;
+    return comparison;
+  }
+
+  int report() {
+    const Comparison compared = comparison();
+    for (const ExecutorResults &results : results_) {
+      for (const std::string &warning : results.warnings) console_.warn(results.variant.name + ": " + warning);
+    }
+    const std::string document = to_text(to_json(compared));
+    console_.print(options_.run.json ? document : describe(compared, console_.out_traits()));
+    const std::string &folder = options_.run.folder;
+    if (!folder.empty()) {
+      for (const auto &[name, text] :
+           {std::pair<std::string, std::string>{"comparison.json", document}, {"comparison.csv", to_csv(compared)}}) {
+        const Result<void> written = write_text(folder + "/" + name, text);
+        if (written) continue;
+        console_.note(written.error());
+        all_written_ = false;
+      }
+      say_what_was_written(folder);
+    }
+    if (!all_written_) return kExitBad;
+    const bool violated = std::any_of(results_.begin(), results_.end(),
+                                      [](const ExecutorResults &results) { return results.check_violations > 0; });
+    const bool missed = compared.executors.front().miss(compared.dags.size() - 1).max > 0;
+    return violated || (options_.run.check && missed) ? kExitNo : kExitOk;
+  }
+
+  void say_what_was_written(const std::string &folder) {
+    const std::string first = fmt::format("{}/{}/repetition-1", folder, results_.front().variant.name);
+    const std::string text = fmt::format(
+        "\nOpen these files:\n"
+        "  {0}/comparison.json, {0}/comparison.csv   this comparison, every repetition\n"
+        "  {1}/trace.json   the schedule: drop it on https://ui.perfetto.dev\n"
+        "  {1}/jobs.csv, summary.json, events.jsonl   every job; the other executors lie beside it\n",
+        folder, first);
+    if (options_.run.json) {
+      console_.note(text);
+    } else {
+      console_.print(text);
+    }
+  }
+
+  const Options &options_;
+  const Workload &workload_;
+  SessionOptions session_;
+  std::uint32_t repetitions_;
+  Console &console_;
+  Progress progress_;
+  std::vector<ExecutorResults> results_;
+  bool all_written_ = true;
+};
+
+int compare(const Options &options, Console &console) {
+  const Result<std::vector<Variant>> variants = parse_variants(options.executors);
+  if (!variants) {
+    console.note(variants.error());
+    return kExitBad;
+  }
+  for (const Variant &variant : *variants) {
+    if (!options.simulate || !variant.realtime_threads) continue;
+    console.error(fmt::format("the simulator has no threads: '{}' is '{}' there", variant.name, variant.executor));
+    return kExitBad;
+  }
+  const std::uint32_t repetitions = options.repeat > 0 ? options.repeat : (options.simulate ? 1 : kThreadsRepetitions);
+  if (repetitions > kMostRepetitions) {
+    console.error(fmt::format("--repeat: {} is more than {}", repetitions, kMostRepetitions));
+    return kExitBad;
+  }
+  const std::optional<Workload> workload = load_configured(options.run, console);
+  if (!workload) return kExitBad;
+  const trace::Driver driver = options.simulate ? trace::Driver::Simulator : trace::Driver::Threads;
+  const Duration usual = options.simulate ? sensible_duration(*workload) : kThreadsDuration;
+  const std::optional<SessionOptions> session = session_options(options.run, driver, usual, console);
+  if (!session) return kExitBad;
+  return Comparing(options, *workload, *session, *variants, repetitions, console).run();
+}
+
+}  // namespace
+
+Action add_compare(CLI::App &app) {
+  auto options = std::make_shared<Options>();
+  add_workload_arguments(app, options->run);
+  app.add_option("--executors", options->executors,
+                 "What to compare: redag, redag-none, redag-cooperative, redag-os, mte, ste, mte-fifo, ste-fifo")
+      ->type_name("LIST")
+      ->capture_default_str();
+  add_count(
+      app, "--repeat", options->repeat,
+      "Repetitions, the executors taking turns; default 3, simulated 1. Simulated ones take seeds SEED, SEED+1, ...")
+      ->default_str("");
+  app.add_flag("--simulate", options->simulate, "Virtual time instead of threads");
+  add_result_arguments(app, options->run);
+  add_simulator_arguments(app, options->run);
+  add_thread_arguments(app, options->run);
+  return [options](Console &console) { return compare(*options, console); };
+}
+
+}  // namespace redag::cli

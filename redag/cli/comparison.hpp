@@ -1,0 +1,72 @@
+// Sessions of several executors on the same jobs, put side by side: medians over repetitions with their spread, and a
+// verdict in words. Pure values and functions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "redag/cli/console.hpp"
+#include "redag/cli/json.hpp"
+#include "redag/cli/session.hpp"
+#include "redag/cli/variant.hpp"
+
+namespace redag::cli {
+
+/// One DAG in one session; times in ns. "total" is all DAGs together.
+struct Observation {
+  std::uint64_t jobs = 0;
+  std::uint64_t finished = 0;
+  std::uint64_t late = 0;
+  std::uint64_t skipped = 0;
+  std::uint64_t aborted = 0;
+  double miss_ratio = 0;            // late / released
+  double miss_ratio_with_lost = 0;  // (late, skipped or aborted) / released
+  metrics::Distribution response;   // f - r of every finished job of the DAG
+  metrics::Distribution end_to_end;
+};
+
+/// Of one number over repetitions.
+struct Spread {
+  double median = 0;
+  double min = 0;
+  double max = 0;
+};
+
+/// Requires a value.
+[[nodiscard]] Spread spread_of(std::vector<double> values);
+
+struct ExecutorResults {
+  Variant variant;
+  std::string preemption;                             // mode that ran
+  std::string preemption_why;                         // of the last repetition
+  std::vector<std::vector<Observation>> repetitions;  // [repetition][DAG]; the last DAG is the total
+  std::uint64_t check_violations = 0;
+  std::vector<std::string> warnings;  // each once
+
+  void add(const Session &session);
+  [[nodiscard]] Spread miss(std::size_t dag) const;
+  [[nodiscard]] Spread late(std::size_t dag) const;
+  [[nodiscard]] Spread response(std::size_t dag, Duration metrics::Distribution::*value) const;
+  [[nodiscard]] std::uint64_t jobs(std::size_t dag) const;
+};
+
+struct Comparison {
+  std::string workload;
+  std::vector<std::string> dags;  // the last is "total"
+  trace::Driver driver = trace::Driver::Threads;
+  Duration duration = 0;
+  std::uint64_t seed = 1;
+  std::uint32_t workers = 1;
+  std::vector<ExecutorResults> executors;  // each with a repetition at least
+};
+
+/// "control: redag misses 0.0 %, mte 14.2 %, ste 30.1 %: redag misses fewest"
+[[nodiscard]] std::vector<std::string> verdicts(const Comparison &comparison);
+
+[[nodiscard]] std::string describe(const Comparison &comparison, const StreamTraits &terminal);
+[[nodiscard]] Json to_json(const Comparison &comparison);
+/// A row per executor, DAG and repetition.
+[[nodiscard]] std::string to_csv(const Comparison &comparison);
+
+}  // namespace redag::cli

@@ -1,0 +1,72 @@
+#include "redag/cli/options.hpp"
+
+#include <gtest/gtest.h>
+
+#include "redag/cli/files.hpp"
+#include "redag/cli/variant.hpp"
+
+namespace redag::cli {
+namespace {
+
+using Cpus = std::vector<int>;
+
+TEST(CpuList, ReadsNumbersAndRanges) {
+  EXPECT_EQ(parse_cpu_list("3"), Cpus({3}));
+  EXPECT_EQ(parse_cpu_list("4,0-2"), Cpus({0, 1, 2, 4}));
+  EXPECT_EQ(parse_cpu_list("1,1-1,0-1"), Cpus({0, 1}));
+}
+
+TEST(CpuList, RejectsEverythingElse) {
+  for (const char *text : {"", ",", "1,", "-1", "2-1", "a", "1 2", "1-", "99999999999", "5000", "0x1"}) {
+    EXPECT_EQ(parse_cpu_list(text), std::nullopt) << text;
+  }
+}
+
+TEST(Suggestion, NamesTheNearestOrAll) {
+  EXPECT_EQ(suggestion("simualte", {"simulate", "run"}), "did you mean 'simulate'?");
+  EXPECT_EQ(suggestion("xyz", {"simulate", "run"}), "one of simulate, run");
+}
+
+TEST(Variant, KnowsWhatItsNameSays) {
+  const auto os = parse_variant("redag-os");
+  ASSERT_TRUE(os.has_value());
+  EXPECT_TRUE(os->is_redag());
+  EXPECT_EQ(os->preemption, PreemptionMode::Os);
+  EXPECT_FALSE(os->realtime_threads);
+  const auto own = parse_variant("redag");
+  ASSERT_TRUE(own.has_value());
+  EXPECT_EQ(own->preemption, std::nullopt) << "the workload's";
+  const auto peer = parse_variant("mte-fifo");
+  ASSERT_TRUE(peer.has_value());
+  EXPECT_EQ(peer->executor, "mte");
+  EXPECT_EQ(peer->preemption, PreemptionMode::None);
+  EXPECT_TRUE(peer->realtime_threads);
+}
+
+TEST(Variant, EveryNameThatIsListedIsRead) {
+  for (const std::string &name : variant_names()) EXPECT_TRUE(parse_variant(name).has_value()) << name;
+}
+
+TEST(Variant, RejectsUnknownAndRepeatedNames) {
+  const auto unknown = parse_variants("redag,mtee");
+  ASSERT_FALSE(unknown.has_value());
+  EXPECT_EQ(unknown.error().front().hint, "did you mean 'mte'?");
+  EXPECT_FALSE(parse_variants("").has_value());
+  EXPECT_FALSE(parse_variants("redag,").has_value());
+  EXPECT_FALSE(parse_variants("redag,redag").has_value());
+  EXPECT_EQ(parse_variants("ste,redag-none")->size(), 2U);
+}
+
+TEST(ResultName, IsKnownEvenHalfWritten) {
+  EXPECT_TRUE(is_result_name("summary.json"));
+  EXPECT_TRUE(is_result_name("events.jsonl.tmp.4711"));
+  EXPECT_TRUE(is_result_name("redag-os"));
+  EXPECT_TRUE(is_result_name("repetition-12"));
+  EXPECT_TRUE(is_result_name("workload-7.yaml"));
+  for (const char *name : {"thesis.tex", "summary.json.bak", "redagging", "mtefoo", "repetition-", "jobs.csv.tmp.x"}) {
+    EXPECT_FALSE(is_result_name(name)) << name;
+  }
+}
+
+}  // namespace
+}  // namespace redag::cli

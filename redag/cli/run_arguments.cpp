@@ -1,0 +1,131 @@
+#include "redag/cli/run_arguments.hpp"
+
+#include <fmt/format.h>
+
+#include "redag/cli/files.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/model/validate.hpp"
+#include "redag/model/workload_yaml.hpp"
+
+namespace redag::cli {
+namespace {
+
+constexpr const char *kWorkloadGroup = "Instead of what the workload says";
+constexpr const char *kResultGroup = "Results";
+
+}  // namespace
+
+void add_workload_arguments(CLI::App &app, RunArguments &arguments) {
+  app.add_option("FILE", arguments.file, "Workload (YAML); - is standard input")->required();
+  add_duration(app, "--duration", arguments.duration, "Releases happen in this time; jobs may still be running then");
+  add_duration(app, "--warmup", arguments.warm_up, "Jobs released in this time at the start are not counted", true);
+  add_count(app, "--seed", arguments.seed, "Of execution times and jitter: every executor gets the same jobs");
+  add_choice(app, "--policy", arguments.policy, policy_choices(), "Priority order")->group(kWorkloadGroup);
+  add_choice(app, "--preemption", arguments.preemption, preemption_choices(), "Of redag")->group(kWorkloadGroup);
+  add_count(app, "--workers", arguments.workers, "Workers")->default_str("")->group(kWorkloadGroup);
+}
+
+void add_result_arguments(CLI::App &app, RunArguments &arguments) {
+  app.add_flag("--json", arguments.json, "Write one JSON document to standard output, and nothing else")
+      ->group(kResultGroup);
+  app.add_option("--out", arguments.folder, "Folder for result files; made if missing")
+      ->type_name("DIR")
+      ->group(kResultGroup);
+  app.add_flag("--force", arguments.force, "Write into a folder that holds other files")->group(kResultGroup);
+  app.add_flag("--check", arguments.check, "Exit with 1 if a deadline was missed")->group(kResultGroup);
+}
+
+void add_simulator_arguments(CLI::App &app, RunArguments &arguments) {
+  const std::string group = "Simulator";
+  add_duration(app, "--overhead-release", arguments.overheads.release, "Processor time to handle a release", true)
+      ->group(group);
+  add_duration(app, "--overhead-dispatch", arguments.overheads.dispatch, "Processor time to start a job", true)
+      ->group(group);
+  add_duration(app, "--overhead-preempt", arguments.overheads.preempt, "Processor time to resume a job", true)
+      ->group(group);
+  add_count(app, "--max-events", arguments.max_events, "Events that are checked and written; later ones are summarized")
+      ->group(group);
+}
+
+void add_thread_arguments(CLI::App &app, RunArguments &arguments) {
+  const std::string group = "Threads";
+  app.add_option("--affinity", arguments.cpus, "Processors of the workers: 2,3 or 0-3")
+      ->type_name("CPUS")
+      ->group(group);
+  app.add_flag("--mlockall", arguments.lock_memory, "Lock the memory: no page faults during the run")->group(group);
+  app.add_flag("--realtime", arguments.realtime_threads, "SCHED_FIFO threads, also for executors that do not preempt")
+      ->group(group);
+}
+
+std::optional<Workload> load_configured(const RunArguments &arguments, Console &console) {
+  Result<LoadedWorkload> loaded = load_input(arguments.file);
+  if (!loaded) {
+    console.note(loaded.error());
+    return std::nullopt;
+  }
+  console.note(loaded->warnings);
+  Workload workload = std::move(loaded->workload);
+  if (!arguments.policy && !arguments.preemption && arguments.workers == 0) return workload;
+  if (arguments.policy) workload.policy = *arguments.policy;
+  if (arguments.preemption) workload.platform.preemption = *arguments.preemption;
+  if (arguments.workers > 0) workload.platform.workers = arguments.workers;
+  // The file was fine; what is wrong now came from the command line and has no line to point at.
+  const Diagnostics mistakes = validate(workload);
+  if (!has_errors(mistakes)) return workload;
+  for (const Diagnostic &mistake : mistakes) {
+    if (mistake.severity == Severity::Error) console.note(mistake);
+  }
+  return std::nullopt;
+}
+
+std::optional<SessionOptions> session_options(const RunArguments &arguments, trace::Driver driver,
+                                              Duration default_duration, Console &console) {
+  SessionOptions options;
+  options.driver = driver;
+  options.duration = arguments.duration.value_or(default_duration);
+  options.warm_up = arguments.warm_up;
+  options.seed = arguments.seed;
+  options.max_events = arguments.max_events;
+  options.overheads = arguments.overheads;
+  options.lock_memory = arguments.lock_memory;
+  options.realtime_threads = arguments.realtime_threads;
+  if (options.warm_up >= options.duration) {
+    console.error(fmt::format("the warm-up of {} leaves nothing of a run of {}", format_duration(options.warm_up),
+                              format_duration(options.duration)));
+    return std::nullopt;
+  }
+  if (!arguments.cpus.empty()) {
+    const std::optional<std::vector<int>> cpus = parse_cpu_list(arguments.cpus);
+    if (!cpus) {
+      console.error(fmt::format("--affinity: '{}' is not a list of processors", arguments.cpus),
+                    "numbers and ranges, as in 0,2-3");
+      return std::nullopt;
+    }
+    options.cpus = *cpus;
+  }
+  if (!arguments.folder.empty()) {
+    if (const Result<void> made = prepare_folder(arguments.folder, arguments.force); !made) {
+      console.note(made.error());
+      return std::nullopt;
+    }
+  }
+  return options;
+}
+
+ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration) {
+  std::vector<std::string> names;
+  for (const Dag &dag : workload.dags) names.push_back(dag.name);
+  return [&progress, names, duration](Time now, const std::vector<std::uint64_t> &misses) {
+    if (!progress.due()) return;
+    std::string missed;
+    for (std::size_t i = 0; i < misses.size(); ++i) {
+      if (misses[i] > 0) missed += fmt::format("{} {} {}", missed.empty() ? ", misses:" : ",", names[i], misses[i]);
+    }
+    const Time shown = std::min(now, duration);
+    progress.draw(static_cast<double>(shown) / static_cast<double>(duration),
+                  fmt::format("{:.1f} of {:.1f} s{}", static_cast<double>(shown) * 1e-9,
+                              static_cast<double>(duration) * 1e-9, missed.empty() ? ", no misses" : missed));
+  };
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,55 @@
+// What `simulate`, `run` and `compare` ask for alike: the workload and changes to it, length, seed, where results go.
+// The steps that they share from there to a session. Not thread-safe.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "redag/base/time.hpp"
+#include "redag/cli/console.hpp"
+#include "redag/cli/progress.hpp"
+#include "redag/cli/session.hpp"
+#include "redag/model/workload.hpp"
+
+namespace redag::cli {
+
+struct RunArguments {
+  std::string file;
+  std::optional<PolicyKind> policy;
+  std::optional<PreemptionMode> preemption;
+  std::uint32_t workers = 0;  // 0: the workload's
+  std::optional<Duration> duration;
+  Duration warm_up = 0;
+  std::uint64_t seed = 1;
+  sim::Overheads overheads;
+  std::uint64_t max_events = std::uint64_t{1} << 22U;
+  std::string cpus;
+  bool lock_memory = false;
+  bool realtime_threads = false;
+  bool json = false;
+  std::string folder;
+  bool force = false;
+  bool check = false;
+  bool all_tasks = false;
+};
+
+void add_workload_arguments(CLI::App &app, RunArguments &arguments);
+void add_result_arguments(CLI::App &app, RunArguments &arguments);
+void add_simulator_arguments(CLI::App &app, RunArguments &arguments);
+void add_thread_arguments(CLI::App &app, RunArguments &arguments);
+
+/// The workload of `arguments.file` with what the command line changes; warnings and errors are printed. Nothing if it
+/// cannot be run.
+[[nodiscard]] std::optional<Workload> load_configured(const RunArguments &arguments, Console &console);
+
+/// Everything but the driver, which is `driver`, and `stop`. `default_duration` where none is given. Errors are
+/// printed.
+[[nodiscard]] std::optional<SessionOptions> session_options(const RunArguments &arguments, trace::Driver driver,
+                                                            Duration default_duration, Console &console);
+
+/// Draws `progress` over a session of `duration`: time, and the DAGs with misses.
+[[nodiscard]] ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration);
+
+}  // namespace redag::cli

@@ -1,0 +1,24 @@
+#include <memory>
+
+#include "redag/cli/commands.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/cli/single_run.hpp"
+
+namespace redag::cli {
+
+Action add_run(CLI::App &app) {
+  auto arguments = std::make_shared<RunArguments>();
+  auto executor = std::make_shared<std::string>("redag");
+  add_workload_arguments(app, *arguments);
+  app.add_option("--executor", *executor, "As in simulate, also mte-fifo and ste-fifo: those on real-time threads")
+      ->type_name("NAME")
+      ->capture_default_str();
+  add_result_arguments(app, *arguments);
+  app.add_flag("--all-tasks", arguments->all_tasks, "A row for every task, however many");
+  add_thread_arguments(app, *arguments);
+  return [arguments, executor](Console &console) {
+    return run_once(*arguments, *executor, trace::Driver::Threads, console);
+  };
+}
+
+}  // namespace redag::cli

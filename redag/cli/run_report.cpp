@@ -1,0 +1,217 @@
+#include "redag/cli/run_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "redag/cli/table.hpp"
+#include "redag/metrics/jobs.hpp"
+#include "redag/metrics/jobs_csv.hpp"
+#include "redag/metrics/perfetto.hpp"
+#include "redag/metrics/summary_json.hpp"
+#include "redag/trace/events_file.hpp"
+
+namespace redag::cli {
+namespace {
+
+constexpr std::size_t kMostTasks = 50;  // rows before the table is cut to the worst
+
+Tint tint_of(double ratio) { return ratio > 0 ? Tint::Bad : Tint::Good; }
+
+// A duration of something that may not have happened.
+Cell time_cell(const metrics::Distribution &distribution, Duration metrics::Distribution::*value) {
+  return {distribution.count > 0 ? humanize_duration(distribution.*value) : "-"};
+}
+
+Cell count_cell(std::uint64_t count, Tint tint = Tint::Plain) {
+  return {format_count(count), count > 0 ? tint : Tint::Faint};
+}
+
+Cell ratio_cell(const metrics::JobStats &jobs, double ratio) {
+  return {jobs.released > 0 ? format_percent(ratio) : "-", tint_of(ratio)};
+}
+
+// Tasks to show: all, in the workload's order, or the worst.
+std::vector<std::size_t> shown_tasks(const metrics::Summary &summary, bool all) {
+  std::vector<std::size_t> order(summary.tasks.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (all || order.size() <= kMostTasks) return order;
+  const auto worse = [&](std::size_t a, std::size_t b) {
+    const metrics::JobStats &x = summary.tasks[a].jobs;
+    const metrics::JobStats &y = summary.tasks[b].jobs;
+    if (x.miss_ratio_with_lost() != y.miss_ratio_with_lost())
+      return x.miss_ratio_with_lost() > y.miss_ratio_with_lost();
+    return x.max_lateness.value_or(-kMaxDuration) > y.max_lateness.value_or(-kMaxDuration);
+  };
+  std::partial_sort(order.begin(), order.begin() + kMostTasks, order.end(), worse);
+  order.resize(kMostTasks);
+  return order;
+}
+
+std::string task_table(const Session &session, const StreamTraits &terminal, bool all) {
+  Table table({{"task", false, 9},
+               {"jobs", true, 5},
+               {"late", true, 6},
+               {"skipped", true, 6},
+               {"aborted", true, 0},
+               {"missed", true, 8},
+               {"p50", true, 3},
+               {"p95", true, 2},
+               {"p99", true, 4},
+               {"max", true, 7},
+               {"deadline", true, 3}});
+  const std::vector<TaskRef> refs = flatten(session.info.workload);
+  for (const std::size_t i : shown_tasks(session.summary, all)) {
+    const metrics::TaskSummary &task = session.summary.tasks[i];
+    const metrics::JobStats &jobs = task.jobs;
+    const bool late = jobs.max_lateness.value_or(0) > 0;
+    table.add({{task.dag + "." + task.name},
+               count_cell(jobs.released),
+               count_cell(jobs.late, Tint::Bad),
+               count_cell(jobs.skipped, Tint::Bad),
+               count_cell(jobs.aborted, Tint::Bad),
+               ratio_cell(jobs, jobs.miss_ratio_with_lost()),
+               time_cell(jobs.response, &metrics::Distribution::p50),
+               time_cell(jobs.response, &metrics::Distribution::p95),
+               time_cell(jobs.response, &metrics::Distribution::p99),
+               {time_cell(jobs.response, &metrics::Distribution::max).text, late ? Tint::Bad : Tint::Plain},
+               {humanize_duration(refs[i].task->deadline)}});
+  }
+  std::string text = table.render(terminal.width, terminal.colour);
+  if (!all && session.summary.tasks.size() > kMostTasks) {
+    text += fmt::format("(the worst {} of {} tasks; --all-tasks shows every one)\n", kMostTasks,
+                        format_count(session.summary.tasks.size()));
+  }
+  return text;
+}
+
+std::string dag_table(const Session &session, const StreamTraits &terminal) {
+  Table table({{"DAG", false, 9},
+               {"jobs", true, 5},
+               {"late", true, 7},
+               {"missed", true, 8},
+               {"end-to-end p50", true, 3},
+               {"p99", true, 4},
+               {"max", true, 6},
+               {"deadline", true, 2},
+               {"active", true, 1}});
+  for (std::size_t i = 0; i < session.summary.dags.size(); ++i) {
+    const metrics::DagSummary &dag = session.summary.dags[i];
+    const metrics::Distribution &end_to_end = dag.end_to_end.response;
+    const std::string bound = dag.max_active > 0 ? fmt::format("{}", dag.max_active) : "-";
+    table.add(
+        {{dag.name},
+         count_cell(dag.jobs.released),
+         ratio_cell(dag.jobs, dag.jobs.miss_ratio()),
+         ratio_cell(dag.jobs, dag.jobs.miss_ratio_with_lost()),
+         time_cell(end_to_end, &metrics::Distribution::p50),
+         time_cell(end_to_end, &metrics::Distribution::p99),
+         {time_cell(end_to_end, &metrics::Distribution::max).text, dag.end_to_end.late > 0 ? Tint::Bad : Tint::Plain},
+         {dag.end_to_end.deadline > 0 ? humanize_duration(dag.end_to_end.deadline) : "-"},
+         {fmt::format("{}/{}", dag.peak_active, bound)}});
+  }
+  return table.render(terminal.width, terminal.colour);
+}
+
+std::string headline(const Session &session) {
+  const trace::RunInfo &info = session.info;
+  const bool simulated = info.driver == trace::Driver::Simulator;
+  std::string text =
+      fmt::format("{}: {}, {}, {} worker{}, {} of {}, seed {}\n", info.workload.name, info.executor,
+                  to_string(info.config.policy), info.config.workers, info.config.workers == 1 ? "" : "s",
+                  simulated ? "simulation" : "run on threads", humanize_duration(info.end - info.start), info.seed);
+  text += fmt::format("preemption: {}{}\n", info.preemption,
+                      info.preemption_why.empty() ? "" : " (" + info.preemption_why + ")");
+  if (!info.overheads.empty()) text += fmt::format("overheads: {}\n", info.overheads);
+  if (info.warm_up > 0) text += fmt::format("warm-up: the first {} are not counted\n", humanize_duration(info.warm_up));
+  if (session.stopped) text += "stopped early: the results are those of the shorter run\n";
+  return text;
+}
+
+}  // namespace
+
+bool has_misses(const metrics::Summary &summary) { return summary.total.miss_ratio_with_lost() > 0; }
+
+std::string describe_check(const metrics::CheckReport &check, const StreamTraits &terminal) {
+  const std::uint64_t checks =
+      std::accumulate(check.checks_by_rule.begin(), check.checks_by_rule.end(), std::uint64_t{0});
+  const auto rules = std::count_if(check.checks_by_rule.begin(), check.checks_by_rule.end(),
+                                   [](std::uint64_t count) { return count > 0; });
+  const std::string tested = fmt::format("{} checks of {} rules", format_count(checks), rules);
+  if (check.ok()) return fmt::format("trace check: {}, {}\n", tinted("ok", Tint::Good, terminal.colour), tested);
+  return fmt::format(
+      "trace check: {}, {}\n{}",
+      tinted(fmt::format("{} violation{}", format_count(check.violation_count), check.violation_count == 1 ? "" : "s"),
+             Tint::Bad, terminal.colour),
+      tested, check.to_string());
+}
+
+std::string describe(const Session &session, const StreamTraits &terminal, const ReportOptions &options) {
+  std::string text = headline(session) + "\n";
+  text += task_table(session, terminal, options.all_tasks) + "\n" + dag_table(session, terminal) + "\n";
+  text += "missed: late, skipped or aborted; response: finish - release\n";
+  if (!session.summary.worker_busy.empty()) {
+    text += "workers busy:";
+    for (const double share : session.summary.worker_busy) text += fmt::format(" {}", format_percent(share));
+    text += "\n";
+  }
+  const metrics::Inversions &inversions = session.summary.inversions;
+  text +=
+      fmt::format("priority inversions: {}{}\n", format_count(inversions.count),
+                  inversions.count > 0 ? fmt::format(", longest {}, in all {}", humanize_duration(inversions.longest),
+                                                     humanize_duration(inversions.total))
+                                       : "");
+  text += describe_check(session.check, terminal);
+  if (session.cut_at) {
+    text += fmt::format("the first {} events were checked and kept: {} of {}; --max-events raises that\n",
+                        format_count(session.trace.events.size()), humanize_duration(*session.cut_at),
+                        humanize_duration(session.info.end));
+  }
+  return text;
+}
+
+Json to_json(const metrics::CheckReport &check) {
+  Json rules = Json::object();
+  for (std::size_t i = 0; i < metrics::kRuleCount; ++i) {
+    if (check.checks_by_rule[i] == 0) continue;
+    rules[to_string(static_cast<metrics::Rule>(i))] = {{"checks", check.checks_by_rule[i]},
+                                                       {"violations", check.violations_by_rule[i]}};
+  }
+  Json violations = Json::array();
+  for (const metrics::Violation &violation : check.violations) {
+    violations.push_back(Json{{"rule", to_string(violation.rule)},
+                              {"time_ns", violation.time},
+                              {"event", violation.event},
+                              {"job", violation.job},
+                              {"text", violation.text}});
+  }
+  return Json{
+      {"ok", check.ok()}, {"violation_count", check.violation_count}, {"rules", rules}, {"violations", violations}};
+}
+
+Json to_json(const Session &session) {
+  Json document = Json::parse(metrics::summary_to_json(session.summary, session.info));
+  Json check = to_json(session.check);
+  check["until_ns"] = session.cut_at.value_or(session.info.end);
+  document["check"] = std::move(check);
+  document["stopped"] = session.stopped;
+  document["warnings"] = session.warnings;
+  return document;
+}
+
+Diagnostics write_session(const Session &session, const std::string &folder) {
+  Diagnostics problems;
+  const auto keep = [&problems](const Result<void> &written) {
+    if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
+  };
+  const trace::Trace &trace = session.trace;
+  keep(metrics::write_summary(folder + "/summary.json", session.summary, session.info));
+  keep(metrics::write_jobs_csv(folder + "/jobs.csv", trace.info.workload,
+                               metrics::fold_jobs(trace.info.workload, trace.events)));
+  keep(metrics::write_perfetto(folder + "/trace.json", trace));
+  keep(trace::write_trace(folder + "/events.jsonl", trace));
+  return problems;
+}
+
+}  // namespace redag::cli

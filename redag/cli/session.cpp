@@ -1,0 +1,192 @@
+#include "redag/cli/session.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+
+#include "redag/base/check.hpp"
+#include "redag/metrics/trace_checker.hpp"
+#include "redag/runtime/run_workload.hpp"
+#include "redag/sched/executors.hpp"
+
+namespace redag::cli {
+namespace {
+
+Duration since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - begin).count();
+}
+
+std::string describe(const sim::Overheads &overheads) {
+  if (overheads.release == 0 && overheads.dispatch == 0 && overheads.preempt == 0) return {};
+  return fmt::format("release {}, dispatch {}, preempt {}", format_duration(overheads.release),
+                     format_duration(overheads.dispatch), format_duration(overheads.preempt));
+}
+
+trace::RunInfo describe_simulation(const Workload &workload, const Variant &variant, const SessionOptions &options) {
+  trace::RunInfo info;
+  info.workload = workload;
+  info.executor = variant.executor;
+  info.config = sched::effective_config(*sched::find_executor(variant.executor), sim::simulated_config(workload));
+  info.preemption = trace::preemption_name(info.config.preemption);
+  const PreemptionMode wanted = workload.platform.preemption;
+  if (wanted == PreemptionMode::Os || wanted == PreemptionMode::Auto) {
+    info.preemption_why = fmt::format("{} is full preemption in the simulator", to_string(wanted));
+  }
+  info.driver = trace::Driver::Simulator;
+  info.seed = options.seed;
+  info.end = options.duration;
+  info.warm_up = options.warm_up;
+  info.overheads = describe(options.overheads);
+  return info;
+}
+
+// The first events of a stream, whole instants of them, and where it was cut off.
+class Prefix {
+ public:
+  Prefix(std::vector<JobEvent> &events, std::size_t limit) : events_(events), limit_(limit) {}
+
+  void add(std::span<const JobEvent> events) {
+    if (cut_ || events.empty()) return;
+    // Between two instants nothing happens: up to the end of that gap, the prefix is the whole trace of a shorter run.
+    // (At its end, a job could be seen that should have finished there.)
+    if (events_.size() >= limit_ && events.front().time - events_.back().time > 1) {
+      cut_ = events.front().time - 1;
+      return;
+    }
+    events_.insert(events_.end(), events.begin(), events.end());
+  }
+
+  [[nodiscard]] std::optional<Time> cut() const { return cut_; }
+
+ private:
+  std::vector<JobEvent> &events_;
+  std::size_t limit_;
+  std::optional<Time> cut_;
+};
+
+Result<Session> simulate(const Workload &workload, const Variant &variant, const SessionOptions &options,
+                         const ProgressHook &progress) {
+  Session session;
+  session.info = describe_simulation(workload, variant, options);
+  metrics::Summarizer summarizer(session.info);
+  MissCounter misses(workload);
+  Prefix kept(session.trace.events, std::max<std::size_t>(options.max_events, 1));
+  std::uint64_t batches = 0;
+  const auto sink = [&](std::span<const JobEvent> events) {
+    session.events += events.size();
+    summarizer.add(events);
+    kept.add(events);
+    if (progress) {
+      misses.add(events);
+      constexpr std::uint64_t kLookEvery = 256;  // asking the clock each instant would be most of the work
+      if (++batches % kLookEvery == 0 && !events.empty()) progress(events.back().time, misses.misses());
+    }
+    return options.stop == nullptr || !options.stop->load(std::memory_order_relaxed);
+  };
+  sim::Options simulator;
+  simulator.horizon = options.duration;
+  simulator.seed = options.seed;
+  simulator.overheads = options.overheads;
+  const auto scheduler = sched::make_scheduler(variant.executor, workload, session.info.config);
+  const sim::Result result = sim::simulate(workload, *scheduler, session.info.config.workers, simulator, sink);
+
+  session.stopped = result.end < options.duration;
+  session.info.end = result.end;
+  session.summary = summarizer.finish(result.end);
+  session.cut_at = kept.cut();
+  session.trace.info = session.info;
+  if (session.cut_at) session.trace.info.end = *session.cut_at;
+  return session;
+}
+
+Result<Session> run_on_threads(const Workload &workload, const Variant &variant, const SessionOptions &options,
+                               const ProgressHook &progress) {
+  runtime::RunOptions run;
+  run.duration = options.duration;
+  run.warm_up = options.warm_up;
+  run.seed = options.seed;
+  run.executor = variant.executor;
+  run.preemption = workload.platform.preemption;
+  run.realtime_threads = options.realtime_threads || variant.realtime_threads;
+  run.lock_memory = options.lock_memory;
+  run.cpus = options.cpus;
+  run.stop = options.stop;
+  run.scheduler = [&](const Workload &w, const sched::Config &config) {
+    return sched::make_scheduler(variant.executor, w, config);
+  };
+  MissCounter misses(workload);
+  std::size_t seen = 0;
+  if (progress) {
+    run.progress = [&](Time now, std::span<const JobEvent> events) {
+      misses.add(events.subspan(seen));
+      seen = events.size();
+      progress(now, misses.misses());
+    };
+  }
+  Result<runtime::RunResult> result = runtime::run_workload(workload, run);
+  if (!result) return tl::unexpected<Diagnostics>(std::move(result.error()));
+
+  Session session;
+  session.trace = std::move(result->trace);
+  session.info = session.trace.info;
+  session.summary = metrics::summarize(session.trace);
+  session.events = session.trace.events.size();
+  session.stopped = result->stopped;
+  session.warnings = std::move(result->warnings);
+  return session;
+}
+
+}  // namespace
+
+MissCounter::MissCounter(const Workload &workload) : misses_(workload.dags.size()) {
+  for (const TaskRef &ref : flatten(workload)) dag_of_.push_back(ref.dag);
+  deadline_.resize(dag_of_.size(), kNever);
+}
+
+void MissCounter::add(std::span<const JobEvent> events) {
+  for (const JobEvent &event : events) {
+    const std::size_t task = event.task.value;
+    if (task >= dag_of_.size()) continue;
+    switch (event.kind) {
+      case JobEventKind::Dispatched: deadline_[task] = event.value; break;
+      case JobEventKind::Finished:
+        if (event.value > deadline_[task]) ++misses_[dag_of_[task].value];
+        break;
+      case JobEventKind::Skipped:
+      case JobEventKind::Aborted: ++misses_[dag_of_[task].value]; break;
+      default: break;
+    }
+  }
+}
+
+Result<Session> run_session(const Workload &workload, const Variant &variant, const SessionOptions &options,
+                            const ProgressHook &progress) {
+  const auto begin = std::chrono::steady_clock::now();
+  Workload configured = workload;
+  if (variant.preemption) configured.platform.preemption = *variant.preemption;
+  const sched::ExecutorKind *kind = sched::find_executor(variant.executor);
+  REDAG_CHECK(kind != nullptr, "an executor that variant_names() lists is unknown");
+  if (kind->single_worker) configured.platform.workers = 1;
+  Result<Session> session = options.driver == trace::Driver::Simulator
+                                ? simulate(configured, variant, options, progress)
+                                : run_on_threads(configured, variant, options, progress);
+  if (!session) return session;
+  session->check = metrics::check_trace(session->trace, rules_for(variant.executor));
+  session->elapsed = since(begin);
+  return session;
+}
+
+metrics::RuleSet rules_for(const std::string &executor) {
+  return executor == "mte" || executor == "ste" ? metrics::RuleSet::wait_set() : metrics::RuleSet::all();
+}
+
+Duration sensible_duration(const Workload &workload) {
+  constexpr Duration kLeast = 10 * kSecond;
+  const std::optional<Duration> hyperperiod = sim::hyperperiod(workload, 60 * kSecond);
+  if (!hyperperiod || *hyperperiod <= 0) return kLeast;
+  return (kLeast + *hyperperiod - 1) / *hyperperiod * *hyperperiod;
+}
+
+}  // namespace redag::cli

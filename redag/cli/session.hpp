@@ -1,0 +1,78 @@
+// One executor on one workload in one world, simulated or real: the one place where a run becomes a trace, a summary
+// and a verdict of the trace checker. Prints nothing. Blocks until the run is over; one session at a time.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "redag/base/result.hpp"
+#include "redag/cli/variant.hpp"
+#include "redag/metrics/check_report.hpp"
+#include "redag/metrics/summary.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/sim/simulator.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag::cli {
+
+struct SessionOptions {
+  trace::Driver driver = trace::Driver::Simulator;
+  Duration duration = 10 * kSecond;
+  Duration warm_up = 0;
+  std::uint64_t seed = 1;
+  /// Simulated events kept, 32 bytes each; what comes later is summarized, but neither checked nor written. A run on
+  /// threads keeps all.
+  std::size_t max_events = std::size_t{1} << 22U;
+  const std::atomic<bool> *stop = nullptr;  // ends the run early, with the results so far
+  sim::Overheads overheads;                 // simulator
+  std::vector<int> cpus;                    // threads, as the two below
+  bool lock_memory = false;
+  bool realtime_threads = false;
+};
+
+/// Deadline misses while a run goes on, by DAG: jobs that finished late, were skipped or aborted. An estimate for the
+/// eye; the summary is exact.
+class MissCounter {
+ public:
+  explicit MissCounter(const Workload &workload);
+  void add(std::span<const JobEvent> events);
+  [[nodiscard]] const std::vector<std::uint64_t> &misses() const { return misses_; }
+
+ private:
+  std::vector<DagId> dag_of_;
+  std::vector<Time> deadline_;  // of the task's job that was dispatched last: jobs of a task do not overlap
+  std::vector<std::uint64_t> misses_;
+};
+
+/// Called now and then while a session runs: where time stands, and the misses so far by DAG.
+using ProgressHook = std::function<void(Time now, const std::vector<std::uint64_t> &misses)>;
+
+struct Session {
+  trace::RunInfo info;
+  metrics::Summary summary;           // of the whole run
+  trace::Trace trace;                 // its first events; all of them unless cut_at
+  std::optional<Time> cut_at;         // `max_events` was reached: `trace` is that of a run that ended here
+  metrics::CheckReport check;         // of `trace`
+  std::uint64_t events = 0;           // of the whole run
+  Duration elapsed = 0;               // wall-clock time of the run and its evaluation
+  bool stopped = false;               // by `stop`
+  std::vector<std::string> warnings;  // what a reader of the figures should know
+};
+
+/// `workload` must be valid. Error: what the machine refused.
+[[nodiscard]] Result<Session> run_session(const Workload &workload, const Variant &variant,
+                                          const SessionOptions &options, const ProgressHook &progress = {});
+
+/// The rules that an executor's traces are held to: those of rclcpp's models follow no priorities.
+[[nodiscard]] metrics::RuleSet rules_for(const std::string &executor);
+
+/// A length for a run that nobody gave one: some hyperperiods of at least 10 s in all; 10 s where one takes more than
+/// a minute.
+[[nodiscard]] Duration sensible_duration(const Workload &workload);
+
+}  // namespace redag::cli

@@ -1,0 +1,117 @@
+#include "redag/cli/session.hpp"
+
+#include <gtest/gtest.h>
+
+#include "redag/metrics/summary_json.hpp"
+
+namespace redag::cli {
+namespace {
+
+Task timer(std::string name, Duration period, Duration wcet) {
+  Task task;
+  task.name = std::move(name);
+  task.period = task.deadline = period;
+  task.wcet = task.bcet = wcet;
+  return task;
+}
+
+// One worker; `slow` always makes `fast` miss unless it is preempted.
+Workload fast_and_slow() {
+  Workload workload;
+  workload.name = "fast and slow";
+  workload.platform = Platform{1, PreemptionMode::None};
+  workload.dags = {Dag{"fast", {timer("f", 10 * kMillisecond, kMillisecond)}, 0, 0, 0, Criticality::Normal},
+                   Dag{"slow", {timer("s", 100 * kMillisecond, 30 * kMillisecond)}, 0, 0, 0, Criticality::Normal}};
+  return workload;
+}
+
+SessionOptions simulated(Duration duration) {
+  SessionOptions options;
+  options.duration = duration;
+  return options;
+}
+
+Session run(const std::string &variant, const SessionOptions &options, const ProgressHook &progress = {}) {
+  Result<Session> session = run_session(fast_and_slow(), *parse_variant(variant), options, progress);
+  if (!session) {
+    ADD_FAILURE() << to_string(session.error());
+    return {};
+  }
+  return *std::move(session);
+}
+
+TEST(Session, TheVariantDecidesThePreemption) {
+  const Session none = run("redag-none", simulated(kSecond));
+  const Session full = run("redag-os", simulated(kSecond));
+  EXPECT_EQ(none.info.preemption, "none");
+  EXPECT_EQ(full.info.preemption, "full");
+  // Of each 100 ms: fast's job of 20 ms is replaced, that of 30 ms starts late at 31 ms, but is not late.
+  EXPECT_GT(none.summary.dags[0].jobs.miss_ratio_with_lost(), 0.0);
+  EXPECT_EQ(full.summary.total.miss_ratio_with_lost(), 0.0);
+  EXPECT_TRUE(none.check.ok()) << none.check.to_string();
+  EXPECT_TRUE(full.check.ok()) << full.check.to_string();
+}
+
+TEST(Session, ACutTraceIsThatOfAShorterRun) {
+  SessionOptions options = simulated(2 * kSecond);
+  const Session whole = run("redag", options);
+  EXPECT_FALSE(whole.cut_at.has_value());
+  options.max_events = whole.trace.events.size() / 3;
+  const Session cut = run("redag", options);
+  ASSERT_TRUE(cut.cut_at.has_value());
+  EXPECT_LT(cut.trace.events.size(), whole.trace.events.size() / 2);
+  EXPECT_GE(cut.trace.events.size(), options.max_events);
+  EXPECT_LT(cut.trace.events.back().time, *cut.cut_at);
+  EXPECT_EQ(cut.trace.info.end, *cut.cut_at);
+  EXPECT_TRUE(cut.check.ok()) << cut.check.to_string();
+  EXPECT_GT(cut.check.checks(metrics::Rule::Grid), 0U);
+  // The summary is of the whole run.
+  EXPECT_EQ(metrics::summary_to_json(cut.summary, cut.info), metrics::summary_to_json(whole.summary, whole.info));
+}
+
+TEST(Session, StopEndsItWithWhatThereIs) {
+  std::atomic<bool> stop{false};
+  SessionOptions options = simulated(3600 * kSecond);
+  options.stop = &stop;
+  Time seen = 0;
+  const Session session = run("redag", options, [&](Time now, const auto &) {
+    seen = now;
+    stop = true;
+  });
+  EXPECT_TRUE(session.stopped);
+  EXPECT_GE(session.info.end, seen);
+  EXPECT_LT(session.info.end, options.duration);
+  EXPECT_TRUE(session.check.ok()) << session.check.to_string();
+}
+
+TEST(Session, ThreadsAndSimulatorGetTheSameJobs) {
+  SessionOptions options = simulated(200 * kMillisecond);
+  const Session simulation = run("redag-none", options);
+  options.driver = trace::Driver::Threads;
+  const Session real = run("redag-none", options);
+  EXPECT_EQ(real.summary.total.released, simulation.summary.total.released);
+  EXPECT_EQ(real.info.driver, trace::Driver::Threads);
+}
+
+TEST(MissCounter, CountsWhatTheSummaryCounts) {
+  const Session session = run("redag-none", simulated(kSecond));
+  MissCounter counter(session.info.workload);
+  counter.add(session.trace.events);
+  for (std::size_t dag = 0; dag < counter.misses().size(); ++dag) {
+    const metrics::JobStats &jobs = session.summary.dags[dag].jobs;
+    EXPECT_EQ(counter.misses()[dag], jobs.late - jobs.overdue + jobs.skipped + jobs.aborted);
+  }
+  EXPECT_GT(counter.misses()[0], 0U);
+}
+
+TEST(SensibleDuration, IsWholeHyperperiods) {
+  Workload workload = fast_and_slow();
+  EXPECT_EQ(sensible_duration(workload), 10 * kSecond);
+  workload.dags[1].tasks[0].period = 700 * kMillisecond;
+  EXPECT_EQ(sensible_duration(workload), 15 * 700 * kMillisecond);
+  workload.dags[0].tasks[0].period = 999'999'937;
+  EXPECT_EQ(sensible_duration(workload), 10 * kSecond) << "nobody waits for that hyperperiod";
+}
+
+}  // namespace
+}  // namespace redag::cli

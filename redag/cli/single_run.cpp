@@ -1,0 +1,69 @@
+#include "redag/cli/single_run.hpp"
+
+#include <fmt/format.h>
+
+#include "redag/cli/commands.hpp"
+#include "redag/cli/run_report.hpp"
+#include "redag/cli/signals.hpp"
+
+namespace redag::cli {
+namespace {
+
+constexpr Duration kThreadsDuration = 10 * kSecond;
+
+Result<Session> run_interruptibly(const Workload &workload, const Variant &variant, SessionOptions options,
+                                  Console &console) {
+  const InterruptGuard guard;
+  options.stop = &InterruptGuard::flag();
+  Progress progress(console);
+  progress.set_label(variant.name);
+  return run_session(workload, variant, options, progress_hook(progress, workload, options.duration));
+}
+
+}  // namespace
+
+int run_once(const RunArguments &arguments, const std::string &executor, trace::Driver driver, Console &console) {
+  const Result<Variant> variant = parse_variant(executor);
+  if (!variant) {
+    console.note(variant.error());
+    return kExitBad;
+  }
+  const bool simulated = driver == trace::Driver::Simulator;
+  if (simulated && variant->realtime_threads) {
+    console.error(fmt::format("the simulator has no threads: use '{}'", variant->executor));
+    return kExitBad;
+  }
+  const std::optional<Workload> workload = load_configured(arguments, console);
+  if (!workload) return kExitBad;
+  const Duration usual = simulated ? sensible_duration(*workload) : kThreadsDuration;
+  const std::optional<SessionOptions> options = session_options(arguments, driver, usual, console);
+  if (!options) return kExitBad;
+
+  const Result<Session> session = run_interruptibly(*workload, *variant, *options, console);
+  if (!session) {
+    console.note(session.error());
+    return kExitBad;
+  }
+  for (const std::string &warning : session->warnings) console.warn(warning);
+  if (arguments.json) {
+    console.print(to_text(to_json(*session)));
+  } else {
+    console.print(describe(*session, console.out_traits(), ReportOptions{arguments.all_tasks}));
+  }
+  bool written = true;
+  if (!arguments.folder.empty()) {
+    const Diagnostics problems = write_session(*session, arguments.folder);
+    console.note(problems);
+    written = problems.empty();
+    const std::string message = fmt::format(
+        "wrote {}/: summary.json, jobs.csv, events.jsonl, trace.json (open it in https://ui.perfetto.dev)\n",
+        arguments.folder);
+    if (written && arguments.json) console.note(message);
+    if (written && !arguments.json) console.print(message);
+  }
+  if (!written) return kExitBad;
+  const bool no = !session->check.ok() || (arguments.check && has_misses(session->summary));
+  return no ? kExitNo : kExitOk;
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,16 @@
+// What `simulate` and `run` share: one session, shown and written. Blocks until it is over or was interrupted.
+#pragma once
+
+#include <string>
+
+#include "redag/cli/console.hpp"
+#include "redag/cli/run_arguments.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag::cli {
+
+/// Returns the exit status. `executor` is a name of variant.hpp.
+[[nodiscard]] int run_once(const RunArguments &arguments, const std::string &executor, trace::Driver driver,
+                           Console &console);
+
+}  // namespace redag::cli

@@ -1,0 +1,89 @@
+#include "redag/cli/table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "redag/cli/progress.hpp"
+
+namespace redag::cli {
+namespace {
+
+Table three_columns() {
+  Table table({{"task", false, 9}, {"jobs", true, 1}, {"max", true, 5}});
+  table.add({{"control.imu"}, {"5 000"}, {"1ms"}});
+  table.add({{"p"}, {"7"}, {"12.5ms", Tint::Bad}});
+  return table;
+}
+
+std::size_t widest_line(const std::string &text) {
+  std::istringstream lines(text);
+  std::size_t widest = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.front() != '(') widest = std::max(widest, display_width(line));
+  }
+  return widest;
+}
+
+TEST(Table, AlignsTextLeftAndNumbersRight) {
+  EXPECT_EQ(three_columns().render(0, false),
+            "task          jobs     max\n"
+            "control.imu  5 000     1ms\n"
+            "p                7  12.5ms\n");
+}
+
+TEST(Table, ColoursCellsWithoutMovingThem) {
+  const std::string text = three_columns().render(0, true);
+  EXPECT_NE(text.find("  \033[31m12.5ms\033[0m"), std::string::npos) << text;
+}
+
+TEST(Table, CutsTextBeforeItDropsColumns) {
+  EXPECT_EQ(three_columns().render(24, false),
+            "task        jobs     max\n"
+            "control.…  5 000     1ms\n"
+            "p              7  12.5ms\n");
+}
+
+TEST(Table, DropsTheLeastImportantColumnsAndSaysSo) {
+  const std::string text = three_columns().render(17, false);
+  EXPECT_LE(widest_line(text), 17U) << text;
+  EXPECT_NE(text.find("(no room for: jobs)"), std::string::npos) << text;
+  EXPECT_NE(text.find("12.5ms"), std::string::npos) << text;
+}
+
+TEST(Table, OfEquallyImportantColumnsTheLastGoes) {
+  Table table({{"aaaaaaaa", true, 1}, {"bbbbbbbb", true, 1}});
+  table.add({{"1"}, {"2"}});
+  EXPECT_EQ(table.render(10, false), "aaaaaaaa\n       1\n(no room for: bbbbbbbb)\n");
+}
+
+TEST(Table, KeepsTheLastColumnOnTheNarrowestTerminal) {
+  const std::string text = three_columns().render(1, false);
+  EXPECT_NE(text.find("task"), std::string::npos) << text;
+}
+
+TEST(Table, CountsCharactersNotBytes) {
+  EXPECT_EQ(display_width("µs"), 2U);
+  EXPECT_EQ(cut("größere", 4), "grö…");
+  EXPECT_EQ(cut("größe", 5), "größe");
+  EXPECT_EQ(cut("abc", 0), "");
+}
+
+TEST(Table, FormatsNumbers) {
+  EXPECT_EQ(format_count(0), "0");
+  EXPECT_EQ(format_count(999), "999");
+  EXPECT_EQ(format_count(1000), "1 000");
+  EXPECT_EQ(format_count(1234567), "1 234 567");
+  EXPECT_EQ(format_percent(0), "0.0 %");
+  EXPECT_EQ(format_percent(0.1421), "14.2 %");
+  EXPECT_EQ(format_percent(1), "100.0 %");
+  EXPECT_EQ(format_percent(3e-5), "0.003 %") << "a miss must not read as none";
+}
+
+TEST(ProgressLine, FitsTheTerminal) {
+  EXPECT_EQ(progress_line("mte 1/3", 0.5, "1.0 of 2.0 s", 80), "mte 1/3 [##########          ]  50 %  1.0 of 2.0 s");
+  EXPECT_EQ(display_width(progress_line("mte 1/3", 2.0, std::string(200, 'x'), 60)), 60U);
+}
+
+}  // namespace
+}  // namespace redag::cli

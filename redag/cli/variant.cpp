@@ -1,0 +1,48 @@
+#include "redag/cli/variant.hpp"
+
+#include <algorithm>
+
+#include "redag/cli/options.hpp"
+
+namespace redag::cli {
+
+const std::vector<std::string> &variant_names() {
+  static const std::vector<std::string> names = {"redag", "redag-none", "redag-cooperative", "redag-os",
+                                                 "mte",   "ste",        "mte-fifo",          "ste-fifo"};
+  return names;
+}
+
+Result<Variant> parse_variant(const std::string &name) {
+  const std::vector<std::string> &names = variant_names();
+  if (std::find(names.begin(), names.end(), name) == names.end()) {
+    return make_error("there is no executor '" + name + "'", suggestion(name, names));
+  }
+  const std::size_t dash = name.find('-');
+  Variant variant{name, name.substr(0, dash), std::nullopt, false};
+  const std::string detail = dash == std::string::npos ? "" : name.substr(dash + 1);
+  // rclcpp's executors cannot preempt: whatever the workload says, a callback runs to its end.
+  if (!variant.is_redag()) variant.preemption = PreemptionMode::None;
+  for (const auto &[text, mode] : preemption_choices()) {
+    if (text == detail) variant.preemption = mode;
+  }
+  variant.realtime_threads = detail == "fifo";
+  return variant;
+}
+
+Result<std::vector<Variant>> parse_variants(std::string_view list) {
+  std::vector<Variant> variants;
+  while (true) {
+    const std::size_t comma = list.find(',');
+    Result<Variant> variant = parse_variant(std::string(list.substr(0, comma)));
+    if (!variant) return tl::unexpected<Diagnostics>(std::move(variant.error()));
+    const auto same = [&](const Variant &other) { return other.name == variant->name; };
+    if (std::any_of(variants.begin(), variants.end(), same)) {
+      return make_error("executor '" + variant->name + "' is named twice");
+    }
+    variants.push_back(*std::move(variant));
+    if (comma == std::string_view::npos) return variants;
+    list.remove_prefix(comma + 1);
+  }
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,33 @@
+// An executor as the command line names it: which scheduler, which preemption, which threads. "redag", "redag-none",
+// "redag-cooperative", "redag-os"; "mte" and "ste" (rclcpp's multi- and single-threaded executors), and "mte-fifo" and
+// "ste-fifo", the same on real-time threads. Pure.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "redag/base/result.hpp"
+#include "redag/model/workload.hpp"
+
+namespace redag::cli {
+
+struct Variant {
+  std::string name;                          // as it was written
+  std::string executor;                      // "redag", "mte", "ste"
+  std::optional<PreemptionMode> preemption;  // instead of the workload's; peers: none
+  bool realtime_threads = false;
+
+  [[nodiscard]] bool is_redag() const { return executor == "redag"; }
+};
+
+[[nodiscard]] const std::vector<std::string> &variant_names();
+
+/// Error: an unknown name, with the nearest one.
+[[nodiscard]] Result<Variant> parse_variant(const std::string &name);
+
+/// "redag,mte": at least one, none twice.
+[[nodiscard]] Result<std::vector<Variant>> parse_variants(std::string_view list);
+
+}  // namespace redag::cli

@@ -1,0 +1,438 @@
+#!/usr/bin/env python3
+"""The program `redag` as its users meet it: files, pipes, terminals, signals, full disks.
+
+Usage: run.py PROGRAM SOURCE_DIR. Uses the standard library only.
+"""
+import csv
+import fcntl
+import json
+import os
+import pathlib
+import pty
+import re
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import termios
+import time
+import unittest
+
+PROGRAM = pathlib.Path()
+SOURCE = pathlib.Path()
+
+CART = """\
+name: cart
+platform: {workers: 1, preemption: none}
+dags:
+  - name: fast
+    tasks: [{name: sense, wcet: 1ms, period: 10ms}, {name: act, wcet: 1ms, activation: data, after: sense}]
+  - name: slow
+    tasks: [{name: plan, wcet: 25ms, period: 100ms}]
+"""
+MISTAKEN = """\
+name: cart
+platform: {workers: 1}
+dags:
+  - name: fast
+    tasks:
+      - {name: sense, wect: 1ms, period: 10ms}
+      - {name: act, wcet: 1, activation: data, after: sense}
+"""
+
+
+def redag(*arguments, text=None, **options):
+    return subprocess.run([PROGRAM, *map(str, arguments)], input=text, capture_output=True, text=True, timeout=250,
+                          check=False, **options)
+
+
+def in_terminal(*arguments, columns=80, **environment):
+    """Runs on a pseudo-terminal; returns exit status and everything written."""
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.environ.update(TERM="xterm", **environment)
+        try:
+            os.execv(PROGRAM, [str(PROGRAM), *map(str, arguments)])
+        finally:
+            os._exit(127)
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    text = b""
+    while True:
+        try:
+            block = os.read(terminal, 65536)
+        except OSError:  # Linux says EIO once the other end is closed
+            break
+        if not block:
+            break
+        text += block
+    os.close(terminal)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), text.decode()
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.cart = self.write("cart.yaml", CART)
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.write_text(text)
+        return path
+
+    def expect(self, result, status, *errors):
+        self.assertEqual(result.returncode, status, result.stderr + result.stdout)
+        for error in errors:
+            self.assertIn(error, result.stderr)
+        return result
+
+    def document(self, result, form, status=0):
+        """Standard output is one JSON document and nothing else."""
+        self.expect(result, status)
+        document = json.loads(result.stdout)
+        self.assertEqual(document["format"], form)
+        return document
+
+
+class Usage(Case):
+    def test_version(self):
+        self.assertRegex(self.expect(redag("--version"), 0).stdout, r"^redag \d+\.\d+\.\d+\n$")
+
+    def test_no_arguments(self):
+        self.expect(redag(), 2, "Subcommands:", "check-trace")
+
+    def test_help_of_every_command(self):
+        listed = redag("--help").stdout
+        for command in ["validate", "generate", "simulate", "run", "compare", "check-trace"]:
+            self.assertIn(command, listed)
+            text = self.expect(redag(command, "--help"), 0).stdout
+            self.assertIn(f"Usage: redag {command}", text)
+            self.assertIn("Examples:", text)
+
+    def test_examples_parse(self):
+        """Every option in the examples of --help exists."""
+        for command in ["validate", "generate", "simulate", "run", "compare", "check-trace"]:
+            text = redag(command, "--help").stdout
+            options, examples = text.split("Examples:")
+            for option in re.findall(r"--[a-z-]+", examples):
+                self.assertIn(option, options, command)
+
+    def test_mistakes_are_near_something(self):
+        self.expect(redag("simualte", self.cart), 2, "did you mean 'simulate'?")
+        self.expect(redag("simulate", self.cart, "--durtion", "1s"), 2, "did you mean '--duration'?")
+        self.expect(redag("simulate", self.cart, "--policy", "rate_monotonc"), 2, "did you mean 'rate_monotonic'?")
+        self.expect(redag("simulate", self.cart, "--executor", "mtee"), 2, "did you mean 'mte'?")
+        self.expect(redag("compare", self.cart, "--executors", "redag,stee"), 2, "did you mean 'ste'?")
+
+    def test_bad_values(self):
+        for arguments, words in [(["--duration", "5"], "no unit"), (["--duration", "0s"], "not longer than 0"),
+                                 (["--duration", "-1s"], "not longer than 0"), (["--seed", "-1"], "whole number"),
+                                 (["--seed", "99999999999999999999"], "whole number"),
+                                 (["--workers", "100000"], "workers"), (["--warmup", "20s"], "leaves nothing")]:
+            self.expect(redag("simulate", self.cart, "--duration=10s" if "--duration" not in arguments else "--seed=1",
+                              *arguments), 2, words)
+        self.expect(redag("run", self.cart, "--affinity", "1-"), 2, "list of processors")
+        self.expect(redag("simulate", self.cart, "--preemption", "os", "--policy", "edf"), 2, "static policy")
+        self.expect(redag("simulate", self.cart, "--executor", "mte-fifo"), 2, "no threads")
+
+
+class Validate(Case):
+    def test_fine(self):
+        self.assertIn("2 DAGs, 3 tasks", self.expect(redag("validate", self.cart), 0).stdout)
+
+    def test_every_mistake_with_its_place(self):
+        bad = self.write("bad.yaml", MISTAKEN)
+        result = self.expect(redag("validate", bad, self.cart), 2, "did you mean 'wcet'?")
+        self.assertRegex(result.stderr, rf"{re.escape(str(bad))}:6:\d+: error: .*wect")
+        self.assertRegex(result.stderr, rf"{re.escape(str(bad))}:7:\d+: error: ")
+        self.assertIn("cart.yaml: ok", result.stdout, "the other files are still looked at")
+
+    def test_json(self):
+        bad = self.write("bad.yaml", MISTAKEN)
+        document = self.document(redag("validate", "--json", bad, self.cart), "redag.validate/1", 2)
+        self.assertEqual([file["ok"] for file in document["files"]], [False, True])
+        self.assertEqual(document["files"][0]["diagnostics"][0]["line"], 6)
+        self.assertEqual(document["files"][1]["workload"]["hyperperiod_ns"], 100_000_000)
+
+    def test_standard_input(self):
+        self.expect(redag("validate", "-", text=CART), 0)
+        self.expect(redag("validate", "-", text=MISTAKEN), 2, "<stdin>:6:")
+
+    def test_what_is_no_workload(self):
+        self.expect(redag("validate", self.folder), 2, str(self.folder))
+        self.expect(redag("validate", "/no/such.yaml"), 2, "/no/such.yaml")
+        self.expect(redag("validate", self.write("empty.yaml", "")), 2, "empty.yaml")
+        binary = self.folder / "binary.yaml"
+        binary.write_bytes(bytes(range(256)))
+        self.expect(redag("validate", "--json", binary), 2)
+
+    def test_name_that_is_not_utf8(self):
+        name = os.fsencode(self.folder) + b"/\xff.yaml"
+        result = subprocess.run([PROGRAM, "validate", "--json", name], capture_output=True, check=False)
+        self.assertEqual(result.returncode, 2)
+        json.loads(result.stdout)
+
+    def test_strict(self):
+        # 3 tasks of 60 % on one worker: legal, and a warning.
+        text = CART.replace("wcet: 25ms", "wcet: 99ms")
+        crowded = self.write("crowded.yaml", text)
+        warned = redag("validate", crowded)
+        if "warning:" not in warned.stderr:
+            self.skipTest("nothing to warn of")
+        self.expect(warned, 0)
+        self.expect(redag("validate", "--strict", crowded), 2, "--strict")
+
+    def test_workloads_of_the_repository(self):
+        files = sorted((SOURCE / "workloads").rglob("*.yaml"))
+        self.assertTrue(files)
+        self.expect(redag("validate", *files), 0)
+
+
+class Generate(Case):
+    def test_same_seed_same_bytes(self):
+        arguments = ["generate", "--dags", "3", "--seed", "5", "--shape", "fork_join"]
+        self.assertEqual(redag(*arguments).stdout, redag(*arguments).stdout)
+        self.assertNotEqual(redag(*arguments).stdout, redag(*arguments[:4], "6", *arguments[5:]).stdout)
+
+    def test_is_valid_and_says_how_it_was_made(self):
+        text = self.expect(redag("generate", "--periods", "robot", "--offsets", "--seed", "9"), 0).stdout
+        self.assertTrue(text.startswith("# redag generate --periods robot --offsets --seed 9\n"), text[:80])
+        self.expect(redag("validate", "-", text=text), 0)
+
+    def test_many(self):
+        sets = self.folder / "sets"
+        self.expect(redag("generate", "--count", "5", "--seed", "10", "--out", sets), 0)
+        files = sorted(sets.iterdir())
+        self.assertEqual([file.name for file in files], [f"workload-{n}.yaml" for n in range(10, 15)])
+        self.expect(redag("validate", *files), 0)
+        self.assertEqual(files[2].read_text(), redag("generate", "--seed", "12").stdout)
+        self.expect(redag("generate", "--count", "2"), 2, "--out")
+
+    def test_impossible(self):
+        self.expect(redag("generate", "--min-tasks", "9", "--max-tasks", "3"), 2, "error:")
+        self.expect(redag("generate", "-o", "/no/such/folder/x.yaml"), 2, "/no/such/folder/x.yaml")
+        self.expect(redag("generate", "-o", "/dev/full"), 2, "No space left")
+
+
+class Simulate(Case):
+    def test_table_and_verdict(self):
+        result = self.expect(redag("simulate", self.cart, "--duration", "1s"), 0)
+        for words in ["fast.sense", "slow.plan", "preemption: none", "trace check: ok"]:
+            self.assertIn(words, result.stdout)
+
+    def test_json_and_files_agree(self):
+        out = self.folder / "deep" / "out"
+        result = redag("simulate", self.cart, "--duration", "2s", "--json", "--out", out)
+        document = self.document(result, "redag.summary/1")
+        self.assertTrue(document["check"]["ok"])
+        written = json.loads((out / "summary.json").read_text())
+        self.assertEqual(written, {key: document[key] for key in written})
+        self.assertEqual(sorted(path.name for path in out.iterdir()),
+                         ["events.jsonl", "jobs.csv", "summary.json", "trace.json"])
+        with open(out / "jobs.csv", newline="") as file:
+            self.assertEqual(len(list(csv.DictReader(file))), document["total"]["released"])
+        json.loads((out / "trace.json").read_text())
+
+    def test_same_seed_same_bytes(self):
+        arguments = ["simulate", SOURCE / "workloads" / "contention.yaml", "--duration", "1s", "--json"]
+        self.assertEqual(redag(*arguments).stdout, redag(*arguments).stdout)
+        self.assertNotEqual(redag(*arguments).stdout, redag(*arguments, "--seed", "2").stdout)
+
+    def test_the_command_line_overrides(self):
+        document = self.document(redag("simulate", self.cart, "--duration", "1s", "--preemption", "cooperative",
+                                       "--workers", "2", "--policy", "fifo", "--json"), "redag.summary/1")
+        self.assertEqual(document["run"]["preemption"], "cooperative")
+        self.assertEqual(document["run"]["config"]["policy"], "fifo")
+        self.assertEqual(len(document["worker_busy"]), 2)
+
+    def test_check_says_no(self):
+        self.expect(redag("simulate", self.cart, "--duration", "1s"), 0)
+        self.expect(redag("simulate", self.cart, "--duration", "1s", "--check"), 1)
+        self.expect(redag("simulate", self.cart, "--duration", "1s", "--check", "--preemption", "os"), 0)
+
+    def test_overheads_cost_time(self):
+        plain = json.loads(redag("simulate", self.cart, "--duration", "1s", "--json").stdout)
+        slower = json.loads(redag("simulate", self.cart, "--duration", "1s", "--json", "--overhead-dispatch", "1ms").stdout)
+        self.assertGreater(slower["worker_busy"][0], plain["worker_busy"][0])
+
+    def test_a_cut_trace_is_said_and_lawful(self):
+        out = self.folder / "out"
+        result = self.expect(redag("simulate", self.cart, "--duration", "60s", "--max-events", "5000", "--out", out), 0)
+        self.assertIn("--max-events", result.stdout)
+        self.expect(redag("check-trace", out), 0)
+        self.assertGreater(json.loads((out / "summary.json").read_text())["end_ns"],
+                           json.loads((out / "events.jsonl").read_text().splitlines()[-1])["end_ns"])
+
+    def test_folders_of_others_are_left_alone(self):
+        (self.folder / "mine").mkdir()
+        thesis = self.write("mine/thesis.tex", "years of work")
+        arguments = ["simulate", self.cart, "--duration", "1s", "--out", self.folder / "mine"]
+        self.expect(redag(*arguments), 2, "thesis.tex", "--force")
+        self.expect(redag(*arguments, "--force"), 0)
+        self.assertEqual(thesis.read_text(), "years of work")
+        self.expect(redag("simulate", self.cart, "--duration", "1s", "--out", self.cart), 2, str(self.cart))
+        self.expect(redag("simulate", self.cart, "--duration", "1s", "--out", "/proc/redag"), 2, "/proc/redag")
+
+    def test_again_into_the_same_folder(self):
+        arguments = ["simulate", self.cart, "--duration", "1s", "--out", self.folder / "out"]
+        self.expect(redag(*arguments), 0)
+        self.expect(redag(*arguments), 0)
+
+    def test_thousands_of_tasks(self):
+        big = self.write("big.yaml", redag("generate", "--dags", "400", "--min-tasks", "5", "--max-tasks", "8",
+                                           "--utilization", "3", "--workers", "4").stdout)
+        result = self.expect(redag("simulate", big, "--duration", "1s"), 0)
+        self.assertIn("--all-tasks", result.stdout)
+        self.assertIn("trace check: ok", result.stdout)
+
+
+class Streams(Case):
+    def test_a_reader_that_leaves(self):
+        out = self.folder / "out"
+        command = f"'{PROGRAM}' simulate '{self.cart}' --duration 2s --json --out '{out}' | head -n 1; echo ${{PIPESTATUS[0]}}"
+        result = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+        self.assertEqual(result.stdout, "{\n0\n", result.stderr)
+        self.assertTrue((out / "summary.json").exists())
+
+    def test_full_disk(self):
+        with open("/dev/full", "w") as full:
+            result = subprocess.run([PROGRAM, "simulate", self.cart, "--duration", "1s"], stdout=full,
+                                    stderr=subprocess.PIPE, text=True, check=False)
+        self.expect(result, 2) if result.stdout else self.assertEqual(result.returncode, 2)
+        self.assertIn("No space left", result.stderr)
+
+    def test_no_colour_in_files(self):
+        self.assertNotIn("\033", redag("simulate", self.cart, "--duration", "1s").stdout)
+
+    def test_terminal(self):
+        status, text = in_terminal("simulate", self.cart, "--duration", "1s")
+        self.assertEqual(status, 0)
+        self.assertIn("\033[", text)
+        status, text = in_terminal("simulate", self.cart, "--duration", "1s", NO_COLOR="1")
+        self.assertNotRegex(text, r"\033\[\d+m")
+
+    def test_narrow_terminals(self):
+        for columns in (60, 40):
+            status, text = in_terminal("compare", self.cart, "--simulate", "--duration", "1s", "--executors",
+                                       "redag-none,redag-os", columns=columns, NO_COLOR="1")
+            self.assertEqual(status, 0, text)
+            table = [line for line in text.splitlines() if re.search(r" redag-(none|os) .*%", line) and ":" not in line]
+            self.assertEqual(len(table), 6, text)
+            self.assertLessEqual(max(map(len, table)), columns, text)
+        self.assertIn("no room for", text)
+
+    def test_progress_on_a_terminal(self):
+        _, text = in_terminal("run", self.cart, "--duration", "1s")
+        self.assertRegex(text, r"\[#+ *\] +\d+ %")
+        self.assertNotIn("[###", redag("run", self.cart, "--duration", "300ms").stderr)
+
+
+class Interrupts(Case):
+    def start(self, *arguments):
+        return subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def test_run_is_finished_and_written(self):
+        out = self.folder / "out"
+        process = self.start("run", self.cart, "--duration", "1h", "--json", "--out", out)
+        time.sleep(2)
+        process.send_signal(signal.SIGINT)
+        text, errors = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 0, errors)
+        document = json.loads(text)
+        self.assertTrue(document["stopped"])
+        self.assertLess(document["end_ns"], 120e9)
+        self.assertTrue((out / "jobs.csv").exists())
+
+    def test_simulation_too(self):
+        process = self.start("simulate", self.cart, "--duration", "10000h", "--max-events", "1000")
+        time.sleep(1)
+        process.send_signal(signal.SIGINT)
+        text, errors = process.communicate(timeout=240)
+        self.assertEqual(process.returncode, 0, errors)
+        self.assertIn("stopped early", text)
+
+    def test_the_second_one_ends_it_at_once(self):
+        # A job that cannot be waited for: the run asks it to end, and then waits for seconds.
+        endless = self.write("endless.yaml", "name: e\nplatform: {workers: 1, preemption: none}\ndags:\n"
+                             "  - {name: d, tasks: [{name: t, wcet: 1000s, period: 2000s}]}\n")
+        process = self.start("run", endless, "--duration", "3000s")
+        time.sleep(2)
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130)
+
+    def test_comparison_keeps_whole_rounds(self):
+        process = self.start("compare", self.cart, "--executors", "redag-none,redag-cooperative", "--repeat", "1000",
+                             "--duration", "100ms", "--json")
+        time.sleep(6)
+        process.send_signal(signal.SIGTERM)
+        text, errors = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 0, errors)
+        self.assertIn("interrupted", errors)
+        counts = {executor["repetitions"] for executor in json.loads(text)["executors"]}
+        self.assertEqual(len(counts), 1)
+
+
+class Compare(Case):
+    def test_simulated(self):
+        out = self.folder / "out"
+        result = redag("compare", self.cart, "--simulate", "--duration", "2s", "--repeat", "2", "--json", "--out", out)
+        document = self.document(result, "redag.comparison/1")
+        self.assertEqual([executor["name"] for executor in document["executors"]], ["redag", "mte", "ste"])
+        for executor in document["executors"]:
+            self.assertEqual(executor["repetitions"], 2)
+            self.assertTrue((out / executor["name"] / "repetition-2" / "events.jsonl").exists())
+        self.assertEqual(len(document["verdicts"]), 2)
+        self.assertEqual(json.loads((out / "comparison.json").read_text()), document)
+        with open(out / "comparison.csv", newline="") as file:
+            self.assertEqual(len(list(csv.DictReader(file))), 3 * 2 * 2)
+        self.expect(redag("check-trace", out), 0)
+
+    def test_on_threads(self):
+        result = self.expect(redag("compare", self.cart, "--duration", "300ms", "--repeat", "1"), 0)
+        self.assertRegex(result.stdout, r"fast: redag misses .* %, mte .* %, ste .* %: ")
+
+    def test_preemption_is_what_makes_the_difference(self):
+        result = redag("compare", self.cart, "--simulate", "--executors", "redag-none,redag-os", "--duration", "1s")
+        self.assertIn(": redag-os misses fewest", self.expect(result, 0).stdout)
+
+
+class CheckTrace(Case):
+    def trace(self):
+        out = self.folder / "out"
+        self.expect(redag("simulate", self.cart, "--duration", "1s", "--out", out), 0)
+        return out / "events.jsonl"
+
+    def test_damaged_traces(self):
+        trace = self.trace()
+        self.assertIn("trace check: ok", self.expect(redag("check-trace", trace), 0).stdout)
+        lines = trace.read_text().splitlines(keepends=True)
+        cut = self.write("cut.jsonl", "".join(lines[: len(lines) // 2]))
+        self.expect(redag("check-trace", cut), 2, "cut.jsonl")
+        self.expect(redag("check-trace", "--json", cut, trace), 2)
+        self.expect(redag("check-trace", self.write("no.jsonl", "no trace\n")), 2, "no.jsonl:1")
+        self.expect(redag("check-trace", "/dev/null"), 2)
+
+    def test_a_lie_is_found(self):
+        trace = self.trace()
+        text = trace.read_text()
+        # The same events under another policy: somebody was chosen against the rules.
+        lie = text.replace('"policy":"rate_monotonic"', '"policy":"fifo"', 1)
+        self.assertNotEqual(lie, text)
+        result = self.expect(redag("check-trace", self.write("lie.jsonl", lie)), 1)
+        self.assertIn("violations", result.stdout)
+        document = self.document(redag("check-trace", "--json", self.folder / "lie.jsonl"), "redag.check-trace/1", 1)
+        self.assertGreater(document["traces"][0]["check"]["violation_count"], 0)
+
+    def test_folder_without_traces(self):
+        self.expect(redag("check-trace", self.folder), 2, "no events.jsonl")
+
+
+if __name__ == "__main__":
+    PROGRAM = pathlib.Path(sys.argv[1]).resolve()
+    SOURCE = pathlib.Path(sys.argv[2]).resolve()
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
