@@ -41,8 +41,9 @@ void find_blockers(const System &system, std::uint32_t level, View &view) {
     if (stretch > longest.amount) longest = Blocker{t, stretch};
     if (system.mode != sched::Preemption::Full || task.group == kNoGroup) continue;
     const auto &group = system.groups[task.group];
-    const bool is_needed =
-        std::any_of(group.begin(), group.end(), [&](std::uint32_t other) { return system.tasks[other].rank <= level; });
+    // While it holds the group for a task of this platform level or above, no task of the level preempts it.
+    const bool is_needed = std::any_of(
+        group.begin(), group.end(), [&](std::uint32_t other) { return system.tasks[other].level <= platform_level; });
     Blocker &holder = holders[task.group];
     if (is_needed && task.wcet - 1 > holder.amount) holder = Blocker{t, task.wcet - 1};
   }

@@ -22,34 +22,36 @@ BoundCaseLimits everything(sched::Preemption preemption) {
   return limits;
 }
 
-TEST(BoundProperty, RtaPreemptiveClassic) { expect_bound_holds(rta_preemptive(), cases({})); }
+constexpr testing::BoundPropertyOptions kFew{.workloads = 250};
+
+TEST(BoundProperty, RtaPreemptiveClassic) { expect_bound_holds(rta_preemptive(), cases({}), kFew); }
 
 TEST(BoundProperty, RtaPreemptiveWithEverything) {
-  expect_bound_holds(rta_preemptive(), cases(everything(sched::Preemption::Full)));
+  expect_bound_holds(rta_preemptive(), cases(everything(sched::Preemption::Full)), kFew);
 }
 
 TEST(BoundProperty, RtaNonpreemptive) {
-  expect_bound_holds(rta_nonpreemptive(), cases(everything(sched::Preemption::None)));
+  expect_bound_holds(rta_nonpreemptive(), cases(everything(sched::Preemption::None)), kFew);
 }
 
 TEST(BoundProperty, RtaDeferred) {
   BoundCaseLimits limits = everything(sched::Preemption::Cooperative);
   limits.groups = false;
-  expect_bound_holds(rta_deferred(), cases(limits));
+  expect_bound_holds(rta_deferred(), cases(limits), kFew);
 }
 
 TEST(BoundProperty, DagOneWorkerPreemptive) {
   BoundCaseLimits limits = everything(sched::Preemption::Full);
   limits.edges = true;
   limits.max_dags = 4;
-  expect_bound_holds(dag_one_worker_preemptive(), cases(limits));
+  expect_bound_holds(dag_one_worker_preemptive(), cases(limits), kFew);
 }
 
 TEST(BoundProperty, DagOneWorkerNonpreemptive) {
   BoundCaseLimits limits = everything(sched::Preemption::None);
   limits.edges = true;
   limits.max_dags = 4;
-  expect_bound_holds(dag_one_worker_deferred(), cases(limits));
+  expect_bound_holds(dag_one_worker_deferred(), cases(limits), kFew);
 }
 
 TEST(BoundProperty, DagOneWorkerCooperative) {
@@ -57,7 +59,7 @@ TEST(BoundProperty, DagOneWorkerCooperative) {
   limits.edges = true;
   limits.groups = false;
   limits.max_dags = 4;
-  expect_bound_holds(dag_one_worker_deferred(), cases(limits));
+  expect_bound_holds(dag_one_worker_deferred(), cases(limits), kFew);
 }
 
 }  // namespace

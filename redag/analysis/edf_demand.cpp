@@ -1,0 +1,182 @@
+#include "redag/analysis/edf_demand.hpp"
+
+#include <algorithm>
+
+#include "redag/analysis/arithmetic.hpp"
+
+namespace redag::analysis {
+namespace {
+
+constexpr int kMaxSteps = 1'000'000;
+
+// As the demand sees a task: its deadline counts from its release as seen, which jitter delays.
+struct Demand {
+  Duration wcet = 0;
+  Duration period = 0;
+  Duration deadline = 0;  // D - J
+  Duration blocking = 0;  // its longest stretch without a preemption point, less one
+  Duration nominal_deadline = 0;
+};
+
+std::optional<std::string> why_not(const System &system) {
+  if (system.platform.workers != 1)
+    return "for one worker; the platform has " + std::to_string(system.platform.workers);
+  if (system.policy != PolicyKind::Edf) return std::string("for edf; the policy is ") + to_string(system.policy);
+  if (system.has_edges()) return "tasks have predecessors";
+  if (system.mode != sched::Preemption::None) {
+    if (!system.groups.empty()) return "groups together with preemption";
+    for (const SystemDag &dag : system.dags) {
+      if (dag.max_active > 0 && dag.tasks.size() > 1) return "DAG '" + dag.name + "' has a max_active";
+    }
+  }
+  for (const SystemTask &task : system.tasks) {
+    if (task.deadline > task.limit) return "task '" + task.name + "': jobs can be skipped before their deadline";
+    if (task.deadline <= task.jitter) return "task '" + task.name + "': its jitter is as large as its deadline";
+    const Duration end_to_end = system.dags[task.dag.value].deadline;
+    if (end_to_end > 0 && end_to_end < task.deadline) {
+      return "DAG '" + system.dags[task.dag.value].name + "': its deadline is below those of its tasks";
+    }
+  }
+  return std::nullopt;
+}
+
+std::vector<Demand> demands_of(const System &system) {
+  std::vector<Demand> demands;
+  for (const SystemTask &task : system.tasks) {
+    const Duration blocking = std::max<Duration>(0, task.region - 1);
+    demands.push_back(Demand{task.wcet, task.period, task.deadline - task.jitter, blocking, task.deadline});
+  }
+  return demands;
+}
+
+Duration demand_until(const std::vector<Demand> &demands, Duration t) {
+  Int128 sum = 0;
+  for (const Demand &task : demands) {
+    if (t >= task.deadline) sum += Int128{(t - task.deadline) / task.period + 1} * task.wcet;
+  }
+  return saturate(sum);
+}
+
+// Length of the longest busy period, blocking included; nothing where the steps run out. T + J: releases as seen.
+std::optional<Duration> busy_period(const std::vector<Demand> &demands, Duration blocking) {
+  Duration length = 1;
+  for (int step = 0; step < kMaxSteps && length < kUnbounded; ++step) {
+    Int128 sum = blocking;
+    for (const Demand &task : demands) {
+      const Duration jitter = task.nominal_deadline - task.deadline;
+      sum += Int128{ceil_div(add(length, jitter), task.period)} * task.wcet;
+    }
+    const Duration next = saturate(sum);
+    if (next == length) return length;
+    length = next;
+  }
+  return std::nullopt;
+}
+
+// The largest absolute deadline below `t`, or 0.
+Duration deadline_below(const std::vector<Demand> &demands, Duration t) {
+  Duration latest = 0;
+  for (const Demand &task : demands) {
+    if (task.deadline >= t) continue;
+    latest = std::max(latest, (t - 1 - task.deadline) / task.period * task.period + task.deadline);
+  }
+  return latest;
+}
+
+Bound refuse(Duration t, Duration demand) {
+  Bound bound;
+  bound.accepts = false;
+  bound.figures = "demand " + std::to_string(demand) + " in an interval of " + std::to_string(t) + " ns";
+  return bound;
+}
+
+Bound refuse_overload() {
+  Bound bound;
+  bound.accepts = false;
+  bound.figures = "no end of the busy period was found: the utilization is about one or above";
+  return bound;
+}
+
+Bound accept() {
+  Bound bound;
+  bound.accepts = true;
+  bound.figures = "the demand fits into every interval";
+  return bound;
+}
+
+// QPA: from the end of the busy period backwards, as far as the demand itself reaches.
+Outcome apply_preemptive(const System &system) {
+  if (auto reason = why_not(system)) return NotApplicable{*reason};
+  if (system.mode != sched::Preemption::Full) return NotApplicable{"for full preemption"};
+  const std::vector<Demand> demands = demands_of(system);
+  const auto length = busy_period(demands, 0);
+  if (!length) return refuse_overload();
+  Duration t = deadline_below(demands, add(*length, 1));
+  for (int step = 0; t > 0; ++step) {
+    if (step == kMaxSteps) return NotApplicable{"gave up: too many intervals to examine"};
+    const Duration demand = demand_until(demands, t);
+    if (demand > t) return refuse(t, demand);
+    // Between the demand and t nothing can be missed; at equality the next deadline decides.
+    t = deadline_below(demands, demand < t ? demand + 1 : t);
+  }
+  return accept();
+}
+
+Outcome apply_nonpreemptive(const System &system) {
+  if (auto reason = why_not(system)) return NotApplicable{*reason};
+  if (system.mode == sched::Preemption::Full) return NotApplicable{"for jobs that keep the worker"};
+  const std::vector<Demand> demands = demands_of(system);
+  Duration longest = 0;
+  for (const Demand &task : demands) longest = std::max(longest, task.blocking);
+  const auto length = busy_period(demands, longest);
+  if (!length) return refuse_overload();
+  // Blocking falls with t, so that the demand cannot be followed backwards: every deadline is examined.
+  int step = 0;
+  for (Duration t = deadline_below(demands, add(*length, 1)); t > 0; t = deadline_below(demands, t)) {
+    if (++step > kMaxSteps) return NotApplicable{"gave up: too many intervals to examine"};
+    Duration blocking = 0;
+    for (const Demand &task : demands) {
+      if (task.nominal_deadline > t) blocking = std::max(blocking, task.blocking);
+    }
+    const Duration demand = add(demand_until(demands, t), blocking);
+    if (demand > t) return refuse(t, demand);
+  }
+  return accept();
+}
+
+}  // namespace
+
+Method edf_demand() {
+  Method method;
+  method.name = "edf_demand";
+  method.subject = Subject::System;
+  method.cite =
+      "S. Baruah, L. Rosier, R. Howell, Algorithms and complexity concerning the preemptive scheduling of periodic, "
+      "real-time tasks on one processor, Real-Time Systems 2, 1990; F. Zhang, A. Burns, Schedulability analysis for "
+      "real-time systems with EDF scheduling, IEEE Transactions on Computers 58(9), 2009";
+  method.assumptions =
+      "one worker, full preemption, edf, no edges, deadlines before the next release is refused, jitter below the "
+      "deadline, no shared groups, no max_active";
+  method.complexity = "pseudo-polynomial; O(n) an interval";
+  method.apply = apply_preemptive;
+  return method;
+}
+
+Method edf_demand_nonpreemptive() {
+  Method method;
+  method.name = "edf_demand_nonpreemptive";
+  method.subject = Subject::System;
+  method.cite =
+      "K. Jeffay, D. Stanat, C. Martel, On non-preemptive scheduling of periodic and sporadic tasks, RTSS 1991; L. "
+      "George, N. Rivierre, M. Spuri, Preemptive and non-preemptive real-time uni-processor scheduling, INRIA RR-2966, "
+      "1996";
+  method.assumptions =
+      "one worker, jobs run to completion or to a preemption point, edf, no edges, deadlines before the next release "
+      "is "
+      "refused, jitter below the deadline; groups and max_active where jobs run to completion";
+  method.complexity = "pseudo-polynomial; O(n) an interval";
+  method.apply = apply_nonpreemptive;
+  return method;
+}
+
+}  // namespace redag::analysis

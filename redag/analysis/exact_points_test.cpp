@@ -1,0 +1,29 @@
+#include "redag/analysis/exact_points.hpp"
+
+#include <gtest/gtest.h>
+
+#include "redag/analysis/linear_bound.hpp"
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using testing::BoundCaseLimits;
+
+testing::BoundGenerator cases(double max_deadline, bool edges) {
+  BoundCaseLimits limits;
+  limits.groups = limits.levels = limits.overheads = limits.caps = limits.queues = true;
+  limits.max_deadline = max_deadline;
+  limits.edges = edges;
+  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
+}
+
+constexpr testing::BoundPropertyOptions kFew{.workloads = 250};
+
+TEST(BoundProperty, PointsTest) { expect_bound_holds(exact_points(), cases(1.0, false), kFew); }
+TEST(BoundProperty, PointsTestOnDags) { expect_bound_holds(exact_points(), cases(1.0, true), kFew); }
+TEST(BoundProperty, LinearBound) { expect_bound_holds(linear_bound(), cases(2.5, false), kFew); }
+TEST(BoundProperty, LinearBoundOnDags) { expect_bound_holds(linear_bound(), cases(1.0, true), kFew); }
+
+}  // namespace
+}  // namespace redag::analysis

@@ -1,0 +1,88 @@
+#include "redag/analysis/linear_bound.hpp"
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/one_worker.hpp"
+
+namespace redag::analysis {
+namespace {
+
+// Utilizations in units of 2^-40, durations in the numerator in units of 2^-16: all products stay below 2^126 for
+// execution times up to 2^50 ns (13 days).
+constexpr int kShareBits = 40;
+constexpr int kTimeBits = 16;
+constexpr Int128 kOne = Int128{1} << kShareBits;
+constexpr Duration kLongest = Duration{1} << 50;
+
+Int128 ceil_of(Int128 numerator, Int128 denominator) { return (numerator + denominator - 1) / denominator; }
+
+ResponseBound bound_unit(const System &system, std::uint32_t u) {
+  const Unit &unit = system.units[u];
+  const one_worker::View view = one_worker::view_of(system, u);
+  Int128 utilization = 0;
+  Int128 slopes = 0;  // sum C_j (1 - U_j)
+  for (const one_worker::Interferer &other : view.more_urgent) {
+    utilization += ceil_of(Int128{other.wcet} << kShareBits, other.period);
+    if (other.wcet < other.period) {
+      slopes += ceil_of((Int128{other.wcet} << kTimeBits) * (other.period - other.wcet), other.period);
+    }
+  }
+  ResponseBound bound;
+  if (utilization + ceil_of(Int128{unit.volume} << kShareBits, unit.period) > kOne) {
+    bound.absent = "the utilization of its level may exceed one";
+    return bound;
+  }
+  const Int128 fixed = (Int128{view.blocking} + unit.volume) << kTimeBits;
+  const Int128 rest = kOne - utilization;  // > 0: the unit's own share is
+  const Duration response = saturate(((fixed + slopes) << (kShareBits - kTimeBits)) / rest);
+  if (response > unit.limit) {
+    bound.absent = one_worker::kExceedsLimit;
+    return bound;
+  }
+
+  bound.response = response;
+  Duration overhead = 0;
+  for (const std::uint32_t t : unit.tasks) overhead += system.tasks[t].overhead;
+  bound.terms.push_back(Term{Term::Kind::Own, TaskId(), unit.dag, unit.volume - overhead, 1});
+  if (overhead > 0) bound.terms.push_back(Term{Term::Kind::Overhead, TaskId(), unit.dag, overhead, 0});
+  for (const one_worker::Blocker &blocker : view.blockers) {
+    const DagId dag = system.tasks[blocker.task].dag;
+    bound.terms.push_back(Term{Term::Kind::Blocking, TaskId(blocker.task), dag, blocker.amount, 1});
+  }
+  // The formula mixes what the others do; it has no share for each.
+  const Duration interference = response - unit.volume - view.blocking;
+  if (interference > 0) bound.terms.push_back(Term{Term::Kind::Interference, TaskId(), DagId(), interference, 0});
+  return bound;
+}
+
+Outcome apply(const System &system) {
+  if (auto reason = one_worker::why_not(system)) return NotApplicable{*reason};
+  if (system.mode != sched::Preemption::Full) return NotApplicable{"for full preemption"};
+  for (const Unit &unit : system.units) {
+    if (unit.jitter > 0) {
+      return NotApplicable{"task '" + system.tasks[unit.tasks.front()].name + "' has release jitter"};
+    }
+    if (unit.volume > kLongest) return NotApplicable{"an execution time above 13 days"};
+  }
+  std::vector<ResponseBound> units;
+  for (std::uint32_t u = 0; u < system.units.size(); ++u) units.push_back(bound_unit(system, u));
+  return from_units(system, std::move(units));
+}
+
+}  // namespace
+
+Method linear_bound() {
+  Method method;
+  method.name = "linear_bound";
+  method.subject = Subject::Task;
+  method.cite =
+      "E. Bini, T. H. C. Nguyen, P. Richard, S. K. Baruah, A response-time bound in fixed-priority scheduling with "
+      "arbitrary deadlines, IEEE Transactions on Computers 58(2), 2009";
+  method.assumptions =
+      "one worker, full preemption, static priorities, any deadlines, no jitter; blocking added; a DAG of one rate "
+      "counts as one task with C = volume";
+  method.complexity = "O(n) a task";
+  method.apply = apply;
+  return method;
+}
+
+}  // namespace redag::analysis
