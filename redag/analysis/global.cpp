@@ -85,7 +85,9 @@ void measure_paths(const System &system, const Unit &unit, GlobalUnit &result) {
   }
 }
 
-GlobalUnit make_unit(const System &system, std::uint32_t id) {
+}  // namespace
+
+GlobalUnit unit_of(const System &system, std::uint32_t id) {
   const Unit &unit = system.units[id];
   const SystemDag &dag = system.dags[unit.dag.value];
   const std::uint32_t workers = system.platform.workers;
@@ -103,8 +105,6 @@ GlobalUnit make_unit(const System &system, std::uint32_t id) {
   return result;
 }
 
-}  // namespace
-
 Units units_of(const System &system, const Needs &needs) {
   Units result;
   result.workers = system.platform.workers;
@@ -112,7 +112,7 @@ Units units_of(const System &system, const Needs &needs) {
   if (!result.reason) result.reason = why_not_structure(system, needs);
   if (result.reason) return result;
   result.units.reserve(system.units.size());
-  for (std::uint32_t u = 0; u < system.units.size(); ++u) result.units.push_back(make_unit(system, u));
+  for (std::uint32_t u = 0; u < system.units.size(); ++u) result.units.push_back(unit_of(system, u));
   std::sort(result.units.begin(), result.units.end(), [&](const GlobalUnit &a, const GlobalUnit &b) {
     return system.units[a.unit].first_rank < system.units[b.unit].first_rank;
   });

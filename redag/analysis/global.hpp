@@ -49,6 +49,9 @@ struct Units {
 };
 [[nodiscard]] Units units_of(const System &system, const Needs &needs);
 
+/// One unit alone; its order among the others is not looked at.
+[[nodiscard]] GlobalUnit unit_of(const System &system, std::uint32_t unit);
+
 /// Lets at most `width` jobs of the unit execute at once.
 void set_width(GlobalUnit &unit, std::uint32_t width);
 

@@ -1,0 +1,217 @@
+#include "redag/analysis/dag_isolated.hpp"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/global.hpp"
+#include "redag/sched/policy.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using global::GlobalUnit;
+
+// Length of the longest path over what is left of each task's wcet, which is taken away.
+Duration take_longest_path(const System &system, const Unit &unit, std::map<std::uint32_t, Duration> &left) {
+  struct Step {
+    Duration length = 0;
+    std::uint32_t before = TaskId::kNoneValue;
+  };
+  std::map<std::uint32_t, Step> paths;
+  std::uint32_t last = unit.tasks.front();
+  for (const std::uint32_t t : unit.tasks) {
+    Step step;
+    for (const std::uint32_t p : system.tasks[t].predecessors) {
+      if (paths[p].length > step.length) step = Step{paths[p].length, p};
+    }
+    step.length += left[t];
+    paths[t] = step;
+    if (step.length > paths[last].length) last = t;
+  }
+  const Duration length = paths[last].length;
+  for (std::uint32_t t = last; t != TaskId::kNoneValue; t = paths[t].before) left[t] = 0;
+  return length;
+}
+
+Duration graham_response(const Unit &unit, std::uint32_t workers) {
+  return unit.length + (unit.volume - unit.length) / workers;
+}
+
+std::optional<std::string> why_not_alone(const System &system) {
+  if (system.units.size() != 1) return "for a DAG that has the platform to itself";
+  if (system.mode == sched::Preemption::Cooperative)
+    return "cooperative mode: a suspended job waits beside idle workers";
+  if (!system.groups.empty()) return "exclusive groups: a worker can idle while a job waits";
+  return std::nullopt;
+}
+
+// `response` from the release as seen.
+ResponseBound bound_of(const System &system, const GlobalUnit &unit, Duration response) {
+  ResponseBound bound;
+  if (add(response, unit.jitter) > unit.limit) {
+    bound.absent = global::kExceedsLimit;
+    return bound;
+  }
+  bound.response = response + unit.jitter;
+  global::SharedTerms terms(system, unit);
+  terms.add_path();
+  terms.add(Term::Kind::Own, unit, response - unit.length);
+  terms.add_jitter();
+  bound.terms = terms.take();
+  return bound;
+}
+
+template <class Respond>
+Outcome apply_alone(const System &system, Respond respond) {
+  if (auto reason = why_not_alone(system)) return NotApplicable{*reason};
+  const GlobalUnit unit = global::unit_of(system, 0);
+  const std::uint32_t workers = unit.bound > 0 ? unit.bound : system.platform.workers;
+  return from_units(system, {bound_of(system, unit, respond(system.units[0], workers))});
+}
+
+Outcome apply_graham(const System &system) {
+  return apply_alone(system, [](const Unit &unit, std::uint32_t workers) { return graham_response(unit, workers); });
+}
+
+Outcome apply_long_paths(const System &system) {
+  return apply_alone(
+      system, [&](const Unit &unit, std::uint32_t workers) { return long_paths_response(system, unit, workers); });
+}
+
+// Jobs of the DAG that can be started and unfinished at once.
+std::uint32_t most_started(const SystemDag &dag) {
+  return dag.max_active > 0 ? dag.max_active : static_cast<std::uint32_t>(dag.tasks.size());
+}
+
+// True where a job that starts more urgent takes a worker from any less urgent one at once.
+bool preempts_at_once(const System &system) {
+  const std::uint32_t levels = system.platform.levels;
+  return system.mode == sched::Preemption::Full && sched::is_static(system.policy) &&
+         (levels == 0 || levels >= system.tasks.size());
+}
+
+bool is_isolated(const System &system, std::size_t dag) {
+  std::uint32_t last_rank = 0;
+  for (const std::uint32_t t : system.dags[dag].tasks) last_rank = std::max(last_rank, system.tasks[t].rank);
+  std::uint64_t sum = 0;
+  for (const SystemDag &other : system.dags) {
+    const bool interferes =
+        !preempts_at_once(system) ||
+        std::any_of(other.tasks.begin(), other.tasks.end(), [&](auto t) { return system.tasks[t].rank <= last_rank; });
+    if (interferes) sum += most_started(other);
+  }
+  return sum <= system.platform.workers;
+}
+
+Outcome apply_isolated(const System &system) {
+  if (!system.groups.empty()) return NotApplicable{"exclusive groups: a worker can idle while a job waits"};
+  std::vector<ResponseBound> responses(system.units.size());
+  bool any = false;
+  for (std::size_t d = 0; d < system.dags.size(); ++d) {
+    const SystemDag &dag = system.dags[d];
+    const bool alone = is_isolated(system, d);
+    any = any || alone;
+    for (const std::uint32_t u : dag.units) {
+      const Unit &unit = system.units[u];
+      if (!alone) {
+        responses[u].absent = "it and what interferes can occupy more than all workers";
+      } else if (dag.max_active > 0 && dag.units.size() > 1) {
+        responses[u].absent = "several parts of the DAG share one max_active";
+      } else {
+        const Duration own = dag.max_active > 0 ? long_paths_response(system, unit, dag.max_active) : unit.length;
+        responses[u] = bound_of(system, global::unit_of(system, u), own);
+      }
+    }
+  }
+  if (!any) return NotApplicable{"the max_active of no DAG and of what can interfere with it sum up to at most m"};
+  return from_units(system, std::move(responses));
+}
+
+}  // namespace
+
+Duration long_paths_response(const System &system, const Unit &unit, std::uint32_t workers) {
+  std::map<std::uint32_t, Duration> left;
+  for (const std::uint32_t t : unit.tasks) left[t] = system.tasks[t].wcet;
+  Duration covered = take_longest_path(system, unit, left);
+  Duration best = graham_response(unit, workers);
+  for (std::uint32_t j = 1; j < workers && covered < unit.volume; ++j) {
+    covered += take_longest_path(system, unit, left);
+    best = std::min(best, unit.length + (unit.volume - covered) / (workers - j));
+  }
+  return best;
+}
+
+std::optional<std::vector<std::uint32_t>> federated_bounds(const System &system) {
+  std::vector<std::uint32_t> bounds;
+  std::uint64_t sum = 0;
+  for (const SystemDag &dag : system.dags) {
+    auto bound = static_cast<std::uint32_t>(dag.tasks.size());
+    if (dag.units.size() == 1) {
+      const Unit &unit = system.units[dag.units.front()];
+      const Duration until = std::min({unit.deadline, unit.limit, unit.period}) - unit.jitter;
+      if (until < unit.length) return std::nullopt;
+      const Duration rest = unit.volume - unit.length;
+      Duration needed = 1;
+      if (rest > 0) {
+        if (until == unit.length) return std::nullopt;
+        needed = ceil_div(rest, until - unit.length);
+      }
+      bound = static_cast<std::uint32_t>(std::min<Duration>(needed, bound));
+    }
+    bounds.push_back(bound);
+    sum += bound;
+  }
+  if (sum > system.platform.workers) return std::nullopt;
+  return bounds;
+}
+
+Method graham() {
+  Method method;
+  method.name = "graham";
+  method.subject = Subject::Dag;
+  method.cite =
+      "R. Graham, Bounds on multiprocessing timing anomalies, SIAM Journal on Applied Mathematics 17(2), 1969";
+  method.assumptions =
+      "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared groups, "
+      "not "
+      "cooperative";
+  method.complexity = "O(tasks + edges)";
+  method.apply = apply_graham;
+  return method;
+}
+
+Method long_paths() {
+  Method method;
+  method.name = "long_paths";
+  method.subject = Subject::Dag;
+  method.cite =
+      "Q. He, N. Guan, M. Lv, X. Jiang, W. Chang, Bounding the response time of DAG tasks using long paths, RTSS 2022";
+  method.assumptions =
+      "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared groups, "
+      "not "
+      "cooperative";
+  method.complexity = "O(workers (tasks + edges))";
+  method.apply = apply_long_paths;
+  return method;
+}
+
+Method isolated() {
+  Method method;
+  method.name = "isolated";
+  method.subject = Subject::Dag;
+  method.cite =
+      "docs/analysis.md, \"Isolation\"; J. Li, J. Chen, K. Agrawal, C. Lu, C. Gill, A. Saifullah, Analysis of "
+      "federated "
+      "and global scheduling for parallel real-time tasks, ECRTS 2014; RTSS 2022 (see long_paths)";
+  method.assumptions =
+      "the max_active of the DAG and of all that can take a worker from it sum up to at most m; any policy and mode; "
+      "one "
+      "rate a DAG with edges, R <= T; no shared groups";
+  method.complexity = "O(DAGs tasks + workers (tasks + edges))";
+  method.apply = apply_isolated;
+  return method;
+}
+
+}  // namespace redag::analysis

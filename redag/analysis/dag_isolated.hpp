@@ -1,0 +1,33 @@
+// Response times of DAGs that nothing else delays: alone on the platform, or because the max_active of all that could
+// interfere leave them workers enough. And the max_active that make a system so (federated scheduling). Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "redag/analysis/bound.hpp"
+
+namespace redag::analysis {
+
+/// A DAG on `workers` of its own: min over j of len(l_0) + floor((vol - sum_{i <= j} len(l_i)) / (workers - j)), l_0
+/// the longest path and l_i the longest in what is left without l_0 .. l_{i-1}. Q. He, N. Guan, M. Lv, X. Jiang, W.
+/// Chang, RTSS 2022, theorem 1; j = 0 is R. Graham's of 1969. O(workers (tasks + edges)).
+[[nodiscard]] Duration long_paths_response(const System &system, const Unit &unit, std::uint32_t workers);
+
+/// R = len + floor((vol - len) / m) of the only DAG. R. Graham, SIAM J. Applied Math. 17(2), 1969.
+[[nodiscard]] Method graham();
+
+/// long_paths_response() of the only DAG.
+[[nodiscard]] Method long_paths();
+
+/// Of every DAG whose max_active and those of the more urgent (of all, where jobs are not preempted at once) sum up to
+/// at most m. Proof: docs/analysis.md, "Isolation".
+[[nodiscard]] Method isolated();
+
+/// max_active for each DAG with which isolated() bounds it within its deadline, n_k = ceil((vol - len) / (D - len)) for
+/// one that needs several workers, or nothing if they do not suffice. J. Li, J. Chen, K. Agrawal, C. Lu, C. Gill, A.
+/// Saifullah, ECRTS 2014 (D = T); S. Baruah, DATE 2015 (D <= T). DAGs of several parts get as many as they have tasks.
+[[nodiscard]] std::optional<std::vector<std::uint32_t>> federated_bounds(const System &system);
+
+}  // namespace redag::analysis

@@ -1,0 +1,158 @@
+#include "redag/analysis/dag_isolated.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using testing::BoundCaseLimits;
+using testing::expect_bound_holds;
+
+BoundCaseLimits graphs(sched::Preemption preemption) {
+  BoundCaseLimits limits;
+  limits.preemption = preemption;
+  limits.max_workers = 6;
+  limits.edges = true;
+  limits.max_dags = 1;
+  limits.max_tasks = 12;
+  limits.jitter = limits.overheads = limits.caps = true;
+  limits.policies = {PolicyKind::RateMonotonic, PolicyKind::Fixed, PolicyKind::Edf, PolicyKind::Fifo};
+  limits.min_utilization = 0.1;
+  limits.max_utilization = 0.6;
+  limits.min_period = 20;
+  limits.max_period = 200;
+  return limits;
+}
+
+testing::BoundGenerator cases(const BoundCaseLimits &limits) {
+  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
+}
+
+TEST(BoundProperty, Graham) {
+  expect_bound_holds(graham(), cases(graphs(sched::Preemption::Full)), {.workloads = 1000});
+  expect_bound_holds(graham(), cases(graphs(sched::Preemption::None)), {.workloads = 1000});
+}
+
+TEST(BoundProperty, LongPaths) {
+  expect_bound_holds(long_paths(), cases(graphs(sched::Preemption::Full)), {.workloads = 1000});
+  expect_bound_holds(long_paths(), cases(graphs(sched::Preemption::None)), {.workloads = 1000});
+}
+
+// Few workers would hardly ever be enough for what the generator draws: small DAGs, bounds of one or two.
+testing::BoundGenerator isolated_cases(sched::Preemption preemption) {
+  BoundCaseLimits limits = graphs(preemption);
+  limits.max_dags = 4;
+  limits.max_tasks = 6;
+  limits.min_workers = 3;
+  limits.max_utilization = 0.7;
+  return [limits](Rng &rng) {
+    testing::BoundCase result = random_bound_case(rng, limits);
+    for (Dag &dag : result.workload.dags) {
+      if (rng.uniform(0, 3) > 0) dag.max_active = static_cast<std::uint32_t>(rng.uniform(1, 2));
+    }
+    return result;
+  };
+}
+
+TEST(BoundProperty, Isolated) {
+  expect_bound_holds(isolated(), isolated_cases(sched::Preemption::Full), {.workloads = 1000});
+  expect_bound_holds(isolated(), isolated_cases(sched::Preemption::None), {.workloads = 1000});
+  expect_bound_holds(isolated(), isolated_cases(sched::Preemption::Cooperative), {.workloads = 1000});
+}
+
+Task make_task(std::string name, Duration wcet, std::vector<std::uint32_t> after) {
+  Task task;
+  task.name = std::move(name);
+  task.wcet = task.bcet = wcet;
+  task.period = task.deadline = 100;
+  task.predecessors = std::move(after);
+  if (!task.predecessors.empty()) task.activation = Activation::Data;
+  return task;
+}
+
+// A source, three parallel tasks, a sink.
+Dag fork_join(std::string name) {
+  Dag dag;
+  dag.name = std::move(name);
+  dag.tasks = {make_task("source", 2, {}), make_task("a", 10, {0}), make_task("b", 9, {0}), make_task("c", 8, {0}),
+               make_task("sink", 3, {1, 2, 3})};
+  return dag;
+}
+
+System compiled(std::uint32_t workers, std::vector<Dag> dags, sched::Preemption preemption) {
+  Workload workload;
+  workload.name = "w";
+  workload.dags = std::move(dags);
+  workload.platform.workers = workers;
+  AnalysisPlatform platform;
+  platform.workers = workers;
+  platform.preemption = preemption;
+  return compile(workload, platform).value();
+}
+
+std::optional<Duration> dag_response(const Method &method, const System &system, std::size_t dag) {
+  const Outcome outcome = method.apply(system);
+  return std::get<Bound>(outcome).dags[dag].response;
+}
+
+TEST(DagIsolated, LongPathsCountWhatRunsBesideThem) {
+  // len 15, vol 32; paths of 15, 9 and 8. On three workers nothing waits; on two j = 1 leaves 8 for one.
+  const System three = compiled(3, {fork_join("d")}, sched::Preemption::Full);
+  EXPECT_EQ(dag_response(graham(), three, 0), 15 + 17 / 3);
+  EXPECT_EQ(dag_response(long_paths(), three, 0), 15);
+  const System two = compiled(2, {fork_join("d")}, sched::Preemption::Full);
+  EXPECT_EQ(dag_response(long_paths(), two, 0), 15 + std::min(17 / 2, 8));
+}
+
+TEST(DagIsolated, LongPathsAreNeverAboveGraham) {
+  const BoundCaseLimits limits = graphs(sched::Preemption::Full);
+  for (std::uint64_t seed = 0; seed < 1000; ++seed) {
+    Rng rng(mix(seed));
+    const testing::BoundCase bound_case = random_bound_case(rng, limits);
+    const System system = compile(bound_case.workload, bound_case.platform).value();
+    if (!std::holds_alternative<Bound>(graham().apply(system))) continue;
+    const auto worse = dag_response(graham(), system, 0);
+    if (!worse) continue;
+    EXPECT_LE(dag_response(long_paths(), system, 0).value(), *worse) << describe(bound_case);
+  }
+}
+
+TEST(DagIsolated, BoundsThatSumUpToTheWorkersShareNothing) {
+  Dag first = fork_join("first");
+  Dag second = fork_join("second");
+  first.max_active = 2;
+  second.max_active = 1;
+  const System enough = compiled(3, {first, second}, sched::Preemption::None);
+  EXPECT_EQ(dag_response(isolated(), enough, 0), 15 + 8);
+  EXPECT_EQ(dag_response(isolated(), enough, 1), 32);
+
+  // Two workers are enough for the first only where it takes them from the second.
+  const System preemptive = compiled(2, {first, second}, sched::Preemption::Full);
+  EXPECT_EQ(dag_response(isolated(), preemptive, 0), 15 + 8);
+  EXPECT_FALSE(dag_response(isolated(), preemptive, 1));
+  const System nonpreemptive = compiled(2, {first, second}, sched::Preemption::None);
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(isolated().apply(nonpreemptive)));
+}
+
+TEST(DagIsolated, FederatedBoundsMeetTheDeadlines) {
+  Dag heavy = fork_join("heavy");
+  heavy.deadline = 24;  // (32 - 15) / (24 - 15): two workers
+  const Dag light = fork_join("light");
+  const auto bounds = federated_bounds(compiled(3, {heavy, light}, sched::Preemption::None));
+  ASSERT_TRUE(bounds);
+  EXPECT_EQ(*bounds, (std::vector<std::uint32_t>{2, 1}));
+  EXPECT_FALSE(federated_bounds(compiled(2, {heavy, light}, sched::Preemption::None)));
+
+  std::vector<Dag> dags{heavy, light};
+  for (std::size_t d = 0; d < dags.size(); ++d) dags[d].max_active = (*bounds)[d];
+  const System system = compiled(3, dags, sched::Preemption::None);
+  EXPECT_LE(dag_response(isolated(), system, 0).value(), 24);
+  EXPECT_EQ(verdict(system, std::get<Bound>(isolated().apply(system))), Verdict::Schedulable);
+}
+
+}  // namespace
+}  // namespace redag::analysis
