@@ -25,7 +25,7 @@ const std::vector<Method> &methods() {
       // One worker, edf
       edf_demand(),
       edf_demand_nonpreemptive(),
-      // m workers
+      // Several workers
       guan(),
       bertogna_cirinei(),
       bertogna_cirinei_any(),
@@ -33,7 +33,6 @@ const std::vector<Method> &methods() {
       melani(),
       dag_bounded(),
       dag_nonpreemptive(),
-      // Several workers
       graham(),
       long_paths(),
       isolated(),
