@@ -1,5 +1,7 @@
 // PriorityScheduler against ReferenceScheduler: the same events must give the same decisions.
+#include <algorithm>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <tuple>
 
@@ -96,6 +98,74 @@ INSTANTIATE_TEST_SUITE_P(
                                          PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::ChainAware),
                        ::testing::Values(Preemption::None, Preemption::Cooperative, Preemption::Full)),
     name_of);
+
+// The same with sequences that RapidCheck makes, and shrinks.
+RC_GTEST_PROP(DifferentialProperty, AnySequenceOfEventsIsDecidedAlike, (std::uint64_t seed)) {
+  const auto policy = *rc::gen::element(PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed,
+                                        PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::ChainAware);
+  const auto preemption = *rc::gen::element(Preemption::None, Preemption::Cooperative, Preemption::Full);
+  Case c = make_case(policy, preemption, seed);
+  using Kind = ScriptStep::Kind;
+  const auto kind = rc::gen::weightedElement<Kind>(
+      {{6, Kind::Release}, {6, Kind::Dispatch}, {4, Kind::Complete}, {2, Kind::Advance}, {2, Kind::PreemptionPoint}});
+  c.script = *rc::gen::scale(
+      3.0, rc::gen::container<Script>(rc::gen::construct<ScriptStep>(kind, rc::gen::arbitrary<std::uint8_t>())));
+  const std::optional<std::string> difference = find_difference(c);
+  if (difference) RC_FAIL(describe(c.workload, c.config) + describe(c.script) + "\n" + *difference);
+}
+
+// assign_priorities() against a sort by the table of docs/model.md, written down as such.
+bool comes_before(PolicyKind policy, const Workload &w, const TaskRef &a, const TaskRef &b) {
+  const Dag &da = w.dags[a.dag.value];
+  const Dag &db = w.dags[b.dag.value];
+  const auto smallest = [](const Dag &dag) {
+    Duration period = kNever;
+    for (const Task &task : dag.tasks) period = std::min(period, task.period);
+    return period;
+  };
+  const std::uint32_t ta = topological_ranks(da)[a.index];
+  const std::uint32_t tb = topological_ranks(db)[b.index];
+  const int pa = a.task->priority.value_or(0);
+  const int pb = b.task->priority.value_or(0);
+  if (policy == PolicyKind::RateMonotonic && a.task->period != b.task->period) return a.task->period < b.task->period;
+  if (policy == PolicyKind::DeadlineMonotonic && a.task->deadline != b.task->deadline) {
+    return a.task->deadline < b.task->deadline;
+  }
+  if (policy == PolicyKind::Fixed && pa != pb) return pa > pb;
+  if (policy == PolicyKind::ChainAware) {
+    if (da.criticality != db.criticality) return da.criticality > db.criticality;
+    if (smallest(da) != smallest(db)) return smallest(da) < smallest(db);
+    return a.dag != b.dag ? a.dag < b.dag : ta > tb;
+  }
+  return a.dag != b.dag ? a.dag < b.dag : ta < tb;
+}
+
+RC_GTEST_PROP(Priorities, AreThePlacesInTheOrderOfThePolicy, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const Workload w = random_workload(rng, {4, 6, true, true, true});
+  const std::vector<TaskRef> tasks = flatten(w);
+  for (const PolicyKind policy : {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed,
+                                  PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::ChainAware}) {
+    const auto levels = static_cast<std::uint32_t>(rng.uniform(0, static_cast<std::int64_t>(tasks.size()) + 1));
+    const std::vector<sched::Priority> priorities = sched::assign_priorities(w.dags, policy, levels);
+    const bool enough = levels == 0 || levels >= tasks.size() || !sched::is_static(policy);
+    for (std::size_t i = 0; i < tasks.size(); ++i) {
+      const auto rank = std::count_if(tasks.begin(), tasks.end(),
+                                      [&](const TaskRef &other) { return comes_before(policy, w, other, tasks[i]); });
+      RC_ASSERT(priorities[i].rank == static_cast<std::uint32_t>(rank));
+      RC_ASSERT(priorities[i].level < (enough ? tasks.size() : levels));
+      for (std::size_t j = 0; j < tasks.size(); ++j) {
+        if (i == j) continue;
+        RC_ASSERT(!enough || priorities[i].level != priorities[j].level);
+        RC_ASSERT(priorities[i].rank > priorities[j].rank || priorities[i].level <= priorities[j].level);
+        // Equal rates share before different ones do.
+        if (!enough && policy == PolicyKind::RateMonotonic && tasks[i].task->period == tasks[j].task->period) {
+          RC_ASSERT(priorities[i].level == priorities[j].level);
+        }
+      }
+    }
+  }
+}
 
 }  // namespace
 }  // namespace redag::testing

@@ -35,7 +35,8 @@ struct RandomWorkloadLimits {
 /// For people: one line a task.
 [[nodiscard]] std::string describe(const Workload &workload, const sched::Config &config);
 
-/// random_workload() for RapidCheck. A failing case is printed as its seed; it does not shrink.
+/// random_workload() for RapidCheck; it does not shrink. A property that drives a scheduler rather draws a seed, which
+/// is printed when it fails.
 [[nodiscard]] rc::Gen<Workload> any_workload(const RandomWorkloadLimits &limits = {});
 
 }  // namespace redag::testing
