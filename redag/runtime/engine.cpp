@@ -15,9 +15,7 @@
 
 namespace redag::runtime {
 
-using sched::Dispatch;
 using sched::Outcome;
-using sched::Preemption;
 
 Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options)
     : options_(std::move(options)),
@@ -222,7 +220,7 @@ void Engine::remove_dag(DagId dag) {
   for (std::uint32_t t = first_tasks_[dag.value].value; t < first_tasks_[dag.value + 1].value; ++t) {
     TaskEntry &entry = tasks_[t];
     entry.removed = true;
-    if (!entry.busy) doomed.push_back(std::exchange(entry.body, nullptr));
+    if (!entry.busy) doomed.emplace_back().swap(entry.body);
   }
   const Time at = now();
   scheduler_->remove_dag(dag, at);

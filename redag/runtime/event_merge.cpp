@@ -1,6 +1,7 @@
 #include "redag/runtime/event_merge.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 namespace redag::runtime {
 namespace {
@@ -12,8 +13,9 @@ bool same_job(const JobEvent &a, const JobEvent &b) { return a.task == b.task &&
 }  // namespace
 
 void EventMerge::merge(std::vector<JobEvent> &out, bool last) {
-  std::stable_sort(started_.begin(), started_.end(),
-                   [](const JobEvent &a, const JobEvent &b) { return a.time < b.time; });
+  std::sort(started_.begin(), started_.end(), [](const JobEvent &x, const JobEvent &y) {
+    return std::tie(x.time, x.task.value, x.job) < std::tie(y.time, y.task.value, y.job);
+  });
   auto next = started_.begin();
   for (const JobEvent &decision : decisions_) {
     for (; next != started_.end() && next->time < decision.time; ++next) append(out, *next);

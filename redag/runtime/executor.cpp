@@ -76,9 +76,9 @@ DagId Executor::add(DagBuilder builder) {
 
   std::vector<Body> bodies;
   std::vector<std::string> names;
-  for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
-    names.push_back(dag.tasks[i].name);
-    bodies.emplace_back([function = std::move(builder.bodies_[i])](const Job &) {
+  for (const Task &task : dag.tasks) names.push_back(task.name);
+  for (DagBuilder::Function &body : builder.bodies_) {
+    bodies.emplace_back([function = std::move(body)](const Job &) {
       function();
       return sched::Outcome::Finished;
     });

@@ -8,7 +8,7 @@
 namespace redag::runtime {
 
 bool ReleaseHeap::later(const Entry &a, const Entry &b) {
-  return std::tie(a.seen, a.id, a.number) > std::tie(b.seen, b.id, b.number);
+  return std::tie(a.seen, a.id.value, a.number) > std::tie(b.seen, b.id.value, b.number);
 }
 
 Duration ReleaseHeap::jitter(const Entry &entry) {
