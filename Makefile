@@ -15,7 +15,8 @@ demo: ## build the program and compare the executors on one workload; pages and 
 	@tools/bootstrap run
 	cmake --preset release
 	cmake --build --preset release
-	build/release/bin/redag compare workloads/contention.yaml --out results/demo
+	build/release/bin/redag compare workloads/contention.yaml --executors redag,mte,ste --repeat 3 --duration 5s \
+	  --out results/demo --force
 
 test: ## build everything and run all tests
 	@tools/bootstrap test

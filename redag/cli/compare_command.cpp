@@ -35,10 +35,14 @@ class Comparing {
         repetitions_(repetitions),
         console_(console),
         progress_(console) {
-    for (const Variant &variant : variants) results_.push_back(ExecutorResults{variant, {}, {}, {}, 0, {}});
+    for (const Variant &variant : variants) results_.push_back(ExecutorResults{variant, {}, {}, {}, false, 0, {}});
   }
 
   int run() {
+    if (const auto busy = options_.simulate ? std::nullopt : busy_machine_warning()) {
+      console_.warn(*busy);
+      warnings_.push_back(*busy);
+    }
     if (!run_all()) return kExitBad;
     progress_.clear();
     const std::size_t done = rounds();
@@ -76,8 +80,9 @@ class Comparing {
         run_session(workload_, results.variant, options, progress_hook(progress_, workload_, options.duration));
     progress_.clear();
     if (!session) {
-      console_.note(fmt::format("{}: ", results.variant.name));
-      console_.note(session.error());
+      for (const Diagnostic &problem : session.error()) {
+        console_.error(results.variant.name + ": " + problem.message, problem.hint);
+      }
       return false;
     }
     if (session->stopped) return true;  // shorter than the others: not comparable
@@ -118,6 +123,7 @@ class Comparing {
     comparison.seed = session_.seed;
     comparison.workers = workload_.platform.workers;
     comparison.executors = results_;
+    comparison.warnings = warnings_;
     return comparison;
   }
 
@@ -168,6 +174,7 @@ class Comparing {
   Console &console_;
   Progress progress_;
   std::vector<ExecutorResults> results_;
+  std::vector<std::string> warnings_;
   bool all_written_ = true;
 };
 

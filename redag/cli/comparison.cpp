@@ -159,6 +159,7 @@ void ExecutorResults::add(const Session &session) {
   repetitions.push_back(std::move(seen));
   preemption = session.info.preemption;
   preemption_why = session.info.preemption_why;
+  realtime = session.realtime_threads;
   check_violations += session.check.violation_count;
   for (const std::string &warning : session.warnings) {
     if (std::find(warnings.begin(), warnings.end(), warning) == warnings.end()) warnings.push_back(warning);
@@ -200,6 +201,19 @@ std::vector<std::string> verdicts(const Comparison &comparison) {
   return lines;
 }
 
+std::string caveat(const Comparison &comparison) {
+  std::vector<std::string> with;
+  std::vector<std::string> without;
+  for (const ExecutorResults &results : comparison.executors) {
+    (results.realtime ? with : without).push_back(results.variant.name);
+  }
+  if (with.empty() || without.empty()) return {};
+  return fmt::format(
+      "{} had real-time (SCHED_FIFO) threads, {} had not: on a busy machine part of the difference is that alone; "
+      "mte-fifo and ste-fifo, or --realtime, give them to everybody",
+      join(with), join(without));
+}
+
 std::string describe(const Comparison &comparison, const StreamTraits &terminal) {
   const std::size_t repetitions = comparison.executors.front().repetitions.size();
   const bool simulated = comparison.driver == trace::Driver::Simulator;
@@ -216,6 +230,7 @@ std::string describe(const Comparison &comparison, const StreamTraits &terminal)
                       repetitions > 1 ? "; medians, and (lowest..highest) repetition" : "");
   text += "response times p50 to max: finish - release of all jobs of the DAG\n\n";
   for (const std::string &line : verdicts(comparison)) text += line + "\n";
+  if (const std::string unfair = caveat(comparison); !unfair.empty()) text += "note: " + unfair + "\n";
   std::string violated;
   for (const ExecutorResults &results : comparison.executors) {
     if (results.check_violations == 0) continue;
@@ -242,7 +257,7 @@ Json to_json(const Comparison &comparison) {
                              {"executor", results.variant.executor},
                              {"preemption", results.preemption},
                              {"preemption_why", results.preemption_why},
-                             {"realtime_threads", results.variant.realtime_threads},
+                             {"realtime_threads", results.realtime},
                              {"repetitions", results.repetitions.size()},
                              {"check_violations", results.check_violations},
                              {"warnings", results.warnings},
@@ -256,7 +271,9 @@ Json to_json(const Comparison &comparison) {
               {"duration_ns", comparison.duration},
               {"seed", comparison.seed},
               {"executors", executors},
-              {"verdicts", verdicts(comparison)}};
+              {"verdicts", verdicts(comparison)},
+              {"caveat", caveat(comparison)},
+              {"warnings", comparison.warnings}};
 }
 
 std::string to_csv(const Comparison &comparison) {

@@ -41,6 +41,7 @@ struct ExecutorResults {
   std::string preemption;                             // mode that ran
   std::string preemption_why;                         // of the last repetition
   std::vector<std::vector<Observation>> repetitions;  // [repetition][DAG]; the last DAG is the total
+  bool realtime = false;                              // on SCHED_FIFO threads
   std::uint64_t check_violations = 0;
   std::vector<std::string> warnings;  // each once
 
@@ -59,10 +60,14 @@ struct Comparison {
   std::uint64_t seed = 1;
   std::uint32_t workers = 1;
   std::vector<ExecutorResults> executors;  // each with a repetition at least
+  std::vector<std::string> warnings;       // about all of it
 };
 
 /// "control: redag misses 0.0 %, mte 14.2 %, ste 30.1 %: redag misses fewest"
 [[nodiscard]] std::vector<std::string> verdicts(const Comparison &comparison);
+
+/// What makes the comparison less than fair: some executors had real-time threads and others had not. Empty if nothing.
+[[nodiscard]] std::string caveat(const Comparison &comparison);
 
 [[nodiscard]] std::string describe(const Comparison &comparison, const StreamTraits &terminal);
 [[nodiscard]] Json to_json(const Comparison &comparison);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace redag::cli {
 namespace {
 
@@ -63,6 +65,16 @@ TEST(Verdict, GroupsThoseThatAreAlike) {
   EXPECT_EQ(verdict({results("redag", {0}), results("redag-os", {0}), results("mte", {0.1}), results("ste", {0.3})}),
             "control: redag misses 0.0 %, redag-os 0.0 %, mte 10.0 %, ste 30.0 %: redag and redag-os miss none, "
             "mte and ste miss more");
+}
+
+TEST(Caveat, SaysWhoHadRealTimeThreads) {
+  Comparison comparison;
+  comparison.executors = {results("redag", {0}), results("mte", {0})};
+  EXPECT_EQ(caveat(comparison), "");
+  comparison.executors[0].realtime = true;
+  EXPECT_EQ(caveat(comparison).find("redag had real-time (SCHED_FIFO) threads, mte had not"), 0U);
+  comparison.executors[1].realtime = true;
+  EXPECT_EQ(caveat(comparison), "");
 }
 
 TEST(Comparison, CsvHasARowForEveryRepetitionAndQuotesNames) {

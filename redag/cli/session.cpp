@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <memory>
 
 #include "redag/base/check.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/runtime/run_workload.hpp"
+#include "redag/runtime/threads.hpp"
 #include "redag/sched/executors.hpp"
 
 namespace redag::cli {
@@ -134,6 +136,7 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   session.summary = metrics::summarize(session.trace);
   session.events = session.trace.events.size();
   session.stopped = result->stopped;
+  session.realtime_threads = run.realtime_threads || result->mode.mode == PreemptionMode::Os;
   session.warnings = std::move(result->warnings);
   return session;
 }
@@ -180,6 +183,14 @@ Result<Session> run_session(const Workload &workload, const Variant &variant, co
 
 metrics::RuleSet rules_for(const std::string &executor) {
   return executor == "mte" || executor == "ste" ? metrics::RuleSet::wait_set() : metrics::RuleSet::all();
+}
+
+std::optional<std::string> busy_machine_warning() {
+  double load = 0;
+  const std::size_t cpus = runtime::usable_cpus().size();
+  // Half a processor each: what a desktop does by itself stays below.
+  if (getloadavg(&load, 1) != 1 || load < 0.5 * static_cast<double>(cpus)) return std::nullopt;
+  return fmt::format("load average {:.1f} on {} processor(s): other programs disturb the figures", load, cpus);
 }
 
 Duration sensible_duration(const Workload &workload) {

@@ -58,6 +58,7 @@ struct Session {
   trace::Trace trace;                 // its first events; all of them unless cut_at
   std::optional<Time> cut_at;         // `max_events` was reached: `trace` is that of a run that ended here
   metrics::CheckReport check;         // of `trace`
+  bool realtime_threads = false;      // the jobs ran on SCHED_FIFO threads
   std::uint64_t events = 0;           // of the whole run
   Duration elapsed = 0;               // wall-clock time of the run and its evaluation
   bool stopped = false;               // by `stop`
@@ -70,6 +71,9 @@ struct Session {
 
 /// The rules that an executor's traces are held to: those of rclcpp's models follow no priorities.
 [[nodiscard]] metrics::RuleSet rules_for(const std::string &executor);
+
+/// What to say of a machine that other programs keep busy before a run on threads; nothing if it is quiet.
+[[nodiscard]] std::optional<std::string> busy_machine_warning();
 
 /// A length for a run that nobody gave one: some hyperperiods of at least 10 s in all; 10 s where one takes more than
 /// a minute.

@@ -39,6 +39,7 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   const std::optional<SessionOptions> options = session_options(arguments, driver, usual, console);
   if (!options) return kExitBad;
 
+  if (const auto busy = simulated ? std::nullopt : busy_machine_warning()) console.warn(*busy);
   const Result<Session> session = run_interruptibly(*workload, *variant, *options, console);
   if (!session) {
     console.note(session.error());
