@@ -1,0 +1,78 @@
+// Task sets a second on one worker: n tasks, UUniFast utilizations, log-uniform periods of 10 ms to 1 s, D = T,
+// rate-monotonic. ExactTest: yes or no from bare numbers; ResponseTimes: rta_preemptive with all its terms.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "redag/analysis/fast_rta.hpp"
+#include "redag/analysis/response_time.hpp"
+#include "redag/base/rng.hpp"
+
+namespace {
+
+using redag::analysis::SimpleTask;
+
+std::vector<SimpleTask> task_set(redag::Rng &rng, std::size_t count, double utilization) {
+  std::vector<SimpleTask> tasks;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double rest =
+        i + 1 < count ? utilization * std::pow(rng.uniform01(), 1.0 / static_cast<double>(count - 1 - i)) : 0.0;
+    const auto period = static_cast<redag::Duration>(1e7 * std::pow(100.0, rng.uniform01()));
+    const auto wcet = static_cast<redag::Duration>((utilization - rest) * static_cast<double>(period));
+    tasks.push_back({std::max<redag::Duration>(1, wcet), period, period});
+    utilization = rest;
+  }
+  std::sort(tasks.begin(), tasks.end(), [](const SimpleTask &a, const SimpleTask &b) { return a.period < b.period; });
+  return tasks;
+}
+
+std::vector<std::vector<SimpleTask>> task_sets(std::size_t count, double utilization) {
+  redag::Rng rng(1);
+  std::vector<std::vector<SimpleTask>> sets;
+  for (int i = 0; i < 1000; ++i) sets.push_back(task_set(rng, count, utilization));
+  return sets;
+}
+
+// Arguments: tasks, utilization in percent.
+void exact_test(benchmark::State &state) {
+  const auto sets = task_sets(static_cast<std::size_t>(state.range(0)), static_cast<double>(state.range(1)) / 100.0);
+  std::int64_t schedulable = 0;
+  for (auto _ : state) {
+    schedulable = 0;
+    for (const auto &set : sets) schedulable += redag::analysis::is_schedulable(set) ? 1 : 0;
+    benchmark::DoNotOptimize(schedulable);
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(sets.size()));
+  state.counters["schedulable"] = static_cast<double>(schedulable) / static_cast<double>(sets.size());
+}
+BENCHMARK(exact_test)->Name("ExactTest")->ArgsProduct({{5, 20, 50}, {70, 80, 90}});
+
+void response_times(benchmark::State &state) {
+  std::vector<redag::analysis::System> systems;
+  for (const auto &set :
+       task_sets(static_cast<std::size_t>(state.range(0)), static_cast<double>(state.range(1)) / 100)) {
+    redag::Workload workload;
+    workload.dags.emplace_back();
+    for (const SimpleTask &numbers : set) {
+      redag::Task task;
+      task.wcet = task.bcet = numbers.wcet;
+      task.period = task.deadline = numbers.period;
+      task.name = "t" + std::to_string(workload.dags[0].tasks.size());
+      workload.dags[0].tasks.push_back(task);
+    }
+    workload.name = workload.dags[0].name = "d";
+    const auto system = redag::analysis::compile(workload, {});
+    if (!system) return state.SkipWithError("a set that does not compile");
+    systems.push_back(*system);
+  }
+  const redag::analysis::Method method = redag::analysis::rta_preemptive();
+  for (auto _ : state) {
+    for (const auto &system : systems) benchmark::DoNotOptimize(method.apply(system));
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(systems.size()));
+}
+BENCHMARK(response_times)->Name("ResponseTimes")->ArgsProduct({{20}, {80}});
+
+}  // namespace

@@ -1,0 +1,214 @@
+// Published examples and hand-made ones, with the numbers that their authors give.
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "redag/analysis/analyze.hpp"
+#include "redag/analysis/edf_demand.hpp"
+#include "redag/analysis/exact_points.hpp"
+#include "redag/analysis/linear_bound.hpp"
+#include "redag/analysis/paper.hpp"
+#include "redag/analysis/response_time.hpp"
+#include "redag/analysis/utilization.hpp"
+#include "redag/testing/bound_property.hpp"
+#include "redag/testing/timeline.hpp"
+
+namespace redag::analysis {
+namespace {
+
+struct Numbers {
+  Duration wcet;
+  Duration period;
+  Duration deadline = 0;  // 0: the period
+};
+
+Workload independent(const std::vector<Numbers> &tasks, PolicyKind policy = PolicyKind::RateMonotonic) {
+  Workload workload;
+  workload.name = "example";
+  workload.policy = policy;
+  Dag dag;
+  dag.name = "d";
+  for (const Numbers &numbers : tasks) {
+    Task task;
+    task.name = "t" + std::to_string(dag.tasks.size());
+    task.wcet = task.bcet = numbers.wcet;
+    task.period = numbers.period;
+    task.deadline = numbers.deadline > 0 ? numbers.deadline : numbers.period;
+    task.priority = 100 - static_cast<int>(dag.tasks.size());
+    dag.tasks.push_back(task);
+  }
+  workload.dags.push_back(dag);
+  return workload;
+}
+
+System compiled(const Workload &workload, sched::Preemption preemption, AnalysisPlatform platform = {}) {
+  platform.preemption = preemption;
+  const auto system = compile(workload, platform);
+  EXPECT_TRUE(system) << to_string(system.error());
+  return *system;
+}
+
+std::vector<Duration> responses(const Method &method, const System &system) {
+  const Outcome outcome = method.apply(system);
+  EXPECT_TRUE(std::holds_alternative<Bound>(outcome)) << std::get<NotApplicable>(outcome).reason;
+  std::vector<Duration> found;
+  for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) found.push_back(bound.response.value_or(-1));
+  return found;
+}
+
+std::vector<Duration> responses(const Method &method, const std::vector<Numbers> &tasks, sched::Preemption preemption) {
+  return responses(method, compiled(independent(tasks), preemption));
+}
+
+bool accepts(const Method &method, const System &system) {
+  const Outcome outcome = method.apply(system);
+  EXPECT_TRUE(std::holds_alternative<Bound>(outcome)) << std::get<NotApplicable>(outcome).reason;
+  return std::get<Bound>(outcome).accepts.value();
+}
+
+using Durations = std::vector<Duration>;
+constexpr auto kFull = sched::Preemption::Full;
+constexpr auto kNone = sched::Preemption::None;
+
+// A. Burns, A. Wellings, Real-Time Systems and Programming Languages, the task set of the response-time chapter.
+TEST(Examples, BurnsWellings) {
+  EXPECT_EQ(responses(rta_preemptive(), {{3, 7}, {3, 12}, {5, 20}}, kFull), (Durations{3, 6, 20}));
+}
+
+// J. Lehoczky, L. Sha, Y. Ding, RTSS 1989, the example of the exact criterion: accepted although U = 0.953.
+TEST(Examples, LehoczkyShaDing) {
+  const std::vector<Numbers> tasks = {{40, 100}, {40, 150}, {100, 350}};
+  EXPECT_EQ(responses(rta_preemptive(), tasks, kFull), (Durations{40, 80, 300}));
+  const System system = compiled(independent(tasks), kFull);
+  EXPECT_TRUE(accepts(exact_points(), system));
+  EXPECT_FALSE(accepts(liu_layland(), system));
+  EXPECT_FALSE(accepts(hyperbolic(), system));
+}
+
+// J. Lehoczky, RTSS 1990: with deadlines above the period the first job is not the worst: 114, 102, 116, 104, 118, ...
+TEST(Examples, LehoczkyArbitraryDeadlines) {
+  Workload workload = independent({{26, 70}, {62, 100, 200}});
+  workload.dags[0].tasks[1].overrun = Overrun::Queue;
+  workload.dags[0].tasks[1].queue_depth = 2;
+  const System system = compiled(workload, kFull);
+  EXPECT_EQ(responses(rta_preemptive(), system), (Durations{26, 118}));
+  const Outcome outcome = rta_preemptive().apply(system);
+  const ResponseBound &bound = std::get<Bound>(outcome).tasks[1];
+  EXPECT_EQ(bound.sum(Term::Kind::Earlier), 4 * (62 - 100)) << "the fifth job of the busy period";
+  EXPECT_EQ(bound.sum(Term::Kind::Interference), 26 * 8);
+
+  // With `skip` the fifth job is not reached: the response passes the period, which is as far as the bound goes.
+  workload.dags[0].tasks[1].overrun = Overrun::Skip;
+  EXPECT_EQ(responses(rta_preemptive(), compiled(workload, kFull)), (Durations{26, -1}));
+}
+
+// R. Davis, A. Burns, R. Bril, J. Lukkien, RTS 35(3), 2007: the flaw of the old CAN analysis. R = 2, 3, 3.5 in dense
+// time; in units of 1/1000 blocking is one unit less, as its cause starts at an instant strictly before.
+TEST(Examples, DavisBurnsBrilLukkien) {
+  const std::vector<Numbers> tasks = {{1000, 2500, 2500}, {1000, 3500, 3250}, {1000, 3500, 3250}};
+  EXPECT_EQ(responses(rta_nonpreemptive(), tasks, kNone), (Durations{1999, 2999, 3500}));
+  const System system = compiled(independent(tasks), kNone);
+  EXPECT_EQ(verdict(system, std::get<Bound>(rta_nonpreemptive().apply(system))), Verdict::NotShown);
+}
+
+// E. Bini, G. Buttazzo, G. Buttazzo 2003: above the limit of Liu and Layland, within the hyperbolic bound.
+TEST(Examples, HyperbolicBeyondLiuLayland) {
+  const System system = compiled(independent({{50, 100}, {43, 130}}), kFull);
+  EXPECT_GT(system.utilization, 0.8285);
+  EXPECT_FALSE(accepts(liu_layland(), system));
+  EXPECT_TRUE(accepts(hyperbolic(), system));
+}
+
+TEST(Examples, HarmonicPeriodsFillTheProcessor) {
+  const System full = compiled(independent({{1, 3}, {1, 6}, {6, 12}}), kFull);
+  EXPECT_TRUE(accepts(harmonic_chains(), full)) << "U = 1 exactly, in thirds";
+  EXPECT_FALSE(accepts(hyperbolic(), full));
+  const System above = compiled(independent({{1, 3}, {1, 6}, {7, 12}}), kFull);
+  EXPECT_FALSE(accepts(harmonic_chains(), above));
+}
+
+// By hand: a job of 20 that started just before holds the only worker for 19 more.
+TEST(Examples, RunToCompletionBlocksTheMostUrgent) {
+  const std::vector<Numbers> tasks = {{1, 10}, {20, 100}};
+  EXPECT_EQ(responses(rta_nonpreemptive(), tasks, kNone)[0], -1) << "20 > 10: jobs would be skipped";
+  EXPECT_EQ(responses(rta_nonpreemptive(), {{1, 30}, {20, 100}}, kNone)[0], 20);
+  EXPECT_EQ(responses(paper_rta(), {{1, 30}, {20, 100}}, kNone)[0], 1) << "what the paper's equation says";
+  EXPECT_EQ(responses(paper_rta_blocking(), {{1, 30}, {20, 100}}, kNone)[0], 20);
+}
+
+// Regions of 4 in a job of 10: 3 units of blocking, and the last region of 2 is not interrupted.
+TEST(Examples, DeferredPreemption) {
+  Workload workload = independent({{2, 20}, {10, 40}});
+  workload.dags[0].tasks[1].region = 4;
+  const System system = compiled(workload, sched::Preemption::Cooperative);
+  EXPECT_EQ(system.tasks[1].last_region, 2);
+  EXPECT_EQ(responses(rta_deferred(), system), (Durations{5, 12}));
+}
+
+TEST(Examples, ThePapersEquationsAreOptimistic) {
+  const System repeats = compiled(independent({{1, 4}, {5, 20}}), kFull);
+  EXPECT_EQ(responses(paper_interference(), repeats), (Durations{1, 6}));
+  EXPECT_EQ(responses(rta_preemptive(), repeats), (Durations{1, 7}));
+  EXPECT_NE(std::get<Bound>(paper_interference().apply(repeats)).unsound, "");
+  EXPECT_EQ(std::get<Bound>(paper_rta().apply(repeats)).unsound, "");
+
+  const System ties = compiled(independent({{5, 10}, {5, 10}}), kFull);
+  EXPECT_EQ(responses(paper_rta(), ties), (Durations{5, 5}));
+  EXPECT_EQ(responses(rta_preemptive(), ties), (Durations{5, 10}));
+  EXPECT_NE(std::get<Bound>(paper_rta().apply(ties)).unsound, "");
+}
+
+// U = 1 fits; 13 units due within 12 do not. And a blocking job that is one unit too long.
+TEST(Examples, EdfDemand) {
+  EXPECT_TRUE(accepts(edf_demand(), compiled(independent({{2, 4}, {7, 14}}, PolicyKind::Edf), kFull)));
+  EXPECT_FALSE(accepts(edf_demand(), compiled(independent({{2, 4}, {7, 14, 12}}, PolicyKind::Edf), kFull)));
+  EXPECT_TRUE(accepts(edf_demand_nonpreemptive(), compiled(independent({{1, 2}, {2, 10}}, PolicyKind::Edf), kNone)));
+  EXPECT_FALSE(accepts(edf_demand_nonpreemptive(), compiled(independent({{1, 2}, {3, 10}}, PolicyKind::Edf), kNone)));
+}
+
+// Groups: the holder finishes at the priority of the one that waits, and holds up what stands between.
+TEST(Examples, BlockingByAGroupReachesTheTasksBetween) {
+  Workload workload = independent({{1, 20}, {2, 40}, {6, 80}});
+  workload.dags[0].tasks[0].group = workload.dags[0].tasks[2].group = "shared";
+  const System system = compiled(workload, kFull);
+  EXPECT_EQ(responses(rta_preemptive(), system), (Durations{1 + 5, 2 + 1 + 5, 6 + 1 + 2}));
+  const Bound bound = std::get<Bound>(rta_preemptive().apply(system));
+  const Term blocking{Term::Kind::Blocking, TaskId(2), DagId(0), 5, 1};
+  EXPECT_NE(std::find(bound.tasks[1].terms.begin(), bound.tasks[1].terms.end(), blocking), bound.tasks[1].terms.end());
+}
+
+TEST(Examples, OverheadsAreCharged) {
+  AnalysisPlatform platform;
+  platform.release_overhead = 1;
+  platform.dispatch_overhead = 2;
+  platform.preempt_overhead = 3;
+  const System system = compiled(independent({{4, 30}, {10, 60}}), kFull, platform);
+  EXPECT_EQ(responses(rta_preemptive(), system), (Durations{10, 26}));
+  const Bound bound = std::get<Bound>(rta_preemptive().apply(system));
+  EXPECT_EQ(bound.tasks[1].sum(Term::Kind::Overhead), 6);
+  EXPECT_EQ(bound.tasks[1].sum(Term::Kind::Own), 10);
+  EXPECT_EQ(bound.tasks[1].sum(Term::Kind::Interference), 10);
+}
+
+TEST(Examples, DagsOnOneWorker) {
+  Workload workload = testing::make_workload({testing::make_dag("fast", {{.name = "a", .period_ms = 20, .wcet_ms = 2},
+                                                                         {.name = "b", .wcet_ms = 1, .after = {0}}}),
+                                              testing::make_dag("slow", {{.name = "c", .period_ms = 100, .wcet_ms = 5},
+                                                                         {.name = "d", .wcet_ms = 9, .after = {0}},
+                                                                         {.name = "e", .wcet_ms = 4, .after = {0}}})},
+                                             1);
+  const System full = compiled(workload, kFull);
+  ASSERT_EQ(full.units.size(), 2U);
+  EXPECT_EQ(full.units[1].volume, 18 * kMillisecond);
+  EXPECT_EQ(full.units[1].length, 14 * kMillisecond);
+  Bound bound = std::get<Bound>(dag_one_worker_preemptive().apply(full));
+  EXPECT_EQ(bound.dags[0].response, 3 * kMillisecond);
+  EXPECT_EQ(bound.dags[1].response, (18 + 2 * 3) * kMillisecond);
+
+  bound = std::get<Bound>(dag_one_worker_deferred().apply(compiled(workload, kNone)));
+  EXPECT_EQ(bound.dags[0].response, (3 + 9) * kMillisecond - 1) << "blocked by the longest callback";
+  EXPECT_EQ(bound.dags[1].response, (18 + 3) * kMillisecond) << "the last callback, of 4, starts at 17";
+}
+
+}  // namespace
+}  // namespace redag::analysis

@@ -1,0 +1,245 @@
+// What theory says of the bounds among themselves, on random workloads.
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "redag/analysis/analyze.hpp"
+#include "redag/analysis/exact_points.hpp"
+#include "redag/analysis/linear_bound.hpp"
+#include "redag/analysis/response_time.hpp"
+#include "redag/analysis/utilization.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+#include "redag/sim/simulator.hpp"
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using testing::BoundCase;
+using testing::BoundCaseLimits;
+
+constexpr int kCases = 1000;
+
+// Calls check(case, system) for random cases that can be analysed.
+template <class Check>
+void for_cases(const BoundCaseLimits &limits, Check check) {
+  for (int i = 0; i < kCases; ++i) {
+    Rng rng(mix(static_cast<std::uint64_t>(i)));
+    const BoundCase bound_case = testing::random_bound_case(rng, limits);
+    const auto system = compile(bound_case.workload, bound_case.platform);
+    ASSERT_TRUE(system);
+    SCOPED_TRACE(describe(bound_case));
+    if (system->not_analysable.empty()) check(bound_case, *system, rng);
+    if (::testing::Test::HasFailure()) return;
+  }
+}
+
+const Bound *bound_of(const Outcome &outcome) { return std::get_if<Bound>(&outcome); }
+
+bool accepts(const Method &method, const System &system) {
+  const Outcome outcome = method.apply(system);
+  const Bound *bound = bound_of(outcome);
+  return bound != nullptr && verdict(system, *bound) == Verdict::Schedulable;
+}
+
+BoundCaseLimits blocked() {
+  BoundCaseLimits limits;
+  limits.groups = limits.levels = limits.overheads = true;
+  return limits;
+}
+
+// The exact test and the response-time analysis are the same question where priorities are all that counts.
+TEST(Relations, ExactPointsIsResponseTimeWithinDeadline) {
+  int schedulable = 0;
+  for_cases(blocked(), [&](const BoundCase &, const System &system, Rng &) {
+    const Outcome points = exact_points().apply(system);
+    const Outcome rta = rta_preemptive().apply(system);
+    ASSERT_EQ(bound_of(points) != nullptr, bound_of(rta) != nullptr);
+    if (bound_of(points) == nullptr) return;
+    EXPECT_EQ(verdict(system, *bound_of(points)), verdict(system, *bound_of(rta)));
+    schedulable += *bound_of(points)->accepts ? 1 : 0;
+  });
+  EXPECT_GT(schedulable, kCases / 5);
+  EXPECT_LT(schedulable, kCases * 4 / 5);
+}
+
+TEST(Relations, UtilizationTestsAreOrdered) {
+  BoundCaseLimits limits = blocked();
+  limits.policies = {PolicyKind::RateMonotonic};
+  limits.min_deadline = 1.0;
+  limits.max_utilization = 0.9;
+  int accepted = 0;
+  for_cases(limits, [&](const BoundCase &, const System &system, Rng &) {
+    const bool liu = accepts(liu_layland(), system);
+    const bool hyper = accepts(hyperbolic(), system);
+    const bool liu_blocked = accepts(liu_layland_blocking(), system);
+    const bool hyper_blocked = accepts(hyperbolic_blocking(), system);
+    const bool rta = accepts(rta_preemptive(), system);
+    accepted += liu ? 1 : 0;
+    EXPECT_LE(liu, hyper);
+    EXPECT_LE(liu, accepts(harmonic_chains(), system));
+    EXPECT_LE(liu, liu_blocked);
+    EXPECT_LE(liu_blocked, hyper_blocked);
+    EXPECT_LE(hyper_blocked, rta);
+    EXPECT_LE(hyper, rta);
+    EXPECT_LE(accepts(harmonic_chains(), system), rta);
+  });
+  EXPECT_GT(accepted, kCases / 20);
+}
+
+TEST(Relations, LinearBoundIsAboveTheFixedPoint) {
+  for_cases(blocked(), [](const BoundCase &, const System &system, Rng &) {
+    const Outcome linear = linear_bound().apply(system);
+    const Outcome rta = rta_preemptive().apply(system);
+    if (bound_of(linear) == nullptr) return;
+    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+      const auto &loose = bound_of(linear)->tasks[t].response;
+      const auto &tight = bound_of(rta)->tasks[t].response;
+      if (!loose) continue;
+      ASSERT_TRUE(tight);
+      EXPECT_GE(*loose, *tight);
+    }
+  });
+}
+
+std::vector<BoundCaseLimits> all_kinds() {
+  std::vector<BoundCaseLimits> kinds;
+  for (const auto mode : {sched::Preemption::Full, sched::Preemption::None, sched::Preemption::Cooperative}) {
+    for (const bool edges : {false, true}) {
+      BoundCaseLimits limits = blocked();
+      limits.preemption = mode;
+      limits.edges = edges;
+      limits.groups = mode != sched::Preemption::Cooperative;
+      limits.jitter = limits.queues = true;
+      limits.max_dags = 4;
+      kinds.push_back(limits);
+    }
+  }
+  return kinds;
+}
+
+void expect_not_smaller(const std::vector<ResponseBound> &before, const std::vector<ResponseBound> &after) {
+  ASSERT_EQ(before.size(), after.size());
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_GE(after[i].response.value_or(kNever), before[i].response.value_or(kNever)) << i;
+  }
+}
+
+TEST(Relations, MoreExecutionNeverShrinksABound) {
+  std::size_t compared = 0;
+  for (const BoundCaseLimits &limits : all_kinds()) {
+    for_cases(limits, [&](const BoundCase &bound_case, const System &system, Rng &rng) {
+      BoundCase longer = bound_case;
+      Dag &dag = longer.workload.dags[static_cast<std::size_t>(
+          rng.uniform(0, static_cast<std::int64_t>(longer.workload.dags.size()) - 1))];
+      Task &task = dag.tasks[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(dag.tasks.size()) - 1))];
+      task.wcet += 1;
+      if (task.region > 0 && limits.preemption == sched::Preemption::Cooperative) return;  // a last region can shrink
+      const auto after = compile(longer.workload, longer.platform);
+      if (!after) return;
+      for (const Method &method : {rta_preemptive(), rta_nonpreemptive(), rta_deferred(), dag_one_worker_preemptive(),
+                                   dag_one_worker_deferred(), linear_bound()}) {
+        const Outcome first = method.apply(system);
+        const Outcome second = method.apply(*after);
+        if (bound_of(first) == nullptr || bound_of(second) == nullptr) continue;
+        SCOPED_TRACE(std::string(method.name));
+        expect_not_smaller(bound_of(first)->tasks, bound_of(second)->tasks);
+        expect_not_smaller(bound_of(first)->dags, bound_of(second)->dags);
+        ++compared;
+      }
+    });
+  }
+  EXPECT_GT(compared, 2000U);
+}
+
+TEST(Relations, TermsAddUpToTheResponse) {
+  std::size_t checked = 0;
+  for (const BoundCaseLimits &limits : all_kinds()) {
+    for_cases(limits, [&](const BoundCase &, const System &system, Rng &) {
+      const Report report = analyze(system);
+      for (const MethodReport &method : report.methods) {
+        if (method.bound() == nullptr) continue;
+        for (const ResponseBound &bound : method.bound()->tasks) {
+          if (!bound.response) {
+            EXPECT_FALSE(bound.absent.empty()) << method.method->name;
+            continue;
+          }
+          const Duration sum = std::accumulate(bound.terms.begin(), bound.terms.end(), Duration{0},
+                                               [](Duration total, const Term &term) { return total + term.amount; });
+          EXPECT_EQ(sum, *bound.response) << method.method->name;
+          ++checked;
+        }
+      }
+    });
+  }
+  EXPECT_GT(checked, 5000U);
+}
+
+// The critical instant of Liu and Layland: all released at once, each for its wcet. The bound is what happens.
+TEST(Relations, ResponseTimeIsReachedAtTheCriticalInstant) {
+  std::size_t compared = 0;
+  for_cases(BoundCaseLimits{}, [&](const BoundCase &bound_case, const System &system, Rng &) {
+    const Outcome outcome = rta_preemptive().apply(system);
+    ASSERT_NE(bound_of(outcome), nullptr);
+    sched::Config config;
+    config.preemption = sched::Preemption::Full;
+    config.policy = bound_case.workload.policy;
+    sched::PriorityScheduler scheduler(bound_case.workload, config);
+    sim::Options options;
+    options.horizon = 200;
+    std::vector<Duration> first(system.tasks.size(), 0);
+    (void)sim::simulate(bound_case.workload, scheduler, 1, options, [&](std::span<const JobEvent> events) {
+      for (const JobEvent &event : events) {
+        if (event.kind == JobEventKind::Finished && event.job == 0) first[event.task.value] = event.value;
+      }
+      return true;
+    });
+    for (const std::uint32_t t : system.by_rank) {
+      const auto &response = bound_of(outcome)->tasks[t].response;
+      if (!response) break;  // its jobs are skipped, and those below it see less of them than the bound counts
+      EXPECT_EQ(first[t], *response) << system.tasks[t].name;
+      ++compared;
+    }
+  });
+  EXPECT_GT(compared, 1000U);
+}
+
+TEST(Report, TrustsNoUnsoundEquationAndNamesWhoSpoke) {
+  std::size_t by_response = 0;
+  BoundCaseLimits limits;
+  limits.policies = {PolicyKind::RateMonotonic};
+  for_cases(limits, [&](const BoundCase &, const System &system, Rng &) {
+    const Report report = analyze(system);
+    ASSERT_EQ(report.methods.size(), methods().size());
+    for (const MethodReport &method : report.methods) {
+      if (method.bound() == nullptr) {
+        EXPECT_FALSE(std::get<NotApplicable>(method.outcome).reason.empty());
+      } else {
+        EXPECT_EQ(method.trusted, method.bound()->unsound.empty());
+      }
+    }
+    // On one worker, preemptive, independent: nobody is below the exact analysis.
+    const Outcome outcome = rta_preemptive().apply(system);
+    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+      EXPECT_EQ(report.tasks[t].response, bound_of(outcome)->tasks[t].response);
+      by_response += report.tasks[t].method != nullptr ? 1 : 0;
+    }
+    EXPECT_EQ(report.verdict == Verdict::Schedulable, !report.by.empty());
+    EXPECT_EQ(report.verdict, verdict(system, *bound_of(outcome)));
+  });
+  EXPECT_GT(by_response, 1000U);
+}
+
+TEST(Registry, NamesAreUniqueAndEveryMethodIsDescribed) {
+  for (const Method &method : methods()) {
+    EXPECT_EQ(find_method(method.name), &method) << method.name;
+    EXPECT_FALSE(method.cite.empty() || method.assumptions.empty() || method.complexity.empty()) << method.name;
+    EXPECT_EQ(method.is_paper(), method.name.starts_with("paper_")) << method.name;
+  }
+  EXPECT_EQ(find_method("no_such_method"), nullptr);
+}
+
+}  // namespace
+}  // namespace redag::analysis
