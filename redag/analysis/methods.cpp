@@ -4,6 +4,7 @@
 #include "redag/analysis/edf_demand.hpp"
 #include "redag/analysis/exact_points.hpp"
 #include "redag/analysis/global_dag.hpp"
+#include "redag/analysis/global_groups.hpp"
 #include "redag/analysis/global_sequential.hpp"
 #include "redag/analysis/linear_bound.hpp"
 #include "redag/analysis/paper.hpp"
@@ -36,6 +37,7 @@ const std::vector<Method> &methods() {
       graham(),
       long_paths(),
       isolated(),
+      dag_groups(),
       // Utilization
       liu_layland(),
       hyperbolic(),

@@ -1,0 +1,193 @@
+#include "redag/analysis/global_groups.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/global.hpp"
+#include "redag/analysis/global_dag.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using global::GlobalUnit;
+using global::SharedTerms;
+
+// What a unit does in a group.
+struct Share {
+  std::uint32_t tasks = 0;
+  Duration volume = 0;
+  Duration least = kUnbounded;
+  Duration most = 0;
+};
+
+class Analysis {
+ public:
+  explicit Analysis(const System &system)
+      : system_(system), view_(global::units_of(system, {.mode = sched::Preemption::None, .groups = true})) {
+    if (view_.reason) return;
+    shares_.assign(view_.units.size(), std::vector<Share>(system.groups.size()));
+    for (std::size_t u = 0; u < view_.units.size(); ++u) {
+      for (const std::uint32_t t : system.units[view_.units[u].unit].tasks) add_task(shares_[u], system.tasks[t]);
+    }
+  }
+
+  [[nodiscard]] const std::optional<std::string> &reason() const { return view_.reason; }
+
+  Bound run() {
+    std::vector<ResponseBound> responses(system_.units.size());
+    bool known = true;
+    for (std::size_t k = 0; k < view_.units.size(); ++k) {
+      ResponseBound &response = responses[view_.units[k].unit];
+      if (!known) {
+        response.absent = global::kMoreUrgent;
+      } else if (respond(k)) {
+        response = itemise(k);
+      } else {
+        known = false;
+        response.absent = global::kExceedsLimit;
+      }
+    }
+    return from_units(system_, std::move(responses));
+  }
+
+ private:
+  // The waits in one window.
+  struct Waits {
+    Duration shared = 0;  // work that all workers do together
+    Duration serial = 0;  // for groups
+  };
+
+  static void add_task(std::vector<Share> &shares, const SystemTask &task) {
+    if (task.group == kNoGroup) return;
+    Share &share = shares[task.group];
+    ++share.tasks;
+    share.volume = add(share.volume, task.wcet);
+    share.least = std::min(share.least, task.wcet);
+    share.most = std::max(share.most, task.wcet);
+  }
+
+  // Work of one DAG's members of a group in a window: they run one after the other, like one task.
+  [[nodiscard]] static Duration serial_work(const GlobalUnit &dag, const Share &share, Duration x) {
+    if (share.tasks == 0) return 0;
+    const Duration until = x + dag.response - share.volume;
+    return until / dag.period * share.volume + std::min(share.volume, until % dag.period);
+  }
+
+  // Of the group's members in the DAG at least one is on the path that waits, or the path does not wait for the group.
+  [[nodiscard]] static Duration own_others(const Share &share) {
+    return share.tasks > 1 ? share.volume - share.least : 0;
+  }
+
+  // A less urgent member that started before the task on the path became ready: once a task on the path.
+  [[nodiscard]] Duration less_urgent(std::size_t k, std::size_t group) const {
+    Duration most = 0;
+    for (std::size_t l = k + 1; l < shares_.size(); ++l) most = std::max(most, shares_[l][group].most - 1);
+    return multiply(std::max<Duration>(0, most), shares_[k][group].tasks);
+  }
+
+  [[nodiscard]] Waits waits(std::size_t k, Duration x) const {
+    const GlobalUnit &own = view_.units[k];
+    Waits result;
+    result.shared = own.volume - own.length;
+    Duration ends = own.path_tasks - 1;  // after which less urgent jobs can be found started
+    for (std::size_t j = 0; j < k; ++j) result.shared = add(result.shared, global::dag_work(view_.units[j], x));
+    for (std::size_t g = 0; g < system_.groups.size(); ++g) {
+      const Share &mine = shares_[k][g];
+      if (mine.tasks == 0) continue;
+      const Duration lower = less_urgent(k, g);
+      result.serial = add(result.serial, add(own_others(mine), lower));
+      ends += mine.tasks - 1 + (lower > 0 ? mine.tasks : 0);
+      for (std::size_t j = 0; j < k; ++j) {
+        const GlobalUnit &other = view_.units[j];
+        result.serial = add(result.serial, serial_work(other, shares_[j][g], x));
+        ends += shares_[j][g].tasks * ceil_div(x + other.response, other.period);
+      }
+    }
+    result.shared = add(result.shared, blocking(k, ends));
+    return result;
+  }
+
+  [[nodiscard]] Duration blocking(std::size_t k, Duration ends) const {
+    return add(first_[k], multiply(later_[k], ends));
+  }
+
+  bool respond(std::size_t k) {
+    GlobalUnit &own = view_.units[k];
+    const std::uint32_t m = view_.workers;
+    first_.resize(view_.units.size());
+    later_.resize(view_.units.size());
+    first_[k] = global::largest_remaining(system_, view_.units, k + 1, m);
+    later_[k] = m > 1 ? global::largest_remaining(system_, view_.units, k + 1, m - 1) : 0;
+    Duration window = own.length;
+    for (int steps = 0; window <= own.limit - own.jitter && steps < global::kMaxSteps; ++steps) {
+      const Waits found = waits(k, window);
+      const Duration grown = add(add(own.length, found.shared / m), found.serial);
+      if (grown <= window) {
+        own.response = window + own.jitter;
+        return true;
+      }
+      window = grown;
+    }
+    return false;
+  }
+
+  [[nodiscard]] ResponseBound itemise(std::size_t k) const {
+    const GlobalUnit &own = view_.units[k];
+    const std::uint32_t m = view_.workers;
+    const Duration x = own.response - own.jitter;
+    SharedTerms terms(system_, own);
+    terms.add_path();
+    terms.add_share(Term::Kind::Own, own, own.volume - own.length, m);
+    Duration shared = own.volume - own.length;
+    for (std::size_t j = 0; j < k; ++j) {
+      const Duration work = global::dag_work(view_.units[j], x);
+      terms.add_share(Term::Kind::Interference, view_.units[j], work, m);
+      shared += work;
+    }
+    terms.add_share(Term::Kind::Blocking, own, waits(k, x).shared - shared, m);
+    for (std::size_t g = 0; g < system_.groups.size(); ++g) {
+      if (shares_[k][g].tasks == 0) continue;
+      terms.add(Term::Kind::Own, own, own_others(shares_[k][g]));
+      terms.add(Term::Kind::Blocking, own, less_urgent(k, g));
+      for (std::size_t j = 0; j < k; ++j) {
+        terms.add(Term::Kind::Interference, view_.units[j], serial_work(view_.units[j], shares_[j][g], x));
+      }
+    }
+    terms.add_jitter();
+    ResponseBound bound;
+    bound.response = own.response;
+    bound.terms = terms.take();
+    return bound;
+  }
+
+  const System &system_;
+  global::Units view_;
+  std::vector<std::vector<Share>> shares_;  // by position in view_, then group
+  std::vector<Duration> first_;             // less urgent work that the path can find at its start
+  std::vector<Duration> later_;             // and after each further end
+};
+
+Outcome apply_groups(const System &system) {
+  if (system.groups.empty()) return NotApplicable{"no exclusive group is shared: see dag_nonpreemptive"};
+  Analysis analysis(system);
+  if (analysis.reason()) return NotApplicable{*analysis.reason()};
+  return analysis.run();
+}
+
+}  // namespace
+
+Method dag_groups() {
+  Method method;
+  method.name = "dag_groups";
+  method.subject = Subject::Dag;
+  method.cite = "docs/analysis.md, \"Exclusive groups\"";
+  method.assumptions =
+      "m workers, jobs run to completion, static priorities that keep DAGs together, one rate a DAG, R <= T; release "
+      "jitter, exclusive groups within and across DAGs; no max_active";
+  method.complexity = "pseudo-polynomial; O(DAGs^2 groups) a step";
+  method.apply = apply_groups;
+  return method;
+}
+
+}  // namespace redag::analysis
