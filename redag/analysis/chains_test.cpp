@@ -1,0 +1,287 @@
+#include "redag/analysis/chains.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include <fmt/format.h>
+
+#include "redag/analysis/global_dag.hpp"
+#include "redag/analysis/response_time.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+#include "redag/sim/simulator.hpp"
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+// When the jobs of a simulation started and ended, by task; job number by position.
+struct Job {
+  Time start = kNever;
+  Time finish = kNever;
+};
+using Schedule = std::vector<std::vector<Job>>;
+
+Schedule simulated(const Workload &workload, const AnalysisPlatform &platform, Duration horizon,
+                   const sim::Options &chosen) {
+  sched::Config config;
+  config.workers = platform.workers;
+  config.preemption = platform.preemption;
+  config.policy = workload.policy;
+  sched::PriorityScheduler scheduler(workload, config);
+  sim::Options options = chosen;
+  options.horizon = horizon;
+  Schedule schedule(workload.task_count());
+  sim::simulate(workload, scheduler, platform.workers, options, [&](std::span<const JobEvent> events) {
+    for (const JobEvent &event : events) {
+      std::vector<Job> &jobs = schedule[event.task.value];
+      if (jobs.size() <= event.job) jobs.resize(event.job + 1);
+      if (event.kind == JobEventKind::Dispatched) jobs[event.job].start = event.time;
+      if (event.kind == JobEventKind::Finished) jobs[event.job].finish = event.time;
+    }
+    return true;
+  });
+  return schedule;
+}
+
+// Longest from right after a read of the first task to the end of the first job of the last that has seen what came
+// then.
+Duration observed_reaction(const Schedule &schedule, const std::vector<TaskId> &chain) {
+  Duration longest = 0;
+  const std::vector<Job> &sources = schedule[chain.front().value];
+  for (std::size_t k = 0; k + 1 < sources.size(); ++k) {
+    Time finish = sources[k + 1].finish;
+    for (std::size_t i = 1; i < chain.size() && finish != kNever; ++i) {
+      const std::vector<Job> &jobs = schedule[chain[i].value];
+      const auto reader = std::find_if(jobs.begin(), jobs.end(), [&](const Job &job) { return job.start >= finish; });
+      finish = reader == jobs.end() || reader->start == kNever ? kNever : reader->finish;
+    }
+    if (finish == kNever) break;
+    longest = std::max(longest, finish - sources[k].start);
+  }
+  return longest;
+}
+
+// Longest from a read of the first task to the end of the job of the last that replaces the output it led to.
+Duration observed_age(const Schedule &schedule, const std::vector<TaskId> &chain) {
+  Duration longest = 0;
+  const std::vector<Job> &outputs = schedule[chain.back().value];
+  for (std::size_t k = 0; k + 1 < outputs.size() && outputs[k + 1].finish != kNever; ++k) {
+    Time start = outputs[k].start;
+    for (std::size_t i = chain.size() - 1; i > 0 && start != kNever; --i) {
+      const std::vector<Job> &jobs = schedule[chain[i - 1].value];
+      Time read = kNever;
+      for (const Job &job : jobs) {
+        if (job.finish <= start) read = job.start;
+      }
+      start = read;
+    }
+    if (start != kNever) longest = std::max(longest, outputs[k + 1].finish - start);
+  }
+  return longest;
+}
+
+struct Tally {
+  std::uint64_t chains = 0;
+  std::uint64_t violations = 0;
+  double ratios = 0;
+  std::string first;
+};
+
+void check_chain(const testing::BoundCase &bound_case, const Method &method, Rng &rng, Tally &tally) {
+  const System system = compile(bound_case.workload, bound_case.platform).value();
+  if (!system.not_analysable.empty()) return;
+  const Outcome outcome = method.apply(system);
+  if (!std::holds_alternative<Bound>(outcome)) return;
+  std::vector<TaskId> chain;
+  const auto length = static_cast<std::size_t>(rng.uniform(1, 5));
+  for (std::size_t i = 0; i < length; ++i) {
+    // Follow an edge, or go anywhere.
+    const auto &next = chain.empty() ? system.tasks[0].predecessors : system.tasks[chain.back().value].successors;
+    const bool follow = !next.empty() && rng.uniform(0, 2) > 0;
+    const auto last = static_cast<std::int64_t>(follow ? next.size() : system.tasks.size()) - 1;
+    const auto position = static_cast<std::size_t>(rng.uniform(0, last));
+    chain.emplace_back(follow ? next[position] : position);
+  }
+  const auto bounded = chain_bound(system, chain, std::get<Bound>(outcome));
+  const auto *bound = std::get_if<ChainBound>(&bounded);
+  if (bound == nullptr) return;
+
+  ++tally.chains;
+  Workload workload = bound_case.workload;
+  Duration longest = 0;
+  for (Dag &dag : workload.dags) {
+    for (const Task &task : dag.tasks) longest = std::max(longest, task.period);
+  }
+  Duration reaction = 0;
+  Duration age = 0;
+  for (int run = 0; run < 4; ++run) {
+    std::uint32_t id = 0;
+    std::vector<Duration> offsets;
+    for (const Unit &unit : system.units) offsets.push_back(run == 0 ? 0 : rng.uniform(0, unit.period));
+    for (Dag &dag : workload.dags) {
+      for (Task &task : dag.tasks) {
+        const std::uint32_t unit = system.tasks[id++].unit;
+        if (task.activation == Activation::Timer) task.offset = offsets[unit];
+      }
+    }
+    const std::uint64_t seed = rng();
+    sim::Options options;
+    options.demand = [seed, run](const Task &task, TaskId task_id, std::uint32_t number) {
+      return run % 2 == 0 ? task.wcet : Rng::stream(seed, task_id.value, number).uniform(1, task.wcet);
+    };
+    options.overheads = {bound_case.platform.release_overhead, bound_case.platform.dispatch_overhead, 0};
+    const Schedule schedule = simulated(workload, bound_case.platform, 15 * longest, options);
+    reaction = std::max(reaction, observed_reaction(schedule, chain));
+    age = std::max(age, observed_age(schedule, chain));
+  }
+  tally.ratios += static_cast<double>(reaction) / static_cast<double>(bound->reaction());
+  if (reaction <= bound->reaction() && age <= bound->age()) return;
+  if (tally.violations++ == 0) {
+    tally.first = fmt::format("reaction {} bound {}, age {} bound {}\n{}", reaction, bound->reaction(), age,
+                              bound->age(), describe(bound_case));
+  }
+}
+
+void expect_chains_hold(const Method &method, const testing::BoundCaseLimits &limits, std::uint64_t count) {
+  if (const char *many = std::getenv("REDAG_BOUND_WORKLOADS")) count = std::strtoull(many, nullptr, 10);
+  Tally tally;
+  for (std::uint64_t seed = 0; tally.chains < count && seed < 20 * count; ++seed) {
+    Rng rng(mix(seed));
+    const testing::BoundCase bound_case = random_bound_case(rng, limits);
+    check_chain(bound_case, method, rng, tally);
+  }
+  fmt::print("[ figures  ] chains over {}: {} chains, {} violations; mean observed/bound {:.3f}\n", method.name,
+             tally.chains, tally.violations, tally.ratios / static_cast<double>(tally.chains));
+  EXPECT_EQ(tally.violations, 0U) << tally.first;
+  EXPECT_GT(tally.chains, count / 2);
+}
+
+testing::BoundCaseLimits periodic(std::uint32_t workers, sched::Preemption preemption, bool edges) {
+  testing::BoundCaseLimits limits;
+  limits.max_workers = workers;
+  limits.preemption = preemption;
+  limits.edges = edges;
+  limits.max_dags = 4;
+  limits.min_utilization = 0.1;
+  limits.max_utilization = 0.5;
+  limits.jitter = limits.overheads = limits.caps = true;
+  return limits;
+}
+
+TEST(ChainProperty, OverDagsPreemptive) {
+  expect_chains_hold(dag_bounded(), periodic(4, sched::Preemption::Full, true), 1000);
+}
+
+TEST(ChainProperty, OverDagsNonpreemptive) {
+  expect_chains_hold(dag_nonpreemptive(), periodic(4, sched::Preemption::None, true), 1000);
+}
+
+TEST(ChainProperty, OneWorkerWithThePriorityDiscount) {
+  testing::BoundCaseLimits limits = periodic(1, sched::Preemption::Full, false);
+  limits.overheads = false;
+  limits.max_utilization = 0.9;
+  expect_chains_hold(rta_preemptive(), limits, 1000);
+  limits.preemption = sched::Preemption::None;
+  expect_chains_hold(rta_nonpreemptive(), limits, 1000);
+}
+
+Workload producer_and_consumer(std::uint32_t workers) {
+  Workload workload;
+  workload.name = "w";
+  workload.platform.workers = workers;
+  workload.policy = PolicyKind::Fixed;
+  int priority = 2;
+  for (const Duration wcet : {9, 1}) {
+    Task task;
+    task.name = "t";
+    task.wcet = task.bcet = wcet;
+    task.period = task.deadline = 10;
+    task.priority = priority--;
+    task.offset = wcet == 1 && workers > 1 ? 8 : 0;
+    Dag dag;
+    dag.name = "d" + std::to_string(wcet);
+    dag.tasks.push_back(task);
+    workload.dags.push_back(dag);
+  }
+  return workload;
+}
+
+// The discount for a more urgent producer says 21; on two workers the consumer, 8 later, starts beside it: 29.
+TEST(Chain, ThePriorityDiscountNeedsOneWorker) {
+  const Workload workload = producer_and_consumer(2);
+  const std::vector<TaskId> chain{TaskId(0U), TaskId(1U)};
+  const AnalysisPlatform platform = platform_of(workload);
+  const System system = compile(workload, platform).value();
+  const auto bound = std::get<ChainBound>(chain_bound(system, chain, std::get<Bound>(dag_bounded().apply(system))));
+  EXPECT_EQ(bound.reaction(), 10 + 9 + 10 + 1);
+  EXPECT_FALSE(bound.one_worker);
+  EXPECT_EQ(observed_reaction(simulated(workload, platform, 200, {}), chain), 29);
+
+  const Workload alone = producer_and_consumer(1);
+  const System one = compile(alone, platform_of(alone)).value();
+  const auto discounted = std::get<ChainBound>(chain_bound(one, chain, std::get<Bound>(rta_preemptive().apply(one))));
+  EXPECT_EQ(discounted.one_worker, 10 + 10 + 10);  // T_1, max(R_1, T_2), R_2
+  EXPECT_EQ(discounted.sum, 39);
+}
+
+TEST(Chain, EdgesMakeOneSegment) {
+  Workload workload = producer_and_consumer(2);
+  Task consumer = workload.dags[1].tasks[0];
+  consumer.activation = Activation::Data;
+  consumer.predecessors = {0};
+  consumer.offset = 0;
+  consumer.name = "consumer";
+  workload.dags[0].tasks.push_back(consumer);
+  workload.dags.pop_back();
+  const System system = compile(workload, platform_of(workload)).value();
+  const std::vector<TaskId> chain{TaskId(0U), TaskId(1U)};
+  const auto bound = std::get<ChainBound>(chain_bound(system, chain, std::get<Bound>(dag_bounded().apply(system))));
+  ASSERT_EQ(bound.segments.size(), 1U);
+  EXPECT_EQ(bound.sum, 10 + 10);
+}
+
+TEST(Chain, WithoutABoundThereIsNone) {
+  const Workload workload = producer_and_consumer(1);
+  const System system = compile(workload, platform_of(workload)).value();
+  const std::vector<TaskId> chain{TaskId(0U)};
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(chain_bound(system, chain, Bound{})));
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(chain_bound(system, {}, Bound{})));
+}
+
+// Every instant tried as the arrival of an input.
+Duration let_by_force(const std::vector<LetTask> &chain, Time from, Time until) {
+  Duration longest = 0;
+  for (Time input = from; input < until; ++input) {
+    Time shown = 0;
+    for (std::size_t i = 0; i < chain.size(); ++i) {
+      Time release = chain[i].offset;
+      // The first task reads what came strictly before; the others what was written at the same instant, too.
+      while (i == 0 ? release <= input : release < shown) release += chain[i].period;
+      shown = release + chain[i].deadline;
+    }
+    longest = std::max(longest, shown - input);
+  }
+  return longest;
+}
+
+TEST(Chain, LetIsExact) {
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    Rng rng(mix(seed));
+    std::vector<LetTask> chain(static_cast<std::size_t>(rng.uniform(1, 4)));
+    for (LetTask &task : chain) {
+      task.period = rng.uniform(1, 8);
+      task.offset = rng.uniform(0, task.period);
+      task.deadline = rng.uniform(1, task.period);
+    }
+    // Periods up to 8: a hyperperiod of at most 840.
+    EXPECT_EQ(let_reaction(chain), let_by_force(chain, 10, 10 + 2 * 840)) << seed;
+  }
+  EXPECT_FALSE(let_reaction({}));
+  const std::vector<LetTask> incommensurate{{1'000'003, 0, 1}, {1'000'033, 0, 1}};
+  EXPECT_FALSE(let_reaction(incommensurate, 1000));
+}
+
+}  // namespace
+}  // namespace redag::analysis
