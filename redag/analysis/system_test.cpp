@@ -1,0 +1,181 @@
+#include "redag/analysis/system.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "redag/analysis/edf_demand.hpp"
+#include "redag/analysis/response_time.hpp"
+#include "redag/analysis/utilization.hpp"
+#include "redag/testing/timeline.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using redag::testing::make_dag;
+using redag::testing::make_workload;
+using redag::testing::TestTask;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// a -> b, a -> c at 20 ms; x alone at 5 ms.
+Workload two_dags() {
+  return make_workload({make_dag("graph", {{.name = "a", .period_ms = 20, .wcet_ms = 2},
+                                           {.name = "b", .wcet_ms = 3, .after = {0}},
+                                           {.name = "c", .wcet_ms = 1, .after = {0}}}),
+                        make_dag("single", {{.name = "x", .period_ms = 5}})},
+                       1);
+}
+
+System compiled(const Workload &workload, const AnalysisPlatform &platform) {
+  const auto system = compile(workload, platform);
+  EXPECT_TRUE(system) << to_string(system.error());
+  return system.value_or(System{});
+}
+
+AnalysisPlatform mode(sched::Preemption preemption, std::uint32_t workers = 1) {
+  AnalysisPlatform platform;
+  platform.preemption = preemption;
+  platform.workers = workers;
+  return platform;
+}
+
+std::string refusal(const Method &method, const Workload &workload, const AnalysisPlatform &platform) {
+  const Outcome outcome = method.apply(compiled(workload, platform));
+  const auto *reason = std::get_if<NotApplicable>(&outcome);
+  return reason == nullptr ? "" : reason->reason;
+}
+
+TEST(System, AGraphOfOneRateIsOneUnit) {
+  const System system = compiled(two_dags(), mode(sched::Preemption::Full));
+  ASSERT_EQ(system.units.size(), 2U);
+  EXPECT_THAT(system.units[0].tasks, ElementsAre(0, 1, 2));
+  EXPECT_EQ(system.units[0].volume, 6 * kMillisecond);
+  EXPECT_EQ(system.units[0].length, 5 * kMillisecond);
+  EXPECT_EQ(system.units[0].limit, 20 * kMillisecond);
+  EXPECT_TRUE(system.units[0].has_edges);
+  EXPECT_THAT(system.tasks[0].successors, ElementsAre(1, 2));
+  EXPECT_THAT(system.by_rank, ElementsAre(3, 0, 1, 2));
+  EXPECT_EQ(system.tasks[1].name, "graph/b");
+  EXPECT_TRUE(system.not_analysable.empty());
+}
+
+TEST(System, RatesThatNoEdgeJoinsAreUnitsOfTheirOwn) {
+  const Workload workload = make_workload(
+      {make_dag("mixed", {{.name = "a", .period_ms = 20}, {.name = "b", .after = {0}}, {.name = "x", .period_ms = 5}})},
+      1);
+  const System system = compiled(workload, mode(sched::Preemption::Full));
+  ASSERT_EQ(system.units.size(), 2U);
+  EXPECT_THAT(system.units[0].tasks, ElementsAre(0, 1));
+  EXPECT_THAT(system.units[1].tasks, ElementsAre(2));
+  EXPECT_THAT(system.dags[0].units, ElementsAre(0, 1));
+}
+
+TEST(System, EdgesBetweenRatesAndOffsetsAreNotAnalysed) {
+  const System rates = compiled(
+      make_workload({make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 10, .after = {0}}})}, 1),
+      mode(sched::Preemption::Full));
+  EXPECT_THAT(rates.not_analysable, HasSubstr("different periods or offsets"));
+  const System offsets = compiled(
+      make_workload(
+          {make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 5, .after = {0}, .offset_ms = 1}})},
+          1),
+      mode(sched::Preemption::Full));
+  EXPECT_THAT(offsets.not_analysable, HasSubstr("different periods or offsets"));
+}
+
+TEST(System, WhatCutsOrRefusesJobsIsNotAnalysed) {
+  Workload budget = two_dags();
+  budget.dags[0].tasks[0].budget = kMillisecond;
+  EXPECT_THAT(compiled(budget, mode(sched::Preemption::Full)).not_analysable, HasSubstr("budget"));
+  Workload pending = two_dags();
+  pending.dags[0].max_pending = 2;
+  EXPECT_THAT(compiled(pending, mode(sched::Preemption::Full)).not_analysable, HasSubstr("max_pending"));
+  AnalysisPlatform threads = mode(sched::Preemption::Full);
+  threads.max_started = 3;
+  EXPECT_THAT(compiled(two_dags(), threads).not_analysable, HasSubstr("threads"));
+  threads.max_started = 4;
+  EXPECT_EQ(compiled(two_dags(), threads).not_analysable, "");
+  AnalysisPlatform preempt = mode(sched::Preemption::Full, 2);
+  preempt.preempt_overhead = 1;
+  EXPECT_THAT(compiled(two_dags(), preempt).not_analysable, HasSubstr("overhead"));
+}
+
+TEST(System, RegionsFollowTheMode) {
+  Workload workload = two_dags();
+  workload.dags[0].tasks[1].region = 2 * kMillisecond;
+  EXPECT_EQ(compiled(workload, mode(sched::Preemption::Full)).tasks[1].region, 0);
+  EXPECT_EQ(compiled(workload, mode(sched::Preemption::None)).tasks[1].region, 3 * kMillisecond);
+  const System cooperative = compiled(workload, mode(sched::Preemption::Cooperative));
+  EXPECT_EQ(cooperative.tasks[1].region, 2 * kMillisecond);
+  EXPECT_EQ(cooperative.tasks[1].last_region, kMillisecond);
+  EXPECT_EQ(cooperative.tasks[0].region, 2 * kMillisecond) << "without a region: the whole job";
+  EXPECT_EQ(cooperative.mode, sched::Preemption::Cooperative);
+  EXPECT_EQ(compiled(two_dags(), mode(sched::Preemption::Cooperative)).mode, sched::Preemption::None)
+      << "no task has a preemption point";
+}
+
+TEST(System, BadInputIsAnError) {
+  EXPECT_FALSE(compile(two_dags(), mode(sched::Preemption::Full, 0)));
+  AnalysisPlatform negative = mode(sched::Preemption::Full);
+  negative.release_overhead = -1;
+  EXPECT_FALSE(compile(two_dags(), negative));
+  Workload invalid = two_dags();
+  invalid.dags[0].tasks[0].wcet = 0;
+  EXPECT_FALSE(compile(invalid, mode(sched::Preemption::Full)));
+}
+
+TEST(NotApplicable, OneWorkerBounds) {
+  const AnalysisPlatform full = mode(sched::Preemption::Full);
+  EXPECT_THAT(refusal(dag_one_worker_preemptive(), two_dags(), mode(sched::Preemption::Full, 2)),
+              HasSubstr("one worker"));
+  EXPECT_THAT(refusal(rta_preemptive(), two_dags(), full), HasSubstr("predecessors"));
+  EXPECT_THAT(refusal(dag_one_worker_deferred(), two_dags(), full), HasSubstr("preempted"));
+  EXPECT_THAT(refusal(dag_one_worker_preemptive(), two_dags(), mode(sched::Preemption::None)), HasSubstr("full"));
+  EXPECT_EQ(refusal(dag_one_worker_preemptive(), two_dags(), full), "");
+  Workload edf = two_dags();
+  edf.policy = PolicyKind::Edf;
+  EXPECT_THAT(refusal(dag_one_worker_preemptive(), edf, full), HasSubstr("static"));
+  EXPECT_THAT(refusal(edf_demand(), edf, full), HasSubstr("predecessors"));
+}
+
+// A bound is not inherited: while a task of the DAG is preempted, one that is more urgent than all others can wait.
+TEST(NotApplicable, MaxActiveOverSeveralUnits) {
+  const auto workload = [](std::uint32_t max_active) {
+    return make_workload({make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 50}}, max_active),
+                          make_dag("e", {{.name = "c", .period_ms = 10}})},
+                         1);
+  };
+  EXPECT_THAT(refusal(rta_preemptive(), workload(1), mode(sched::Preemption::Full)), HasSubstr("max_active"));
+  EXPECT_EQ(refusal(rta_preemptive(), workload(2), mode(sched::Preemption::Full)), "");
+  EXPECT_EQ(refusal(rta_nonpreemptive(), workload(1), mode(sched::Preemption::None)), "");
+}
+
+TEST(NotApplicable, GroupsInCooperativeMode) {
+  Workload workload = make_workload({make_dag("d", {{.name = "a", .period_ms = 5, .group = "g"},
+                                                    {.name = "b", .period_ms = 50, .wcet_ms = 4, .group = "g"}})},
+                                    1);
+  workload.dags[0].tasks[1].region = kMillisecond;
+  EXPECT_THAT(refusal(rta_deferred(), workload, mode(sched::Preemption::Cooperative)), HasSubstr("groups"));
+  EXPECT_EQ(refusal(rta_nonpreemptive(), workload, mode(sched::Preemption::None)), "");
+}
+
+TEST(NotApplicable, UtilizationNeedsTheOrderByRate) {
+  Workload workload = make_workload({make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 50}})}, 1,
+                                    PreemptionMode::Os, PolicyKind::Fixed);
+  workload.dags[0].tasks[1].priority = 7;
+  const AnalysisPlatform full = mode(sched::Preemption::Full);
+  EXPECT_THAT(refusal(liu_layland(), workload, full), HasSubstr("less urgent than one of a larger period"));
+  workload.policy = PolicyKind::RateMonotonic;
+  EXPECT_EQ(refusal(liu_layland(), workload, full), "");
+  EXPECT_THAT(refusal(liu_layland(), workload, mode(sched::Preemption::None)), HasSubstr("with blocking"));
+  EXPECT_EQ(refusal(hyperbolic_blocking(), workload, mode(sched::Preemption::None)), "");
+  workload.dags[0].tasks[0].jitter = 1;
+  EXPECT_THAT(refusal(hyperbolic_blocking(), workload, full), HasSubstr("jitter"));
+  workload.dags[0].tasks[0].jitter = 0;
+  workload.dags[0].tasks[0].deadline -= 1;
+  EXPECT_THAT(refusal(global_rm_utilization(), workload, mode(sched::Preemption::Full, 2)), HasSubstr("deadline"));
+  EXPECT_THAT(refusal(global_rm_light(), workload, full), HasSubstr("two workers"));
+}
+
+}  // namespace
+}  // namespace redag::analysis
