@@ -10,7 +10,7 @@
 #include "redag/runtime/release_timer.hpp"
 #include "redag/runtime/synthetic.hpp"
 #include "redag/runtime/threads.hpp"
-#include "redag/sched/priority_scheduler.hpp"
+#include "redag/sched/executors.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -41,9 +41,15 @@ class Run {
  private:
   Result<void> prepare() {
     const PriorityBand band = probe_priority_band();
+    const sched::ExecutorKind *kind = sched::find_executor(options_.executor);
+    if (kind == nullptr && !options_.scheduler) {
+      return make_error(fmt::format("there is no executor '{}'", options_.executor));
+    }
+    const bool preemptive = kind == nullptr || kind->preemptive;
     const auto wanted = options_.preemption.value_or(workload_.platform.preemption);
-    Result<Mode> mode = resolve_mode(wanted, workload_.policy, band);
+    Result<Mode> mode = resolve_mode(preemptive ? wanted : PreemptionMode::None, workload_.policy, band);
     if (!mode) return tl::unexpected(mode.error());
+    if (!preemptive && wanted != PreemptionMode::None) mode->reason = "executor " + options_.executor + " has no other";
     if (options_.realtime_threads && band.top_job == 0) {
       return make_error("the workers cannot be SCHED_FIFO threads: this process may not", realtime_hint());
     }
@@ -63,8 +69,9 @@ class Run {
     engine.realtime_threads = options_.realtime_threads;
     engine.cpus = options_.cpus;
     engine.trace_capacity = options_.trace_capacity;
+    if (kind != nullptr) engine.config = sched::effective_config(*kind, engine.config);
     auto scheduler = options_.scheduler ? options_.scheduler(workload_, engine.config)
-                                        : std::make_unique<sched::PriorityScheduler>(workload_, engine.config);
+                                        : sched::make_scheduler(options_.executor, workload_, engine.config);
     engine_ = std::make_unique<Engine>(std::move(scheduler), std::move(engine));
     engine_->bind(workload_, synthetic_bodies(workload_, options_.seed, give_up_));
     timer_ = std::make_unique<ReleaseTimer>([this](auto releases) { engine_->release(releases); }, options_.seed);

@@ -26,8 +26,8 @@ struct RunOptions {
   Duration duration = 10 * kSecond;          // releases in [0, duration); the trace ends there
   Duration warm_up = 0;                      // of it: noted in the trace, for the metrics to leave out
   std::uint64_t seed = 1;                    // execution times and jitter
-  std::string executor = "redag";            // name for the trace
-  SchedulerFactory scheduler;                // empty: PriorityScheduler
+  std::string executor = "redag";            // as in redag/sched/executors.hpp
+  SchedulerFactory scheduler;                // instead of the one that `executor` names
   std::optional<PreemptionMode> preemption;  // instead of the workload's
   std::uint32_t threads = 0;      // os: jobs that can be started at once; 0: as many as there are tasks, at most 64
   bool realtime_threads = false;  // none, cooperative: workers and release timer at SCHED_FIFO too

@@ -6,7 +6,7 @@
 
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/runtime/mode.hpp"
-#include "redag/sched/priority_scheduler.hpp"
+#include "redag/sched/executors.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -135,18 +135,21 @@ TEST(RunWorkload, ABudgetCutsAJobOff) {
   EXPECT_EQ(cut->task, TaskId(2));
 }
 
-TEST(RunWorkload, RealtimeThreadsAndAModelOfAnotherExecutorCanBeAskedFor) {
-  if (probe_priority_band().top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+TEST(RunWorkload, EveryExecutorRunsOnThreads) {
+  for (const sched::ExecutorKind &kind : sched::executors()) {
+    RunOptions options;
+    options.duration = 150 * kMillisecond;
+    options.executor = kind.name;
+    options.realtime_threads = probe_priority_band().top_job > 0;
+    const RunResult result = run(two_rates(2, PreemptionMode::Auto), options);
+    EXPECT_EQ(result.mode.mode == PreemptionMode::None, !kind.preemptive) << kind.name;
+    EXPECT_EQ(result.trace.info.config.workers, kind.single_worker ? 1U : 2U);
+    for (const Usage &usage : result.usage) EXPECT_GT(usage.jobs, 0U) << kind.name;
+    if (kind.name == "redag") expect_lawful(result);
+  }
   RunOptions options;
-  options.duration = 50 * kMillisecond;
-  options.realtime_threads = true;
-  bool asked = false;
-  options.scheduler = [&](const Workload &workload, const sched::Config &config) {
-    asked = true;
-    return std::make_unique<sched::PriorityScheduler>(workload, config);
-  };
-  expect_lawful(run(two_rates(2, PreemptionMode::None), options));
-  EXPECT_TRUE(asked);
+  options.executor = "nobody's";
+  EXPECT_FALSE(run_workload(two_rates(1, PreemptionMode::None), options));
 }
 
 }  // namespace
