@@ -33,7 +33,8 @@ struct Config {
 
 enum class Outcome : std::uint8_t { Finished, Threw, BudgetExceeded };
 
-/// One decision: run `job` on `worker` from now.
+/// One decision: run `job` on `worker` from now. With `resume`, for a job that runs there already: only its level
+/// changed.
 struct Dispatch {
   JobSlot job;
   TaskId task;
@@ -79,7 +80,8 @@ class Scheduler {
   /// Decides. Calling it again without a new event yields nothing.
   virtual Step dispatch(Time now) = 0;
 
-  /// Would dispatch() put a job over `job` if that were at a preemption point now? (Never, in the other modes.)
+  /// Cooperative: could dispatch() put a job over `job` if that were at a preemption point now? May say yes in vain (a
+  /// bound or a group can keep the more urgent job waiting), never no. In the other modes: no.
   [[nodiscard]] virtual bool outranked(JobSlot job) const = 0;
 
   /// Reconfiguration; both allocate. New TaskIds follow the existing ones and are never reused. Periods and deadlines
