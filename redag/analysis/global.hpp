@@ -19,8 +19,10 @@ struct GlobalUnit {
   Duration length = 0;
   Duration period = 0;
   Duration jitter = 0;
-  Duration limit = 0;            // responses above it count as none; never above the period
-  Duration response = 0;         // of the bound at work, once known
+  Duration limit = 0;     // responses above it count as none; never above the period
+  Duration response = 0;  // of the bound at work, once known
+  Duration work = 0;      // in the window at hand, and with a job from before: scratch of the fixed points
+  Duration carried = 0;
   Duration turn = 0;             // width * period, see divide()
   double rate = 0;               // 1 / turn
   std::uint32_t width = 1;       // jobs of it that can execute at once, never above the workers

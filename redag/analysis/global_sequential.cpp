@@ -9,110 +9,142 @@ namespace redag::analysis {
 namespace global {
 namespace {
 
-// Least fixed point of a monotone `next` that is at least `start`, or nothing above `stop`.
-template <class Next>
-bool least_fixed_point(Duration start, Duration stop, Duration &result, Next next) {
-  Duration x = start;
-  for (int steps = 0; x <= stop && steps < kMaxSteps; ++steps) {
-    const Duration y = next(x);
-    if (y <= x) {
-      result = x;
-      return true;
-    }
-    x = y;
-  }
-  return false;
-}
-
-// The `kept` largest of the values offered; a few workers need a few.
+// The `kept` largest of the values offered, with what they belong to; a few workers need a few.
 class Largest {
  public:
-  explicit Largest(std::uint32_t kept) : kept_(kept) {}
-  void offer(Duration value) {
-    if (value <= smallest_) return;
+  explicit Largest(std::size_t kept) : kept_(std::min(kept, kMost)) {}
+
+  void offer(Duration value, std::size_t whose = 0) {
+    if (kept_ == 0 || value <= entries_[kept_ - 1].value) return;
     std::size_t i = kept_ - 1;
-    for (; i > 0 && values_[i - 1] < value; --i) values_[i] = values_[i - 1];
-    values_[i] = value;
-    smallest_ = values_[kept_ - 1];
+    for (; i > 0 && entries_[i - 1].value < value; --i) entries_[i] = entries_[i - 1];
+    entries_[i] = {value, whose};
   }
-  [[nodiscard]] Duration sum() const {
-    Duration total = 0;
-    for (std::size_t i = 0; i < kept_; ++i) total += values_[i];
-    return total;
-  }
+
+  struct Entry {
+    Duration value = 0;
+    std::size_t whose = 0;
+  };
+  [[nodiscard]] std::span<const Entry> entries() const { return std::span(entries_).first(kept_); }
+
   static constexpr std::size_t kMost = 64;
 
  private:
   std::size_t kept_;
-  Duration smallest_ = 0;
-  std::array<Duration, kMost> values_{};
+  std::array<Entry, kMost> entries_{};
 };
 
-// A task's work in a window that starts when an instant with an idle worker ends: without a job from before, and by how
-// much more with one. A job from before has executed for at least a tick, unless jitter can hide its release.
+// Least d with sum_i min(w_i, d) + rest < m d, where `all` is the sum of the w_i and rest, and `largest` holds the m -
+// 1 largest w_i. The j largest count for d each: d = floor((all - their sum) / (m - j)) + 1 for the j that makes it
+// least. (With fewer than m - 1 values kept d can be larger than the least one; it keeps the inequality.)
+Duration least_window(Duration all, std::span<const Largest::Entry> largest, std::uint32_t workers) {
+  auto share = static_cast<Duration>(workers);
+  Duration least = all / share + 1;
+  for (const Largest::Entry &entry : largest) {
+    if (entry.value < least) break;
+    all -= entry.value;
+    --share;
+    least = std::min(least, all / share + 1);
+  }
+  return least;
+}
+
+// The least d >= 1 with sum_i min(W_i(d), d) + rest < m d, by steps of least_window(): work grows with the window, so
+// no d that one of them skips can do. That a job waits in d instants would take m d of work, so it waits in less. Plain
+// iteration instead creeps, a nanosecond a step, while m tasks interfere in every instant. False above `stop`.
+template <class Window>
+bool least_fixed_point(Duration stop, Duration &result, Window next) {
+  Duration d = 1;
+  for (int steps = 0; d <= stop && steps < kMaxSteps; ++steps) {
+    const Duration grown = next(d);
+    if (grown <= d) {
+      result = d;
+      return true;
+    }
+    d = grown;
+  }
+  return false;
+}
+
+// A task's work in a window that starts when an instant with an idle worker ends: without a job from before, and with
+// one. A job from before has executed for at least a tick, unless jitter can hide its release.
 struct Work {
   Duration fresh = 0;
-  Duration more = 0;
+  Duration carried = 0;
 };
 
-Work guan_work(const GlobalUnit &task, Duration x, Duration most) {
+Work guan_work(const GlobalUnit &task, Duration x) {
   const Duration wcet = task.volume;
   const Division jobs = divide(x + task.jitter, task);
-  const Duration fresh = std::min(most, jobs.quotient * wcet + std::min(wcet, jobs.remainder));
+  const Duration fresh = jobs.quotient * wcet + std::min(wcet, jobs.remainder);
   Duration carried = wcet;
   if (x > wcet) {
     const Division before = divide(x - wcet, task);
     const Duration tail = std::max<Duration>(0, before.remainder - (task.period - task.response));
     carried = (before.quotient + 1) * wcet + std::min(tail, task.jitter > 0 ? wcet : wcet - 1);
   }
-  return Work{fresh, std::max<Duration>(0, std::min(most, carried) - fresh)};
+  return Work{fresh, std::max(fresh, carried)};
 }
 
-// Sum of interference of the more urgent tasks in a window of length x.
-Duration guan_interference(std::span<const GlobalUnit> more_urgent, Duration x, Duration most, std::uint32_t workers) {
+// least_window() for the m - 1 tasks that carry in most at `d`.
+Duration guan_window(std::span<GlobalUnit> more_urgent, Duration x, Duration d, std::uint32_t workers) {
+  const std::size_t carrying = workers - 1;
+  const bool all_carry = carrying >= more_urgent.size() || carrying > Largest::kMost;
+  Largest most_carried(all_carry ? 0 : carrying);
+  for (std::size_t i = 0; i < more_urgent.size(); ++i) {
+    GlobalUnit &other = more_urgent[i];
+    const Work work = guan_work(other, x);
+    other.work = all_carry && carrying > 0 ? work.carried : work.fresh;
+    other.carried = work.carried;
+    if (!all_carry) most_carried.offer(std::min(work.carried, d) - std::min(work.fresh, d), i);
+  }
+  for (const Largest::Entry &entry : most_carried.entries()) {
+    if (entry.value > 0) more_urgent[entry.whose].work = more_urgent[entry.whose].carried;
+  }
+  Largest largest(carrying);
   Duration sum = 0;
-  if (workers - 1 >= more_urgent.size() || workers > Largest::kMost) {
-    for (const GlobalUnit &other : more_urgent) {
-      const Work work = guan_work(other, x, most);
-      sum += work.fresh + (workers > 1 ? work.more : 0);
-    }
-    return sum;
-  }
-  if (workers == 1) {
-    for (const GlobalUnit &other : more_urgent) sum += guan_work(other, x, most).fresh;
-    return sum;
-  }
-  Largest largest(workers - 1);
   for (const GlobalUnit &other : more_urgent) {
-    const Work work = guan_work(other, x, most);
-    sum += work.fresh;
-    largest.offer(work.more);
+    sum += other.work;
+    largest.offer(other.work);
   }
-  return sum + largest.sum();
+  return least_window(sum, largest.entries(), workers);
 }
+
+// least_window() with sequential_work() of all but `skip`, and `rest`.
+Duration carrying_window(std::span<GlobalUnit> others, std::size_t skip, Duration x, Duration rest,
+                         std::uint32_t workers) {
+  Largest largest(workers - 1);
+  Duration sum = rest;
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    if (i == skip) continue;
+    others[i].work = sequential_work(others[i], x);
+    sum += others[i].work;
+    largest.offer(others[i].work);
+  }
+  return least_window(sum, largest.entries(), workers);
+}
+
+constexpr std::size_t kNobody = SIZE_MAX;
 
 }  // namespace
 
 bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
   GlobalUnit &own = units[k];
-  Duration window = 0;
-  const auto more_urgent = units.first(k);
-  const bool found = least_fixed_point(own.volume, own.limit - own.jitter, window, [&](Duration x) {
-    Duration sum = 0;
-    for (const GlobalUnit &other : more_urgent) sum += std::min(sequential_work(other, x), x - own.volume + 1);
-    return own.volume + sum / workers;
+  Duration d = 0;
+  const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
+    return carrying_window(units.first(k), kNobody, waiting + own.volume - 1, 0, workers);
   });
-  own.response = window + own.jitter;
+  own.response = d - 1 + own.volume + own.jitter;
   return found;
 }
 
 bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
   GlobalUnit &own = units[k];
-  Duration window = 0;
-  const bool found = least_fixed_point(own.volume, own.limit - own.jitter, window, [&](Duration x) {
-    return own.volume + guan_interference(units.first(k), x, x - own.volume + 1, workers) / workers;
+  Duration d = 0;
+  const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
+    return guan_window(units.first(k), waiting + own.volume - 1, waiting, workers);
   });
-  own.response = window + own.jitter;
+  own.response = d - 1 + own.volume + own.jitter;
   return found;
 }
 
@@ -120,14 +152,21 @@ bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t 
                                        Duration remaining) {
   GlobalUnit &own = units[k];
   if (remaining >= kUnbounded / 4) return false;
-  const auto more_urgent = units.first(k);
-  Duration start = 0;
-  const bool found = least_fixed_point(0, own.limit - own.jitter - own.volume, start, [&](Duration s) {
-    Duration sum = remaining;
-    for (const GlobalUnit &other : more_urgent) sum += sequential_work(other, s + 1);
-    return sum / workers;
+  Duration d = 0;
+  const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
+    return carrying_window(units.first(k), kNobody, waiting, remaining, workers);
   });
-  own.response = start + own.volume + own.jitter;
+  own.response = d - 1 + own.volume + own.jitter;
+  return found;
+}
+
+bool any_order_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
+  GlobalUnit &own = units[k];
+  Duration d = 0;
+  const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
+    return carrying_window(units, k, waiting + own.volume - 1, 0, workers);
+  });
+  if (found) own.response = std::min(own.response, d - 1 + own.volume + own.jitter);
   return found;
 }
 
@@ -138,32 +177,44 @@ namespace {
 using global::GlobalUnit;
 using global::SharedTerms;
 
-// Interference terms of one fixed point: work of each more urgent task, divided by the workers.
-template <class Amount>
+// Interference terms of one fixed point, whose last step left the work of each more urgent task in `work`.
 ResponseBound itemise(const System &system, std::span<const GlobalUnit> units, std::size_t k, std::uint32_t workers,
-                      Duration remaining, Amount amount) {
+                      Duration remaining) {
   const GlobalUnit &own = units[k];
   ResponseBound bound;
   bound.response = own.response;
   SharedTerms terms(system, own);
   terms.add_path();
   terms.add_jitter();
+  const Duration waiting = own.response - own.jitter - own.volume + 1;
   if (remaining > 0) terms.add_share(Term::Kind::Blocking, own, remaining, workers);
-  for (std::size_t i = 0; i < k; ++i) terms.add_share(Term::Kind::Interference, units[i], amount(units[i]), workers);
+  for (std::size_t i = 0; i < k; ++i) {
+    terms.add_share(Term::Kind::Interference, units[i], std::min(units[i].work, waiting), workers);
+  }
   bound.terms = terms.take();
+  // With very many workers the fixed point need not be the least one.
+  Duration sum = 0;
+  for (const Term &term : bound.terms) sum += term.amount;
+  if (sum < own.response) {
+    bound.terms.push_back(Term{Term::Kind::Interference, TaskId(), DagId(), own.response - sum, 0});
+  }
   return bound;
 }
 
-template <class Respond, class Explain>
-Bound from_most_urgent(const System &system, global::Units &view, Respond respond, Explain explain) {
+// `respond(k, remaining)` says whether units[k] has a response; `remaining` is its less urgent work, 0 by default.
+template <class Respond>
+Outcome from_most_urgent(const System &system, sched::Preemption mode, Respond respond) {
+  global::Units view = global::units_of(system, {.mode = mode, .edges = false});
+  if (view.reason) return NotApplicable{*view.reason};
   std::vector<ResponseBound> responses(system.units.size());
   bool known = true;
   for (std::size_t k = 0; k < view.units.size(); ++k) {
     ResponseBound &response = responses[view.units[k].unit];
+    Duration remaining = 0;
     if (!known) {
       response.absent = global::kMoreUrgent;
-    } else if (respond(k)) {
-      response = explain(k);
+    } else if (respond(view, k, remaining)) {
+      response = itemise(system, view.units, k, view.workers, remaining);
     } else {
       known = false;
       response.absent = global::kExceedsLimit;
@@ -173,84 +224,35 @@ Bound from_most_urgent(const System &system, global::Units &view, Respond respon
 }
 
 Outcome apply_bertogna_cirinei(const System &system) {
-  global::Units view = global::units_of(system, {.edges = false});
-  if (view.reason) return NotApplicable{*view.reason};
-  const std::span<GlobalUnit> units(view.units);
-  return from_most_urgent(
-      system, view, [&](std::size_t k) { return global::bertogna_cirinei_response(units, k, view.workers); },
-      [&](std::size_t k) {
-        const Duration x = units[k].response - units[k].jitter;
-        return itemise(system, units, k, view.workers, 0, [&](const GlobalUnit &other) {
-          return std::min(global::sequential_work(other, x), x - units[k].volume + 1);
-        });
-      });
+  return from_most_urgent(system, sched::Preemption::Full, [](global::Units &view, std::size_t k, Duration &) {
+    return global::bertogna_cirinei_response(view.units, k, view.workers);
+  });
 }
 
 Outcome apply_guan(const System &system) {
-  global::Units view = global::units_of(system, {.edges = false});
-  if (view.reason) return NotApplicable{*view.reason};
-  const std::span<GlobalUnit> units(view.units);
-  std::vector<std::size_t> order;
-  std::vector<bool> carries(units.size());
-  return from_most_urgent(
-      system, view, [&](std::size_t k) { return global::guan_response(units, k, view.workers); },
-      [&](std::size_t k) {
-        const Duration x = units[k].response - units[k].jitter;
-        const Duration most = x - units[k].volume + 1;
-        const auto work = [&](std::size_t i) { return global::guan_work(units[i], x, most); };
-        order.resize(k);
-        for (std::size_t i = 0; i < k; ++i) order[i] = i;
-        const std::size_t carried = std::min<std::size_t>(k, view.workers - 1);
-        std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(carried), order.end(),
-                          [&](std::size_t a, std::size_t b) { return work(a).more > work(b).more; });
-        std::fill(carries.begin(), carries.end(), false);
-        for (std::size_t i = 0; i < carried; ++i) carries[order[i]] = true;
-        return itemise(system, units, k, view.workers, 0, [&](const GlobalUnit &other) {
-          const auto i = static_cast<std::size_t>(&other - units.data());
-          return work(i).fresh + (carries[i] ? work(i).more : 0);
-        });
-      });
+  return from_most_urgent(system, sched::Preemption::Full, [](global::Units &view, std::size_t k, Duration &) {
+    return global::guan_response(view.units, k, view.workers);
+  });
 }
 
 Outcome apply_nonpreemptive(const System &system) {
-  global::Units view = global::units_of(system, {.mode = sched::Preemption::None, .edges = false});
-  if (view.reason) return NotApplicable{*view.reason};
-  const std::span<GlobalUnit> units(view.units);
-  Duration remaining = 0;
-  return from_most_urgent(
-      system, view,
-      [&](std::size_t k) {
-        remaining = global::largest_remaining(system, view.units, k + 1, view.workers);
-        return global::sequential_nonpreemptive_response(units, k, view.workers, remaining);
-      },
-      [&](std::size_t k) {
-        const Duration start = units[k].response - units[k].jitter - units[k].volume;
-        return itemise(system, units, k, view.workers, remaining,
-                       [&](const GlobalUnit &other) { return global::sequential_work(other, start + 1); });
-      });
+  return from_most_urgent(system, sched::Preemption::None,
+                          [&system](global::Units &view, std::size_t k, Duration &remaining) {
+                            remaining = global::largest_remaining(system, view.units, k + 1, view.workers);
+                            return global::sequential_nonpreemptive_response(view.units, k, view.workers, remaining);
+                          });
 }
 
-// One round over all tasks with the responses of the last; false: some task has none, so nothing is known of any.
-bool refine_any(std::span<GlobalUnit> units, std::uint32_t workers, bool &changed) {
-  changed = false;
-  for (std::size_t k = 0; k < units.size(); ++k) {
-    GlobalUnit &own = units[k];
-    Duration window = own.volume;
-    int steps = 0;
-    for (;; ++steps) {
-      if (window > own.limit - own.jitter || steps >= global::kMaxSteps) return false;
-      Duration sum = 0;
-      for (std::size_t i = 0; i < units.size(); ++i) {
-        if (i != k) sum += std::min(global::sequential_work(units[i], window), window - own.volume + 1);
-      }
-      const Duration next = own.volume + sum / workers;
-      if (next <= window) break;
-      window = next;
-    }
-    changed = changed || window + own.jitter < own.response;
-    own.response = std::min(own.response, window + own.jitter);
-  }
-  return true;
+ResponseBound any_order_bound(const System &system, const GlobalUnit &unit) {
+  ResponseBound bound;
+  bound.response = unit.response;
+  SharedTerms terms(system, unit);
+  terms.add_path();
+  terms.add_jitter();
+  bound.terms = terms.take();
+  const Duration others = unit.response - unit.jitter - unit.volume;
+  if (others > 0) bound.terms.push_back(Term{Term::Kind::Interference, TaskId(), DagId(), others, 0});
+  return bound;
 }
 
 Outcome apply_any(const System &system) {
@@ -258,29 +260,25 @@ Outcome apply_any(const System &system) {
   const auto mode = system.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
   global::Units view = global::units_of(system, {.mode = mode, .edges = false, .any_policy = true});
   if (view.reason) return NotApplicable{*view.reason};
-  const std::span<GlobalUnit> units(view.units);
-  for (GlobalUnit &unit : units) unit.response = unit.limit;  // as if; holds if every task keeps its limit
+  // As if every task kept its limit. If the first round confirms that for all, it is so, and each further round may
+  // rely on what the last one found: the first job ever to break a bound would have to come after another such job.
+  for (GlobalUnit &unit : view.units) unit.response = unit.limit;
   constexpr int kRounds = 50;
   bool changed = true;
   for (int round = 0; round < kRounds && changed; ++round) {
-    if (refine_any(units, view.workers, changed)) continue;
-    ResponseBound none;
-    none.absent = "some task's response can exceed its limit, which all others rely on";
-    return from_units(system, std::vector<ResponseBound>(system.units.size(), none));
-  }
-  std::vector<ResponseBound> responses(system.units.size());
-  for (const GlobalUnit &unit : units) {
-    ResponseBound &response = responses[unit.unit];
-    response.response = unit.response;
-    SharedTerms terms(system, unit);
-    terms.add_path();
-    terms.add_jitter();
-    terms.add(Term::Kind::Interference, unit, unit.response - unit.jitter - unit.volume);
-    response.terms = terms.take();
-    for (Term &term : response.terms) {
-      if (term.kind == Term::Kind::Interference) term.task = TaskId(), term.dag = DagId();
+    changed = false;
+    for (std::size_t k = 0; k < view.units.size(); ++k) {
+      const Duration before = view.units[k].response;
+      if (!global::any_order_response(view.units, k, view.workers)) {
+        ResponseBound none;
+        none.absent = "some task's response can exceed its limit, which all others rely on";
+        return from_units(system, std::vector<ResponseBound>(system.units.size(), none));
+      }
+      changed = changed || view.units[k].response < before;
     }
   }
+  std::vector<ResponseBound> responses(system.units.size());
+  for (const GlobalUnit &unit : view.units) responses[unit.unit] = any_order_bound(system, unit);
   return from_units(system, std::move(responses));
 }
 

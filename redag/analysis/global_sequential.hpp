@@ -16,7 +16,7 @@ namespace global {
 /// eq. 4.
 [[nodiscard]] inline Duration sequential_work(const GlobalUnit &task, Duration x) {
   const Division jobs = divide(std::max<Duration>(0, x + task.response - task.volume), task);
-  return std::min(x, jobs.quotient * task.volume + std::min(task.volume, jobs.remainder));
+  return jobs.quotient * task.volume + std::min(task.volume, jobs.remainder);
 }
 
 /// Each fills in `response` of units[k] given those of the more urgent ones, units[0 .. k). False: above its limit, or
@@ -26,6 +26,8 @@ namespace global {
 /// `remaining`: sum of the m largest C - 1 of less urgent tasks.
 [[nodiscard]] bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
                                                      Duration remaining);
+/// Lowers `response` of units[k] given those of all others, in any work-conserving order.
+[[nodiscard]] bool any_order_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers);
 
 }  // namespace global
 

@@ -1,0 +1,107 @@
+// Speed of the bounds for several workers. Guan: 20 tasks on 4 workers, bare numbers and as a method with its terms.
+// Melani and its kin: sets of 2-5 DAGs of 3-9 tasks on 4 workers. Rates are task sets a second.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <vector>
+
+#include "redag/analysis/global_dag.hpp"
+#include "redag/analysis/global_sequential.hpp"
+#include "redag/base/rng.hpp"
+#include "redag/model/generate.hpp"
+
+namespace {
+
+using redag::Duration;
+using redag::Workload;
+namespace analysis = redag::analysis;
+using analysis::global::GlobalUnit;
+
+constexpr std::uint32_t kWorkers = 4;
+constexpr std::size_t kSets = 256;  // more than fit the branch predictor's memory
+
+std::vector<analysis::System> systems(redag::DagShape shape, std::uint32_t percent) {
+  const bool graphs = shape != redag::DagShape::Independent;
+  std::vector<analysis::System> result;
+  for (std::uint64_t seed = 0; result.size() < kSets; ++seed) {
+    redag::GenerateOptions options;
+    options.shape = shape;
+    options.workers = kWorkers;
+    options.preemption = redag::PreemptionMode::Os;
+    options.dags = graphs ? static_cast<std::uint32_t>(redag::Rng(redag::mix(seed)).uniform(2, 5)) : 20;
+    options.min_tasks = graphs ? 3 : 1;
+    options.max_tasks = graphs ? 9 : 1;
+    options.utilization = kWorkers * percent / 100.0;
+    const redag::Result<Workload> workload = redag::generate(options, seed);
+    if (!workload) continue;
+    result.push_back(analysis::compile(*workload, analysis::platform_of(*workload)).value());
+  }
+  return result;
+}
+
+std::vector<std::vector<GlobalUnit>> bare(const std::vector<analysis::System> &sets) {
+  std::vector<std::vector<GlobalUnit>> result;
+  for (const analysis::System &system : sets) result.push_back(analysis::global::units_of(system, {}).units);
+  return result;
+}
+
+// Runs `respond` on all tasks of each set in turn until one has no bound; reports how many sets had one for all.
+template <class Respond>
+void run_bare(benchmark::State &state, std::vector<std::vector<GlobalUnit>> sets, Respond respond) {
+  std::size_t next = 0;
+  std::int64_t schedulable = 0;
+  for (auto _ : state) {
+    std::vector<GlobalUnit> &units = sets[next++ % kSets];
+    bool all = true;
+    for (std::size_t k = 0; k < units.size() && all; ++k) all = respond(units, k);
+    schedulable += all ? 1 : 0;
+  }
+  state.SetItemsProcessed(state.iterations());
+  state.counters["bounded"] = static_cast<double>(schedulable) / static_cast<double>(state.iterations());
+}
+
+void run_method(benchmark::State &state, const analysis::Method &method, redag::DagShape shape) {
+  const auto sets = systems(shape, static_cast<std::uint32_t>(state.range(0)));
+  std::size_t next = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(method.apply(sets[next++ % kSets]));
+  state.SetItemsProcessed(state.iterations());
+}
+
+void BM_GuanBare(benchmark::State &state) {
+  const auto sets = systems(redag::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
+  run_bare(state, bare(sets), [](std::vector<GlobalUnit> &units, std::size_t k) {
+    return analysis::global::guan_response(units, k, kWorkers);
+  });
+}
+
+void BM_BertognaCirineiBare(benchmark::State &state) {
+  const auto sets = systems(redag::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
+  run_bare(state, bare(sets), [](std::vector<GlobalUnit> &units, std::size_t k) {
+    return analysis::global::bertogna_cirinei_response(units, k, kWorkers);
+  });
+}
+
+void BM_Guan(benchmark::State &state) { run_method(state, analysis::guan(), redag::DagShape::Independent); }
+
+void BM_MelaniBare(benchmark::State &state) {
+  const auto sets = systems(redag::DagShape::Layered, static_cast<std::uint32_t>(state.range(0)));
+  auto units = bare(sets);
+  for (auto &set : units) {
+    for (GlobalUnit &unit : set) analysis::global::set_width(unit, kWorkers);
+  }
+  run_bare(state, std::move(units), [](std::vector<GlobalUnit> &set, std::size_t k) {
+    return analysis::global::melani_response(set, k, kWorkers);
+  });
+}
+
+void BM_Melani(benchmark::State &state) { run_method(state, analysis::melani(), redag::DagShape::Layered); }
+void BM_DagBounded(benchmark::State &state) { run_method(state, analysis::dag_bounded(), redag::DagShape::Layered); }
+
+}  // namespace
+
+BENCHMARK(BM_GuanBare)->Arg(40)->Arg(60)->Arg(80);
+BENCHMARK(BM_BertognaCirineiBare)->Arg(40)->Arg(60)->Arg(80);
+BENCHMARK(BM_Guan)->Arg(40)->Arg(60)->Arg(80);
+BENCHMARK(BM_MelaniBare)->Arg(30)->Arg(60);
+BENCHMARK(BM_Melani)->Arg(30)->Arg(60);
+BENCHMARK(BM_DagBounded)->Arg(30)->Arg(60);
