@@ -59,7 +59,8 @@ class Run {
     result_.warnings = mode_warnings(*mode, workers, cpus);
     if (options_.lock_memory) {
       if (const Result<void> locked = redag::runtime::lock_memory(); !locked) {
-        result_.warnings.push_back(to_string(locked.error()));
+        const Diagnostic &why = locked.error().front();
+        result_.warnings.push_back(fmt::format("{} ({})", why.message, why.hint));
       }
     }
 
