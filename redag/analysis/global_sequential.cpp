@@ -77,13 +77,13 @@ Work guan_work(const GlobalUnit &task, Duration x) {
   const Duration wcet = task.volume;
   const Division jobs = divide(x + task.jitter, task);
   const Duration fresh = jobs.quotient * wcet + std::min(wcet, jobs.remainder);
-  Duration carried = wcet;
-  if (x > wcet) {
-    const Division before = divide(x - wcet, task);
-    const Duration tail = std::max<Duration>(0, before.remainder - (task.period - task.response));
-    carried = (before.quotient + 1) * wcet + std::min(tail, task.jitter > 0 ? wcet : wcet - 1);
-  }
-  return Work{fresh, std::max(fresh, carried)};
+  // floor and remainder of (x - C) / T without another division; J + C <= R <= T.
+  const Duration into = jobs.remainder - (task.jitter + wcet);
+  const Duration whole = into < 0 ? jobs.quotient : jobs.quotient + 1;
+  const Duration last = into < 0 ? into + task.period : into;
+  const Duration tail = std::max<Duration>(0, last - (task.period - task.response));
+  const Duration carried = whole * wcet + std::min(tail, task.jitter > 0 ? wcet : wcet - 1);
+  return Work{fresh, std::max({fresh, carried, wcet})};
 }
 
 // least_window() for the m - 1 tasks that carry in most at `d`.
@@ -105,13 +105,13 @@ Duration guan_window(std::span<GlobalUnit> more_urgent, Duration x, Duration d, 
   Duration sum = 0;
   for (const GlobalUnit &other : more_urgent) {
     sum += other.work;
-    largest.offer(other.work);
+    if (other.work >= d) largest.offer(other.work);  // no window below d comes of this: less work is never cut
   }
   return least_window(sum, largest.entries(), workers);
 }
 
 // least_window() with sequential_work() of all but `skip`, and `rest`.
-Duration carrying_window(std::span<GlobalUnit> others, std::size_t skip, Duration x, Duration rest,
+Duration carrying_window(std::span<GlobalUnit> others, std::size_t skip, Duration x, Duration d, Duration rest,
                          std::uint32_t workers) {
   Largest largest(workers - 1);
   Duration sum = rest;
@@ -119,7 +119,7 @@ Duration carrying_window(std::span<GlobalUnit> others, std::size_t skip, Duratio
     if (i == skip) continue;
     others[i].work = sequential_work(others[i], x);
     sum += others[i].work;
-    largest.offer(others[i].work);
+    if (others[i].work >= d) largest.offer(others[i].work);
   }
   return least_window(sum, largest.entries(), workers);
 }
@@ -132,7 +132,7 @@ bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::
   GlobalUnit &own = units[k];
   Duration d = 0;
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
-    return carrying_window(units.first(k), kNobody, waiting + own.volume - 1, 0, workers);
+    return carrying_window(units.first(k), kNobody, waiting + own.volume - 1, waiting, 0, workers);
   });
   own.response = d - 1 + own.volume + own.jitter;
   return found;
@@ -154,7 +154,7 @@ bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t 
   if (remaining >= kUnbounded / 4) return false;
   Duration d = 0;
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
-    return carrying_window(units.first(k), kNobody, waiting, remaining, workers);
+    return carrying_window(units.first(k), kNobody, waiting, waiting, remaining, workers);
   });
   own.response = d - 1 + own.volume + own.jitter;
   return found;
@@ -164,7 +164,7 @@ bool any_order_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_
   GlobalUnit &own = units[k];
   Duration d = 0;
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
-    return carrying_window(units, k, waiting + own.volume - 1, 0, workers);
+    return carrying_window(units, k, waiting + own.volume - 1, waiting, 0, workers);
   });
   if (found) own.response = std::min(own.response, d - 1 + own.volume + own.jitter);
   return found;
