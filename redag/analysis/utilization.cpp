@@ -144,7 +144,7 @@ class ChainCover {
     std::size_t matched = 0;
     for (std::uint32_t u = 0; u < system_.units.size(); ++u) {
       visited_.assign(system_.units.size(), false);
-      matched += extend(u) ? 1 : 0;
+      matched += extend(u) ? 1U : 0U;
     }
     return system_.units.size() - matched;
   }
