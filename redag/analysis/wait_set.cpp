@@ -1,0 +1,83 @@
+#include "redag/analysis/wait_set.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/global.hpp"
+
+namespace redag::analysis {
+namespace {
+
+// From readiness to finish, by TaskId.
+std::vector<Duration> responses_from_ready(const System &system) {
+  Duration all = 0;
+  for (const SystemTask &task : system.tasks) all = add(all, task.wcet);
+  std::vector<Duration> result(system.tasks.size());
+  Duration before = 0;  // timers are registered before subscriptions, each in the order of TaskIds
+  for (const bool data : {false, true}) {
+    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+      const SystemTask &task = system.tasks[t];
+      if (task.data != data) continue;
+      result[t] = add(task.wcet, add(all - task.wcet, before) / system.platform.workers);
+      before = add(before, task.wcet);
+    }
+  }
+  return result;
+}
+
+ResponseBound bound_of(const System &system, const Unit &unit, const std::vector<Duration> &from_ready) {
+  std::vector<Duration> paths(system.tasks.size(), 0);  // longest sum that ends with a task, and its own execution
+  std::vector<Duration> own(system.tasks.size(), 0);
+  std::uint32_t last = unit.tasks.front();
+  for (const std::uint32_t t : unit.tasks) {
+    for (const std::uint32_t p : system.tasks[t].predecessors) {
+      if (paths[p] <= paths[t]) continue;
+      paths[t] = paths[p];
+      own[t] = own[p];
+    }
+    paths[t] = add(paths[t], from_ready[t]);
+    own[t] = add(own[t], system.tasks[t].wcet);
+    if (paths[t] > paths[last]) last = t;
+  }
+  ResponseBound bound;
+  const Duration response = add(paths[last], unit.jitter);
+  if (response > std::min(unit.limit, unit.period)) {
+    bound.absent = global::kExceedsLimit;
+    return bound;
+  }
+  bound.response = response;
+  bound.terms.push_back(Term{Term::Kind::Own, TaskId(), unit.dag, own[last], 1});
+  bound.terms.push_back(Term{Term::Kind::Blocking, TaskId(), DagId(), paths[last] - own[last], 0});
+  if (unit.jitter > 0) bound.terms.push_back(Term{Term::Kind::Jitter, TaskId(), unit.dag, unit.jitter, 0});
+  return bound;
+}
+
+Outcome apply_wait_set(const System &system) {
+  if (system.mode != sched::Preemption::None) return NotApplicable{"rclcpp's executors do not preempt"};
+  if (!system.groups.empty()) return NotApplicable{"exclusive groups: a busy group's callbacks can miss every window"};
+  const std::vector<Duration> from_ready = responses_from_ready(system);
+  std::vector<ResponseBound> responses;
+  for (const Unit &unit : system.units) responses.push_back(bound_of(system, unit, from_ready));
+  return from_units(system, std::move(responses));
+}
+
+}  // namespace
+
+Method wait_set() {
+  Method method;
+  method.name = "wait_set";
+  method.subject = Subject::Dag;
+  method.cite =
+      "docs/analysis.md, \"rclcpp's executors\"; windows: D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, "
+      "Response-time analysis of ROS 2 processing chains under reservation-based scheduling, ECRTS 2019";
+  method.assumptions =
+      "rclcpp's single- or multi-threaded executor of Humble, m threads with processors of their own; one rate a DAG "
+      "with "
+      "edges, R <= T; no shared exclusive groups";
+  method.complexity = "O(tasks + edges)";
+  method.apply = apply_wait_set;
+  return method;
+}
+
+}  // namespace redag::analysis
