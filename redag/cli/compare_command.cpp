@@ -88,8 +88,8 @@ class Comparing {
     if (session->stopped) return true;  // shorter than the others: not comparable
     results.add(*session);
     if (!session->check.ok()) {
-      console_.note(fmt::format("{}, repetition {}: ", results.variant.name, repetition + 1) +
-                    describe_check(session->check, console_.err_traits()));
+      console_.note(fmt::format("{}, repetition {}: {}", results.variant.name, repetition + 1,
+                                describe_check(session->check, console_.err_traits())));
     }
     return write(*session, results.variant, repetition);
   }

@@ -111,7 +111,7 @@ std::string suggestion(std::string_view given, const std::vector<std::string> &c
 }
 
 const Choices<PolicyKind> &policy_choices() {
-  static const Choices<PolicyKind> choices = [] {
+  static const Choices<PolicyKind> kChoices = [] {
     Choices<PolicyKind> all;
     for (const PolicyKind kind : {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed,
                                   PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::ChainAware}) {
@@ -119,11 +119,11 @@ const Choices<PolicyKind> &policy_choices() {
     }
     return all;
   }();
-  return choices;
+  return kChoices;
 }
 
 const Choices<PreemptionMode> &preemption_choices() {
-  static const Choices<PreemptionMode> choices = [] {
+  static const Choices<PreemptionMode> kChoices = [] {
     Choices<PreemptionMode> all;
     for (const PreemptionMode mode :
          {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os, PreemptionMode::Auto}) {
@@ -131,7 +131,7 @@ const Choices<PreemptionMode> &preemption_choices() {
     }
     return all;
   }();
-  return choices;
+  return kChoices;
 }
 
 }  // namespace redag::cli

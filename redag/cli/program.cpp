@@ -48,6 +48,7 @@ constexpr std::array kCommands = {
 
 std::vector<std::string> command_names() {
   std::vector<std::string> names;
+  names.reserve(kCommands.size());
   for (const Entry &entry : kCommands) names.emplace_back(entry.name);
   return names;
 }

@@ -96,8 +96,7 @@ std::string dag_table(const Session &session, const StreamTraits &terminal) {
                {"max", true, 6},
                {"deadline", true, 2},
                {"active", true, 1}});
-  for (std::size_t i = 0; i < session.summary.dags.size(); ++i) {
-    const metrics::DagSummary &dag = session.summary.dags[i];
+  for (const metrics::DagSummary &dag : session.summary.dags) {
     const metrics::Distribution &end_to_end = dag.end_to_end.response;
     const std::string bound = dag.max_active > 0 ? fmt::format("{}", dag.max_active) : "-";
     table.add(

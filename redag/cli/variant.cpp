@@ -7,9 +7,9 @@
 namespace redag::cli {
 
 const std::vector<std::string> &variant_names() {
-  static const std::vector<std::string> names = {"redag", "redag-none", "redag-cooperative", "redag-os",
-                                                 "mte",   "ste",        "mte-fifo",          "ste-fifo"};
-  return names;
+  static const std::vector<std::string> kNames = {"redag", "redag-none", "redag-cooperative", "redag-os",
+                                                  "mte",   "ste",        "mte-fifo",          "ste-fifo"};
+  return kNames;
 }
 
 Result<Variant> parse_variant(const std::string &name) {
