@@ -69,7 +69,7 @@ void JobFolder::add(const JobEvent &event) {
       record.deadline = event.value;
       found->on_worker_since = event.time;
       break;
-    case JobEventKind::Started: record.start = event.time; break;
+    case JobEventKind::Started: record.start = event.value; break;  // exact, where the time had to wait for its turn
     case JobEventKind::Preempted:
       ++record.preemptions;
       if (found->on_worker_since != kNever) record.on_worker += event.time - found->on_worker_since;

@@ -1,19 +1,5 @@
 // Model of rclcpp's SingleThreadedExecutor and MultiThreadedExecutor as of ROS 2 Humble. Owns which ready job runs
-// next; a job's life is Lifecycle's. Not thread-safe.
-//
-// Modelled (rclcpp/src/rclcpp/executor.cpp and allocator_memory_strategy.hpp):
-// - A wait returns the set of ready entities (Executor::wait_for_work, collect_entities, remove_null_handles). Entities
-//   of an exclusive group that is busy are left out. This set is used up before the next wait: what becomes ready
-//   meanwhile is not seen (the processing window of Casini, Blass, Luetkebohle, Brandenburg, ECRTS 2019).
-// - From the set: timers first, then subscriptions (get_next_ready_executable_from_map), in the order of registration,
-//   each once; those whose group is busy are passed over and stay (get_next_timer, get_next_subscription).
-// - MultiThreadedExecutor::run: the threads take one entity each under a lock; a group is busy until its job ends.
-// Not modelled: what rcl_wait, the lock and waking a thread cost; services, clients, waitables; that groups are walked
-// in the order of their addresses, which is arbitrary (here: order of DAGs and tasks).
-//
-// A timer task is a timer, a data task a subscription. `group` is the callback group; a task without one is alone in a
-// group of its own, whereas in ROS 2 all callbacks of a node share its default group unless told otherwise. Bounds of
-// DAGs (max_active), priorities and preemption are unknown to these executors.
+// next; a job's life is Lifecycle's. Not thread-safe. What is modelled and what is not: at the class.
 #pragma once
 
 #include <cstdint>
@@ -24,6 +10,19 @@
 
 namespace redag::sched {
 
+/// Modelled (rclcpp/src/rclcpp/executor.cpp and allocator_memory_strategy.hpp):
+/// - A wait returns the set of ready entities (Executor::wait_for_work, collect_entities, remove_null_handles).
+///   Entities of an exclusive group that is busy are left out. This set is used up before the next wait: what becomes
+///   ready meanwhile is not seen (the processing window of Casini, Blass, Luetkebohle, Brandenburg, ECRTS 2019).
+/// - From the set: timers first, then subscriptions (get_next_ready_executable_from_map), in the order of registration,
+///   each once; those whose group is busy are passed over and stay (get_next_timer, get_next_subscription).
+/// - MultiThreadedExecutor::run: the threads take one entity each under a lock; a group is busy until its job ends.
+/// Not modelled: what rcl_wait, the lock and waking a thread cost; services, clients, waitables; that groups are walked
+/// in the order of their addresses, which is arbitrary (here: order of DAGs and tasks).
+///
+/// A timer task is a timer, a data task a subscription. `group` is the callback group; a task without one is alone in a
+/// group of its own, whereas in ROS 2 all callbacks of a node share its default group unless told otherwise. Bounds of
+/// DAGs (max_active), priorities and preemption are unknown to these executors.
 class WaitSetScheduler final : public Lifecycle {
  public:
   /// Requires config.workers > 0 and Preemption::None; 1 worker is the SingleThreadedExecutor.
