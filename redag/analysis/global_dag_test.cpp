@@ -103,6 +103,51 @@ ResponseBound dag_response(const Method &method, const System &system, std::size
   return std::get<Bound>(method.apply(system)).dags[dag];
 }
 
+// DAGs that are narrow and wide in turn above a wide one with longer tasks: what random graphs hardly ever are.
+testing::BoundCase narrow_and_wide_case(Rng &rng, sched::Preemption preemption, bool bounds) {
+  testing::BoundCase result;
+  result.platform.workers = static_cast<std::uint32_t>(rng.uniform(2, 4));
+  result.platform.preemption = preemption;
+  result.workload.name = "random";
+  result.workload.platform.workers = result.platform.workers;
+  const auto add_dag = [&](std::int64_t stages, Duration longest, Duration period) {
+    Dag dag;
+    dag.name = "d" + std::to_string(result.workload.dags.size());
+    std::vector<std::uint32_t> before;
+    for (std::int64_t stage = 0; stage < stages; ++stage) {
+      const auto first = static_cast<std::uint32_t>(dag.tasks.size());
+      const std::int64_t width = stage % 2 == 0 ? 1 : rng.uniform(2, result.platform.workers + 2);
+      std::vector<std::uint32_t> now;
+      for (std::int64_t i = 0; i < width; ++i) {
+        const Duration wcet = rng.uniform(1, stage % 2 == 0 ? 2 : longest);
+        now.push_back(first + static_cast<std::uint32_t>(i));
+        dag.tasks.push_back(make_task("t" + std::to_string(now.back()), wcet, period, before));
+      }
+      before = now;
+    }
+    if (bounds && rng.uniform(0, 1) == 0) dag.max_active = static_cast<std::uint32_t>(rng.uniform(1, 3));
+    result.workload.dags.push_back(dag);
+  };
+  add_dag(rng.uniform(1, 7), 4, 150);
+  if (rng.uniform(0, 2) == 0) add_dag(rng.uniform(1, 3), 4, 200);
+  add_dag(rng.uniform(1, 4), 12, 400);
+  return result;
+}
+
+TEST(BoundProperty, DagNonpreemptiveNarrowAndWide) {
+  for (const bool bounds : {false, true}) {
+    const auto generator = [bounds](Rng &rng) { return narrow_and_wide_case(rng, sched::Preemption::None, bounds); };
+    expect_bound_holds(dag_nonpreemptive(), generator, {.workloads = 1500, .periods = 5});
+  }
+}
+
+TEST(BoundProperty, DagBoundedNarrowAndWide) {
+  for (const bool bounds : {false, true}) {
+    const auto generator = [bounds](Rng &rng) { return narrow_and_wide_case(rng, sched::Preemption::Full, bounds); };
+    expect_bound_holds(dag_bounded(), generator, {.workloads = 1000, .periods = 5});
+  }
+}
+
 TEST(GlobalDag, LessUrgentWorkStartsWheneverTheUpperDagIsNarrow) {
   const System system = compiled(narrow_and_wide(), sched::Preemption::None);
   EXPECT_EQ(system.units[0].length, 26);

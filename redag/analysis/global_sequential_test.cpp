@@ -49,6 +49,18 @@ TEST(BoundProperty, Guan) {
   expect_bound_holds(guan(), cases(several_workers(sched::Preemption::Full)), {.workloads = 2000});
 }
 
+// Few long tasks on two workers, looked at from many offsets: where a task that carries work in matters.
+TEST(BoundProperty, GuanWithCarriedWork) {
+  BoundCaseLimits limits;
+  limits.min_workers = limits.max_workers = 2;
+  limits.max_dags = 5;
+  limits.min_utilization = 0.5;
+  limits.max_utilization = 0.9;
+  limits.min_period = 3;
+  limits.max_period = 14;
+  expect_bound_holds(guan(), cases(limits), {.workloads = 1500, .runs = 20, .periods = 30});
+}
+
 TEST(BoundProperty, SequentialNonpreemptive) {
   expect_bound_holds(sequential_nonpreemptive(), cases(several_workers(sched::Preemption::None)), {.workloads = 2000});
 }
