@@ -92,17 +92,24 @@ bool preempts_at_once(const System &system) {
          (levels == 0 || levels >= system.tasks.size());
 }
 
-bool is_isolated(const System &system, std::size_t dag) {
+// Workers that nothing else can keep from the DAG: as many as it can use, or all, or 0.
+std::uint32_t own_workers(const System &system, std::size_t dag) {
   std::uint32_t last_rank = 0;
   for (const std::uint32_t t : system.dags[dag].tasks) last_rank = std::max(last_rank, system.tasks[t].rank);
-  std::uint64_t sum = 0;
-  for (const SystemDag &other : system.dags) {
+  std::uint64_t others = 0;
+  for (std::size_t d = 0; d < system.dags.size(); ++d) {
+    const SystemDag &other = system.dags[d];
     const bool interferes =
         !preempts_at_once(system) ||
         std::any_of(other.tasks.begin(), other.tasks.end(), [&](auto t) { return system.tasks[t].rank <= last_rank; });
-    if (interferes) sum += most_started(other);
+    if (d != dag && interferes) others += most_started(other);
   }
-  return sum <= system.platform.workers;
+  const std::uint32_t wanted = most_started(system.dags[dag]);
+  const std::uint32_t workers = system.platform.workers;
+  if (others + wanted <= workers) return wanted;
+  // Below its own bound it would compete with others for workers; with nobody else there is nothing to compete for.
+  const bool alone = others == 0 && system.dags[dag].units.size() == 1 && system.mode != sched::Preemption::Cooperative;
+  return alone ? workers : 0;
 }
 
 Outcome apply_isolated(const System &system) {
@@ -111,21 +118,23 @@ Outcome apply_isolated(const System &system) {
   bool any = false;
   for (std::size_t d = 0; d < system.dags.size(); ++d) {
     const SystemDag &dag = system.dags[d];
-    const bool alone = is_isolated(system, d);
-    any = any || alone;
+    const std::uint32_t workers = own_workers(system, d);
+    any = any || workers > 0;
     for (const std::uint32_t u : dag.units) {
       const Unit &unit = system.units[u];
-      if (!alone) {
+      if (workers == 0) {
         responses[u].absent = "it and what interferes can occupy more than all workers";
       } else if (dag.max_active > 0 && dag.units.size() > 1) {
         responses[u].absent = "several parts of the DAG share one max_active";
       } else {
-        const Duration own = dag.max_active > 0 ? long_paths_response(system, unit, dag.max_active) : unit.length;
+        const bool one_each = workers >= dag.tasks.size();
+        const Duration own = one_each ? unit.length : long_paths_response(system, unit, workers);
         responses[u] = bound_of(system, global::unit_of(system, u), own);
       }
     }
   }
-  if (!any) return NotApplicable{"the max_active of no DAG and of what can interfere with it sum up to at most m"};
+  if (!any)
+    return NotApplicable{"no DAG has workers to itself: bounds of it and of what interferes sum up to more than m"};
   return from_units(system, std::move(responses));
 }
 

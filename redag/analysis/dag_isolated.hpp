@@ -22,7 +22,7 @@ namespace redag::analysis {
 [[nodiscard]] Method long_paths();
 
 /// Of every DAG whose max_active and those of the more urgent (of all, where jobs are not preempted at once) sum up to
-/// at most m. Proof: docs/analysis.md, "Isolation".
+/// at most m, or that no other can take a worker from. Proof: docs/analysis.md, "Isolation".
 [[nodiscard]] Method isolated();
 
 /// max_active for each DAG with which isolated() bounds it within its deadline, n_k = ceil((vol - len) / (D - len)) for

@@ -138,6 +138,12 @@ TEST(DagIsolated, BoundsThatSumUpToTheWorkersShareNothing) {
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(isolated().apply(nonpreemptive)));
 }
 
+TEST(DagIsolated, TheMostUrgentHasAllWorkersWhereItPreempts) {
+  const System system = compiled(2, {fork_join("first"), fork_join("second")}, sched::Preemption::Full);
+  EXPECT_EQ(dag_response(isolated(), system, 0), 15 + 8);
+  EXPECT_FALSE(dag_response(isolated(), system, 1));
+}
+
 TEST(DagIsolated, FederatedBoundsMeetTheDeadlines) {
   Dag heavy = fork_join("heavy");
   heavy.deadline = 24;  // (32 - 15) / (24 - 15): two workers

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "redag/analysis/response_time.hpp"
 #include "redag/testing/bound_property.hpp"
 
 namespace redag::analysis {
@@ -203,20 +204,26 @@ TEST(GlobalDag, BoundedIsNeverAboveMelani) {
   EXPECT_GT(smaller, 100U);
 }
 
-// On one worker a DAG's bound is that of a task with its volume, carried-in work included.
-TEST(GlobalDag, OneWorkerIsAtLeastTheVolume) {
+// On one worker a DAG is a task with C = its volume, and its response is known exactly.
+TEST(GlobalDag, OnOneWorkerItIsNotBelowTheExactResponse) {
   BoundCaseLimits limits = graphs(sched::Preemption::Full);
   limits.max_workers = 1;
-  const auto compared = compare_all(limits, 500, [](const testing::BoundCase &, const System &system) {
+  limits.jitter = limits.overheads = false;
+  std::uint64_t equal = 0;
+  const auto compared = compare_all(limits, 1000, [&](const testing::BoundCase &bound_case, const System &system) {
+    const Outcome exact = dag_one_worker_preemptive().apply(system);
     const Outcome outcome = dag_bounded().apply(system);
-    if (!std::holds_alternative<Bound>(outcome)) return false;
-    for (const Unit &unit : system.units) {
-      const ResponseBound &bound = std::get<Bound>(outcome).tasks[unit.tasks.front()];
-      EXPECT_GE(bound.response.value_or(kNever), unit.volume + unit.jitter);
+    if (!std::holds_alternative<Bound>(exact) || !std::holds_alternative<Bound>(outcome)) return false;
+    for (std::size_t d = 0; d < system.dags.size(); ++d) {
+      const Duration found = std::get<Bound>(outcome).dags[d].response.value_or(kNever);
+      const Duration known = std::get<Bound>(exact).dags[d].response.value_or(kNever);
+      EXPECT_GE(found, known) << describe(bound_case);
+      if (found == known) ++equal;
     }
     return true;
   });
-  EXPECT_GT(compared, 100U);
+  EXPECT_GT(compared, 300U);
+  EXPECT_GT(equal, 300U);
 }
 
 TEST(GlobalDag, MoreExecutionNeverShrinksABound) {
