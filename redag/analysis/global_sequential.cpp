@@ -49,18 +49,15 @@ Duration least_window(Duration all, std::span<const Largest::Entry> largest, std
   return least;
 }
 
-// The least d >= 1 with sum_i min(W_i(d), d) + rest < m d, by steps of least_window(): work grows with the window, so
-// no d that one of them skips can do. That a job waits in d instants would take m d of work, so it waits in less. Plain
-// iteration instead creeps, a nanosecond a step, while m tasks interfere in every instant. False above `stop`.
+// The least d, from the given one on, with sum_i min(W_i(d), d) + rest < m d, by steps of least_window(): work grows
+// with the window, so no d that one of them skips can do. That a job waits in d instants would take m d of work, so it
+// waits in less. Plain iteration instead creeps, a nanosecond a step, while m tasks interfere in every instant. False
+// above `stop`.
 template <class Window>
-bool least_fixed_point(Duration stop, Duration &result, Window next) {
-  Duration d = 1;
+bool least_fixed_point(Duration stop, Duration &d, Window next) {
   for (int steps = 0; d <= stop && steps < kMaxSteps; ++steps) {
     const Duration grown = next(d);
-    if (grown <= d) {
-      result = d;
-      return true;
-    }
+    if (grown <= d) return true;
     d = grown;
   }
   return false;
@@ -110,6 +107,19 @@ Duration guan_window(std::span<GlobalUnit> more_urgent, Duration x, Duration d, 
   return least_window(sum, largest.entries(), workers);
 }
 
+// least_window() if no task carried work in: not above guan_window(), and cheaper.
+Duration fresh_window(std::span<const GlobalUnit> more_urgent, Duration x, Duration d, std::uint32_t workers) {
+  Largest largest(workers - 1);
+  Duration sum = 0;
+  for (const GlobalUnit &other : more_urgent) {
+    const Division jobs = divide(x + other.jitter, other);
+    const Duration work = jobs.quotient * other.volume + std::min(other.volume, jobs.remainder);
+    sum += work;
+    if (work >= d) largest.offer(work);
+  }
+  return least_window(sum, largest.entries(), workers);
+}
+
 // least_window() with sequential_work() of all but `skip`, and `rest`.
 Duration carrying_window(std::span<GlobalUnit> others, std::size_t skip, Duration x, Duration d, Duration rest,
                          std::uint32_t workers) {
@@ -130,7 +140,7 @@ constexpr std::size_t kNobody = SIZE_MAX;
 
 bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
   GlobalUnit &own = units[k];
-  Duration d = 0;
+  Duration d = 1;
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
     return carrying_window(units.first(k), kNobody, waiting + own.volume - 1, waiting, 0, workers);
   });
@@ -140,11 +150,13 @@ bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::
 
 bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
   GlobalUnit &own = units[k];
-  Duration d = 0;
-  const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
-    return guan_window(units.first(k), waiting + own.volume - 1, waiting, workers);
-  });
-  own.response = d - 1 + own.volume + own.jitter;
+  const Duration stop = own.limit - own.jitter - own.volume + 1;
+  const auto window = [&](Duration d) { return d + own.volume - 1; };
+  Duration d = 1;
+  const bool found =
+      least_fixed_point(stop, d, [&](Duration w) { return fresh_window(units.first(k), window(w), w, workers); }) &&
+      least_fixed_point(stop, d, [&](Duration w) { return guan_window(units.first(k), window(w), w, workers); });
+  own.response = window(d) + own.jitter;
   return found;
 }
 
@@ -152,7 +164,7 @@ bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t 
                                        Duration remaining) {
   GlobalUnit &own = units[k];
   if (remaining >= kUnbounded / 4) return false;
-  Duration d = 0;
+  Duration d = 1;
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
     return carrying_window(units.first(k), kNobody, waiting, waiting, remaining, workers);
   });
@@ -162,7 +174,7 @@ bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t 
 
 bool any_order_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
   GlobalUnit &own = units[k];
-  Duration d = 0;
+  Duration d = 1;
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
     return carrying_window(units, k, waiting + own.volume - 1, waiting, 0, workers);
   });
