@@ -106,7 +106,8 @@ class SharedTerms {
 
 inline constexpr std::string_view kExceedsLimit = "its response exceeds the limit: jobs would be skipped";
 inline constexpr std::string_view kMoreUrgent = "something more urgent has no bound";
-inline constexpr std::string_view kGaveUp = "gave up: the fixed point takes too many steps";
+inline constexpr std::string_view kNoFixedPoint =
+    "no fixed point within its limit, above which jobs would be skipped, in the steps allowed";
 
 /// Evaluations of one fixed point; ordinary systems need tens.
 inline constexpr int kMaxSteps = 100'000;

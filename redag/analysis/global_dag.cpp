@@ -146,7 +146,7 @@ Bound from_most_urgent(const System &system, const std::vector<GlobalUnit> &unit
       response.terms = terms.take();
     } else {
       known = false;
-      response.absent = global::kExceedsLimit;
+      response.absent = global::kNoFixedPoint;
     }
   }
   return from_units(system, std::move(responses));

@@ -45,7 +45,7 @@ class Analysis {
         response = itemise(k);
       } else {
         known = false;
-        response.absent = global::kExceedsLimit;
+        response.absent = global::kNoFixedPoint;
       }
     }
     return from_units(system_, std::move(responses));

@@ -229,7 +229,7 @@ Outcome from_most_urgent(const System &system, sched::Preemption mode, Respond r
       response = itemise(system, view.units, k, view.workers, remaining);
     } else {
       known = false;
-      response.absent = global::kExceedsLimit;
+      response.absent = global::kNoFixedPoint;
     }
   }
   return from_units(system, std::move(responses));
