@@ -21,6 +21,7 @@ Action add_generate(CLI::App &app);
 Action add_simulate(CLI::App &app);
 Action add_run(CLI::App &app);
 Action add_compare(CLI::App &app);
+Action add_analyze(CLI::App &app);
 Action add_check_trace(CLI::App &app);
 
 }  // namespace redag::cli

@@ -41,6 +41,11 @@ constexpr std::array kCommands = {
           "  redag compare cart.yaml\n"
           "  redag compare cart.yaml --executors redag-none,redag-os,mte,mte-fifo --repeat 5 --out results/cmp\n"
           "  redag compare cart.yaml --simulate --duration 60s --json\n"},
+    Entry{"analyze", "Bound every response time: which deadlines hold whatever happens, and why", add_analyze,
+          "  redag analyze cart.yaml\n"
+          "  redag analyze cart.yaml --preemption none --workers 2 --check\n"
+          "  redag analyze cart.yaml --explain control.pid\n"
+          "  redag analyze --methods\n"},
     Entry{"check-trace", "Hold recorded traces to the rules of the model", add_check_trace,
           "  redag check-trace results/demo\n"
           "  redag check-trace --json results/os/events.jsonl\n"},
@@ -81,7 +86,8 @@ CLI::App *chosen(CLI::App &app) {
 }
 
 int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
-  CLI::App app("Priority scheduling for many callback DAGs in one process: validate, simulate, run, compare.", "redag");
+  CLI::App app("Priority scheduling for many callback DAGs in one process: validate, simulate, run, compare, analyze.",
+               "redag");
   app.set_version_flag("--version", std::string("redag ") + kVersion);
   app.require_subcommand(0, 1);
   app.get_formatter()->column_width(34);

@@ -15,14 +15,24 @@ constexpr const char *kResultGroup = "Results";
 
 }  // namespace
 
+void add_platform_arguments(CLI::App &app, RunArguments &arguments) {
+  add_choice(app, "--policy", arguments.policy, policy_choices(), "Priority order")->group(kWorkloadGroup);
+  add_choice(app, "--preemption", arguments.preemption, preemption_choices(), "Of redag")->group(kWorkloadGroup);
+  add_count(app, "--workers", arguments.workers, "Workers")->default_str("")->group(kWorkloadGroup);
+}
+
+void add_overhead_arguments(CLI::App &app, sim::Overheads &overheads, const std::string &group) {
+  add_duration(app, "--overhead-release", overheads.release, "Processor time to handle a release", true)->group(group);
+  add_duration(app, "--overhead-dispatch", overheads.dispatch, "Processor time to start a job", true)->group(group);
+  add_duration(app, "--overhead-preempt", overheads.preempt, "Processor time to resume a job", true)->group(group);
+}
+
 void add_workload_arguments(CLI::App &app, RunArguments &arguments) {
   app.add_option("FILE", arguments.file, "Workload (YAML); - is standard input")->required();
   add_duration(app, "--duration", arguments.duration, "Releases happen in this time; jobs may still be running then");
   add_duration(app, "--warmup", arguments.warm_up, "Jobs released in this time at the start are not counted", true);
   add_count(app, "--seed", arguments.seed, "Of execution times and jitter: every executor gets the same jobs");
-  add_choice(app, "--policy", arguments.policy, policy_choices(), "Priority order")->group(kWorkloadGroup);
-  add_choice(app, "--preemption", arguments.preemption, preemption_choices(), "Of redag")->group(kWorkloadGroup);
-  add_count(app, "--workers", arguments.workers, "Workers")->default_str("")->group(kWorkloadGroup);
+  add_platform_arguments(app, arguments);
 }
 
 void add_result_arguments(CLI::App &app, RunArguments &arguments) {
@@ -37,12 +47,7 @@ void add_result_arguments(CLI::App &app, RunArguments &arguments) {
 
 void add_simulator_arguments(CLI::App &app, RunArguments &arguments) {
   const std::string group = "Simulator";
-  add_duration(app, "--overhead-release", arguments.overheads.release, "Processor time to handle a release", true)
-      ->group(group);
-  add_duration(app, "--overhead-dispatch", arguments.overheads.dispatch, "Processor time to start a job", true)
-      ->group(group);
-  add_duration(app, "--overhead-preempt", arguments.overheads.preempt, "Processor time to resume a job", true)
-      ->group(group);
+  add_overhead_arguments(app, arguments.overheads, group);
   add_count(app, "--max-events", arguments.max_events, "Events that are checked and written; later ones are summarized")
       ->group(group);
 }

@@ -1,5 +1,5 @@
 // What `simulate`, `run` and `compare` ask for alike: the workload and changes to it, length, seed, where results go.
-// The steps that they share from there to a session. Not thread-safe.
+// The steps that they share from there to a session. `analyze` takes the workload's part. Not thread-safe.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -35,6 +35,9 @@ struct RunArguments {
   bool all_tasks = false;
 };
 
+/// What replaces the platform and the policy of the workload.
+void add_platform_arguments(CLI::App &app, RunArguments &arguments);
+void add_overhead_arguments(CLI::App &app, sim::Overheads &overheads, const std::string &group);
 void add_workload_arguments(CLI::App &app, RunArguments &arguments);
 void add_result_arguments(CLI::App &app, RunArguments &arguments);
 void add_simulator_arguments(CLI::App &app, RunArguments &arguments);

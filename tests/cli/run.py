@@ -105,7 +105,7 @@ class Usage(Case):
 
     def test_help_of_every_command(self):
         listed = redag("--help").stdout
-        for command in ["validate", "generate", "simulate", "run", "compare", "check-trace"]:
+        for command in ["validate", "generate", "simulate", "run", "compare", "analyze", "check-trace"]:
             self.assertIn(command, listed)
             text = self.expect(redag(command, "--help"), 0).stdout
             self.assertIn(f"Usage: redag {command}", text)
@@ -113,7 +113,7 @@ class Usage(Case):
 
     def test_examples_parse(self):
         """Every option in the examples of --help exists."""
-        for command in ["validate", "generate", "simulate", "run", "compare", "check-trace"]:
+        for command in ["validate", "generate", "simulate", "run", "compare", "analyze", "check-trace"]:
             text = redag(command, "--help").stdout
             options, examples = text.split("Examples:")
             for option in re.findall(r"--[a-z-]+", examples):
@@ -399,6 +399,96 @@ class Compare(Case):
     def test_preemption_is_what_makes_the_difference(self):
         result = redag("compare", self.cart, "--simulate", "--executors", "redag-none,redag-os", "--duration", "1s")
         self.assertIn(": redag-os misses fewest", self.expect(result, 0).stdout)
+
+
+class Analyze(Case):
+    def test_table_and_verdict(self):
+        result = self.expect(redag("analyze", self.cart), 0)
+        # One worker, run to completion: plan (25 ms) blocks fast, which has 10 ms.
+        self.assertRegex(result.stdout, r"fast\.sense +10ms +- +- +no bound")
+        self.assertRegex(result.stdout, r"slow\.plan +100ms +\S+ms +\S+ms +ok +dag_one_worker_deferred")
+        self.assertIn("preemption: none\n", result.stdout)
+        self.assertIn("not shown schedulable: 2 tasks without a bound", result.stdout)
+        self.assertRegex(result.stdout, r"melani +does not apply +\S")
+
+    def test_overrides_and_check(self):
+        self.expect(redag("analyze", self.cart, "--check"), 1)
+        preempted = self.expect(redag("analyze", self.cart, "--check", "--preemption", "os"), 0)
+        self.assertIn("schedulable: every deadline is met, by ", preempted.stdout)
+        self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--policy", "fixed"), 0)
+        self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--workers", "2"), 0)
+        self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--overhead-dispatch", "5ms"), 1)
+
+    def test_auto_is_said(self):
+        self.assertIn("auto is analysed as os", redag("analyze", SOURCE / "workloads" / "hello.yaml").stdout)
+        text = redag("analyze", SOURCE / "workloads" / "hello.yaml", "--preemption", "cooperative").stdout
+        self.assertIn("preemption: cooperative (no task has a region: the same as none)", text)
+
+    def test_overload_is_certain(self):
+        text = redag("analyze", self.write("over.yaml", CART.replace("25ms", "99ms"))).stdout
+        self.assertIn("\nnot schedulable: the utilization, 1.190, is above what 1 worker can do", text)
+
+    def test_explanation(self):
+        text = self.expect(redag("analyze", self.cart, "--preemption", "os", "--explain", "slow.plan"), 0).stdout
+        # 25 ms of its own and four times the 2 ms of fast: in 33 ms, fast comes at 0, 10, 20 and 30.
+        self.assertIn("slow.plan: answers within 33ms of its release, deadline 100ms: ok", text)
+        self.assertRegex(text, r"own execution +slow.plan +1 +25ms +75\.8 %")
+        self.assertRegex(text, r"interference of +fast +4 +8ms +24\.2 %")
+        self.assertIn("what to change: the largest term is 25ms of 33ms", text)
+        text = self.expect(redag("analyze", self.cart, "--explain", "fast"), 0).stdout
+        self.assertIn("fast: no bound", text)
+        self.assertIn("jobs would be skipped", text)
+
+    def test_unknown_task(self):
+        self.expect(redag("analyze", self.cart, "--explain", "slow.plam"), 2, "did you mean 'slow.plan'?")
+        self.expect(redag("analyze", self.cart, "--explain", "act"), 2, "did you mean 'fast.act'?")
+        self.assertEqual(redag("analyze", self.cart, "--json", "--explain", "nobody").stdout, "")
+
+    def test_json(self):
+        document = self.document(redag("analyze", self.cart, "--preemption", "os", "--json"), "redag.analysis/1")
+        self.assertTrue(document["schedulable"])
+        self.assertEqual([task["name"] for task in document["tasks"]], ["fast.sense", "fast.act", "slow.plan"])
+        for row in document["tasks"] + document["dags"]:
+            self.assertEqual(row["bound_ns"], sum(term["amount_ns"] for term in row["terms"]))
+        plan = document["tasks"][2]
+        self.assertEqual((plan["bound_ns"], plan["slack_ns"], plan["verdict"]), (33_000_000, 67_000_000, "ok"))
+        listed = redag("analyze", "--methods").stdout
+        for method in document["methods"]:
+            self.assertIn(f"\n{method['name']} (", "\n" + listed)
+            if method["paper"] and not method["sound"]:
+                self.assertNotIn(method["name"], document["by"])
+        explained = json.loads(redag("analyze", self.cart, "--json", "--explain", "slow").stdout)
+        self.assertEqual(explained["explanation"]["name"], "slow")
+
+    def test_bad_input(self):
+        self.expect(redag("analyze"), 2, "FILE is required")
+        self.expect(redag("analyze", self.write("bad.yaml", MISTAKEN)), 2, "did you mean 'wcet'?")
+        self.expect(redag("analyze", self.cart, "--preemption", "os", "--policy", "edf"), 2, "static policy")
+        self.expect(redag("analyze", self.cart, "--overhead-release", "-1us"), 2, "--overhead-release")
+
+    def test_no_simulated_response_is_above_its_bound(self):
+        bounded = 0
+        for seed in range(1, 25):
+            text = redag("generate", "--seed", seed, "--dags", 3, "--utilization", "1.1", "--workers", 1 + seed % 2).stdout
+            for mode in ("none", "os"):
+                analysis = json.loads(redag("analyze", "-", "--preemption", mode, "--json", text=text).stdout)
+                run = json.loads(redag("simulate", "-", "--preemption", mode, "--duration", "2s", "--json", text=text).stdout)
+                for task, seen in zip(analysis["tasks"], run["tasks"]):
+                    if task["bound_ns"] is not None and seen["response"]["count"] > 0:
+                        bounded += 1
+                        self.assertLessEqual(seen["response"]["max_ns"], task["bound_ns"], (seed, mode, task["name"]))
+        self.assertGreater(bounded, 20)
+
+    def test_workloads_of_the_repository(self):
+        for file in sorted((SOURCE / "workloads").rglob("*.yaml")):
+            self.expect(redag("analyze", file), 0)
+            self.expect(redag("analyze", file, "--preemption", "none"), 0)
+
+    def test_narrow_terminal(self):
+        status, text = in_terminal("analyze", self.cart, columns=50, NO_COLOR="1")
+        self.assertEqual(status, 0, text)
+        rows = [line for line in text.splitlines() if re.match(r"(fast|slow|melani)", line)]
+        self.assertLessEqual(max(map(len, rows)), 50, text)
 
 
 class CheckTrace(Case):

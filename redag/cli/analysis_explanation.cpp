@@ -1,0 +1,172 @@
+#include "redag/cli/analysis_explanation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "redag/cli/options.hpp"
+#include "redag/cli/table.hpp"
+
+namespace redag::cli {
+namespace {
+
+using analysis::MethodReport;
+using analysis::Term;
+
+// Whose share it is. A unit of several tasks is called by its DAG.
+std::string owner(const Analysed &analysed, const Term &term) {
+  if (term.task.valid()) return task_name(analysed, term.task);
+  if (term.dag.valid()) return analysed.system.dags[term.dag.value].name;
+  switch (term.kind) {
+    case Term::Kind::Blocking: return "less urgent work";
+    case Term::Kind::Interference: return "more urgent work, together";
+    default: return "-";
+  }
+}
+
+std::string what(const Term &term) {
+  switch (term.kind) {
+    case Term::Kind::Own: return "own execution";
+    case Term::Kind::Earlier: return term.amount < 0 ? "since earlier jobs were released" : "earlier jobs of its own";
+    case Term::Kind::Blocking: return "blocking by";
+    case Term::Kind::Interference: return "interference of";
+    case Term::Kind::Jitter: return "release jitter";
+    case Term::Kind::Overhead: return "overhead";
+  }
+  return "?";
+}
+
+std::string advice_on_blocking(const Analysed &analysed, const std::string &who) {
+  switch (analysed.system.mode) {
+    case sched::Preemption::None:
+      return fmt::format(
+          "{} keeps its worker until it ends: shorten it, or let it be preempted (`region` with "
+          "--preemption cooperative, or os)",
+          who);
+    case sched::Preemption::Cooperative:
+      return fmt::format("{} keeps its worker until its next preemption point: give it a shorter `region`", who);
+    case sched::Preemption::Full: break;
+  }
+  return fmt::format("{} holds a group or shares a priority level: shorten it, or take it out of the group", who);
+}
+
+std::string advice(const Analysed &analysed, const Term &term) {
+  const std::string who = owner(analysed, term);
+  switch (term.kind) {
+    case Term::Kind::Own: return "a smaller wcet of its own counts most";
+    case Term::Kind::Earlier: return "its earlier jobs are not done when it comes: a smaller wcet or a longer period";
+    case Term::Kind::Blocking: return advice_on_blocking(analysed, who);
+    case Term::Kind::Interference: {
+      const std::string times = term.jobs > 1 ? fmt::format(" comes {} times before it ends",
+                                                            format_count(static_cast<std::uint64_t>(term.jobs)))
+                                              : std::string(" goes first");
+      return fmt::format("{}{}: shorten it, release it less often, or add a worker", who, times);
+    }
+    case Term::Kind::Jitter: return "a release that is seen sooner counts most";
+    case Term::Kind::Overhead: return "fewer and longer jobs, or cheaper scheduling, count most";
+  }
+  return {};
+}
+
+double share(Duration part, Duration whole) {
+  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
+}
+
+std::string explain_bound(const Analysed &analysed, const Row &row, const StreamTraits &terminal) {
+  const Duration response = *row.tightest.response;
+  std::vector<Term> terms = row.tightest.bound.terms;
+  std::stable_sort(terms.begin(), terms.end(), [](const Term &a, const Term &b) { return a.amount > b.amount; });
+  Table table({{"what", false, 9}, {"of", false, 8}, {"jobs", true, 2}, {"time", true, 7}, {"share", true, 5}});
+  for (const Term &term : terms) {
+    if (term.amount == 0) continue;
+    const bool is_negative = term.amount < 0;
+    table.add({{what(term)},
+               {owner(analysed, term)},
+               {term.jobs > 0 ? format_count(static_cast<std::uint64_t>(term.jobs)) : "-"},
+               {is_negative ? "-" + humanize_duration(-term.amount) : humanize_duration(term.amount)},
+               {is_negative ? "-" : format_percent(share(term.amount, response))}});
+  }
+  std::string text = fmt::format("where it comes from, by {}:\n", row.tightest.method->name) +
+                     table.render(terminal.width, terminal.colour);
+  if (terms.empty()) return text;
+  text += fmt::format("what to change: the largest term is {} of {}, {}: {}\n", humanize_duration(terms.front().amount),
+                      humanize_duration(response), format_percent(share(terms.front().amount, response)),
+                      advice(analysed, terms.front()));
+  if (row.slack.value_or(0) < 0) text += fmt::format("{} are missing\n", humanize_duration(-*row.slack));
+  return text;
+}
+
+// Why nothing bounds it, what could not be asked, and who uses the workers.
+std::string explain_absence(const Analysed &analysed, const Row &row) {
+  std::string text = fmt::format("why there is no bound: {}\n", row.reason);
+  if (!analysed.system.not_analysable.empty()) return text;
+  std::vector<std::pair<std::string, std::string>> reasons;  // why not, and which methods say so
+  for (const MethodReport &report : analysed.report.methods) {
+    const auto *reason = std::get_if<analysis::NotApplicable>(&report.outcome);
+    if (reason == nullptr || report.method->subject == analysis::Subject::System) continue;
+    const auto same =
+        std::find_if(reasons.begin(), reasons.end(), [&](const auto &known) { return known.first == reason->reason; });
+    if (same == reasons.end()) {
+      reasons.emplace_back(reason->reason, std::string(report.method->name));
+    } else {
+      same->second += ", " + std::string(report.method->name);
+    }
+  }
+  if (!reasons.empty()) text += "what does not apply:\n";
+  for (const auto &[reason, methods] : reasons) text += fmt::format("  {}\n    {}\n", reason, methods);
+  std::vector<std::pair<double, std::string>> loads;
+  for (const analysis::Unit &unit : analysed.system.units) {
+    loads.emplace_back(share(unit.volume, unit.period), unit.tasks.size() > 1
+                                                            ? analysed.system.dags[unit.dag.value].name
+                                                            : task_name(analysed, TaskId(unit.tasks.front())));
+  }
+  std::stable_sort(loads.begin(), loads.end(), [](const auto &a, const auto &b) { return a.first > b.first; });
+  constexpr std::size_t kMost = 3;
+  text += "who uses most of the workers:";
+  for (std::size_t i = 0; i < loads.size() && i < kMost; ++i) {
+    text += fmt::format("{} {} {}", i == 0 ? "" : ",", loads[i].second, format_percent(loads[i].first));
+  }
+  return text + "\n";
+}
+
+}  // namespace
+
+Result<Row> find_row(const Analysed &analysed, const std::string &name) {
+  std::vector<std::string> names;
+  for (const bool of_dags : {false, true}) {
+    for (Row &row : of_dags ? dag_rows(analysed) : task_rows(analysed)) {
+      std::string slashed = row.name;
+      if (const std::size_t dot = slashed.find('.'); dot != std::string::npos) slashed[dot] = '/';
+      if (row.name == name || (!of_dags && slashed == name)) return std::move(row);
+      names.push_back(row.name);
+    }
+  }
+  // The task's own name, without its DAG's, is the likeliest mistake.
+  for (const std::string &candidate : names) {
+    const std::size_t at = candidate.size() > name.size() ? candidate.size() - name.size() - 1 : std::string::npos;
+    if (at != std::string::npos && candidate.compare(at, std::string::npos, "." + name) == 0) {
+      return make_error("there is no task or DAG '" + name + "'", "did you mean '" + candidate + "'?");
+    }
+  }
+  return make_error("there is no task or DAG '" + name + "'", suggestion(name, names));
+}
+
+std::string explain(const Analysed &analysed, const Row &row, const StreamTraits &terminal) {
+  std::string text = tinted(row.name, Tint::Strong, terminal.colour) + ": ";
+  if (row.tightest.response) {
+    text += fmt::format("answers within {} of its release, ", humanize_duration(*row.tightest.response));
+  } else {
+    text += "no bound on its response time, ";
+  }
+  text += row.deadline > 0 ? fmt::format("deadline {}: ", humanize_duration(row.deadline)) : "no end-to-end deadline: ";
+  text += row.standing == Standing::NoDeadline ? "nothing to miss" : to_string(row.standing);
+  if (row.standing == Standing::Ok && row.says != nullptr) text += fmt::format(", shown by {}", row.says->name);
+  text += "\n";
+  if (row.due && row.deadline > *row.due) {
+    text += fmt::format("held to {}: beyond, the next release would skip a job that has not started\n",
+                        humanize_duration(*row.due));
+  }
+  return text + (row.tightest.response ? explain_bound(analysed, row, terminal) : explain_absence(analysed, row));
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,405 @@
+#include "redag/cli/analysis_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "redag/cli/table.hpp"
+
+namespace redag::cli {
+namespace {
+
+using analysis::Method;
+using analysis::MethodReport;
+using analysis::NotApplicable;
+using analysis::Verdict;
+
+constexpr std::size_t kMostTasks = 50;  // rows before the table is cut to the tightest
+
+// A trusted test that answers for all tasks at once, or null.
+const Method *accepting_test(const Analysed &analysed) {
+  for (const MethodReport &method : analysed.report.methods) {
+    if (method.trusted && method.bound()->accepts == true) return method.method;
+  }
+  return nullptr;
+}
+
+// Why the trusted methods that could have bounded this response did not: the first to say so.
+std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_dag) {
+  if (!analysed.system.not_analysable.empty()) return analysed.system.not_analysable;
+  for (const MethodReport &method : analysed.report.methods) {
+    if (!method.trusted) continue;
+    const auto &bounds = is_dag ? method.bound()->dags : method.bound()->tasks;
+    if (index < bounds.size() && !bounds[index].absent.empty()) {
+      return fmt::format("{}: {}", method.method->name, bounds[index].absent);
+    }
+  }
+  return "no method that bounds response times applies";
+}
+
+void judge(const Analysed &analysed, Row &row, std::size_t index, bool is_dag) {
+  row.says = row.tightest.method;
+  if (row.tightest.response && row.due) row.slack = *row.due - *row.tightest.response;
+  if (!row.tightest.response) row.reason = why_no_bound(analysed, index, is_dag);
+  const Method *test = accepting_test(analysed);
+  const bool is_met = row.slack.value_or(-1) >= 0;
+  if (!is_met && row.due && test != nullptr) {
+    // A yes-or-no test can accept where the bounds are too coarse: a number above the deadline says nothing then.
+    row.tightest = {};
+    row.slack.reset();
+    row.reason = fmt::format("{} accepts the workload as a whole, and tells no response times", test->name);
+    row.says = test;
+    row.standing = Standing::Ok;
+  } else if (!row.tightest.response) {
+    row.standing = row.due || test == nullptr ? Standing::NoBound : Standing::NoDeadline;
+  } else if (!row.due) {
+    row.standing = Standing::NoDeadline;
+  } else {
+    row.standing = is_met ? Standing::Ok : Standing::MayMiss;
+  }
+}
+
+Tint tint_of(Standing standing) {
+  switch (standing) {
+    case Standing::Ok: return Tint::Good;
+    case Standing::MayMiss: return Tint::Bad;
+    case Standing::NoBound: return Tint::Caution;
+    case Standing::NoDeadline: return Tint::Faint;
+  }
+  return Tint::Plain;
+}
+
+// A slack below 0 is written with its sign, which durations of people never have.
+std::string signed_duration(Duration duration) {
+  return duration < 0 ? "-" + humanize_duration(-duration) : humanize_duration(duration);
+}
+
+std::string table_of(const char *title, const std::vector<Row> &rows, const StreamTraits &terminal) {
+  Table table({{title, false, 9},
+               {"deadline", true, 4},
+               {"bound", true, 7},
+               {"slack", true, 5},
+               {"verdict", false, 8, true},
+               {"method", false, 3}});
+  for (const Row &row : rows) {
+    const Tint tint = tint_of(row.standing);
+    table.add({{row.name},
+               {row.deadline > 0 ? humanize_duration(row.deadline) : "-"},
+               {row.tightest.response ? humanize_duration(*row.tightest.response) : "-"},
+               {row.slack ? signed_duration(*row.slack) : "-", row.slack.value_or(0) < 0 ? Tint::Bad : Tint::Plain},
+               {to_string(row.standing), tint},
+               {row.says != nullptr ? std::string(row.says->name) : "-", Tint::Faint}});
+  }
+  return table.render(terminal.width, terminal.colour);
+}
+
+// All, in the workload's order, or those that are nearest to a miss or past it.
+std::vector<Row> shown_rows(std::vector<Row> rows, bool all) {
+  if (all || rows.size() <= kMostTasks) return rows;
+  const auto urgency = [](const Row &row) {
+    if (row.standing == Standing::NoBound) return -kMaxDuration;
+    return row.slack.value_or(kMaxDuration);
+  };
+  std::stable_sort(rows.begin(), rows.end(), [&](const Row &a, const Row &b) { return urgency(a) < urgency(b); });
+  rows.resize(kMostTasks);
+  return rows;
+}
+
+// What a method says in a few words, and how good that is.
+Cell answer(const MethodReport &report) {
+  const analysis::Bound *bound = report.bound();
+  if (bound == nullptr) return {"does not apply", Tint::Faint};
+  if (!report.trusted) return {"not sound here", Tint::Caution};
+  if (report.verdict == Verdict::Schedulable) return {"schedulable", Tint::Good};
+  return {"not shown", Tint::Caution};
+}
+
+std::string remark(const Analysed &analysed, const MethodReport &report) {
+  const analysis::Bound *bound = report.bound();
+  if (bound == nullptr) return std::get<NotApplicable>(report.outcome).reason;
+  std::string text;
+  if (!bound->tasks.empty()) {
+    const auto has_response = [](const analysis::ResponseBound &task) { return task.response.has_value(); };
+    const auto bounded = std::count_if(bound->tasks.begin(), bound->tasks.end(), has_response);
+    text = fmt::format("bounds {} of {} tasks", bounded, analysed.system.tasks.size());
+  }
+  if (!bound->figures.empty()) text += (text.empty() ? "" : "; ") + bound->figures;
+  if (!bound->unsound.empty()) text += (text.empty() ? "" : "; ") + bound->unsound;
+  return text;
+}
+
+std::string method_table(const Analysed &analysed, const StreamTraits &terminal) {
+  if (!analysed.system.not_analysable.empty()) {
+    return fmt::format("none of the {} methods applies: {}\n", analysed.report.methods.size(),
+                       analysed.system.not_analysable);
+  }
+  std::vector<const MethodReport *> order;
+  for (const MethodReport &report : analysed.report.methods) order.push_back(&report);
+  // What speaks first, what does not apply last.
+  const auto place = [](const MethodReport *report) {
+    return report->bound() == nullptr ? 2 : report->trusted ? 0 : 1;
+  };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](const MethodReport *a, const MethodReport *b) { return place(a) < place(b); });
+  Table table({{"method", false, 9, true}, {"answer", false, 8, true}, {"why", false, 1}});
+  for (const MethodReport *report : order) {
+    const std::string paper = report->method->is_paper() ? "paper: " : "";
+    table.add({{std::string(report->method->name)}, answer(*report), {paper + remark(analysed, *report), Tint::Faint}});
+  }
+  return table.render(terminal.width, terminal.colour);
+}
+
+std::string plural(std::size_t count, const char *noun) {
+  return fmt::format("{} {}{}", format_count(count), noun, count == 1 ? "" : "s");
+}
+
+std::string headline(const Analysed &analysed) {
+  const analysis::AnalysisPlatform &platform = analysed.system.platform;
+  const std::string reason = mode_reason(analysed);
+  std::string text =
+      fmt::format("{}: {}, {}, utilization {:.3f}\n", analysed.workload.name, to_string(analysed.workload.policy),
+                  plural(platform.workers, "worker"), analysed.system.utilization);
+  text += fmt::format("preemption: {}{}\n", mode_name(analysed), reason.empty() ? "" : " (" + reason + ")");
+  if (platform.levels > 0) text += fmt::format("priority levels: {}\n", platform.levels);
+  if (platform.release_overhead > 0 || platform.dispatch_overhead > 0 || platform.preempt_overhead > 0) {
+    text += fmt::format("overheads: release {}, dispatch {}, preempt {}\n", format_duration(platform.release_overhead),
+                        format_duration(platform.dispatch_overhead), format_duration(platform.preempt_overhead));
+  }
+  return text;
+}
+
+// "a and b", "a, b and 2 more".
+std::string listed(const std::vector<const Method *> &methods) {
+  constexpr std::size_t kMost = 3;
+  std::string text;
+  for (std::size_t i = 0; i < methods.size() && i < kMost; ++i) {
+    const bool last = i + 1 == methods.size();
+    text += fmt::format("{}{}", i == 0 ? "" : last ? " and " : ", ", methods[i]->name);
+  }
+  if (methods.size() > kMost) text += fmt::format(" and {} more", methods.size() - kMost);
+  return text;
+}
+
+Json duration_json(const std::optional<Duration> &duration) { return duration ? Json(*duration) : Json(); }
+
+Json terms_json(const Analysed &analysed, const analysis::ResponseBound &bound) {
+  Json terms = Json::array();
+  for (const analysis::Term &term : bound.terms) {
+    terms.push_back(Json{{"kind", to_string(term.kind)},
+                         {"dag", term.dag.valid() ? Json(analysed.system.dags[term.dag.value].name) : Json()},
+                         {"task", term.task.valid() ? Json(task_name(analysed, term.task)) : Json()},
+                         {"amount_ns", term.amount},
+                         {"jobs", term.jobs}});
+  }
+  return terms;
+}
+
+Json row_json(const Analysed &analysed, const Row &row) {
+  return Json{{"name", row.name},
+              {"deadline_ns", row.deadline > 0 ? Json(row.deadline) : Json()},
+              {"due_ns", duration_json(row.due)},
+              {"bound_ns", duration_json(row.tightest.response)},
+              {"slack_ns", duration_json(row.slack)},
+              {"verdict", to_string(row.standing)},
+              {"method", row.says != nullptr ? Json(std::string(row.says->name)) : Json()},
+              {"reason", row.reason},
+              {"terms", terms_json(analysed, row.tightest.bound)}};
+}
+
+Json method_json(const MethodReport &report) {
+  const Method &method = *report.method;
+  const analysis::Bound *bound = report.bound();
+  return Json{{"name", std::string(method.name)},
+              {"subject", to_string(method.subject)},
+              {"applies", bound != nullptr},
+              {"reason", bound == nullptr ? std::get<NotApplicable>(report.outcome).reason : ""},
+              {"sound", report.trusted},
+              {"unsound_because", bound != nullptr ? bound->unsound : ""},
+              {"schedulable", bound != nullptr && report.verdict == Verdict::Schedulable},
+              {"figures", bound != nullptr ? bound->figures : ""},
+              {"paper", method.is_paper()},
+              {"cite", std::string(method.cite)},
+              {"assumptions", std::string(method.assumptions)},
+              {"complexity", std::string(method.complexity)},
+              {"sound_only_if", std::string(method.sound_only_if)}};
+}
+
+}  // namespace
+
+const char *to_string(Standing standing) {
+  switch (standing) {
+    case Standing::Ok: return "ok";
+    case Standing::MayMiss: return "MAY MISS";
+    case Standing::NoBound: return "no bound";
+    case Standing::NoDeadline: return "-";
+  }
+  return "?";
+}
+
+Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform) {
+  Result<analysis::System> system = analysis::compile(workload, platform);
+  if (!system) return tl::unexpected<Diagnostics>(system.error());
+  analysis::Report report = analysis::analyze(*system);
+  return Analysed{workload, *std::move(system), std::move(report)};
+}
+
+std::string task_name(const Analysed &analysed, TaskId task) {
+  const analysis::SystemTask &found = analysed.system.tasks[task.value];
+  const std::string &dag = analysed.system.dags[found.dag.value].name;
+  return dag + "." + found.name.substr(dag.size() + 1);
+}
+
+std::vector<Row> task_rows(const Analysed &analysed) {
+  std::vector<Row> rows;
+  for (std::size_t t = 0; t < analysed.system.tasks.size(); ++t) {
+    const analysis::SystemTask &task = analysed.system.tasks[t];
+    Row row;
+    row.name = task_name(analysed, TaskId(t));
+    row.deadline = task.deadline;
+    row.due = std::min(task.deadline, task.limit);
+    row.tightest = analysed.report.tasks[t];
+    judge(analysed, row, t, false);
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+std::vector<Row> dag_rows(const Analysed &analysed) {
+  std::vector<Row> rows;
+  for (std::size_t d = 0; d < analysed.system.dags.size(); ++d) {
+    Row row;
+    row.name = analysed.system.dags[d].name;
+    row.deadline = analysed.system.dags[d].deadline;
+    if (row.deadline > 0) row.due = row.deadline;
+    row.tightest = analysed.report.dags[d];
+    judge(analysed, row, d, true);
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+const char *mode_name(const Analysed &analysed) {
+  switch (analysed.system.platform.preemption) {
+    case sched::Preemption::None: return "none";
+    case sched::Preemption::Cooperative: return "cooperative";
+    case sched::Preemption::Full: return "full";
+  }
+  return "?";
+}
+
+std::string mode_reason(const Analysed &analysed) {
+  const analysis::System &system = analysed.system;
+  if (system.platform.preemption == sched::Preemption::Cooperative && system.mode == sched::Preemption::None) {
+    return "no task has a region: the same as none";
+  }
+  if (analysed.workload.platform.preemption != PreemptionMode::Auto) return {};
+  const bool is_static = system.policy != PolicyKind::Edf && system.policy != PolicyKind::Fifo;
+  return is_static
+             ? "auto is analysed as os; a process without SCHED_FIFO runs it as cooperative: see --preemption"
+             : fmt::format("auto is analysed as os, as simulated; threads run {} as cooperative: see --preemption",
+                           to_string(system.policy));
+}
+
+std::string verdict_in_words(const Analysed &analysed) {
+  const analysis::Report &report = analysed.report;
+  if (report.verdict == Verdict::Schedulable) {
+    return fmt::format("schedulable: every deadline is met, by {}", listed(report.by));
+  }
+  const double needed = analysed.workload.utilization();
+  const std::uint32_t workers = analysed.system.platform.workers;
+  if (needed > workers * (1 + 1e-9)) {
+    return fmt::format("not schedulable: the utilization, {:.3f}, is above what {} can do", needed,
+                       plural(workers, "worker"));
+  }
+  if (!analysed.system.not_analysable.empty()) {
+    return "not shown schedulable: no method takes this workload: " + analysed.system.not_analysable;
+  }
+  std::size_t late = 0;
+  std::size_t unbounded = 0;
+  const auto count = [&](const std::vector<Row> &rows) {
+    for (const Row &row : rows) {
+      if (row.standing == Standing::MayMiss) ++late;
+      if (row.standing == Standing::NoBound && row.due) ++unbounded;
+    }
+  };
+  count(task_rows(analysed));
+  const std::size_t late_tasks = late;
+  const std::size_t unbounded_tasks = unbounded;
+  count(dag_rows(analysed));
+  std::string missing;
+  const auto say = [&](std::size_t number, const char *noun, const char *what) {
+    if (number > 0) missing += fmt::format("{}{} {}", missing.empty() ? "" : ", ", plural(number, noun), what);
+  };
+  say(late_tasks, "task", "with a bound above the deadline");
+  say(unbounded_tasks, "task", "without a bound");
+  say(late - late_tasks, "DAG", "with a bound above the end-to-end deadline");
+  say(unbounded - unbounded_tasks, "DAG", "with an end-to-end deadline and without a bound");
+  return fmt::format("not shown schedulable: {}; bounds are safe, not exact; --explain says where one comes from",
+                     missing);
+}
+
+std::string describe(const Analysed &analysed, const StreamTraits &terminal, bool all) {
+  const std::vector<Row> tasks = task_rows(analysed);
+  std::string text = headline(analysed) + "\n" + table_of("task", shown_rows(tasks, all), terminal);
+  if (!all && tasks.size() > kMostTasks) {
+    text += fmt::format("(the {} of {} tasks with the least slack; --all-tasks shows every one)\n", kMostTasks,
+                        format_count(tasks.size()));
+  }
+  text += "\n" + table_of("DAG", dag_rows(analysed), terminal) + "\n";
+  text +=
+      "bound: response time from the nominal release that no job exceeds; of a DAG, and of its tasks where edges\n"
+      "join them, from the source's release to the finish of the last task; verdicts hold for every execution\n";
+  for (const Row &row : tasks) {
+    if (*row.due == row.deadline) continue;
+    text += "slack: to the deadline, or to where the next release would skip a job that has not started, if sooner\n";
+    break;
+  }
+  const bool yes = analysed.report.verdict == Verdict::Schedulable;
+  const std::string words = verdict_in_words(analysed);
+  const std::size_t colon = words.find(':');
+  text += "\n" + tinted(words.substr(0, colon), yes ? Tint::Good : Tint::Bad, terminal.colour) + words.substr(colon);
+  return text + "\n\n" + method_table(analysed, terminal);
+}
+
+std::string describe_methods() {
+  std::string text;
+  for (const Method &method : analysis::methods()) {
+    text +=
+        fmt::format("{} ({}{})\n  assumes: {}\n  cite: {}\n  complexity: {}\n", method.name, to_string(method.subject),
+                    method.is_paper() ? ", paper" : "", method.assumptions, method.cite, method.complexity);
+    if (method.is_paper()) text += fmt::format("  sound only if: {}\n", method.sound_only_if);
+  }
+  return text;
+}
+
+Json to_json(const Analysed &analysed) {
+  const analysis::AnalysisPlatform &platform = analysed.system.platform;
+  Json document = {
+      {"format", "redag.analysis/1"},
+      {"workload", analysed.workload.name},
+      {"policy", to_string(analysed.workload.policy)},
+      {"workers", platform.workers},
+      {"preemption", mode_name(analysed)},
+      {"preemption_why", mode_reason(analysed)},
+      {"levels", platform.levels},
+      {"overheads_ns",
+       {{"release", platform.release_overhead},
+        {"dispatch", platform.dispatch_overhead},
+        {"preempt", platform.preempt_overhead}}},
+      {"utilization", analysed.system.utilization},
+      {"schedulable", analysed.report.verdict == Verdict::Schedulable},
+      {"verdict", verdict_in_words(analysed)},
+  };
+  document["by"] = Json::array();
+  for (const Method *method : analysed.report.by) document["by"].push_back(std::string(method->name));
+  document["tasks"] = Json::array();
+  for (const Row &row : task_rows(analysed)) document["tasks"].push_back(row_json(analysed, row));
+  document["dags"] = Json::array();
+  for (const Row &row : dag_rows(analysed)) document["dags"].push_back(row_json(analysed, row));
+  document["methods"] = Json::array();
+  for (const MethodReport &report : analysed.report.methods) document["methods"].push_back(method_json(report));
+  return document;
+}
+
+}  // namespace redag::cli

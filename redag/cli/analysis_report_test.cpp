@@ -1,0 +1,152 @@
+#include "redag/cli/analysis_report.hpp"
+
+#include <gtest/gtest.h>
+
+#include "redag/cli/analysis_explanation.hpp"
+
+namespace redag::cli {
+namespace {
+
+Task timer(std::string name, Duration period, Duration wcet) {
+  Task task;
+  task.name = std::move(name);
+  task.period = task.deadline = period;
+  task.wcet = task.bcet = wcet;
+  return task;
+}
+
+Dag dag_of(std::string name, std::vector<Task> tasks) {
+  return Dag{std::move(name), std::move(tasks), 0, 0, 0, Criticality::Normal};
+}
+
+// One worker: a (T 10, C 3), b (T 20, C 7), in milliseconds. Preempted: 3 and 7 + 3 = 10, as the second a comes then.
+Workload two_tasks(PreemptionMode mode) {
+  Workload workload;
+  workload.name = "two";
+  workload.platform = Platform{1, mode};
+  workload.dags = {dag_of("fast", {timer("a", 10 * kMillisecond, 3 * kMillisecond)}),
+                   dag_of("slow", {timer("b", 20 * kMillisecond, 7 * kMillisecond)})};
+  return workload;
+}
+
+Analysed look_at(const Workload &workload) {
+  Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload));
+  EXPECT_TRUE(analysed) << to_string(analysed.error());
+  return *std::move(analysed);
+}
+
+Row row_of(const Analysed &analysed, const std::string &name) {
+  Result<Row> row = find_row(analysed, name);
+  EXPECT_TRUE(row) << to_string(row.error());
+  return *std::move(row);
+}
+
+TEST(AnalysisReport, KnownResponsesOnOneWorker) {
+  const Analysed analysed = look_at(two_tasks(PreemptionMode::Os));
+  const std::vector<Row> rows = task_rows(analysed);
+  ASSERT_EQ(rows.size(), 2U);
+  EXPECT_EQ(rows[0].name, "fast.a");
+  EXPECT_EQ(rows[0].tightest.response, 3 * kMillisecond);
+  EXPECT_EQ(rows[0].slack, 7 * kMillisecond);
+  EXPECT_EQ(rows[0].standing, Standing::Ok);
+  EXPECT_EQ(rows[0].says->name, "rta_preemptive");
+  EXPECT_EQ(rows[1].tightest.response, 10 * kMillisecond);
+  EXPECT_EQ(verdict_in_words(analysed).find("schedulable: every deadline is met, by "), 0U);
+}
+
+TEST(AnalysisReport, ATightDeadlineIsNamedNotCalledAMiss) {
+  Workload workload = two_tasks(PreemptionMode::Os);
+  workload.dags[1].tasks[0].deadline = 9 * kMillisecond;
+  const Analysed analysed = look_at(workload);
+  const Row row = row_of(analysed, "slow.b");
+  EXPECT_EQ(row.standing, Standing::MayMiss);
+  EXPECT_EQ(row.slack, -kMillisecond);
+  const std::string words = verdict_in_words(analysed);
+  EXPECT_EQ(words.find("not shown schedulable: 1 task with a bound above the deadline;"), 0U) << words;
+  const std::string text = describe(analysed, StreamTraits{}, false);
+  EXPECT_NE(text.find("slow.b       9ms   10ms   -1ms  MAY MISS"), std::string::npos) << text;
+  EXPECT_NE(explain(analysed, row, StreamTraits{}).find("1ms are missing"), std::string::npos);
+}
+
+TEST(AnalysisReport, DeadlinesOfDagsCount) {
+  Workload workload = two_tasks(PreemptionMode::Os);
+  workload.dags[1].deadline = 8 * kMillisecond;
+  const Analysed analysed = look_at(workload);
+  EXPECT_EQ(dag_rows(analysed)[0].standing, Standing::NoDeadline);
+  EXPECT_EQ(dag_rows(analysed)[1].standing, Standing::MayMiss);
+  EXPECT_EQ(verdict_in_words(analysed).find("not shown schedulable: 1 DAG with a bound above the end-to-end"), 0U);
+}
+
+TEST(AnalysisReport, ATestWithoutNumbersStillAnswers) {
+  Workload workload = two_tasks(PreemptionMode::Auto);
+  workload.policy = PolicyKind::Edf;
+  const Analysed analysed = look_at(workload);
+  const Row row = row_of(analysed, "fast.a");
+  EXPECT_EQ(row.standing, Standing::Ok);
+  EXPECT_FALSE(row.slack);
+  EXPECT_EQ(row.says->name, "edf_demand");
+  EXPECT_NE(mode_reason(analysed).find("threads run edf as cooperative"), std::string::npos);
+  EXPECT_NE(explain(analysed, row, StreamTraits{}).find("tells no response times"), std::string::npos);
+}
+
+TEST(AnalysisReport, ThePapersEquationsAreShownAndNotTrusted) {
+  Workload workload = two_tasks(PreemptionMode::Os);
+  workload.dags[1].tasks[0].jitter = kMillisecond;
+  const Json document = to_json(look_at(workload));
+  bool is_shown = false;
+  for (const Json &method : document["methods"]) {
+    if (method["name"] != "paper_rta") continue;
+    is_shown = true;
+    EXPECT_EQ(method["applies"], true);
+    EXPECT_EQ(method["sound"], false);
+    EXPECT_NE(method["unsound_because"], "");
+  }
+  EXPECT_TRUE(is_shown);
+  for (const Json &task : document["tasks"]) EXPECT_NE(task["method"], "paper_rta");
+}
+
+TEST(AnalysisReport, WhatNoMethodTakesIsSaidOnce) {
+  Workload workload = two_tasks(PreemptionMode::Os);
+  workload.dags[0].tasks[0].budget = kMillisecond;
+  const Analysed analysed = look_at(workload);
+  const std::string text = describe(analysed, StreamTraits{}, false);
+  EXPECT_NE(text.find("none of the"), std::string::npos) << text;
+  EXPECT_EQ(row_of(analysed, "fast").standing, Standing::NoBound);
+  EXPECT_NE(row_of(analysed, "fast").reason.find("budget"), std::string::npos);
+}
+
+TEST(AnalysisReport, ManyTasksAreCutToThoseWithTheLeastSlack) {
+  Workload workload = two_tasks(PreemptionMode::Os);
+  for (int i = 0; i < 60; ++i) {
+    workload.dags.push_back(dag_of("d" + std::to_string(i), {timer("t", kSecond, kMicrosecond)}));
+  }
+  const Analysed analysed = look_at(workload);
+  const std::string few = describe(analysed, StreamTraits{}, false);
+  EXPECT_NE(few.find("(the 50 of 62 tasks with the least slack"), std::string::npos);
+  EXPECT_NE(few.find("fast.a "), std::string::npos);
+  EXPECT_NE(describe(analysed, StreamTraits{}, true).find("d0.t "), std::string::npos);
+}
+
+TEST(Explanation, TermsAddUpAndTheLargestIsNamed) {
+  const Analysed analysed = look_at(two_tasks(PreemptionMode::None));
+  // Not preempted, a waits for b (7 ms, of which one nanosecond at least is done) and for nothing else.
+  const Row row = row_of(analysed, "fast/a");
+  EXPECT_EQ(row.tightest.response, 10 * kMillisecond - 1);
+  const std::string text = explain(analysed, row, StreamTraits{});
+  EXPECT_NE(text.find("blocking by    slow.b     1   7ms  70.0 %"), std::string::npos) << text;
+  EXPECT_NE(text.find("own execution  fast.a     1   3ms  30.0 %"), std::string::npos) << text;
+  EXPECT_NE(text.find("slow.b keeps its worker until it ends"), std::string::npos) << text;
+}
+
+TEST(Explanation, UnknownNamesGetTheNearest) {
+  const Analysed analysed = look_at(two_tasks(PreemptionMode::Os));
+  for (const auto &[given, meant] : {std::pair{"fast.b", "fast.a"}, {"b", "slow.b"}, {"slwo", "slow"}}) {
+    const Result<Row> row = find_row(analysed, given);
+    ASSERT_FALSE(row) << given;
+    EXPECT_NE(row.error().front().hint.find(std::string("'") + meant + "'"), std::string::npos) << given;
+  }
+  EXPECT_EQ(row_of(analysed, "slow").name, "slow");
+}
+
+}  // namespace
+}  // namespace redag::cli
