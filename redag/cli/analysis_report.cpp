@@ -181,50 +181,6 @@ std::string listed(const std::vector<const Method *> &methods) {
   return text;
 }
 
-Json duration_json(const std::optional<Duration> &duration) { return duration ? Json(*duration) : Json(); }
-
-Json terms_json(const Analysed &analysed, const analysis::ResponseBound &bound) {
-  Json terms = Json::array();
-  for (const analysis::Term &term : bound.terms) {
-    terms.push_back(Json{{"kind", to_string(term.kind)},
-                         {"dag", term.dag.valid() ? Json(analysed.system.dags[term.dag.value].name) : Json()},
-                         {"task", term.task.valid() ? Json(task_name(analysed, term.task)) : Json()},
-                         {"amount_ns", term.amount},
-                         {"jobs", term.jobs}});
-  }
-  return terms;
-}
-
-Json row_json(const Analysed &analysed, const Row &row) {
-  return Json{{"name", row.name},
-              {"deadline_ns", row.deadline > 0 ? Json(row.deadline) : Json()},
-              {"due_ns", duration_json(row.due)},
-              {"bound_ns", duration_json(row.tightest.response)},
-              {"slack_ns", duration_json(row.slack)},
-              {"verdict", to_string(row.standing)},
-              {"method", row.says != nullptr ? Json(std::string(row.says->name)) : Json()},
-              {"reason", row.reason},
-              {"terms", terms_json(analysed, row.tightest.bound)}};
-}
-
-Json method_json(const MethodReport &report) {
-  const Method &method = *report.method;
-  const analysis::Bound *bound = report.bound();
-  return Json{{"name", std::string(method.name)},
-              {"subject", to_string(method.subject)},
-              {"applies", bound != nullptr},
-              {"reason", bound == nullptr ? std::get<NotApplicable>(report.outcome).reason : ""},
-              {"sound", report.trusted},
-              {"unsound_because", bound != nullptr ? bound->unsound : ""},
-              {"schedulable", bound != nullptr && report.verdict == Verdict::Schedulable},
-              {"figures", bound != nullptr ? bound->figures : ""},
-              {"paper", method.is_paper()},
-              {"cite", std::string(method.cite)},
-              {"assumptions", std::string(method.assumptions)},
-              {"complexity", std::string(method.complexity)},
-              {"sound_only_if", std::string(method.sound_only_if)}};
-}
-
 }  // namespace
 
 const char *to_string(Standing standing) {
@@ -371,35 +327,6 @@ std::string describe_methods() {
     if (method.is_paper()) text += fmt::format("  sound only if: {}\n", method.sound_only_if);
   }
   return text;
-}
-
-Json to_json(const Analysed &analysed) {
-  const analysis::AnalysisPlatform &platform = analysed.system.platform;
-  Json document = {
-      {"format", "redag.analysis/1"},
-      {"workload", analysed.workload.name},
-      {"policy", to_string(analysed.workload.policy)},
-      {"workers", platform.workers},
-      {"preemption", mode_name(analysed)},
-      {"preemption_why", mode_reason(analysed)},
-      {"levels", platform.levels},
-      {"overheads_ns",
-       {{"release", platform.release_overhead},
-        {"dispatch", platform.dispatch_overhead},
-        {"preempt", platform.preempt_overhead}}},
-      {"utilization", analysed.system.utilization},
-      {"schedulable", analysed.report.verdict == Verdict::Schedulable},
-      {"verdict", verdict_in_words(analysed)},
-  };
-  document["by"] = Json::array();
-  for (const Method *method : analysed.report.by) document["by"].push_back(std::string(method->name));
-  document["tasks"] = Json::array();
-  for (const Row &row : task_rows(analysed)) document["tasks"].push_back(row_json(analysed, row));
-  document["dags"] = Json::array();
-  for (const Row &row : dag_rows(analysed)) document["dags"].push_back(row_json(analysed, row));
-  document["methods"] = Json::array();
-  for (const MethodReport &report : analysed.report.methods) document["methods"].push_back(method_json(report));
-  return document;
 }
 
 }  // namespace redag::cli
