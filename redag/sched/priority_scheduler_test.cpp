@@ -79,6 +79,27 @@ TEST(PriorityScheduler, MoreStartedJobsThanThreadsIsImpossible) {
   EXPECT_EQ(workers.suspended(), "low");
 }
 
+TEST(PriorityScheduler, APreemptedJobGoesBackToItsWorkerIfThatIsFree) {
+  const Workload workload = make_workload({make_dag("a", {{"low", 30}, {"mid", 20}, {"high", 10}})}, 2);
+  ManualWorkers workers = drive(workload, Preemption::Full);
+  workers.release("low").release("mid").decide();
+  workers.at(1).release("high").decide();
+  workers.at(2).finish("mid").finish("high").decide();
+  EXPECT_EQ(workers.running(), "- low");
+}
+
+// The holder takes the waiting job's place in the total order, not its deadline alone: `second`, of the same deadline
+// as the waiting job and ahead of it, is ahead of the holder too.
+TEST(PriorityScheduler, InheritanceTakesTheWholePlaceInTheOrder) {
+  const Workload workload = make_workload({make_dag("a", {{"holder", 40, 1, {}, "g"}, {"filler", 40}}),
+                                           make_dag("b", {{"first", 20}, {"second", 20}, {"waiting", 20, 1, {}, "g"}})},
+                                          2, PreemptionMode::None, PolicyKind::Edf);
+  ManualWorkers workers = drive(workload, Preemption::Full);
+  workers.release("holder").release("filler").decide();
+  workers.at(1).release("first").release("second").release("waiting").decide();
+  EXPECT_EQ(workers.running(), "second first");
+}
+
 TEST(PriorityScheduler, AJobMayEndWhileItCountsAsPreempted) {
   const Workload workload = make_workload({make_dag("a", {{"low", 30}, {"high", 10}})}, 1);
   ManualWorkers workers = drive(workload, Preemption::Full);
