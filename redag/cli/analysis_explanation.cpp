@@ -26,7 +26,8 @@ std::string owner(const Analysed &analysed, const Term &term) {
 
 std::string what(const Term &term) {
   switch (term.kind) {
-    case Term::Kind::Own: return "own execution";
+    // Of a DAG on several workers: its longest path (one job), and what its other tasks keep that path waiting.
+    case Term::Kind::Own: return term.jobs == 0 ? "own tasks beside the path" : "own execution";
     case Term::Kind::Earlier: return term.amount < 0 ? "since earlier jobs were released" : "earlier jobs of its own";
     case Term::Kind::Blocking: return "blocking by";
     case Term::Kind::Interference: return "interference of";
@@ -53,7 +54,9 @@ std::string advice_on_blocking(const Analysed &analysed, const std::string &who)
 std::string advice(const Analysed &analysed, const Term &term) {
   const std::string who = owner(analysed, term);
   switch (term.kind) {
-    case Term::Kind::Own: return "a smaller wcet of its own counts most";
+    case Term::Kind::Own:
+      return term.jobs == 0 ? "its own tasks wait for each other: smaller wcets, or a larger max_active, count most"
+                            : "a smaller wcet of its own counts most";
     case Term::Kind::Earlier: return "its earlier jobs are not done when it comes: a smaller wcet or a longer period";
     case Term::Kind::Blocking: return advice_on_blocking(analysed, who);
     case Term::Kind::Interference: {

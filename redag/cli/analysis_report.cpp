@@ -20,7 +20,8 @@ constexpr std::size_t kMostTasks = 50;  // rows before the table is cut to the t
 // A trusted test that answers for all tasks at once, or null.
 const Method *accepting_test(const Analysed &analysed) {
   for (const MethodReport &method : analysed.report.methods) {
-    if (method.trusted && method.bound()->accepts == true) return method.method;
+    const analysis::Bound *bound = method.bound();
+    if (method.trusted && bound != nullptr && bound->accepts == true) return method.method;
   }
   return nullptr;
 }
@@ -29,8 +30,9 @@ const Method *accepting_test(const Analysed &analysed) {
 std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_dag) {
   if (!analysed.system.not_analysable.empty()) return analysed.system.not_analysable;
   for (const MethodReport &method : analysed.report.methods) {
-    if (!method.trusted) continue;
-    const auto &bounds = is_dag ? method.bound()->dags : method.bound()->tasks;
+    const analysis::Bound *bound = method.bound();
+    if (!method.trusted || bound == nullptr) continue;
+    const auto &bounds = is_dag ? bound->dags : bound->tasks;
     if (index < bounds.size() && !bounds[index].absent.empty()) {
       return fmt::format("{}: {}", method.method->name, bounds[index].absent);
     }

@@ -138,6 +138,25 @@ TEST(Explanation, TermsAddUpAndTheLargestIsNamed) {
   EXPECT_NE(text.find("slow.b keeps its worker until it ends"), std::string::npos) << text;
 }
 
+TEST(Explanation, OfADagOnSeveralWorkersTellsThePathFromTheRest) {
+  // 1, then 4 and 4 side by side, on two workers: the longest path is 5, and L + (V - L) / m = 5 + 4 / 2.
+  Workload workload = two_tasks(PreemptionMode::Os);
+  workload.platform.workers = 2;
+  Task left = timer("left", 10 * kMillisecond, 4 * kMillisecond);
+  left.activation = Activation::Data;
+  left.predecessors = {0};
+  Task right = left;
+  right.name = "right";
+  workload.dags = {dag_of("fork", {timer("first", 10 * kMillisecond, kMillisecond), left, right})};
+  const Analysed analysed = look_at(workload);
+  const Row row = row_of(analysed, "fork.right");
+  EXPECT_EQ(row.tightest.response, 7 * kMillisecond);
+  EXPECT_EQ(row.tightest.response, row_of(analysed, "fork").tightest.response);
+  const std::string text = explain(analysed, row, StreamTraits{});
+  EXPECT_NE(text.find("own execution              fork     1   5ms  71.4 %"), std::string::npos) << text;
+  EXPECT_NE(text.find("own tasks beside the path  fork     -   2ms  28.6 %"), std::string::npos) << text;
+}
+
 TEST(Explanation, UnknownNamesGetTheNearest) {
   const Analysed analysed = look_at(two_tasks(PreemptionMode::Os));
   for (const auto &[given, meant] : {std::pair{"fast.b", "fast.a"}, {"b", "slow.b"}, {"slwo", "slow"}}) {
