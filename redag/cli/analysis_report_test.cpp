@@ -139,7 +139,7 @@ TEST(Explanation, TermsAddUpAndTheLargestIsNamed) {
 }
 
 TEST(Explanation, OfADagOnSeveralWorkersTellsThePathFromTheRest) {
-  // 1, then 4 and 4 side by side, on two workers: the longest path is 5, and L + (V - L) / m = 5 + 4 / 2.
+  // 1, then three times 4 side by side, on two workers: the longest path is 5, and L + (V - L) / m = 5 + 8 / 2.
   Workload workload = two_tasks(PreemptionMode::Os);
   workload.platform.workers = 2;
   Task left = timer("left", 10 * kMillisecond, 4 * kMillisecond);
@@ -147,14 +147,16 @@ TEST(Explanation, OfADagOnSeveralWorkersTellsThePathFromTheRest) {
   left.predecessors = {0};
   Task right = left;
   right.name = "right";
-  workload.dags = {dag_of("fork", {timer("first", 10 * kMillisecond, kMillisecond), left, right})};
+  Task third = left;
+  third.name = "third";
+  workload.dags = {dag_of("fork", {timer("first", 10 * kMillisecond, kMillisecond), left, right, third})};
   const Analysed analysed = look_at(workload);
   const Row row = row_of(analysed, "fork.right");
-  EXPECT_EQ(row.tightest.response, 7 * kMillisecond);
+  EXPECT_EQ(row.tightest.response, 9 * kMillisecond);
   EXPECT_EQ(row.tightest.response, row_of(analysed, "fork").tightest.response);
   const std::string text = explain(analysed, row, StreamTraits{});
-  EXPECT_NE(text.find("own execution              fork     1   5ms  71.4 %"), std::string::npos) << text;
-  EXPECT_NE(text.find("own tasks beside the path  fork     -   2ms  28.6 %"), std::string::npos) << text;
+  EXPECT_NE(text.find("own execution              fork     1   5ms  55.6 %"), std::string::npos) << text;
+  EXPECT_NE(text.find("own tasks beside the path  fork     -   4ms  44.4 %"), std::string::npos) << text;
 }
 
 TEST(Explanation, UnknownNamesGetTheNearest) {
