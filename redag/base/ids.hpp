@@ -20,7 +20,7 @@ struct Id {
   [[nodiscard]] static constexpr Id none() { return Id{}; }
   [[nodiscard]] constexpr bool valid() const { return value != kNoneValue; }
 
-  friend constexpr auto operator<=>(const Id &, const Id &) = default;
+  friend constexpr auto operator<=>(const Id &, const Id &) = default;  // NOLINT(modernize-use-nullptr): a false alarm
 };
 
 using TaskId = Id<struct TaskTag>;      // position of a task in its workload: DAG by DAG, task by task
