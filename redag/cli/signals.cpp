@@ -3,22 +3,35 @@
 #include <unistd.h>
 
 #include "redag/base/check.hpp"
+#include "redag/base/time.hpp"
+#include "redag/runtime/clock.hpp"
 
 namespace redag::cli {
 namespace {
 
 std::atomic<bool> interrupt_flag{false};
-static_assert(std::atomic<bool>::is_always_lock_free);
+std::atomic<Time> first_signal{0};
+static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<Time>::is_always_lock_free);
 
-// Async-signal-safe: an atomic and _exit.
+// One wish can arrive twice: timeout(1) signals the process and then its group. Nobody presses Ctrl-C again that fast.
+constexpr Duration kSameWish = 200 * kMillisecond;
+
+// Async-signal-safe: atomics, clock_gettime and _exit.
 void on_signal(int number) {
   constexpr int kSignalExit = 128;  // as a shell reports a death by signal
-  if (interrupt_flag.exchange(true)) _exit(kSignalExit + number);
+  const Time now = runtime::monotonic_now();
+  Time first = 0;
+  if (first_signal.compare_exchange_strong(first, now)) {
+    interrupt_flag.store(true);
+  } else if (now - first > kSameWish) {
+    _exit(kSignalExit + number);
+  }
 }
 
 }  // namespace
 
 InterruptGuard::InterruptGuard() {
+  first_signal.store(0);
   interrupt_flag.store(false);
   struct sigaction action {};
   action.sa_handler = on_signal;

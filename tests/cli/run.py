@@ -356,6 +356,17 @@ class Interrupts(Case):
         self.assertEqual(process.returncode, 0, errors)
         self.assertIn("stopped early", text)
 
+    def test_one_wish_that_arrives_twice_is_one(self):
+        # As timeout(1) does: first to the process, then to its group.
+        process = self.start("run", self.cart, "--duration", "1h", "--json")
+        time.sleep(2)
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        text, errors = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 0, errors)
+        self.assertTrue(json.loads(text)["stopped"])
+
     def test_the_second_one_ends_it_at_once(self):
         # A job that cannot be waited for: the run asks it to end, and then waits for seconds.
         endless = self.write("endless.yaml", "name: e\nplatform: {workers: 1, preemption: none}\ndags:\n"
