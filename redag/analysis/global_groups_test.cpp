@@ -62,7 +62,7 @@ TEST(GlobalGroups, AGroupIsOneWorker) {
   platform.preemption = sched::Preemption::None;
   const System system = compile(workload, platform).value();
   const Outcome outcome = dag_groups().apply(system);
-  const Bound &bound = std::get<Bound>(outcome);
+  const auto &bound = std::get<Bound>(outcome);
   EXPECT_GE(bound.tasks[0].response.value(), 10 + 9);
   EXPECT_GE(bound.tasks[2].response.value(), 30);
 

@@ -14,7 +14,7 @@
 namespace redag::analysis {
 
 const std::vector<Method> &methods() {
-  static const std::vector<Method> all = {
+  static const std::vector<Method> kAll = {
       // One worker, static priorities
       rta_preemptive(),
       rta_nonpreemptive(),
@@ -52,7 +52,7 @@ const std::vector<Method> &methods() {
       paper_rta(),
       paper_rta_blocking(),
   };
-  return all;
+  return kAll;
 }
 
 }  // namespace redag::analysis

@@ -153,6 +153,7 @@ class Compiler {
     std::map<std::uint32_t, std::vector<std::uint32_t>> parts;
     for (const std::uint32_t t : order) parts[find(t - first)].push_back(t);
     std::vector<std::vector<std::uint32_t>> lists;
+    lists.reserve(parts.size());
     for (auto &[representative, tasks] : parts) lists.push_back(std::move(tasks));
     std::sort(lists.begin(), lists.end());
     return lists;

@@ -13,7 +13,6 @@ namespace {
 
 using redag::testing::make_dag;
 using redag::testing::make_workload;
-using redag::testing::TestTask;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 

@@ -120,7 +120,7 @@ TEST(WaitSetBound, EveryOtherCallbackOnceAndThoseBeforeTwice) {
     const Workload workload = three_timers(workers);
     const System system = compile(workload, platform_of(workload)).value();
     const Outcome outcome = wait_set().apply(system);
-    const Bound &bound = std::get<Bound>(outcome);
+    const auto &bound = std::get<Bound>(outcome);
     EXPECT_EQ(bound.tasks[0].response, 3 + (5 + 7) / workers);
     EXPECT_EQ(bound.tasks[1].response, 5 + (3 + 7 + 3) / workers);
     EXPECT_EQ(bound.tasks[2].response, 7 + (3 + 5 + 3 + 5) / workers);

@@ -43,6 +43,7 @@ class Comparing {
       console_.warn(*busy);
       warnings_.push_back(*busy);
     }
+    const InterruptGuard guard;  // until the results are written
     if (!run_all()) return kExitBad;
     progress_.clear();
     const std::size_t done = rounds();
@@ -59,7 +60,6 @@ class Comparing {
  private:
   // False: an error was printed.
   bool run_all() {
-    const InterruptGuard guard;
     session_.stop = &InterruptGuard::flag();
     for (std::uint32_t repetition = 0; repetition < repetitions_; ++repetition) {
       // Rotated, so that nobody always runs on the warmest or the quietest machine.

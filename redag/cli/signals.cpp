@@ -41,7 +41,10 @@ InterruptGuard::InterruptGuard() {
   REDAG_CHECK(sigaction(SIGTERM, &action, &old_terminate_) == 0, "no handler for SIGTERM");
 }
 
+// Once interrupted the handlers stay: the program is about to end, and a wish that arrives twice must not kill it on
+// the way out.
 InterruptGuard::~InterruptGuard() {
+  if (interrupted()) return;
   sigaction(SIGINT, &old_interrupt_, nullptr);
   sigaction(SIGTERM, &old_terminate_, nullptr);
 }

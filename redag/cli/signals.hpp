@@ -9,7 +9,7 @@ namespace redag::cli {
 
 class InterruptGuard {
  public:
-  /// Installs the handlers; the destructor puts back what was there.
+  /// Installs the handlers; the destructor puts back what was there, unless there was a signal.
   InterruptGuard();
   ~InterruptGuard();
   InterruptGuard(const InterruptGuard &) = delete;

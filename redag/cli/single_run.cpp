@@ -13,7 +13,6 @@ constexpr Duration kThreadsDuration = 10 * kSecond;
 
 Result<Session> run_interruptibly(const Workload &workload, const Variant &variant, SessionOptions options,
                                   Console &console) {
-  const InterruptGuard guard;
   options.stop = &InterruptGuard::flag();
   Progress progress(console);
   progress.set_label(variant.name);
@@ -40,6 +39,7 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   if (!options) return kExitBad;
 
   if (const auto busy = simulated ? std::nullopt : busy_machine_warning()) console.warn(*busy);
+  const InterruptGuard guard;  // until the results are written
   const Result<Session> session = run_interruptibly(*workload, *variant, *options, console);
   if (!session) {
     console.note(session.error());
