@@ -138,7 +138,7 @@ class Comparing {
     if (!folder.empty()) {
       for (const auto &[name, text] :
            {std::pair<std::string, std::string>{"comparison.json", document}, {"comparison.csv", to_csv(compared)}}) {
-        const Result<void> written = write_text(folder + "/" + name, text);
+        const Result<void> written = write_text(fmt::format("{}/{}", folder, name), text);
         if (written) continue;
         console_.note(written.error());
         all_written_ = false;

@@ -108,7 +108,7 @@ TEST(SensibleDuration, IsWholeHyperperiods) {
   Workload workload = fast_and_slow();
   EXPECT_EQ(sensible_duration(workload), 10 * kSecond);
   workload.dags[1].tasks[0].period = 700 * kMillisecond;
-  EXPECT_EQ(sensible_duration(workload), 15 * 700 * kMillisecond);
+  EXPECT_EQ(sensible_duration(workload), Duration{15} * 700 * kMillisecond);
   workload.dags[0].tasks[0].period = 999'999'937;
   EXPECT_EQ(sensible_duration(workload), 10 * kSecond) << "nobody waits for that hyperperiod";
 }

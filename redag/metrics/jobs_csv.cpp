@@ -47,14 +47,12 @@ bool take_record(std::string_view &text, std::vector<std::string> &fields, int &
       } else {
         in_quotes = !in_quotes;
       }
-    } else if (in_quotes) {
-      fields.back() += c;
-    } else if (c == '\n') {
+    } else if (!in_quotes && c == '\n') {
       ++i;
       break;
-    } else if (c == ',') {
+    } else if (!in_quotes && c == ',') {
       fields.emplace_back();
-    } else if (c != '\r') {
+    } else if (in_quotes || c != '\r') {
       fields.back() += c;
     }
   }

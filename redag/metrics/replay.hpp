@@ -23,7 +23,7 @@ struct Urgency {
   std::uint32_t rank = 0;
   std::uint64_t sequence = 0;  // order of readiness
 
-  friend auto operator<=>(const Urgency &, const Urgency &) = default;
+  friend auto operator<=>(const Urgency &, const Urgency &) = default;  // NOLINT(modernize-use-nullptr): a false alarm
 };
 
 struct LiveJob {
@@ -58,7 +58,7 @@ class Replay {
     Urgency urgency;
     TaskId task;
     std::uint32_t number = 0;
-    friend auto operator<=>(const Waiter &, const Waiter &) = default;
+    friend auto operator<=>(const Waiter &, const Waiter &) = default;  // NOLINT(modernize-use-nullptr): a false alarm
   };
   static constexpr std::uint32_t kNoGroup = 0xffffffff;
 
