@@ -23,7 +23,7 @@ struct Share {
   int weight;
 };
 
-// S. Kramer, D. Ziegenbein, A. Hamann, "Real world automotive benchmarks for free", WATERS 2015, table III, in per cent
+// S. Kramer, D. Ziegenbein, A. Hamann, "Real world automotive benchmarks for free", WATERS 2015, in per cent
 // of the runnables. The 15 % that follow the crankshaft have no period and are left out.
 constexpr std::array kAutomotive = {
     Share{1 * kMillisecond, 3},    Share{2 * kMillisecond, 2},   Share{5 * kMillisecond, 2},
