@@ -12,9 +12,10 @@ namespace redag {
 namespace {
 
 constexpr std::array<const char *, kFieldCount> kFieldNames = {
-    "name",        "platform",    "workers",    "preemption", "policy",   "dags",     "tasks",  "max_active",
-    "max_pending", "criticality", "wcet",       "bcet",       "period",   "deadline", "offset", "jitter",
-    "region",      "budget",      "activation", "overrun",    "priority", "group",    "after",  "execution"};
+    "name",        "platform",    "workers",     "preemption", "policy",     "dags",    "tasks",
+    "max_active",  "max_pending", "criticality", "wcet",       "bcet",       "period",  "deadline",
+    "offset",      "jitter",      "region",      "budget",     "activation", "overrun", "priority",
+    "concurrency", "group",       "after",       "execution",  "callback"};
 
 struct DurationRule {
   Field field;
@@ -32,7 +33,7 @@ constexpr std::array kDurationRules = {
 /// Collects findings about one workload; the place is set as the walk goes.
 class Checker {
  public:
-  explicit Checker(const Workload &workload) : workload_(workload) {}
+  Checker(const Workload &workload, ValidateOptions options) : workload_(workload), options_(options) {}
 
   std::vector<Finding> run() {
     check_platform();
@@ -133,6 +134,7 @@ class Checker {
     for (const DurationRule &rule : kDurationRules) {
       const Duration value = task.*rule.member;
       const char *name = to_string(rule.field);
+      if (rule.field == Field::Wcet && value == 0 && options_.wcet_optional && task.callback) continue;
       // A data task's period is check_inherited_periods()' business.
       if (rule.field == Field::Period && task.activation == Activation::Data) continue;
       // A deadline that was taken over from a bad period is not a second mistake.
@@ -224,6 +226,15 @@ class Checker {
       error(Field::Overrun, {},
             fmt::format("queue depth of task '{}' must be from 1 to {}, not {}", task.name, kMaxQueueDepth,
                         task.queue_depth));
+    }
+    if (task.concurrency < 1 || task.concurrency > kMaxConcurrency) {
+      error(Field::Concurrency, {},
+            fmt::format("concurrency of task '{}' must be from 1 to {}, not {}", task.name, kMaxConcurrency,
+                        task.concurrency));
+    } else if (task.concurrency > 1 && !task.group.empty()) {
+      error(Field::Concurrency, Field::Group,
+            fmt::format("task '{}' has concurrency {} and is in group '{}'", task.name, task.concurrency, task.group),
+            "jobs of one group never overlap: remove one of them");
     }
     if (task.priority && workload_.policy != PolicyKind::Fixed) {
       warning(Field::Priority, Field::Policy,
@@ -353,6 +364,7 @@ class Checker {
   }
 
   const Workload &workload_;
+  ValidateOptions options_;
   DagId dag_;
   std::uint32_t task_ = Finding::kNone;
   std::vector<Finding> findings_;
@@ -362,11 +374,13 @@ class Checker {
 
 const char *to_string(Field field) { return kFieldNames[static_cast<std::size_t>(field)]; }
 
-std::vector<Finding> find_mistakes(const Workload &workload) { return Checker(workload).run(); }
+std::vector<Finding> find_mistakes(const Workload &workload, ValidateOptions options) {
+  return Checker(workload, options).run();
+}
 
-Diagnostics validate(const Workload &workload) {
+Diagnostics validate(const Workload &workload, ValidateOptions options) {
   Diagnostics diagnostics;
-  for (Finding &finding : find_mistakes(workload)) {
+  for (Finding &finding : find_mistakes(workload, options)) {
     diagnostics.push_back(Diagnostic{finding.severity, {}, 0, 0, std::move(finding.message), std::move(finding.hint)});
   }
   return diagnostics;

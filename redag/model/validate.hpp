@@ -14,6 +14,7 @@ namespace redag {
 
 inline constexpr std::uint32_t kMaxWorkers = 4096;
 inline constexpr std::uint32_t kMaxQueueDepth = 65536;
+inline constexpr std::uint32_t kMaxConcurrency = 1024;
 
 /// What a workload is made of; the text is the key of the file format.
 enum class Field : std::uint8_t {
@@ -38,12 +39,14 @@ enum class Field : std::uint8_t {
   Activation,
   Overrun,
   Priority,
+  Concurrency,
   Group,
   After,
   Execution,
+  Callback,
 };
 
-inline constexpr std::size_t kFieldCount = 24;
+inline constexpr std::size_t kFieldCount = 26;
 
 [[nodiscard]] const char *to_string(Field field);
 
@@ -80,11 +83,16 @@ struct Finding {
   std::string hint;
 };
 
+struct ValidateOptions {
+  /// A task with a callback may have no wcet (0): what is going to be measured is not known before.
+  bool wcet_optional = false;
+};
+
 /// Every broken rule, in the order of the workload. Linear in its size. Never crashes, whatever the workload holds.
-[[nodiscard]] std::vector<Finding> find_mistakes(const Workload &workload);
+[[nodiscard]] std::vector<Finding> find_mistakes(const Workload &workload, ValidateOptions options = {});
 
 /// find_mistakes() as messages without a place: errors and warnings; empty for a flawless workload.
-[[nodiscard]] Diagnostics validate(const Workload &workload);
+[[nodiscard]] Diagnostics validate(const Workload &workload, ValidateOptions options = {});
 
 [[nodiscard]] bool has_errors(const Diagnostics &diagnostics);
 

@@ -28,7 +28,7 @@ std::vector<TaskRef> flatten(const Workload &workload) {
   for (std::size_t d = 0; d < workload.dags.size(); ++d) {
     const auto &tasks = workload.dags[d].tasks;
     for (std::size_t i = 0; i < tasks.size(); ++i) {
-      refs.push_back(TaskRef{DagId(d), static_cast<std::uint32_t>(i), &tasks[i]});
+      refs.push_back(TaskRef{DagId(d), static_cast<std::uint32_t>(i), &tasks[i], TaskId(refs.size())});
     }
   }
   return refs;
@@ -83,6 +83,18 @@ const char *to_string(Criticality value) {
 }
 
 const char *to_string(Activation value) { return value == Activation::Timer ? "timer" : "data"; }
+
+const char *to_string(Callback::Kind value) {
+  switch (value) {
+    case Callback::Kind::Timer: return "timer";
+    case Callback::Kind::Subscription: return "subscription";
+    case Callback::Kind::Service: return "service";
+    case Callback::Kind::Client: return "client";
+    case Callback::Kind::Action: return "action";
+    case Callback::Kind::Waitable: return "waitable";
+  }
+  return "?";
+}
 
 const char *to_string(PolicyKind value) {
   switch (value) {

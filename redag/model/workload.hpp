@@ -43,6 +43,19 @@ struct ExecutionTime {
   friend bool operator==(const ExecutionTime &, const ExecutionTime &) = default;
 };
 
+/// Which ROS 2 callback a task is. Names are patterns: "*" stands for any run of characters, "?" for one.
+struct Callback {
+  enum class Kind : std::uint8_t { Timer, Subscription, Service, Client, Action, Waitable };
+
+  std::string node;  // fully qualified: "/nav/planner", "/lidar_*"
+  Kind kind = Kind::Timer;
+  std::string name;                    // of the topic, service or action; empty for timers and waitables
+  Duration period = 0;                 // of the timer; 0: any, and for all other kinds
+  std::optional<std::uint32_t> index;  // n-th timer (waitable) of its node by creation, from 0; none: any
+
+  friend bool operator==(const Callback &, const Callback &) = default;
+};
+
 /// tau_i = (C_i, T_i, D_i, chi_i) of the paper (eq. task_tuple), and what a real callback needs besides.
 struct Task {
   std::string name;
@@ -59,9 +72,11 @@ struct Task {
   Overrun overrun = Overrun::Skip;
   std::uint32_t queue_depth = 1;            // for Overrun::Queue, >= 1
   std::optional<int> priority;              // for PolicyKind::Fixed; larger is more urgent
+  std::uint32_t concurrency = 1;            // jobs in progress at once (a reentrant callback)
   std::string group;                        // jobs of one group never overlap; empty: no group; shared by all DAGs
   std::vector<std::uint32_t> predecessors;  // positions in the same DAG
   ExecutionTime execution;
+  std::optional<Callback> callback;  // what runs its jobs under ROS 2; its wcet may then be unknown (0)
 
   friend bool operator==(const Task &, const Task &) = default;
 };
@@ -110,6 +125,7 @@ struct TaskRef {
   DagId dag;
   std::uint32_t index = 0;  // position in the DAG
   const Task *task = nullptr;
+  TaskId id;
 };
 
 [[nodiscard]] std::vector<TaskRef> flatten(const Workload &workload);
@@ -123,6 +139,7 @@ void inherit_periods(Dag &dag);
 
 [[nodiscard]] const char *to_string(Criticality value);
 [[nodiscard]] const char *to_string(Activation value);
+[[nodiscard]] const char *to_string(Callback::Kind value);
 [[nodiscard]] const char *to_string(PolicyKind value);
 [[nodiscard]] const char *to_string(PreemptionMode value);
 

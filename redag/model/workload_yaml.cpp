@@ -65,13 +65,15 @@ std::vector<std::string_view> names_of(std::span<const Field> fields) {
 /// One file on its way to a workload: reads the tree, gathers every mistake, then lets validate.hpp look at the whole.
 class Reader : private yaml::ValueReader {
  public:
-  Reader(const Node &root, std::string file) : ValueReader(std::move(file)) { root_.node = &root; }
+  Reader(const Node &root, std::string file, LoadOptions options) : ValueReader(std::move(file)), options_(options) {
+    root_.node = &root;
+  }
 
   Result<LoadedWorkload> run() {
     read_top();
     if (structure_known_) {
       inherit();
-      report(find_mistakes(workload_));
+      report(find_mistakes(workload_, options_));
     }
     std::stable_sort(diagnostics_.begin(), diagnostics_.end(), [](const Diagnostic &a, const Diagnostic &b) {
       return std::tie(a.line, a.column) < std::tie(b.line, b.column);
@@ -290,7 +292,7 @@ class Reader : private yaml::ValueReader {
   /// Periods of data tasks and deadlines that are not given. A DAG whose edges are wrong has none to inherit.
   void inherit() {
     std::vector<bool> unsound(workload_.dags.size(), false);
-    for (const Finding &finding : find_mistakes(workload_)) {
+    for (const Finding &finding : find_mistakes(workload_, options_)) {
       const bool structural = finding.field == Field::After || finding.field == Field::Activation;
       if (finding.dag.valid() && structural) unsound[finding.dag.value] = true;
     }
@@ -363,6 +365,7 @@ class Reader : private yaml::ValueReader {
     return samples == nullptr ? *value : samples->children[finding.item];
   }
 
+  LoadOptions options_;
   Part root_;
   Part platform_;
   std::vector<DagPart> dags_;
@@ -392,20 +395,20 @@ Result<std::string> read_file(const std::filesystem::path &path) {
 
 }  // namespace
 
-Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_name) {
+Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_name, LoadOptions options) {
   if (text.size() > kMaxWorkloadBytes) {
     return tl::unexpected<Diagnostics>(Diagnostics{
         Diagnostic{Severity::Error, file_name, 0, 0, fmt::format("larger than {} MiB", kMaxWorkloadBytes >> 20U), {}}});
   }
   const Result<Node> root = yaml::parse(text, file_name);
   if (!root) return tl::unexpected<Diagnostics>(root.error());
-  return Reader(*root, std::move(file_name)).run();
+  return Reader(*root, std::move(file_name), options).run();
 }
 
-Result<LoadedWorkload> load_workload(const std::filesystem::path &path) {
+Result<LoadedWorkload> load_workload(const std::filesystem::path &path, LoadOptions options) {
   const Result<std::string> text = read_file(path);
   if (!text) return tl::unexpected<Diagnostics>(text.error());
-  return parse_workload(*text, path.string());
+  return parse_workload(*text, path.string(), options);
 }
 
 }  // namespace redag

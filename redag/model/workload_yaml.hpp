@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "redag/base/result.hpp"
+#include "redag/model/validate.hpp"
 #include "redag/model/workload.hpp"
 
 namespace redag {
@@ -16,20 +17,25 @@ struct LoadedWorkload {
   Diagnostics warnings;
 };
 
+/// What a file has to say: LoadOptions{.wcet_optional = true} is for what runs callbacks and measures them.
+using LoadOptions = ValidateOptions;
+
 /// Longest text that is read, in bytes.
 inline constexpr std::size_t kMaxWorkloadBytes = std::size_t{256} << 20U;
 
 /// Reads and validates a file. Errors: all mistakes, by line (with the warnings among them), or why the file cannot be
 /// read.
-[[nodiscard]] Result<LoadedWorkload> load_workload(const std::filesystem::path &path);
+[[nodiscard]] Result<LoadedWorkload> load_workload(const std::filesystem::path &path, LoadOptions options = {});
 
 /// The same for text that is already in memory; `file_name` is what the diagnostics call it.
-[[nodiscard]] Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_name);
+[[nodiscard]] Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_name,
+                                                    LoadOptions options = {});
 
-/// parse_workload(to_yaml(w)) gives w again. Requires that validate(w) has no errors.
+/// parse_workload(to_yaml(w), name, options) gives w again. Requires that validate(w, options) has no errors.
 [[nodiscard]] std::string to_yaml(const Workload &workload);
 
 /// Writes to_yaml(workload). Errors: those of validate(), or why the file cannot be written.
-[[nodiscard]] Result<void> save_workload(const Workload &workload, const std::filesystem::path &path);
+[[nodiscard]] Result<void> save_workload(const Workload &workload, const std::filesystem::path &path,
+                                         ValidateOptions options = {});
 
 }  // namespace redag

@@ -129,8 +129,8 @@ std::string to_yaml(const Workload &workload) {
   return std::string(out.c_str(), out.size()) + "\n";
 }
 
-Result<void> save_workload(const Workload &workload, const std::filesystem::path &path) {
-  Diagnostics mistakes = validate(workload);
+Result<void> save_workload(const Workload &workload, const std::filesystem::path &path, ValidateOptions options) {
+  Diagnostics mistakes = validate(workload, options);
   if (has_errors(mistakes)) return tl::unexpected<Diagnostics>(std::move(mistakes));
   errno = 0;
   std::ofstream stream(path, std::ios::binary | std::ios::trunc);

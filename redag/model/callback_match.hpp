@@ -1,0 +1,83 @@
+// Which task of a workload is which ROS 2 callback: patterns of the file against callbacks that were found at run time,
+// and what to tell people where the two do not meet. For set-up, not for the hot path. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "redag/model/workload.hpp"
+
+namespace redag {
+
+/// A real callback. All names are fully qualified and hold no patterns.
+struct CallbackId {
+  Callback::Kind kind = Callback::Kind::Timer;
+  std::string node;
+  std::string name;         // of the topic, service or action; empty for timers and waitables
+  Duration period = 0;      // of a timer
+  std::uint32_t index = 0;  // n-th timer (waitable) of its node by creation, from 0
+
+  friend bool operator==(const CallbackId &, const CallbackId &) = default;
+};
+
+/// Does `pattern` describe all of `text`? "*" is any run of characters (also none, also with "/"), "?" is any one;
+/// there is no escape, because no ROS name contains either. O(pattern * text) at worst, O(text) with one "*"; no
+/// allocation.
+[[nodiscard]] bool glob_match(std::string_view pattern, std::string_view text);
+
+[[nodiscard]] bool matches(const Callback &pattern, const CallbackId &id);
+
+/// "/ekf subscription /imu/data", "/imu_driver timer 2 ms (0)", "/camera waitable (1)".
+[[nodiscard]] std::string to_string(const CallbackId &id);
+
+/// The same for a pattern: "/lidar_* timer", "/imu_driver timer 2 ms", "/imu_driver timer (0)".
+[[nodiscard]] std::string to_string(const Callback &pattern);
+
+/// Does ROS itself create this callback in a node that did not ask for it: parameters, clock, log levels, life cycle?
+[[nodiscard]] bool is_ros_internal(const CallbackId &id);
+
+/// Gives real callbacks their tasks and keeps account of both sides. Needs the workload for as long as it lives,
+/// unchanged.
+class CallbackMatcher {
+ public:
+  explicit CallbackMatcher(const Workload &workload);
+
+  /// The task that runs this callback; none if the file names none. A task whose node has no wildcard wins over one
+  /// whose node has, then the first in the file. A task can be found for several callbacks.
+  [[nodiscard]] std::optional<TaskRef> find(const CallbackId &id);
+
+  /// A line for every task with a callback that was not found so far, in the order of the file: what it names, and what
+  /// is nearest to it among the callbacks seen.
+  [[nodiscard]] std::vector<std::string> unmatched() const;
+
+  /// The callbacks seen that no task names, each once, in the order in which they were first seen, without those of ROS
+  /// itself.
+  [[nodiscard]] std::vector<std::string> unconfigured() const;
+
+ private:
+  struct Seen {
+    CallbackId id;
+    std::optional<std::uint32_t> entry;  // position in entries_
+  };
+  struct Entry {
+    TaskRef task;
+    std::string name;  // "dag.task"
+    bool matched = false;
+  };
+
+  [[nodiscard]] std::optional<std::uint32_t> entry_of(const CallbackId &id) const;
+  [[nodiscard]] std::string explain(const Entry &entry) const;
+
+  std::vector<Entry> entries_;                                                // tasks with a callback
+  std::unordered_map<std::string_view, std::vector<std::uint32_t>> by_node_;  // entries without wildcard in the node
+  std::vector<std::uint32_t> patterns_;                                       // the others
+  std::vector<Seen> seen_;
+  std::unordered_set<std::string> seen_texts_;
+};
+
+}  // namespace redag
