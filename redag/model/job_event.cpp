@@ -28,6 +28,7 @@ const char *to_string(Reason reason) {
     case Reason::Removed: return "removed";
     case Reason::Exception: return "exception";
     case Reason::Budget: return "budget";
+    case Reason::NoData: return "no_data";
   }
   return "?";
 }

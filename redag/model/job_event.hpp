@@ -33,9 +33,10 @@ enum class Reason : std::uint8_t {
   Precedence,  // Skipped: not ready when its task's next job was released
   QueueFull,   // Skipped: `queue_depth` jobs of its task were waiting
   DagFull,     // Skipped: `max_pending` jobs of its DAG were waiting
-  Removed,     // Skipped: its DAG was removed
+  Removed,     // Skipped: its task or its DAG was removed
   Exception,   // Aborted: the body threw
   Budget,      // Aborted: cut off at its budget
+  NoData,      // Aborted: it found nothing to do (its message was overwritten, its timer cancelled)
 };
 
 /// 32 bytes, trivially copyable: what the rings hold.

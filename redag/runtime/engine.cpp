@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <climits>
 #include <thread>
 #include <utility>
 
@@ -20,7 +21,7 @@ using sched::Outcome;
 Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options)
     : options_(std::move(options)),
       scheduler_(std::move(scheduler)),
-      first_tasks_{TaskId(0)},
+      paused_(options_.start_paused),
       decisions_(options_.trace_capacity) {
   const sched::Config &config = options_.config;
   REDAG_CHECK(!os() || config.max_started >= config.workers, "os: a thread for every processor, at least");
@@ -29,6 +30,8 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
   for (std::uint32_t i = 0; i < count; ++i) {
     threads_.push_back(std::make_unique<Thread>(i, options_.trace_capacity));
   }
+  caller_ = std::make_unique<Thread>(count, options_.trace_capacity);
+  caller_->stack.reserve(1);
 }
 
 Engine::~Engine() {
@@ -67,10 +70,14 @@ Result<void> Engine::start() {
     join();
     return result;
   }
+  const Time at = now();
   Locked locked(*this);
+  withdraw_if_halting();
   if (os()) {
     for (auto thread = threads_.rbegin(); thread != threads_.rend(); ++thread) idle_.push_back(thread->get());
   }
+  running_ = true;
+  decide(locked, at, nullptr, JobSlot());
   return result;
 }
 
@@ -100,9 +107,11 @@ void Engine::join() {
   }
 }
 
-bool Engine::in_body() const noexcept {
-  const RunningJob *job = RunningJob::current();
-  return job != nullptr && job->engine == this;
+std::optional<TaskId> Engine::current_task() const noexcept {
+  for (const RunningJob *job = RunningJob::current(); job != nullptr; job = job->below) {
+    if (job->engine == this) return job->task;
+  }
+  return std::nullopt;
 }
 
 // ---- jobs, on their threads ----
@@ -115,8 +124,9 @@ Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot bel
     self.events.push(
         JobEvent{begun, begun, job.task, job.number, job.worker.value, JobEventKind::Started, Reason::None, 0});
   }
-  RunningJob running{this, self.index,           &self.outranked, job.slot, assignment.entry->budget, thread_cpu_now(),
-                     0,    RunningJob::current()};
+  RunningJob running{
+      this, self.index,           &self.outranked, job.task, job.slot, assignment.entry->budget, thread_cpu_now(),
+      0,    RunningJob::current()};
   RunningJob::set_current(&running);
   const Outcome outcome = call(assignment);
   RunningJob::set_current(running.below);
@@ -141,13 +151,14 @@ Engine::Next Engine::finish(Thread &self, const Assignment &assignment, Outcome 
   withdraw_if_halting();
   TaskEntry &entry = *assignment.entry;
   entry.count(used);
-  entry.busy = false;
-  if (entry.removed) doomed.swap(entry.body);
+  --entry.busy;
+  if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
   self.stack.pop_back();
   --unfinished_;
   scheduler_->complete(assignment.job.slot, at, outcome);
-  const Next next = decide(locked, at, &self, below);
+  const Next next = decide(locked, at, &self == caller_.get() ? nullptr : &self, below);
   if (unfinished_ == 0 && halted_at_ != kNever) idle_event_.set();
+  if (unfinished_ == 0 && pause_waiters_ > 0) wake_pause_waiters();
   return next;
 }
 
@@ -187,53 +198,151 @@ void Engine::release(TaskId task, Time nominal) {
   release(std::span(&one, 1));
 }
 
+void Engine::miss(TaskId task, Time nominal, Reason reason) {
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  if (halted_at_ != kNever) return;
+  scheduler_->miss(task, nominal, at, reason);
+  decide(locked, at, nullptr, JobSlot());
+}
+
+// ---- pauses ----
+
+void Engine::pause() {
+  Locked locked(*this);
+  paused_ = true;
+  refresh_outranked();
+}
+
+void Engine::resume() {
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  paused_ = false;
+  if (pause_waiters_ > 0) wake_pause_waiters();
+  decide(locked, at, nullptr, JobSlot());
+}
+
+bool Engine::wait_paused(Time deadline) {
+  for (bool in_time = true;;) {
+    std::uint32_t seen = 0;
+    {
+      Locked locked(*this);
+      if (!paused_) return false;
+      if (unfinished_ == 0) return true;
+      if (!in_time) return false;
+      ++pause_waiters_;
+      seen = pause_changes_.load(std::memory_order_relaxed);
+    }
+    in_time = futex_wait_until(pause_changes_, seen, deadline);
+    Locked locked(*this);
+    --pause_waiters_;
+  }
+}
+
+void Engine::wake_pause_waiters() {
+  pause_changes_.fetch_add(1, std::memory_order_release);
+  futex_wake(pause_changes_, INT_MAX);
+}
+
+bool Engine::run_one() {
+  Next next;
+  {
+    const Time at = now();
+    Locked locked(*this);
+    withdraw_if_halting();
+    REDAG_CHECK(paused_, "run_one() is for a paused engine");
+    REDAG_CHECK(caller_->stack.empty(), "one run_one() at a time");
+    next = decide(locked, at, caller_.get(), JobSlot());
+  }
+  if (next.kind != Next::Kind::Start) return false;
+  run(*caller_, next.assignment, JobSlot());
+  return true;
+}
+
+// ---- tasks ----
+
 void Engine::bind(const Workload &workload, std::vector<Body> bodies) {
   REDAG_CHECK(bodies.size() == workload.task_count(), "every task needs a body");
   Locked locked(*this);
-  std::size_t first = 0;
-  for (const Dag &dag : workload.dags) {
-    register_dag(dag, std::span(bodies).subspan(first, dag.tasks.size()));
-    first += dag.tasks.size();
-  }
+  for (const TaskRef &ref : flatten(workload)) register_task(ref.id, *ref.task, bodies[ref.id.value]);
 }
 
 AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
   REDAG_CHECK(bodies.size() == dag.tasks.size(), "every task needs a body");
-  Locked locked(*this);
-  const TaskId first = first_tasks_.back();
   const Time at = now();
-  const DagId id = scheduler_->add_dag(dag, at);
-  register_dag(dag, bodies);
-  REDAG_CHECK(id.value + 2 == first_tasks_.size(), "the scheduler numbers DAGs differently");
-  if (halted_at_ != kNever) {
-    scheduler_->remove_dag(id, at);  // nothing starts any more
-  }
+  Locked locked(*this);
+  withdraw_if_halting();
+  AddedDag added;
+  added.dag = scheduler_->add_dag(dag, at);
+  const std::span<const TaskId> tasks = scheduler_->tasks_of(added.dag);
+  added.tasks.assign(tasks.begin(), tasks.end());
+  for (std::size_t i = 0; i < bodies.size(); ++i) register_task(added.tasks[i], dag.tasks[i], bodies[i]);
   decide(locked, at, nullptr, JobSlot());
-  return AddedDag{id, first};
+  return added;
+}
+
+TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body body) {
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  const TaskId id = scheduler_->add_task(dag, rank, task, at);
+  register_task(id, task, body);
+  decide(locked, at, nullptr, JobSlot());
+  return id;
 }
 
 void Engine::remove_dag(DagId dag) {
   std::vector<Body> doomed;  // destroyed without the lock: destructors are the user's code
-  Locked locked(*this);
-  REDAG_CHECK(dag.value + 1 < first_tasks_.size(), "removal of a DAG that does not exist");
-  withdraw_if_halting();
-  for (std::uint32_t t = first_tasks_[dag.value].value; t < first_tasks_[dag.value + 1].value; ++t) {
-    TaskEntry &entry = tasks_[t];
-    entry.removed = true;
-    if (!entry.busy) doomed.emplace_back().swap(entry.body);
-  }
   const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  REDAG_CHECK(dag.value < scheduler_->dag_slots(), "removal of a DAG that does not exist");
+  for (const TaskId task : scheduler_->tasks_of(dag)) remove_entry(task, doomed);
   scheduler_->remove_dag(dag, at);
   decide(locked, at, nullptr, JobSlot());
 }
 
-void Engine::register_dag(const Dag &dag, std::span<Body> bodies) {
-  for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
-    tasks_.emplace_back(std::move(bodies[i]), dag.tasks[i].wcet, dag.tasks[i].budget);
-  }
-  first_tasks_.push_back(TaskId(tasks_.size()));
-  // Jobs of one task do not overlap: no stack is deeper than there are tasks.
-  for (auto &thread : threads_) thread->stack.reserve(tasks_.size());
+void Engine::remove_task(TaskId task) {
+  std::vector<Body> doomed;
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  REDAG_CHECK(task.value < tasks_.size(), "removal of a task that does not exist");
+  remove_entry(task, doomed);
+  scheduler_->remove_task(task, at);
+  decide(locked, at, nullptr, JobSlot());
+}
+
+void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  scheduler_->set_timing(task, period, deadline, at);
+  decide(locked, at, nullptr, JobSlot());
+}
+
+// An id that is used again begins anew; the body of before went when its last job ended.
+void Engine::register_task(TaskId id, const Task &task, Body &body) {
+  REDAG_CHECK(id.value <= tasks_.size(), "the scheduler numbers tasks differently");
+  if (id.value == tasks_.size()) tasks_.emplace_back();
+  TaskEntry &entry = tasks_[id.value];
+  REDAG_CHECK(!entry.body && entry.busy == 0, "a task that is still there is replaced");
+  most_started_ += task.concurrency;
+  most_started_ -= entry.concurrency;
+  entry = TaskEntry{};
+  entry.body.swap(body);
+  entry.wcet = task.wcet;
+  entry.budget = task.budget;
+  entry.concurrency = task.concurrency;
+  for (auto &thread : threads_) thread->stack.reserve(most_started_);
+}
+
+void Engine::remove_entry(TaskId id, std::vector<Body> &doomed) {
+  TaskEntry &entry = tasks_[id.value];
+  entry.removed = true;
+  if (entry.busy == 0) doomed.emplace_back().swap(entry.body);
 }
 
 // ---- the end ----
@@ -243,7 +352,7 @@ void Engine::register_dag(const Dag &dag, std::span<Body> bodies) {
 void Engine::withdraw_if_halting() {
   if (halted_at_ != kNever || !halting_.load(std::memory_order_acquire)) return;
   halted_at_ = now();
-  for (std::size_t dag = 0; dag + 1 < first_tasks_.size(); ++dag) scheduler_->remove_dag(DagId(dag), halted_at_);
+  scheduler_->close(halted_at_);
   const sched::Step step = scheduler_->dispatch(halted_at_);
   for (const JobEvent &event : step.events) {
     if (event.kind == JobEventKind::Skipped) ++tasks_[event.task.value].withdrawn;
@@ -272,12 +381,14 @@ std::vector<Job> Engine::started() const {
   const std::lock_guard guard(lock_);
   std::vector<Job> jobs;
   for (const auto &thread : threads_) jobs.insert(jobs.end(), thread->stack.begin(), thread->stack.end());
+  jobs.insert(jobs.end(), caller_->stack.begin(), caller_->stack.end());
   return jobs;
 }
 
 void Engine::drain(std::vector<JobEvent> &out, bool last) {
   decisions_.drain(merge_.decisions());
   for (auto &thread : threads_) thread->events.drain(merge_.started());
+  caller_->events.drain(merge_.started());
   merge_.merge(out, last);
 }
 
@@ -285,6 +396,7 @@ std::uint64_t Engine::lost_events() const {
   if (options_.trace_capacity == 0) return 0;
   std::uint64_t lost = decisions_.dropped();
   for (const auto &thread : threads_) lost += thread->events.dropped();
+  lost += caller_->events.dropped();
   return lost;
 }
 

@@ -2,8 +2,8 @@
 // the scheduler decides, and decides nothing. Who releases jobs (release timer, rclcpp) and what jobs do (bodies) is
 // given from outside.
 //
-// Threads: any thread, also a body, may call anything but start(), join() and drain(); drain() is for one thread at a
-// time; halt() is async-signal-safe. No lock is held while a body runs.
+// Threads: any thread, also a body, may call anything but start(), join(), wait_idle(), wait_paused(), run_one() and
+// drain(); drain() is for one thread at a time; halt() is async-signal-safe. No lock is held while a body runs.
 #pragma once
 
 #include <atomic>
@@ -12,10 +12,12 @@
 #include <exception>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "redag/base/futex.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/result.hpp"
 #include "redag/runtime/event_merge.hpp"
@@ -54,6 +56,7 @@ struct EngineOptions {
   std::vector<int> cpus;           // worker threads run there only; empty: anywhere, with `os` on m processors
   std::size_t trace_capacity = 0;  // events the rings hold between two drain(); 0: no events
   ExceptionHandler on_exception;   // empty: exceptions are only counted
+  bool start_paused = false;       // as after pause()
 };
 
 /// Processor time of a task's jobs that ended.
@@ -67,7 +70,7 @@ struct Usage {
 
 struct AddedDag {
   DagId dag;
-  TaskId first_task;  // the others follow
+  std::vector<TaskId> tasks;  // in the DAG's order; consecutive unless ids are reused
 };
 
 class Engine {
@@ -80,7 +83,8 @@ class Engine {
   /// Gives the tasks that the scheduler was built with their bodies, in TaskId order. Before start().
   void bind(const Workload &workload, std::vector<Body> bodies);
 
-  /// Creates the threads; they wait for jobs. Error: what the system refused, with a hint. Once.
+  /// Creates the threads; until then no job starts on them, and what is released waits. Error: what the system refused,
+  /// with a hint. Once, or never: run_one() needs no threads.
   [[nodiscard]] Result<void> start();
 
   /// Sets the origin of all times that the scheduler sees (CLOCK_MONOTONIC). Until then now() is 0. Before any release.
@@ -90,11 +94,31 @@ class Engine {
   /// Jobs of timer tasks are released, all at this instant; decisions are carried out before it returns.
   void release(std::span<const Release> releases);
   void release(TaskId task, Time nominal);
+  /// A release that is skipped at once, as `reason` (sched::Scheduler::miss).
+  void miss(TaskId task, Time nominal, Reason reason);
 
-  /// Reconfiguration while running; bodies in the DAG's task order. Allocates under the lock.
+  /// Reconfiguration while running; bodies in the DAG's task order, which may be none. All of it allocates under the
+  /// lock. Which tasks can be added, and what ids they get: sched::Scheduler.
   AddedDag add_dag(const Dag &dag, std::vector<Body> bodies);
   /// Jobs that have not started are skipped. A body is destroyed as soon as its last job has ended.
   void remove_dag(DagId dag);
+  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Body body);
+  /// As remove_dag(). With reuse_ids nobody may use the id from here on.
+  void remove_task(TaskId task);
+  void set_timing(TaskId task, Duration period, Duration deadline);
+
+  /// From when it returns the scheduler starts no job, until resume(). Jobs that have started go on (one that a thread
+  /// was just given counts as started); releases are accepted and kept.
+  void pause();
+  /// Waits until no started job is left, while paused. False: not by `deadline` (CLOCK_MONOTONIC; kNever: for ever), or
+  /// resumed meanwhile.
+  [[nodiscard]] bool wait_paused(Time deadline);
+  /// Decides at once.
+  void resume();
+  /// Starts the most urgent eligible job, if there is one and a worker is free for it, and runs it to its end on the
+  /// calling thread, at that thread's own priority; a preemption point in it only looks at its budget. False: there was
+  /// none. Requires pause(), and that no other run_one() is in progress.
+  bool run_one();
 
   /// No job starts from now on; jobs that have started go on. What was released and has not started stays in flight.
   void halt() noexcept { halting_.store(true, std::memory_order_release); }
@@ -117,7 +141,9 @@ class Engine {
   /// Priority changes that the system refused while running (rights were taken away).
   [[nodiscard]] std::uint64_t refused_priorities() const noexcept { return refused_priorities_.load(); }
   /// Is the calling thread inside one of this engine's bodies?
-  [[nodiscard]] bool in_body() const noexcept;
+  [[nodiscard]] bool in_body() const noexcept { return current_task().has_value(); }
+  /// The task whose job the calling thread runs in this engine, the topmost one of several; nothing outside bodies.
+  [[nodiscard]] std::optional<TaskId> current_task() const noexcept;
   [[nodiscard]] std::uint32_t thread_count() const { return static_cast<std::uint32_t>(threads_.size()); }
   [[nodiscard]] const EngineOptions &options() const { return options_; }
 
@@ -143,8 +169,11 @@ class Engine {
   void hand(Locked &locked, Thread &thread, const Assignment &assignment);
   void set_level(Thread &thread, std::uint32_t level);
   void refresh_outranked();
-  void register_dag(const Dag &dag, std::span<Body> bodies);
+  void register_task(TaskId id, const Task &task, Body &body);
+  void remove_entry(TaskId id, std::vector<Body> &doomed);
   void withdraw_if_halting();
+  void wake_pause_waiters();
+  [[nodiscard]] bool may_start() const { return running_ && !paused_; }
 
   [[nodiscard]] bool os() const { return options_.config.preemption == sched::Preemption::Full; }
   [[nodiscard]] bool realtime() const { return os() || options_.realtime_threads; }
@@ -153,10 +182,15 @@ class Engine {
   std::unique_ptr<sched::Scheduler> scheduler_;
   mutable PiMutex lock_;  // guards the scheduler and everything below that says so
   std::vector<std::unique_ptr<Thread>> threads_;
+  std::unique_ptr<Thread> caller_;   // whoever is in run_one()
   std::vector<Thread *> idle_;       // lock: os, threads without a job
-  std::deque<TaskEntry> tasks_;      // lock; entries stay where they are
-  std::vector<TaskId> first_tasks_;  // lock: of each DAG, and one past the last
+  std::deque<TaskEntry> tasks_;      // lock; by TaskId; entries stay where they are
+  std::size_t most_started_ = 0;     // lock: jobs that all tasks together can have in progress
   std::uint32_t unfinished_ = 0;     // lock: jobs dispatched and not ended
+  bool running_ = false;             // lock: the threads are there
+  bool paused_;                      // lock
+  std::uint32_t pause_waiters_ = 0;  // lock
+  FutexWord pause_changes_{0};       // counts what wait_paused() waits for; written under the lock
   Time halted_at_ = kNever;          // lock
   trace::Ring decisions_;            // written under the lock
   EventMerge merge_;                 // drain() only

@@ -11,7 +11,9 @@ using sched::Dispatch;
 
 // `self`: the calling thread, if it has just lost its job and can take another; `below`: the job suspended on it.
 Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot below) {
-  const sched::Step step = scheduler_->dispatch(now);
+  // Paused, only run_one() starts a job, on the caller's thread.
+  const std::uint32_t for_caller = self == caller_.get() ? 1 : 0;
+  const sched::Step step = scheduler_->dispatch(now, may_start() ? sched::kNoLimit : for_caller);
   if (options_.trace_capacity > 0) {
     for (const JobEvent &event : step.events) decisions_.push(event);
   }
@@ -20,11 +22,11 @@ Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot belo
   return next;
 }
 
-// none, cooperative: thread w is worker w.
+// none, cooperative: thread w is worker w, save that the caller of run_one() does the work of whichever it was given.
 Engine::Next Engine::place_on_workers(Locked &locked, const sched::Step &step, Thread *self, JobSlot below) {
   Next next;
   for (const Dispatch &dispatch : step.dispatches) {
-    Thread &thread = *threads_[dispatch.worker.value];
+    Thread &thread = self == caller_.get() ? *self : *threads_[dispatch.worker.value];
     if (dispatch.resume) {
       // Other than that of the job below, these are changes of level: nothing to do without levels.
       if (&thread == self && dispatch.job == below) next.kind = Next::Kind::Resume;
@@ -52,15 +54,16 @@ Engine::Next Engine::place_on_pool(Locked &locked, const sched::Step &step, Thre
   }
   Next next;
   if (own != nullptr) {
-    set_level(*self, own->level);
+    if (self != caller_.get()) set_level(*self, own->level);
     next = Next{Next::Kind::Start, assign(*self, *own)};
-  } else if (self != nullptr) {
+  } else if (self != nullptr && self != caller_.get()) {
     idle_.push_back(self);
   }
   for (const Dispatch &dispatch : step.dispatches) {
     if (&dispatch == own) continue;
     if (dispatch.resume) {
       const auto runs_it = [&](const auto &t) { return !t->stack.empty() && t->stack.back().slot == dispatch.job; };
+      if (runs_it(caller_)) continue;  // at its own priority
       const auto thread = std::find_if(threads_.begin(), threads_.end(), runs_it);
       REDAG_CHECK(thread != threads_.end(), "a job goes on that no thread has");
       set_level(**thread, dispatch.level);
@@ -77,8 +80,8 @@ Engine::Next Engine::place_on_pool(Locked &locked, const sched::Step &step, Thre
 
 Engine::Assignment Engine::assign(Thread &thread, const Dispatch &dispatch) {
   TaskEntry &entry = tasks_[dispatch.task.value];
-  REDAG_CHECK(!entry.busy, "two jobs of one task at a time");
-  entry.busy = true;
+  REDAG_CHECK(entry.busy < entry.concurrency, "more jobs of one task at a time than it allows");
+  ++entry.busy;
   ++unfinished_;
   const Job job{dispatch.task, dispatch.number, dispatch.job, dispatch.worker};
   thread.stack.push_back(job);
@@ -104,7 +107,7 @@ void Engine::set_level(Thread &thread, std::uint32_t level) {
 // Lets preemption points cost one load while there is nothing to do.
 void Engine::refresh_outranked() {
   for (auto &thread : threads_) {
-    const bool outranked = !thread->stack.empty() && scheduler_->outranked(thread->stack.back().slot);
+    const bool outranked = may_start() && !thread->stack.empty() && scheduler_->outranked(thread->stack.back().slot);
     thread->outranked.store(outranked, std::memory_order_relaxed);
   }
 }

@@ -10,9 +10,6 @@
 namespace redag::runtime {
 
 struct Engine::TaskEntry {
-  TaskEntry(Body its_body, Duration its_wcet, Duration its_budget)
-      : body(std::move(its_body)), wcet(its_wcet), budget(its_budget) {}
-
   void count(Duration used) {
     ++usage.jobs;
     usage.total += used;
@@ -22,11 +19,12 @@ struct Engine::TaskEntry {
   }
 
   Body body;
-  Duration wcet;
-  Duration budget;
+  Duration wcet = 0;
+  Duration budget = 0;
   Usage usage;
-  std::uint64_t withdrawn = 0;  // jobs taken away at the end
-  bool busy = false;            // a job of it has started and not ended
+  std::uint64_t withdrawn = 0;    // jobs taken away at the end
+  std::uint32_t concurrency = 0;  // jobs that can be in progress
+  std::uint32_t busy = 0;         // jobs that have started and not ended
   bool removed = false;
 };
 

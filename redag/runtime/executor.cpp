@@ -85,8 +85,9 @@ DagId Executor::add(DagBuilder builder) {
   }
   const std::lock_guard guard(lock_);
   const AddedDag ids = engine_->add_dag(dag, std::move(bodies));
-  dags_.push_back(Added{dag.name, std::move(names), ids.first_task});
-  timer_->add(dag, ids.first_task, running_ ? std::max<Time>(0, engine_->now()) : 0);
+  const TaskId first = ids.tasks.empty() ? TaskId(0) : ids.tasks.front();  // the others follow: ids are not reused
+  dags_.push_back(Added{dag.name, std::move(names), first});
+  timer_->add(dag, first, running_ ? std::max<Time>(0, engine_->now()) : 0);
   return ids.dag;
 }
 

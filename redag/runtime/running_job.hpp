@@ -15,6 +15,7 @@ struct RunningJob {
   Engine *engine = nullptr;
   std::uint32_t thread = 0;                      // position among the engine's threads
   const std::atomic<bool> *outranked = nullptr;  // set while a more urgent job could run on top
+  TaskId task;
   JobSlot slot;
   Duration budget = 0;      // 0: none
   Duration cpu_start = 0;   // of the thread, when the body began

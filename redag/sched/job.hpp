@@ -23,7 +23,7 @@ struct Job {
   TaskId task;
   std::uint32_t number = 0;
   Time release = 0;
-  Time ready = 0;
+  Time deadline = 0;  // absolute
   Time origin = 0;
 
   TaskId priority_of;  // the task whose priority it has: its own, or that of a job from which it inherited

@@ -5,12 +5,40 @@
 #include "redag/base/check.hpp"
 
 namespace redag::sched {
+namespace {
+
+Reason reason_of(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::Threw: return Reason::Exception;
+    case Outcome::BudgetExceeded: return Reason::Budget;
+    case Outcome::NoData: return Reason::NoData;
+    case Outcome::Finished: break;
+  }
+  return Reason::None;
+}
+
+}  // namespace
 
 void Lifecycle::release(TaskId task, Time nominal, Time now) {
   REDAG_CHECK(task.value < tasks_.size(), "release of a task that does not exist");
   REDAG_CHECK(tasks_[task.value].timer, "data tasks are released by their predecessors");
   begin(now);
-  if (!tasks_[task.value].removed) admit(task, nominal, nominal);
+  if (takes_releases(tasks_[task.value])) admit(task, nominal, nominal);
+}
+
+void Lifecycle::miss(TaskId id, Time nominal, Time now, Reason reason) {
+  REDAG_CHECK(id.value < tasks_.size(), "release of a task that does not exist");
+  TaskState &task = tasks_[id.value];
+  REDAG_CHECK(task.timer, "data tasks are released by their predecessors");
+  begin(now);
+  if (!takes_releases(task)) return;
+  Job fresh;
+  fresh.task = id;
+  fresh.number = task.next_number++;
+  ++task.accounting.released;
+  emit(fresh, JobEventKind::Released, nominal);
+  ++task.accounting.skipped;
+  emit(fresh, JobEventKind::Skipped, 0, reason);
 }
 
 void Lifecycle::complete(JobSlot job_slot, Time now, Outcome outcome) {
@@ -25,14 +53,15 @@ void Lifecycle::complete(JobSlot job_slot, Time now, Outcome outcome) {
     emit(job, JobEventKind::Finished, now);
   } else {
     ++task.accounting.aborted;
-    emit(job, JobEventKind::Aborted, now, outcome == Outcome::Threw ? Reason::Exception : Reason::Budget);
+    emit(job, JobEventKind::Aborted, now, reason_of(outcome));
   }
   on_end(slot);
   free_slot(slot);
-  if (outcome != Outcome::Finished || task.removed) return;
+  if (outcome != Outcome::Finished || !takes_releases(task)) return;
 
   precedence_.on_complete(job.task, job.release, job.origin, [&](TaskId successor) {
     const TaskState &next = tasks_[successor.value];
+    if (next.life != TaskLife::Live) return;
     if (!next.timer) {
       admit(successor, now, precedence_.consume(successor));
     } else if (next.waiting != kNil) {
@@ -41,33 +70,211 @@ void Lifecycle::complete(JobSlot job_slot, Time now, Outcome outcome) {
   });
 }
 
-DagId Lifecycle::add_dag(const Dag &dag, Time now) {
-  begin(now);
-  append(dag);
+// ---- reconfiguration ----
+
+void Lifecycle::load(const Workload &workload) {
+  for (const Dag &dag : workload.dags) append_dag(dag);
   prioritise();
   on_reconfigured();
-  return DagId(dag_states_.size() - 1);
+}
+
+DagId Lifecycle::add_dag(const Dag &dag, Time now) {
+  begin(now);
+  collect();
+  const DagId id = append_dag(dag);
+  prioritise();
+  on_reconfigured();
+  return id;
+}
+
+TaskId Lifecycle::add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) {
+  REDAG_CHECK(dag.value < dag_states_.size() && !dag_states_[dag.value].removed,
+              "a task for a DAG that does not exist");
+  REDAG_CHECK(task.activation == Activation::Timer && task.predecessors.empty(),
+              "a task that is added alone has no predecessors");
+  begin(now);
+  collect();
+  const TaskId id = append_task(dag, rank, task);
+  precedence_.add_task(task, id);
+  reserve_step();
+  prioritise();
+  on_reconfigured();
+  return id;
 }
 
 void Lifecycle::remove_dag(DagId dag, Time now) {
   REDAG_CHECK(dag.value < dag_states_.size(), "removal of a DAG that does not exist");
   begin(now);
-  const DagState &state = dag_states_[dag.value];
-  for (std::uint32_t t = state.first_task; t < state.first_task + state.task_count; ++t) {
-    TaskState &task = tasks_[t];
-    task.removed = true;
-    for (std::uint32_t slot = task.first_slot; slot < task.first_slot + task.slot_count; ++slot) {
-      const JobState job_state = jobs_[slot].state;
-      if (job_state == JobState::Waiting || job_state == JobState::Ready) skip(slot, Reason::Removed);
-    }
-  }
+  dag_states_[dag.value].removed = true;
+  for (const TaskId task : dag_states_[dag.value].tasks) tasks_[task.value].life = TaskLife::Removed;
+  skip_all([&](const Job &job) { return tasks_[job.task.value].dag == dag; });
 }
 
-void Lifecycle::load(const Workload &workload) {
-  for (const Dag &dag : workload.dags) append(dag);
+void Lifecycle::remove_task(TaskId task, Time now) {
+  REDAG_CHECK(task.value < tasks_.size(), "removal of a task that does not exist");
+  begin(now);
+  if (tasks_[task.value].life != TaskLife::Live) return;
+  tasks_[task.value].life = TaskLife::Removed;
+  skip_all([&](const Job &job) { return job.task == task; });
+}
+
+void Lifecycle::set_timing(TaskId task, Duration period, Duration deadline, Time now) {
+  REDAG_CHECK(task.value < tasks_.size(), "a new period for a task that does not exist");
+  REDAG_CHECK(period > 0 && deadline > 0, "a task needs a period and a deadline");
+  begin(now);
+  if (tasks_[task.value].life == TaskLife::Gone) return;
+  tasks_[task.value].period = period;
+  tasks_[task.value].deadline = deadline;
+  precedence_.set_period(task, period);
   prioritise();
   on_reconfigured();
 }
+
+void Lifecycle::close(Time now) {
+  begin(now);
+  closed_ = true;
+  skip_all([](const Job &) { return true; });
+}
+
+template <class Predicate>
+void Lifecycle::skip_all(Predicate which) {
+  for (std::uint32_t slot = 0; slot < jobs_.size(); ++slot) {
+    const JobState state = jobs_[slot].state;
+    if ((state == JobState::Waiting || state == JobState::Ready) && which(jobs_[slot])) skip(slot, Reason::Removed);
+  }
+}
+
+DagId Lifecycle::append_dag(const Dag &dag) {
+  DagId id(dag_states_.size());
+  if (free_dags_.empty()) {
+    dag_states_.emplace_back();
+  } else {
+    id = free_dags_.back();
+    free_dags_.pop_back();
+  }
+  dag_states_[id.value] = DagState{dag.max_active, dag.max_pending, 0, dag.criticality, false, false, {}};
+  const std::vector<std::uint32_t> topological = topological_ranks(dag);
+  for (std::size_t i = 0; i < dag.tasks.size(); ++i) append_task(id, topological[i], dag.tasks[i]);
+  precedence_.add_dag(dag, dag_states_[id.value].tasks);
+  reserve_step();
+  return id;
+}
+
+TaskId Lifecycle::append_task(DagId dag, std::uint32_t rank, const Task &task) {
+  REDAG_CHECK(task.period > 0 && task.deadline > 0, "a task needs a period and a deadline (inherit_periods)");
+  REDAG_CHECK(task.concurrency > 0, "a task that may have no job in progress never runs");
+  TaskId id(tasks_.size());
+  if (free_tasks_.empty()) {
+    tasks_.emplace_back();
+  } else {
+    id = free_tasks_.back();
+    free_tasks_.pop_back();
+  }
+  TaskState state;
+  state.period = task.period;
+  state.deadline = task.deadline;
+  state.dag = dag;
+  if (!task.group.empty()) state.group = join_group(task.group);
+  state.queue_depth = task.overrun == Overrun::Queue ? std::max(1U, task.queue_depth) : 0;
+  state.concurrency = task.concurrency;
+  state.topological_rank = rank;
+  state.fixed_priority = task.priority.value_or(0);
+  state.timer = task.activation == Activation::Timer;
+  // The jobs that have started, the ready ones, and one that waits for its predecessors.
+  const std::uint32_t slot_count = state.concurrency + std::max(1U, state.queue_depth) + 1;
+  for (std::uint32_t i = 0; i < slot_count; ++i) {
+    const std::uint32_t slot = new_slot();
+    jobs_[slot].next = state.free_slot;
+    state.free_slot = slot;
+  }
+  tasks_[id.value] = state;
+  dag_states_[dag.value].tasks.push_back(id);
+  return id;
+}
+
+// Room for what one instant can bring: each task's release, the skip of its last job, readiness, deferral, start,
+// preemption.
+void Lifecycle::reserve_step() {
+  events_.reserve(2 * jobs_.size() + 64);
+  dispatches_.reserve(2 * std::size_t{config_.workers} + 16);
+}
+
+// Removed tasks of which nothing is left leave the order of priority, and with reuse_ids also their places.
+void Lifecycle::collect() {
+  std::vector<bool> in_use(tasks_.size(), false);
+  for (const Job &job : jobs_) {
+    if (job.state == JobState::Free) continue;
+    in_use[job.task.value] = true;
+    if (job.state != JobState::Waiting) in_use[job.priority_of.value] = true;
+  }
+  std::vector<TaskId> gone;
+  for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
+    if (tasks_[t].life == TaskLife::Removed && !in_use[t]) gone.emplace_back(t);
+  }
+  for (const TaskId task : gone) retire(task);
+  if (!config_.reuse_ids) return;
+  if (!gone.empty()) precedence_.forget(gone);
+  for (std::uint32_t d = 0; d < dag_states_.size(); ++d) {
+    DagState &dag = dag_states_[d];
+    if (!dag.removed || dag.free || !dag.tasks.empty()) continue;
+    dag.free = true;
+    free_dags_.emplace_back(d);
+  }
+}
+
+void Lifecycle::retire(TaskId id) {
+  TaskState &task = tasks_[id.value];
+  task.life = TaskLife::Gone;
+  if (task.group != kNil) leave_group(task.group);
+  task.group = kNil;
+  std::erase(dag_states_[task.dag.value].tasks, id);
+  if (!config_.reuse_ids) return;
+  while (task.free_slot != kNil) free_slots_.push_back(take_slot(task));
+  free_tasks_.push_back(id);
+}
+
+std::uint32_t Lifecycle::join_group(const std::string &name) {
+  const auto [place, is_new] = group_positions_.try_emplace(name, 0U);
+  if (is_new) {
+    const auto unused = std::find_if(groups_.begin(), groups_.end(), [](const Group &g) { return g.tasks == 0; });
+    place->second = static_cast<std::uint32_t>(unused - groups_.begin());
+    if (unused == groups_.end()) groups_.emplace_back();
+    groups_[place->second] = Group{place, 0};
+  }
+  ++groups_[place->second].tasks;
+  return place->second;
+}
+
+void Lifecycle::leave_group(std::uint32_t position) {
+  Group &group = groups_[position];
+  if (--group.tasks == 0) group_positions_.erase(group.name);
+}
+
+void Lifecycle::prioritise() {
+  std::vector<Duration> dag_periods(dag_states_.size(), kNever);
+  for (const TaskState &task : tasks_) {
+    if (task.life == TaskLife::Gone) continue;
+    dag_periods[task.dag.value] = std::min(dag_periods[task.dag.value], task.period);
+  }
+  std::vector<RankedTask> ranked;
+  for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
+    const TaskState &task = tasks_[t];
+    if (task.life == TaskLife::Gone) continue;
+    ranked.push_back(RankedTask{task.period, task.deadline, task.fixed_priority,
+                                dag_states_[task.dag.value].criticality, dag_periods[task.dag.value], task.dag.value,
+                                task.topological_rank, TaskId(t)});
+  }
+  rank_count_ = ranked.size();
+  const std::vector<Priority> priorities = assign_priorities(ranked, config_.policy, config_.levels);
+  for (std::size_t i = 0; i < ranked.size(); ++i) tasks_[ranked[i].task.value].priority = priorities[i];
+  for (Job &job : jobs_) {
+    if (job.state == JobState::Free || job.state == JobState::Waiting) continue;
+    job.rank = tasks_[job.priority_of.value].priority.rank;
+    if (is_static(config_.policy)) job.key = job.rank;
+  }
+}
+
+// ---- the step ----
 
 void Lifecycle::begin(Time now) {
   now_ = std::max(now_, now);
@@ -89,7 +296,7 @@ void Lifecycle::start(std::uint32_t slot, WorkerId worker, std::uint32_t over, s
   --dag_states_[task.dag.value].pending;
   job.state = JobState::Running;
   job.worker = worker;
-  emit(job, JobEventKind::Dispatched, job.release + task.deadline);
+  emit(job, JobEventKind::Dispatched, job.deadline);
   dispatches_.push_back(
       Dispatch{JobSlot(slot), job.task, job.number, worker, over == kNil ? JobSlot() : JobSlot(over), false, level});
 }
@@ -130,6 +337,7 @@ void Lifecycle::admit(TaskId id, Time nominal, Time origin) {
   fresh.task = id;
   fresh.number = task.next_number++;
   fresh.release = nominal;
+  fresh.deadline = nominal + task.deadline;
   ++task.accounting.released;
   emit(fresh, JobEventKind::Released, nominal);
 
@@ -165,13 +373,12 @@ void Lifecycle::make_ready(std::uint32_t slot, Time origin) {
   ++task.ready_count;
   task.latest_ready = slot;
   job.state = JobState::Ready;
-  job.ready = now_;
   job.origin = origin;
   job.sequence = next_sequence_++;
   job.priority_of = job.task;
   job.rank = task.priority.rank;
   switch (config_.policy) {
-    case PolicyKind::Edf: job.key = job.release + task.deadline; break;
+    case PolicyKind::Edf: job.key = job.deadline; break;
     case PolicyKind::Fifo: job.key = static_cast<std::int64_t>(job.sequence); break;
     default: job.key = task.priority.rank; break;
   }
@@ -194,48 +401,14 @@ void Lifecycle::skip(std::uint32_t slot, Reason reason) {
   free_slot(slot);
 }
 
-void Lifecycle::append(const Dag &dag) {
-  const auto task_count = static_cast<std::uint32_t>(dag.tasks.size());
-  dag_states_.push_back(
-      DagState{dag.max_active, dag.max_pending, 0, static_cast<std::uint32_t>(tasks_.size()), task_count});
-  for (const Task &task : dag.tasks) {
-    REDAG_CHECK(task.period > 0 && task.deadline > 0, "a task needs a period and a deadline (inherit_periods)");
-    TaskState state;
-    state.deadline = task.deadline;
-    state.dag = DagId(dag_states_.size() - 1);
-    state.queue_depth = task.overrun == Overrun::Queue ? std::max(1U, task.queue_depth) : 0;
-    state.timer = task.activation == Activation::Timer;
-    if (!task.group.empty()) {
-      const auto next_position = static_cast<std::uint32_t>(group_positions_.size());
-      state.group = group_positions_.try_emplace(task.group, next_position).first->second;
-    }
-    // One job that has started, the ready ones, and one that waits for its predecessors.
-    state.first_slot = static_cast<std::uint32_t>(jobs_.size());
-    state.slot_count = std::max(1U, state.queue_depth) + 2;
-    jobs_.resize(jobs_.size() + state.slot_count);
-    for (std::uint32_t slot = state.first_slot; slot < jobs_.size(); ++slot) {
-      jobs_[slot].next = state.free_slot;
-      state.free_slot = slot;
-    }
-    tasks_.push_back(state);
+std::uint32_t Lifecycle::new_slot() {
+  if (free_slots_.empty()) {
+    jobs_.emplace_back();
+    return static_cast<std::uint32_t>(jobs_.size() - 1);
   }
-  precedence_.add_dag(dag);
-  dags_.push_back(dag);
-
-  // Room for what one instant can bring: each task's release, the skip of its last job, readiness, deferral, start,
-  // preemption.
-  events_.reserve(6 * tasks_.size() + 64);
-  dispatches_.reserve(2 * std::size_t{config_.workers} + 16);
-}
-
-void Lifecycle::prioritise() {
-  const std::vector<Priority> priorities = assign_priorities(dags_, config_.policy, config_.levels);
-  for (std::size_t i = 0; i < tasks_.size(); ++i) tasks_[i].priority = priorities[i];
-  for (Job &job : jobs_) {
-    if (job.state == JobState::Free || job.state == JobState::Waiting) continue;
-    job.rank = tasks_[job.priority_of.value].priority.rank;
-    if (is_static(config_.policy)) job.key = job.rank;
-  }
+  const std::uint32_t slot = free_slots_.back();
+  free_slots_.pop_back();
+  return slot;
 }
 
 std::uint32_t Lifecycle::take_slot(TaskState &task) {

@@ -4,9 +4,9 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "redag/sched/job.hpp"
@@ -19,26 +19,42 @@ namespace redag::sched {
 class Lifecycle : public Scheduler {
  public:
   void release(TaskId task, Time nominal, Time now) final;
+  void miss(TaskId task, Time nominal, Time now, Reason reason) final;
   void complete(JobSlot job, Time now, Outcome outcome) final;
   DagId add_dag(const Dag &dag, Time now) final;
   void remove_dag(DagId dag, Time now) final;
+  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) final;
+  void remove_task(TaskId task, Time now) final;
+  void set_timing(TaskId task, Duration period, Duration deadline, Time now) final;
+  void close(Time now) final;
+  [[nodiscard]] std::span<const TaskId> tasks_of(DagId dag) const final { return dag_states_[dag.value].tasks; }
+  [[nodiscard]] std::size_t task_slots() const final { return tasks_.size(); }
+  [[nodiscard]] std::size_t dag_slots() const final { return dag_states_.size(); }
   [[nodiscard]] Accounting accounting(TaskId task) const final { return tasks_[task.value].accounting; }
 
   [[nodiscard]] const Job &job(JobSlot slot) const { return jobs_[slot.value]; }
   [[nodiscard]] const Config &config() const { return config_; }
+  /// Room there is for jobs and groups: how memory grows.
+  [[nodiscard]] std::size_t job_slots() const { return jobs_.size(); }
+  [[nodiscard]] std::size_t group_slots() const { return groups_.size(); }
 
  protected:
+  // Live -> Removed -> Gone (no job of it is left, and none has its priority) -> with reuse_ids another Live task.
+  enum class TaskLife : std::uint8_t { Live, Removed, Gone };
+
   struct TaskState {
+    Duration period = 0;
     Duration deadline = 0;
     DagId dag;
-    std::uint32_t group = kNil;     // position among the workload's groups
+    std::uint32_t group = kNil;     // position among the groups
     std::uint32_t queue_depth = 0;  // 0: overrun by skipping
+    std::uint32_t concurrency = 1;
+    std::uint32_t topological_rank = 0;
+    int fixed_priority = 0;
     bool timer = true;
-    bool removed = false;
-    Priority priority;
+    TaskLife life = TaskLife::Live;
+    Priority priority;  // not of one that is gone
 
-    std::uint32_t first_slot = 0;
-    std::uint32_t slot_count = 0;
     std::uint32_t free_slot = kNil;     // list through Job::next
     std::uint32_t waiting = kNil;       // the job whose predecessors are incomplete
     std::uint32_t latest_ready = kNil;  // the job that became ready last; not started if ready_count > 0
@@ -50,8 +66,10 @@ class Lifecycle : public Scheduler {
     std::uint32_t max_active = 0;
     std::uint32_t max_pending = 0;
     std::uint32_t pending = 0;  // released, not started
-    std::uint32_t first_task = 0;
-    std::uint32_t task_count = 0;
+    Criticality criticality = Criticality::Normal;
+    bool removed = false;
+    bool free = false;          // its id is to be used again
+    std::vector<TaskId> tasks;  // not those that are gone
   };
 
   explicit Lifecycle(const Config &config) : config_(config) {}
@@ -63,7 +81,7 @@ class Lifecycle : public Scheduler {
   virtual void on_ready(std::uint32_t slot) = 0;      // the job can be queued
   virtual void on_withdrawn(std::uint32_t slot) = 0;  // a ready, not started job is skipped
   virtual void on_end(std::uint32_t slot) = 0;        // a started job ended; afterwards its slot is free
-  virtual void on_reconfigured() = 0;                 // tasks or DAGs were added; priorities may have changed
+  virtual void on_reconfigured() = 0;                 // tasks were added, or timings changed: priorities are new
 
   /// Moves time forward and, after a dispatch, empties the step's buffers. Every verb begins with it.
   void begin(Time now);
@@ -79,7 +97,9 @@ class Lifecycle : public Scheduler {
   /// What dispatch() returns.
   Step step();
 
-  [[nodiscard]] std::size_t group_count() const { return group_positions_.size(); }
+  [[nodiscard]] std::size_t group_count() const { return groups_.size(); }
+  /// Tasks in the order of priority: ranks are smaller than this.
+  [[nodiscard]] std::size_t rank_count() const { return rank_count_; }
   [[nodiscard]] const TaskState &task_of(const Job &job) const { return tasks_[job.task.value]; }
 
   Config config_;
@@ -91,15 +111,37 @@ class Lifecycle : public Scheduler {
   void admit(TaskId id, Time nominal, Time origin);
   void make_ready(std::uint32_t slot, Time origin);
   void skip(std::uint32_t slot, Reason reason);
-  void append(const Dag &dag);
+  [[nodiscard]] bool takes_releases(const TaskState &task) const { return task.life == TaskLife::Live && !closed_; }
+
+  template <class Predicate>
+  void skip_all(Predicate which);
+  DagId append_dag(const Dag &dag);
+  TaskId append_task(DagId dag, std::uint32_t rank, const Task &task);
+  void reserve_step();
+  void collect();
+  void retire(TaskId id);
   void prioritise();
+  std::uint32_t join_group(const std::string &name);
+  void leave_group(std::uint32_t position);
+  std::uint32_t new_slot();
   std::uint32_t take_slot(TaskState &task);
   void free_slot(std::uint32_t slot);
   void emit(const Job &job, JobEventKind kind, std::int64_t value, Reason reason = Reason::None);
 
+  struct Group {
+    std::map<std::string, std::uint32_t>::iterator name;
+    std::uint32_t tasks = 0;  // 0: the position is free
+  };
+
   Precedence precedence_;
-  std::vector<Dag> dags_;  // as given: priorities are assigned anew when a DAG is added
-  std::unordered_map<std::string, std::uint32_t> group_positions_;
+  std::map<std::string, std::uint32_t> group_positions_;
+  std::vector<Group> groups_;
+  // To be used again (reuse_ids); group positions always are.
+  std::vector<TaskId> free_tasks_;
+  std::vector<DagId> free_dags_;
+  std::vector<std::uint32_t> free_slots_;
+  std::size_t rank_count_ = 0;
+  bool closed_ = false;
   std::vector<JobEvent> events_;
   std::vector<Dispatch> dispatches_;
   Time now_ = 0;

@@ -7,19 +7,19 @@
 namespace redag::sched {
 namespace {
 
-// What a policy sorts by, smallest first; where these are equal, the common order (DAG, topological, file) decides.
+// What a policy sorts by, smallest first; where these are equal, the common order (DAG, topological, TaskId) decides.
 using PolicyKey = std::array<std::int64_t, 4>;
 
-PolicyKey policy_key(PolicyKind policy, const Dag &dag, const Task &task, std::int64_t dag_index, Duration dag_period,
-                     std::int64_t topological_rank) {
+PolicyKey policy_key(PolicyKind policy, const RankedTask &task) {
   switch (policy) {
     case PolicyKind::RateMonotonic: return {task.period};
     case PolicyKind::DeadlineMonotonic: return {task.deadline};
-    case PolicyKind::Fixed: return {-std::int64_t{task.priority.value_or(0)}};
+    case PolicyKind::Fixed: return {-std::int64_t{task.priority}};
     // PiCAS (Choi, Xiang, Kim, RTAS 2021): the chain first, and within it downstream first, so that an instance is
     // finished before the next one starts.
     case PolicyKind::ChainAware:
-      return {-static_cast<std::int64_t>(dag.criticality), dag_period, dag_index, -topological_rank};
+      return {-static_cast<std::int64_t>(task.dag_criticality), task.dag_period, task.dag,
+              -std::int64_t{task.topological_rank}};
     case PolicyKind::Edf:
     case PolicyKind::Fifo: break;
   }
@@ -30,21 +30,16 @@ struct Entry {
   PolicyKey key{};
   std::uint32_t dag = 0;
   std::uint32_t topological_rank = 0;
-  std::uint32_t task = 0;  // TaskId; follows the order in the file
+  TaskId task;
+  std::size_t position = 0;  // among the tasks asked for
 };
 
-std::vector<Entry> sorted_entries(std::span<const Dag> dags, PolicyKind policy) {
+std::vector<Entry> sorted_entries(std::span<const RankedTask> tasks, PolicyKind policy) {
   std::vector<Entry> entries;
-  std::uint32_t id = 0;
-  for (std::uint32_t d = 0; d < dags.size(); ++d) {
-    const Dag &dag = dags[d];
-    const std::vector<std::uint32_t> topological = topological_ranks(dag);
-    Duration shortest = kNever;
-    for (const Task &task : dag.tasks) shortest = std::min(shortest, task.period);
-    for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
-      entries.push_back(
-          Entry{policy_key(policy, dag, dag.tasks[i], d, shortest, topological[i]), d, topological[i], id++});
-    }
+  entries.reserve(tasks.size());
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    const RankedTask &task = tasks[i];
+    entries.push_back(Entry{policy_key(policy, task), task.dag, task.topological_rank, task.task, i});
   }
   std::sort(entries.begin(), entries.end(), [](const Entry &a, const Entry &b) {
     return std::tie(a.key, a.dag, a.topological_rank, a.task) < std::tie(b.key, b.dag, b.topological_rank, b.task);
@@ -54,8 +49,8 @@ std::vector<Entry> sorted_entries(std::span<const Dag> dags, PolicyKind policy) 
 
 }  // namespace
 
-std::vector<Priority> assign_priorities(std::span<const Dag> dags, PolicyKind policy, std::uint32_t levels) {
-  const std::vector<Entry> entries = sorted_entries(dags, policy);
+std::vector<Priority> assign_priorities(std::span<const RankedTask> tasks, PolicyKind policy, std::uint32_t levels) {
+  const std::vector<Entry> entries = sorted_entries(tasks, policy);
   std::vector<Priority> priorities(entries.size());
 
   const bool own_levels = levels == 0 || levels >= entries.size() || !is_static(policy);
@@ -72,9 +67,25 @@ std::vector<Priority> assign_priorities(std::span<const Dag> dags, PolicyKind po
       level =
           classes <= levels ? class_index : static_cast<std::uint32_t>(std::uint64_t{class_index} * levels / classes);
     }
-    priorities[entries[rank].task] = Priority{rank, level};
+    priorities[entries[rank].position] = Priority{rank, level};
   }
   return priorities;
+}
+
+std::vector<Priority> assign_priorities(std::span<const Dag> dags, PolicyKind policy, std::uint32_t levels) {
+  std::vector<RankedTask> tasks;
+  for (std::uint32_t d = 0; d < dags.size(); ++d) {
+    const Dag &dag = dags[d];
+    const std::vector<std::uint32_t> topological = topological_ranks(dag);
+    Duration shortest = kNever;
+    for (const Task &task : dag.tasks) shortest = std::min(shortest, task.period);
+    for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+      const Task &task = dag.tasks[i];
+      tasks.push_back(RankedTask{task.period, task.deadline, task.priority.value_or(0), dag.criticality, shortest, d,
+                                 topological[i], TaskId(tasks.size())});
+    }
+  }
+  return assign_priorities(tasks, policy, levels);
 }
 
 }  // namespace redag::sched

@@ -22,10 +22,26 @@ struct Priority {
   return policy != PolicyKind::Edf && policy != PolicyKind::Fifo;
 }
 
-/// One Priority per TaskId (DAG by DAG). `levels`: how many the platform has, 0 for no limit. With enough levels every
-/// task has its own. With fewer, tasks that the policy ranks equal (the same period, say) share one first; if that is
-/// not enough, neighbours share, spread evenly. Policies without static priorities give every task a level of its own.
-/// O(n log n). Requires acyclic DAGs with periods and deadlines set.
+/// A task as the order sees it.
+struct RankedTask {
+  Duration period = 0;
+  Duration deadline = 0;
+  int priority = 0;  // for PolicyKind::Fixed; larger is more urgent
+  Criticality dag_criticality = Criticality::Normal;
+  Duration dag_period = 0;  // the shortest period in its DAG
+  std::uint32_t dag = 0;    // position of the DAG, and within that of the task: ties of the policy
+  std::uint32_t topological_rank = 0;
+  TaskId task;  // the last tie
+};
+
+/// One Priority per entry, in the order of `tasks`. `levels`: how many the platform has, 0 for no limit. With enough
+/// levels every task has its own. With fewer, tasks that the policy ranks equal (the same period, say) share one first;
+/// if that is not enough, neighbours share, spread evenly. Policies without static priorities give every task a level
+/// of its own. O(n log n).
+[[nodiscard]] std::vector<Priority> assign_priorities(std::span<const RankedTask> tasks, PolicyKind policy,
+                                                      std::uint32_t levels = 0);
+
+/// The same for whole DAGs: one Priority per TaskId (DAG by DAG). Requires acyclic DAGs with periods and deadlines set.
 [[nodiscard]] std::vector<Priority> assign_priorities(std::span<const Dag> dags, PolicyKind policy,
                                                       std::uint32_t levels = 0);
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "redag/model/workload.hpp"
@@ -11,8 +12,15 @@ namespace redag::sched {
 
 class Precedence {
  public:
-  /// Appends the DAG's tasks and edges; TaskIds go on where they stopped. Allocates.
-  void add_dag(const Dag &dag);
+  /// Adds the DAG's tasks, which are new or forgotten ones, and its edges; `ids` in the order of its tasks. Allocates.
+  void add_dag(const Dag &dag, std::span<const TaskId> ids);
+  /// Adds a task without edges. Allocates.
+  void add_task(const Task &task, TaskId id) { add_node(task, id); }
+  /// Takes away tasks, and the edges into and out of them: their ids can be added again. Linear in all edges.
+  void forget(std::span<const TaskId> tasks);
+  /// Which edges join tasks of one period and offset is found anew; data that is now too old is discarded. Linear in
+  /// all edges.
+  void set_period(TaskId task, Duration period);
 
   /// `task` has a new job, released at `release`. Data too old for it is discarded.
   /// Returns whether all its predecessors have fresh data.
@@ -48,7 +56,7 @@ class Precedence {
 
  private:
   struct Edge {
-    TaskId to;
+    TaskId to;             // none: forgotten
     bool aligned = false;  // timer to timer, same period and offset: job k waits for job k
     bool fresh = false;    // completed since `to` last consumed
     Time release = 0;      // of the predecessor's job that completed last
@@ -61,9 +69,15 @@ class Precedence {
     std::uint32_t last_successor = 0;
     std::uint32_t fresh = 0;  // edges into the task with fresh data
     Time last_release = 0;
+    Duration period = 0;
+    Duration offset = 0;
+    bool timer = true;
   };
 
-  std::vector<Node> nodes_;
+  Node &add_node(const Task &task, TaskId id);
+  [[nodiscard]] static bool is_aligned(const Node &from, const Node &to);
+
+  std::vector<Node> nodes_;  // by TaskId
   std::vector<Edge> edges_;
   std::vector<std::uint32_t> successors_;
 };

@@ -15,16 +15,42 @@ PriorityScheduler::PriorityScheduler(const Workload &workload, const Config &con
 
 // ---- decisions ----
 
-Step PriorityScheduler::dispatch(Time now) {
+Step PriorityScheduler::dispatch(Time now, std::uint32_t most) {
   begin(now);
   for (std::uint32_t best = top(); best != kNil; best = top()) {
+    const bool starts = !jobs_[best].started();
+    if (starts && most == 0) {
+      if (!set_aside(best)) break;
+      continue;
+    }
     Place place;
     if (!find_place(jobs_[best], place)) break;
     if (park_if_not_eligible(best)) continue;
+    if (starts) --most;
     run(best, place);
   }
+  put_back();
   close_open_workers();
   return step();
+}
+
+// No more jobs may start: looks past this one for jobs that have started. Those are in the queue with full preemption
+// only.
+bool PriorityScheduler::set_aside(std::uint32_t slot) {
+  if (config_.preemption != Preemption::Full) return false;
+  remove(slot);
+  jobs_[slot].next = aside_;
+  aside_ = slot;
+  return true;
+}
+
+void PriorityScheduler::put_back() {
+  while (aside_ != kNil) {
+    const std::uint32_t slot = aside_;
+    aside_ = jobs_[slot].next;
+    jobs_[slot].next = kNil;
+    push(slot);
+  }
 }
 
 void PriorityScheduler::preemption_point(JobSlot job, Time now) {
@@ -222,9 +248,11 @@ void PriorityScheduler::remove(std::uint32_t slot) {
 
 // Gates, levels and the ready queue are built anew; parked jobs go back to the ready queue and find their gates again.
 void PriorityScheduler::on_reconfigured() {
-  level_of_rank_.resize(tasks_.size());
-  for (const TaskState &task : tasks_) level_of_rank_[task.priority.rank] = task.priority.level;
-  levels_ = LevelQueue(static_ ? tasks_.size() : 0);
+  level_of_rank_.resize(rank_count());
+  for (const TaskState &task : tasks_) {
+    if (task.life != TaskLife::Gone) level_of_rank_[task.priority.rank] = task.priority.level;
+  }
+  levels_ = LevelQueue(static_ ? rank_count() : 0);
   heap_ = HeapQueue();
 
   gates_.clear();
@@ -242,9 +270,10 @@ void PriorityScheduler::on_reconfigured() {
   };
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     const TaskState &task = tasks_[t];
+    if (task.life == TaskLife::Gone) continue;
     TaskGates &list = task_gates_[t];
     std::uint32_t own = kNil;
-    pass(list, GateKind::Task, own, 1);
+    pass(list, GateKind::Task, own, task.concurrency);
     const std::uint32_t max_active = dag_states_[task.dag.value].max_active;
     if (max_active > 0) pass(list, GateKind::Dag, dag_gates[task.dag.value], max_active);
     if (task.group != kNil) pass(list, GateKind::Group, group_gates[task.group], 1);

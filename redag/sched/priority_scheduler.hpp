@@ -21,7 +21,7 @@ class PriorityScheduler final : public Lifecycle {
   PriorityScheduler(const Workload &workload, const Config &config);
 
   void preemption_point(JobSlot job, Time now) override;
-  Step dispatch(Time now) override;
+  Step dispatch(Time now, std::uint32_t most = kNoLimit) override;
   [[nodiscard]] bool outranked(JobSlot job) const override;
 
  private:
@@ -64,6 +64,8 @@ class PriorityScheduler final : public Lifecycle {
   bool park_if_not_eligible(std::uint32_t slot);
   void inherit(std::uint32_t holder, const Job &waiter);
   void close_open_workers();
+  bool set_aside(std::uint32_t slot);
+  void put_back();
 
   void push(std::uint32_t slot);
   void remove(std::uint32_t slot);
@@ -80,6 +82,7 @@ class PriorityScheduler final : public Lifecycle {
   std::vector<Worker> workers_;
   LevelBitmap free_workers_;
   std::vector<std::uint32_t> open_workers_;
+  std::uint32_t aside_ = kNil;  // during dispatch(): jobs that may not start, out of the queue; linked by Job::next
 };
 
 }  // namespace redag::sched

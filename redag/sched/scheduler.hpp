@@ -1,5 +1,5 @@
 // The scheduler's interface: events in, decisions out. An implementation is a value: no thread, no clock, no I/O, and
-// after construction no allocation (except in add_dag/remove_dag). Not thread-safe: the driver serialises the calls.
+// after construction no allocation (except in reconfiguration). Not thread-safe: the driver serialises the calls.
 //
 // A driver reports what happened (release, complete, preemption_point), any number at one instant, and then asks for
 // the decisions with dispatch(). Releases and completions of one instant are so decided together.
@@ -29,9 +29,20 @@ struct Config {
   std::uint32_t levels = 0;
   // Full preemption on threads: jobs that can be started and unfinished at once (0: no bound).
   std::uint32_t max_started = 0;
+  // Ids, job slots and group positions of removed tasks and DAGs are used again once nothing of them is in flight, so
+  // that memory stays flat under endless adding and removing. Otherwise an id names one task for ever, as traces need.
+  bool reuse_ids = false;
 };
 
-enum class Outcome : std::uint8_t { Finished, Threw, BudgetExceeded };
+enum class Outcome : std::uint8_t {
+  Finished,
+  Threw,
+  BudgetExceeded,
+  NoData,  // found nothing to do: its message was overwritten, its timer cancelled
+};
+
+/// Of dispatch(): as many jobs as there are places.
+inline constexpr std::uint32_t kNoLimit = 0xffffffff;
 
 /// One decision: run `job` on `worker` from now. With `resume`, for a job that runs there already: only its level
 /// changed.
@@ -70,6 +81,10 @@ class Scheduler {
   /// The period of timer task `task` expired at `nominal`; it is `now`. A release of a removed task is ignored.
   virtual void release(TaskId task, Time nominal, Time now) = 0;
 
+  /// A release of timer task `task` that is skipped at once, as `reason`: a period that the timer missed, a message
+  /// that the middleware overwrote. Nothing else happens to the task's jobs.
+  virtual void miss(TaskId task, Time nominal, Time now, Reason reason) = 0;
+
   /// A dispatched job ended at `now` as `outcome`. Data tasks whose predecessors are now complete are released.
   virtual void complete(JobSlot job, Time now, Outcome outcome) = 0;
 
@@ -77,17 +92,37 @@ class Scheduler {
   /// over it, it simply goes on.
   virtual void preemption_point(JobSlot job, Time now) = 0;
 
-  /// Decides. Calling it again without a new event yields nothing.
-  virtual Step dispatch(Time now) = 0;
+  /// Decides. Calling it again without a new event yields nothing. Of the jobs that have not started, at most `most` do
+  /// now; once that many have, the others are not looked at, and started ones go on as if those were not there.
+  virtual Step dispatch(Time now, std::uint32_t most = kNoLimit) = 0;
 
   /// Cooperative: could dispatch() put a job over `job` if that were at a preemption point now? May say yes in vain (a
   /// bound or a group can keep the more urgent job waiting), never no. In the other modes: no.
   [[nodiscard]] virtual bool outranked(JobSlot job) const = 0;
 
-  /// Reconfiguration; both allocate. New TaskIds follow the existing ones and are never reused. Periods and deadlines
-  /// must be set (inherit_periods). remove_dag skips what has not started; what has started ends as usual.
+  // Reconfiguration; all of it allocates, and assigns priorities anew where tasks or timings change. New ids follow the
+  // existing ones, unless Config::reuse_ids finds free ones. Periods and deadlines must be set (inherit_periods).
+
+  /// A DAG may have no tasks yet.
   virtual DagId add_dag(const Dag &dag, Time now) = 0;
+  /// Skips what has not started; what has started ends as usual.
   virtual void remove_dag(DagId dag, Time now) = 0;
+  /// Adds a timer task without predecessors to a DAG, to be released from outside. `rank` is its topological rank
+  /// there, for the total order: ties of the policy are broken by DAG, rank, TaskId.
+  virtual TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) = 0;
+  /// As remove_dag(), for one task. Its successors get no data from it any more.
+  virtual void remove_task(TaskId task, Time now) = 0;
+  /// Another period and deadline, for jobs released from now on; the order changes at once. Successors keep theirs.
+  virtual void set_timing(TaskId task, Duration period, Duration deadline, Time now) = 0;
+  /// The run ends: what has not started is skipped (Removed), and nothing is released any more. Nothing is removed.
+  virtual void close(Time now) = 0;
+
+  /// The DAG's tasks, removed ones as long as their ids are theirs; first those it was added with, in its order. Valid
+  /// until the next reconfiguration.
+  [[nodiscard]] virtual std::span<const TaskId> tasks_of(DagId dag) const = 0;
+  /// Ids in use are smaller than these.
+  [[nodiscard]] virtual std::size_t task_slots() const = 0;
+  [[nodiscard]] virtual std::size_t dag_slots() const = 0;
 
   [[nodiscard]] virtual Accounting accounting(TaskId task) const = 0;
 };

@@ -18,15 +18,15 @@ void WaitSetScheduler::preemption_point(JobSlot /*job*/, Time /*now*/) {
 }
 
 // Executor::get_next_executable, by one free thread after the other: from the window, or else from a new one.
-Step WaitSetScheduler::dispatch(Time now) {
+Step WaitSetScheduler::dispatch(Time now, std::uint32_t most) {
   begin(now);
-  for (std::uint32_t worker = free_worker(); worker != kNil; worker = free_worker()) {
+  for (std::uint32_t worker = free_worker(); worker != kNil && most > 0; worker = free_worker(), --most) {
     std::uint32_t slot = take();
     if (slot == kNil && wait()) slot = take();
     if (slot == kNil) break;
     Entity &entity = entities_[jobs_[slot].task.value];
     unlink(entity, slot);
-    busy_[entity.group] = true;
+    --room_[entity.group];
     working_[worker] = true;
     start(slot, WorkerId(worker), kNil, 0);
   }
@@ -43,7 +43,7 @@ std::uint32_t WaitSetScheduler::free_worker() const {
 std::uint32_t WaitSetScheduler::take() {
   for (const std::uint32_t task : registration_) {
     Entity &entity = entities_[task];
-    if (!entity.in_window || busy_[entity.group]) continue;
+    if (!entity.in_window || room_[entity.group] == 0) continue;
     entity.in_window = false;
     if (entity.first != kNil) return entity.first;
   }
@@ -55,7 +55,7 @@ std::uint32_t WaitSetScheduler::take() {
 bool WaitSetScheduler::wait() {
   bool any = false;
   for (Entity &entity : entities_) {
-    entity.in_window = entity.first != kNil && !busy_[entity.group];
+    entity.in_window = entity.first != kNil && room_[entity.group] > 0;
     any = any || entity.in_window;
   }
   return any;
@@ -71,7 +71,7 @@ void WaitSetScheduler::on_ready(std::uint32_t slot) {
 void WaitSetScheduler::on_withdrawn(std::uint32_t slot) { unlink(entities_[jobs_[slot].task.value], slot); }
 
 void WaitSetScheduler::on_end(std::uint32_t slot) {
-  busy_[entities_[jobs_[slot].task.value].group] = false;
+  ++room_[entities_[jobs_[slot].task.value].group];
   working_[jobs_[slot].worker.value] = false;
 }
 
@@ -91,13 +91,16 @@ void WaitSetScheduler::on_reconfigured() {
       if (tasks_[t].timer == timers) registration_.push_back(t);
     }
   }
-  busy_.assign(tasks_.size() + group_count(), false);
+  room_.assign(tasks_.size() + group_count(), 1);
   for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
     const std::uint32_t named = tasks_[t].group;
-    entities_[t].group = named == kNil ? t : static_cast<std::uint32_t>(tasks_.size()) + named;
+    Entity &entity = entities_[t];
+    entity.group = named == kNil ? t : static_cast<std::uint32_t>(tasks_.size()) + named;
+    if (named == kNil) room_[t] = tasks_[t].concurrency;
+    if (entity.first == kNil) entity.in_window = false;  // it may be another task of this id
   }
   for (const Job &job : jobs_) {
-    if (job.started()) busy_[entities_[job.task.value].group] = true;
+    if (job.started()) --room_[entities_[job.task.value].group];
   }
 }
 

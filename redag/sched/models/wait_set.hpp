@@ -29,7 +29,7 @@ class WaitSetScheduler final : public Lifecycle {
   WaitSetScheduler(const Workload &workload, const Config &config);
 
   void preemption_point(JobSlot job, Time now) override;
-  Step dispatch(Time now) override;
+  Step dispatch(Time now, std::uint32_t most = kNoLimit) override;
   [[nodiscard]] bool outranked(JobSlot /*job*/) const override { return false; }
 
  private:
@@ -37,7 +37,7 @@ class WaitSetScheduler final : public Lifecycle {
   struct Entity {
     std::uint32_t first = kNil;  // ready jobs, oldest first, linked by Job::task_next
     std::uint32_t last = kNil;
-    std::uint32_t group = 0;  // position in busy_
+    std::uint32_t group = 0;  // position in room_
     bool in_window = false;
   };
 
@@ -53,7 +53,7 @@ class WaitSetScheduler final : public Lifecycle {
 
   std::vector<Entity> entities_;             // by TaskId
   std::vector<std::uint32_t> registration_;  // tasks in the order in which a window is searched
-  std::vector<bool> busy_;                   // callback groups: one for each task, then the named ones
+  std::vector<std::uint32_t> room_;          // jobs that groups can start: one group for each task, then the named ones
   std::vector<bool> working_;                // workers
 };
 
