@@ -15,6 +15,37 @@ import yaml
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SCHEMA = json.loads((ROOT / "docs" / "workload.schema.json").read_text(encoding="utf-8"))
 TASK = {"name": "t", "wcet": "1ms", "period": "10ms"}
+CALLBACKS = (
+    {"timer": "2ms"},
+    {"timer": "any"},
+    {"timer": {"index": 0}},
+    {"timer": {"period": "2ms", "index": 3}},
+    {"subscription": "/imu/data"},
+    {"service": "/set_*"},
+    {"client": "*/plan"},
+    {"action": "/navigate"},
+    {"waitable": "any"},
+    {"waitable": {"index": 1}},
+)
+BAD_CALLBACKS = (
+    "/n",
+    {"timer": "2ms"},
+    {"node": "/n"},
+    {"node": "n", "timer": "any"},
+    {"node": "/n/", "timer": "any"},
+    {"node": "/", "timer": "any"},
+    {"node": "/a//b", "timer": "any"},
+    {"node": "/a b", "timer": "any"},
+    {"node": "/n", "timer": "2ms", "service": "/s"},
+    {"node": "/n", "timer": 0},
+    {"node": "/n", "timer": {}},
+    {"node": "/n", "timer": {"indx": 0}},
+    {"node": "/n", "timer": {"index": -1}},
+    {"node": "/n", "waitable": "2ms"},
+    {"node": "/n", "waitable": {"period": "2ms"}},
+    {"node": "/n", "subscription": "imu"},
+    {"node": "/n", "topic": "/imu"},
+)
 
 
 def errors(document):
@@ -54,6 +85,8 @@ class SchemaTest(unittest.TestCase):
             {"offset": 0},
             {"wcet": "1µs"},
             {"wcet": ".5ms"},
+            {"concurrency": 2},
+            *({"callback": {"node": "/n", **of}} for of in CALLBACKS),
         ):
             with self.subTest(changes=changes):
                 self.assertEqual(errors(with_task(**changes)), [])
@@ -72,9 +105,19 @@ class SchemaTest(unittest.TestCase):
             {"activation": "event"},
             {"priority": "high"},
             {"after": ["a", "a"]},
+            {"concurrency": 0},
+            {"concurrency": 1025},
+            *({"callback": callback} for callback in BAD_CALLBACKS),
         ):
             with self.subTest(changes=changes):
                 self.assertNotEqual(errors(with_task(**changes)), [])
+
+    def test_only_a_callback_may_be_without_wcet(self):
+        document = with_task(callback={"node": "/n", "timer": "any"})
+        del document["dags"][0]["tasks"][0]["wcet"]
+        self.assertEqual(errors(document), [])
+        del document["dags"][0]["tasks"][0]["callback"]
+        self.assertNotEqual(errors(document), [])
 
     def test_refuses_incomplete_documents(self):
         self.assertNotEqual(errors({}), [])

@@ -99,6 +99,9 @@ class Compiler {
       // Preemption points are at multiples of the region that lie strictly inside the job.
       compiled.last_region = whole ? add(task.wcet, lead) : (task.wcet - 1) % task.region + 1;
     }
+    if (task.concurrency > 1) {
+      refuse("task '" + compiled.name + "': jobs of a task with concurrency above 1 can overlap");
+    }
     if (task.budget > 0 && task.budget < task.wcet) {
       refuse("task '" + compiled.name + "': its budget is below its wcet, so jobs can be cut off");
     }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "redag/analysis/analyze.hpp"
 #include "redag/analysis/edf_demand.hpp"
 #include "redag/analysis/response_time.hpp"
 #include "redag/analysis/utilization.hpp"
@@ -97,6 +98,14 @@ TEST(System, WhatCutsOrRefusesJobsIsNotAnalysed) {
   AnalysisPlatform preempt = mode(sched::Preemption::Full, 2);
   preempt.preempt_overhead = 1;
   EXPECT_THAT(compiled(two_dags(), preempt).not_analysable, HasSubstr("overhead"));
+}
+
+TEST(System, OverlappingJobsOfOneTaskAreNotAnalysed) {
+  Workload workload = two_dags();
+  workload.dags[0].tasks[1].concurrency = 2;
+  const System system = compiled(workload, mode(sched::Preemption::Full, 2));
+  EXPECT_EQ(system.not_analysable, "task 'graph/b': jobs of a task with concurrency above 1 can overlap");
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(analyze(system).methods.at(0).outcome));
 }
 
 TEST(System, RegionsFollowTheMode) {

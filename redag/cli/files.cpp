@@ -52,11 +52,11 @@ bool is_number(std::string_view text) {
 
 }  // namespace
 
-Result<LoadedWorkload> load_input(const std::string &path) {
-  if (path != "-") return load_workload(path);
+Result<LoadedWorkload> load_input(const std::string &path, LoadOptions options) {
+  if (path != "-") return load_workload(path, options);
   Result<std::string> text = read_standard_input();
   if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
-  return parse_workload(*text, "<stdin>");
+  return parse_workload(*text, "<stdin>", options);
 }
 
 Result<void> write_text(const std::string &path, std::string_view text) {

@@ -12,7 +12,7 @@
 namespace redag::cli {
 
 /// load_workload(), or the text on standard input if `path` is "-".
-[[nodiscard]] Result<LoadedWorkload> load_input(const std::string &path);
+[[nodiscard]] Result<LoadedWorkload> load_input(const std::string &path, LoadOptions options = {});
 
 /// Writes a whole file or nothing (trace::OutputFile); devices and pipes are written as they are.
 [[nodiscard]] Result<void> write_text(const std::string &path, std::string_view text);

@@ -22,6 +22,7 @@ struct Facts {
   std::size_t dags = 0;
   std::size_t tasks = 0;
   std::size_t edges = 0;
+  std::size_t without_wcet = 0;  // callbacks that are still to be measured
   double utilization = 0;
   std::uint32_t workers = 0;
   std::optional<Duration> hyperperiod;
@@ -31,7 +32,10 @@ Facts facts_of(const Workload &workload) {
   Facts facts;
   facts.dags = workload.dags.size();
   facts.tasks = workload.task_count();
-  for (const TaskRef &ref : flatten(workload)) facts.edges += ref.task->predecessors.size();
+  for (const TaskRef &ref : flatten(workload)) {
+    facts.edges += ref.task->predecessors.size();
+    if (ref.task->wcet == 0) ++facts.without_wcet;
+  }
   facts.utilization = workload.utilization();
   facts.workers = workload.platform.workers;
   facts.hyperperiod = sim::hyperperiod(workload);
@@ -43,8 +47,9 @@ std::string plural(std::size_t count, const char *noun) {
 }
 
 std::string describe(const Facts &facts) {
-  return fmt::format("{}, {}, {}, utilization {:.3f} on {} ({:.1f} %), hyperperiod {}", plural(facts.dags, "DAG"),
-                     plural(facts.tasks, "task"), plural(facts.edges, "edge"), facts.utilization,
+  const std::string unknown = facts.without_wcet == 0 ? "" : fmt::format(" ({} without wcet)", facts.without_wcet);
+  return fmt::format("{}, {}{}, {}, utilization {:.3f} on {} ({:.1f} %), hyperperiod {}", plural(facts.dags, "DAG"),
+                     plural(facts.tasks, "task"), unknown, plural(facts.edges, "edge"), facts.utilization,
                      plural(facts.workers, "worker"), 100 * facts.utilization / facts.workers,
                      facts.hyperperiod ? format_duration(*facts.hyperperiod) : "beyond 146 years");
 }
@@ -54,6 +59,7 @@ Json facts_json(const std::string &name, const Facts &facts) {
               {"dags", facts.dags},
               {"tasks", facts.tasks},
               {"edges", facts.edges},
+              {"without_wcet", facts.without_wcet},
               {"utilization", facts.utilization},
               {"workers", facts.workers},
               {"hyperperiod_ns", facts.hyperperiod ? Json(*facts.hyperperiod) : Json()}};
@@ -63,7 +69,7 @@ int validate_files(const Options &options, Console &console) {
   Json files = Json::array();
   bool all_ok = true;
   for (const std::string &file : options.files) {
-    const Result<LoadedWorkload> loaded = load_input(file);
+    const Result<LoadedWorkload> loaded = load_input(file, {.wcet_optional = true});
     const Diagnostics &found = loaded ? loaded->warnings : loaded.error();
     const bool ok = loaded.has_value() && (found.empty() || !options.strict);
     all_ok = all_ok && ok;

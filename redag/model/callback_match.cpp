@@ -62,6 +62,22 @@ bool glob_match(std::string_view pattern, std::string_view text) {
   return pattern.find_first_not_of('*', p) == std::string_view::npos;
 }
 
+std::string ros_name_mistake(std::string_view pattern) {
+  constexpr std::string_view kLegal = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_/*?";
+  if (pattern.empty()) return "is empty";
+  const std::size_t odd = pattern.find_first_not_of(kLegal);
+  if (odd != std::string_view::npos) {
+    const auto byte = static_cast<unsigned char>(pattern[odd]);
+    const bool printable = byte >= 0x20 && byte < 0x7f;
+    return (printable ? fmt::format("contains '{}'", pattern[odd]) : fmt::format("contains byte {:#04x}", byte)) +
+           ", as no ROS name does";
+  }
+  if (std::string_view("/*?").find(pattern.front()) == std::string_view::npos) return "does not begin with '/'";
+  if (pattern.back() == '/') return "ends with '/'";
+  if (pattern.find("//") != std::string_view::npos) return "contains '//'";
+  return {};
+}
+
 bool matches(const Callback &pattern, const CallbackId &id) {
   return pattern.kind == id.kind && (pattern.period == 0 || pattern.period == id.period) &&
          (!pattern.index || *pattern.index == id.index) && glob_match(pattern.node, id.node) &&

@@ -30,6 +30,10 @@ struct CallbackId {
 /// allocation.
 [[nodiscard]] bool glob_match(std::string_view pattern, std::string_view text);
 
+/// Why `pattern` cannot stand for a fully qualified ROS name, to follow that name in a message ("does not begin with
+/// '/'"); empty if it can.
+[[nodiscard]] std::string ros_name_mistake(std::string_view pattern);
+
 [[nodiscard]] bool matches(const Callback &pattern, const CallbackId &id);
 
 /// "/ekf subscription /imu/data", "/imu_driver timer 2 ms (0)", "/camera waitable (1)".

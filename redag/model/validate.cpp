@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "redag/model/callback_match.hpp"
+
 namespace redag {
 namespace {
 
@@ -123,6 +125,7 @@ class Checker {
       check_execution(task);
       check_activation(task);
       check_options(task);
+      check_callback(task);
       sound_edges = check_edges(dag, task, i) && sound_edges;
     }
     task_ = Finding::kNone;
@@ -241,6 +244,54 @@ class Checker {
               fmt::format("policy '{}' ignores the priority of task '{}'", to_string(workload_.policy), task.name),
               "use 'policy: fixed', or remove it");
     }
+  }
+
+  void check_callback(const Task &task) {
+    if (!task.callback) return;
+    const Callback &callback = *task.callback;
+    const char *kind = to_string(callback.kind);
+    const bool is_timer = callback.kind == Callback::Kind::Timer;
+    const bool is_counted = is_timer || callback.kind == Callback::Kind::Waitable;
+    const auto refuse = [&](std::uint32_t item, std::string message, std::string hint = {}) {
+      error(Field::Callback, {}, std::move(message), std::move(hint)).item = item;
+    };
+    check_callback_name(task, callback.node, "node", kCallbackNode);
+    if (!is_counted) {
+      check_callback_name(task, callback.name, kind, kCallbackKind);
+    } else if (!callback.name.empty()) {
+      refuse(kCallbackKind, fmt::format("the {} of task '{}' has a name", kind, task.name));
+    }
+    if (callback.period < 0 || callback.period > kMaxDuration || (!is_timer && callback.period != 0)) {
+      refuse(kCallbackKind, fmt::format("the {} of task '{}' cannot have period {}", kind, task.name,
+                                        format_duration(callback.period)));
+    } else if (callback.period != 0 && task.activation == Activation::Timer && callback.period != task.period) {
+      warning(Field::Period, Field::Callback,
+              fmt::format("period {} of task '{}' is not that of its timer, {}", format_duration(task.period),
+                          task.name, format_duration(callback.period)),
+              "its priority follows from the period");
+    }
+    if (!is_counted && callback.index) {
+      refuse(kCallbackKind, fmt::format("the {} of task '{}' has an index", kind, task.name));
+    }
+    if (is_timer && task.activation == Activation::Data) {
+      error(Field::Callback, Field::Activation, fmt::format("data task '{}' names a timer", task.name),
+            "its predecessors release it: name what takes their data, or use 'activation: timer'")
+          .item = kCallbackKind;
+    }
+    const auto [other, is_first] = callbacks_.emplace(to_string(callback), task.name);
+    if (!is_first) {
+      warning(Field::Callback, {},
+              fmt::format("task '{}' names the same callback as task '{}'", task.name, other->second),
+              "only the first in the file is used");
+    }
+  }
+
+  void check_callback_name(const Task &task, const std::string &name, const char *what, std::uint32_t item) {
+    const std::string why = ros_name_mistake(name);
+    if (why.empty()) return;
+    error(Field::Callback, {}, fmt::format("{} '{}' of the callback of task '{}' {}", what, name, task.name, why),
+          "full names, as 'ros2 node info' prints them; * and ? stand for any characters")
+        .item = item;
   }
 
   bool check_edges(const Dag &dag, const Task &task, std::uint32_t index) {
@@ -368,6 +419,7 @@ class Checker {
   DagId dag_;
   std::uint32_t task_ = Finding::kNone;
   std::vector<Finding> findings_;
+  std::unordered_map<std::string, std::string_view> callbacks_;  // text of a callback -> task that names it first
 };
 
 }  // namespace

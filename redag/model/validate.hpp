@@ -69,6 +69,10 @@ class FieldSet {
 
 [[nodiscard]] constexpr FieldSet operator|(Field a, Field b) { return FieldSet(a) | FieldSet(b); }
 
+/// Parts of a callback, for Finding::item.
+inline constexpr std::uint32_t kCallbackNode = 0;
+inline constexpr std::uint32_t kCallbackKind = 1;  // with its name, period or index
+
 /// One broken rule and the place in the workload to change.
 struct Finding {
   static constexpr std::uint32_t kNone = UINT32_MAX;
@@ -77,7 +81,7 @@ struct Finding {
   DagId dag;                   // none: about the workload
   std::uint32_t task = kNone;  // position in the DAG; none: about the DAG
   Field field = Field::Name;   // to point at
-  std::uint32_t item = kNone;  // position in `predecessors` or `samples`
+  std::uint32_t item = kNone;  // position in `predecessors` or `samples`, or part of the callback
   FieldSet involves;           // everything the rule looked at
   std::string message;
   std::string hint;

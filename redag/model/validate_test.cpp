@@ -38,6 +38,35 @@ TEST(Validate, RefusesWhatOnlyCppCanBuild) {
   EXPECT_NE(found.find("deadline of DAG 'd' is negative"), std::string::npos) << found;
 }
 
+TEST(Validate, RefusesCallbacksThatTheFormatCannotHold) {
+  Workload workload = valid();
+  Task &task = workload.dags[0].tasks[0];
+  const auto mistake = [&](Callback callback) {
+    task.callback = std::move(callback);
+    return to_string(validate(workload));
+  };
+  using Kind = Callback::Kind;
+  const auto none = std::nullopt;
+  EXPECT_EQ(mistake({"/n", Kind::Timer, "", 0, none}), "");
+  EXPECT_EQ(mistake({"/n", Kind::Timer, "/x", 0, none}), "error: the timer of task 'a' has a name");
+  EXPECT_EQ(mistake({"/n", Kind::Timer, "", -1, none}), "error: the timer of task 'a' cannot have period -1ns");
+  EXPECT_EQ(mistake({"/n", Kind::Service, "/x", 5, none}), "error: the service of task 'a' cannot have period 5ns");
+  EXPECT_EQ(mistake({"/n", Kind::Action, "/x", 0, 3}), "error: the action of task 'a' has an index");
+  EXPECT_NE(mistake({"/n", Kind::Action, "", 0, none}).find("action '' of the callback of task 'a' is empty"),
+            std::string::npos);
+}
+
+TEST(Validate, LeavesOnlyTheWcetOfCallbacksOpen) {
+  Workload workload = valid();
+  for (Task &task : workload.dags[0].tasks) task.wcet = 0;
+  workload.dags[0].tasks[0].callback = Callback{"/n", Callback::Kind::Timer, "", 0, std::nullopt};
+  EXPECT_EQ(validate(workload).size(), 2U);
+  EXPECT_EQ(to_string(validate(workload, {.wcet_optional = true})),
+            "error: wcet of task 'b' must be greater than zero, not 0s");
+  workload.dags[0].tasks[0].wcet = -1;
+  EXPECT_EQ(validate(workload, {.wcet_optional = true}).size(), 2U);
+}
+
 TEST(Validate, WantsInheritedPeriods) {
   Workload workload = valid();
   workload.dags[0].tasks[1].period = 5 * kMillisecond;
@@ -111,6 +140,14 @@ RC_GTEST_PROP(Validate, PassesOnlyWhatIsSound, ()) {
     task.jitter = number();
     task.offset = number();
     task.activation = *rc::gen::element(Activation::Timer, Activation::Data);
+    task.concurrency = *rc::gen::element(0U, 1U, 2U, UINT32_MAX);
+    task.group = *rc::gen::element<std::string>("", "g");
+    if (*rc::gen::arbitrary<bool>()) {
+      using Kind = Callback::Kind;
+      const auto name = [] { return *rc::gen::element<std::string>("", "/", "/a", "a", "*", "/a//b", "\xff"); };
+      task.callback = Callback{name(), *rc::gen::element(Kind::Timer, Kind::Service, Kind::Waitable), name(), number(),
+                               *rc::gen::element<std::optional<std::uint32_t>>(std::nullopt, 0U, UINT32_MAX)};
+    }
     task.execution.kind = *rc::gen::element(ExecutionTime::Kind::Constant, ExecutionTime::Kind::Normal);
     task.execution.mean = number();
     task.execution.stddev = number();
@@ -128,6 +165,7 @@ RC_GTEST_PROP(Validate, PassesOnlyWhatIsSound, ()) {
   for (const Task &task : dag.tasks) {
     RC_ASSERT(task.wcet > 0 && task.period > 0 && task.deadline > 0);
     RC_ASSERT(task.bcet >= 0 && task.bcet <= task.wcet);
+    RC_ASSERT(task.concurrency >= 1 && (task.concurrency == 1 || task.group.empty()));
   }
 }
 

@@ -27,10 +27,10 @@ constexpr std::array kTopFields = {Field::Name, Field::Platform, Field::Policy, 
 constexpr std::array kPlatformFields = {Field::Workers, Field::Preemption};
 constexpr std::array kDagFields = {Field::Name,       Field::Period,      Field::Deadline, Field::MaxActive,
                                    Field::MaxPending, Field::Criticality, Field::Tasks};
-constexpr std::array kTaskFields = {Field::Name,     Field::Wcet,    Field::Bcet,        Field::Period,
-                                    Field::Deadline, Field::Offset,  Field::Jitter,      Field::Region,
-                                    Field::Budget,   Field::Group,   Field::Criticality, Field::Activation,
-                                    Field::After,    Field::Overrun, Field::Priority,    Field::Execution};
+constexpr std::array kTaskFields = {
+    Field::Name,       Field::Wcet,   Field::Bcet,    Field::Period,      Field::Deadline,  Field::Offset,
+    Field::Jitter,     Field::Region, Field::Budget,  Field::Concurrency, Field::Group,     Field::Criticality,
+    Field::Activation, Field::After,  Field::Overrun, Field::Priority,    Field::Execution, Field::Callback};
 
 constexpr std::array kCriticalities = {Criticality::Low, Criticality::Normal, Criticality::High};
 constexpr std::array kActivations = {Activation::Timer, Activation::Data};
@@ -190,13 +190,14 @@ class Reader : private yaml::ValueReader {
       return;
     }
     take_text(part, Field::Name, task.name);
-    take_duration(part, Field::Wcet, task.wcet);
+    take_wcet(task, part);
     take_duration(part, Field::Bcet, task.bcet);
     take_positive_duration(part, Field::Deadline, task.deadline);
     take_duration(part, Field::Offset, task.offset);
     take_duration(part, Field::Jitter, task.jitter);
     take_duration(part, Field::Region, task.region);
     take_duration(part, Field::Budget, task.budget);
+    take_count(part, Field::Concurrency, task.concurrency);
     take_text(part, Field::Group, task.group);
     take_enum(part, Field::Criticality, task.criticality, kCriticalities);
     take_enum(part, Field::Activation, task.activation, kActivations);
@@ -207,10 +208,21 @@ class Reader : private yaml::ValueReader {
     if (find(part, Field::Bcet) != nullptr) task.execution.kind = ExecutionTime::Kind::Uniform;
     take(part, Field::Execution, task.execution,
          [this](const Node &value, std::string_view) { return execution(value); });
-    if (find(part, Field::Wcet) == nullptr) {
-      error(node, fmt::format("task '{}' has no wcet", task.name), "add 'wcet:', the longest execution time");
-      part.broken |= Field::Wcet;
+    take(part, Field::Callback, task.callback, [this](const Node &value, std::string_view) { return callback(value); });
+  }
+
+  void take_wcet(Task &task, TaskPart &part) {
+    const bool is_callback = find(part, Field::Callback) != nullptr;
+    if (is_callback && options_.wcet_optional) {
+      take_positive_duration(part, Field::Wcet, task.wcet);
+      return;
     }
+    take_duration(part, Field::Wcet, task.wcet);
+    if (find(part, Field::Wcet) != nullptr) return;
+    error(*part.node, fmt::format("task '{}' has no wcet", task.name),
+          is_callback ? "run the node with learning and save what it measured, or state the longest execution time"
+                      : "add 'wcet:', the longest execution time");
+    part.broken |= Field::Wcet;
   }
 
   void take_period(Task &task, TaskPart &part, Duration inherited, FieldSet dag_broken) {
@@ -223,6 +235,10 @@ class Reader : private yaml::ValueReader {
       part.broken |= Field::Period;
     } else if (given != nullptr) {
       take_duration(part, Field::Period, task.period);
+    } else if (part.broken.intersects(Field::Callback)) {
+      part.broken |= Field::Period;  // its timer may have one
+    } else if (task.callback && task.callback->period != 0) {
+      task.period = task.callback->period;
     } else {
       task.period = inherited;
       if (dag_broken.intersects(Field::Period)) part.broken |= Field::Period;
@@ -361,6 +377,10 @@ class Reader : private yaml::ValueReader {
     if (value == nullptr) return *part.node;
     if (finding.item == Finding::kNone) return *value;
     if (finding.field == Field::After) return *dags_[finding.dag.value].tasks[finding.task].edges[finding.item];
+    if (finding.field == Field::Callback) {
+      const Callback &callback = *workload_.dags[finding.dag.value].tasks[finding.task].callback;
+      return *yaml::find(*value, finding.item == kCallbackNode ? "node" : to_string(callback.kind));
+    }
     const Node *samples = yaml::find(*value, "empirical");
     return samples == nullptr ? *value : samples->children[finding.item];
   }

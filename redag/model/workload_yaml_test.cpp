@@ -106,6 +106,65 @@ TEST(ParseWorkload, BcetMeansUniformUnlessSaidOtherwise) {
   EXPECT_EQ(tasks.at(4).overrun, Overrun::Skip);
 }
 
+TEST(ParseWorkload, ReadsEveryFormOfACallback) {
+  using Kind = Callback::Kind;
+  const Workload workload = read(R"({platform: {workers: 2}, dags: [{name: d, period: 10ms, tasks: [
+    {name: a, wcet: 1ms, callback: {node: /imu_driver, timer: 2ms}, concurrency: 3},
+    {name: b, wcet: 1ms, callback: {node: /imu_driver, timer: {index: 0}}},
+    {name: c, wcet: 1ms, callback: {node: "*", timer: any}},
+    {name: d, wcet: 1ms, callback: {timer: {period: 5ms, index: 2}, node: /n}},
+    {name: e, wcet: 1ms, callback: {node: /ekf, subscription: /imu/data}, activation: data, after: a},
+    {name: f, wcet: 1ms, callback: {node: "/map_?", service: /map_*/reset}, period: 1s},
+    {name: g, wcet: 1ms, callback: {node: /n, client: /plan}},
+    {name: h, wcet: 1ms, callback: {node: /n, action: /go}},
+    {name: i, wcet: 1ms, callback: {node: /n, waitable: {index: 1}}},
+    {name: j, wcet: 1ms, callback: {node: /n, waitable: any}}]}]})");
+  const auto &tasks = workload.dags.at(0).tasks;
+  const auto none = std::nullopt;
+  EXPECT_EQ(tasks.at(0).callback, (Callback{"/imu_driver", Kind::Timer, "", 2 * kMillisecond, none}));
+  EXPECT_EQ(tasks.at(0).period, 2 * kMillisecond);  // of the timer rather than of the DAG
+  EXPECT_EQ(tasks.at(0).deadline, 2 * kMillisecond);
+  EXPECT_EQ(tasks.at(0).concurrency, 3U);
+  EXPECT_EQ(tasks.at(1).callback, (Callback{"/imu_driver", Kind::Timer, "", 0, 0}));
+  EXPECT_EQ(tasks.at(1).period, 10 * kMillisecond);
+  EXPECT_EQ(tasks.at(1).concurrency, 1U);
+  EXPECT_EQ(tasks.at(2).callback, (Callback{"*", Kind::Timer, "", 0, none}));
+  EXPECT_EQ(tasks.at(3).callback, (Callback{"/n", Kind::Timer, "", 5 * kMillisecond, 2}));
+  EXPECT_EQ(tasks.at(3).period, 5 * kMillisecond);
+  EXPECT_EQ(tasks.at(4).callback, (Callback{"/ekf", Kind::Subscription, "/imu/data", 0, none}));
+  EXPECT_EQ(tasks.at(4).period, 2 * kMillisecond);
+  EXPECT_EQ(tasks.at(5).callback, (Callback{"/map_?", Kind::Service, "/map_*/reset", 0, none}));
+  EXPECT_EQ(tasks.at(5).period, kSecond);
+  EXPECT_EQ(tasks.at(6).callback, (Callback{"/n", Kind::Client, "/plan", 0, none}));
+  EXPECT_EQ(tasks.at(7).callback, (Callback{"/n", Kind::Action, "/go", 0, none}));
+  EXPECT_EQ(tasks.at(8).callback, (Callback{"/n", Kind::Waitable, "", 0, 1}));
+  EXPECT_EQ(tasks.at(9).callback, (Callback{"/n", Kind::Waitable, "", 0, none}));
+}
+
+TEST(ParseWorkload, MayLeaveTheWcetOfACallbackOpen) {
+  const std::string text = "dags: [{name: d, tasks: [{name: t, callback: {node: /n, timer: 2ms}}]}]";
+  const Result<LoadedWorkload> strict = parse_workload(text, "w.yaml");
+  ASSERT_FALSE(strict);
+  EXPECT_EQ(to_string(strict.error()),
+            "w.yaml:1:26: error: task 't' has no wcet (run the node with learning and save what it measured, or state "
+            "the longest execution time)");
+  const LoadOptions open{.wcet_optional = true};
+  const Result<LoadedWorkload> loaded = parse_workload(text, "w.yaml", open);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(to_string(loaded->warnings), "");
+  EXPECT_EQ(loaded->workload.dags.at(0).tasks.at(0).wcet, 0);
+  EXPECT_EQ(parse_workload(to_yaml(loaded->workload), "again", open).value().workload, loaded->workload);
+
+  const auto mistakes = [&](const std::string &task) {
+    const auto result = parse_workload("dags: [{name: d, tasks: [" + task + "]}]", "w.yaml", open);
+    return result ? std::string() : to_string(result.error());
+  };
+  EXPECT_EQ(mistakes("{name: t, period: 1s}"),
+            "w.yaml:1:26: error: task 't' has no wcet (add 'wcet:', the longest execution time)");
+  EXPECT_EQ(mistakes("{name: t, wcet: 0, callback: {node: /n, timer: 2ms}}"),
+            "w.yaml:1:42: error: wcet must be greater than zero, not '0'");
+}
+
 TEST(ParseWorkload, AcceptsAByteOrderMarkAndWindowsLineEnds) {
   EXPECT_EQ(read("\xEF\xBB\xBF"
                  "dags:\r\n  - name: d\r\n    tasks:\r\n      - {name: t, wcet: 1ms, period: 1s}\r\n")
@@ -278,6 +337,64 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"policy: edf\nplatform: {preemption: os}\n" + with("wcet: 1ms, period: 1s"),
                 {"w.yaml:2:24: error: preemption 'os' needs a static policy, and 'edf' is not one"}}));
 
+// The callback begins at column 50.
+std::string with_callback(const char *callback) {
+  return with(fmt::format("wcet: 1ms, period: 1s, callback: {}", callback).c_str());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Callbacks, ParseWorkloadRefuses,
+    testing::Values(
+        Mistake{with_callback("/ekf"),
+                {"w.yaml:4:50: error: callback must be a map of node, timer, subscription, service, client, action, "
+                 "waitable, not '/ekf'"}},
+        Mistake{with_callback("{node: /n, timer: any, service: /s}"),
+                {"w.yaml:4:73: error: callback says both timer and service (a task of its own for each callback)"}},
+        Mistake{with_callback("{timer: any}"), {"w.yaml:4:50: error: callback has no node (add 'node:', the full"}},
+        Mistake{with_callback("{node: /n}"),
+                {"w.yaml:4:50: error: callback does not say what it is of its node (add one of timer, subscription, "
+                 "service, client, action, waitable)"}},
+        Mistake{with_callback("{node: /n, subscripton: /imu}"),
+                {"w.yaml:4:50: error: callback does not say",
+                 "w.yaml:4:61: error: unknown key 'subscripton' in callback (did you mean 'subscription'?)"}},
+        Mistake{with_callback("{node: /n, timer: any, timer: 2ms}"), {"4:73: error: key 'timer' is given twice"}},
+        Mistake{with_callback("{node: ekf, subscription: /imu}"),
+                {"w.yaml:4:57: error: node 'ekf' of the callback of task 't' does not begin with '/' (full names, as"}},
+        Mistake{with_callback("{node: /ekf, subscription: imu/data}"),
+                {"4:77: error: subscription 'imu/data' of the callback of task 't' does not begin with '/'"}},
+        Mistake{with_callback("{node: /ekf/, service: ~/reset}"),
+                {"4:57: error: node '/ekf/' of the callback of task 't' ends with '/'",
+                 "4:73: error: service '~/reset' of the callback of task 't' contains '~', as no ROS name does"}},
+        Mistake{with_callback("{node: [/a], timer: any}"), {"4:57: error: node must be a name, not a list"}},
+        Mistake{with_callback("{node: /n, action: }"), {"4:69: error: action must be a name, not nothing"}},
+        Mistake{with_callback("{node: /n, timer: 0}"),
+                {"4:68: error: timer must be greater than zero, not '0' (or 'any'"}},
+        Mistake{with_callback("{node: /n, timer: 2}"), {"4:68: error: timer: '2' is not a duration: it has no unit"}},
+        Mistake{with_callback("{node: /n, timer: [2ms]}"),
+                {"4:68: error: timer must be a period, any, or a map of period, index, not a list"}},
+        Mistake{with_callback("{node: /n, timer: {}}"),
+                {"4:68: error: timer says nothing (for any of the node's write 'any')"}},
+        Mistake{with_callback("{node: /n, timer: {index: -1}}"),
+                {"4:76: error: index must be a whole number from 0 to 4294967295, not '-1'"}},
+        Mistake{with_callback("{node: /n, timer: {indx: 1}}"),
+                {"4:69: error: unknown key 'indx' in timer (did you mean 'index'?)"}},
+        Mistake{with_callback("{node: /n, waitable: 2ms}"),
+                {"4:71: error: waitable must be any, or a map of index, not '2ms'"}},
+        Mistake{with_callback("{node: /n, waitable: {period: 2ms}}"),
+                {"4:72: error: unknown key 'period' in waitable"}},
+        Mistake{tasks({"{name: a, wcet: 1ms, period: 1s}",
+                       "{name: b, wcet: 1ms, activation: data, after: a, callback: {node: /n, timer: any}}"}),
+                {"w.yaml:5:84: error: data task 'b' names a timer (its predecessors release it"}},
+        // What a broken timer may have given is not missed.
+        Mistake{with("wcet: 1ms, callback: {node: /n, timer: 2sec}"), {"4:56: error: timer: '2sec' is not a duration"}},
+        Mistake{with("wcet: 1ms, callback: {node: /n, timer: any}"), {"4:7: error: timer task 't' has no period"}},
+        Mistake{with("wcet: 1ms, period: 1s, concurrency: 0"),
+                {"4:53: error: concurrency must be a whole number from 1"}},
+        Mistake{with("wcet: 1ms, period: 1s, concurrency: 1025"),
+                {"4:53: error: concurrency of task 't' must be from 1 to 1024, not 1025"}},
+        Mistake{with("wcet: 1ms, period: 1s, concurrency: 2, group: g"),
+                {"4:53: error: task 't' has concurrency 2 and is in group 'g' (jobs of one group never overlap"}}));
+
 INSTANTIATE_TEST_SUITE_P(
     Graphs, ParseWorkloadRefuses,
     testing::Values(
@@ -333,6 +450,13 @@ TEST(ParseWorkload, Warns) {
   EXPECT_NE(
       warnings("policy: fixed\n" + with("wcet: 1ms, period: 10ms")).find("1:9: warning: policy 'fixed', but no task"),
       std::string::npos);
+  EXPECT_NE(warnings(with("wcet: 1ms, period: 10ms, callback: {node: /n, timer: 2ms}"))
+                .find("4:36: warning: period 10ms of task 't' is not that of its timer, 2ms"),
+            std::string::npos);
+  EXPECT_NE(warnings(tasks({"{name: a, wcet: 1ms, period: 10ms, callback: {node: /n, service: /s}}",
+                            "{name: b, wcet: 1ms, period: 10ms, callback: {node: /n, service: /s}}"}))
+                .find("5:52: warning: task 'b' names the same callback as task 'a' (only the first in the file"),
+            std::string::npos);
   EXPECT_NE(
       warnings(with("wcet: 3ms, period: 10ms, budget: 2ms")).find("4:50: warning: budget 2ms of task 't' is below"),
       std::string::npos);
@@ -383,6 +507,21 @@ TEST(SaveWorkload, RoundTripsThroughAFile) {
 
 // --- properties ---
 
+Callback arbitrary_callback(Activation activation) {
+  using Kind = Callback::Kind;
+  Callback callback;
+  callback.node = *rc::gen::element<std::string>("/a", "*", "?", "/lidar_*", "*/x_?", "/n/o");
+  callback.kind = *rc::gen::element(Kind::Subscription, Kind::Service, Kind::Client, Kind::Action, Kind::Waitable);
+  if (activation == Activation::Timer && *rc::gen::arbitrary<bool>()) callback.kind = Kind::Timer;
+  if (callback.kind == Kind::Timer) callback.period = *rc::gen::element<Duration>(0, 1, 2 * kMillisecond);
+  if (callback.kind == Kind::Timer || callback.kind == Kind::Waitable) {
+    if (*rc::gen::arbitrary<bool>()) callback.index = *rc::gen::element(0U, 7U, UINT32_MAX);
+  } else {
+    callback.name = *rc::gen::element<std::string>("/imu/data", "*", "/a?*");
+  }
+  return callback;
+}
+
 /// A generated workload with every optional part drawn as well.
 Workload arbitrary_workload() {
   GenerateOptions options;
@@ -420,6 +559,12 @@ Workload arbitrary_workload() {
       if (*rc::gen::arbitrary<bool>()) task.execution = {ExecutionTime::Kind::Normal, task.wcet, 3, {}};
       if (*rc::gen::arbitrary<bool>()) task.execution = {ExecutionTime::Kind::Empirical, 0, 0, {task.wcet, task.wcet}};
       if (*rc::gen::arbitrary<bool>()) task.execution = {ExecutionTime::Kind::Constant, 0, 0, {}};
+      if (task.group.empty()) task.concurrency = *rc::gen::element(1U, 2U, kMaxConcurrency);
+      if (*rc::gen::arbitrary<bool>()) task.callback = arbitrary_callback(task.activation);
+      // The rate of the timer itself, or another one.
+      if (task.callback && task.callback->period != 0 && *rc::gen::arbitrary<bool>()) {
+        task.callback->period = task.period;
+      }
     }
   }
   return workload;
@@ -430,6 +575,20 @@ RC_GTEST_PROP(ToYaml, RoundTrips, ()) {
   const std::string text = to_yaml(workload);
   const Result<LoadedWorkload> loaded = parse_workload(text, "round.yaml");
   if (!loaded) RC_FAIL(to_string(loaded.error()) + "\n" + text);
+  RC_ASSERT(loaded->workload == workload);
+}
+
+RC_GTEST_PROP(ToYaml, RoundTripsWithoutWcets, ()) {
+  Workload workload = arbitrary_workload();
+  for (Dag &dag : workload.dags) {
+    for (Task &task : dag.tasks) {
+      if (!task.callback || *rc::gen::arbitrary<bool>()) continue;
+      task.wcet = task.bcet = 0;
+      task.execution = {};
+    }
+  }
+  const Result<LoadedWorkload> loaded = parse_workload(to_yaml(workload), "round.yaml", {.wcet_optional = true});
+  if (!loaded) RC_FAIL(to_string(loaded.error()) + "\n" + to_yaml(workload));
   RC_ASSERT(loaded->workload == workload);
 }
 
@@ -544,6 +703,8 @@ TEST(Schema, HasTheKeysOfTheReader) {
   expect_same_keys(schema["properties"]["platform"]["properties"], hint_of("platform: {xyzxyzxyz: 1}"));
   expect_same_keys(schema["definitions"]["dag"]["properties"], hint_of("dags: [{xyzxyzxyz: 1}]"));
   expect_same_keys(schema["definitions"]["task"]["properties"], hint_of("dags: [{tasks: [{xyzxyzxyz: 1}]}]"));
+  expect_same_keys(schema["definitions"]["callback"]["properties"],
+                   hint_of("dags: [{tasks: [{callback: {xyzxyzxyz: 1}}]}]"));
 }
 
 }  // namespace

@@ -42,6 +42,7 @@ class ValueReader {
   std::optional<Duration> positive_duration(const Node &node, std::string_view key);
   std::optional<std::string> text(const Node &node, std::string_view key);
   std::optional<ExecutionTime> execution(const Node &node);
+  std::optional<Callback> callback(const Node &node);
 
   template <class Integer>
   std::optional<Integer> integer(const Node &node, std::string_view key, Integer smallest) {
@@ -76,6 +77,7 @@ class ValueReader {
  private:
   std::optional<ExecutionTime> normal_execution(const Node &node);
   std::optional<ExecutionTime> empirical_execution(const Node &node);
+  bool counted_callback(const Node &node, Callback &callback);
 
   // Many wrong names among many candidates would take quadratic time: after so many comparisons, no more hints.
   std::size_t comparisons_left_ = 200'000;

@@ -20,6 +20,10 @@ void write(YAML::Emitter &out, Field field, const std::string &value) {
   out << YAML::Key << to_string(field) << YAML::Value << value;
 }
 
+void write_count(YAML::Emitter &out, Field field, std::uint32_t value) {
+  out << YAML::Key << to_string(field) << YAML::Value << value;
+}
+
 void write_duration(YAML::Emitter &out, Field field, Duration value) {
   if (value != 0) write(out, field, format_duration(value));
 }
@@ -73,7 +77,25 @@ void write_overrun(YAML::Emitter &out, const Task &task) {
   out << YAML::Key << "queue" << YAML::Value << task.queue_depth << YAML::EndMap;
 }
 
+void write_callback(YAML::Emitter &out, const Callback &callback) {
+  out << YAML::Key << to_string(Field::Callback) << YAML::Value << YAML::BeginMap;
+  out << YAML::Key << "node" << YAML::Value << callback.node;
+  out << YAML::Key << to_string(callback.kind) << YAML::Value;
+  if (!callback.name.empty()) {
+    out << callback.name;
+  } else if (callback.index) {
+    out << YAML::BeginMap;
+    write_duration(out, Field::Period, callback.period);
+    out << YAML::Key << "index" << YAML::Value << *callback.index << YAML::EndMap;
+  } else {
+    out << (callback.period == 0 ? "any" : format_duration(callback.period));
+  }
+  out << YAML::EndMap;
+}
+
 void write_task(YAML::Emitter &out, const Dag &dag, const Task &task, Duration dag_period) {
+  const bool has_timer = task.callback && task.callback->period != 0;
+  const Duration implied_period = has_timer ? task.callback->period : dag_period;
   out << YAML::Flow << YAML::BeginMap;
   write(out, Field::Name, task.name);
   write_duration(out, Field::Wcet, task.wcet);
@@ -81,7 +103,7 @@ void write_task(YAML::Emitter &out, const Dag &dag, const Task &task, Duration d
   write_execution(out, task);
   if (task.activation == Activation::Data) {
     write(out, Field::Activation, to_string(task.activation));
-  } else if (task.period != dag_period) {
+  } else if (task.period != implied_period) {
     write_duration(out, Field::Period, task.period);
   }
   if (task.deadline != task.period) write_duration(out, Field::Deadline, task.deadline);
@@ -91,9 +113,11 @@ void write_task(YAML::Emitter &out, const Dag &dag, const Task &task, Duration d
   write_duration(out, Field::Budget, task.budget);
   if (task.criticality != dag.criticality) write(out, Field::Criticality, to_string(task.criticality));
   write_edges(out, dag, task);
+  if (task.concurrency != 1) write_count(out, Field::Concurrency, task.concurrency);
   if (!task.group.empty()) write(out, Field::Group, task.group);
   write_overrun(out, task);
   if (task.priority) out << YAML::Key << to_string(Field::Priority) << YAML::Value << *task.priority;
+  if (task.callback) write_callback(out, *task.callback);
   out << YAML::EndMap;
 }
 
@@ -103,8 +127,8 @@ void write_dag(YAML::Emitter &out, const Dag &dag) {
   write(out, Field::Name, dag.name);
   write_duration(out, Field::Period, period);
   write_duration(out, Field::Deadline, dag.deadline);
-  if (dag.max_active != 0) out << YAML::Key << to_string(Field::MaxActive) << YAML::Value << dag.max_active;
-  if (dag.max_pending != 0) out << YAML::Key << to_string(Field::MaxPending) << YAML::Value << dag.max_pending;
+  if (dag.max_active != 0) write_count(out, Field::MaxActive, dag.max_active);
+  if (dag.max_pending != 0) write_count(out, Field::MaxPending, dag.max_pending);
   if (dag.criticality != Criticality::Normal) write(out, Field::Criticality, to_string(dag.criticality));
   out << YAML::Key << to_string(Field::Tasks) << YAML::Value << YAML::BeginSeq;
   for (const Task &task : dag.tasks) write_task(out, dag, task, period);

@@ -106,7 +106,7 @@ Result<RunInfo> read_header(std::string_view line, const std::string &file) {
 }  // namespace
 
 Result<EventsWriter> EventsWriter::create(const std::string &path, const RunInfo &info) {
-  Diagnostics mistakes = validate(info.workload);
+  Diagnostics mistakes = validate(info.workload, {.wcet_optional = true});
   if (has_errors(mistakes)) return tl::unexpected<Diagnostics>(std::move(mistakes));
   Result<OutputFile> file = OutputFile::create(path);
   if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));

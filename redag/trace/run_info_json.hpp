@@ -10,7 +10,8 @@
 
 namespace redag::trace {
 
-/// One line, without a line break. Requires that validate(info.workload) has no errors.
+/// One line, without a line break. Requires that validate(info.workload, {.wcet_optional = true}) has no
+/// errors.
 [[nodiscard]] std::string run_info_to_json(const RunInfo &info);
 
 /// The reverse. Errors (missing or ill-typed keys, an invalid workload) name `file` and `line`.
