@@ -1,6 +1,7 @@
 #include "redag/sched/lifecycle.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 #include "redag/base/check.hpp"
 
@@ -271,6 +272,14 @@ void Lifecycle::prioritise() {
     if (job.state == JobState::Free || job.state == JobState::Waiting) continue;
     job.rank = tasks_[job.priority_of.value].priority.rank;
     if (is_static(config_.policy)) job.key = job.rank;
+    // What it inherited may now be less than its own.
+    const std::uint32_t own_rank = tasks_[job.task.value].priority.rank;
+    const std::int64_t own_key = is_static(config_.policy) ? own_rank : job.deadline;
+    if (job.priority_of != job.task && std::tie(own_key, own_rank) < std::tie(job.key, job.rank)) {
+      job.priority_of = job.task;
+      job.key = own_key;
+      job.rank = own_rank;
+    }
   }
 }
 

@@ -77,12 +77,7 @@ void Precedence::set_period(TaskId task, Duration period) {
   for (const Node &from : nodes_) {
     for (std::uint32_t i = from.first_successor; i < from.last_successor; ++i) {
       Edge &edge = edges_[successors_[i]];
-      Node &to = nodes_[edge.to.value];
-      edge.aligned = is_aligned(from, to);
-      if (edge.aligned && edge.fresh && edge.release < to.last_release) {
-        edge.fresh = false;
-        --to.fresh;
-      }
+      edge.aligned = is_aligned(from, nodes_[edge.to.value]);
     }
   }
 }

@@ -18,8 +18,8 @@ class Precedence {
   void add_task(const Task &task, TaskId id) { add_node(task, id); }
   /// Takes away tasks, and the edges into and out of them: their ids can be added again. Linear in all edges.
   void forget(std::span<const TaskId> tasks);
-  /// Which edges join tasks of one period and offset is found anew; data that is now too old is discarded. Linear in
-  /// all edges.
+  /// Which edges join tasks of one period and offset is found anew; data that came keeps its state. Linear in all
+  /// edges.
   void set_period(TaskId task, Duration period);
 
   /// `task` has a new job, released at `release`. Data too old for it is discarded.

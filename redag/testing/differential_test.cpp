@@ -54,7 +54,7 @@ Case make_case(PolicyKind policy, Preemption preemption, std::uint64_t seed) {
   Case c;
   c.workload = random_workload(rng, limits);
   c.config = random_config(rng, policy, preemption, c.workload.task_count());
-  c.script = random_script(seed, static_cast<std::size_t>(rng.uniform(10, 300)), rng.uniform01() < 0.2);
+  c.script = random_script(seed, static_cast<std::size_t>(rng.uniform(10, 300)), rng.uniform01() < 0.4);
   return c;
 }
 
@@ -106,8 +106,16 @@ RC_GTEST_PROP(DifferentialProperty, AnySequenceOfEventsIsDecidedAlike, (std::uin
   const auto preemption = *rc::gen::element(Preemption::None, Preemption::Cooperative, Preemption::Full);
   Case c = make_case(policy, preemption, seed);
   using Kind = ScriptStep::Kind;
-  const auto kind = rc::gen::weightedElement<Kind>(
-      {{6, Kind::Release}, {6, Kind::Dispatch}, {4, Kind::Complete}, {2, Kind::Advance}, {2, Kind::PreemptionPoint}});
+  const auto kind = rc::gen::weightedElement<Kind>({{6, Kind::Release},
+                                                    {6, Kind::Dispatch},
+                                                    {4, Kind::Complete},
+                                                    {2, Kind::Advance},
+                                                    {2, Kind::PreemptionPoint},
+                                                    {1, Kind::Miss},
+                                                    {1, Kind::DispatchSome},
+                                                    {1, Kind::AddTask},
+                                                    {1, Kind::RemoveTask},
+                                                    {1, Kind::SetTiming}});
   c.script = *rc::gen::scale(
       3.0, rc::gen::container<Script>(rc::gen::construct<ScriptStep>(kind, rc::gen::arbitrary<std::uint8_t>())));
   const std::optional<std::string> difference = find_difference(c);

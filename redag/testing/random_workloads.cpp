@@ -57,6 +57,7 @@ Task random_task(Rng &rng, std::size_t index, const RandomWorkloadLimits &limits
   if (chance(rng, 0.5)) task.region = kMicrosecond * rng.uniform(1, 3);
   if (chance(rng, 0.4)) task.priority = static_cast<int>(rng.uniform(-2, 2));
   if (limits.groups && chance(rng, 0.4)) task.group = kGroups[between(rng, 0, kGroups.size() - 1)];
+  if (limits.overlap && task.group.empty() && chance(rng, 0.15)) task.concurrency = between(rng, 2, 3);
   if (limits.bounds && chance(rng, 0.3)) {
     task.overrun = Overrun::Queue;
     task.queue_depth = between(rng, 1, 3);
@@ -123,11 +124,11 @@ std::string describe(const Workload &workload, const sched::Config &config) {
     text += fmt::format("dag {}: max_active {}, max_pending {}, criticality {}\n", dag.name, dag.max_active,
                         dag.max_pending, to_string(dag.criticality));
     for (const Task &task : dag.tasks) {
-      text +=
-          fmt::format("  task {}: {}, T {}, D {}, offset {}, after {{{}}}, group '{}', queue {}, priority {}\n", id++,
-                      to_string(task.activation), format_duration(task.period), format_duration(task.deadline),
-                      format_duration(task.offset), fmt::join(task.predecessors, ","), task.group,
-                      task.overrun == Overrun::Queue ? task.queue_depth : 0, task.priority.value_or(0));
+      text += fmt::format(
+          "  task {}: {}, T {}, D {}, offset {}, after {{{}}}, group '{}', concurrency {}, queue {}, priority {}\n",
+          id++, to_string(task.activation), format_duration(task.period), format_duration(task.deadline),
+          format_duration(task.offset), fmt::join(task.predecessors, ","), task.group, task.concurrency,
+          task.overrun == Overrun::Queue ? task.queue_depth : 0, task.priority.value_or(0));
     }
   }
   return text;

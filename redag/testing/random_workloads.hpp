@@ -18,8 +18,9 @@ struct RandomWorkloadLimits {
   std::uint32_t max_dags = 3;
   std::uint32_t max_tasks = 4;  // per DAG
   bool groups = true;
-  bool bounds = true;  // max_active, max_pending, queues
-  bool data = true;    // data tasks; otherwise all tasks are timers
+  bool bounds = true;   // max_active, max_pending, queues
+  bool data = true;     // data tasks; otherwise all tasks are timers
+  bool overlap = true;  // jobs of one task that overlap (concurrency above 1)
 };
 
 /// A valid workload; times are a few microseconds.

@@ -1,6 +1,7 @@
 #include "redag/testing/reference_scheduler.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <tuple>
 
 #include "redag/base/check.hpp"
@@ -25,25 +26,31 @@ ReferenceScheduler::ReferenceScheduler(const Workload &workload, const sched::Co
 void ReferenceScheduler::add_tasks(const Dag &dag) {
   const std::size_t first = tasks_.size();
   const std::vector<std::uint32_t> topological = topological_ranks(dag);
+  dags_.push_back(DagState{dag, {}, false});
   for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
     TaskState state;
     state.task = dag.tasks[i];
-    state.dag = dags_.size();
+    state.dag = dags_.size() - 1;
     state.topological = topological[i];
     for (const std::uint32_t p : dag.tasks[i].predecessors) state.predecessors.push_back(first + p);
     state.inputs.resize(state.predecessors.size());
+    state.last_release = std::numeric_limits<Time>::min();
+    dags_.back().tasks.emplace_back(tasks_.size());
     tasks_.push_back(state);
   }
-  dags_.push_back(DagState{dag, false});
+}
+
+Duration ReferenceScheduler::shortest_period(std::size_t dag) const {
+  Duration shortest = kNever;
+  for (const TaskState &state : tasks_) {
+    if (state.dag == dag && !state.gone) shortest = std::min(shortest, state.task.period);
+  }
+  return shortest;
 }
 
 // The table of docs/model.md, "Priority", and its ties.
 bool ReferenceScheduler::task_before(const TaskState &a, const TaskState &b) const {
-  const auto smallest_period = [this](const TaskState &state) {
-    Duration smallest = kNever;
-    for (const Task &task : dags_[state.dag].dag.tasks) smallest = std::min(smallest, task.period);
-    return smallest;
-  };
+  const auto smallest_period = [this](const TaskState &state) { return shortest_period(state.dag); };
   switch (config_.policy) {
     case PolicyKind::RateMonotonic:
       if (a.task.period != b.task.period) return a.task.period < b.task.period;
@@ -62,23 +69,48 @@ bool ReferenceScheduler::task_before(const TaskState &a, const TaskState &b) con
       }
       if (smallest_period(a) != smallest_period(b)) return smallest_period(a) < smallest_period(b);
       if (a.dag != b.dag) return a.dag < b.dag;
-      return a.topological > b.topological;
+      if (a.topological != b.topological) return a.topological > b.topological;
+      break;
     case PolicyKind::Edf:
     case PolicyKind::Fifo: break;
   }
-  return std::tie(a.dag, a.topological) < std::tie(b.dag, b.topological);
+  // TaskId last: `tasks_` is in that order.
+  return std::tuple(a.dag, a.topological, &a - tasks_.data()) < std::tuple(b.dag, b.topological, &b - tasks_.data());
+}
+
+void ReferenceScheduler::forget_what_is_gone() {
+  for (std::size_t task = 0; task < tasks_.size(); ++task) {
+    TaskState &state = tasks_[task];
+    if (!state.removed || state.gone) continue;
+    bool used = false;
+    for (std::size_t job = 0; job < jobs_.size(); ++job) {
+      if (jobs_[job].state != State::Done) used = used || jobs_[job].task == task || effective(job).task == task;
+    }
+    state.gone = !used;
+    if (state.gone) std::erase(dags_[state.dag].tasks, TaskId(task));
+  }
 }
 
 void ReferenceScheduler::rank_tasks() {
-  std::vector<Dag> dags;
-  for (const DagState &state : dags_) dags.push_back(state.dag);
-  const auto priorities = sched::assign_priorities(dags, config_.policy, config_.levels);
+  std::vector<sched::RankedTask> ranked;
   for (std::size_t i = 0; i < tasks_.size(); ++i) {
-    tasks_[i].level = priorities[i].level;
-    tasks_[i].rank = 0;
+    const TaskState &state = tasks_[i];
+    if (state.gone) continue;
+    ranked.push_back({state.task.period, state.task.deadline, state.task.priority.value_or(0),
+                      dags_[state.dag].dag.criticality, shortest_period(state.dag),
+                      static_cast<std::uint32_t>(state.dag), state.topological, TaskId(i)});
+  }
+  const auto priorities = sched::assign_priorities(ranked, config_.policy, config_.levels);
+  for (std::size_t i = 0; i < ranked.size(); ++i) tasks_[ranked[i].task.value].level = priorities[i].level;
+  for (TaskState &state : tasks_) {
+    state.rank = 0;
     for (const TaskState &other : tasks_) {
-      if (task_before(other, tasks_[i])) ++tasks_[i].rank;
+      if (!other.gone && task_before(other, state)) ++state.rank;
     }
+  }
+  // An inheritance that has become less than its own is over.
+  for (Job &job : jobs_) {
+    if (job.heir_of != kNone && !key_before(jobs_[job.heir_of], job)) job.heir_of = kNone;
   }
 }
 
@@ -92,28 +124,41 @@ bool ReferenceScheduler::same_phase(const TaskState &predecessor, const TaskStat
 void ReferenceScheduler::release(TaskId task, Time nominal, Time now) {
   TaskState &state = tasks_[task.value];
   REDAG_CHECK(state.task.activation == Activation::Timer, "data tasks are released by their predecessors");
-  if (dags_[state.dag].removed) return;
+  if (state.removed || closed_) return;
   create_job(task.value, nominal, now, {});
 }
 
-// "Overrun and admission", for timer and data tasks alike.
-void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, const std::vector<Data> &consumed) {
+void ReferenceScheduler::miss(TaskId task, Time nominal, Time now, Reason reason) {
+  if (tasks_[task.value].removed || closed_) return;
+  skip(new_job(task.value, nominal, now), now, reason);
+}
+
+std::size_t ReferenceScheduler::new_job(std::size_t task, Time release, Time now) {
   TaskState &state = tasks_[task];
   const std::size_t job = jobs_.size();
   jobs_.emplace_back();
   jobs_[job].task = task;
   jobs_[job].number = state.next_number++;
   jobs_[job].release = release;
-  jobs_[job].consumed = consumed;
+  jobs_[job].deadline = release + state.task.deadline;
   ++state.count.released;
   emit(JobEventKind::Released, job, now, release, WorkerId::kNoneValue);
+  return job;
+}
 
+// "Overrun and admission", for timer and data tasks alike.
+void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, const std::vector<Data> &consumed) {
+  TaskState &state = tasks_[task];
+  const std::size_t job = new_job(task, release, now);
+  jobs_[job].consumed = consumed;
   for (const std::size_t other : jobs_of(task, State::Waiting)) {
     if (other != job) skip(other, now, Reason::Precedence);
   }
   if (state.task.overrun == Overrun::Skip) {
     for (const std::size_t other : jobs_of(task, State::Ready)) skip(other, now, Reason::Overrun);
-  } else if (jobs_of(task, State::Ready).size() >= state.task.queue_depth) {
+  }
+  if (state.task.activation == Activation::Timer) discard_old_data(state, release);
+  if (state.task.overrun == Overrun::Queue && jobs_of(task, State::Ready).size() >= state.task.queue_depth) {
     skip(job, now, Reason::QueueFull);
     return;
   }
@@ -130,15 +175,20 @@ void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, co
   resolve(job, now);
 }
 
+// "Job k waits for job k": data of the same period or a later one.
+void ReferenceScheduler::discard_old_data(TaskState &state, Time release) const {
+  state.last_release = release;
+  for (std::size_t i = 0; i < state.inputs.size(); ++i) {
+    Data &input = state.inputs[i];
+    if (same_phase(tasks_[state.predecessors[i]], state) && input.release < release) input.fresh = false;
+  }
+}
+
 // "Readiness": makes a waiting job ready if it can be.
 void ReferenceScheduler::resolve(std::size_t job, Time now) {
   Job &j = jobs_[job];
   TaskState &state = tasks_[j.task];
   if (state.task.activation == Activation::Timer) {
-    for (std::size_t i = 0; i < state.inputs.size(); ++i) {
-      Data &input = state.inputs[i];
-      if (same_phase(tasks_[state.predecessors[i]], state) && input.release < j.release) input.fresh = false;
-    }
     if (!std::all_of(state.inputs.begin(), state.inputs.end(), [](const Data &d) { return d.fresh; })) return;
     j.consumed = state.inputs;
     for (Data &input : state.inputs) input.fresh = false;
@@ -177,20 +227,24 @@ void ReferenceScheduler::complete(JobSlot slot, Time now, Outcome outcome) {
     deliver(job, now);
   } else {
     ++tasks_[j.task].count.aborted;
-    const Reason reason = outcome == Outcome::Threw ? Reason::Exception : Reason::Budget;
+    const Reason reason = outcome == Outcome::Threw            ? Reason::Exception
+                          : outcome == Outcome::BudgetExceeded ? Reason::Budget
+                                                               : Reason::NoData;
     emit(JobEventKind::Aborted, job, now, now, j.worker, reason);
   }
 }
 
 void ReferenceScheduler::deliver(std::size_t job, Time now) {
   const std::size_t producer = jobs_[job].task;
-  if (dags_[tasks_[producer].dag].removed) return;
+  if (tasks_[producer].removed || closed_) return;
   const Data data{true, jobs_[job].release, jobs_[job].origin};
   for (std::size_t s = 0; s < tasks_.size(); ++s) {
     TaskState &state = tasks_[s];
     const auto input = std::find(state.predecessors.begin(), state.predecessors.end(), producer);
     if (input == state.predecessors.end()) continue;
+    if (same_phase(tasks_[producer], state) && data.release < state.last_release) continue;  // of an earlier period
     state.inputs[static_cast<std::size_t>(input - state.predecessors.begin())] = data;
+    if (state.removed) continue;
     if (state.task.activation == Activation::Timer) {
       for (const std::size_t waiting : jobs_of(s, State::Waiting)) resolve(waiting, now);
     } else if (std::all_of(state.inputs.begin(), state.inputs.end(), [](const Data &d) { return d.fresh; })) {
@@ -220,7 +274,9 @@ std::vector<std::size_t> ReferenceScheduler::jobs_of(std::size_t task, State sta
 }
 
 bool ReferenceScheduler::task_busy(const Job &job) const {
-  return std::any_of(jobs_.begin(), jobs_.end(), [&](const Job &o) { return o.task == job.task && started(o); });
+  const auto in_progress =
+      std::count_if(jobs_.begin(), jobs_.end(), [&](const Job &o) { return o.task == job.task && started(o); });
+  return in_progress >= static_cast<std::ptrdiff_t>(tasks_[job.task].task.concurrency);
 }
 
 bool ReferenceScheduler::dag_at_bound(const Job &job) const {
@@ -252,9 +308,7 @@ bool ReferenceScheduler::key_before(const Job &a, const Job &b) const {
   const TaskState &ta = tasks_[a.task];
   const TaskState &tb = tasks_[b.task];
   if (config_.policy == PolicyKind::Edf) {
-    const Time da = a.release + ta.task.deadline;
-    const Time db = b.release + tb.task.deadline;
-    if (da != db) return da < db;
+    if (a.deadline != b.deadline) return a.deadline < b.deadline;
   }
   if (config_.policy == PolicyKind::Fifo && a.ready_order != b.ready_order) return a.ready_order < b.ready_order;
   return std::tie(ta.rank, a.number) < std::tie(tb.rank, b.number);
@@ -282,16 +336,18 @@ bool ReferenceScheduler::considered_before(std::size_t a, std::size_t b) const {
 
 // ---- dispatch -------------------------------------------------------------------------------------------------------
 
-Step ReferenceScheduler::dispatch(Time now) {
+Step ReferenceScheduler::dispatch(Time now, std::uint32_t most) {
   dispatches_.clear();
   // One decision at a time; each can change the order, because a job that waits for a group hands on its priority.
   std::vector<std::size_t> passed_over;
   for (;;) {
-    const std::size_t job = first_candidate(passed_over);
+    const std::size_t job = first_candidate(passed_over, most > 0);
     if (job == kNone) break;
     const std::uint32_t worker = worker_for(job);
     if (worker == WorkerId::kNoneValue) break;
-    if (started(jobs_[job]) || can_start(job, now)) {
+    const bool starts = !started(jobs_[job]);
+    if (!starts || can_start(job, now)) {
+      if (starts) --most;
       place(job, worker, now);
     } else {
       passed_over.push_back(job);
@@ -305,11 +361,11 @@ Step ReferenceScheduler::dispatch(Time now) {
   return Step{dispatches_, step_events_};
 }
 
-std::size_t ReferenceScheduler::first_candidate(const std::vector<std::size_t> &passed_over) const {
+std::size_t ReferenceScheduler::first_candidate(const std::vector<std::size_t> &passed_over, bool may_start) const {
   std::size_t first = kNone;
   for (std::size_t i = 0; i < jobs_.size(); ++i) {
     const bool resumable = jobs_[i].state == State::Suspended && config_.preemption == Preemption::Full;
-    if (jobs_[i].state != State::Ready && !resumable) continue;
+    if (!(jobs_[i].state == State::Ready && may_start) && !resumable) continue;
     if (std::find(passed_over.begin(), passed_over.end(), i) != passed_over.end()) continue;
     if (first == kNone || considered_before(i, first)) first = i;
   }
@@ -370,8 +426,7 @@ void ReferenceScheduler::place(std::size_t job, std::uint32_t worker, Time now) 
   j.worker = worker;
   j.told_level = decision.level;
   stack.push_back(job);
-  const Time deadline = j.release + tasks_[j.task].task.deadline;
-  emit(decision.resume ? JobEventKind::Resumed : JobEventKind::Dispatched, job, now, decision.resume ? 0 : deadline,
+  emit(decision.resume ? JobEventKind::Resumed : JobEventKind::Dispatched, job, now, decision.resume ? 0 : j.deadline,
        worker);
   dispatches_.push_back(decision);
 }
@@ -413,21 +468,53 @@ bool ReferenceScheduler::outranked(JobSlot job) const {
 // ---- reconfiguration and counts -------------------------------------------------------------------------------------
 
 DagId ReferenceScheduler::add_dag(const Dag &dag, Time /*now*/) {
+  forget_what_is_gone();
   add_tasks(dag);
   rank_tasks();
   return DagId(dags_.size() - 1);
 }
 
+TaskId ReferenceScheduler::add_task(DagId dag, std::uint32_t rank, const Task &task, Time /*now*/) {
+  forget_what_is_gone();
+  TaskState state;
+  state.task = task;
+  state.dag = dag.value;
+  state.topological = rank;
+  const TaskId id(tasks_.size());
+  tasks_.push_back(state);
+  dags_[dag.value].tasks.push_back(id);
+  rank_tasks();
+  return id;
+}
+
 void ReferenceScheduler::remove_dag(DagId dag, Time now) {
-  if (dags_[dag.value].removed) return;
-  for (std::size_t task = 0; task < tasks_.size(); ++task) {
-    if (tasks_[task].dag != dag.value) continue;
-    for (std::size_t job = 0; job < jobs_.size(); ++job) {
-      const bool waits = jobs_[job].state == State::Waiting || jobs_[job].state == State::Ready;
-      if (jobs_[job].task == task && waits) skip(job, now, Reason::Removed);
-    }
-  }
+  for (const TaskId task : dags_[dag.value].tasks) remove_task(task, now);
   dags_[dag.value].removed = true;
+}
+
+void ReferenceScheduler::remove_task(TaskId task, Time now) {
+  if (tasks_[task.value].removed) return;
+  skip_all(task.value, now);
+  tasks_[task.value].removed = true;
+}
+
+void ReferenceScheduler::set_timing(TaskId task, Duration period, Duration deadline, Time /*now*/) {
+  if (tasks_[task.value].gone) return;
+  tasks_[task.value].task.period = period;
+  tasks_[task.value].task.deadline = deadline;
+  rank_tasks();
+}
+
+void ReferenceScheduler::close(Time now) {
+  for (std::size_t task = 0; task < tasks_.size(); ++task) skip_all(task, now);
+  closed_ = true;
+}
+
+void ReferenceScheduler::skip_all(std::size_t task, Time now) {
+  for (std::size_t job = 0; job < jobs_.size(); ++job) {
+    const bool waits = jobs_[job].state == State::Waiting || jobs_[job].state == State::Ready;
+    if (jobs_[job].task == task && waits) skip(job, now, Reason::Removed);
+  }
 }
 
 Accounting ReferenceScheduler::accounting(TaskId task) const {

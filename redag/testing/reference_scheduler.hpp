@@ -1,9 +1,11 @@
 // docs/model.md written down a second time, as plainly as possible: at each dispatch() every live job is looked at,
 // sorted by the total order and decided. For tests: what PriorityScheduler decides must equal this. It shares with the
-// library's scheduler the interface and assign_priorities() (for levels only), nothing else. Not thread-safe.
+// library's scheduler the interface and assign_priorities() (for levels only), nothing else. Ids are never used again.
+// Not thread-safe.
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "redag/sched/scheduler.hpp"
@@ -15,12 +17,20 @@ class ReferenceScheduler final : public sched::Scheduler {
   ReferenceScheduler(const Workload &workload, const sched::Config &config);
 
   void release(TaskId task, Time nominal, Time now) override;
+  void miss(TaskId task, Time nominal, Time now, Reason reason) override;
   void complete(JobSlot job, Time now, sched::Outcome outcome) override;
   void preemption_point(JobSlot job, Time now) override;
-  sched::Step dispatch(Time now) override;
+  sched::Step dispatch(Time now, std::uint32_t most = sched::kNoLimit) override;
   [[nodiscard]] bool outranked(JobSlot job) const override;
   DagId add_dag(const Dag &dag, Time now) override;
   void remove_dag(DagId dag, Time now) override;
+  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) override;
+  void remove_task(TaskId task, Time now) override;
+  void set_timing(TaskId task, Duration period, Duration deadline, Time now) override;
+  void close(Time now) override;
+  [[nodiscard]] std::span<const TaskId> tasks_of(DagId dag) const override { return dags_[dag.value].tasks; }
+  [[nodiscard]] std::size_t task_slots() const override { return tasks_.size(); }
+  [[nodiscard]] std::size_t dag_slots() const override { return dags_.size(); }
   [[nodiscard]] sched::Accounting accounting(TaskId task) const override;
 
  private:
@@ -39,6 +49,9 @@ class ReferenceScheduler final : public sched::Scheduler {
     std::vector<std::size_t> predecessors;  // tasks of the workload
     std::uint32_t topological = 0;
     std::vector<Data> inputs;  // one for each predecessor
+    bool removed = false;
+    bool gone = false;  // removed, and no job has its priority: not in the order any more
+    Time last_release = 0;
     std::uint32_t next_number = 0;
     std::uint32_t rank = 0;
     std::uint32_t level = 0;
@@ -47,6 +60,7 @@ class ReferenceScheduler final : public sched::Scheduler {
 
   struct DagState {
     Dag dag;
+    std::vector<TaskId> tasks;
     bool removed = false;
   };
 
@@ -59,6 +73,7 @@ class ReferenceScheduler final : public sched::Scheduler {
     std::uint32_t number = 0;
     State state = State::Waiting;
     Time release = 0;
+    Time deadline = 0;
     Time origin = 0;
     std::uint64_t ready_order = 0;
     std::uint32_t worker = WorkerId::kNoneValue;
@@ -73,10 +88,15 @@ class ReferenceScheduler final : public sched::Scheduler {
   using Stack = std::vector<std::size_t>;
 
   void add_tasks(const Dag &dag);
+  void forget_what_is_gone();
   void rank_tasks();
+  [[nodiscard]] Duration shortest_period(std::size_t dag) const;
   [[nodiscard]] bool task_before(const TaskState &a, const TaskState &b) const;
   [[nodiscard]] bool same_phase(const TaskState &predecessor, const TaskState &successor) const;
 
+  std::size_t new_job(std::size_t task, Time release, Time now);
+  void skip_all(std::size_t task, Time now);
+  void discard_old_data(TaskState &state, Time release) const;
   void create_job(std::size_t task, Time release, Time now, const std::vector<Data> &consumed);
   void resolve(std::size_t job, Time now);
   void deliver(std::size_t job, Time now);
@@ -95,7 +115,7 @@ class ReferenceScheduler final : public sched::Scheduler {
   [[nodiscard]] bool outranks(std::size_t a, std::size_t b) const;
   [[nodiscard]] bool considered_before(std::size_t a, std::size_t b) const;
 
-  [[nodiscard]] std::size_t first_candidate(const std::vector<std::size_t> &passed_over) const;
+  [[nodiscard]] std::size_t first_candidate(const std::vector<std::size_t> &passed_over, bool may_start) const;
   [[nodiscard]] std::uint32_t worker_for(std::size_t job) const;
   [[nodiscard]] bool can_start(std::size_t job, Time now);
   void place(std::size_t job, std::uint32_t worker, Time now);
@@ -110,6 +130,7 @@ class ReferenceScheduler final : public sched::Scheduler {
   std::vector<Job> jobs_;
   std::vector<Stack> workers_;
   std::uint64_t ready_count_ = 0;
+  bool closed_ = false;
   std::vector<JobEvent> events_;
   std::vector<sched::Dispatch> dispatches_;
   std::vector<JobEvent> step_events_;

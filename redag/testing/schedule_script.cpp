@@ -1,6 +1,7 @@
 #include "redag/testing/schedule_script.hpp"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <set>
 #include <tuple>
@@ -91,49 +92,72 @@ class Run {
   std::optional<std::string> step(const ScriptStep &step) {
     switch (step.kind) {
       case Kind::Advance: now_ += kMicrosecond * step.choice; break;
-      case Kind::Release: release(step.choice); break;
+      case Kind::Release: release(step.choice, false); break;
+      case Kind::Miss: release(step.choice, true); break;
       case Kind::Complete: complete(step.choice); break;
       case Kind::PreemptionPoint: preemption_point(step.choice); break;
       case Kind::Dispatch: return dispatch();
+      case Kind::DispatchSome: return dispatch_some(step.choice);
       case Kind::AddDag: add_dag(step.choice); break;
       case Kind::RemoveDag: remove_dag(step.choice); break;
+      case Kind::AddTask: return add_task(step.choice);
+      case Kind::RemoveTask: remove_task(step.choice); break;
+      case Kind::SetTiming: set_timing(step.choice); break;
     }
     return std::nullopt;
   }
 
   /// Two dispatches: the second must do nothing.
   std::optional<std::string> dispatch() {
-    if (auto difference = dispatch_once()) return difference;
+    if (auto difference = dispatch_once(sched::kNoLimit)) return difference;
     if (!tested_->dispatch(now_).events.empty()) return "a dispatch without an event decided something";
     static_cast<void>(expected_->dispatch(now_));
     return std::nullopt;
   }
 
+  /// With a limit, and again with none to start: the second must do nothing.
+  std::optional<std::string> dispatch_some(std::uint8_t choice) {
+    if (auto difference = dispatch_once(choice % 3U)) return difference;
+    if (!tested_->dispatch(now_, 0).events.empty()) return "a dispatch that may start nothing decided something";
+    static_cast<void>(expected_->dispatch(now_, 0));
+    return std::nullopt;
+  }
+
  private:
   enum class State : std::uint8_t { Running, Suspended };
+  struct KnownDag {
+    bool bounded = false;  // by max_active
+    bool removed = false;
+  };
 
   void know(const Dag &dag) {
-    ++dag_count_;
-    for (const Task &task : dag.tasks) {
-      if (task.activation == Activation::Timer) timers_.push_back(TaskId(task_count_));
-      releases_.push_back(task.offset);
-      periods_.push_back(task.period);
-      if (dag.max_active > 0 && (!task.group.empty() || config_.max_started > 0))
-        uncounted_.insert(TaskId(task_count_));
-      ++task_count_;
-    }
+    dags_.push_back(KnownDag{dag.max_active > 0, false});
+    for (const Task &task : dag.tasks) know(dags_.back(), task);
+  }
+
+  void know(const KnownDag &dag, const Task &task) {
+    const TaskId id(task_count_++);
+    if (task.activation == Activation::Timer) timers_.push_back(id);
+    releases_.push_back(task.offset);
+    periods_.push_back(task.period);
+    if (dag.bounded && (!task.group.empty() || config_.max_started > 0)) uncounted_.insert(id);
   }
 
   // One of the timers that are due; a due one that is not chosen is late.
-  void release(std::uint8_t choice) {
+  void release(std::uint8_t choice, bool missed) {
     std::vector<TaskId> due;
     for (const TaskId task : timers_) {
       if (releases_[task.value] <= now_) due.push_back(task);
     }
     if (due.empty()) return;
     const TaskId task = due[choice % due.size()];
-    tested_->release(task, releases_[task.value], now_);
-    expected_->release(task, releases_[task.value], now_);
+    for (const Side *side : {&tested_, &expected_}) {
+      if (missed) {
+        (*side)->miss(task, releases_[task.value], now_, choice % 2 == 0 ? Reason::Overrun : Reason::QueueFull);
+      } else {
+        (*side)->release(task, releases_[task.value], now_);
+      }
+    }
     releases_[task.value] += periods_[task.value];
   }
 
@@ -148,6 +172,7 @@ class Run {
     const JobKey key = jobs[choice / 8U % jobs.size()];
     const Outcome outcome = choice % 8 == 0   ? Outcome::Threw
                             : choice % 8 == 1 ? Outcome::BudgetExceeded
+                            : choice % 8 == 2 ? Outcome::NoData
                                               : Outcome::Finished;
     tested_->complete(tested_.slot(key), now_, outcome);
     expected_->complete(expected_.slot(key), now_, outcome);
@@ -176,14 +201,54 @@ class Run {
   }
 
   void remove_dag(std::uint8_t choice) {
-    const DagId dag(choice % dag_count_);
+    const DagId dag(choice % dags_.size());
+    dags_[dag.value].removed = true;
     tested_->remove_dag(dag, now_);
     expected_->remove_dag(dag, now_);
   }
 
-  std::optional<std::string> dispatch_once() {
-    const std::vector<JobEvent> actual = tested_.take(tested_->dispatch(now_), uncounted_);
-    const std::vector<JobEvent> wanted = expected_.take(expected_->dispatch(now_), uncounted_);
+  // To one of the DAGs that are left, anywhere in its order.
+  std::optional<std::string> add_task(std::uint8_t choice) {
+    std::vector<std::size_t> left;
+    for (std::size_t d = 0; d < dags_.size(); ++d) {
+      if (!dags_[d].removed) left.push_back(d);
+    }
+    if (left.empty()) return std::nullopt;
+    Rng rng(choice);
+    Task task = random_dag(rng, {1, 1, true, true, false}).tasks.front();
+    task.offset += now_ / task.period * task.period;
+    const auto rank = static_cast<std::uint32_t>(rng.uniform(0, 4));
+    const std::size_t dag = left[choice % left.size()];
+    const TaskId id = tested_->add_task(DagId(dag), rank, task, now_);
+    if (id != expected_->add_task(DagId(dag), rank, task, now_)) return "  a task has another id";
+    know(dags_[dag], task);
+    const auto actual = tested_->tasks_of(DagId(dag));
+    const auto wanted = expected_->tasks_of(DagId(dag));
+    if (!std::equal(actual.begin(), actual.end(), wanted.begin(), wanted.end())) return "  a DAG has other tasks";
+    return std::nullopt;
+  }
+
+  void remove_task(std::uint8_t choice) {
+    if (task_count_ == 0) return;
+    const TaskId task(choice % task_count_);
+    tested_->remove_task(task, now_);
+    expected_->remove_task(task, now_);
+  }
+
+  void set_timing(std::uint8_t choice) {
+    if (task_count_ == 0) return;
+    Rng rng(choice);
+    const TaskId task(choice % task_count_);
+    const Duration period = 10 * kMicrosecond * rng.uniform(1, 5);
+    const Duration deadline = 10 * kMicrosecond * rng.uniform(1, 4);
+    tested_->set_timing(task, period, deadline, now_);
+    expected_->set_timing(task, period, deadline, now_);
+    periods_[task.value] = period;
+  }
+
+  std::optional<std::string> dispatch_once(std::uint32_t most) {
+    const std::vector<JobEvent> actual = tested_.take(tested_->dispatch(now_, most), uncounted_);
+    const std::vector<JobEvent> wanted = expected_.take(expected_->dispatch(now_, most), uncounted_);
     if (actual != wanted) {
       return fmt::format("  decided:\n{}  expected:\n{}", describe(actual), describe(wanted));
     }
@@ -223,7 +288,7 @@ class Run {
   Side expected_;
   sched::Config config_;
   Time now_ = 0;
-  std::size_t dag_count_ = 0;
+  std::vector<KnownDag> dags_;
   std::size_t task_count_ = 0;
   std::vector<TaskId> timers_;
   std::set<TaskId> uncounted_;  // tasks whose deferrals are not compared
@@ -236,11 +301,16 @@ const char *name_of(Kind kind) {
   switch (kind) {
     case Kind::Advance: return "advance";
     case Kind::Release: return "release";
+    case Kind::Miss: return "miss";
     case Kind::Complete: return "complete";
     case Kind::PreemptionPoint: return "point";
     case Kind::Dispatch: return "dispatch";
+    case Kind::DispatchSome: return "dispatch_some";
     case Kind::AddDag: return "add";
     case Kind::RemoveDag: return "remove";
+    case Kind::AddTask: return "add_task";
+    case Kind::RemoveTask: return "remove_task";
+    case Kind::SetTiming: return "set_timing";
   }
   return "?";
 }
@@ -255,16 +325,19 @@ Script random_script(std::uint64_t seed, std::size_t length, bool reconfigure) {
   const double release = 0.3 + 0.5 * rng.uniform01();
   const double point = 0.2 * rng.uniform01();
   const double advance = 0.1 + 0.5 * rng.uniform01();
+  const double limited = rng.uniform01() < 0.5 ? 0 : 0.5 * rng.uniform01();
+  constexpr std::array<Kind, 6> kReconfigurations{Kind::AddDag,     Kind::RemoveDag, Kind::AddTask,
+                                                  Kind::RemoveTask, Kind::SetTiming, Kind::SetTiming};
   while (script.size() < length) {
     ScriptStep step;
     const double kind = rng.uniform01();
     step.choice = static_cast<std::uint8_t>(rng.uniform(0, 255));
     if (rng.uniform01() < dispatch) {
-      step.kind = Kind::Dispatch;
-    } else if (reconfigure && rng.uniform01() < 0.02) {
-      step.kind = rng.uniform01() < 0.5 ? Kind::AddDag : Kind::RemoveDag;
+      step.kind = rng.uniform01() < limited ? Kind::DispatchSome : Kind::Dispatch;
+    } else if (reconfigure && rng.uniform01() < 0.06) {
+      step.kind = kReconfigurations.at(static_cast<std::size_t>(rng.uniform(0, kReconfigurations.size() - 1)));
     } else if (kind < release) {
-      step.kind = Kind::Release;
+      step.kind = rng.uniform01() < 0.05 ? Kind::Miss : Kind::Release;
     } else if (kind < release + point) {
       step.kind = Kind::PreemptionPoint;
     } else if (rng.uniform01() < advance) {

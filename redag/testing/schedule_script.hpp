@@ -15,7 +15,20 @@ namespace redag::testing {
 /// One happening. What it means depends on the state that it finds, so every sequence of these is a legal one, and so
 /// is what is left of it when some are taken out.
 struct ScriptStep {
-  enum class Kind : std::uint8_t { Advance, Release, Complete, PreemptionPoint, Dispatch, AddDag, RemoveDag };
+  enum class Kind : std::uint8_t {
+    Advance,
+    Release,
+    Miss,
+    Complete,
+    PreemptionPoint,
+    Dispatch,
+    DispatchSome,  // with a limit
+    AddDag,
+    RemoveDag,
+    AddTask,
+    RemoveTask,
+    SetTiming,
+  };
   Kind kind = Kind::Advance;
   std::uint8_t choice = 0;  // which task, job or DAG; how far
 
@@ -24,7 +37,7 @@ struct ScriptStep {
 
 using Script = std::vector<ScriptStep>;
 
-/// `reconfigure`: DAGs are also added and removed.
+/// `reconfigure`: DAGs and tasks are also added and removed, and get other periods.
 [[nodiscard]] Script random_script(std::uint64_t seed, std::size_t length, bool reconfigure);
 
 [[nodiscard]] std::string describe(const Script &script);
