@@ -157,8 +157,11 @@ void MissCounter::add(std::span<const JobEvent> events) {
       case JobEventKind::Finished:
         if (event.value > deadline_[task]) ++misses_[dag_of_[task].value];
         break;
-      case JobEventKind::Skipped:
-      case JobEventKind::Aborted: ++misses_[dag_of_[task].value]; break;
+      case JobEventKind::Aborted:
+        if (event.reason == Reason::NoData) break;
+        ++misses_[dag_of_[task].value];
+        break;
+      case JobEventKind::Skipped: ++misses_[dag_of_[task].value]; break;
       default: break;
     }
   }

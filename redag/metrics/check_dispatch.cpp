@@ -36,8 +36,13 @@ void DispatchRules::check_bounds(const JobEvent &event) {
   const Replay &replay = context_.replay;
   const DagId dag_id = replay.dag_of(event.task);
   const Dag &dag = context_.info.workload.dags[dag_id.value];
-  context_.expect(Rule::TaskOverlap, replay.task_active(event.task) == 0, event.task, event.job,
-                  [] { return std::string("another job of its task has started and not ended"); });
+  const std::uint32_t concurrency = replay.task(event.task).concurrency;
+  context_.expect(Rule::TaskOverlap, replay.task_active(event.task) < concurrency, event.task, event.job, [&] {
+    return concurrency == 1 ? "another job of its task has started and not ended"
+                            : std::to_string(replay.task_active(event.task)) +
+                                  " jobs of its task have started and not ended, at most " +
+                                  std::to_string(concurrency) + " allowed";
+  });
   const auto jobs = replay.jobs_of(event.task);
   const auto first = std::find_if(jobs.begin(), jobs.end(), [](const LiveJob &j) { return j.state == State::Ready; });
   context_.expect(Rule::TaskOverlap, first == jobs.end() || first->number == event.job, event.task, event.job,
@@ -84,7 +89,9 @@ void DispatchRules::check_choice(const LiveJob &chosen, const Urgency &urgency) 
   const auto &eligible = replay.eligible();
   // A resumed job (Cooperative) keeps its worker unless it is outranked by level.
   const bool goes_on = mode() == Preemption::Cooperative && chosen.state == State::Suspended;
-  if (!eligible.empty()) {
+  // A job that goes on where none may start passes by those that are eligible.
+  const bool none_may_start = context_.info.stepped && chosen.state == State::Suspended;
+  if (!eligible.empty() && !none_may_start) {
     const Replay::Waiter &best = *eligible.begin();
     const bool is_itself = best.task == chosen.task && best.number == chosen.number;
     const bool outranks = goes_on ? replay.preempts(best.urgency, urgency) : best.urgency < urgency;
@@ -103,8 +110,8 @@ void DispatchRules::deferred(const JobEvent &event) {
   const bool at_bound = dag.max_active > 0 && replay.active(dag_id) >= dag.max_active;
   context_.expect(Rule::Deferral, at_bound, event.task, event.job,
                   [&] { return "deferred although DAG " + dag.name + " is below max_active"; });
-  context_.expect(Rule::Deferral, replay.task_active(event.task) == 0, event.task, event.job,
-                  [] { return std::string("deferred although its own task keeps it from running"); });
+  context_.expect(Rule::Deferral, replay.task_active(event.task) < replay.task(event.task).concurrency, event.task,
+                  event.job, [] { return std::string("deferred although its own task keeps it from running"); });
 }
 
 void DispatchRules::preempted(const JobEvent &event, const LiveJob &job) {
@@ -207,7 +214,7 @@ void DispatchRules::check_free_workers() {
   if (replay.free_workers() == 0) return;
   const auto &eligible = replay.eligible();
   const Replay::Waiter waiter = eligible.empty() ? Replay::Waiter{} : *eligible.begin();
-  context_.expect(Rule::WorkConservation, eligible.empty(), waiter.task, waiter.number,
+  context_.expect(Rule::WorkConservation, eligible.empty() || context_.info.stepped, waiter.task, waiter.number,
                   [] { return std::string("it is eligible, and a worker is free"); });
   const auto suspended = replay.suspended();
   const Replay::JobRef preempted_job = suspended.empty() ? Replay::JobRef{} : suspended.front();
@@ -215,7 +222,7 @@ void DispatchRules::check_free_workers() {
                   [] { return std::string("it is preempted, and a worker is free"); });
   const auto &owed = replay.owed_deferral();
   const TaskId undeferred = owed.empty() ? TaskId() : *owed.begin();
-  context_.expect(Rule::Deferral, owed.empty(), undeferred, 0, [] {
+  context_.expect(Rule::Deferral, owed.empty() || context_.info.stepped, undeferred, 0, [] {
     return std::string("its first ready job is kept from a free worker by max_active alone and was not deferred");
   });
 }
@@ -235,7 +242,8 @@ void DispatchRules::check_running() {
     });
   };
   const auto &eligible = replay.eligible();
-  if (!eligible.empty()) judge(eligible.begin()->urgency, eligible.begin()->task, eligible.begin()->number);
+  if (!eligible.empty() && !context_.info.stepped)
+    judge(eligible.begin()->urgency, eligible.begin()->task, eligible.begin()->number);
   const LiveJob *suspended = most_urgent_suspended();
   if (suspended != nullptr) judge(replay.inherited(*suspended), suspended->task, suspended->number);
 }

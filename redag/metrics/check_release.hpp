@@ -49,6 +49,7 @@ class ReleaseRules {
   void expect_skips(const JobEvent &event);
   void ready(const JobEvent &event, const LiveJob &job);
   void skipped(const JobEvent &event, const LiveJob *job);
+  bool is_miss(const JobEvent &event) const;
   void finished(const JobEvent &event, const LiveJob &job);
   void check_nothing_is_owed(TaskId id);
   void touch(TaskId id);
@@ -65,6 +66,7 @@ class ReleaseRules {
   std::vector<TaskState> tasks_;
   std::vector<bool> removed_;  // per DAG
   std::vector<ExpectedSkip> expected_skips_;
+  ExpectedSkip just_released_;  // by the last event; no task: that was another event
   std::vector<TaskId> touched_;
 };
 

@@ -202,7 +202,7 @@ Replay::Gate Replay::gate_of(const TaskState &task, const LiveJob *&first) const
     break;
   }
   if (first == nullptr) return Gate::NoJob;
-  if (task.active > 0) return Gate::Task;
+  if (task.active >= task.task->concurrency) return Gate::Task;
   const Shared &dag = dags_[task.dag.value];
   if (dag.capacity > 0 && dag.active >= dag.capacity) return Gate::Dag;
   return task.group != kNoGroup && groups_[task.group].active > 0 ? Gate::Group : Gate::Open;

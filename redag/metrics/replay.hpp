@@ -93,7 +93,7 @@ class Replay {
   /// Full preemption: started jobs that have no worker.
   [[nodiscard]] std::span<const JobRef> suspended() const { return suspended_; }
 
-  /// Eligible jobs, most urgent first; at most one a task. Empty while `max_started` jobs have started.
+  /// Eligible jobs, most urgent first; of each task its first ready one. Empty while `max_started` jobs have started.
   [[nodiscard]] const std::set<Waiter> &eligible() const { return at_thread_limit() ? none_ : eligible_; }
   /// Tasks whose first ready job waits for its DAG's max_active alone and has not been counted as deferred.
   [[nodiscard]] const std::set<TaskId> &owed_deferral() const { return owed_deferral_; }

@@ -33,7 +33,7 @@ void add_counts(JobStats &to, const JobStats &from) {
 
 double JobStats::miss_ratio() const { return ratio(late, released); }
 
-double JobStats::miss_ratio_with_lost() const { return ratio(late + skipped + aborted, released); }
+double JobStats::miss_ratio_with_lost() const { return ratio(late + skipped + aborted - no_data(), released); }
 
 void Summarizer::Samples::append(const Samples &other) {
   metrics::append(response, other.response);
@@ -70,7 +70,7 @@ void Summarizer::count(const JobRecord &job) {
   if (job.deferred) ++stats.deferred;
   stats.preemptions += job.preemptions;
   Samples &samples = samples_[job.task.value];
-  if (job.has_started()) samples.start_latency.push_back(job.start - job.ready);
+  if (job.has_started() && job.reason != Reason::NoData) samples.start_latency.push_back(job.start - job.ready);
   switch (job.outcome) {
     case JobOutcome::InFlight: ++stats.in_flight; return;
     case JobOutcome::Skipped:

@@ -16,7 +16,7 @@
 
 namespace redag::metrics {
 
-inline constexpr std::size_t kReasonCount = 8;
+inline constexpr std::size_t kReasonCount = static_cast<std::size_t>(Reason::NoData) + 1;
 
 /// Jobs of a task, of a DAG, or of all. Jobs released before the end of the warm-up are not in it.
 struct JobStats {
@@ -33,12 +33,14 @@ struct JobStats {
   std::optional<Duration> max_lateness;  // L_max over finished jobs; negative: the closest a job came to its deadline
   Distribution response;                 // f - r, finished jobs
   Distribution response_from_ready;      // f - ready
-  Distribution start_latency;            // start - ready
+  Distribution start_latency;            // start - ready; not of jobs without data
   Distribution on_worker;                // time on a worker; execution time where nothing else could run there
 
   /// MR = late / released (eq. miss_rate); 0 where nothing was released.
   [[nodiscard]] double miss_ratio() const;
-  /// The same with skipped and aborted jobs counted as misses.
+  /// Aborted jobs that found nothing to do: nobody waited for them, so they are no misses.
+  [[nodiscard]] std::uint64_t no_data() const { return by_reason[static_cast<std::size_t>(Reason::NoData)]; }
+  /// MR with skipped and aborted jobs counted as misses, save those without data.
   [[nodiscard]] double miss_ratio_with_lost() const;
 };
 

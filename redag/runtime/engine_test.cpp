@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "redag/runtime/clock.hpp"
@@ -47,6 +50,13 @@ class Bench {
   }
 
   void start() {
+    bind();
+    const Result<void> ready = engine->start();
+    ASSERT_TRUE(ready) << to_string(ready.error());
+    engine->set_origin(monotonic_now());
+  }
+
+  void bind() {
     std::vector<Body> logging;
     for (std::size_t t = 0; t < bodies.size(); ++t) {
       logging.emplace_back([this, t](const Job &job) {
@@ -57,9 +67,6 @@ class Bench {
       });
     }
     engine->bind(workload_, std::move(logging));
-    const Result<void> ready = engine->start();
-    ASSERT_TRUE(ready) << to_string(ready.error());
-    engine->set_origin(monotonic_now());
   }
 
   void release(std::initializer_list<std::size_t> tasks) {
@@ -268,6 +275,139 @@ TEST_P(EngineInEveryMode, TheHotPathDoesNotAllocate) {
   done.wait();
   bench.finish();
   EXPECT_EQ(after, before);
+}
+
+TEST_P(EngineInEveryMode, PausedItStartsNothingAndKeepsWhatIsReleased) {
+  Bench bench(ladder(3), GetParam(), 1);
+  Event begun;
+  Event go;
+  Event done;
+  bench.bodies[2] = [&](const Job &) {
+    begun.set();
+    go.wait();
+    return Outcome::Finished;
+  };
+  bench.bodies[0] = [&](const Job &job) {
+    if (job.number == 1) done.set();
+    return Outcome::Finished;
+  };
+  bench.start();
+  bench.release({2});
+  begun.wait();
+  bench.engine->pause();
+  bench.release({0, 1});
+  EXPECT_FALSE(bench.engine->wait_paused(monotonic_now()));
+  go.set();
+  EXPECT_TRUE(bench.engine->wait_paused(kNever));
+  EXPECT_EQ(bench.log(), "+2 -2");
+  bench.engine->resume();
+  while (bench.engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+  bench.engine->pause();
+  EXPECT_TRUE(bench.engine->wait_paused(kNever));
+  bench.release({0});
+  EXPECT_EQ(bench.log(), "+2 -2 +1 -1 +0 -0");
+  bench.engine->resume();
+  done.wait();
+  bench.finish();
+}
+
+// Without a thread of its own: jobs run one by one, the most urgent first, on the thread that asks.
+TEST_P(EngineInEveryMode, RunOneNeedsNoThreads) {
+  Bench bench(ladder(3), GetParam(), 1);
+  const std::thread::id here = std::this_thread::get_id();
+  for (std::size_t t = 0; t < 3; ++t) {
+    bench.bodies[t] = [&, t](const Job &) -> Outcome {
+      EXPECT_EQ(std::this_thread::get_id(), here);
+      EXPECT_EQ(bench.engine->current_task(), TaskId(t));
+      if (t == 0) bench.release({2});
+      preemption_point();
+      if (t == 1) throw std::runtime_error("no");
+      return t == 2 ? Outcome::NoData : Outcome::Finished;
+    };
+  }
+  bench.engine->pause();
+  bench.bind();
+  bench.release({0, 1});
+  EXPECT_EQ(bench.engine->current_task(), std::nullopt);
+  EXPECT_TRUE(bench.engine->run_one());
+  EXPECT_TRUE(bench.engine->run_one());
+  EXPECT_TRUE(bench.engine->run_one());
+  EXPECT_FALSE(bench.engine->run_one());
+  EXPECT_EQ(bench.log(), "+1 +0 -0 +2 -2");
+  EXPECT_EQ(bench.exceptions, 1);
+  bench.engine->miss(TaskId(0), 0, Reason::Overrun);
+  bench.finish();
+  EXPECT_EQ(bench.engine->accounting(TaskId(0)), (sched::Accounting{2, 1, 1, 0, 0}));
+  EXPECT_EQ(bench.engine->accounting(TaskId(2)), (sched::Accounting{1, 0, 0, 1, 0}));
+  const auto starts = std::count_if(bench.events.begin(), bench.events.end(),
+                                    [](const JobEvent &e) { return e.kind == JobEventKind::Started; });
+  EXPECT_EQ(starts, 3);
+}
+
+// Tasks come and go, the engine is paused, stepped and resumed, while threads release: every body of a task that was
+// removed is destroyed, and none runs after.
+TEST_P(EngineInEveryMode, TasksComeAndGoWhileItRuns) {
+  const PriorityBand band = probe_priority_band();
+  EngineOptions options;
+  options.config = make_config(Mode{GetParam(), {}}, 2, PolicyKind::RateMonotonic, band, 20);
+  options.config.reuse_ids = true;
+  options.band = band;
+  options.trace_capacity = 1 << 18;
+  options.start_paused = true;
+  Engine engine(std::make_unique<sched::PriorityScheduler>(Workload{}, options.config), options);
+  const DagId dag = engine.add_dag(Dag{}, {}).dag;
+  std::atomic<int> in_progress{0};
+  std::atomic<int> most{0};
+  Task task;
+  task.period = task.deadline = kSecond;
+  task.concurrency = 2;
+  task.overrun = Overrun::Queue;
+  task.queue_depth = 3;
+  const TaskId steady = engine.add_task(dag, 0, task, [&](const Job &) {
+    most = std::max(most.load(), ++in_progress);
+    preemption_point();
+    --in_progress;
+    return Outcome::Finished;
+  });
+  ASSERT_TRUE(engine.start());
+  engine.set_origin(monotonic_now());
+  engine.resume();
+  std::atomic<bool> stop{false};
+  std::thread source([&] {
+    while (!stop) engine.release(steady, engine.now());
+  });
+  std::thread stepper([&] {
+    while (!stop) {
+      engine.pause();
+      EXPECT_TRUE(engine.wait_paused(kNever));
+      engine.run_one();
+      engine.resume();
+      std::this_thread::yield();
+    }
+  });
+  for (int i = 0; i < 300; ++i) {
+    auto alive = std::make_shared<int>(0);
+    const std::weak_ptr<int> watch = alive;
+    Task other = task;
+    other.concurrency = 1;
+    other.period = kMillisecond * (1 + i % 7);
+    const TaskId id = engine.add_task(dag, 1, other, [alive = std::move(alive)](const Job &) {
+      ++*alive;
+      return Outcome::Finished;
+    });
+    engine.release(id, engine.now());
+    engine.set_timing(id, kSecond, kSecond);
+    engine.release(id, engine.now());
+    engine.remove_task(id);
+    while (!watch.expired()) std::this_thread::yield();
+  }
+  stop = true;
+  source.join();
+  stepper.join();
+  engine.halt();
+  EXPECT_TRUE(engine.wait_idle(kNever));
+  EXPECT_LE(most, 2);
+  EXPECT_GT(engine.accounting(steady).finished, 0U);
 }
 
 TEST(Engine, NestedJobsRunOnOneThreadAndTheirTimeIsNotChargedToTheJobBelow) {

@@ -1,6 +1,9 @@
 #include "redag/sched/priority_scheduler.hpp"
 
+#include <algorithm>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -290,6 +293,88 @@ TEST(PriorityScheduler, AllocatesNothingInSteadyState) {
       EXPECT_EQ(redag::testing::allocation_count(), before_run);
     }
   }
+}
+
+Task lone_task(Duration period) {
+  Task task;
+  task.wcet = 1;
+  task.period = task.deadline = period;
+  return task;
+}
+
+// Tasks and DAGs, with edges and groups, come and go for ever while jobs run: storage grows to what is there at a time.
+TEST(PriorityScheduler, ReusedIdsKeepMemoryFlat) {
+  Rng rng(7);
+  Config config{2, Preemption::Full, PolicyKind::RateMonotonic, 0, 0};
+  config.reuse_ids = true;
+  PriorityScheduler scheduler(Workload{}, config);
+  const DagId home = scheduler.add_dag(Dag{}, 0);
+  std::vector<TaskId> lone;
+  std::vector<DagId> dags;
+  std::vector<JobSlot> running;
+  std::size_t group_number = 0;
+  for (Time now = 1; now <= 10'000; ++now) {
+    if (rng.uniform01() < 0.5 || lone.size() == 8) {
+      const auto which = static_cast<std::ptrdiff_t>(rng.uniform(0, 7));
+      if (which < static_cast<std::ptrdiff_t>(lone.size())) {
+        scheduler.remove_task(lone[static_cast<std::size_t>(which)], now);
+        lone.erase(lone.begin() + which);
+      }
+    } else {
+      Task task = lone_task(rng.uniform(1, 50));
+      if (rng.uniform01() < 0.5) task.group = "group " + std::to_string(group_number++);
+      const TaskId id = scheduler.add_task(home, 0, task, now);
+      EXPECT_EQ(scheduler.accounting(id), Accounting{});
+      EXPECT_EQ(std::count(lone.begin(), lone.end(), id), 0);
+      lone.push_back(id);
+    }
+    if (dags.size() == 3) {
+      scheduler.remove_dag(dags.front(), now);
+      dags.erase(dags.begin());
+    } else if (rng.uniform01() < 0.3) {
+      dags.push_back(scheduler.add_dag(make_dag("d", {{"a", 5}, {"b", 0, 1, {0}}, {"c", 7, 1, {0, 1}}}), now));
+      scheduler.release(scheduler.tasks_of(dags.back())[0], now, now);
+    }
+    for (const TaskId id : lone) scheduler.release(id, now, now);
+    while (running.size() > 1 || (!running.empty() && rng.uniform01() < 0.6)) {
+      scheduler.complete(running.back(), now, Outcome::Finished);
+      running.pop_back();
+    }
+    for (const Dispatch &dispatch : scheduler.dispatch(now).dispatches) {
+      if (!dispatch.resume) running.push_back(dispatch.job);
+    }
+  }
+  EXPECT_GT(group_number, 2'000U);
+  EXPECT_LE(scheduler.task_slots(), 8U + 4 * 3 + 16);
+  EXPECT_LE(scheduler.dag_slots(), 1U + 4 + 16);
+  EXPECT_LE(scheduler.job_slots(), 3 * scheduler.task_slots());
+  EXPECT_LE(scheduler.group_slots(), 8U + 16);
+}
+
+TEST(PriorityScheduler, WithoutReuseAnIdNamesOneTaskForEver) {
+  PriorityScheduler scheduler(Workload{}, {});
+  const DagId dag = scheduler.add_dag(Dag{}, 0);
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    const TaskId id = scheduler.add_task(dag, 0, lone_task(10), 0);
+    EXPECT_EQ(id, TaskId(i));
+    scheduler.release(id, 0, 0);
+    scheduler.remove_task(id, 0);
+    scheduler.release(id, 1, 1);  // ignored
+    EXPECT_EQ(scheduler.accounting(id), (Accounting{1, 0, 1, 0, 0}));
+  }
+}
+
+TEST(PriorityScheduler, ALimitHoldsBackWhatHasNotStarted) {
+  const Workload workload = make_workload({make_dag("a", {{"low", 30}, {"mid", 20}, {"high", 10}})}, 2);
+  PriorityScheduler scheduler(workload, {2, Preemption::Full, PolicyKind::RateMonotonic, 0, 0});
+  for (const std::size_t t : {0U, 1U, 2U}) scheduler.release(TaskId(t), 0, 0);
+  EXPECT_TRUE(scheduler.dispatch(0, 0).dispatches.empty());
+  const Step one = scheduler.dispatch(0, 1);
+  ASSERT_EQ(one.dispatches.size(), 1U);
+  EXPECT_EQ(one.dispatches[0].task, TaskId(2));
+  const Step rest = scheduler.dispatch(0);
+  ASSERT_EQ(rest.dispatches.size(), 1U);
+  EXPECT_EQ(rest.dispatches[0].task, TaskId(1));
 }
 
 }  // namespace

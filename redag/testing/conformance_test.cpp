@@ -48,6 +48,7 @@ Workload random_workload(std::uint64_t seed) {
     for (Task &task : dag.tasks) {
       if (rng.uniform01() < 0.7) task.region = std::max<Duration>(1, task.wcet / rng.uniform(1, 5));
       if (rng.uniform01() < 0.1) task.budget = std::max<Duration>(1, task.wcet / 2);
+      if (task.group.empty() && rng.uniform01() < 0.1) task.concurrency = static_cast<std::uint32_t>(rng.uniform(2, 3));
       if (rng.uniform01() < 0.5) task.priority = static_cast<int>(rng.uniform(-2, 2));
     }
   }

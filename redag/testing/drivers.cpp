@@ -84,7 +84,10 @@ class RandomJobs {
       return;
     }
     started_.erase(started_.begin() + static_cast<std::ptrdiff_t>(choice));
-    scheduler_.complete(job.slot, now, dice > 0.97 ? sched::Outcome::Threw : sched::Outcome::Finished);
+    scheduler_.complete(job.slot, now,
+                        dice > 0.97   ? sched::Outcome::Threw
+                        : dice > 0.94 ? sched::Outcome::NoData
+                                      : sched::Outcome::Finished);
   }
 
   Rng &rng() { return rng_; }
@@ -99,6 +102,28 @@ class RandomJobs {
   Rng rng_;
   std::vector<Started> started_;
 };
+
+// The last task of a workload, where it could as well be added while running: it has no edges.
+bool last_task_is_alone(const Workload &workload) {
+  const Dag &dag = workload.dags.back();
+  const auto last = static_cast<std::uint32_t>(dag.tasks.size() - 1);
+  if (last == 0 || dag.tasks[last].activation != Activation::Timer || !dag.tasks[last].predecessors.empty())
+    return false;
+  return std::none_of(dag.tasks.begin(), dag.tasks.end(), [last](const Task &task) {
+    return std::count(task.predecessors.begin(), task.predecessors.end(), last) > 0;
+  });
+}
+
+// Adds that task as the others stand without it: among equal ranks it is the last, and chain_aware turns the ranks
+// round. It gets its timing when it is there.
+void add_last_task(sched::Scheduler &scheduler, const Dag &whole, DagId dag, PolicyKind policy, Time now) {
+  const std::uint32_t rank = topological_ranks(whole).back();
+  REDAG_CHECK(rank > 0, "another source stands before it");
+  Task task = whole.tasks.back();
+  task.period = task.deadline = kSecond;
+  const TaskId id = scheduler.add_task(dag, policy == PolicyKind::ChainAware ? rank : rank - 1, task, now);
+  scheduler.set_timing(id, whole.tasks.back().period, whole.tasks.back().deadline, now);
+}
 
 }  // namespace
 
@@ -121,10 +146,19 @@ trace::Trace SimulatorDriver::run(const RunSpec &spec) {
 
 trace::Trace ManualDriver::run(const RunSpec &spec) {
   trace::Trace trace = empty_trace(spec, trace::Driver::Threads);
-  sched::PriorityScheduler scheduler(spec.workload, trace.info.config);
+  trace.info.stepped = spec.seed % 2 == 0;
+  Workload at_first = spec.workload;
+  bool one_is_missing = last_task_is_alone(spec.workload);
+  if (one_is_missing) at_first.dags.back().tasks.pop_back();
+  sched::PriorityScheduler scheduler(at_first, trace.info.config);
   RandomJobs jobs(scheduler, spec.preemption, spec.seed);
+  std::uint32_t most = sched::kNoLimit;
   const auto decide = [&](Time instant) {
-    const sched::Step step = scheduler.dispatch(instant);
+    if (trace.info.stepped && jobs.rng().uniform01() < 0.3) {
+      const auto choice = static_cast<std::uint32_t>(jobs.rng().uniform(0, 3));
+      most = choice == 3 ? sched::kNoLimit : choice;
+    }
+    const sched::Step step = scheduler.dispatch(instant, most);
     jobs.carry_out(step);
     trace.events.insert(trace.events.end(), step.events.begin(), step.events.end());
   };
@@ -141,7 +175,17 @@ trace::Trace ManualDriver::run(const RunSpec &spec) {
       jobs.something_happens(now);
     }
     move_to(std::max(now, arrival.seen));
-    scheduler.release(arrival.task, arrival.nominal, now);
+    if (one_is_missing && arrival.task.value + 1 == spec.workload.task_count()) {
+      one_is_missing = false;
+      add_last_task(scheduler, spec.workload.dags.back(), DagId(spec.workload.dags.size() - 1), spec.workload.policy,
+                    now);
+    }
+    const double dice = jobs.rng().uniform01();
+    if (dice < 0.06) {
+      scheduler.miss(arrival.task, arrival.nominal, now, dice < 0.03 ? Reason::Overrun : Reason::QueueFull);
+    } else {
+      scheduler.release(arrival.task, arrival.nominal, now);
+    }
   }
   decide(now);
   return trace;

@@ -24,7 +24,8 @@ struct SimulatorDriver {
 
 /// Virtual time in which jobs end, and reach preemption points, at random and not when their execution time is over;
 /// with full preemption also while they count as preempted, as on a real machine. Releases are on the grid, some seen
-/// late.
+/// late, some missed. Every other run is stepped: jobs are held back at times, and started one by one. The last task is
+/// added while running where that is possible.
 struct ManualDriver {
   static trace::Trace run(const RunSpec &spec);
 };

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view kFormat = "redag.events/1";
 constexpr auto kLastKind = JobEventKind::Aborted;
-constexpr auto kLastReason = Reason::Budget;
+constexpr auto kLastReason = Reason::NoData;
 
 // One event: [time,"kind",task,job,worker,value,"reason"]; worker -1: none. Millions of lines are read, so this form is
 // read by hand; it is JSON all the same.

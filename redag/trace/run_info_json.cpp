@@ -100,6 +100,7 @@ RunInfo info_from(const Json &json) {
   info.start = integer_of(json, "start_ns", -kMaxDuration, kMaxDuration);
   info.end = integer_of(json, "end_ns", -kMaxDuration, kMaxDuration);
   info.warm_up = integer_of(json, "warm_up_ns", 0, kMaxDuration);
+  info.stepped = json.value("stepped", false);
   info.lost_events = unsigned_of(json, "lost_events");
   info.overheads = text_of(json, "overheads");
   info.machine = machine_from(member(json, "machine"));
@@ -110,7 +111,7 @@ RunInfo info_from(const Json &json) {
 
 std::string run_info_to_json(const RunInfo &info) {
   const sched::Config &config = info.config;
-  const Json json = {
+  Json json = {
       {"executor", info.executor},
       {"config",
        {{"workers", config.workers},
@@ -129,6 +130,7 @@ std::string run_info_to_json(const RunInfo &info) {
       {"overheads", info.overheads},
       {"machine", {{"cpus", info.machine.cpus}, {"kernel", info.machine.kernel}, {"model", info.machine.model}}},
       {"workload", to_yaml(info.workload)}};
+  if (info.stepped) json["stepped"] = true;
   // Texts from outside may not be UTF-8; a replaced character is better than no file.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -39,6 +39,7 @@ struct RunInfo {
   Time start = 0;                 // origin of the release grid: job k of a timer is released at start + offset + k * T
   Time end = 0;                   // horizon: nothing is released at or after it; jobs may finish later
   Duration warm_up = 0;           // jobs released before start + warm_up are not counted
+  bool stepped = false;           // at times no job could start, or one at a time: a free worker proves nothing
   std::uint64_t lost_events = 0;  // dropped by full rings: the stream has holes if > 0
   std::string overheads;          // what the driver added to execution; empty: nothing (the model's ideal machine)
   Machine machine;
