@@ -73,7 +73,7 @@ void DispatchRules::check_place(const JobEvent &event, const LiveJob &job) {
   if (stack.empty()) return;
   const LiveJob *below = replay.find(stack.back().task, stack.back().number);
   if (below == nullptr) return;
-  context_.expect(Rule::Preemption, replay.preempts(job.own, replay.inherited(*below)), event.task, event.job,
+  context_.expect(Rule::Preemption, replay.preempts(job.own, urgency_of(*below)), event.task, event.job,
                   [&] { return "it runs on top of " + name(stack.back()) + ", which it does not outrank"; });
   context_.expect(Rule::Priority, replay.free_workers() == 0, event.task, event.job,
                   [&] { return "it runs on top of " + name(stack.back()) + " although a worker is free"; });
@@ -100,7 +100,7 @@ void DispatchRules::check_choice(const LiveJob &chosen, const Urgency &urgency) 
   if (mode() != Preemption::Full) return;
   const LiveJob *suspended = most_urgent_suspended();
   if (suspended == nullptr || (suspended->task == chosen.task && suspended->number == chosen.number)) return;
-  if (replay.inherited(*suspended) < urgency) complain(Replay::JobRef{suspended->task, suspended->number});
+  if (urgency_of(*suspended) < urgency) complain(Replay::JobRef{suspended->task, suspended->number});
 }
 
 void DispatchRules::deferred(const JobEvent &event) {
@@ -191,8 +191,7 @@ void DispatchRules::check_evictions() {
     const LiveJob *by = replay.running(eviction.worker);
     // Where levels are shared, the job may inherit from one that was looked at only after the preemption: so its own
     // level decides, and what it inherits only in the total order.
-    const bool outranked =
-        by != nullptr && replay.preempts(by->raised, job->own) && by->raised < replay.inherited(*job);
+    const bool outranked = by != nullptr && replay.preempts(by->raised, job->own) && by->raised < urgency_of(*job);
     context_.expect(Rule::Preemption, outranked, eviction.job.task, eviction.job.number, [&] {
       return by == nullptr ? std::string("preempted by nobody")
                            : "preempted by " + context_.job_name(by->task, by->number) + ", which does not outrank it";
@@ -245,7 +244,13 @@ void DispatchRules::check_running() {
   if (!eligible.empty() && !context_.info.stepped)
     judge(eligible.begin()->urgency, eligible.begin()->task, eligible.begin()->number);
   const LiveJob *suspended = most_urgent_suspended();
-  if (suspended != nullptr) judge(replay.inherited(*suspended), suspended->task, suspended->number);
+  if (suspended != nullptr) judge(urgency_of(*suspended), suspended->task, suspended->number);
+}
+
+// With what a started job inherits from those that wait for its group. Where jobs were held back, those may not have
+// been looked at: only its own is sure.
+Urgency DispatchRules::urgency_of(const LiveJob &job) const {
+  return context_.info.stepped ? job.own : context_.replay.inherited(job);
 }
 
 const LiveJob *DispatchRules::most_urgent_suspended() const {
@@ -253,7 +258,7 @@ const LiveJob *DispatchRules::most_urgent_suspended() const {
   Urgency best_urgency;
   for (const Replay::JobRef &ref : context_.replay.suspended()) {
     const LiveJob *job = context_.replay.find(ref.task, ref.number);
-    const Urgency urgency = context_.replay.inherited(*job);
+    const Urgency urgency = urgency_of(*job);
     if (best != nullptr && best_urgency <= urgency) continue;
     best = job;
     best_urgency = urgency;

@@ -89,6 +89,19 @@ TEST(Summary, CountsPerTaskDagAndTotal) {
   EXPECT_DOUBLE_EQ(s.total.miss_ratio(), 2.0 / 8.0);
 }
 
+// A job that found nothing to do is aborted, and neither a miss nor a response.
+TEST(Summary, AJobWithoutDataIsNoMiss) {
+  TraceBuilder t(make_workload({make_dag("a", {{"t", 10, 1}})}, 1));
+  t.at(0).arrives("t", 0).at(1).dispatched("t", 0, 0, 10).at(2).aborted("t", 0, 0, Reason::NoData);
+  t.at(10).arrives("t", 1).dispatched("t", 1, 0, 20).at(11).aborted("t", 1, 0, Reason::Exception);
+  const Summary s = summarize(t.until(20));
+  EXPECT_EQ(s.total.aborted, 2U);
+  EXPECT_EQ(s.total.no_data(), 1U);
+  EXPECT_DOUBLE_EQ(s.total.miss_ratio_with_lost(), 0.5);
+  EXPECT_EQ(s.total.start_latency.count, 1U);
+  EXPECT_EQ(s.total.response.count, 0U);
+}
+
 TEST(Summary, EndToEndGoesBackToTheSource) {
   const Summary s = summarize(example());
   const EndToEnd &chain = s.dags[0].end_to_end;

@@ -103,12 +103,17 @@ class RandomJobs {
   std::vector<Started> started_;
 };
 
-// The last task of a workload, where it could as well be added while running: it has no edges.
+// The last task of a workload, where it could as well be added while running: it has no edges, and does not give its
+// DAG another place (chain_aware).
 bool last_task_is_alone(const Workload &workload) {
   const Dag &dag = workload.dags.back();
   const auto last = static_cast<std::uint32_t>(dag.tasks.size() - 1);
   if (last == 0 || dag.tasks[last].activation != Activation::Timer || !dag.tasks[last].predecessors.empty())
     return false;
+  if (std::none_of(dag.tasks.begin(), dag.tasks.end() - 1,
+                   [&](const Task &task) { return task.period <= dag.tasks[last].period; })) {
+    return false;
+  }
   return std::none_of(dag.tasks.begin(), dag.tasks.end(), [last](const Task &task) {
     return std::count(task.predecessors.begin(), task.predecessors.end(), last) > 0;
   });
