@@ -1,0 +1,151 @@
+// ReDAG-RT as an rclcpp executor: executes the callbacks of all its nodes in one global order, most urgent first, by
+// the library's scheduler. Takes the place of rclcpp::executors::MultiThreadedExecutor; docs/ros2.md says what changes.
+//
+// Threads: as rclcpp's executors. Everything may be called while spinning and from callbacks, except the spin functions
+// (which throw then).
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rclcpp/executor.hpp"
+#include "rclcpp/version.h"
+#include "redag/model/callback_match.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/runtime/engine.hpp"
+#include "redag/runtime/mode.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag_rclcpp {
+
+/// An exception that left a callback.
+struct ExceptionInfo {
+  std::string task;  // "control.ekf", or the callback's own description
+  std::exception_ptr exception;
+};
+
+enum class OnException : std::uint8_t {
+  Stop,      // spinning ends as by cancel(), and the spin function throws the first such exception
+  Continue,  // the job counts as aborted, nothing else happens
+};
+
+struct ReDAGOptions {
+  std::uint32_t workers = 0;  // callbacks that execute at the same time; 0: one a usable processor
+  redag::PreemptionMode preemption = redag::PreemptionMode::Auto;
+  redag::PolicyKind policy = redag::PolicyKind::RateMonotonic;
+  std::uint32_t threads = 0;  // os: callbacks that can be started and unfinished at once; 0: workers + 16
+  std::vector<int> cpus{};    // processors for the workers; empty: os takes `workers` of the usable ones
+
+  /// Which callback is which task of which DAG (docs/workload_format.md, `callback`). Platform and policy of the
+  /// workload are not read here: see load_options().
+  std::optional<redag::Workload> workload{};
+  /// Period of what neither the workload nor a timer gives one; decides its priority until it is learned.
+  std::chrono::nanoseconds default_period = std::chrono::milliseconds(100);
+  /// Rates and edges are learned for so long after the first spin, and then frozen; 0: not at all.
+  std::chrono::nanoseconds learn = std::chrono::nanoseconds(0);
+
+  /// os: threads of the middleware that deliver messages are given a higher priority than the workers, where they are
+  /// known (Cyclone DDS, Fast DDS). Otherwise busy workers could delay the very messages they wait for.
+  bool raise_middleware = true;
+  std::size_t trace_capacity = 0;  // events kept between two drain_trace(); 0: none are recorded
+  /// Called on the worker's thread; must not throw. Empty: Stop.
+  std::function<OnException(const ExceptionInfo &)> on_exception{};
+};
+
+/// What one callback did since it was added.
+struct CallbackStats {
+  redag::CallbackId id;
+  std::string dag;             // "" if the workload does not name it
+  std::string task;            // "control.ekf", or to_string(id)
+  redag::Duration period = 0;  // for its priority; of a timer or the workload, or learned, or the default
+  redag::Duration deadline = 0;
+  redag::Duration wcet = 0;          // as the workload states it; 0: not stated
+  redag::sched::Accounting jobs;     // skipped: releases that were missed or overwritten before they could start
+  std::uint64_t misses = 0;          // ended after the deadline, or never started
+  redag::Duration response_p50 = 0;  // from the release (timer: expected call; message: arrival) to the end
+  redag::Duration response_p99 = 0;
+  redag::Duration response_max = 0;
+  redag::Duration execution_p50 = 0;  // processor time
+  redag::Duration execution_p99 = 0;
+  redag::Duration execution_max = 0;
+};
+
+class ReDAGExecutor : public rclcpp::Executor {
+ public:
+  RCLCPP_SMART_PTR_DEFINITIONS(ReDAGExecutor)
+
+  /// Throws std::runtime_error if preemption `os` is asked for and cannot be had (the text says how to get it), or
+  /// if the workload is not valid.
+  explicit ReDAGExecutor(const rclcpp::ExecutorOptions &options = rclcpp::ExecutorOptions(),
+                         ReDAGOptions redag_options = ReDAGOptions());
+  explicit ReDAGExecutor(ReDAGOptions redag_options);
+  ~ReDAGExecutor() override;
+
+  /// Executes callbacks on the workers until cancel() or shutdown, and returns when those that had started have ended.
+  /// Throws the first exception of a callback (see ReDAGOptions::on_exception).
+  void spin() override;
+  // On the calling thread, one callback at a time, most urgent first.
+  void spin_some(std::chrono::nanoseconds max_duration = std::chrono::nanoseconds(0)) override;
+  void spin_all(std::chrono::nanoseconds max_duration) override;
+  void spin_once(std::chrono::nanoseconds timeout = std::chrono::nanoseconds(-1)) override;
+
+  /// As rclcpp's. Before the very first spin it makes that one return at once (rclcpp forgets it).
+#if RCLCPP_VERSION_MAJOR >= 28
+  void cancel() override;
+#else
+  void cancel();
+#endif
+
+  using rclcpp::Executor::add_node;
+  using rclcpp::Executor::remove_node;
+  void add_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify = true) override;
+  void remove_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify = true) override;
+  void add_callback_group(rclcpp::CallbackGroup::SharedPtr group,
+                          rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify = true) override;
+  void remove_callback_group(rclcpp::CallbackGroup::SharedPtr group, bool notify = true) override;
+
+  /// Which preemption mode this is, and why.
+  [[nodiscard]] const redag::runtime::Mode &mode() const;
+  [[nodiscard]] std::uint32_t workers() const;
+  /// What a user should know: too few processors, tasks of the workload that no callback matches, middleware threads
+  /// that could not be raised.
+  [[nodiscard]] std::vector<std::string> warnings() const;
+
+  /// Live figures of all callbacks, most urgent first. Cheap enough for once a second.
+  [[nodiscard]] std::vector<CallbackStats> stats() const;
+
+  /// The callbacks as a workload, with what was learned: periods, edges, execution times (wcet: the longest seen).
+  /// Ready for `redag analyze` once every callback has run.
+  [[nodiscard]] redag::Workload learned() const;
+  /// True once the learning window is over (or there is none).
+  [[nodiscard]] bool learning_done() const;
+
+  /// Appends the events since the last call; one thread at a time.
+  void drain_trace(std::vector<redag::JobEvent> &events);
+  /// What the events' task ids mean, for the file: all callbacks there ever were, as tasks. Events have to be
+  /// renumbered by `renumber` before they are written with it.
+  [[nodiscard]] redag::trace::RunInfo trace_info() const;
+  void renumber(std::vector<redag::JobEvent> &events) const;
+
+ protected:
+  void spin_once_impl(std::chrono::nanoseconds timeout) override;
+#if RCLCPP_VERSION_MAJOR >= 21
+  rclcpp::FutureReturnCode spin_until_future_complete_impl(
+      std::chrono::nanoseconds timeout,
+      const std::function<std::future_status(std::chrono::nanoseconds)> &wait_for_future) override;
+#endif
+
+ private:
+  RCLCPP_DISABLE_COPY(ReDAGExecutor)
+
+  class Core;
+  std::shared_ptr<Core> core_;
+};
+
+}  // namespace redag_rclcpp

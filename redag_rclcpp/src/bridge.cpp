@@ -1,0 +1,138 @@
+#include "bridge.hpp"
+
+#include <rcl/wait.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "compat.hpp"
+#include "rclcpp/exceptions.hpp"
+
+namespace redag_rclcpp {
+namespace {
+
+void check(rcl_ret_t result, const char *what) {
+  if (result != RCL_RET_OK) rclcpp::exceptions::throw_from_rcl_error(result, what);
+}
+
+}  // namespace
+
+Bridge::Bridge(rclcpp::Context::SharedPtr context)
+    : context_(std::move(context)), wake_(context_), set_(rcl_get_zero_initialized_wait_set()) {
+  check(rcl_wait_set_init(&set_, 0, 1, 0, 0, 0, 0, context_->get_rcl_context().get(), rcl_get_default_allocator()),
+        "cannot create a wait set");
+  watch(wake_);
+}
+
+Bridge::~Bridge() {
+  if (rcl_wait_set_fini(&set_) != RCL_RET_OK) rcl_reset_error();
+}
+
+void Bridge::add(std::shared_ptr<Callback> callback) {
+  {
+    const std::lock_guard guard(lock_);
+    callbacks_.push_back(std::move(callback));
+  }
+  wake();
+}
+
+void Bridge::remove(const Callback &callback) {
+  {
+    const std::lock_guard guard(lock_);
+    const auto found = std::find_if(callbacks_.begin(), callbacks_.end(), [&](auto &c) { return c.get() == &callback; });
+    if (found == callbacks_.end()) return;
+    *found = std::move(callbacks_.back());
+    callbacks_.pop_back();
+  }
+  wake();
+}
+
+bool Bridge::empty() const {
+  const std::lock_guard guard(lock_);
+  return callbacks_.empty();
+}
+
+void Bridge::wake() {
+  try {
+    wake_.trigger();
+  } catch (const rclcpp::exceptions::RCLError &) {
+    // The context was shut down: whoever waits is woken by that.
+  }
+}
+
+void Bridge::wait(std::chrono::nanoseconds timeout) {
+  std::vector<Entry> entries;
+  {
+    const std::lock_guard guard(lock_);
+    for (const auto &callback : callbacks_) entries.push_back(Entry{callback, callback->waited()});
+  }
+  fill(entries);
+  const rcl_ret_t result = rcl_wait(&set_, timeout.count() < 0 ? -1 : timeout.count());
+  if (result == RCL_RET_TIMEOUT) return;
+  check(result, "waiting failed");
+
+  for (Entry &entry : entries) {
+    const auto &waited = entry.waited;
+    if (waited.timer) {
+      if (set_.guard_conditions[entry.index] != nullptr) entry.callback->look_at_timer();
+      continue;
+    }
+    const bool ready = (waited.subscription && set_.subscriptions[entry.index] != nullptr) ||
+                       (waited.service && set_.services[entry.index] != nullptr) ||
+                       (waited.client && set_.clients[entry.index] != nullptr) ||
+                       (waited.waitable && compat::is_ready(*waited.waitable, set_));
+    if (ready) entry.callback->seen_by_wait_set();
+  }
+}
+
+void Bridge::fill(std::vector<Entry> &entries) {
+  std::size_t subscriptions = 0;
+  std::size_t guard_conditions = conditions_.size();
+  std::size_t timers = 0;
+  std::size_t clients = 0;
+  std::size_t services = 0;
+  std::size_t events = 0;
+  for (const Entry &entry : entries) {
+    guard_conditions += entry.waited.timer != nullptr;
+    subscriptions += entry.waited.subscription != nullptr;
+    services += entry.waited.service != nullptr;
+    clients += entry.waited.client != nullptr;
+    if (const auto &waitable = entry.waited.waitable) {
+      subscriptions += waitable->get_number_of_ready_subscriptions();
+      guard_conditions += waitable->get_number_of_ready_guard_conditions();
+      timers += waitable->get_number_of_ready_timers();
+      clients += waitable->get_number_of_ready_clients();
+      services += waitable->get_number_of_ready_services();
+      events += waitable->get_number_of_ready_events();
+    }
+  }
+  check(rcl_wait_set_clear(&set_), "cannot clear the wait set");
+  check(rcl_wait_set_resize(&set_, subscriptions, guard_conditions, timers, clients, services, events),
+        "cannot resize the wait set");
+  for (const rclcpp::GuardCondition *condition : conditions_) {
+    check(rcl_wait_set_add_guard_condition(&set_, &condition->get_rcl_guard_condition(), nullptr),
+          "cannot wait for a guard condition");
+  }
+  for (Entry &entry : entries) {
+    const auto &waited = entry.waited;
+    if (waited.timer) {
+      check(rcl_wait_set_add_guard_condition(&set_, rcl_timer_get_guard_condition(waited.timer.get()), &entry.index),
+            "cannot wait for a timer's guard condition");
+    }
+    if (waited.subscription) {
+      check(rcl_wait_set_add_subscription(&set_, waited.subscription->get_subscription_handle().get(), &entry.index),
+            "cannot wait for a subscription");
+    }
+    if (waited.service) {
+      check(rcl_wait_set_add_service(&set_, waited.service->get_service_handle().get(), &entry.index),
+            "cannot wait for a service");
+    }
+    if (waited.client) {
+      check(rcl_wait_set_add_client(&set_, waited.client->get_client_handle().get(), &entry.index),
+            "cannot wait for a client");
+    }
+    if (waited.waitable) compat::add_to_wait_set(*waited.waitable, set_);
+  }
+}
+
+}  // namespace redag_rclcpp

@@ -1,0 +1,53 @@
+// The part of the world that only a wait set can watch: the executor's guard conditions, guard conditions of timers, and
+// entities without hooks. One thread at a time waits; any thread may add, remove and wake.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "callback.hpp"
+#include "rclcpp/context.hpp"
+#include "rclcpp/guard_condition.hpp"
+
+namespace redag_rclcpp {
+
+class Bridge {
+ public:
+  explicit Bridge(rclcpp::Context::SharedPtr context);
+  ~Bridge();
+  Bridge(const Bridge &) = delete;
+  Bridge &operator=(const Bridge &) = delete;
+
+  /// wait() returns when it is triggered. Outlives the bridge.
+  void watch(const rclcpp::GuardCondition &condition) { conditions_.push_back(&condition); }
+
+  void add(std::shared_ptr<Callback> callback);
+  void remove(const Callback &callback);
+  [[nodiscard]] bool empty() const;
+
+  /// The wait that is under way, or else the next one, returns at once.
+  void wake();
+
+  /// Waits until something is ready (negative timeout: for ever) and tells the callbacks that it concerns.
+  void wait(std::chrono::nanoseconds timeout);
+
+ private:
+  struct Entry {
+    std::shared_ptr<Callback> callback;
+    Callback::Waited waited;
+    std::size_t index = 0;  // in the wait set
+  };
+  void fill(std::vector<Entry> &entries);
+
+  rclcpp::Context::SharedPtr context_;
+  rclcpp::GuardCondition wake_;
+  std::vector<const rclcpp::GuardCondition *> conditions_;
+  rcl_wait_set_t set_;
+
+  mutable std::mutex lock_;
+  std::vector<std::shared_ptr<Callback>> callbacks_;
+};
+
+}  // namespace redag_rclcpp

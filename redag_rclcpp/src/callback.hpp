@@ -1,0 +1,182 @@
+// One callback of a node as a task: its entity (timer, subscription, ...), the hooks that tell when it has something to
+// do, what is pending, and how it is executed. Owns no entity: nodes can be destroyed at any time.
+//
+// An arrival (a message, request, ...) becomes a token. Of the tokens one at a time is a released job that waits in the
+// scheduler; the others wait here, so that a long queue costs the scheduler nothing. When the job starts, the next token
+// is released.
+//
+// Threads: hooks are called by the middleware's and by publishing threads, with locks of theirs held; execute() by
+// workers. Lock order: theirs, release_lock_, lock_, the timer queue's, the engine's. Nothing of rclcpp that takes locks
+// is called with one of ours held.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "histogram.hpp"
+#include "rclcpp/client.hpp"
+#include "rclcpp/service.hpp"
+#include "rclcpp/subscription_base.hpp"
+#include "rclcpp/timer.hpp"
+#include "rclcpp/waitable.hpp"
+#include "redag/base/pi_mutex.hpp"
+#include "redag/model/callback_match.hpp"
+#include "redag/runtime/engine.hpp"
+#include "timer_queue.hpp"
+#include "token_queue.hpp"
+
+namespace redag_rclcpp {
+
+/// What callbacks need of the executor.
+class Intake {
+ public:
+  virtual ~Intake() = default;
+
+  virtual redag::runtime::Engine &engine() = 0;
+  virtual TimerQueue &timers() = 0;
+  /// May arrivals be released to the scheduler at once? Otherwise note() collects who has some.
+  [[nodiscard]] virtual bool direct() const = 0;
+  /// Takes no lock but its own.
+  virtual void note(std::shared_ptr<class Callback> callback) = 0;
+  /// Somebody was noted: whoever waits for work looks again. Not with locks of ours held.
+  virtual void wake() = 0;
+  /// The queue's next() is earlier than it was.
+  virtual void timers_changed() = 0;
+  /// Something that the wait set saw has been dealt with.
+  virtual void wait_set_changed() = 0;
+  [[nodiscard]] virtual bool learning() const = 0;
+};
+
+class Callback final : public TimerQueue::Timer, public std::enable_shared_from_this<Callback> {
+ public:
+  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::TimerBase::SharedPtr &timer);
+  /// `intra_process`: the waitable through which the subscription gets messages of its own process; or null.
+  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::SubscriptionBase::SharedPtr &subscription,
+           const rclcpp::Waitable::SharedPtr &intra_process);
+  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ServiceBase::SharedPtr &service);
+  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ClientBase::SharedPtr &client);
+  /// `only_wait_set`: its on-ready hook does not tell of everything.
+  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::Waitable::SharedPtr &waitable,
+           bool only_wait_set);
+
+  /// Connects the entity: what arrives from now on is released as jobs of `task`. True if part of it can only be
+  /// watched by a wait set: see waited().
+  bool attach(TaskId task);
+  /// Disconnects it: when this returns, no hook is under way that would release anything. Not with locks of ours held.
+  void detach();
+
+  /// Runs one job.
+  redag::sched::Outcome execute();
+
+  /// Releases the first token, if none is released. For who collects note()d callbacks, and when direct() begins.
+  void admit();
+
+  // What a wait set has to watch for this callback; see Bridge.
+  struct Waited {
+    std::shared_ptr<const rcl_timer_t> timer;  // its guard condition tells of resets and jumps of time
+    rclcpp::SubscriptionBase::SharedPtr subscription;
+    rclcpp::ServiceBase::SharedPtr service;
+    rclcpp::ClientBase::SharedPtr client;
+    rclcpp::Waitable::SharedPtr waitable;
+  };
+  /// Nothing while an arrival that the wait set saw is not dealt with.
+  [[nodiscard]] Waited waited() const;
+  /// The wait set saw an arrival.
+  void seen_by_wait_set();
+  /// The timer was reset or its clock jumped: looks when it is due.
+  void look_at_timer();
+
+  Time expire(Time now, std::vector<redag::runtime::Release> &releases,
+              std::vector<redag::runtime::Release> &missed) override;
+
+  /// Does the entity still exist?
+  [[nodiscard]] bool alive() const;
+  [[nodiscard]] const redag::CallbackId &id() const { return id_; }
+  [[nodiscard]] TaskId task() const { return task_; }
+  [[nodiscard]] bool is_timer() const { return timer_handle_ != nullptr; }
+
+  void set_deadline(Duration deadline) { deadline_.store(deadline, std::memory_order_relaxed); }
+  [[nodiscard]] const Histogram &response() const { return response_; }
+  [[nodiscard]] const Histogram &execution() const { return execution_; }
+  [[nodiscard]] std::uint64_t late() const { return late_.load(std::memory_order_relaxed); }
+
+  /// What was learned: tasks that published what arrived here, each once; and the mean time between arrivals (0: fewer
+  /// than three).
+  [[nodiscard]] std::vector<TaskId> publishers() const;
+  [[nodiscard]] Duration mean_interval() const;
+
+ private:
+  enum class Source : std::uint8_t { Middleware, IntraProcess };
+  struct Token {
+    Time arrival = 0;
+    Source source = Source::Middleware;
+    int part = 0;           // of a waitable
+    bool seen_only = false;  // by the wait set: what arrived has to be asked for
+  };
+
+  static std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
+
+  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id);
+
+  void hook();
+  void unhook();
+  void arrived(std::size_t count, Source source, int part, bool seen_only = false);
+  [[nodiscard]] bool drop_oldest(Source source);
+  void learn_from_arrival(Time now, std::size_t count);
+  [[nodiscard]] bool take_token(Token &token);
+  void reschedule();
+  [[nodiscard]] bool follows_ros_time() const;
+
+  // False: there was nothing to do.
+  [[nodiscard]] bool execute_timer(Time &release);
+  [[nodiscard]] bool execute_token(const Token &token);
+  [[nodiscard]] bool execute_subscription();
+  [[nodiscard]] bool execute_service();
+  [[nodiscard]] bool execute_client();
+  [[nodiscard]] bool execute_waitable(rclcpp::Waitable &waitable, const Token &token);
+
+  const redag::CallbackId id_;
+  redag::runtime::Engine &engine_;  // not after detach(), except by a job
+  TaskId task_;
+
+  std::weak_ptr<rclcpp::TimerBase> timer_;
+  std::shared_ptr<const rcl_timer_t> timer_handle_;  // not the timer: that cancels it when it is destroyed
+  std::weak_ptr<rclcpp::SubscriptionBase> subscription_;
+  std::weak_ptr<rclcpp::Waitable> intra_process_;
+  std::weak_ptr<rclcpp::ServiceBase> service_;
+  std::weak_ptr<rclcpp::ClientBase> client_;
+  std::weak_ptr<rclcpp::Waitable> waitable_;
+  std::size_t depth_ = 0;  // arrivals that each source keeps; 0: all
+  std::atomic<bool> by_wait_set_{false};  // the entity cannot be hooked
+
+  // Held while a hook releases, so that detach() can wait for it, but not while a worker takes its token: a worker that
+  // wakes before the hook is done with the engine must not wait for the hook.
+  redag::PiMutex release_lock_;
+
+  mutable redag::PiMutex lock_;
+  std::shared_ptr<Intake> intake_;  // lock; null once detached
+  TokenQueue<Token> tokens_;        // lock; the first one is that of the released job, if there is one
+  std::size_t kept_[2] = {0, 0};    // lock: tokens by source
+  bool released_ = false;           // lock: a job waits in the scheduler
+  bool noted_ = false;              // lock: note()d, and not admitted since
+  bool seen_ = false;               // lock: by the wait set, and not dealt with
+  std::vector<TaskId> publishers_;  // lock
+  std::uint64_t arrivals_ = 0;      // lock
+  Time first_arrival_ = 0;          // lock
+  Time last_arrival_ = 0;           // lock
+
+  // Timers.
+  Time last_release_ = redag::kNever;   // the timer queue's lock
+  std::atomic<Time> nominal_{0};        // release of the job that starts next
+  std::atomic<bool> uncalled_{false};   // released, and not called since
+  std::atomic<bool> restarted_{false};  // its grid begins anew
+
+  std::atomic<Duration> deadline_{redag::kNever};
+  std::atomic<std::uint64_t> late_{0};
+  Histogram response_;
+  Histogram execution_;
+};
+
+}  // namespace redag_rclcpp

@@ -1,0 +1,82 @@
+// What differs between ROS 2 distributions, behind one set of names. Humble: rclcpp 16; Jazzy: 28.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <utility>
+
+#include "rclcpp/callback_group.hpp"
+#include "rclcpp/context.hpp"
+#include "rclcpp/guard_condition.hpp"
+#include "rclcpp/timer.hpp"
+#include "rclcpp/version.h"
+#include "rclcpp/waitable.hpp"
+#include "rclcpp_action/server.hpp"
+
+namespace redag_rclcpp::compat {
+
+// Waitables take the wait set and the data by reference since Jazzy.
+#if RCLCPP_VERSION_MAJOR >= 28
+inline void add_to_wait_set(rclcpp::Waitable &waitable, rcl_wait_set_t &set) { waitable.add_to_wait_set(set); }
+inline bool is_ready(rclcpp::Waitable &waitable, const rcl_wait_set_t &set) { return waitable.is_ready(set); }
+inline void execute(rclcpp::Waitable &waitable, const std::shared_ptr<void> &data) { waitable.execute(data); }
+#else
+inline void add_to_wait_set(rclcpp::Waitable &waitable, rcl_wait_set_t &set) { waitable.add_to_wait_set(&set); }
+inline bool is_ready(rclcpp::Waitable &waitable, rcl_wait_set_t &set) { return waitable.is_ready(&set); }
+inline void execute(rclcpp::Waitable &waitable, std::shared_ptr<void> &data) { waitable.execute(data); }
+#endif
+
+/// Null if the group has none yet and its context is gone.
+inline rclcpp::GuardCondition::SharedPtr notify_guard_condition(rclcpp::CallbackGroup &group,
+                                                                const rclcpp::Context::SharedPtr &context) {
+#if RCLCPP_VERSION_MAJOR >= 28
+  (void)context;
+  return group.get_notify_guard_condition();
+#else
+  return group.get_notify_guard_condition(context);
+#endif
+}
+
+/// A timer's call: consumes the expiry, so that the next one is known, and can then be executed.
+class TimerCall {
+ public:
+  explicit TimerCall(rclcpp::TimerBase &timer) : timer_(timer), data_(timer.call()) {}
+
+  /// False: the timer was cancelled.
+  [[nodiscard]] bool valid() const { return static_cast<bool>(data_); }
+
+#if RCLCPP_VERSION_MAJOR >= 28
+  void execute() { timer_.execute_callback(data_); }
+
+ private:
+  rclcpp::TimerBase &timer_;
+  std::shared_ptr<void> data_;
+#else
+  void execute() { timer_.execute_callback(); }
+
+ private:
+  rclcpp::TimerBase &timer_;
+  bool data_;
+#endif
+};
+
+/// True if the timer itself tells of resets; elsewhere its guard condition does (and of jumps of ROS time, always).
+#if RCLCPP_VERSION_MAJOR >= 21
+inline constexpr bool kTimersTellOfResets = true;
+inline void set_on_reset(rclcpp::TimerBase &timer, std::function<void()> callback) {
+  timer.set_on_reset_callback([callback = std::move(callback)](std::size_t) { callback(); });
+}
+inline void clear_on_reset(rclcpp::TimerBase &timer) { timer.clear_on_reset_callback(); }
+#else
+inline constexpr bool kTimersTellOfResets = false;
+inline void set_on_reset(rclcpp::TimerBase &, const std::function<void()> &) {}
+inline void clear_on_reset(rclcpp::TimerBase &) {}
+#endif
+
+/// Are there events of this waitable that its on-ready hook does not tell of? Action servers tell only wait sets that
+/// goals expire; since Jazzy they have a hook for that too.
+inline bool needs_wait_set(const rclcpp::Waitable &waitable) {
+  return RCLCPP_VERSION_MAJOR < 28 && dynamic_cast<const rclcpp_action::ServerBase *>(&waitable) != nullptr;
+}
+
+}  // namespace redag_rclcpp::compat

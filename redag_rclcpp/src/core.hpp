@@ -1,0 +1,173 @@
+// What is behind ReDAGExecutor: the engine with its scheduler, the callbacks of all groups, and the threads that tell
+// when they have something to do. Knows rclcpp's entities, not its Executor (see Host).
+//
+// Threads: collect() and the spin functions are serialised by their callers' rules (one spinner; collect_lock_).
+// Callbacks' hooks come from anywhere. Lock order: collect_lock_, rclcpp's, callbacks', the timer queue's, the engine's.
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "bridge.hpp"
+#include "callback.hpp"
+#include "rclcpp/callback_group.hpp"
+#include "redag/runtime/mode.hpp"
+#include "redag/runtime/parker.hpp"
+#include "redag_rclcpp/executor.hpp"
+#include "timer_queue.hpp"
+
+namespace redag_rclcpp {
+
+using NodeBase = rclcpp::node_interfaces::NodeBaseInterface;
+
+/// What Core asks of the rclcpp::Executor around it.
+struct Host {
+  std::function<std::vector<rclcpp::CallbackGroup::WeakPtr>()> groups;  // all that are to be executed
+  std::function<bool()> may_spin;                                       // not cancelled and not shut down
+  std::function<void()> stop;                                           // as cancel()
+};
+
+class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_this<Core> {
+ public:
+  Core(const rclcpp::Context::SharedPtr &context, ReDAGOptions options);
+  ~Core() override;
+
+  void open(Host host, const std::vector<const rclcpp::GuardCondition *> &conditions);
+  /// Disconnects everything and ends all threads. Before the executor's own members go.
+  void close();
+
+  void add_node(const NodeBase::SharedPtr &node);
+  void remove_node(const NodeBase::SharedPtr &node);
+  void add_group(const rclcpp::CallbackGroup::SharedPtr &group, const NodeBase::SharedPtr &node);
+  void remove_group(const rclcpp::CallbackGroup::SharedPtr &group);
+
+  /// Brings the tasks in line with what the groups hold now.
+  void collect();
+
+  /// False: somebody cancelled before anything had spun; rclcpp would lose that. Only the first time.
+  [[nodiscard]] bool begin_first_spin() { return first_spin_.exchange(FirstSpin::Begun) != FirstSpin::Cancelled; }
+  void cancel_first_spin() {
+    FirstSpin expected = FirstSpin::Awaited;
+    first_spin_.compare_exchange_strong(expected, FirstSpin::Cancelled);
+  }
+
+  void spin();
+  void spin_ready(std::chrono::nanoseconds max_duration, bool exhaustive);
+  void spin_one(std::chrono::nanoseconds timeout);
+
+  [[nodiscard]] const redag::runtime::Mode &mode() const { return mode_; }
+  [[nodiscard]] const ReDAGOptions &options() const { return options_; }
+  [[nodiscard]] std::vector<std::string> warnings() const;
+  [[nodiscard]] std::vector<CallbackStats> stats() const;
+  [[nodiscard]] redag::Workload learned() const;
+  [[nodiscard]] bool learning_done() const { return !learning_; }
+  [[nodiscard]] redag::trace::RunInfo trace_info() const;
+  void renumber(std::vector<redag::JobEvent> &events) const;
+
+  // Intake
+  redag::runtime::Engine &engine() override { return *engine_; }
+  TimerQueue &timers() override { return timers_; }
+  [[nodiscard]] bool direct() const override { return direct_; }
+  void note(std::shared_ptr<Callback> callback) override;
+  void wake() override;
+  void timers_changed() override;
+  void wait_set_changed() override;
+  [[nodiscard]] bool learning() const override { return learning_; }
+
+ private:
+  /// A task that the scheduler has, or had (traces only).
+  struct Record {
+    std::shared_ptr<Callback> callback;  // null once removed
+    redag::CallbackId id;
+    redag::Task task;
+    std::uint32_t dag = 0;   // position in dags_
+    std::uint32_t rank = 0;  // topological, in its DAG
+    bool configured = false;
+  };
+  struct DagInfo {
+    redag::Dag dag;  // without tasks
+    redag::DagId id;
+  };
+  struct Found;
+
+  void add(const Found &found);
+  void remove(const std::shared_ptr<Callback> &callback);
+  void place(Record &record, const Found &found);
+  void watch_group(rclcpp::CallbackGroup &group, const std::function<void(std::size_t)> &callback);
+  [[nodiscard]] std::vector<Found> find_entities();
+  [[nodiscard]] std::string group_name(const rclcpp::CallbackGroup::SharedPtr &group);
+
+  void start();
+  void raise_middleware();
+  void stop_workers();
+  void time_releases() noexcept;
+  redag::Time expire_timers();
+  void admit(bool look_around);
+  void admit_noted();
+  bool run_one();
+  void mark_dirty();
+  void on_exception(const redag::runtime::Job &job, std::exception_ptr exception);
+  void throw_failure();
+  void begin_learning();
+  void stop_learning();
+  [[nodiscard]] redag::Duration learned_period(const Record &record, int depth) const;
+  void add_learned_edges(redag::Workload &workload, const std::vector<std::vector<std::uint32_t>> &ids) const;
+  [[nodiscard]] std::string name_of(const Record &record) const;
+  [[nodiscard]] redag::Workload as_workload(std::vector<std::vector<std::uint32_t>> &tasks, bool with_edges) const;
+
+  rclcpp::Context::SharedPtr context_;
+  ReDAGOptions options_;
+  Host host_;
+  redag::runtime::Mode mode_;
+  redag::runtime::PriorityBand band_;
+  std::vector<std::string> warnings_;  // lock: records_lock_
+  redag::Time origin_ = 0;  // of the engine's clock, on CLOCK_MONOTONIC
+  std::unique_ptr<redag::runtime::Engine> engine_;
+  TimerQueue timers_;
+  Bridge bridge_;
+  std::optional<redag::CallbackMatcher> matcher_;
+
+  mutable std::recursive_mutex collect_lock_;  // the next five; recursive because destructors of users' objects run below it
+  std::vector<NodeBase::WeakPtr> nodes_;
+  std::map<const void *, std::shared_ptr<Callback>> callbacks_;  // by entity
+  std::map<rclcpp::CallbackGroup::WeakPtr, std::string, std::owner_less<rclcpp::CallbackGroup::WeakPtr>> group_names_;
+  std::map<rclcpp::CallbackGroup::WeakPtr, NodeBase::WeakPtr, std::owner_less<rclcpp::CallbackGroup::WeakPtr>>
+      manual_groups_;
+  std::map<std::pair<std::string, int>, std::uint32_t> next_index_;  // of timers and waitables, by node and kind
+  std::uint64_t next_group_ = 0;
+
+  mutable std::mutex records_lock_;  // the next three; innermost
+  std::vector<DagInfo> dags_;
+  std::vector<Record> records_;  // by TaskId
+  std::exception_ptr failure_;
+
+  enum class FirstSpin : std::uint8_t { Awaited, Cancelled, Begun };
+  std::atomic<FirstSpin> first_spin_{FirstSpin::Awaited};
+
+  std::atomic<bool> dirty_{true};
+  std::atomic<bool> direct_{false};
+  std::atomic<bool> learning_{false};
+  redag::Time learn_until_ = redag::kNever;
+  bool started_ = false;
+  bool closed_ = false;
+
+  std::mutex noted_lock_;
+  std::vector<std::shared_ptr<Callback>> noted_;
+  std::atomic<bool> waiting_{false};  // a spin function that pulls waits for work
+
+  std::thread timer_thread_;
+  redag::runtime::Parker timer_parker_;
+  std::atomic<bool> timing_{false};
+  std::atomic<bool> timer_exit_{false};
+  redag::PiMutex expire_lock_;  // the next two: of the timer thread, or of who pulls
+  std::vector<redag::runtime::Release> due_;
+  std::vector<redag::runtime::Release> missed_;
+};
+
+}  // namespace redag_rclcpp

@@ -1,0 +1,158 @@
+#include "redag_rclcpp/executor.hpp"
+
+#include <stdexcept>
+#include <utility>
+
+#include "core.hpp"
+
+namespace redag_rclcpp {
+
+using std::chrono::nanoseconds;
+
+namespace {
+
+/// Claims the executor for one spin function.
+class Spinning {
+ public:
+  Spinning(std::atomic_bool &spinning, const char *function) : spinning_(spinning) {
+    if (spinning_.exchange(true)) throw std::runtime_error(std::string(function) + "() called while already spinning");
+  }
+  ~Spinning() { spinning_.store(false); }
+  Spinning(const Spinning &) = delete;
+  Spinning &operator=(const Spinning &) = delete;
+
+ private:
+  std::atomic_bool &spinning_;
+};
+
+}  // namespace
+
+ReDAGExecutor::ReDAGExecutor(const rclcpp::ExecutorOptions &options, ReDAGOptions redag_options)
+    : rclcpp::Executor(options), core_(std::make_shared<Core>(options.context, std::move(redag_options))) {
+  Host host;
+  host.groups = [this] {
+#if RCLCPP_VERSION_MAJOR < 21
+    {
+      // Newer ones do this when they are asked for the groups.
+      const std::lock_guard<std::mutex> guard(mutex_);
+      add_callback_groups_from_nodes_associated_to_executor();
+    }
+#endif
+    return get_all_callback_groups();
+  };
+  host.may_spin = [this] { return rclcpp::ok(context_) && spinning.load(); };
+  host.stop = [this] { rclcpp::Executor::cancel(); };
+#if RCLCPP_VERSION_MAJOR >= 28
+  const rclcpp::GuardCondition *interrupt = interrupt_guard_condition_.get();
+#else
+  const rclcpp::GuardCondition *interrupt = &interrupt_guard_condition_;
+#endif
+  core_->open(std::move(host), {interrupt, shutdown_guard_condition_.get()});
+}
+
+ReDAGExecutor::ReDAGExecutor(ReDAGOptions redag_options)
+    : ReDAGExecutor(rclcpp::ExecutorOptions(), std::move(redag_options)) {}
+
+ReDAGExecutor::~ReDAGExecutor() { core_->close(); }
+
+// ---- nodes and groups ----
+
+void ReDAGExecutor::add_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
+  rclcpp::Executor::add_node(node, notify);
+  core_->add_node(node);
+}
+
+void ReDAGExecutor::remove_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
+  rclcpp::Executor::remove_node(node, notify);
+  core_->remove_node(node);
+}
+
+void ReDAGExecutor::add_callback_group(rclcpp::CallbackGroup::SharedPtr group,
+                                       rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
+  rclcpp::Executor::add_callback_group(group, node, notify);
+  core_->add_group(group, node);
+}
+
+void ReDAGExecutor::remove_callback_group(rclcpp::CallbackGroup::SharedPtr group, bool notify) {
+  rclcpp::Executor::remove_callback_group(group, notify);
+  core_->remove_group(group);
+}
+
+// ---- spinning ----
+
+void ReDAGExecutor::spin() {
+  const Spinning claimed(spinning, "spin");
+  if (!core_->begin_first_spin()) return;
+  core_->spin();
+}
+
+void ReDAGExecutor::spin_some(nanoseconds max_duration) {
+  const Spinning claimed(spinning, "spin_some");
+  if (!core_->begin_first_spin()) return;
+  core_->spin_ready(max_duration, false);
+}
+
+void ReDAGExecutor::spin_all(nanoseconds max_duration) {
+  if (max_duration < nanoseconds(0)) throw std::invalid_argument("max_duration must be greater than or equal to 0");
+  const Spinning claimed(spinning, "spin_all");
+  if (!core_->begin_first_spin()) return;
+  core_->spin_ready(max_duration, true);
+}
+
+void ReDAGExecutor::spin_once(nanoseconds timeout) {
+  const Spinning claimed(spinning, "spin_once");
+  if (!core_->begin_first_spin()) return;
+  core_->spin_one(timeout);
+}
+
+// Called by spin_until_future_complete, which has claimed the executor. What completes the future need not be one of our
+// callbacks, so that no wait is long.
+void ReDAGExecutor::spin_once_impl(nanoseconds timeout) {
+  constexpr nanoseconds kLongest = std::chrono::milliseconds(10);
+  const bool is_long = timeout < nanoseconds(0) || timeout > kLongest;
+  if (!core_->begin_first_spin()) {
+    rclcpp::Executor::cancel();
+    return;
+  }
+  core_->spin_one(is_long ? kLongest : timeout);
+}
+
+#if RCLCPP_VERSION_MAJOR >= 21
+rclcpp::FutureReturnCode ReDAGExecutor::spin_until_future_complete_impl(
+    nanoseconds timeout, const std::function<std::future_status(nanoseconds)> &wait_for_future) {
+  using rclcpp::FutureReturnCode;
+  const auto is_complete = [&] { return wait_for_future(nanoseconds(0)) == std::future_status::ready; };
+  if (is_complete()) return FutureReturnCode::SUCCESS;
+  const auto start = std::chrono::steady_clock::now();
+  const Spinning claimed(spinning, "spin_until_future_complete");
+  while (rclcpp::ok(context_) && spinning.load()) {
+    nanoseconds left = timeout;
+    if (timeout >= nanoseconds(0)) left = std::max(nanoseconds(0), timeout - (std::chrono::steady_clock::now() - start));
+    spin_once_impl(left);
+    if (is_complete()) return FutureReturnCode::SUCCESS;
+    if (timeout >= nanoseconds(0) && std::chrono::steady_clock::now() - start >= timeout) {
+      return FutureReturnCode::TIMEOUT;
+    }
+  }
+  return FutureReturnCode::INTERRUPTED;
+}
+#endif
+
+void ReDAGExecutor::cancel() {
+  core_->cancel_first_spin();
+  rclcpp::Executor::cancel();
+}
+
+// ---- what can be asked ----
+
+const redag::runtime::Mode &ReDAGExecutor::mode() const { return core_->mode(); }
+std::uint32_t ReDAGExecutor::workers() const { return core_->options().workers; }
+std::vector<std::string> ReDAGExecutor::warnings() const { return core_->warnings(); }
+std::vector<CallbackStats> ReDAGExecutor::stats() const { return core_->stats(); }
+redag::Workload ReDAGExecutor::learned() const { return core_->learned(); }
+bool ReDAGExecutor::learning_done() const { return core_->learning_done(); }
+void ReDAGExecutor::drain_trace(std::vector<redag::JobEvent> &events) { core_->engine().drain(events); }
+redag::trace::RunInfo ReDAGExecutor::trace_info() const { return core_->trace_info(); }
+void ReDAGExecutor::renumber(std::vector<redag::JobEvent> &events) const { core_->renumber(events); }
+
+}  // namespace redag_rclcpp

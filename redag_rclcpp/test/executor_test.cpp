@@ -1,0 +1,366 @@
+// What our executor does beyond rclcpp's: order, bounds, learning, exceptions, figures, traces.
+#include "redag_rclcpp/executor.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <mutex>
+#include <thread>
+
+#include "executor_types.hpp"
+#include "rclcpp/rclcpp.hpp"
+#include "redag/metrics/trace_checker.hpp"
+#include "redag/model/validate.hpp"
+#include "redag/model/workload_yaml.hpp"
+#include "redag/runtime/preemption_point.hpp"
+#include "test_msgs/msg/empty.hpp"
+
+namespace redag_rclcpp {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+using test_msgs::msg::Empty;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr auto kLimit = 20s;
+
+template <class Condition>
+bool eventually(Condition condition) {
+  const auto end = steady_clock::now() + kLimit;
+  while (!condition()) {
+    if (steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(1ms);
+  }
+  return true;
+}
+
+class ExecutorTest : public ::testing::TestWithParam<redag::PreemptionMode> {
+ protected:
+  void SetUp() override {
+    if (GetParam() == redag::PreemptionMode::Os && redag::runtime::probe_priority_band().top_job == 0) {
+      GTEST_SKIP() << "SCHED_FIFO is not to be had here";
+    }
+    rclcpp::init(0, nullptr);
+    node = std::make_shared<rclcpp::Node>("node", rclcpp::NodeOptions().use_intra_process_comms(true));
+    options.preemption = GetParam();
+    options.workers = 1;
+  }
+  void TearDown() override {
+    node.reset();
+    if (rclcpp::ok()) rclcpp::shutdown();
+  }
+
+  rclcpp::CallbackGroup::SharedPtr new_group() {
+    return groups.emplace_back(node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive));
+  }
+  rclcpp::Subscription<Empty>::SharedPtr subscribe(const std::string &topic, std::function<void()> body) {
+    rclcpp::SubscriptionOptions subscription;
+    subscription.callback_group = new_group();
+    return node->create_subscription<Empty>(topic, rclcpp::QoS(10), [body](Empty::ConstSharedPtr) { body(); },
+                                            subscription);
+  }
+  rclcpp::Publisher<Empty>::SharedPtr publisher(const std::string &topic) {
+    return node->create_publisher<Empty>(topic, rclcpp::QoS(10));
+  }
+  redag::Workload parse(const std::string &text) {
+    auto workload = redag::parse_workload(text, "test.yaml", redag::LoadOptions{.wcet_optional = true});
+    EXPECT_TRUE(workload) << to_string(workload.error());
+    return workload->workload;
+  }
+
+  rclcpp::Node::SharedPtr node;
+  std::vector<rclcpp::CallbackGroup::SharedPtr> groups;
+  ReDAGOptions options;
+};
+
+constexpr const char *kThreeRates = R"(
+name: rates
+dags:
+  - name: slow
+    tasks: [{name: slow, period: 100ms, callback: {node: /node, subscription: /slow}}]
+  - name: fast
+    tasks: [{name: fast, period: 10ms, callback: {node: /node, subscription: /fast}}]
+  - name: middle
+    tasks: [{name: middle, period: 50ms, callback: {node: /node, subscription: /middle}}]
+)";
+
+TEST_P(ExecutorTest, RunsTheHighestRateFirst) {
+  options.workload = parse(kThreeRates);
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::vector<std::string> order;
+  auto slow = subscribe("/slow", [&] { order.push_back("slow"); });
+  auto middle = subscribe("/middle", [&] { order.push_back("middle"); });
+  auto fast = subscribe("/fast", [&] { order.push_back("fast"); });
+  executor.add_node(node);
+  for (const char *topic : {"/slow", "/middle", "/fast"}) publisher(topic)->publish(Empty());
+  executor.spin_all(kLimit);
+  EXPECT_THAT(order, ElementsAre("fast", "middle", "slow"));
+}
+
+TEST_P(ExecutorTest, WorkersTakeTheHighestRateFirst) {
+  options.workload = parse(kThreeRates);
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::mutex mutex;
+  std::vector<std::string> order;
+  const auto add = [&](const char *name) {
+    const std::lock_guard guard(mutex);
+    order.emplace_back(name);
+  };
+  auto to_fast = publisher("/fast");
+  auto to_middle = publisher("/middle");
+  auto to_slow = publisher("/slow");
+  // The job of the highest rate releases all others while it holds the only worker.
+  std::atomic<bool> first{true};
+  auto slow = subscribe("/slow", [&] { add("slow"); });
+  auto middle = subscribe("/middle", [&] { add("middle"); });
+  auto fast = subscribe("/fast", [&] {
+    add("fast");
+    if (!first.exchange(false)) return;
+    to_slow->publish(Empty());
+    to_middle->publish(Empty());
+    to_fast->publish(Empty());
+  });
+  executor.add_node(node);
+  std::thread thread([&] { executor.spin(); });
+  ASSERT_TRUE(eventually([&] { return executor.is_spinning(); }));
+  to_fast->publish(Empty());
+  EXPECT_TRUE(eventually([&] {
+    const std::lock_guard guard(mutex);
+    return order.size() == 4;
+  }));
+  executor.cancel();
+  thread.join();
+  EXPECT_THAT(order, ElementsAre("fast", "fast", "middle", "slow"));
+}
+
+TEST_P(ExecutorTest, MaxActiveBoundsADag) {
+  options.workers = 3;
+  options.workload = parse(R"(
+name: bounded
+dags:
+  - name: perception
+    max_active: 1
+    tasks:
+      - {name: a, period: 10ms, callback: {node: /node, subscription: /a}}
+      - {name: b, period: 10ms, callback: {node: /node, subscription: /b}}
+      - {name: c, period: 10ms, callback: {node: /node, subscription: /c}}
+)");
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::atomic<int> inside{0};
+  std::atomic<int> most{0};
+  std::atomic<int> count{0};
+  const auto body = [&] {
+    const int now = ++inside;
+    if (now > most) most = now;
+    std::this_thread::sleep_for(2ms);
+    --inside;
+    ++count;
+  };
+  auto a = subscribe("/a", body);
+  auto b = subscribe("/b", body);
+  auto c = subscribe("/c", body);
+  executor.add_node(node);
+  std::thread thread([&] { executor.spin(); });
+  for (int i = 0; i < 5; ++i) {
+    for (const char *topic : {"/a", "/b", "/c"}) publisher(topic)->publish(Empty());
+  }
+  EXPECT_TRUE(eventually([&] { return count == 15; }));
+  executor.cancel();
+  thread.join();
+  EXPECT_EQ(most, 1);
+}
+
+TEST_P(ExecutorTest, CancelBeforeTheFirstSpinIsNotLost) {
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  executor.add_node(node);
+  executor.cancel();
+  executor.spin();  // returns
+  std::atomic<int> count{0};
+  auto timer = node->create_wall_timer(1ms, [&] {
+    if (++count == 3) executor.cancel();
+  });
+  executor.spin();
+  EXPECT_GE(count, 3);
+}
+
+TEST_P(ExecutorTest, SpinThrowsACallbacksException) {
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  auto timer = node->create_wall_timer(1ms, [] { throw std::domain_error("from a callback"); });
+  executor.add_node(node);
+  EXPECT_THROW(executor.spin(), std::domain_error);
+  EXPECT_THROW(
+      while (true) executor.spin_once(1s), std::domain_error);
+  EXPECT_FALSE(executor.is_spinning());
+}
+
+TEST_P(ExecutorTest, AHandlerCanContinueAfterAnException) {
+  std::atomic<int> handled{0};
+  std::string task;
+  options.on_exception = [&](const ExceptionInfo &info) {
+    if (handled == 0) task = info.task;
+    ++handled;
+    return OnException::Continue;
+  };
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  auto timer = node->create_wall_timer(1ms, [] { throw std::domain_error("from a callback"); });
+  executor.add_node(node);
+  std::thread thread([&] { executor.spin(); });
+  EXPECT_TRUE(eventually([&] { return handled >= 3; }));
+  executor.cancel();
+  thread.join();
+  EXPECT_THAT(task, HasSubstr("/node timer 1"));
+  EXPECT_GE(executor.stats().at(0).jobs.aborted, 3U);
+}
+
+TEST_P(ExecutorTest, SpinningInACallbackIsRefused) {
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::atomic<bool> refused{false};
+  auto timer = node->create_wall_timer(1ms, [&] {
+    try {
+      executor.spin_some();
+    } catch (const std::runtime_error &) {
+      refused = true;
+    }
+    executor.cancel();
+  });
+  executor.add_node(node);
+  executor.spin();
+  EXPECT_TRUE(refused);
+}
+
+TEST_P(ExecutorTest, MissedPeriodsOfATimerAreCounted) {
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::atomic<int> count{0};
+  auto timer = node->create_wall_timer(10ms, [&] {
+    if (++count == 3) std::this_thread::sleep_for(105ms);
+    if (count == 6) executor.cancel();
+  });
+  executor.add_node(node);
+  executor.spin();
+  CallbackStats stats;
+  for (const CallbackStats &s : executor.stats()) {
+    if (s.id.kind == redag::Callback::Kind::Timer) stats = s;
+  }
+  EXPECT_EQ(stats.period, 10'000'000);
+  EXPECT_EQ(stats.jobs.released, stats.jobs.finished + stats.jobs.skipped + stats.jobs.aborted + stats.jobs.in_flight());
+  // The long run spans ten points of the grid at least; the last of them ran, late or not.
+  EXPECT_GE(stats.jobs.skipped, 8U);
+  EXPECT_GE(stats.misses, 9U);
+}
+
+TEST_P(ExecutorTest, OverwrittenMessagesAreCounted) {
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::atomic<int> count{0};
+  rclcpp::SubscriptionOptions subscription_options;
+  auto subscription = node->create_subscription<Empty>("/x", rclcpp::QoS(3), [&](Empty::ConstSharedPtr) { ++count; });
+  executor.add_node(node);
+  auto to_x = node->create_publisher<Empty>("/x", rclcpp::QoS(3));
+  for (int i = 0; i < 10; ++i) to_x->publish(Empty());
+  executor.spin_all(kLimit);
+  EXPECT_EQ(count, 3);
+  CallbackStats stats;
+  for (const CallbackStats &s : executor.stats()) {
+    if (s.id.name == "/x") stats = s;
+  }
+  EXPECT_EQ(stats.jobs.released, 10U);
+  EXPECT_EQ(stats.jobs.finished, 3U);
+  EXPECT_EQ(stats.jobs.skipped, 7U);
+}
+
+TEST_P(ExecutorTest, LearnsRatesAndEdges) {
+  options.learn = 400ms;
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  auto out = publisher("/b");
+  auto b_out = publisher("/c");
+  auto source = node->create_wall_timer(20ms, [&] { out->publish(Empty()); }, new_group());
+  auto b = subscribe("/b", [&] { b_out->publish(Empty()); });
+  auto c = subscribe("/c", [] {});
+  executor.add_node(node);
+  std::thread thread([&] { executor.spin(); });
+  EXPECT_TRUE(eventually([&] { return !executor.is_spinning() || executor.learning_done(); }));
+  ASSERT_TRUE(eventually([&] {
+    for (const CallbackStats &stats : executor.stats()) {
+      if (stats.id.name == "/c") return stats.period == 20'000'000;
+    }
+    return false;
+  }));
+  executor.cancel();
+  thread.join();
+  const redag::Workload learned = executor.learned();
+  EXPECT_FALSE(has_errors(redag::validate(learned, redag::ValidateOptions{.wcet_optional = true})))
+      << to_string(redag::validate(learned));
+  const redag::Dag &dag = learned.dags.at(0);
+  const auto position = [&](const std::string &text) {
+    for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {
+      if (dag.tasks[i].name.find(text) != std::string::npos) return i;
+    }
+    ADD_FAILURE() << "no task " << text;
+    return 0U;
+  };
+  EXPECT_THAT(dag.tasks[position("/b")].predecessors, ElementsAre(position("timer")));
+  EXPECT_THAT(dag.tasks[position("/c")].predecessors, ElementsAre(position("/b")));
+  EXPECT_EQ(dag.tasks[position("/c")].activation, redag::Activation::Data);
+  EXPECT_GT(dag.tasks[position("/c")].wcet, 0);
+  // What was learned can be given to the next run, and names the same callbacks.
+  options.workload = learned;
+  options.learn = 0ms;
+  ReDAGExecutor again(rclcpp::ExecutorOptions(), options);
+  executor.remove_node(node);
+  again.add_node(node);
+  EXPECT_THAT(again.warnings(), ::testing::Not(::testing::Contains(HasSubstr("no callback matches"))));
+}
+
+TEST_P(ExecutorTest, ItsTraceHoldsToTheModel) {
+  options.workers = 2;
+  options.trace_capacity = 1 << 16;
+  options.workload = parse(R"(
+name: traced
+dags:
+  - name: chain
+    max_active: 2
+    tasks:
+      - {name: source, callback: {node: /node, timer: 2ms}}
+      - {name: sink, after: [source], activation: data, callback: {node: /node, subscription: /sink}}
+  - name: load
+    tasks:
+      - {name: load, callback: {node: /node, timer: 15ms}}
+)");
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  auto to_sink = publisher("/sink");
+  const auto burn = [](std::chrono::microseconds time) {
+    const auto end = steady_clock::now() + time;
+    while (steady_clock::now() < end) redag::preemption_point();
+  };
+  auto source = node->create_wall_timer(2ms, [&] {
+    burn(200us);
+    to_sink->publish(Empty());
+  }, new_group());
+  auto sink = subscribe("/sink", [&] { burn(300us); });
+  auto load = node->create_wall_timer(15ms, [&] { burn(6ms); }, new_group());
+  executor.add_node(node);
+  std::vector<redag::JobEvent> events;
+  std::thread thread([&] { executor.spin(); });
+  std::this_thread::sleep_for(500ms);
+  executor.cancel();
+  thread.join();
+  executor.drain_trace(events);
+  executor.renumber(events);
+  const redag::trace::Trace trace{executor.trace_info(), std::move(events)};
+  EXPECT_EQ(trace.info.lost_events, 0U);
+  EXPECT_GT(trace.events.size(), 1000U);
+  EXPECT_FALSE(has_errors(redag::validate(trace.info.workload))) << to_string(redag::validate(trace.info.workload));
+  const auto report = redag::metrics::check_trace(
+      trace, redag::metrics::RuleSet::all().without(redag::metrics::Rule::Grid));
+  EXPECT_TRUE(report.ok()) << report.to_string();
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, ExecutorTest,
+                         ::testing::Values(redag::PreemptionMode::None, redag::PreemptionMode::Cooperative,
+                                           redag::PreemptionMode::Os),
+                         [](const auto &info) { return std::string(to_string(info.param)); });
+
+}  // namespace
+}  // namespace redag_rclcpp

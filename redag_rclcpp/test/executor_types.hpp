@@ -1,0 +1,78 @@
+// The executors that every conformance test runs with: one listed here runs all of them.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "rclcpp/executors.hpp"
+#include "rclcpp/version.h"
+#include "redag_rclcpp/executor.hpp"
+#if RCLCPP_VERSION_MAJOR >= 21
+#include "rclcpp/experimental/executors/events_executor/events_executor.hpp"
+#endif
+
+namespace redag_rclcpp {
+
+template <redag::PreemptionMode mode>
+class ReDAGWith : public ReDAGExecutor {
+ public:
+  ReDAGWith() : ReDAGExecutor(options()) {}
+
+ private:
+  static ReDAGOptions options() {
+    ReDAGOptions options;
+    options.preemption = mode;
+    options.workers = 2;
+    return options;
+  }
+};
+using ReDAGNone = ReDAGWith<redag::PreemptionMode::None>;
+using ReDAGCooperative = ReDAGWith<redag::PreemptionMode::Cooperative>;
+using ReDAGOs = ReDAGWith<redag::PreemptionMode::Os>;
+
+using OurTypes = ::testing::Types<ReDAGNone, ReDAGCooperative, ReDAGOs>;
+using AllTypes =
+    ::testing::Types<ReDAGNone, ReDAGCooperative, ReDAGOs, rclcpp::executors::SingleThreadedExecutor,
+                     rclcpp::executors::MultiThreadedExecutor
+#if RCLCPP_VERSION_MAJOR >= 21
+                     ,
+                     rclcpp::experimental::executors::EventsExecutor
+#endif
+                     >;
+
+struct TypeNames {
+  template <class T>
+  static std::string GetName(int) {
+    if (std::is_same_v<T, ReDAGNone>) return "redag_none";
+    if (std::is_same_v<T, ReDAGCooperative>) return "redag_cooperative";
+    if (std::is_same_v<T, ReDAGOs>) return "redag_os";
+    if (std::is_same_v<T, rclcpp::executors::SingleThreadedExecutor>) return "single_threaded";
+    if (std::is_same_v<T, rclcpp::executors::MultiThreadedExecutor>) return "multi_threaded";
+    return "events";
+  }
+};
+
+/// Executes callbacks of several groups at the same time.
+template <class T>
+inline constexpr bool kParallel =
+    std::is_base_of_v<ReDAGExecutor, T> || std::is_same_v<T, rclcpp::executors::MultiThreadedExecutor>;
+
+template <class T>
+inline constexpr bool kOurs = std::is_base_of_v<ReDAGExecutor, T>;
+
+#if RCLCPP_VERSION_MAJOR >= 21
+template <class T>
+inline constexpr bool kEvents = std::is_same_v<T, rclcpp::experimental::executors::EventsExecutor>;
+#else
+template <class T>
+inline constexpr bool kEvents = false;
+#endif
+
+/// This machine lets us use SCHED_FIFO, if T needs it.
+template <class T>
+bool can_run() {
+  return !std::is_same_v<T, ReDAGOs> || redag::runtime::probe_priority_band().top_job > 0;
+}
+
+}  // namespace redag_rclcpp
