@@ -1,0 +1,517 @@
+#include "workload/workload_nodes.hpp"
+
+#include <fmt/format.h>
+#include <rcl/timer.h>
+#include <rcutils/time.h>
+
+#include <cctype>
+#include <chrono>
+#include <limits>
+#include <map>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "rclcpp/version.h"
+#include "redag/model/demand.hpp"
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/preemption_point.hpp"
+
+namespace redag_rclcpp {
+
+using redag::Activation;
+using redag::Dag;
+using redag::Duration;
+using redag::JobEvent;
+using redag::JobEventKind;
+using redag::kNever;
+using redag::Task;
+using redag::TaskId;
+using redag::Time;
+
+redag::Time timer_clock_now() noexcept {
+  rcutils_time_point_value_t now = 0;
+  // It fails for a null pointer and where there is no steady clock: neither can be here.
+  [[maybe_unused]] const rcutils_ret_t status = rcutils_steady_time_now(&now);
+  return now;
+}
+
+namespace {
+
+constexpr Duration kPhaseTolerance = redag::kMicrosecond;  // of a timer's first expiry
+constexpr int kPhaseAttempts = 1000;
+constexpr Duration kConnectLook = 5 * redag::kMillisecond;
+
+std::atomic<std::uint64_t> instances{0};
+
+// About a microsecond between two looks at the clock, which is a system call.
+void spin_briefly() {
+  for (int i = 0; i < 400; ++i) asm volatile("" ::: "memory");
+}
+
+// What ROS accepts as part of a name: letters, digits, underscores, no digit first.
+std::string ros_token(const std::string &name) {
+  std::string token;
+  for (const char c : name) token += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+  if (token.empty() || std::isdigit(static_cast<unsigned char>(token.front())) != 0) token.insert(0, "t");
+  return token;
+}
+
+// `token`, or with a number behind it if it is taken.
+std::string unique(const std::string &token, std::set<std::string> &taken) {
+  std::string name = token;
+  for (int n = 2; !taken.insert(name).second; ++n) name = fmt::format("{}_{}", token, n);
+  return name;
+}
+
+rclcpp::NodeOptions node_options(bool intra_process) {
+  rclcpp::NodeOptions options;
+  options.use_intra_process_comms(intra_process);
+  // Nothing but the workload's own callbacks.
+  options.start_parameter_services(false).start_parameter_event_publisher(false).enable_rosout(false);
+  options.use_global_arguments(false);
+  options.append_parameter_override("start_type_description_service", false);
+  return options;
+}
+
+redag::Diagnostic diagnostic(redag::Severity severity, std::string message, std::string hint) {
+  return redag::Diagnostic{severity, {}, 0, 0, std::move(message), std::move(hint)};
+}
+
+}  // namespace
+
+redag::Diagnostics ros_limits(const redag::Workload &workload) {
+  redag::Diagnostics found;
+  for (const Dag &dag : workload.dags) {
+    if (dag.max_pending > 0) {
+      found.push_back(diagnostic(redag::Severity::Warning, fmt::format("DAG '{}': max_pending is ignored", dag.name),
+                                 "rclcpp queues what the subscriptions' depths allow"));
+    }
+    for (const Task &task : dag.tasks) {
+      const std::string name = fmt::format("task '{}.{}'", dag.name, task.name);
+      if (task.jitter > 0) {
+        found.push_back(diagnostic(redag::Severity::Error, name + ": a ROS timer has no release jitter",
+                                   "remove 'jitter', or use 'redag run'"));
+      }
+      if (task.concurrency > 1) {
+        found.push_back(diagnostic(redag::Severity::Error, name + ": jobs of one task do not overlap here",
+                                   "remove 'concurrency'"));
+      }
+      if (task.activation == Activation::Timer && task.overrun == redag::Overrun::Queue) {
+        found.push_back(diagnostic(redag::Severity::Warning, name + ": a ROS timer does not queue expiries",
+                                   "read 'overrun: queue' as 'skip'"));
+      }
+    }
+  }
+  return found;
+}
+
+// A topic that a task publishes on.
+struct WorkloadNodes::Output {
+  std::string topic;
+  std::size_t depth = 1;
+  std::size_t subscriptions = 0;
+  rclcpp::Publisher<Message>::SharedPtr publisher;
+};
+
+// What a task gets from one predecessor. Guarded by the task's callback group, as all of TaskNode is.
+struct WorkloadNodes::Input {
+  TaskId from;
+  std::uint32_t output = 0;  // position among the predecessor's
+  bool aligned = false;      // timer tasks of one period and offset: job k waits for job k
+  bool fresh = false;
+  std::int64_t sequence = 0;
+  Time release = 0;
+  Time origin = 0;
+  Time finish = 0;
+  rclcpp::Subscription<Message>::SharedPtr subscription;
+};
+
+struct WorkloadNodes::TaskNode {
+  TaskId id;
+  const Task *task = nullptr;
+  std::string dag_name;   // in ROS
+  std::string task_name;  // in ROS
+  rclcpp::Node::SharedPtr node;
+  rclcpp::CallbackGroup::SharedPtr group;
+  rclcpp::TimerBase::SharedPtr timer;
+  std::uint32_t timer_index = 0;  // among the timers of its node
+  Time first_expiry = 0;
+  std::int64_t last_job = -1;  // timer: that expired
+  std::int64_t waiting = -1;   // timer with predecessors: job that waits for data; -1: none
+  Time consumed = -1;          // data: end of the last predecessor, of the last job
+  std::int64_t completed = 0;
+  std::deque<Input> inputs;
+  std::uint32_t slowest = 0;  // input that numbers the jobs of a data task: the one with the largest period
+  std::deque<Output> outputs;
+  Message message;
+};
+
+struct WorkloadNodes::Job {
+  std::int64_t number = 0;  // for the execution time; of timer tasks the job's number
+  Time trigger = 0;         // of data tasks: end of the last predecessor
+  Time release = 0;
+  Time origin = 0;
+};
+
+WorkloadNodes::WorkloadNodes(const redag::Workload &workload, const NodesOptions &options)
+    : workload_(workload), options_(options), instance_(++instances) {
+  std::set<std::string> dag_names;
+  for (const redag::Dag &dag : workload_.dags) {
+    const std::string dag_name = unique(ros_token(dag.name), dag_names);
+    std::set<std::string> task_names;
+    const std::size_t first = tasks_.size();
+    for (const Task &task : dag.tasks) {
+      TaskNode &made = tasks_.emplace_back();
+      made.id = TaskId(tasks_.size() - 1);
+      made.task = &task;
+      made.dag_name = dag_name;
+      made.task_name = unique(ros_token(task.name), task_names);
+      for (const std::uint32_t p : task.predecessors) {
+        const Task &from = dag.tasks[p];
+        Input &input = made.inputs.emplace_back();
+        input.from = TaskId(first + p);
+        input.aligned = task.activation == Activation::Timer && from.activation == Activation::Timer &&
+                        from.period == task.period && from.offset == task.offset;
+        const auto position = static_cast<std::uint32_t>(made.inputs.size() - 1);
+        if (from.period > dag.tasks[task.predecessors[made.slowest]].period) made.slowest = position;
+      }
+    }
+  }
+  for (TaskNode &task : tasks_) create_node(task);
+  create_topics();
+  for (std::uint32_t i = 0; i < options_.threads; ++i) {
+    rings_.push_back(std::make_unique<redag::trace::Ring>(options_.trace_capacity));
+  }
+}
+
+WorkloadNodes::~WorkloadNodes() = default;
+
+// Tasks of one exclusive group share a node, because a callback group belongs to one.
+void WorkloadNodes::create_node(TaskNode &task) {
+  if (!task.task->group.empty()) {
+    for (const TaskNode &other : tasks_) {
+      if (other.node == nullptr || other.task->group != task.task->group) continue;
+      task.node = other.node;
+      task.group = other.group;
+      return;
+    }
+  }
+  task.node = std::make_shared<rclcpp::Node>(task.task_name, "/" + task.dag_name, node_options(options_.intra_process));
+  task.group = task.node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
+  nodes_.push_back(task.node);
+}
+
+// A topic per task with successors. Where tasks of one node have the same predecessor, each but the first has a topic
+// of its own: by their topics alone the executor tells callbacks of a node apart.
+void WorkloadNodes::create_topics() {
+  std::set<std::pair<const rclcpp::Node *, std::string>> subscribed;
+  for (TaskNode &task : tasks_) {
+    for (Input &input : task.inputs) {
+      TaskNode &from = tasks_[input.from.value];
+      std::string topic = fmt::format("/{}/{}/output", from.dag_name, from.task_name);
+      if (!subscribed.emplace(task.node.get(), topic).second) topic += "_" + task.task_name;
+      auto output = std::find_if(from.outputs.begin(), from.outputs.end(),
+                                 [&](const Output &known) { return known.topic == topic; });
+      if (output == from.outputs.end()) output = from.outputs.insert(output, Output{topic, 1, 0, nullptr});
+      input.output = static_cast<std::uint32_t>(output - from.outputs.begin());
+      if (task.task->overrun == redag::Overrun::Queue) {
+        output->depth = std::max<std::size_t>(output->depth, task.task->queue_depth);
+      }
+      ++output->subscriptions;
+    }
+  }
+  for (TaskNode &task : tasks_) {
+    task.message.data.resize(4);
+    for (Output &output : task.outputs) {
+      output.publisher = task.node->create_publisher<Message>(output.topic, rclcpp::QoS(output.depth).reliable());
+    }
+    for (Input &input : task.inputs) {
+      rclcpp::SubscriptionOptions options;
+      options.callback_group = task.group;
+      const bool queue = task.task->overrun == redag::Overrun::Queue;
+      const rclcpp::QoS qos = rclcpp::QoS(queue ? task.task->queue_depth : 1).reliable();
+      input.subscription = task.node->create_subscription<Message>(
+          tasks_[input.from.value].outputs[input.output].topic, qos,
+          [this, &task, &input](Message::ConstSharedPtr message) { on_message(task, input, *message); }, options);
+    }
+  }
+}
+
+redag::Result<void> WorkloadNodes::connect(Duration timeout) {
+  const Time deadline = timer_clock_now() + timeout;
+  for (;;) {
+    bool all = true;
+    for (const TaskNode &task : tasks_) {
+      for (const Output &output : task.outputs) {
+        const std::size_t seen = output.publisher->get_subscription_count();
+        const std::size_t publishers = task.node->count_publishers(output.topic);
+        if (seen > output.subscriptions || publishers > 1) {
+          return redag::make_error(fmt::format("somebody else uses the topic '{}'", output.topic),
+                                   "give each run a ROS_DOMAIN_ID of its own");
+        }
+        all = all && seen == output.subscriptions && publishers == 1;
+      }
+      for (const Input &input : task.inputs) all = all && input.subscription->get_publisher_count() == 1;
+    }
+    if (all) return {};
+    if (timer_clock_now() > deadline) {
+      return redag::make_error(
+          fmt::format("the nodes do not find each other within {}", redag::format_duration(timeout)),
+          "check the middleware's configuration: 'ros2 doctor --report'");
+    }
+    std::this_thread::sleep_for(std::chrono::nanoseconds(kConnectLook));
+  }
+}
+
+// ---- timers ----
+
+// A timer's grid begins when it is reset. With the distance to its first expiry as its period, and the true one set
+// right after, it stands where we want it, but for the time between two looks at a clock.
+void WorkloadNodes::arm(Time origin) {
+  origin_ = origin;
+  std::map<const rclcpp::Node *, std::uint32_t> timers;
+  for (TaskNode &task : tasks_) {
+    if (task.task->activation != Activation::Timer) continue;
+    task.timer_index = timers[task.node.get()]++;
+    create_timer(task);
+  }
+}
+
+void WorkloadNodes::create_timer(TaskNode &task) {
+#if RCLCPP_VERSION_MAJOR >= 28
+  const auto callback = [this, &task](const rclcpp::TimerInfo &info) {
+    on_timer(task, (info.actual_call_time.nanoseconds() - task.first_expiry) / task.task->period);
+  };
+#else
+  const auto callback = [this, &task] { on_timer(task, expired_job(task)); };
+#endif
+  task.timer = task.node->create_wall_timer(std::chrono::nanoseconds(task.task->period), callback, task.group);
+  const std::shared_ptr<const rcl_timer_t> handle = task.timer->get_timer_handle();
+  const Time wanted = origin_ + task.task->offset;
+  for (int attempt = 0; attempt < kPhaseAttempts; ++attempt) {
+    std::int64_t old = 0;
+    if (rcl_timer_exchange_period(handle.get(), wanted - timer_clock_now(), &old) != RCL_RET_OK) {
+      rclcpp::exceptions::throw_from_rcl_error(RCL_RET_ERROR, "cannot set a timer's period");
+    }
+    task.timer->reset();
+    if (rcl_timer_exchange_period(handle.get(), task.task->period, &old) != RCL_RET_OK) {
+      rclcpp::exceptions::throw_from_rcl_error(RCL_RET_ERROR, "cannot set a timer's period");
+    }
+    const Time before = timer_clock_now();
+    const Duration until = task.timer->time_until_trigger().count();
+    const Time after = timer_clock_now();
+    task.first_expiry = before + until + (after - before) / 2;
+    if (after + until - wanted <= kPhaseTolerance) break;
+  }
+  phase_error_ = std::max(phase_error_, std::abs(task.first_expiry - wanted));
+}
+
+// The point of the timer's grid that was called: the one before its next.
+std::int64_t WorkloadNodes::expired_job(TaskNode &task) const {
+  for (;;) {
+    const Time before = timer_clock_now();
+    const Duration until = task.timer->time_until_trigger().count();
+    const Time after = timer_clock_now();
+    // Preempted in between for so long that the answer could be of another point: look again.
+    if (after - before > task.task->period / 4) continue;
+    return (before + until + task.task->period / 2 - task.first_expiry) / task.task->period - 1;
+  }
+}
+
+// ---- bodies ----
+
+void WorkloadNodes::on_timer(TaskNode &task, std::int64_t job) {
+  if (halting_.load(std::memory_order_relaxed)) return;
+  job = std::max(job, task.last_job + 1);  // a call within the phase error of a point of the grid
+  task.last_job = job;
+  if (task.inputs.empty()) {
+    const Time release = task.task->offset + job * task.task->period;
+    execute(task, Job{job, 0, release, release});
+  } else {
+    task.waiting = job;
+    run_if_complete(task);
+  }
+}
+
+void WorkloadNodes::on_message(TaskNode &task, Input &input, const Message &message) {
+  if (halting_.load(std::memory_order_relaxed) || message.data.size() != 4) return;
+  // Completed before the release of the last job, which consumed all data up to then: docs/model.md, "Release".
+  if (message.data[3] <= task.consumed) return;
+  input.fresh = true;
+  input.sequence = message.data[0];
+  input.release = message.data[1];
+  input.origin = message.data[2];
+  input.finish = message.data[3];
+  run_if_complete(task);
+}
+
+void WorkloadNodes::run_if_complete(TaskNode &task) {
+  const bool timed = task.task->activation == Activation::Timer;
+  if (timed && task.waiting < 0) return;
+  Job job;
+  job.number = timed ? task.waiting : task.inputs[task.slowest].sequence;
+  job.release = timed ? task.task->offset + job.number * task.task->period : 0;
+  job.origin = timed ? job.release : kNever;
+  for (const Input &input : task.inputs) {
+    if (!input.fresh || (input.aligned && input.release < job.release)) return;
+    job.trigger = std::max(job.trigger, input.finish);
+    job.origin = std::min(job.origin, input.origin);
+  }
+  for (Input &input : task.inputs) input.fresh = false;
+  task.waiting = -1;
+  if (!timed) {
+    job.release = job.trigger;
+    task.consumed = job.trigger;
+  }
+  execute(task, job);
+}
+
+void WorkloadNodes::execute(TaskNode &task, const Job &job) {
+  running_.fetch_add(1);
+  if (!halting_.load()) {
+    std::uint32_t thread = 0;
+    redag::trace::Ring *const events = ring(thread);
+    const auto number = static_cast<std::uint32_t>(job.number);
+    record({now(), job.trigger, task.id, number, thread, JobEventKind::Started}, events);
+    const Duration demand = redag::execution_time(*task.task, task.id, number, options_.seed);
+    const bool cut_off = task.task->budget > 0 && demand > task.task->budget;
+    use_processor(cut_off ? task.task->budget : demand, task.task->region);
+    const Time finish = now();
+    record({finish, finish, task.id, number, thread, cut_off ? JobEventKind::Aborted : JobEventKind::Finished,
+            cut_off ? redag::Reason::Budget : redag::Reason::None},
+           events);
+    if (!cut_off) publish(task, job, finish);
+  }
+  running_.fetch_sub(1);
+}
+
+void WorkloadNodes::publish(TaskNode &task, const Job &job, Time finish) {
+  const auto fill = [&](Message &message) {
+    message.data[0] = task.completed;
+    message.data[1] = job.release;
+    message.data[2] = job.origin;
+    message.data[3] = finish;
+  };
+  for (const Output &output : task.outputs) {
+    if (options_.intra_process) {
+      auto message = std::make_unique<Message>();
+      message->data.resize(4);
+      fill(*message);
+      output.publisher->publish(std::move(message));
+    } else {
+      fill(task.message);
+      output.publisher->publish(task.message);
+    }
+  }
+  ++task.completed;
+}
+
+// Of its own processor time: being preempted does not shorten its work.
+void WorkloadNodes::use_processor(Duration demand, Duration region) const {
+  const auto used = [this] { return options_.redag ? redag::job_cpu_time() : redag::runtime::thread_cpu_now(); };
+  const Duration begin = used();
+  Duration next_point = region > 0 ? region : kNever;
+  for (Duration so_far = 0; so_far < demand; so_far = used() - begin) {
+    if (give_up_.load(std::memory_order_relaxed)) return;
+    if (options_.redag && so_far >= next_point) {
+      redag::preemption_point();
+      next_point += region;
+    }
+    spin_briefly();
+  }
+}
+
+// ---- records ----
+
+redag::trace::Ring *WorkloadNodes::ring(std::uint32_t &thread) noexcept {
+  struct Seat {
+    std::uint64_t instance = 0;
+    std::uint32_t thread = 0;
+  };
+  static thread_local Seat seat;
+  if (seat.instance != instance_) seat = Seat{instance_, next_thread_.fetch_add(1)};
+  thread = seat.thread;
+  return thread < rings_.size() ? rings_[thread].get() : nullptr;
+}
+
+void WorkloadNodes::record(const JobEvent &event, redag::trace::Ring *ring) noexcept {
+  if (ring == nullptr) {
+    lost_.fetch_add(1, std::memory_order_relaxed);
+  } else {
+    ring->push(event);
+  }
+}
+
+void WorkloadNodes::drain(std::vector<JobEvent> &events) {
+  for (const auto &ring : rings_) ring->drain(events);
+}
+
+std::uint64_t WorkloadNodes::lost_events() const {
+  std::uint64_t lost = lost_.load();
+  for (const auto &ring : rings_) lost += ring->dropped();
+  return lost;
+}
+
+bool WorkloadNodes::wait_idle(Time deadline) const {
+  while (running_.load() > 0) {
+    if (timer_clock_now() > deadline) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+Duration WorkloadNodes::measurement_cost() {
+  constexpr int kRounds = 2000;
+  redag::trace::Ring scratch(2 * kRounds);
+  TaskNode *timed = nullptr;
+  for (TaskNode &task : tasks_) {
+    if (task.timer != nullptr) timed = &task;
+  }
+  const Time begin = timer_clock_now();
+  for (int i = 0; i < kRounds; ++i) {
+    running_.fetch_add(1);
+    if (timed != nullptr && RCLCPP_VERSION_MAJOR < 28) (void)expired_job(*timed);
+    for (const JobEventKind kind : {JobEventKind::Started, JobEventKind::Finished}) {
+      record({now(), 0, TaskId(0), static_cast<std::uint32_t>(i), 0, kind}, &scratch);
+    }
+    running_.fetch_sub(1);
+  }
+  return (timer_clock_now() - begin) / kRounds;
+}
+
+// ---- for the executor ----
+
+// A task is one callback there. A task here has one per predecessor, and a timer: in each of them its job can run. The
+// others become tasks of their own, as urgent as the first.
+redag::Workload WorkloadNodes::bound_workload() const {
+  redag::Workload bound = workload_;
+  std::size_t next = 0;
+  for (Dag &dag : bound.dags) {
+    std::vector<Task> more;
+    for (Task &task : dag.tasks) {
+      const TaskNode &node = tasks_[next++];
+      task.budget = 0;  // the body keeps it
+      const auto bind = [&](redag::Callback::Kind kind) -> redag::Callback & {
+        Task *to = &task;
+        if (task.callback) {
+          to = &more.emplace_back(task);
+          to->name += fmt::format(" ({})", more.size() + 1);
+          to->activation = Activation::Timer;
+          to->predecessors.clear();
+        }
+        to->callback = redag::Callback{node.node->get_fully_qualified_name(), kind, {}, 0, std::nullopt};
+        return *to->callback;
+      };
+      task.callback.reset();
+      if (task.activation == Activation::Timer) bind(redag::Callback::Kind::Timer).index = node.timer_index;
+      for (const Input &input : node.inputs) {
+        bind(redag::Callback::Kind::Subscription).name = input.subscription->get_topic_name();
+      }
+    }
+    dag.tasks.insert(dag.tasks.end(), more.begin(), more.end());
+  }
+  return bound;
+}
+
+}  // namespace redag_rclcpp

@@ -1,0 +1,112 @@
+// The results of a run as files and as text.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "redag/metrics/jobs.hpp"
+#include "redag/metrics/jobs_csv.hpp"
+#include "redag/metrics/perfetto.hpp"
+#include "redag/metrics/summary_json.hpp"
+#include "redag/trace/events_file.hpp"
+#include "redag/trace/output_file.hpp"
+#include "workload/text_table.hpp"
+#include "workload/workload_run.hpp"
+
+namespace redag_rclcpp {
+
+using redag::metrics::CheckReport;
+using redag::metrics::Distribution;
+
+namespace {
+
+nlohmann::ordered_json to_json(const CheckReport &check) {
+  nlohmann::ordered_json rules = nlohmann::ordered_json::object();
+  for (std::size_t i = 0; i < redag::metrics::kRuleCount; ++i) {
+    if (check.checks_by_rule[i] == 0) continue;
+    rules[to_string(static_cast<redag::metrics::Rule>(i))] = {{"checks", check.checks_by_rule[i]},
+                                                              {"violations", check.violations_by_rule[i]}};
+  }
+  nlohmann::ordered_json violations = nlohmann::ordered_json::array();
+  for (const redag::metrics::Violation &violation : check.violations) violations.push_back(violation.to_string());
+  return {{"ok", check.ok()}, {"violation_count", check.violation_count}, {"rules", rules}, {"violations", violations}};
+}
+
+redag::Result<void> write_check(const std::string &path, const WorkloadRun &run) {
+  nlohmann::ordered_json document = {{"format", "redag.check/1"}, {"nodes", to_json(run.check)}};
+  if (run.scheduler) document["scheduler"] = to_json(run.scheduler->check);
+  document["stopped"] = run.stopped;
+  document["warnings"] = run.warnings;
+  return redag::trace::OutputFile::create(path).and_then([&](redag::trace::OutputFile file) {
+    file.write(document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+    return file.commit();
+  });
+}
+
+std::string verdict(const char *what, const CheckReport &check) {
+  const std::uint64_t checks =
+      std::accumulate(check.checks_by_rule.begin(), check.checks_by_rule.end(), std::uint64_t{0});
+  const auto rules = std::count_if(check.checks_by_rule.begin(), check.checks_by_rule.end(),
+                                   [](std::uint64_t count) { return count > 0; });
+  return fmt::format("{}: {}, {} checks of {} rules\n{}", what,
+                     check.ok() ? std::string("ok") : fmt::format("{} violations", check.violation_count), checks,
+                     rules, check.ok() ? "" : check.to_string());
+}
+
+std::string time_text(const Distribution &distribution, redag::Duration Distribution::*value) {
+  return distribution.count > 0 ? redag::humanize_duration(distribution.*value) : "-";
+}
+
+}  // namespace
+
+redag::Diagnostics write_results(const WorkloadRun &run, const std::string &folder) {
+  redag::Diagnostics problems;
+  const auto keep = [&problems](const redag::Result<void> &written) {
+    if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
+  };
+  const redag::trace::Trace &trace = run.trace;
+  keep(redag::metrics::write_summary(folder + "/summary.json", run.summary, trace.info));
+  keep(redag::metrics::write_jobs_csv(folder + "/jobs.csv", trace.info.workload,
+                                      redag::metrics::fold_jobs(trace.info.workload, trace.events)));
+  keep(redag::metrics::write_perfetto(folder + "/trace.json", trace));
+  keep(redag::trace::write_trace(folder + "/events.jsonl", trace));
+  if (run.scheduler) keep(redag::trace::write_trace(folder + "/scheduler_events.jsonl", run.scheduler->trace));
+  keep(write_check(folder + "/check.json", run));
+  return problems;
+}
+
+std::string describe(const WorkloadRun &run) {
+  const redag::trace::RunInfo &info = run.trace.info;
+  std::string text =
+      fmt::format("{}: {}, {} thread{}, {} as ROS 2 nodes, seed {}\npreemption: {}{}\n{}\n", info.workload.name,
+                  info.executor, info.workload.platform.workers, info.workload.platform.workers == 1 ? "" : "s",
+                  redag::humanize_duration(info.end - info.start), info.seed, info.preemption,
+                  info.preemption_why.empty() ? "" : " (" + info.preemption_why + ")", info.overheads);
+  if (info.warm_up > 0) text += fmt::format("the first {} are not counted\n", redag::humanize_duration(info.warm_up));
+  if (run.stopped) text += "stopped early: the results are those of the shorter run\n";
+  TextTable tasks({"task", "jobs", "late", "skipped", "aborted", "missed", "p50", "p95", "p99", "max"});
+  for (const redag::metrics::TaskSummary &task : run.summary.tasks) {
+    const redag::metrics::JobStats &jobs = task.jobs;
+    tasks.add({task.dag + "." + task.name, fmt::format("{}", jobs.released), fmt::format("{}", jobs.late),
+               fmt::format("{}", jobs.skipped), fmt::format("{}", jobs.aborted),
+               fmt::format("{:.2f} %", 100 * jobs.miss_ratio_with_lost()), time_text(jobs.response, &Distribution::p50),
+               time_text(jobs.response, &Distribution::p95), time_text(jobs.response, &Distribution::p99),
+               time_text(jobs.response, &Distribution::max)});
+  }
+  TextTable dags({"DAG", "jobs", "missed", "end-to-end p50", "p99", "max", "active"});
+  for (const redag::metrics::DagSummary &dag : run.summary.dags) {
+    const Distribution &end_to_end = dag.end_to_end.response;
+    dags.add({dag.name, fmt::format("{}", dag.jobs.released),
+              fmt::format("{:.2f} %", 100 * dag.jobs.miss_ratio_with_lost()), time_text(end_to_end, &Distribution::p50),
+              time_text(end_to_end, &Distribution::p99), time_text(end_to_end, &Distribution::max),
+              fmt::format("{}/{}", dag.peak_active, dag.max_active > 0 ? fmt::format("{}", dag.max_active) : "-")});
+  }
+  text += "\n" + tasks.render() + "\n" + dags.render() + "\n";
+  text += "missed: late, skipped or aborted; response: finish - release\n";
+  text += verdict("trace check, as the nodes saw it", run.check);
+  if (run.scheduler) text += verdict("trace check, the scheduler's decisions", run.scheduler->check);
+  return text;
+}
+
+}  // namespace redag_rclcpp

@@ -1,0 +1,269 @@
+#include "workload/workload_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <numeric>
+#include <thread>
+#include <utility>
+
+#include "rclcpp/rclcpp.hpp"
+#include "rclcpp/version.h"
+#if RCLCPP_VERSION_MAJOR >= 21
+#include "rclcpp/experimental/executors/events_executor/events_executor.hpp"
+#endif
+#include "redag/metrics/trace_checker.hpp"
+#include "redag/runtime/threads.hpp"
+#include "redag_rclcpp/executor.hpp"
+#include "workload/node_events.hpp"
+#include "workload/workload_nodes.hpp"
+
+namespace redag_rclcpp {
+
+using redag::Duration;
+using redag::JobEvent;
+using redag::PreemptionMode;
+using redag::Time;
+using redag::metrics::Rule;
+using redag::metrics::RuleSet;
+
+namespace {
+
+constexpr Duration kConnectTimeout = 20 * redag::kSecond;
+constexpr Duration kStartMargin = 300 * redag::kMillisecond;  // from the timers' creation to time 0
+constexpr Duration kCollectEvery = 100 * redag::kMillisecond;
+constexpr Duration kDrainTimeout = 5 * redag::kSecond;
+constexpr std::uint32_t kSpareThreads = 16;  // of our executor, with os
+constexpr std::size_t kSchedulerEvents = std::size_t{1} << 17U;
+
+bool is_redag(const std::string &name) { return name.rfind("redag", 0) == 0; }
+bool has_one_thread(const std::string &name) { return name == "ste" || name == "static" || name == "events"; }
+
+std::optional<PreemptionMode> preemption_of(const std::string &name) {
+  if (name == "redag-none") return PreemptionMode::None;
+  if (name == "redag-cooperative") return PreemptionMode::Cooperative;
+  if (name == "redag-os") return PreemptionMode::Os;
+  return std::nullopt;
+}
+
+class Run {
+ public:
+  Run(const redag::Workload &workload, const WorkloadRunOptions &options) : workload_(workload), options_(options) {
+    // max_active and groups are judged by this one; the threads are what really ran.
+    workers_ = options_.threads > 0 ? options_.threads : workload_.platform.workers;
+    if (has_one_thread(options_.executor)) workers_ = 1;
+    workload_.platform.workers = workers_;
+  }
+
+  redag::Result<WorkloadRun> execute() {
+    if (auto known = check_executor(options_.executor); !known) return tl::unexpected(known.error());
+    if (auto possible = look_at_limits(); !possible) return tl::unexpected(possible.error());
+    NodesOptions nodes;
+    nodes.seed = options_.seed;
+    nodes.intra_process = options_.intra_process;
+    nodes.redag = is_redag(options_.executor);
+    nodes.threads = workers_ + (nodes.redag ? kSpareThreads : 0) + 1;
+    nodes_ = std::make_unique<WorkloadNodes>(workload_, nodes);
+    if (auto connected = nodes_->connect(kConnectTimeout); !connected) return tl::unexpected(connected.error());
+    try {
+      make_executor();
+    } catch (const std::runtime_error &error) {  // preemption that this process may not have
+      return redag::make_error(error.what(), options_.executor == "redag-os" ? redag::runtime::realtime_hint() : "");
+    }
+    nodes_->arm(timer_clock_now() + kStartMargin);
+    const Duration cost = nodes_->measurement_cost();
+    for (const auto &node : nodes_->nodes()) executor_->add_node(node);
+    std::thread spinning([this] { spin(); });
+    collect_until_end();
+    nodes_->halt();
+    if (!nodes_->wait_idle(timer_clock_now() + kDrainTimeout)) {
+      nodes_->give_up();
+      result_.warnings.push_back(
+          fmt::format("bodies were still running {} after the end", redag::format_duration(kDrainTimeout)));
+    }
+    executor_->cancel();
+    spinning.join();
+    if (failure_) return redag::make_error(fmt::format("the executor failed: {}", failure_text()));
+    collect();
+    describe_run(cost);
+    evaluate();
+    return std::move(result_);
+  }
+
+ private:
+  redag::Result<void> look_at_limits() {
+    redag::Diagnostics errors;
+    for (const redag::Diagnostic &found : ros_limits(workload_)) {
+      if (found.severity == redag::Severity::Error) {
+        errors.push_back(found);
+      } else {
+        result_.warnings.push_back(fmt::format("{} ({})", found.message, found.hint));
+      }
+    }
+    if (!errors.empty()) return tl::unexpected(errors);
+    const bool bounded = std::any_of(workload_.dags.begin(), workload_.dags.end(),
+                                     [](const redag::Dag &dag) { return dag.max_active > 0; });
+    if (bounded && !is_redag(options_.executor)) {
+      result_.warnings.push_back(fmt::format("{} has no bounds: max_active is ignored", options_.executor));
+    }
+    return {};
+  }
+
+  void make_executor() {
+    const std::string &name = options_.executor;
+    if (is_redag(name)) {
+      ReDAGOptions redag;
+      redag.workers = workers_;
+      redag.preemption = preemption_of(name).value_or(workload_.platform.preemption);
+      redag.policy = workload_.policy;
+      redag.threads = workers_ + kSpareThreads;
+      redag.workload = nodes_->bound_workload();
+      redag.trace_capacity = kSchedulerEvents;
+      redag_ = std::make_shared<ReDAGExecutor>(redag);
+      executor_ = redag_;
+    } else if (name == "mte") {
+      executor_ = std::make_shared<rclcpp::executors::MultiThreadedExecutor>(rclcpp::ExecutorOptions(), workers_);
+    } else if (name == "ste") {
+      executor_ = std::make_shared<rclcpp::executors::SingleThreadedExecutor>();
+    } else if (name == "static") {
+      executor_ = std::make_shared<rclcpp::executors::StaticSingleThreadedExecutor>();
+    }
+#if RCLCPP_VERSION_MAJOR >= 21
+    if (name == "events") executor_ = std::make_shared<rclcpp::experimental::executors::EventsExecutor>();
+#endif
+  }
+
+  void spin() {
+    try {
+      executor_->spin();
+    } catch (...) {
+      const std::lock_guard guard(failure_lock_);
+      failure_ = std::current_exception();
+    }
+  }
+
+  std::string failure_text() {
+    const std::lock_guard guard(failure_lock_);
+    try {
+      std::rethrow_exception(failure_);
+    } catch (const std::exception &error) {
+      return error.what();
+    } catch (...) {
+      return "an exception of an unknown type";
+    }
+  }
+
+  void collect_until_end() {
+    for (Time now = nodes_->now(); now < options_.duration; now = nodes_->now()) {
+      if (options_.stop != nullptr && options_.stop->load()) {
+        result_.stopped = true;
+        break;
+      }
+      std::this_thread::sleep_for(std::chrono::nanoseconds(std::min(kCollectEvery, options_.duration - now)));
+      collect();
+    }
+    end_ = result_.stopped ? std::clamp<Time>(nodes_->now(), 0, options_.duration) : options_.duration;
+  }
+
+  void collect() {
+    nodes_->drain(bodies_);
+    if (redag_ != nullptr) redag_->drain_trace(decisions_);
+  }
+
+  void describe_run(Duration cost) {
+    redag::trace::RunInfo &info = result_.trace.info;
+    info.workload = workload_;
+    info.executor = options_.executor;
+    // Threads that ran bodies: with os more than run at the same time.
+    info.config.workers = std::max(workers_, nodes_->threads_seen());
+    info.config.policy = workload_.policy;
+    info.preemption = "none";
+    info.preemption_why = options_.executor + " has no other";
+    if (redag_ != nullptr) {
+      info.preemption = to_string(redag_->mode().mode);
+      info.preemption_why = redag_->mode().reason;
+      const bool cooperative = redag_->mode().mode == PreemptionMode::Cooperative;
+      if (cooperative) info.config.preemption = redag::sched::Preemption::Cooperative;
+      for (std::string &warning : redag_->warnings()) result_.warnings.push_back(std::move(warning));
+    }
+    info.driver = redag::trace::Driver::Threads;
+    info.seed = options_.seed;
+    info.end = end_;
+    info.warm_up = options_.warm_up;
+    info.overheads = fmt::format("ROS 2 {} transport; measuring takes {} a job; timers are within {} of the grid",
+                                 options_.intra_process ? "intra-process" : "middleware", redag::format_duration(cost),
+                                 redag::format_duration(nodes_->phase_error()));
+    info.machine = redag::trace::this_machine();
+    info.lost_events = nodes_->lost_events();
+    if (info.lost_events > 0) {
+      result_.warnings.push_back(fmt::format("{} events were lost: the figures are incomplete", info.lost_events));
+    }
+  }
+
+  void evaluate() {
+    result_.trace.events = node_events(workload_, bodies_, {end_, options_.executor == "events"});
+    result_.summary = redag::metrics::summarize(result_.trace);
+    result_.check = redag::metrics::check_trace(result_.trace, node_rules());
+    if (redag_ == nullptr) return;
+    SchedulerTrace scheduler;
+    redag_->renumber(decisions_);
+    scheduler.trace.info = redag_->trace_info();
+    scheduler.trace.info.seed = options_.seed;
+    scheduler.trace.events = std::move(decisions_);
+    scheduler.check = redag::metrics::check_trace(scheduler.trace, scheduler_rules());
+    result_.scheduler = std::move(scheduler);
+  }
+
+  redag::Workload workload_;
+  const WorkloadRunOptions &options_;
+  std::uint32_t workers_ = 1;
+  WorkloadRun result_;
+  std::unique_ptr<WorkloadNodes> nodes_;
+  std::shared_ptr<rclcpp::Executor> executor_;  // after the nodes: it goes first
+  std::shared_ptr<ReDAGExecutor> redag_;        // the same, if it is ours
+  std::vector<JobEvent> bodies_;
+  std::vector<JobEvent> decisions_;
+  Time end_ = 0;
+  std::mutex failure_lock_;
+  std::exception_ptr failure_;
+};
+
+}  // namespace
+
+const std::vector<std::string> &executor_names() {
+  static const std::vector<std::string> kNames = {"redag",  "redag-none", "redag-cooperative", "redag-os", "mte", "ste",
+                                                  "static", "events"};
+  return kNames;
+}
+
+redag::Result<void> check_executor(const std::string &name) {
+  const std::vector<std::string> &names = executor_names();
+  if (std::find(names.begin(), names.end(), name) == names.end()) {
+    return redag::make_error(fmt::format("there is no executor '{}'", name),
+                             fmt::format("one of {}", fmt::join(names, ", ")));
+  }
+  if (name == "events" && RCLCPP_VERSION_MAJOR < 21) {
+    return redag::make_error("this ROS 2 has no executor 'events'",
+                             fmt::format("it came with rclcpp 21 (Iron); this is rclcpp {}", RCLCPP_VERSION_MAJOR));
+  }
+  return {};
+}
+
+RuleSet node_rules() {
+  RuleSet rules = RuleSet::wait_set();
+  for (const Rule rule : {Rule::Precedence, Rule::Admission, Rule::Worker}) rules = rules.without(rule);
+  return rules;
+}
+
+RuleSet scheduler_rules() { return RuleSet::all(); }
+
+redag::Result<WorkloadRun> run_as_nodes(const redag::Workload &workload, const WorkloadRunOptions &options) {
+  return Run(workload, options).execute();
+}
+
+}  // namespace redag_rclcpp
