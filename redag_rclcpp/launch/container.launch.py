@@ -1,0 +1,98 @@
+"""A ReDAG component container with components in it.
+
+    ros2 launch redag_rclcpp container.launch.py
+    ros2 launch redag_rclcpp container.launch.py config:=robot.yaml \
+        components:="demo_nodes_cpp/demo_nodes_cpp::Talker demo_nodes_cpp/demo_nodes_cpp::Listener"
+
+Without `components` two pipelines of the example components run, as config/example.yaml describes them.
+"""
+
+import os
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import ComposableNodeContainer
+from launch_ros.descriptions import ComposableNode
+
+PACKAGE = 'redag_rclcpp'
+
+# Name, default, description. All but the last two are parameters of the container, by the same name.
+ARGUMENTS = [
+    ('config', '', 'Workload file; by default that of the example, and none where `components` is given'),
+    ('workers', '0', 'Callbacks at the same time; 0: what the workload says, or else one a processor'),
+    ('preemption', 'auto', 'auto, os, cooperative or none'),
+    ('policy', 'rate_monotonic', 'Order of callbacks'),
+    ('learn', '10.0', 'Seconds in which rates and edges are learned'),
+    ('metrics_period', '1.0', 'Seconds between /diagnostics and ~/metrics'),
+    ('trace', '', 'Folder for results, written at the end'),
+    ('save_path', 'redag_workload.yaml', 'Where ~/save writes what was learned'),
+    ('name', 'redag_container', 'Name of the container'),
+    ('components', 'example', 'Components to load: PACKAGE/PLUGIN, separated by blanks'),
+]
+
+
+def example_components():
+    """Two pipelines: 200 Hz with 1.2 ms of work, 10 Hz with 40 ms."""
+    rates = [('fast', 0.005, (0.0002, 0.0005, 0.0002)), ('slow', 0.1, (0.005, 0.03, 0.005))]
+    components = []
+    for namespace, period, loads in rates:
+        for plugin, load in zip(['Sensor', 'Filter', 'Control'], loads):
+            parameters = {'load': load}
+            if plugin == 'Sensor':
+                parameters['period'] = period
+            components.append(
+                ComposableNode(
+                    package=PACKAGE,
+                    plugin=f'redag_rclcpp::examples::{plugin}',
+                    namespace='/' + namespace,
+                    parameters=[parameters],
+                ))
+    return components
+
+
+def named_components(text):
+    components = []
+    for word in text.split():
+        package, slash, plugin = word.partition('/')
+        if not (package and slash and plugin):
+            raise ValueError(f"components: '{word}' is not PACKAGE/PLUGIN")
+        components.append(ComposableNode(package=package, plugin=plugin))
+    return components
+
+
+def container(context):
+    values = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
+    is_example = values['components'] == 'example'
+    if not values['config'] and is_example:
+        values['config'] = os.path.join(get_package_share_directory(PACKAGE), 'config', 'example.yaml')
+    return [
+        ComposableNodeContainer(
+            package=PACKAGE,
+            executable='component_container',
+            name=values['name'],
+            namespace='',
+            output='screen',
+            parameters=[{
+                'config': values['config'],
+                'workers': int(values['workers']),
+                'preemption': values['preemption'],
+                'policy': values['policy'],
+                'learn': float(values['learn']),
+                'metrics_period': float(values['metrics_period']),
+                'trace': values['trace'],
+                'save_path': values['save_path'],
+            }],
+            composable_node_descriptions=example_components() if is_example else named_components(
+                values['components']),
+        )
+    ]
+
+
+def generate_launch_description():
+    arguments = [
+        DeclareLaunchArgument(name, default_value=default, description=description)
+        for name, default, description in ARGUMENTS
+    ]
+    return LaunchDescription(arguments + [OpaqueFunction(function=container)])

@@ -1,0 +1,154 @@
+#include "bounds.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "redag/analysis/analyze.hpp"
+
+namespace redag_rclcpp {
+
+using redag::JobEvent;
+using redag::JobEventKind;
+using redag::Task;
+using redag::Workload;
+
+namespace {
+
+std::string name_of(const redag::Dag &dag, const Task &task) { return dag.name + "." + task.name; }
+
+std::uint64_t key_of(const JobEvent &event) { return std::uint64_t{event.task.value} << 32U | event.job; }
+
+// The group in which ROS executes the task's callback.
+std::string group_of(const Workload &learned, const std::string &name) {
+  for (const redag::Dag &dag : learned.dags) {
+    for (const Task &task : dag.tasks) {
+      if (name_of(dag, task) == name) return task.group;
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+bool Bounds::update(const std::vector<CallbackStats> &stats, const redag::sched::Config &config,
+                    const std::function<Workload()> &learned) {
+  std::vector<std::string> now;
+  for (const CallbackStats &callback : stats) {
+    if (!callback.dag.empty()) now.push_back(callback.task + " " + to_string(callback.id));
+  }
+  std::sort(now.begin(), now.end());
+  if (now.empty() || now == analysed_) return false;
+  analysed_ = std::move(now);
+
+  const std::map<std::string, TaskBound> before = std::exchange(bounds_, {});
+  names_.clear();
+  releases_.clear();
+  absent_.clear();
+  Workload workload;
+  if (as_executed(stats, learned(), workload)) analyse(workload, config);
+  for (auto &[name, bound] : bounds_) {
+    // What was counted goes on counting.
+    const auto same = before.find(name);
+    if (same == before.end() || same->second.response != bound.response) continue;
+    bound.exceeded = same->second.exceeded;
+    bound.worst = same->second.worst;
+  }
+  return true;
+}
+
+bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload &learned, Workload &result) {
+  result = workload_;
+  for (redag::Dag &dag : result.dags) {
+    for (Task &task : dag.tasks) {
+      const std::string name = name_of(dag, task);
+      if (task.wcet == 0) absent_ = fmt::format("{} has no wcet", name);
+      const auto is_it = [&](const CallbackStats &callback) { return callback.task == name && !callback.dag.empty(); };
+      const auto callbacks = std::count_if(stats.begin(), stats.end(), is_it);
+      if (callbacks > 1)
+        absent_ = fmt::format("{} is {} callbacks; the analysis takes a task for one", name, callbacks);
+      if (callbacks == 1) {
+        const CallbackStats &callback = *std::find_if(stats.begin(), stats.end(), is_it);
+        const redag::Duration period = callback.id.period;
+        if (period > 0 && task.activation == redag::Activation::Timer && period != task.period) {
+          absent_ = fmt::format("the timer of {} has a period of {}, and not the stated {}", name,
+                                redag::format_duration(period), redag::format_duration(task.period));
+        }
+        task.group = group_of(learned, name);
+      }
+      if (!absent_.empty()) return false;
+      // A timer's callback runs when the timer says, whatever the file says it follows.
+      if (task.activation == redag::Activation::Timer) task.predecessors.clear();
+      task.offset = 0;
+      task.overrun = redag::Overrun::Skip;
+      if (!task.group.empty()) task.concurrency = 1;
+    }
+    redag::inherit_periods(dag);
+  }
+  return true;
+}
+
+void Bounds::analyse(const Workload &workload, const redag::sched::Config &config) {
+  redag::analysis::AnalysisPlatform platform;
+  platform.workers = config.workers;
+  platform.preemption = config.preemption;
+  platform.levels = config.levels;
+  platform.max_started = config.max_started;
+  Workload analysed = workload;
+  analysed.policy = config.policy;
+  const redag::Result<redag::analysis::System> system = redag::analysis::compile(analysed, platform);
+  if (!system) {
+    absent_ = to_string(system.error());
+    return;
+  }
+  if (!system->not_analysable.empty()) {
+    absent_ = system->not_analysable;
+    return;
+  }
+  const redag::analysis::Report report = redag::analysis::analyze(*system);
+  std::vector<std::string> without;
+  for (const redag::TaskRef &ref : redag::flatten(analysed)) {
+    const std::string name = name_of(analysed.dags[ref.dag.value], *ref.task);
+    const redag::analysis::Tightest &tightest = report.tasks[ref.id.value];
+    if (tightest.response) {
+      bounds_[name] = TaskBound{*tightest.response, std::string(tightest.method->name), 0, 0};
+    } else {
+      without.push_back(name);
+    }
+  }
+  if (!without.empty()) absent_ = fmt::format("no sound bound for {}", fmt::join(without, ", "));
+}
+
+void Bounds::count(std::span<const JobEvent> events, const std::function<std::string(redag::TaskId)> &name_of,
+                   const std::function<void(const std::string &, const TaskBound &)> &first) {
+  if (bounds_.empty()) return;
+  for (const JobEvent &event : events) {
+    auto known = names_.find(event.task.value);
+    if (known == names_.end()) {
+      std::string name = name_of(event.task);
+      if (bounds_.count(name) == 0) name.clear();
+      known = names_.emplace(event.task.value, std::move(name)).first;
+    }
+    if (known->second.empty()) continue;
+    switch (event.kind) {
+      case JobEventKind::Released: releases_[key_of(event)] = event.value; break;
+      case JobEventKind::Skipped:
+      case JobEventKind::Aborted: releases_.erase(key_of(event)); break;
+      case JobEventKind::Finished: {
+        const auto release = releases_.find(key_of(event));
+        if (release == releases_.end()) break;  // released before there was a bound
+        const redag::Duration response = event.value - release->second;
+        releases_.erase(release);
+        TaskBound &bound = bounds_[known->second];
+        if (response <= bound.response) break;
+        bound.worst = std::max(bound.worst, response);
+        if (++bound.exceeded == 1) first(known->second, bound);
+        break;
+      }
+      default: break;
+    }
+  }
+}
+
+}  // namespace redag_rclcpp

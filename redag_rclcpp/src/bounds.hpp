@@ -1,0 +1,63 @@
+// Response times against proven bounds: which bound each task of a workload has on the executor as it runs, and which
+// responses exceeded it. A value; not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "redag/model/job_event.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/sched/scheduler.hpp"
+#include "redag_rclcpp/executor.hpp"
+
+namespace redag_rclcpp {
+
+struct TaskBound {
+  redag::Duration response = 0;
+  std::string method;          // that gave it, see `redag analyze --methods`
+  std::uint64_t exceeded = 0;  // responses above it
+  redag::Duration worst = 0;   // of these
+};
+
+class Bounds {
+ public:
+  /// `workload`: as its file has it.
+  explicit Bounds(redag::Workload workload) : workload_(std::move(workload)) {}
+
+  /// Analyses anew if the callbacks behind the tasks are not those of the last call. `learned` is asked only then. A
+  /// task that is one callback has the exclusive group that ROS gave this callback. Takes as long as the analysis. True
+  /// if it was done.
+  bool update(const std::vector<CallbackStats> &stats, const redag::sched::Config &config,
+              const std::function<redag::Workload()> &learned);
+
+  /// Counts responses above their bounds. `name_of`: "dag.task" of an event's task id, asked once an id.
+  /// `first`: told of the first response above the bound of each task.
+  void count(std::span<const redag::JobEvent> events, const std::function<std::string(redag::TaskId)> &name_of,
+             const std::function<void(const std::string &name, const TaskBound &bound)> &first);
+
+  /// By "dag.task".
+  [[nodiscard]] const std::map<std::string, TaskBound> &tasks() const { return bounds_; }
+  /// What stands in the way of bounds for all tasks; empty: nothing.
+  [[nodiscard]] const std::string &absent() const { return absent_; }
+
+ private:
+  /// `workload_` as the executor runs it. False, and `absent_` says why: it cannot be compared.
+  [[nodiscard]] bool as_executed(const std::vector<CallbackStats> &stats, const redag::Workload &learned,
+                                 redag::Workload &result);
+  void analyse(const redag::Workload &workload, const redag::sched::Config &config);
+
+  redag::Workload workload_;
+  std::vector<std::string> analysed_;  // what the last analysis was for
+  std::map<std::string, TaskBound> bounds_;
+  std::string absent_ = "no callback was seen yet";
+
+  std::unordered_map<std::uint32_t, std::string> names_;     // by task id; "": has no bound to compare with
+  std::unordered_map<std::uint64_t, redag::Time> releases_;  // of jobs in flight, by task id and number
+};
+
+}  // namespace redag_rclcpp

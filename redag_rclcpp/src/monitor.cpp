@@ -1,0 +1,343 @@
+#include "redag_rclcpp/monitor.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "bounds.hpp"
+#include "rclcpp/exceptions.hpp"
+#include "rclcpp/logging.hpp"
+#include "redag/model/workload_yaml.hpp"
+#include "redag/trace/output_file.hpp"
+#include "report.hpp"
+#include "results.hpp"
+#include "std_msgs/msg/string.hpp"
+#include "std_srvs/srv/trigger.hpp"
+
+namespace redag_rclcpp {
+
+using diagnostic_msgs::msg::DiagnosticArray;
+using redag::JobEvent;
+using std_msgs::msg::String;
+using std_srvs::srv::Trigger;
+
+namespace {
+
+constexpr auto kDrainPeriod = std::chrono::milliseconds(50);
+constexpr auto kLookPeriod = std::chrono::milliseconds(500);  // at the callbacks behind the bounds
+
+/// What is to be done every so often.
+class Turn {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// `period` 0: never.
+  explicit Turn(std::chrono::nanoseconds period) : period_(period) {
+    if (period.count() == 0) next_ = Clock::time_point::max();
+  }
+
+  [[nodiscard]] Clock::time_point next() const { return next_; }
+  [[nodiscard]] bool is_due(Clock::time_point now) {
+    if (now < next_) return false;
+    next_ = now + period_;
+    return true;
+  }
+
+ private:
+  std::chrono::nanoseconds period_;
+  Clock::time_point next_ = Clock::now();
+};
+
+}  // namespace
+
+class Monitor::Impl : public std::enable_shared_from_this<Impl> {
+ public:
+  Impl(rclcpp::Node::SharedPtr node, ReDAGExecutor &executor, MonitorOptions options)
+      : node_(std::move(node)), executor_(executor), options_(std::move(options)), keeper_(options_.trace_events) {
+    if (options_.workload) bounds_.emplace(*options_.workload);
+    const redag::trace::RunInfo info = executor_.trace_info();
+    config_ = info.config;
+    if (options_.trace.empty()) return;
+    const redag::Result<void> ready = prepare_folder(options_.trace);
+    if (!ready) throw std::runtime_error(to_string(ready.error()));
+  }
+
+  void start();
+  void stop_thread();
+
+  [[nodiscard]] Snapshot snapshot();
+  [[nodiscard]] redag::Result<std::string> save(const std::string &path) const;
+  redag::Result<void> finish();
+
+ private:
+  void create_entities();
+  void publish();
+  void main();
+  void drain();
+  void look_at_callbacks();
+  [[nodiscard]] std::string name_of(redag::TaskId task) const;
+
+  const rclcpp::Node::SharedPtr node_;
+  ReDAGExecutor &executor_;
+  const MonitorOptions options_;
+  redag::sched::Config config_;
+
+  rclcpp::CallbackGroup::SharedPtr group_;
+  rclcpp::Publisher<DiagnosticArray>::SharedPtr diagnostics_;
+  rclcpp::Publisher<String>::SharedPtr metrics_;
+  rclcpp::Service<Trigger>::SharedPtr metrics_service_;
+  rclcpp::Service<Trigger>::SharedPtr save_service_;
+
+  std::mutex bounds_lock_;
+  std::optional<Bounds> bounds_;  // bounds_lock_
+
+  // The thread's, and after it finish()'s.
+  Diagnoser diagnoser_;
+  TraceKeeper keeper_;
+  std::vector<JobEvent> events_;
+
+  std::thread thread_;
+  std::mutex stop_lock_;
+  std::condition_variable stop_condition_;
+  bool stop_ = false;      // stop_lock_
+  bool finished_ = false;  // stop_lock_
+};
+
+void Monitor::Impl::start() {
+  create_entities();
+  if (bounds_ || !options_.trace.empty() || options_.period.count() > 0) thread_ = std::thread([this] { main(); });
+}
+
+void Monitor::Impl::create_entities() {
+  const auto weak = weak_from_this();
+  group_ = node_->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
+  diagnostics_ = node_->create_publisher<DiagnosticArray>("/diagnostics", 10);
+  metrics_ = node_->create_publisher<String>("~/metrics", rclcpp::QoS(1).transient_local());
+
+  const auto create_service = [&](const char *name, auto callback) {
+#if RCLCPP_VERSION_MAJOR >= 28
+    return node_->create_service<Trigger>(name, callback, rclcpp::ServicesQoS(), group_);
+#else
+    return node_->create_service<Trigger>(name, callback, rmw_qos_profile_services_default, group_);
+#endif
+  };
+  metrics_service_ =
+      create_service("~/metrics", [weak](Trigger::Request::ConstSharedPtr, Trigger::Response::SharedPtr response) {
+        const auto self = weak.lock();
+        if (!self) return;
+        response->success = true;
+        response->message = to_json(self->snapshot());
+      });
+  if (!node_->has_parameter("save_path")) node_->declare_parameter<std::string>("save_path", options_.save_path);
+  save_service_ =
+      create_service("~/save", [weak](Trigger::Request::ConstSharedPtr, Trigger::Response::SharedPtr response) {
+        const auto self = weak.lock();
+        if (!self) return;
+        const redag::Result<std::string> saved = self->save(self->node_->get_parameter("save_path").value_to_string());
+        response->success = saved.has_value();
+        response->message = saved ? "wrote " + *saved : to_string(saved.error());
+      });
+}
+
+Snapshot Monitor::Impl::snapshot() {
+  Snapshot result;
+  result.stamp = node_->now().nanoseconds();
+  result.mode = executor_.mode();
+  result.workers = executor_.workers();
+  result.policy = config_.policy;
+  result.learning = !executor_.learning_done();
+  result.warnings = executor_.warnings();
+  const std::vector<CallbackStats> stats = executor_.stats();
+  const std::lock_guard guard(bounds_lock_);
+  result.has_bounds = bounds_.has_value();
+  if (bounds_) result.bounds_absent = bounds_->absent();
+  for (const CallbackStats &callback : stats) {
+    TaskFigures task;
+    task.stats = callback;
+    const auto kind = callback.id.kind;
+    const bool learned = kind == redag::Callback::Kind::Subscription && !result.learning &&
+                         callback.period != options_.default_period.count();
+    task.has_deadline = !callback.dag.empty() || kind == redag::Callback::Kind::Timer || learned;
+    if (bounds_) {
+      const auto bound = bounds_->tasks().find(callback.task);
+      if (bound != bounds_->tasks().end() && !callback.dag.empty()) task.bound = bound->second;
+    }
+    result.tasks.push_back(std::move(task));
+  }
+  return result;
+}
+
+redag::Result<std::string> Monitor::Impl::save(const std::string &path) const {
+  if (path.empty()) return redag::make_error("parameter 'save_path' is empty", "set it to the path of a file");
+  const std::string absolute = std::filesystem::absolute(path).lexically_normal().string();
+  const redag::Result<void> saved =
+      redag::save_workload(executor_.learned(), absolute, redag::ValidateOptions{.wcet_optional = true});
+  if (!saved) return tl::unexpected<redag::Diagnostics>(saved.error());
+  return absolute;
+}
+
+// ---- the thread ----
+
+void Monitor::Impl::main() {
+  const bool has_events = bounds_ || !options_.trace.empty();
+  Turn look(bounds_ ? kLookPeriod : std::chrono::nanoseconds(0));
+  Turn draining(has_events ? kDrainPeriod : std::chrono::nanoseconds(0));
+  Turn publishing(options_.period);
+  std::unique_lock lock(stop_lock_);
+  while (!stop_) {
+    lock.unlock();
+    const auto now = Turn::Clock::now();
+    if (look.is_due(now)) look_at_callbacks();
+    if (draining.is_due(now)) drain();
+    if (publishing.is_due(now)) publish();
+    lock.lock();
+    stop_condition_.wait_until(lock, std::min({look.next(), draining.next(), publishing.next()}),
+                               [this] { return stop_; });
+  }
+}
+
+// Not by a callback: who wants to know how an overloaded executor does must not wait for it.
+void Monitor::Impl::publish() {
+  const Snapshot now = snapshot();
+  DiagnosticArray array;
+  array.header.stamp = node_->now();
+  array.status = diagnoser_.diagnose(now);
+  String message;
+  message.data = to_json(now);
+  try {
+    diagnostics_->publish(array);
+    metrics_->publish(message);
+  } catch (const rclcpp::exceptions::RCLError &error) {
+    if (rclcpp::ok(node_->get_node_base_interface()->get_context())) {
+      RCLCPP_ERROR(node_->get_logger(), "metrics could not be published: %s", error.what());
+    }
+  }
+}
+
+void Monitor::Impl::look_at_callbacks() {
+  if (!bounds_) return;
+  const std::vector<CallbackStats> stats = executor_.stats();
+  std::string absent;
+  {
+    // The analysis works on a copy: who asks for figures does not wait for it.
+    std::optional<Bounds> updated;
+    {
+      const std::lock_guard guard(bounds_lock_);
+      updated = bounds_;
+    }
+    if (!updated->update(stats, config_, [this] { return executor_.learned(); })) return;
+    absent = updated->absent();
+    const std::lock_guard guard(bounds_lock_);
+    bounds_ = std::move(updated);
+  }
+  if (!absent.empty()) RCLCPP_INFO(node_->get_logger(), "bounds on response times: %s", absent.c_str());
+}
+
+void Monitor::Impl::drain() {
+  events_.clear();
+  executor_.drain_trace(events_);
+  if (events_.empty()) return;
+  if (!options_.trace.empty()) {
+    const bool was_cut = keeper_.is_cut();
+    keeper_.add(events_);
+    if (keeper_.is_cut() && !was_cut) {
+      RCLCPP_WARN(node_->get_logger(), "the trace ends here, at %zu events; parameter trace_events allows more",
+                  keeper_.size());
+    }
+  }
+  const std::lock_guard guard(bounds_lock_);
+  if (!bounds_) return;
+  bounds_->count(
+      events_, [this](redag::TaskId task) { return name_of(task); },
+      [this](const std::string &name, const TaskBound &bound) {
+        RCLCPP_WARN(node_->get_logger(),
+                    "%s responded in %s, above its bound of %s (%s): an execution time or a rate is not what the "
+                    "workload says, or a callback ran that it does not name",
+                    name.c_str(), redag::humanize_duration(bound.worst).c_str(),
+                    redag::format_duration(bound.response).c_str(), bound.method.c_str());
+      });
+}
+
+// The executor numbers tasks anew for files: DAG by DAG. Callbacks that come meanwhile can move the numbers.
+std::string Monitor::Impl::name_of(redag::TaskId task) const {
+  for (;;) {
+    const redag::Workload workload = executor_.trace_info().workload;
+    JobEvent event;
+    event.task = task;
+    std::vector<JobEvent> events{event};
+    executor_.renumber(events);
+    if (executor_.trace_info().workload.task_count() == workload.task_count()) {
+      return redag::trace::task_name(workload, events.front().task);
+    }
+  }
+}
+
+void Monitor::Impl::stop_thread() {
+  {
+    const std::lock_guard guard(stop_lock_);
+    stop_ = true;
+  }
+  stop_condition_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+redag::Result<void> Monitor::Impl::finish() {
+  stop_thread();
+  {
+    const std::lock_guard guard(stop_lock_);
+    if (std::exchange(finished_, true)) return {};
+  }
+  const bool has_trace = !options_.trace.empty();
+  if (bounds_ || has_trace) drain();
+  const Snapshot last = snapshot();
+  RCLCPP_INFO(node_->get_logger(), "%s", summarize(last).c_str());
+
+  redag::Diagnostics problems;
+  const auto write_metrics = [&](const std::string &path) {
+    auto file = redag::trace::OutputFile::create(path);
+    redag::Result<void> written;
+    if (file) {
+      file->write(to_json(last) + "\n");
+      written = file->commit();
+    } else {
+      written = tl::unexpected<redag::Diagnostics>(file.error());
+    }
+    if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
+  };
+  if (!options_.metrics_file.empty()) write_metrics(options_.metrics_file);
+  if (has_trace) {
+    write_metrics(options_.trace + "/metrics.json");
+    const redag::Diagnostics more = keeper_.write(options_.trace, executor_);
+    problems.insert(problems.end(), more.begin(), more.end());
+    if (problems.empty()) {
+      RCLCPP_INFO(node_->get_logger(),
+                  "wrote %s: metrics.json, summary.json, jobs.csv, events.jsonl, trace.json (open it in "
+                  "https://ui.perfetto.dev)",
+                  options_.trace.c_str());
+    }
+  }
+  if (!problems.empty()) return tl::unexpected<redag::Diagnostics>(std::move(problems));
+  return {};
+}
+
+Monitor::Monitor(const rclcpp::Node::SharedPtr &node, ReDAGExecutor &executor, MonitorOptions options)
+    : impl_(std::make_shared<Impl>(node, executor, std::move(options))) {
+  impl_->start();
+}
+
+Monitor::~Monitor() {
+  const redag::Result<void> done = impl_->finish();
+  if (!done) RCLCPP_ERROR(rclcpp::get_logger("redag_rclcpp"), "%s", to_string(done.error()).c_str());
+}
+
+std::string Monitor::metrics() const { return to_json(impl_->snapshot()); }
+redag::Result<std::string> Monitor::save(const std::string &path) const { return impl_->save(path); }
+redag::Result<void> Monitor::finish() { return impl_->finish(); }
+
+}  // namespace redag_rclcpp

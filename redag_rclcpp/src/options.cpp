@@ -1,0 +1,255 @@
+#include "redag_rclcpp/options.hpp"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <string_view>
+
+#include "rclcpp/exceptions.hpp"
+#include "rclcpp/logging.hpp"
+#include "redag/model/validate.hpp"
+#include "redag/model/workload_yaml.hpp"
+#include "redag/runtime/threads.hpp"
+
+namespace redag_rclcpp {
+namespace {
+
+using rclcpp::ParameterType;
+using rclcpp::ParameterValue;
+using std::chrono::nanoseconds;
+
+constexpr std::int64_t kMostThreads = 4096;
+constexpr std::int64_t kMostTraceEvents = 1'000'000'000;
+constexpr double kMostSeconds = 1e6;                          // eleven days: longer is a mistake of units
+constexpr std::size_t kTraceCapacity = std::size_t{1} << 14;  // events a ring; the monitor empties them often
+
+constexpr std::array kModes = {redag::PreemptionMode::Auto, redag::PreemptionMode::None,
+                               redag::PreemptionMode::Cooperative, redag::PreemptionMode::Os};
+constexpr std::array kPolicies = {redag::PolicyKind::RateMonotonic, redag::PolicyKind::DeadlineMonotonic,
+                                  redag::PolicyKind::Fixed,         redag::PolicyKind::Edf,
+                                  redag::PolicyKind::Fifo,          redag::PolicyKind::ChainAware};
+
+[[noreturn]] void refuse(const char *name, const ParameterValue &value, const std::string &allowed) {
+  throw rclcpp::exceptions::InvalidParameterValueException(
+      fmt::format("parameter '{}' is {}: {}", name, rclcpp::to_string(value), allowed));
+}
+
+struct Spec {
+  const char *name;
+  const char *description;
+  std::string allowed;
+};
+
+/// Declares and reads parameters, and judges their values itself: one message for the wrong type and the wrong value.
+class Reader {
+ public:
+  explicit Reader(rclcpp::Node &node) : node_(node) {}
+
+  ParameterValue value(const Spec &spec, const ParameterValue &initial, bool read_only = true) {
+    if (!node_.has_parameter(spec.name)) {
+      rcl_interfaces::msg::ParameterDescriptor descriptor;
+      descriptor.description = spec.description;
+      descriptor.additional_constraints = spec.allowed;
+      descriptor.read_only = read_only;
+      descriptor.dynamic_typing = true;  // 5 for 5.0, and our own words for what is neither
+      node_.declare_parameter(spec.name, initial, descriptor);
+    }
+    return node_.get_parameter(spec.name).get_parameter_value();
+  }
+
+  std::int64_t integer(const Spec &spec, std::int64_t initial, std::int64_t least, std::int64_t most) {
+    const ParameterValue value = this->value(spec, ParameterValue(initial));
+    if (value.get_type() != ParameterType::PARAMETER_INTEGER) refuse(spec.name, value, spec.allowed);
+    const auto number = value.get<std::int64_t>();
+    if (number < least || number > most) refuse(spec.name, value, spec.allowed);
+    return number;
+  }
+
+  bool flag(const Spec &spec, bool initial) {
+    const ParameterValue value = this->value(spec, ParameterValue(initial));
+    if (value.get_type() != ParameterType::PARAMETER_BOOL) refuse(spec.name, value, spec.allowed);
+    return value.get<bool>();
+  }
+
+  std::string text(const Spec &spec, const std::string &initial, bool read_only = true) {
+    const ParameterValue value = this->value(spec, ParameterValue(initial), read_only);
+    if (value.get_type() != ParameterType::PARAMETER_STRING) refuse(spec.name, value, spec.allowed);
+    return value.get<std::string>();
+  }
+
+  nanoseconds seconds(const Spec &spec, double initial, bool may_be_zero) {
+    const ParameterValue value = this->value(spec, ParameterValue(initial));
+    double number = 0;
+    if (value.get_type() == ParameterType::PARAMETER_DOUBLE) {
+      number = value.get<double>();
+    } else if (value.get_type() == ParameterType::PARAMETER_INTEGER) {
+      number = static_cast<double>(value.get<std::int64_t>());
+    } else {
+      refuse(spec.name, value, spec.allowed);
+    }
+    const bool fits = number == 0 ? may_be_zero : number >= 1e-9 && number <= kMostSeconds;
+    if (!fits) refuse(spec.name, value, spec.allowed);
+    return nanoseconds(std::llround(number * 1e9));
+  }
+
+  template <class Values>
+  typename Values::value_type one_of(const Spec &spec, const Values &values) {
+    const ParameterValue value = this->value(spec, ParameterValue(std::string(to_string(values.front()))));
+    if (value.get_type() == ParameterType::PARAMETER_STRING) {
+      for (const auto candidate : values) {
+        if (value.get<std::string>() == to_string(candidate)) return candidate;
+      }
+    }
+    refuse(spec.name, value, spec.allowed);
+  }
+
+ private:
+  rclcpp::Node &node_;
+};
+
+template <class Values>
+std::string names_of(const Values &values) {
+  std::string text = "allowed are";
+  for (const auto value : values) text += fmt::format("{} {}", value == values.front() ? "" : ",", to_string(value));
+  return text;
+}
+
+std::vector<int> read_cpus(Reader &reader) {
+  const Spec spec{"cpu_affinity",
+                  "Processors that the workers may use; none: all that the process may use (os: as many "
+                  "of them as there are workers)",
+                  "a list of whole numbers, each of a processor that the process may use"};
+  const ParameterValue value = reader.value(spec, ParameterValue(std::vector<std::int64_t>{}));
+  if (value.get_type() != ParameterType::PARAMETER_INTEGER_ARRAY) refuse(spec.name, value, spec.allowed);
+  const std::vector<int> usable = redag::runtime::usable_cpus();
+  std::vector<int> cpus;
+  for (const std::int64_t cpu : value.get<std::vector<std::int64_t>>()) {
+    const bool known = std::any_of(usable.begin(), usable.end(), [&](int other) { return other == cpu; });
+    const bool twice = std::any_of(cpus.begin(), cpus.end(), [&](int other) { return other == cpu; });
+    if (!known || twice) {
+      refuse(spec.name, value, spec.allowed + fmt::format(" ({}), once", fmt::join(usable, ", ")));
+    }
+    cpus.push_back(static_cast<int>(cpu));
+  }
+  return cpus;
+}
+
+// The format has a default for the number of workers. A file that does not say it leaves it to the parameter.
+bool states_workers(const std::string &path) {
+  const YAML::Node file = YAML::LoadFile(path);
+  return file["platform"] && file["platform"]["workers"];
+}
+
+void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
+  const Spec spec{"config", "Workload file that says which callback is which task of which DAG; empty: none",
+                  "the path of a workload file (docs/workload_format.md)"};
+  const std::string path = reader.text(spec, "");
+  if (path.empty()) return;
+  redag::Result<redag::LoadedWorkload> loaded = redag::load_workload(path, {.wcet_optional = true});
+  if (!loaded) {
+    throw rclcpp::exceptions::InvalidParameterValueException(
+        fmt::format("parameter 'config' is {}:\n{}", path, to_string(loaded.error())));
+  }
+  for (const redag::Diagnostic &warning : loaded->warnings) {
+    RCLCPP_WARN(node.get_logger(), "%s", warning.to_string().c_str());
+  }
+  const redag::Workload &workload = loaded->workload;
+  if (options.workers == 0 && states_workers(path)) options.workers = workload.platform.workers;
+  if (options.preemption == redag::PreemptionMode::Auto) options.preemption = workload.platform.preemption;
+  if (options.policy == redag::PolicyKind::RateMonotonic) options.policy = workload.policy;
+  options.workload = std::move(loaded->workload);
+}
+
+bool has_all_wcets(const redag::Workload &workload) {
+  const auto refs = redag::flatten(workload);
+  return !refs.empty() && std::all_of(refs.begin(), refs.end(), [](const auto &ref) { return ref.task->wcet > 0; });
+}
+
+std::string read_trace(Reader &reader) {
+  return reader.text({"trace",
+                      "Folder for events.jsonl, jobs.csv, summary.json and trace.json, written when spinning "
+                      "ends; empty: none",
+                      "the path of a folder"},
+                     "");
+}
+
+bool read_bounds(Reader &reader) {
+  return reader.flag({"bounds", "Compare response times with their bounds, where `config` states all execution times",
+                      "allowed are true, false"},
+                     true);
+}
+
+}  // namespace
+
+ReDAGOptions declare_options(rclcpp::Node &node) {
+  Reader reader(node);
+  ReDAGOptions options;
+  options.workers = static_cast<std::uint32_t>(reader.integer(
+      {"workers", "Callbacks that execute at the same time; 0: what `config` says, or else one a processor",
+       fmt::format("a whole number from 0 to {} is allowed", kMostThreads)},
+      0, 0, kMostThreads));
+  options.preemption = reader.one_of(
+      {"preemption",
+       "What can interrupt a running callback; auto: what `config` says, or else os where the process has "
+       "real-time rights, and cooperative where not",
+       names_of(kModes)},
+      kModes);
+  options.policy = reader.one_of(
+      {"policy", "The order of callbacks; rate_monotonic: what `config` says, if it says", names_of(kPolicies)},
+      kPolicies);
+  const Spec threads{"threads",
+                     "Callbacks that can be started and unfinished at once, with preemption os; 0: workers + 16",
+                     fmt::format("0, or a whole number from the number of workers to {}, is allowed", kMostThreads)};
+  options.threads = static_cast<std::uint32_t>(reader.integer(threads, 0, 0, kMostThreads));
+  options.cpus = read_cpus(reader);
+  read_config(node, reader, options);
+  if (options.threads > 0 && options.threads < options.workers) {
+    refuse(threads.name, ParameterValue(std::int64_t{options.threads}),
+           threads.allowed + fmt::format(" (there are {} workers)", options.workers));
+  }
+  options.default_period = reader.seconds(
+      {"default_period", "Seconds: the period, for its priority, of what neither `config` nor a timer gives one",
+       "a number of seconds above 0 is allowed"},
+      0.1, false);
+  options.learn =
+      reader.seconds({"learn", "Seconds after the first spin in which rates and edges are learned; 0: not at all",
+                      "a number of seconds, or 0, is allowed"},
+                     10.0, true);
+  options.raise_middleware =
+      reader.flag({"raise_middleware",
+                   "With preemption os: give threads of the middleware that deliver messages a higher priority "
+                   "than the workers",
+                   "allowed are true, false"},
+                  true);
+  const bool counts_responses = read_bounds(reader) && options.workload && has_all_wcets(*options.workload);
+  if (!read_trace(reader).empty() || counts_responses) options.trace_capacity = kTraceCapacity;
+  return options;
+}
+
+MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &executor) {
+  Reader reader(node);
+  MonitorOptions options;
+  options.period =
+      reader.seconds({"metrics_period", "Seconds between two messages on /diagnostics and ~/metrics; 0: none",
+                      "a number of seconds, or 0, is allowed"},
+                     1.0, true);
+  options.metrics_file = reader.text(
+      {"metrics_file", "File for the last ~/metrics, written when spinning ends; empty: none", "the path of a file"},
+      "");
+  options.save_path = reader.text({"save_path", "File that ~/save writes what was learned to", "the path of a file"},
+                                  options.save_path, false);
+  options.trace = read_trace(reader);
+  options.trace_events = static_cast<std::size_t>(
+      reader.integer({"trace_events", "So many of the first events are kept for `trace`, at 32 bytes each",
+                      fmt::format("a whole number from 1 to {} is allowed", kMostTraceEvents)},
+                     static_cast<std::int64_t>(options.trace_events), 1, kMostTraceEvents));
+  options.default_period = executor.default_period;
+  if (read_bounds(reader)) options.workload = executor.workload;
+  return options;
+}
+
+}  // namespace redag_rclcpp

@@ -1,0 +1,97 @@
+// component_container: rclcpp_components' container with a ReDAGExecutor. Components need no change; what they do is
+// ordered, measured and reported (docs/ros2.md).
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <cstring>
+#include <memory>
+
+#include "rclcpp/rclcpp.hpp"
+#include "rclcpp_components/component_manager.hpp"
+#include "redag_rclcpp/executor.hpp"
+#include "redag_rclcpp/monitor.hpp"
+#include "redag_rclcpp/options.hpp"
+
+namespace {
+
+constexpr int kExitOk = 0;
+constexpr int kExitFailed = 1;    // a callback threw, or results could not be written
+constexpr int kExitBadInput = 2;  // parameters, the workload file
+
+constexpr const char *kHelp = R"(A component container that executes callbacks by rate, across all components.
+
+  ros2 run redag_rclcpp component_container [--ros-args -p NAME:=VALUE ...]
+
+  config            workload file: which callback is which task of which DAG      ""
+  workers           callbacks at the same time; 0: one a processor                0
+  preemption        auto, os, cooperative, none                                   auto
+  policy            rate_monotonic, deadline_monotonic, fixed, edf, fifo, chain_aware
+                                                                                  rate_monotonic
+  threads           os: callbacks started and unfinished at once; 0: workers + 16 0
+  cpu_affinity      processors of the workers                                     []
+  default_period    seconds, where nobody says                                    0.1
+  learn             seconds in which rates and edges are learned                  10.0
+  raise_middleware  os: the middleware's threads above the workers                true
+  metrics_period    seconds between /diagnostics and ~/metrics; 0: none           1.0
+  bounds            compare response times with their bounds                      true
+  trace             folder for results, written at the end                        ""
+  trace_events      events kept for it                                            10000000
+  metrics_file      file for the last metrics, written at the end                 ""
+  save_path         where ~/save writes what was learned                          redag_workload.yaml
+
+Services: ~/_container/load_node and its kin (ros2 component ...), ~/metrics and ~/save (std_srvs/srv/Trigger).
+Ends with SIGINT or SIGTERM: 0; 1 if a callback threw or results could not be written; 2 for bad parameters.
+)";
+
+int run() {
+  const auto manager = std::make_shared<rclcpp_components::ComponentManager>(
+      std::weak_ptr<rclcpp::Executor>(), "ComponentManager",
+      rclcpp::NodeOptions().start_parameter_event_publisher(false));
+  const rclcpp::Logger logger = manager->get_logger();
+  std::shared_ptr<redag_rclcpp::ReDAGExecutor> executor;
+  std::unique_ptr<redag_rclcpp::Monitor> monitor;
+  try {
+    redag_rclcpp::ReDAGOptions options = redag_rclcpp::declare_options(*manager);
+    redag_rclcpp::MonitorOptions monitored = redag_rclcpp::declare_monitor_options(*manager, options);
+    executor = std::make_shared<redag_rclcpp::ReDAGExecutor>(std::move(options));
+    manager->set_executor(executor);
+    executor->add_node(manager);
+    monitor = std::make_unique<redag_rclcpp::Monitor>(manager, *executor, std::move(monitored));
+  } catch (const std::exception &error) {
+    RCLCPP_FATAL(logger, "%s", error.what());
+    return kExitBadInput;
+  }
+
+  int status = kExitOk;
+  try {
+    executor->spin();
+  } catch (const std::exception &error) {
+    RCLCPP_FATAL(logger, "a callback threw: %s", error.what());
+    status = kExitFailed;
+  }
+  if (const redag::Result<void> written = monitor->finish(); !written) {
+    RCLCPP_ERROR(logger, "%s", to_string(written.error()).c_str());
+    status = kExitFailed;
+  }
+  return status;
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  for (int i = 1; i < argc && std::strcmp(argv[i], "--ros-args") != 0; ++i) {
+    if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) {
+      fmt::print("{}", kHelp);
+      return kExitOk;
+    }
+  }
+  try {
+    rclcpp::init(argc, argv);
+  } catch (const std::exception &error) {
+    fmt::print(stderr, "component_container: {}\n", error.what());
+    return kExitBadInput;
+  }
+  const int status = run();
+  rclcpp::shutdown();
+  return status;
+}

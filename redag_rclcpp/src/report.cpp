@@ -1,0 +1,183 @@
+#include "report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "redag/base/time.hpp"
+
+namespace redag_rclcpp {
+
+using diagnostic_msgs::msg::DiagnosticStatus;
+using diagnostic_msgs::msg::KeyValue;
+using redag::format_duration;
+using redag::humanize_duration;
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json distribution(redag::Duration p50, redag::Duration p99, redag::Duration max) {
+  return Json{{"p50_ns", p50}, {"p99_ns", p99}, {"max_ns", max}};
+}
+
+Json task_json(const TaskFigures &task) {
+  const CallbackStats &stats = task.stats;
+  Json json{{"task", stats.task},
+            {"dag", stats.dag.empty() ? Json() : Json(stats.dag)},
+            {"callback", to_string(stats.id)},
+            {"period_ns", stats.period},
+            {"deadline_ns", stats.deadline},
+            {"deadline_assumed", !task.has_deadline},
+            {"wcet_ns", stats.wcet > 0 ? Json(stats.wcet) : Json()},
+            {"released", stats.jobs.released},
+            {"finished", stats.jobs.finished},
+            {"skipped", stats.jobs.skipped},
+            {"aborted", stats.jobs.aborted},
+            {"deferred", stats.jobs.deferred},
+            {"misses", stats.misses},
+            {"response", distribution(stats.response_p50, stats.response_p99, stats.response_max)},
+            {"execution", distribution(stats.execution_p50, stats.execution_p99, stats.execution_max)},
+            {"bound", nullptr}};
+  if (task.bound) {
+    json["bound"] = Json{{"response_ns", task.bound->response},
+                         {"method", task.bound->method},
+                         {"exceeded", task.bound->exceeded},
+                         {"worst_ns", task.bound->exceeded > 0 ? Json(task.bound->worst) : Json()}};
+  }
+  return json;
+}
+
+KeyValue pair(std::string key, std::string value) {
+  KeyValue pair;
+  pair.key = std::move(key);
+  pair.value = std::move(value);
+  return pair;
+}
+
+void warn(DiagnosticStatus &status, const std::string &text) {
+  status.level = DiagnosticStatus::WARN;
+  if (!status.message.empty()) status.message += "; ";
+  status.message += text;
+}
+
+// "ekf" of "control.ekf"; "timer 2 ms (0)" of "/imu timer 2 ms (0)".
+std::string short_name(const CallbackStats &stats) {
+  const std::string &prefix = stats.dag.empty() ? stats.id.node : stats.dag;
+  const bool has_prefix = stats.task.size() > prefix.size() && stats.task.compare(0, prefix.size(), prefix) == 0;
+  return has_prefix ? stats.task.substr(prefix.size() + 1) : stats.task;
+}
+
+DiagnosticStatus executor_status(const Snapshot &snapshot) {
+  DiagnosticStatus status;
+  status.name = "ReDAG: executor";
+  status.message = fmt::format("{} workers, preemption {}", snapshot.workers, to_string(snapshot.mode.mode));
+  status.level = DiagnosticStatus::OK;
+  status.values.push_back(pair("preemption", to_string(snapshot.mode.mode)));
+  status.values.push_back(pair("why", snapshot.mode.reason.empty() ? "asked for" : snapshot.mode.reason));
+  status.values.push_back(pair("workers", std::to_string(snapshot.workers)));
+  status.values.push_back(pair("policy", to_string(snapshot.policy)));
+  status.values.push_back(pair("learning", snapshot.learning ? "yes" : "no"));
+  if (snapshot.has_bounds) {
+    status.values.push_back(pair("bounds", snapshot.bounds_absent.empty() ? "all tasks" : snapshot.bounds_absent));
+  }
+  for (std::size_t i = 0; i < snapshot.warnings.size(); ++i) {
+    status.values.push_back(pair(fmt::format("warning {}", i + 1), snapshot.warnings[i]));
+  }
+  if (!snapshot.warnings.empty()) warn(status, fmt::format("{} warnings", snapshot.warnings.size()));
+  return status;
+}
+
+}  // namespace
+
+std::string to_json(const Snapshot &snapshot) {
+  Json tasks = Json::array();
+  for (const TaskFigures &task : snapshot.tasks) tasks.push_back(task_json(task));
+  const Json json{{"format", "redag.metrics/1"},
+                  {"stamp_ns", snapshot.stamp},
+                  {"preemption", to_string(snapshot.mode.mode)},
+                  {"preemption_why", snapshot.mode.reason},
+                  {"workers", snapshot.workers},
+                  {"policy", to_string(snapshot.policy)},
+                  {"learning", snapshot.learning},
+                  {"warnings", snapshot.warnings},
+                  {"bounds_absent", snapshot.has_bounds ? Json(snapshot.bounds_absent) : Json("not asked for")},
+                  {"tasks", tasks}};
+  // Names from outside may not be UTF-8; a replaced character is better than no snapshot.
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string summarize(const Snapshot &snapshot) {
+  std::uint64_t released = 0;
+  std::uint64_t misses = 0;
+  const TaskFigures *worst = nullptr;
+  for (const TaskFigures &task : snapshot.tasks) {
+    if (!task.has_deadline) continue;
+    released += task.stats.jobs.released;
+    misses += task.stats.misses;
+    if (task.stats.misses > 0 && (worst == nullptr || task.stats.misses > worst->stats.misses)) worst = &task;
+  }
+  std::string text = fmt::format("{} jobs with deadlines, {} missed", released, misses);
+  if (worst != nullptr) {
+    text += fmt::format(", most by {} ({} of {})", worst->stats.task, worst->stats.misses, worst->stats.jobs.released);
+  }
+  return text;
+}
+
+std::vector<DiagnosticStatus> Diagnoser::diagnose(const Snapshot &snapshot) {
+  std::vector<DiagnosticStatus> result{executor_status(snapshot)};
+  std::map<std::string, std::size_t> positions;
+  for (const TaskFigures &task : snapshot.tasks) {
+    const CallbackStats &stats = task.stats;
+    if (stats.dag.empty() && is_ros_internal(stats.id)) continue;
+    const std::string name = stats.dag.empty() ? "ReDAG: node " + stats.id.node : "ReDAG: DAG " + stats.dag;
+    const auto [entry, is_new] = positions.emplace(name, result.size());
+    if (is_new) {
+      result.emplace_back();
+      result.back().name = name;
+      result.back().level = DiagnosticStatus::OK;
+    }
+    add(result[entry->second], task);
+  }
+  for (DiagnosticStatus &status : result) {
+    if (status.message.empty()) status.message = "no new misses";
+  }
+  std::map<std::string, std::uint64_t> misses;
+  for (const TaskFigures &task : snapshot.tasks) misses[task.stats.task + to_string(task.stats.id)] = task.stats.misses;
+  misses_ = std::move(misses);
+  return result;
+}
+
+void Diagnoser::add(DiagnosticStatus &status, const TaskFigures &task) {
+  const CallbackStats &stats = task.stats;
+  const std::string name = short_name(stats);
+  const auto value = [&](const char *key, std::string text) {
+    status.values.push_back(pair(name + " " + key, std::move(text)));
+  };
+  value("period", format_duration(stats.period));
+  value("deadline", format_duration(stats.deadline) + (task.has_deadline ? "" : " (assumed)"));
+  value("released", std::to_string(stats.jobs.released));
+  value("misses", std::to_string(stats.misses));
+  value("response p50", humanize_duration(stats.response_p50));
+  value("response p99", humanize_duration(stats.response_p99));
+  value("response max", humanize_duration(stats.response_max));
+  value("execution max", humanize_duration(stats.execution_max));
+  if (stats.wcet > 0) value("wcet", format_duration(stats.wcet));
+  if (task.bound) value("bound", format_duration(task.bound->response));
+
+  const auto last = misses_.find(stats.task + to_string(stats.id));
+  const std::uint64_t before = last == misses_.end() ? 0 : last->second;
+  const std::uint64_t missed = stats.misses > before ? stats.misses - before : 0;
+  if (missed > 0 && task.has_deadline) warn(status, fmt::format("{} missed {} more deadlines", name, missed));
+  if (stats.wcet > 0 && stats.execution_max > stats.wcet) {
+    warn(status, fmt::format("{} executed for {}, its wcet is {}", name, humanize_duration(stats.execution_max),
+                             format_duration(stats.wcet)));
+  }
+  if (task.bound && task.bound->exceeded > 0) {
+    warn(status, fmt::format("{} of {} responded above the bound of {}, at most in {}", task.bound->exceeded, name,
+                             format_duration(task.bound->response), humanize_duration(task.bound->worst)));
+  }
+}
+
+}  // namespace redag_rclcpp

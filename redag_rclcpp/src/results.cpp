@@ -1,0 +1,56 @@
+#include "results.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+
+#include "redag/metrics/jobs.hpp"
+#include "redag/metrics/jobs_csv.hpp"
+#include "redag/metrics/perfetto.hpp"
+#include "redag/metrics/summary_json.hpp"
+#include "redag/trace/events_file.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag_rclcpp {
+
+redag::Result<void> prepare_folder(const std::string &path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error) return redag::make_error(fmt::format("cannot make folder '{}': {}", path, error.message()));
+  if (access(path.c_str(), W_OK | X_OK) != 0)
+    return redag::make_error(fmt::format("cannot write to folder '{}'", path));
+  return {};
+}
+
+void TraceKeeper::add(const std::vector<redag::JobEvent> &events) {
+  const std::size_t room = most_ - events_.size();
+  const auto end = events.begin() + static_cast<std::ptrdiff_t>(std::min(room, events.size()));
+  events_.insert(events_.end(), events.begin(), end);
+  if (events.size() > room) is_cut_ = true;
+}
+
+redag::Diagnostics TraceKeeper::write(const std::string &folder, const ReDAGExecutor &executor) {
+  redag::Diagnostics problems;
+  const auto keep = [&problems](const redag::Result<void> &written) {
+    if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
+  };
+  redag::trace::Trace trace;
+  trace.info = executor.trace_info();
+  trace.events = std::move(events_);
+  executor.renumber(trace.events);
+  // What is kept of a longer run is a run that ended earlier.
+  if (is_cut_ && !trace.events.empty()) trace.info.end = trace.events.back().time;
+
+  const redag::metrics::Summary summary = redag::metrics::summarize(trace);
+  keep(redag::metrics::write_summary(folder + "/summary.json", summary, trace.info));
+  keep(redag::metrics::write_jobs_csv(folder + "/jobs.csv", trace.info.workload,
+                                      redag::metrics::fold_jobs(trace.info.workload, trace.events)));
+  keep(redag::metrics::write_perfetto(folder + "/trace.json", trace));
+  keep(redag::trace::write_trace(folder + "/events.jsonl", trace));
+  return problems;
+}
+
+}  // namespace redag_rclcpp

@@ -1,0 +1,238 @@
+// The component container as a program of its own: loading, running, metrics, a clean end with results, bad parameters.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
+#include <thread>
+
+#include "composition_interfaces/srv/load_node.hpp"
+#include "composition_interfaces/srv/unload_node.hpp"
+#include "rclcpp/rclcpp.hpp"
+#include "redag/base/time.hpp"
+#include "redag/metrics/trace_checker.hpp"
+#include "redag/trace/events_file.hpp"
+#include "std_msgs/msg/float64.hpp"
+#include "std_srvs/srv/trigger.hpp"
+
+namespace redag_rclcpp {
+namespace {
+
+using namespace std::chrono_literals;
+using composition_interfaces::srv::LoadNode;
+using composition_interfaces::srv::UnloadNode;
+using std::chrono::steady_clock;
+using std_msgs::msg::Float64;
+using std_srvs::srv::Trigger;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using Json = nlohmann::json;
+
+constexpr auto kLimit = 60s;
+
+constexpr const char *kWorkload = R"(name: test
+platform: {workers: 2, preemption: cooperative}
+dags:
+  - name: fast
+    tasks:
+      - {name: sensor, period: 10ms, wcet: 5ms, callback: {node: /fast/sensor, timer: any}}
+      - {name: filter, wcet: 5ms, activation: data, after: sensor, callback: {node: /fast/filter, subscription: /fast/samples}}
+)";
+
+/// A child process; killed if it is still there at the end.
+class Process {
+ public:
+  Process(const std::vector<std::string> &arguments, const std::string &output) {
+    std::vector<char *> argv;
+    for (const std::string &argument : arguments) argv.push_back(const_cast<char *>(argument.c_str()));
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, 1, output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    posix_spawn_file_actions_adddup2(&actions, 1, 2);
+    EXPECT_EQ(posix_spawn(&id_, argv[0], &actions, nullptr, argv.data(), environ), 0);
+    posix_spawn_file_actions_destroy(&actions);
+  }
+  ~Process() {
+    if (id_ <= 0) return;
+    kill(id_, SIGKILL);
+    waitpid(id_, nullptr, 0);
+  }
+  Process(const Process &) = delete;
+  Process &operator=(const Process &) = delete;
+
+  void interrupt() const { kill(id_, SIGINT); }
+
+  /// Its exit code; -1 if a signal ended it, -2 if it does not end.
+  int wait() {
+    int status = 0;
+    const auto end = steady_clock::now() + kLimit;
+    while (waitpid(id_, &status, WNOHANG) == 0) {
+      if (steady_clock::now() > end) return -2;
+      std::this_thread::sleep_for(10ms);
+    }
+    id_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+ private:
+  pid_t id_ = -1;
+};
+
+class ContainerTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() / ("redag_container_test_" + std::to_string(getpid()));
+    output_ = folder_ / "output";
+    // An install prefix with nothing but the components in it.
+    const std::filesystem::path index = folder_ / "share/ament_index/resource_index";
+    std::filesystem::create_directories(index / "rclcpp_components");
+    std::ofstream components(index / "rclcpp_components" / "examples");
+    for (const char *name : {"Sensor", "Filter", "Control"}) {
+      components << "redag_rclcpp::examples::" << name << ";" << COMPONENTS << "\n";
+    }
+    const char *prefixes = std::getenv("AMENT_PREFIX_PATH");
+    setenv("AMENT_PREFIX_PATH", (folder_.string() + ":" + (prefixes ? prefixes : "")).c_str(), 1);
+    rclcpp::init(0, nullptr);
+    spinning_.emplace();
+    node_ = std::make_shared<rclcpp::Node>("tester");
+    spinning_->add_node(node_);
+  }
+  void TearDown() override {
+    spinning_.reset();
+    node_.reset();
+    rclcpp::shutdown();
+    if (HasFailure()) std::cerr << text();
+    std::filesystem::remove_all(folder_);
+  }
+
+  Process start(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), CONTAINER);
+    return Process(arguments, output_);
+  }
+  int run(const std::vector<std::string> &arguments) { return start(arguments).wait(); }
+  [[nodiscard]] std::string text() const {
+    std::ostringstream text;
+    text << std::ifstream(output_).rdbuf();
+    return text.str();
+  }
+
+  template <class Service>
+  typename Service::Response::SharedPtr call(const std::string &name, const typename Service::Request &request) {
+    const auto client = node_->create_client<Service>(name);
+    if (!client->wait_for_service(kLimit)) return nullptr;
+    auto future = client->async_send_request(std::make_shared<typename Service::Request>(request));
+    if (spinning_->spin_until_future_complete(future, kLimit) != rclcpp::FutureReturnCode::SUCCESS) return nullptr;
+    return future.get();
+  }
+
+  LoadNode::Response::SharedPtr load(const std::string &plugin, const std::vector<rclcpp::Parameter> &parameters) {
+    LoadNode::Request request;
+    request.package_name = "examples";
+    request.plugin_name = "redag_rclcpp::examples::" + plugin;
+    request.node_namespace = "/fast";
+    for (const auto &parameter : parameters) request.parameters.push_back(parameter.to_parameter_msg());
+    return call<LoadNode>("/ComponentManager/_container/load_node", request);
+  }
+
+  template <class Condition>
+  bool eventually(Condition condition) {
+    const auto end = steady_clock::now() + kLimit;
+    while (!condition()) {
+      if (steady_clock::now() > end) return false;
+      spinning_->spin_once(10ms);
+    }
+    return true;
+  }
+
+  std::filesystem::path folder_;
+  std::filesystem::path output_;
+  rclcpp::Node::SharedPtr node_;
+  std::optional<rclcpp::executors::SingleThreadedExecutor> spinning_;
+};
+
+TEST_F(ContainerTest, HelpIsPrinted) {
+  EXPECT_EQ(run({"--help"}), 0);
+  EXPECT_THAT(text(), AllOf(HasSubstr("component_container"), HasSubstr("preemption"), HasSubstr("save_path")));
+}
+
+TEST_F(ContainerTest, BadParametersEndItWithTwo) {
+  EXPECT_EQ(run({"--ros-args", "-p", "preemption:=full"}), 2);
+  EXPECT_THAT(text(), AllOf(HasSubstr("'preemption' is full"), HasSubstr("cooperative, os")));
+
+  const std::string file = folder_ / "robot.yaml";
+  std::ofstream(file) << "name: robot\ndags:\n  - name: control\n    tsks: []\n";
+  EXPECT_EQ(run({"--ros-args", "-p", "config:=" + file}), 2);
+  EXPECT_THAT(text(), HasSubstr(file + ":4:"));
+
+  EXPECT_EQ(run({"--ros-args", "-p", "trace:=/proc/nowhere"}), 2);
+  EXPECT_THAT(text(), HasSubstr("/proc/nowhere"));
+
+  EXPECT_EQ(run({"--ros-args", "-p", "workers"}), 2);
+}
+
+TEST_F(ContainerTest, ComponentsRunAndResultsAreWrittenAtTheEnd) {
+  const std::string config = folder_ / "robot.yaml";
+  std::ofstream(config) << kWorkload;
+  const std::filesystem::path results = folder_ / "results";
+  Process container = start({"--ros-args", "-p", "config:=" + config, "-p", "trace:=" + results.string(), "-p",
+                             "metrics_file:=" + (folder_ / "last.json").string(), "-p", "metrics_period:=0.1"});
+  for (const char *plugin : {"Sensor", "Filter"}) {
+    const auto loaded = load(plugin, {{"load", 0.001}});
+    ASSERT_NE(loaded, nullptr);
+    ASSERT_TRUE(loaded->success) << loaded->error_message;
+  }
+  int estimates = 0;
+  const auto subscription =
+      node_->create_subscription<Float64>("/fast/estimate", 1, [&](const Float64 &) { ++estimates; });
+  EXPECT_TRUE(eventually([&] { return estimates >= 10; }));
+
+  const auto metrics = call<Trigger>("/ComponentManager/metrics", Trigger::Request());
+  ASSERT_NE(metrics, nullptr);
+  const Json json = Json::parse(metrics->message);
+  EXPECT_EQ(json["workers"], 2);
+  EXPECT_EQ(json["preemption"], "cooperative");
+  std::map<std::string, Json> tasks;
+  for (const Json &task : json["tasks"]) tasks[task["task"]] = task;
+  ASSERT_EQ(tasks.count("fast.filter"), 1U) << json.dump(1);
+  EXPECT_GE(tasks["fast.filter"]["finished"], 10);
+  EXPECT_GE(tasks["fast.filter"]["execution"]["max_ns"], redag::kMillisecond);
+  EXPECT_EQ(tasks["fast.sensor"]["period_ns"], 10 * redag::kMillisecond);
+
+  // A component that goes takes nothing with it.
+  const auto another = load("Control", {});
+  ASSERT_TRUE(another && another->success);
+  UnloadNode::Request unload;
+  unload.unique_id = another->unique_id;
+  const auto unloaded = call<UnloadNode>("/ComponentManager/_container/unload_node", unload);
+  ASSERT_TRUE(unloaded && unloaded->success);
+  estimates = 0;
+  EXPECT_TRUE(eventually([&] { return estimates >= 3; }));
+
+  container.interrupt();
+  EXPECT_EQ(container.wait(), 0);
+  EXPECT_THAT(text(), HasSubstr("wrote " + results.string()));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "last.json"));
+  for (const char *name : {"summary.json", "jobs.csv", "trace.json", "metrics.json"}) {
+    EXPECT_TRUE(std::filesystem::exists(results / name)) << name;
+  }
+  const auto trace = redag::trace::read_trace(results / "events.jsonl");
+  ASSERT_TRUE(trace) << to_string(trace.error());
+  const auto check =
+      redag::metrics::check_trace(*trace, redag::metrics::RuleSet::all().without(redag::metrics::Rule::Grid));
+  EXPECT_TRUE(check.ok()) << check.to_string();
+  const Json summary = Json::parse(std::ifstream(results / "summary.json"));
+  EXPECT_EQ(summary["run"]["preemption"], "cooperative");
+  EXPECT_GT(summary["total"]["finished"], 20);
+}
+
+}  // namespace
+}  // namespace redag_rclcpp

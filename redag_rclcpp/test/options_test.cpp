@@ -1,0 +1,219 @@
+// Parameters become options: defaults, what wins over what, and what mistakes are called.
+#include "redag_rclcpp/options.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "rclcpp/rclcpp.hpp"
+#include "redag/runtime/threads.hpp"
+
+namespace redag_rclcpp {
+namespace {
+
+using namespace std::chrono_literals;
+using rclcpp::Parameter;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr const char *kWorkload = R"(name: robot
+platform: {workers: 3, preemption: none}
+policy: edf
+dags:
+  - name: control
+    tasks:
+      - {name: imu, wcet: 1ms, callback: {node: /imu, timer: 5ms}}
+)";
+
+class OptionsTest : public ::testing::Test {
+ protected:
+  void SetUp() override { rclcpp::init(0, nullptr); }
+  void TearDown() override {
+    rclcpp::shutdown();
+    for (const std::string &file : files_) std::filesystem::remove(file);
+  }
+
+  static rclcpp::Node::SharedPtr node_with(const std::vector<Parameter> &overrides) {
+    return std::make_shared<rclcpp::Node>("node", rclcpp::NodeOptions().parameter_overrides(overrides));
+  }
+  static ReDAGOptions options_with(const std::vector<Parameter> &overrides) {
+    return declare_options(*node_with(overrides));
+  }
+  static std::string mistake_with(const std::vector<Parameter> &overrides) {
+    const auto node = node_with(overrides);
+    try {
+      const ReDAGOptions options = declare_options(*node);
+      (void)declare_monitor_options(*node, options);
+    } catch (const rclcpp::exceptions::InvalidParameterValueException &error) {
+      return error.what();
+    }
+    return "none";
+  }
+  std::string file_with(const std::string &text) {
+    files_.push_back(std::filesystem::temp_directory_path() / ("redag_options_test_" + std::to_string(getpid()) + "_" +
+                                                               std::to_string(files_.size()) + ".yaml"));
+    std::ofstream(files_.back()) << text;
+    return files_.back();
+  }
+
+ private:
+  std::vector<std::string> files_;
+};
+
+TEST_F(OptionsTest, Defaults) {
+  const auto node = node_with({});
+  const ReDAGOptions options = declare_options(*node);
+  EXPECT_EQ(options.workers, 0U);
+  EXPECT_EQ(options.preemption, redag::PreemptionMode::Auto);
+  EXPECT_EQ(options.policy, redag::PolicyKind::RateMonotonic);
+  EXPECT_EQ(options.threads, 0U);
+  EXPECT_TRUE(options.cpus.empty());
+  EXPECT_FALSE(options.workload);
+  EXPECT_EQ(options.default_period, 100ms);
+  EXPECT_EQ(options.learn, 10s);
+  EXPECT_TRUE(options.raise_middleware);
+  EXPECT_EQ(options.trace_capacity, 0U);
+
+  const MonitorOptions monitor = declare_monitor_options(*node, options);
+  EXPECT_EQ(monitor.period, 1s);
+  EXPECT_EQ(monitor.trace, "");
+  EXPECT_EQ(monitor.metrics_file, "");
+  EXPECT_FALSE(monitor.workload);
+}
+
+TEST_F(OptionsTest, ValuesAreRead) {
+  const std::int64_t cpu = redag::runtime::usable_cpus().front();
+  const auto node = node_with({{"workers", 2},
+                               {"preemption", "cooperative"},
+                               {"policy", "deadline_monotonic"},
+                               {"threads", 7},
+                               {"cpu_affinity", std::vector<std::int64_t>{cpu}},
+                               {"default_period", 0.02},
+                               {"learn", 1.5},
+                               {"raise_middleware", false},
+                               {"trace", "results"},
+                               {"metrics_period", 0.25},
+                               {"trace_events", 10},
+                               {"metrics_file", "m.json"},
+                               {"save_path", "s.yaml"}});
+  const ReDAGOptions options = declare_options(*node);
+  EXPECT_EQ(options.workers, 2U);
+  EXPECT_EQ(options.preemption, redag::PreemptionMode::Cooperative);
+  EXPECT_EQ(options.policy, redag::PolicyKind::DeadlineMonotonic);
+  EXPECT_EQ(options.threads, 7U);
+  EXPECT_EQ(options.cpus, std::vector<int>{static_cast<int>(cpu)});
+  EXPECT_EQ(options.default_period, 20ms);
+  EXPECT_EQ(options.learn, 1500ms);
+  EXPECT_FALSE(options.raise_middleware);
+  EXPECT_GT(options.trace_capacity, 0U);
+
+  const MonitorOptions monitor = declare_monitor_options(*node, options);
+  EXPECT_EQ(monitor.period, 250ms);
+  EXPECT_EQ(monitor.trace, "results");
+  EXPECT_EQ(monitor.trace_events, 10U);
+  EXPECT_EQ(monitor.metrics_file, "m.json");
+  EXPECT_EQ(monitor.save_path, "s.yaml");
+  EXPECT_EQ(monitor.default_period, 20ms);
+}
+
+TEST_F(OptionsTest, WholeSecondsNeedNoPoint) {
+  EXPECT_EQ(options_with({{"learn", 5}}).learn, 5s);
+  EXPECT_EQ(options_with({{"learn", 0}}).learn, 0s);
+}
+
+TEST_F(OptionsTest, TheWorkloadCountsWhereParametersAreAtTheirDefaults) {
+  const std::string file = file_with(kWorkload);
+  const ReDAGOptions from_file = options_with({{"config", file}});
+  EXPECT_EQ(from_file.workers, 3U);
+  EXPECT_EQ(from_file.preemption, redag::PreemptionMode::None);
+  EXPECT_EQ(from_file.policy, redag::PolicyKind::Edf);
+  ASSERT_TRUE(from_file.workload);
+  EXPECT_EQ(from_file.workload->name, "robot");
+
+  const ReDAGOptions given =
+      options_with({{"config", file}, {"workers", 1}, {"preemption", "cooperative"}, {"policy", "fifo"}});
+  EXPECT_EQ(given.workers, 1U);
+  EXPECT_EQ(given.preemption, redag::PreemptionMode::Cooperative);
+  EXPECT_EQ(given.policy, redag::PolicyKind::Fifo);
+}
+
+TEST_F(OptionsTest, AFileThatSaysNoNumberOfWorkersLeavesItOpen) {
+  std::string text = kWorkload;
+  text.replace(text.find("workers: 3, "), 12, "");
+  EXPECT_EQ(options_with({{"config", file_with(text)}}).workers, 0U);
+}
+
+TEST_F(OptionsTest, ResponsesAreCountedWhereBoundsArePossible) {
+  const std::string file = file_with(kWorkload);
+  EXPECT_GT(options_with({{"config", file}}).trace_capacity, 0U);
+  EXPECT_EQ(options_with({{"config", file}, {"bounds", false}}).trace_capacity, 0U);
+  std::string measured = kWorkload;
+  measured.replace(measured.find("wcet: 1ms, "), 11, "");
+  EXPECT_EQ(options_with({{"config", file_with(measured)}}).trace_capacity, 0U);
+
+  const auto node = node_with({{"config", file}, {"bounds", false}});
+  const ReDAGOptions options = declare_options(*node);
+  EXPECT_TRUE(options.workload);
+  EXPECT_FALSE(declare_monitor_options(*node, options).workload);
+}
+
+TEST_F(OptionsTest, MistakesSayWhichParameterWhatItIsAndWhatIsAllowed) {
+  EXPECT_THAT(mistake_with({{"workers", -1}}), AllOf(HasSubstr("'workers'"), HasSubstr("-1"), HasSubstr("0 to 4096")));
+  EXPECT_THAT(mistake_with({{"workers", "two"}}), AllOf(HasSubstr("'workers'"), HasSubstr("two"), HasSubstr("whole")));
+  EXPECT_THAT(mistake_with({{"workers", 2.0}}), AllOf(HasSubstr("'workers'"), HasSubstr("2.0"), HasSubstr("whole")));
+  EXPECT_THAT(mistake_with({{"preemption", "full"}}),
+              AllOf(HasSubstr("'preemption'"), HasSubstr("full"), HasSubstr("auto, none, cooperative, os")));
+  EXPECT_THAT(mistake_with({{"policy", "rm"}}), AllOf(HasSubstr("'policy'"), HasSubstr("rm"), HasSubstr("edf")));
+  EXPECT_THAT(mistake_with({{"threads", 2}, {"workers", 4}}),
+              AllOf(HasSubstr("'threads'"), HasSubstr("is 2"), HasSubstr("4 workers")));
+  EXPECT_THAT(mistake_with({{"cpu_affinity", std::vector<std::int64_t>{100'000}}}),
+              AllOf(HasSubstr("'cpu_affinity'"), HasSubstr("100000"), HasSubstr("may use (")));
+  EXPECT_THAT(mistake_with({{"default_period", 0.0}}), AllOf(HasSubstr("'default_period'"), HasSubstr("above 0")));
+  EXPECT_THAT(mistake_with({{"learn", -1.0}}), AllOf(HasSubstr("'learn'"), HasSubstr("-1")));
+  EXPECT_THAT(mistake_with({{"learn", "long"}}), AllOf(HasSubstr("'learn'"), HasSubstr("long"), HasSubstr("seconds")));
+  EXPECT_THAT(mistake_with({{"raise_middleware", 1}}),
+              AllOf(HasSubstr("'raise_middleware'"), HasSubstr("true, false")));
+  EXPECT_THAT(mistake_with({{"bounds", "yes"}}), AllOf(HasSubstr("'bounds'"), HasSubstr("true, false")));
+  EXPECT_THAT(mistake_with({{"trace", 3}}), AllOf(HasSubstr("'trace'"), HasSubstr("folder")));
+  EXPECT_THAT(mistake_with({{"trace_events", 0}}), AllOf(HasSubstr("'trace_events'"), HasSubstr("from 1")));
+  EXPECT_THAT(mistake_with({{"metrics_period", std::numeric_limits<double>::quiet_NaN()}}),
+              AllOf(HasSubstr("'metrics_period'"), HasSubstr("nan")));
+}
+
+TEST_F(OptionsTest, MistakesInTheWorkloadAreNamedByLine) {
+  std::string text = kWorkload;
+  text.replace(text.find("wcet"), 4, "wect");
+  const std::string file = file_with(text);
+  EXPECT_THAT(mistake_with({{"config", file}}),
+              AllOf(HasSubstr("'config'"), HasSubstr(file + ":7:"), HasSubstr("wcet")));
+  EXPECT_THAT(mistake_with({{"config", "/nowhere/robot.yaml"}}), AllOf(HasSubstr("'config'"), HasSubstr("/nowhere")));
+}
+
+TEST_F(OptionsTest, ParametersSayWhatTheyAreAndStay) {
+  const auto node = node_with({});
+  const ReDAGOptions options = declare_options(*node);
+  (void)declare_monitor_options(*node, options);
+  for (const char *name :
+       {"workers", "preemption", "policy", "threads", "cpu_affinity", "config", "default_period", "learn",
+        "raise_middleware", "metrics_period", "trace", "bounds", "trace_events", "metrics_file", "save_path"}) {
+    const auto descriptor = node->describe_parameter(name);
+    EXPECT_FALSE(descriptor.description.empty()) << name;
+    EXPECT_FALSE(descriptor.additional_constraints.empty()) << name;
+    EXPECT_EQ(descriptor.read_only, std::string(name) != "save_path") << name;
+  }
+  EXPECT_FALSE(node->set_parameter({"workers", 2}).successful);
+  EXPECT_TRUE(node->set_parameter({"save_path", "elsewhere.yaml"}).successful);
+}
+
+TEST_F(OptionsTest, ParametersThatAreThereAlreadyAreRead) {
+  const auto node = std::make_shared<rclcpp::Node>("node", rclcpp::NodeOptions()
+                                                               .parameter_overrides({{"workers", 2}})
+                                                               .automatically_declare_parameters_from_overrides(true));
+  EXPECT_EQ(declare_options(*node).workers, 2U);
+  EXPECT_EQ(declare_options(*node).workers, 2U);
+}
+
+}  // namespace
+}  // namespace redag_rclcpp
