@@ -616,6 +616,7 @@ void ReDAGExecutor::Core::stop_learning() {
 redag::Duration ReDAGExecutor::Core::learned_period(const Record &record, int depth) const {
   constexpr int kDeepest = 32;
   if (record.configured || record.callback->is_timer()) return record.task.period;
+  if (is_ros_internal(record.id)) return 0;  // loading nodes comes in bursts that say nothing of a rate
   redag::Duration period = 0;
   for (const redag::TaskId publisher : record.callback->publishers()) {
     if (depth >= kDeepest || publisher.value >= records_.size() || !records_[publisher.value].callback) continue;
