@@ -3,13 +3,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <tuple>
 
+#include "rclcpp/version.h"
 #include "redag/metrics/jobs.hpp"
 #include "redag/metrics/trace_checker.hpp"
+#include "redag/model/callback_match.hpp"
 #include "redag/model/demand.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "workload/node_events.hpp"
@@ -353,7 +358,8 @@ TEST_F(Nodes, EveryCallbackIsBoundToATaskOfItsOwn) {
 }
 
 TEST_F(Nodes, TimersAreOnTheGrid) {
-  WorkloadNodes nodes(workload_of(kLight), {});
+  const Workload workload = workload_of(kLight);
+  WorkloadNodes nodes(workload, {});
   nodes.arm(timer_clock_now() + 100 * kMillisecond);
   EXPECT_LT(nodes.phase_error(), kMillisecond);
 }

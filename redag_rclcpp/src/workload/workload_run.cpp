@@ -260,7 +260,7 @@ RuleSet node_rules() {
   return rules;
 }
 
-RuleSet scheduler_rules() { return RuleSet::all(); }
+RuleSet scheduler_rules() { return RuleSet::all().without(Rule::Grid); }
 
 redag::Result<WorkloadRun> run_as_nodes(const redag::Workload &workload, const WorkloadRunOptions &options) {
   return Run(workload, options).execute();

@@ -51,7 +51,8 @@ struct WorkloadRun {
 /// a body (threads, messages under way) is not, so that nothing is said about priorities or idle workers.
 [[nodiscard]] redag::metrics::RuleSet node_rules();
 
-/// Those that our executor's own trace is held to: it has no grid for what messages release, and no workers' Started.
+/// Those that our executor's own trace is held to: all but the grid, which what messages release has not, and whose
+/// origin for the timers is theirs.
 [[nodiscard]] redag::metrics::RuleSet scheduler_rules();
 
 /// `workload` must be valid. Errors: what ROS or the machine refuse.
