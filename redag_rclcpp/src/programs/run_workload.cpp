@@ -318,6 +318,7 @@ int compare(const redag::Workload &workload, const Arguments &arguments, const s
   std::map<std::string, Repetitions> results;
   bool failed = false;
   bool lawful = true;
+  bool real_time = false;
   for (std::uint32_t repetition = 0; repetition < arguments.repeat && !interrupted && !failed; ++repetition) {
     for (const std::string &executor : arguments.executors) {
       if (interrupted) break;
@@ -336,6 +337,7 @@ int compare(const redag::Workload &workload, const Arguments &arguments, const s
         lawful = false;
       }
       if (interrupted) break;  // a shorter run is not comparable
+      real_time = real_time || trace->info.preemption == "os";
       results[executor].push_back(redag::metrics::summarize(*trace).dags);
     }
   }
@@ -347,6 +349,11 @@ int compare(const redag::Workload &workload, const Arguments &arguments, const s
     fmt::print(
         "missed: late, skipped or aborted of released jobs, median of the runs; response times: finish - release, "
         "medians\n");
+  }
+  if (real_time && results.size() > 1) {
+    fmt::print(
+        "note: redag with preemption os has real-time (SCHED_FIFO) threads, the others have not: on a busy "
+        "machine part of the difference is that alone\n");
   }
   if (interrupted) fmt::print("stopped early: only whole runs are shown\n");
   if (failed) return kExitBad;
