@@ -94,6 +94,7 @@ Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id,
 Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ServiceBase::SharedPtr &service)
     : Callback(std::move(intake), std::move(id)) {
   service_ = service;
+  by_wait_set_ = compat::needs_wait_set(std::string(service->get_service_name()));
 }
 
 Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ClientBase::SharedPtr &client)

@@ -360,7 +360,7 @@ dags:
 INSTANTIATE_TEST_SUITE_P(Modes, ExecutorTest,
                          ::testing::Values(redag::PreemptionMode::None, redag::PreemptionMode::Cooperative,
                                            redag::PreemptionMode::Os),
-                         [](const auto &info) { return std::string(to_string(info.param)); });
+                         [](const auto &mode) { return std::string(to_string(mode.param)); });
 
 }  // namespace
 }  // namespace redag_rclcpp

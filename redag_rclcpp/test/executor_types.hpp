@@ -14,7 +14,7 @@
 
 namespace redag_rclcpp {
 
-template <redag::PreemptionMode mode>
+template <redag::PreemptionMode kMode>
 class ReDAGWith : public ReDAGExecutor {
  public:
   ReDAGWith() : ReDAGExecutor(options()) {}
@@ -22,7 +22,7 @@ class ReDAGWith : public ReDAGExecutor {
  private:
   static ReDAGOptions options() {
     ReDAGOptions options;
-    options.preemption = mode;
+    options.preemption = kMode;
     options.workers = 2;
     return options;
   }

@@ -1,0 +1,268 @@
+// Latency and cost of executors, side by side: ours in each preemption mode and rclcpp's own, interleaved round by round
+// in one process. Prints a table of medians over the rounds, and ratios to the best of rclcpp's.
+//
+//   ros2 run redag_rclcpp bench_executors [--rounds 5] [--seconds 1] [--only timer_idle,...]
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "rclcpp/rclcpp.hpp"
+#include "rclcpp/version.h"
+#include "redag_rclcpp/executor.hpp"
+#include "std_msgs/msg/u_int64.hpp"
+#if RCLCPP_VERSION_MAJOR >= 21
+#include "rclcpp/experimental/executors/events_executor/events_executor.hpp"
+#endif
+
+namespace {
+
+using namespace std::chrono_literals;
+using Message = std_msgs::msg::UInt64;
+using std::chrono::nanoseconds;
+using std::chrono::steady_clock;
+
+std::int64_t now_ns() { return steady_clock::now().time_since_epoch().count(); }
+
+double cpu_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval &t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+struct Kind {
+  std::string name;
+  std::function<std::unique_ptr<rclcpp::Executor>()> make;
+  bool is_ours = false;
+};
+
+std::unique_ptr<rclcpp::Executor> make_redag(redag::PreemptionMode mode) {
+  redag_rclcpp::ReDAGOptions options;
+  options.preemption = mode;
+  return std::make_unique<redag_rclcpp::ReDAGExecutor>(options);
+}
+
+std::vector<Kind> kinds() {
+  std::vector<Kind> all;
+  all.push_back({"ste", [] { return std::make_unique<rclcpp::executors::SingleThreadedExecutor>(); }});
+  all.push_back({"mte", [] { return std::make_unique<rclcpp::executors::MultiThreadedExecutor>(rclcpp::ExecutorOptions(), 2); }});
+  all.push_back({"static", [] { return std::make_unique<rclcpp::executors::StaticSingleThreadedExecutor>(); }});
+#if RCLCPP_VERSION_MAJOR >= 21
+  all.push_back({"events", [] { return std::make_unique<rclcpp::experimental::executors::EventsExecutor>(); }});
+#endif
+  all.push_back({"redag-none", [] { return make_redag(redag::PreemptionMode::None); }, true});
+  all.push_back({"redag-coop", [] { return make_redag(redag::PreemptionMode::Cooperative); }, true});
+  if (redag::runtime::probe_priority_band().top_job > 0) {
+    all.push_back({"redag-os", [] { return make_redag(redag::PreemptionMode::Os); }, true});
+  }
+  return all;
+}
+
+/// Microseconds, or what the measurement says.
+struct Sample {
+  std::vector<double> values;
+  void add(double value) { values.push_back(value); }
+  [[nodiscard]] double at(double share) {
+    if (values.empty()) return 0;
+    const auto n = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n), values.end());
+    return values[n];
+  }
+};
+
+using Figures = std::map<std::string, double>;
+
+class Spinning {
+ public:
+  explicit Spinning(rclcpp::Executor &executor) : executor_(executor), thread_([&] { executor.spin(); }) {
+    while (!executor.is_spinning()) std::this_thread::sleep_for(100us);
+    std::this_thread::sleep_for(50ms);
+  }
+  ~Spinning() {
+    executor_.cancel();
+    thread_.join();
+  }
+
+ private:
+  rclcpp::Executor &executor_;
+  std::thread thread_;
+};
+
+void burn(nanoseconds time) {
+  const auto end = steady_clock::now() + time;
+  while (steady_clock::now() < end) {
+  }
+}
+
+// A 100 Hz timer; how late is each call against a grid fitted to the earliest ones? With `load`, another callback of a
+// group of its own computes 60 ms of every 100 ms.
+Figures timer_lateness(rclcpp::Executor &executor, double seconds, bool load) {
+  auto node = std::make_shared<rclcpp::Node>("bench");
+  auto fast = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
+  auto slow = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
+  std::vector<std::int64_t> calls;
+  calls.reserve(100000);
+  auto timer = node->create_wall_timer(10ms, [&] { calls.push_back(now_ns()); }, fast);
+  rclcpp::TimerBase::SharedPtr background;
+  if (load) background = node->create_wall_timer(100ms, [] { burn(60ms); }, slow);
+  executor.add_node(node);
+  {
+    Spinning spinning(executor);
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  }
+  executor.remove_node(node);
+  // The grid: the phase that no call is earlier than.
+  constexpr std::int64_t kPeriod = 10'000'000;
+  std::int64_t phase = kPeriod;
+  if (calls.empty()) return {};
+  const std::int64_t first = calls.front();
+  for (const std::int64_t call : calls) {
+    std::int64_t offset = (call - first) % kPeriod;
+    if (offset > kPeriod / 2) offset -= kPeriod;
+    phase = std::min(phase, offset);
+  }
+  Sample lateness;
+  std::int64_t last_point = -1;
+  std::size_t points = 0;
+  for (const std::int64_t call : calls) {
+    const std::int64_t since = call - first - phase;
+    const std::int64_t point = since / kPeriod;
+    if (point != last_point) ++points;
+    last_point = point;
+    lateness.add(static_cast<double>(since - point * kPeriod) / 1e3);
+  }
+  const auto expected = static_cast<double>((calls.back() - first) / kPeriod + 1);
+  return {{"p50_us", lateness.at(0.5)},
+          {"p99_us", lateness.at(0.99)},
+          {"lost_%", 100.0 * (1.0 - static_cast<double>(points) / expected)}};
+}
+
+// From publish() to the callback's begin, at 500 Hz.
+Figures publish_latency(rclcpp::Executor &executor, double seconds, bool intra_process) {
+  auto node = std::make_shared<rclcpp::Node>("bench", rclcpp::NodeOptions().use_intra_process_comms(intra_process));
+  Sample latency;
+  auto subscription = node->create_subscription<Message>("latency", rclcpp::QoS(10), [&](Message::UniquePtr message) {
+    latency.add(static_cast<double>(now_ns() - static_cast<std::int64_t>(message->data)) / 1e3);
+  });
+  auto publisher = node->create_publisher<Message>("latency", rclcpp::QoS(10));
+  executor.add_node(node);
+  {
+    Spinning spinning(executor);
+    const int count = static_cast<int>(seconds * 500);
+    for (int i = 0; i < count; ++i) {
+      auto message = std::make_unique<Message>();
+      message->data = static_cast<std::uint64_t>(now_ns());
+      publisher->publish(std::move(message));
+      std::this_thread::sleep_for(2ms);
+    }
+    std::this_thread::sleep_for(50ms);
+  }
+  executor.remove_node(node);
+  return {{"p50_us", latency.at(0.5)}, {"p99_us", latency.at(0.99)}};
+}
+
+// Callbacks that each publish to the next of a ring of `count` subscriptions: the executor is never idle.
+Figures saturation(rclcpp::Executor &executor, double seconds, int count) {
+  auto node = std::make_shared<rclcpp::Node>("bench", rclcpp::NodeOptions().use_intra_process_comms(true));
+  std::vector<rclcpp::Subscription<Message>::SharedPtr> subscriptions;
+  std::vector<rclcpp::Publisher<Message>::SharedPtr> publishers;
+  std::atomic<std::uint64_t> calls{0};
+  std::atomic<bool> stop{false};
+  for (int i = 0; i < count; ++i) {
+    publishers.push_back(node->create_publisher<Message>("ring" + std::to_string(i), rclcpp::QoS(10)));
+  }
+  for (int i = 0; i < count; ++i) {
+    auto &next = publishers[static_cast<std::size_t>((i + 1) % count)];
+    subscriptions.push_back(node->create_subscription<Message>(
+        "ring" + std::to_string(i), rclcpp::QoS(10), [&, next](Message::UniquePtr message) {
+          calls.fetch_add(1, std::memory_order_relaxed);
+          if (!stop) next->publish(std::move(message));
+        }));
+  }
+  executor.add_node(node);
+  Figures figures;
+  {
+    Spinning spinning(executor);
+    publishers[0]->publish(std::make_unique<Message>());
+    std::this_thread::sleep_for(20ms);
+    const std::uint64_t calls_before = calls;
+    const double cpu_before = cpu_seconds();
+    const auto start = steady_clock::now();
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+    const double elapsed = std::chrono::duration<double>(steady_clock::now() - start).count();
+    const auto done = static_cast<double>(calls - calls_before);
+    figures["kcalls_per_s"] = done / elapsed / 1e3;
+    figures["cpu_s_per_10k"] = (cpu_seconds() - cpu_before) / done * 1e4;
+    stop = true;
+    std::this_thread::sleep_for(20ms);
+  }
+  executor.remove_node(node);
+  return figures;
+}
+
+struct Measurement {
+  std::string name;
+  std::function<Figures(rclcpp::Executor &, double)> run;
+};
+
+std::vector<Measurement> measurements() {
+  return {
+      {"timer_idle", [](auto &e, double s) { return timer_lateness(e, s, false); }},
+      {"timer_loaded", [](auto &e, double s) { return timer_lateness(e, s, true); }},
+      {"intra_process", [](auto &e, double s) { return publish_latency(e, s, true); }},
+      {"dds", [](auto &e, double s) { return publish_latency(e, s, false); }},
+      {"saturation_1", [](auto &e, double s) { return saturation(e, s, 1); }},
+      {"saturation_50", [](auto &e, double s) { return saturation(e, s, 50); }},
+  };
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values.empty() ? 0 : values[values.size() / 2];
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  int rounds = 5;
+  double seconds = 1;
+  std::string only;
+  for (int i = 1; i + 1 < argc; i += 2) {
+    const std::string option = argv[i];
+    if (option == "--rounds") rounds = std::atoi(argv[i + 1]);
+    if (option == "--seconds") seconds = std::atof(argv[i + 1]);
+    if (option == "--only") only = argv[i + 1];
+  }
+  rclcpp::init(0, nullptr);
+  rclcpp::get_logger("redag_rclcpp").set_level(rclcpp::Logger::Level::Error);
+  const auto all = kinds();
+  for (const Measurement &measurement : measurements()) {
+    if (!only.empty() && ("," + only + ",").find("," + measurement.name + ",") == std::string::npos) continue;
+    std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, by executor
+    for (int round = 0; round < rounds; ++round) {
+      for (const Kind &kind : all) {
+        const auto executor = kind.make();
+        for (const auto &[figure, value] : measurement.run(*executor, seconds)) results[figure][kind.name].push_back(value);
+      }
+    }
+    std::printf("%s\n", measurement.name.c_str());
+    for (auto &[figure, by_kind] : results) {
+      std::printf("  %-14s", figure.c_str());
+      for (const Kind &kind : all) std::printf("  %s %.3g", kind.name.c_str(), median(by_kind[kind.name]));
+      std::printf("\n");
+    }
+    std::fflush(stdout);
+  }
+  rclcpp::shutdown();
+}
