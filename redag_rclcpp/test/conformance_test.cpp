@@ -75,6 +75,11 @@ class Conformance : public ::testing::Test {
     node.reset();
     if (rclcpp::ok()) rclcpp::shutdown();
   }
+  /// After a node with several groups was removed. Humble's executors keep pointers to the guard conditions of its
+  /// groups and use them when they are spun again; ours has to go on.
+  void renew_executor() {
+    if (!kOurs<T>) executor = std::make_unique<T>();
+  }
 
   std::shared_ptr<rclcpp::Node> node;
   std::unique_ptr<T> executor;
@@ -296,10 +301,10 @@ TYPED_TEST(Conformance, AFutureOfAnotherThreadEndsTheSpin) {
   std::thread other([&] {
     std::this_thread::sleep_for(50ms);
     promise.set_value();
-    // rclcpp's executors look at the future only when something wakes them.
-    std::this_thread::sleep_for(50ms);
-    this->node->get_node_base_interface()->get_notify_guard_condition().trigger();
   });
+  // rclcpp's executors look at the future only when something wakes them.
+  rclcpp::TimerBase::SharedPtr waking;
+  if (!kOurs<TypeParam>) waking = this->node->create_wall_timer(10ms, [] {});
   EXPECT_EQ(this->executor->spin_until_future_complete(future, kLimit), rclcpp::FutureReturnCode::SUCCESS);
   other.join();
 }
@@ -419,6 +424,7 @@ TYPED_TEST(Conformance, GroupsAndReentrantCallbacksRunInParallel) {
       EXPECT_TRUE(eventually([&] { return met.load(); }));
     }
     this->executor->remove_node(other);
+    this->renew_executor();
   }
 }
 
