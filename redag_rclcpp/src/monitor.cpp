@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -161,8 +162,8 @@ Snapshot Monitor::Impl::snapshot() {
     TaskFigures task;
     task.stats = callback;
     const auto kind = callback.id.kind;
-    const bool learned = kind == redag::Callback::Kind::Subscription && !result.learning &&
-                         callback.period != options_.default_period.count();
+    const bool learned = kind == redag::Callback::Kind::Subscription && !is_ros_internal(callback.id) &&
+                         !result.learning && callback.period != options_.default_period.count();
     task.has_deadline = !callback.dag.empty() || kind == redag::Callback::Kind::Timer || learned;
     if (bounds_) {
       const auto bound = bounds_->tasks().find(callback.task);
@@ -176,8 +177,13 @@ Snapshot Monitor::Impl::snapshot() {
 redag::Result<std::string> Monitor::Impl::save(const std::string &path) const {
   if (path.empty()) return redag::make_error("parameter 'save_path' is empty", "set it to the path of a file");
   const std::string absolute = std::filesystem::absolute(path).lexically_normal().string();
+  std::set<std::string> configured;
+  for (const CallbackStats &callback : executor_.stats()) configured.insert(callback.dag);
+  redag::Workload learned = executor_.learned();
+  drop_idle_tasks(learned, configured);
+  if (learned.dags.empty()) return redag::make_error("no callback has run yet");
   const redag::Result<void> saved =
-      redag::save_workload(executor_.learned(), absolute, redag::ValidateOptions{.wcet_optional = true});
+      redag::save_workload(learned, absolute, redag::ValidateOptions{.wcet_optional = true});
   if (!saved) return tl::unexpected<redag::Diagnostics>(saved.error());
   return absolute;
 }

@@ -125,12 +125,39 @@ std::string summarize(const Snapshot &snapshot) {
   return text;
 }
 
+void drop_idle_tasks(redag::Workload &workload, const std::set<std::string> &configured) {
+  for (redag::Dag &dag : workload.dags) {
+    if (configured.count(dag.name) > 0) continue;
+    std::vector<redag::Task> kept;
+    std::map<std::uint32_t, std::uint32_t> positions;
+    for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {
+      if (dag.tasks[i].wcet == 0) continue;
+      positions[i] = static_cast<std::uint32_t>(kept.size());
+      kept.push_back(dag.tasks[i]);
+    }
+    for (redag::Task &task : kept) {
+      std::vector<std::uint32_t> predecessors;
+      for (const std::uint32_t p : task.predecessors) {
+        if (const auto position = positions.find(p); position != positions.end())
+          predecessors.push_back(position->second);
+      }
+      if (predecessors.empty()) task.activation = redag::Activation::Timer;
+      task.predecessors = std::move(predecessors);
+    }
+    dag.tasks = std::move(kept);
+  }
+  auto &dags = workload.dags;
+  dags.erase(std::remove_if(dags.begin(), dags.end(), [](const redag::Dag &dag) { return dag.tasks.empty(); }),
+             dags.end());
+}
+
 std::vector<DiagnosticStatus> Diagnoser::diagnose(const Snapshot &snapshot) {
   std::vector<DiagnosticStatus> result{executor_status(snapshot)};
   std::map<std::string, std::size_t> positions;
   for (const TaskFigures &task : snapshot.tasks) {
     const CallbackStats &stats = task.stats;
-    if (stats.dag.empty() && is_ros_internal(stats.id)) continue;
+    // Nodes have many callbacks that never run: services, events of publishers.
+    if (stats.dag.empty() && (stats.jobs.released == 0 || is_ros_internal(stats.id))) continue;
     const std::string name = stats.dag.empty() ? "ReDAG: node " + stats.id.node : "ReDAG: DAG " + stats.dag;
     const auto [entry, is_new] = positions.emplace(name, result.size());
     if (is_new) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,10 @@ struct Snapshot {
 
 /// One line for people: jobs, misses, and who missed most.
 [[nodiscard]] std::string summarize(const Snapshot &snapshot);
+
+/// Leaves out the tasks that never ran (services that nobody called, events of publishers), save those of DAGs that are
+/// in `configured`, and DAGs without tasks: they would keep the workload from being analysed.
+void drop_idle_tasks(redag::Workload &workload, const std::set<std::string> &configured);
 
 /// Turns snapshots into diagnostics; what is new is new since the last one.
 class Diagnoser {

@@ -253,11 +253,14 @@ TEST(Diagnoser, SaysWhatWasWrong) {
   other.stats.id.node = "/lidar";
   other.stats.id.name = "/scan";
   other.stats.task = to_string(other.stats.id);
+  TaskFigures idle = other;
+  idle.stats.id.node = "/idle";
+  other.stats.jobs.released = 3;
   TaskFigures internal = other;
   internal.stats.id.name = "/parameter_events";
   internal.stats.id.node = "/clock_node";
   Diagnoser diagnoser;
-  const auto statuses = diagnoser.diagnose(snapshot_of({task, other, internal}));
+  const auto statuses = diagnoser.diagnose(snapshot_of({task, other, internal, idle}));
 
   const DiagnosticStatus *dag = find_status(statuses, "ReDAG: DAG control");
   ASSERT_NE(dag, nullptr);
@@ -271,9 +274,36 @@ TEST(Diagnoser, SaysWhatWasWrong) {
   const DiagnosticStatus *node = find_status(statuses, "ReDAG: node /lidar");
   ASSERT_NE(node, nullptr);
   EXPECT_EQ(node->level, DiagnosticStatus::OK);
-  EXPECT_EQ(value_of(*node, "subscription /scan released"), "0");
+  EXPECT_EQ(value_of(*node, "subscription /scan released"), "3");
   EXPECT_EQ(find_status(statuses, "ReDAG: node /clock_node"), nullptr) << "ROS' own";
+  EXPECT_EQ(find_status(statuses, "ReDAG: node /idle"), nullptr) << "never ran";
   EXPECT_NE(find_status(statuses, "ReDAG: executor"), nullptr);
+}
+
+TEST(DropIdleTasks, LeavesWhatCanBeAnalysed) {
+  redag::Workload workload = parse(R"(
+name: test
+dags:
+  - name: ros
+    tasks:
+      - {name: idle, period: 10ms, callback: {node: /a, waitable: any}}
+      - {name: source, wcet: 1ms, callback: {node: /a, timer: 10ms}}
+      - {name: sink, wcet: 1ms, activation: data, after: source, callback: {node: /b, subscription: /x}}
+      - {name: orphan, wcet: 1ms, activation: data, after: idle, callback: {node: /b, subscription: /y}}
+  - {name: control, tasks: [{name: loop, callback: {node: /robot, timer: 10ms}}]}
+  - {name: unused, tasks: [{name: never, period: 10ms, callback: {node: /c, service: /c/s}}]}
+)");
+  drop_idle_tasks(workload, {"control"});
+  ASSERT_EQ(workload.dags.size(), 2U);
+  const redag::Dag &ros = workload.dags[0];
+  ASSERT_EQ(ros.tasks.size(), 3U);
+  EXPECT_EQ(ros.tasks[0].name, "source");
+  EXPECT_THAT(ros.tasks[1].predecessors, ElementsAre(0));
+  EXPECT_EQ(ros.tasks[1].activation, redag::Activation::Data);
+  EXPECT_EQ(ros.tasks[2].name, "orphan");
+  EXPECT_THAT(ros.tasks[2].predecessors, IsEmpty());
+  EXPECT_EQ(ros.tasks[2].activation, redag::Activation::Timer);
+  EXPECT_EQ(workload.dags[1].name, "control") << "as its file has it";
 }
 
 // ---- with an executor ----

@@ -51,7 +51,8 @@ class Monitor {
   /// What ~/metrics answers ("redag.metrics/1", docs/results_format.md).
   [[nodiscard]] std::string metrics() const;
 
-  /// Writes ReDAGExecutor::learned() as a workload file. The path as an absolute one, or why not.
+  /// Writes ReDAGExecutor::learned() as a workload file, without unnamed callbacks that never ran. The path as an
+  /// absolute one, or why not.
   [[nodiscard]] redag::Result<std::string> save(const std::string &path) const;
 
   /// To be called when spinning has ended: writes the files of the options. Later calls do nothing.
