@@ -74,10 +74,11 @@ inline void set_on_reset(rclcpp::TimerBase &, const std::function<void()> &) {}
 inline void clear_on_reset(rclcpp::TimerBase &) {}
 #endif
 
-/// Are there events of this waitable that its on-ready hook does not tell of? Action servers tell only wait sets that
-/// goals expire; since Jazzy they have a hook for that too.
+/// Are there events of this waitable that its on-ready hook does not tell of? Action servers, up to Jazzy at least, tell
+/// only wait sets that goals expire (rclcpp issue 2661). Newer ones have not been tried: there it costs nothing but the
+/// exact arrival times of goals.
 inline bool needs_wait_set(const rclcpp::Waitable &waitable) {
-  return RCLCPP_VERSION_MAJOR < 28 && dynamic_cast<const rclcpp_action::ServerBase *>(&waitable) != nullptr;
+  return dynamic_cast<const rclcpp_action::ServerBase *>(&waitable) != nullptr;
 }
 
 /// Must the service be destroyed without a hook? Life-cycle nodes finalise the middleware's part of their services

