@@ -130,7 +130,7 @@ Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot bel
   RunningJob::set_current(&running);
   const Outcome outcome = call(assignment);
   RunningJob::set_current(running.below);
-  return finish(self, assignment, outcome, running.cpu_time(), below);
+  return finish(self, assignment, outcome, running.total >= 0 ? running.total : running.cpu_time(), below);
 }
 
 Outcome Engine::call(const Assignment &assignment) {

@@ -33,6 +33,7 @@ namespace redag::runtime {
 struct Job {
   TaskId task;
   std::uint32_t number = 0;  // within its task, from 0
+  Time release = 0;          // nominal
   JobSlot slot;
   WorkerId worker;  // with `os`: the processor it was given first
 };

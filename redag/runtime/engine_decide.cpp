@@ -83,7 +83,7 @@ Engine::Assignment Engine::assign(Thread &thread, const Dispatch &dispatch) {
   REDAG_CHECK(entry.busy < entry.concurrency, "more jobs of one task at a time than it allows");
   ++entry.busy;
   ++unfinished_;
-  const Job job{dispatch.task, dispatch.number, dispatch.job, dispatch.worker};
+  const Job job{dispatch.task, dispatch.number, dispatch.release, dispatch.job, dispatch.worker};
   thread.stack.push_back(job);
   return Assignment{job, &entry};
 }

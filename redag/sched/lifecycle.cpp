@@ -306,8 +306,8 @@ void Lifecycle::start(std::uint32_t slot, WorkerId worker, std::uint32_t over, s
   job.state = JobState::Running;
   job.worker = worker;
   emit(job, JobEventKind::Dispatched, job.deadline);
-  dispatches_.push_back(
-      Dispatch{JobSlot(slot), job.task, job.number, worker, over == kNil ? JobSlot() : JobSlot(over), false, level});
+  dispatches_.push_back(Dispatch{JobSlot(slot), job.task, job.number, job.release, worker,
+                                 over == kNil ? JobSlot() : JobSlot(over), false, level});
 }
 
 void Lifecycle::suspend(std::uint32_t slot) {
@@ -321,13 +321,13 @@ void Lifecycle::resume(std::uint32_t slot, WorkerId worker, std::uint32_t over, 
   job.state = JobState::Running;
   job.worker = worker;
   emit(job, JobEventKind::Resumed, 0);
-  dispatches_.push_back(
-      Dispatch{JobSlot(slot), job.task, job.number, worker, over == kNil ? JobSlot() : JobSlot(over), true, level});
+  dispatches_.push_back(Dispatch{JobSlot(slot), job.task, job.number, job.release, worker,
+                                 over == kNil ? JobSlot() : JobSlot(over), true, level});
 }
 
 void Lifecycle::change_level(std::uint32_t slot, std::uint32_t level) {
   const Job &job = jobs_[slot];
-  dispatches_.push_back(Dispatch{JobSlot(slot), job.task, job.number, job.worker, JobSlot(), true, level});
+  dispatches_.push_back(Dispatch{JobSlot(slot), job.task, job.number, job.release, job.worker, JobSlot(), true, level});
 }
 
 void Lifecycle::defer(std::uint32_t slot) {

@@ -50,6 +50,7 @@ struct Dispatch {
   JobSlot job;
   TaskId task;
   std::uint32_t number = 0;  // of the job within its task
+  Time release = 0;          // nominal
   WorkerId worker;
   JobSlot over;         // the job that loses the worker (Full), or is suspended under this one (Cooperative); or none
   bool resume = false;  // the job had started before

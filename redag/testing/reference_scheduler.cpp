@@ -440,8 +440,8 @@ void ReferenceScheduler::resume_uncovered(Time now) {
     jobs_[top].state = State::Running;
     jobs_[top].told_level = level_of(top);
     emit(JobEventKind::Resumed, top, now, 0, w);
-    dispatches_.push_back(Dispatch{JobSlot(top), TaskId(jobs_[top].task), jobs_[top].number, WorkerId(w),
-                                   JobSlot::none(), true, level_of(top)});
+    dispatches_.push_back(Dispatch{JobSlot(top), TaskId(jobs_[top].task), jobs_[top].number, jobs_[top].release,
+                                   WorkerId(w), JobSlot::none(), true, level_of(top)});
   }
 }
 
@@ -451,8 +451,8 @@ void ReferenceScheduler::tell_levels() {
     Job &j = jobs_[i];
     if (j.state != State::Running || j.told_level == level_of(i)) continue;
     j.told_level = level_of(i);
-    dispatches_.push_back(
-        Dispatch{JobSlot(i), TaskId(j.task), j.number, WorkerId(j.worker), JobSlot::none(), true, j.told_level});
+    dispatches_.push_back(Dispatch{JobSlot(i), TaskId(j.task), j.number, j.release, WorkerId(j.worker), JobSlot::none(),
+                                   true, j.told_level});
   }
 }
 

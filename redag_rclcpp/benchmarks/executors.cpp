@@ -1,5 +1,5 @@
-// Latency and cost of executors, side by side: ours in each preemption mode and rclcpp's own, interleaved round by round
-// in one process. Prints a table of medians over the rounds, and ratios to the best of rclcpp's.
+// Latency and cost of executors, side by side: ours in each preemption mode and rclcpp's own, interleaved round by
+// round in one process. Prints a table of medians over the rounds, and ratios to the best of rclcpp's.
 //
 //   ros2 run redag_rclcpp bench_executors [--rounds 5] [--seconds 1] [--only timer_idle,...]
 #include <sys/resource.h>
@@ -37,7 +37,9 @@ std::int64_t now_ns() { return steady_clock::now().time_since_epoch().count(); }
 double cpu_seconds() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval &t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  const auto seconds = [](const timeval &t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
@@ -56,7 +58,8 @@ std::unique_ptr<rclcpp::Executor> make_redag(redag::PreemptionMode mode) {
 std::vector<Kind> kinds() {
   std::vector<Kind> all;
   all.push_back({"ste", [] { return std::make_unique<rclcpp::executors::SingleThreadedExecutor>(); }});
-  all.push_back({"mte", [] { return std::make_unique<rclcpp::executors::MultiThreadedExecutor>(rclcpp::ExecutorOptions(), 2); }});
+  all.push_back(
+      {"mte", [] { return std::make_unique<rclcpp::executors::MultiThreadedExecutor>(rclcpp::ExecutorOptions(), 2); }});
   all.push_back({"static", [] { return std::make_unique<rclcpp::executors::StaticSingleThreadedExecutor>(); }});
 #if RCLCPP_VERSION_MAJOR >= 21
   all.push_back({"events", [] { return std::make_unique<rclcpp::experimental::executors::EventsExecutor>(); }});
@@ -113,9 +116,12 @@ Figures timer_lateness(rclcpp::Executor &executor, double seconds, bool load) {
   auto slow = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
   std::vector<std::int64_t> calls;
   calls.reserve(100000);
-  auto timer = node->create_wall_timer(10ms, [&] { calls.push_back(now_ns()); }, fast);
+  auto timer = node->create_wall_timer(
+      10ms, [&] { calls.push_back(now_ns()); }, fast);
   rclcpp::TimerBase::SharedPtr background;
-  if (load) background = node->create_wall_timer(100ms, [] { burn(60ms); }, slow);
+  if (load)
+    background = node->create_wall_timer(
+        100ms, [] { burn(60ms); }, slow);
   executor.add_node(node);
   {
     Spinning spinning(executor);
@@ -184,11 +190,11 @@ Figures saturation(rclcpp::Executor &executor, double seconds, int count) {
   }
   for (int i = 0; i < count; ++i) {
     auto &next = publishers[static_cast<std::size_t>((i + 1) % count)];
-    subscriptions.push_back(node->create_subscription<Message>(
-        "ring" + std::to_string(i), rclcpp::QoS(10), [&, next](Message::UniquePtr message) {
-          calls.fetch_add(1, std::memory_order_relaxed);
-          if (!stop) next->publish(std::move(message));
-        }));
+    subscriptions.push_back(node->create_subscription<Message>("ring" + std::to_string(i), rclcpp::QoS(10),
+                                                               [&, next](Message::UniquePtr message) {
+                                                                 calls.fetch_add(1, std::memory_order_relaxed);
+                                                                 if (!stop) next->publish(std::move(message));
+                                                               }));
   }
   executor.add_node(node);
   Figures figures;
@@ -253,7 +259,8 @@ int main(int argc, char **argv) {
     for (int round = 0; round < rounds; ++round) {
       for (const Kind &kind : all) {
         const auto executor = kind.make();
-        for (const auto &[figure, value] : measurement.run(*executor, seconds)) results[figure][kind.name].push_back(value);
+        for (const auto &[figure, value] : measurement.run(*executor, seconds))
+          results[figure][kind.name].push_back(value);
       }
     }
     std::printf("%s\n", measurement.name.c_str());

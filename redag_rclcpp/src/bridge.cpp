@@ -39,7 +39,8 @@ void Bridge::add(std::shared_ptr<Callback> callback) {
 void Bridge::remove(const Callback &callback) {
   {
     const std::lock_guard guard(lock_);
-    const auto found = std::find_if(callbacks_.begin(), callbacks_.end(), [&](auto &c) { return c.get() == &callback; });
+    const auto found =
+        std::find_if(callbacks_.begin(), callbacks_.end(), [&](auto &c) { return c.get() == &callback; });
     if (found == callbacks_.end()) return;
     *found = std::move(callbacks_.back());
     callbacks_.pop_back();
@@ -66,7 +67,7 @@ void Bridge::wait(std::chrono::nanoseconds timeout) {
     const std::lock_guard guard(lock_);
     for (const auto &callback : callbacks_) entries.push_back(Entry{callback, callback->waited()});
   }
-  fill(entries);
+  fill(set_, conditions_, entries);
   const rcl_ret_t result = rcl_wait(&set_, timeout.count() < 0 ? -1 : timeout.count());
   if (result == RCL_RET_TIMEOUT) return;
   check(result, "waiting failed");
@@ -85,9 +86,10 @@ void Bridge::wait(std::chrono::nanoseconds timeout) {
   }
 }
 
-void Bridge::fill(std::vector<Entry> &entries) {
+void Bridge::fill(rcl_wait_set_t &set, const std::vector<const rclcpp::GuardCondition *> &conditions,
+                  std::vector<Entry> &entries) {
   std::size_t subscriptions = 0;
-  std::size_t guard_conditions = conditions_.size();
+  std::size_t guard_conditions = conditions.size();
   std::size_t timers = 0;
   std::size_t clients = 0;
   std::size_t services = 0;
@@ -106,32 +108,59 @@ void Bridge::fill(std::vector<Entry> &entries) {
       events += waitable->get_number_of_ready_events();
     }
   }
-  check(rcl_wait_set_clear(&set_), "cannot clear the wait set");
-  check(rcl_wait_set_resize(&set_, subscriptions, guard_conditions, timers, clients, services, events),
+  check(rcl_wait_set_clear(&set), "cannot clear the wait set");
+  check(rcl_wait_set_resize(&set, subscriptions, guard_conditions, timers, clients, services, events),
         "cannot resize the wait set");
-  for (const rclcpp::GuardCondition *condition : conditions_) {
-    check(rcl_wait_set_add_guard_condition(&set_, &condition->get_rcl_guard_condition(), nullptr),
+  for (const rclcpp::GuardCondition *condition : conditions) {
+    check(rcl_wait_set_add_guard_condition(&set, &condition->get_rcl_guard_condition(), nullptr),
           "cannot wait for a guard condition");
   }
   for (Entry &entry : entries) {
     const auto &waited = entry.waited;
     if (waited.timer) {
-      check(rcl_wait_set_add_guard_condition(&set_, rcl_timer_get_guard_condition(waited.timer.get()), &entry.index),
+      check(rcl_wait_set_add_guard_condition(&set, rcl_timer_get_guard_condition(waited.timer.get()), &entry.index),
             "cannot wait for a timer's guard condition");
     }
     if (waited.subscription) {
-      check(rcl_wait_set_add_subscription(&set_, waited.subscription->get_subscription_handle().get(), &entry.index),
+      check(rcl_wait_set_add_subscription(&set, waited.subscription->get_subscription_handle().get(), &entry.index),
             "cannot wait for a subscription");
     }
     if (waited.service) {
-      check(rcl_wait_set_add_service(&set_, waited.service->get_service_handle().get(), &entry.index),
+      check(rcl_wait_set_add_service(&set, waited.service->get_service_handle().get(), &entry.index),
             "cannot wait for a service");
     }
     if (waited.client) {
-      check(rcl_wait_set_add_client(&set_, waited.client->get_client_handle().get(), &entry.index),
+      check(rcl_wait_set_add_client(&set, waited.client->get_client_handle().get(), &entry.index),
             "cannot wait for a client");
     }
-    if (waited.waitable) compat::add_to_wait_set(*waited.waitable, set_);
+    if (waited.waitable) compat::add_to_wait_set(*waited.waitable, set);
+  }
+}
+
+void find_leftovers(const rclcpp::Context::SharedPtr &context,
+                    const std::vector<std::shared_ptr<Callback>> &callbacks) {
+  std::vector<Bridge::Entry> entries;
+  for (const auto &callback : callbacks) {
+    const Callback::Waited waited = callback->hooked();
+    if (waited.subscription || waited.service || waited.client) entries.push_back({callback, waited});
+  }
+  if (entries.empty()) return;
+  rcl_wait_set_t set = rcl_get_zero_initialized_wait_set();
+  check(rcl_wait_set_init(&set, 0, 0, 0, 0, 0, 0, context->get_rcl_context().get(), rcl_get_default_allocator()),
+        "cannot create a wait set");
+  const std::unique_ptr<rcl_wait_set_t, void (*)(rcl_wait_set_t *)> owner(&set, [](rcl_wait_set_t *finished) {
+    if (rcl_wait_set_fini(finished) != RCL_RET_OK) rcl_reset_error();
+  });
+  Bridge::fill(set, {}, entries);
+  const rcl_ret_t result = rcl_wait(&set, 0);
+  if (result != RCL_RET_TIMEOUT) check(result, "looking for messages failed");
+  for (const Bridge::Entry &entry : entries) {
+    const auto &waited = entry.waited;
+    const bool ready = (waited.subscription && set.subscriptions[entry.index] != nullptr) ||
+                       (waited.service && set.services[entry.index] != nullptr) ||
+                       (waited.client && set.clients[entry.index] != nullptr);
+    entry.callback->take_leftovers(result == RCL_RET_OK && ready,
+                                   waited.waitable && compat::is_ready(*waited.waitable, set));
   }
 }
 

@@ -1,5 +1,5 @@
-// The part of the world that only a wait set can watch: the executor's guard conditions, guard conditions of timers, and
-// entities without hooks. One thread at a time waits; any thread may add, remove and wake.
+// The part of the world that only a wait set can watch: the executor's guard conditions, guard conditions of timers,
+// and entities without hooks. One thread at a time waits; any thread may add, remove and wake.
 #pragma once
 
 #include <chrono>
@@ -39,7 +39,10 @@ class Bridge {
     Callback::Waited waited;
     std::size_t index = 0;  // in the wait set
   };
-  void fill(std::vector<Entry> &entries);
+  static void fill(rcl_wait_set_t &set, const std::vector<const rclcpp::GuardCondition *> &conditions,
+                   std::vector<Entry> &entries);
+  friend void find_leftovers(const rclcpp::Context::SharedPtr &context,
+                             const std::vector<std::shared_ptr<Callback>> &callbacks);
 
   rclcpp::Context::SharedPtr context_;
   rclcpp::GuardCondition wake_;
@@ -49,5 +52,9 @@ class Bridge {
   mutable std::mutex lock_;
   std::vector<std::shared_ptr<Callback>> callbacks_;
 };
+
+/// What arrived before these callbacks were attached and was not executed by who had them before: hooks do not tell of
+/// it again.
+void find_leftovers(const rclcpp::Context::SharedPtr &context, const std::vector<std::shared_ptr<Callback>> &callbacks);
 
 }  // namespace redag_rclcpp

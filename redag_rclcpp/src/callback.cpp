@@ -1,6 +1,7 @@
 #include "callback.hpp"
 
 #include <rcl/timer.h>
+#include <rcl/wait.h>
 #include <tracetools/tracetools.h>
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 #include "compat.hpp"
 #include "rclcpp/executor.hpp"
 #include "rclcpp/logging.hpp"
-#include "redag/runtime/preemption_point.hpp"
+#include "redag/runtime/running_job.hpp"
 
 #ifndef TRACETOOLS_TRACEPOINT  // its name before Jazzy
 #define TRACETOOLS_TRACEPOINT TRACEPOINT
@@ -45,7 +46,9 @@ bool take_and_handle(const char *what, const char *name, Take take, Handle handl
   return taken;
 }
 
-std::size_t depth_of(const rclcpp::QoS &qos) { return qos.history() == rclcpp::HistoryPolicy::KeepLast ? qos.depth() : 0; }
+std::size_t depth_of(const rclcpp::QoS &qos) {
+  return qos.history() == rclcpp::HistoryPolicy::KeepLast ? qos.depth() : 0;
+}
 
 /// A timer's clock and ours, read together.
 struct TimerReading {
@@ -143,9 +146,8 @@ void Callback::hook() {
   if (const auto service = service_.lock()) service->set_on_new_request_callback(tell);
   if (const auto client = client_.lock()) client->set_on_new_response_callback(tell);
   if (const auto waitable = waitable_.lock()) {
-    waitable->set_on_ready_callback([self = shared_from_this()](std::size_t count, int part) {
-      self->arrived(count, Source::Middleware, part);
-    });
+    waitable->set_on_ready_callback(
+        [self = shared_from_this()](std::size_t count, int part) { self->arrived(count, Source::Middleware, part); });
   }
 }
 
@@ -313,6 +315,28 @@ Callback::Waited Callback::waited() const {
   return waited;
 }
 
+Callback::Waited Callback::hooked() const {
+  Waited hooked;
+  if (by_wait_set_) return hooked;
+  hooked.subscription = subscription_.lock();
+  hooked.service = service_.lock();
+  hooked.client = client_.lock();
+  hooked.waitable = intra_process_.lock();
+  return hooked;
+}
+
+void Callback::take_leftovers(bool middleware, bool intra_process) {
+  for (const Source source : {Source::Middleware, Source::IntraProcess}) {
+    if (!(source == Source::Middleware ? middleware : intra_process)) continue;
+    {
+      const std::lock_guard guard(lock_);
+      leftovers_[index_of(source)] = true;
+      if (kept_[index_of(source)] > 0) continue;
+    }
+    arrived(1, source, 0);
+  }
+}
+
 void Callback::seen_by_wait_set() {
   {
     const std::lock_guard guard(lock_);
@@ -369,7 +393,6 @@ Time Callback::expire(Time now, std::vector<Release> &releases, std::vector<Rele
   if (simulated || period == 0) {
     // Times of another clock have no point on ours; a period of 0 has no grid.
     if (!uncalled_.exchange(true)) {
-      nominal_ = now;
       releases.push_back(Release{task_, now});
     }
     return kNever;
@@ -384,7 +407,6 @@ Time Callback::expire(Time now, std::vector<Release> &releases, std::vector<Rele
       for (std::int64_t i = std::min(between, kMostMissed); i > 0; --i) missed.push_back({task_, nominal - i * period});
     }
     last_release_ = nominal;
-    nominal_ = nominal;
     uncalled_ = true;
     releases.push_back(Release{task_, nominal});
   }
@@ -393,32 +415,26 @@ Time Callback::expire(Time now, std::vector<Release> &releases, std::vector<Rele
 
 // ---- execution ----
 
-Outcome Callback::execute() {
-  Time release = 0;
-  if (is_timer()) {
-    if (!execute_timer(release)) return Outcome::NoData;
-  } else {
-    Token token;
-    if (!take_token(token)) return Outcome::NoData;
-    release = token.arrival;
-    if (!execute_token(token)) return Outcome::NoData;
-  }
-  const Duration response = engine_.now() - release;
+Outcome Callback::execute(const redag::runtime::Job &job) {
+  Token token;
+  const bool executed = is_timer() ? execute_timer() : take_token(token) && execute_token(token);
+  if (!executed) return Outcome::NoData;
+  const Duration response = engine_.now() - job.release;
   response_.add(response);
   if (response > deadline_.load(std::memory_order_relaxed)) late_.fetch_add(1, std::memory_order_relaxed);
-  execution_.add(redag::job_cpu_time());
+  execution_.add(redag::runtime::RunningJob::current()->close());
   return Outcome::Finished;
 }
 
-bool Callback::execute_timer(Time &release) {
+bool Callback::execute_timer() {
   const auto timer = timer_.lock();
   if (!timer) return false;
-  release = nominal_;
-  // Cancelled, or called for this expiry already: then the job before this one started after it.
   bool due = false;
   if (rcl_timer_is_ready(timer_handle_.get(), &due) != RCL_RET_OK) rcl_reset_error();
   uncalled_ = false;
   if (!due) {
+    // Cancelled; or the job before this one started so late that its call consumed this expiry too, which is lost.
+    if (!timer->is_canceled()) late_.fetch_add(1, std::memory_order_relaxed);
     reschedule();
     return false;
   }
@@ -449,9 +465,24 @@ bool Callback::execute_token(const Token &token) {
     const Token &token;
   } watch{*this, token};
 
+  const bool taken = execute_arrival(token);
+  bool more = false;
+  {
+    const std::lock_guard guard(lock_);
+    bool &leftovers = leftovers_[index_of(token.source)];
+    leftovers = leftovers && taken;
+    more = leftovers && kept_[index_of(token.source)] == 0;
+  }
+  if (more) arrived(1, token.source, 0);
+  return taken;
+}
+
+bool Callback::execute_arrival(const Token &token) {
   if (token.source == Source::IntraProcess) {
     const auto waitable = intra_process_.lock();
-    return waitable && execute_waitable(*waitable, token);
+    // An empty buffer must not be taken from.
+    rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
+    return waitable && compat::is_ready(*waitable, unused) && execute_waitable(*waitable, token);
   }
   if (const auto waitable = waitable_.lock()) return execute_waitable(*waitable, token);
   return execute_subscription() || execute_service() || execute_client();

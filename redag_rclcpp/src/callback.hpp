@@ -2,12 +2,12 @@
 // do, what is pending, and how it is executed. Owns no entity: nodes can be destroyed at any time.
 //
 // An arrival (a message, request, ...) becomes a token. Of the tokens one at a time is a released job that waits in the
-// scheduler; the others wait here, so that a long queue costs the scheduler nothing. When the job starts, the next token
-// is released.
+// scheduler; the others wait here, so that a long queue costs the scheduler nothing. When the job starts, the next
+// token is released.
 //
 // Threads: hooks are called by the middleware's and by publishing threads, with locks of theirs held; execute() by
-// workers. Lock order: theirs, release_lock_, lock_, the timer queue's, the engine's. Nothing of rclcpp that takes locks
-// is called with one of ours held.
+// workers. Lock order: theirs, release_lock_, lock_, the timer queue's, the engine's. Nothing of rclcpp that takes
+// locks is called with one of ours held.
 #pragma once
 
 #include <atomic>
@@ -53,8 +53,8 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
  public:
   Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::TimerBase::SharedPtr &timer);
   /// `intra_process`: the waitable through which the subscription gets messages of its own process; or null.
-  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::SubscriptionBase::SharedPtr &subscription,
-           const rclcpp::Waitable::SharedPtr &intra_process);
+  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id,
+           const rclcpp::SubscriptionBase::SharedPtr &subscription, const rclcpp::Waitable::SharedPtr &intra_process);
   Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ServiceBase::SharedPtr &service);
   Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ClientBase::SharedPtr &client);
   /// `only_wait_set`: its on-ready hook does not tell of everything.
@@ -68,7 +68,7 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
   void detach();
 
   /// Runs one job.
-  redag::sched::Outcome execute();
+  redag::sched::Outcome execute(const redag::runtime::Job &job);
 
   /// Releases the first token, if none is released. For who collects note()d callbacks, and when direct() begins.
   void admit();
@@ -83,6 +83,11 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
   };
   /// Nothing while an arrival that the wait set saw is not dealt with.
   [[nodiscard]] Waited waited() const;
+  /// The entities with hooks; `waitable`: the intra-process part of a subscription.
+  [[nodiscard]] Waited hooked() const;
+  /// There is something in the middleware, or in the intra-process buffer, that no hook may have told of: takes until
+  /// nothing is left.
+  void take_leftovers(bool middleware, bool intra_process);
   /// The wait set saw an arrival.
   void seen_by_wait_set();
   /// The timer was reset or its clock jumped: looks when it is due.
@@ -112,7 +117,7 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
   struct Token {
     Time arrival = 0;
     Source source = Source::Middleware;
-    int part = 0;           // of a waitable
+    int part = 0;            // of a waitable
     bool seen_only = false;  // by the wait set: what arrived has to be asked for
   };
 
@@ -130,8 +135,9 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
   [[nodiscard]] bool follows_ros_time() const;
 
   // False: there was nothing to do.
-  [[nodiscard]] bool execute_timer(Time &release);
+  [[nodiscard]] bool execute_timer();
   [[nodiscard]] bool execute_token(const Token &token);
+  [[nodiscard]] bool execute_arrival(const Token &token);
   [[nodiscard]] bool execute_subscription();
   [[nodiscard]] bool execute_service();
   [[nodiscard]] bool execute_client();
@@ -148,7 +154,7 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
   std::weak_ptr<rclcpp::ServiceBase> service_;
   std::weak_ptr<rclcpp::ClientBase> client_;
   std::weak_ptr<rclcpp::Waitable> waitable_;
-  std::size_t depth_ = 0;  // arrivals that each source keeps; 0: all
+  std::size_t depth_ = 0;                 // arrivals that each source keeps; 0: all
   std::atomic<bool> by_wait_set_{false};  // the entity cannot be hooked
 
   // Held while a hook releases, so that detach() can wait for it, but not while a worker takes its token: a worker that
@@ -156,20 +162,20 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
   redag::PiMutex release_lock_;
 
   mutable redag::PiMutex lock_;
-  std::shared_ptr<Intake> intake_;  // lock; null once detached
-  TokenQueue<Token> tokens_;        // lock; the first one is that of the released job, if there is one
-  std::size_t kept_[2] = {0, 0};    // lock: tokens by source
-  bool released_ = false;           // lock: a job waits in the scheduler
-  bool noted_ = false;              // lock: note()d, and not admitted since
-  bool seen_ = false;               // lock: by the wait set, and not dealt with
-  std::vector<TaskId> publishers_;  // lock
-  std::uint64_t arrivals_ = 0;      // lock
-  Time first_arrival_ = 0;          // lock
-  Time last_arrival_ = 0;           // lock
+  std::shared_ptr<Intake> intake_;      // lock; null once detached
+  TokenQueue<Token> tokens_;            // lock; the first one is that of the released job, if there is one
+  std::size_t kept_[2] = {0, 0};        // lock: tokens by source
+  bool leftovers_[2] = {false, false};  // lock: by source, there may be more than tokens
+  bool released_ = false;               // lock: a job waits in the scheduler
+  bool noted_ = false;                  // lock: note()d, and not admitted since
+  bool seen_ = false;                   // lock: by the wait set, and not dealt with
+  std::vector<TaskId> publishers_;      // lock
+  std::uint64_t arrivals_ = 0;          // lock
+  Time first_arrival_ = 0;              // lock
+  Time last_arrival_ = 0;               // lock
 
   // Timers.
   Time last_release_ = redag::kNever;   // the timer queue's lock
-  std::atomic<Time> nominal_{0};        // release of the job that starts next
   std::atomic<bool> uncalled_{false};   // released, and not called since
   std::atomic<bool> restarted_{false};  // its grid begins anew
 

@@ -12,7 +12,11 @@
 #include "rclcpp/timer.hpp"
 #include "rclcpp/version.h"
 #include "rclcpp/waitable.hpp"
+#include "rclcpp_action/client.hpp"
 #include "rclcpp_action/server.hpp"
+#if RCLCPP_VERSION_MAJOR < 21
+#include "rclcpp/qos_event.hpp"
+#endif
 
 namespace redag_rclcpp::compat {
 
@@ -74,20 +78,28 @@ inline void set_on_reset(rclcpp::TimerBase &, const std::function<void()> &) {}
 inline void clear_on_reset(rclcpp::TimerBase &) {}
 #endif
 
-/// Are there events of this waitable that its on-ready hook does not tell of? Action servers, up to Jazzy at least, tell
-/// only wait sets that goals expire (rclcpp issue 2661). Newer ones have not been tried: there it costs nothing but the
-/// exact arrival times of goals.
+/// Is the on-ready hook of this waitable one not to rely on?
+/// - Action servers, up to Jazzy at least, tell only wait sets that goals expire (rclcpp issue 2661). Newer ones have
+/// not
+///   been tried; there it costs nothing but the exact arrival times of goals.
+/// - Action clients and QoS events of Humble call a hook with too few arguments for what happened before it was set.
 inline bool needs_wait_set(const rclcpp::Waitable &waitable) {
-  return dynamic_cast<const rclcpp_action::ServerBase *>(&waitable) != nullptr;
+  if (dynamic_cast<const rclcpp_action::ServerBase *>(&waitable) != nullptr) return true;
+#if RCLCPP_VERSION_MAJOR < 21
+  return dynamic_cast<const rclcpp_action::ClientBase *>(&waitable) != nullptr ||
+         dynamic_cast<const rclcpp::QOSEventHandlerBase *>(&waitable) != nullptr;
+#else
+  return false;
+#endif
 }
 
 /// Must the service be destroyed without a hook? Life-cycle nodes finalise the middleware's part of their services
-/// before the rclcpp::Service, whose destructor on Humble then clears the hook of what is no more. They share nothing to
-/// know them by but their names; for a service of a user's with such a name only the arrival time is less exact.
+/// before the rclcpp::Service, whose destructor on Humble then clears the hook of what is no more. They share nothing
+/// to know them by but their names; for a service of a user's with such a name only the arrival time is less exact.
 inline bool needs_wait_set(const std::string &service_name) {
   if (RCLCPP_VERSION_MAJOR >= 28) return false;
-  for (const char *name : {"change_state", "get_state", "get_available_states", "get_available_transitions",
-                           "get_transition_graph"}) {
+  for (const char *name :
+       {"change_state", "get_state", "get_available_states", "get_available_transitions", "get_transition_graph"}) {
     if (service_name.substr(service_name.rfind('/') + 1) == name) return true;
   }
   return false;

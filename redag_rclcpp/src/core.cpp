@@ -31,6 +31,7 @@ using Kind = redag::Callback::Kind;
 namespace {
 
 constexpr std::uint32_t kSpareThreads = 16;
+constexpr redag::Duration kNodesAppear = 3 * redag::kSecond;  // after the first spin: then names should match
 
 rclcpp::Logger logger() { return rclcpp::get_logger("redag_rclcpp"); }
 
@@ -219,9 +220,13 @@ void ReDAGExecutor::Core::collect() {
     if (present.count(key) == 0 || !callback->alive()) gone.push_back(callback);
   }
   for (const auto &callback : gone) remove(callback);
+  std::vector<std::shared_ptr<Callback>> added;
   for (const Found &entity : found) {
-    if (callbacks_.count(entity.key) == 0) add(entity);
+    if (callbacks_.count(entity.key) != 0) continue;
+    add(entity);
+    added.push_back(callbacks_.at(entity.key));
   }
+  if (!added.empty() && rclcpp::ok(context_)) find_leftovers(context_, added);
 }
 
 std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
@@ -244,6 +249,7 @@ std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
   for (const auto &weak : host_.groups()) {
     const auto group = weak.lock();
     if (!group) continue;
+    (void)group_name(group);  // also an empty one is watched: something may be created in it
     Found base;
     base.group = group;
     base.node = nodes[group.get()];
@@ -327,7 +333,7 @@ void ReDAGExecutor::Core::add(const Found &found) {
 
   const redag::TaskId task =
       engine_->add_task(dags_[record.dag].id, record.rank, record.task,
-                        [callback](const redag::runtime::Job &) { return callback->execute(); });
+                        [callback](const redag::runtime::Job &job) { return callback->execute(job); });
   {
     const std::lock_guard guard(records_lock_);
     if (records_.size() <= task.value) records_.resize(task.value + 1);
@@ -461,16 +467,26 @@ void ReDAGExecutor::Core::start() {
   started_ = true;
   RCLCPP_INFO(logger(), "%u workers, preemption %s%s%s", options_.workers, to_string(mode_.mode),
               mode_.reason.empty() ? "" : ", ", mode_.reason.c_str());
-  for (const std::string &warning : warnings()) RCLCPP_WARN(logger(), "%s", warning.c_str());
+  {
+    const std::lock_guard guard(records_lock_);
+    for (const std::string &warning : warnings_) RCLCPP_WARN(logger(), "%s", warning.c_str());
+  }
+  if (matcher_) report_unmatched_at_ = engine_->now() + kNodesAppear;
+}
+
+// Tasks of the workload that are still without a callback when nodes and components should have been loaded.
+void ReDAGExecutor::Core::report_unmatched() {
+  report_unmatched_at_ = kNever;
+  const std::lock_guard guard(collect_lock_);
+  for (const std::string &line : matcher_->unmatched()) RCLCPP_WARN(logger(), "%s", line.c_str());
 }
 
 void ReDAGExecutor::Core::raise_middleware() {
   const auto refused = raise_middleware_threads(band_.timer);
   std::string warning;
   if (find_middleware_threads().empty()) {
-    warning =
-        "the middleware's threads are not known by name: give its receive threads a SCHED_FIFO priority above " +
-        std::to_string(band_.top_job) + " yourself, or busy workers delay messages (docs/ros2.md)";
+    warning = "the middleware's threads are not known by name: give its receive threads a SCHED_FIFO priority above " +
+              std::to_string(band_.top_job) + " yourself, or busy workers delay messages (docs/ros2.md)";
   } else if (!refused.empty()) {
     warning = fmt::format("{} threads of the middleware could not be raised above the workers", refused.size());
   }
@@ -492,15 +508,11 @@ void ReDAGExecutor::Core::spin() {
     while (host_.may_spin()) {
       if (dirty_) collect();
       admit_noted();
-      nanoseconds timeout(-1);
-      if (learning_) {
-        timeout = nanoseconds(std::max<redag::Duration>(0, learn_until_ - engine_->now()));
-        if (timeout.count() == 0) {
-          stop_learning();
-          continue;
-        }
-      }
-      bridge_.wait(timeout);
+      const redag::Time now = engine_->now();
+      if (learning_ && now >= learn_until_) stop_learning();
+      if (now >= report_unmatched_at_) report_unmatched();
+      const redag::Time next = std::min(report_unmatched_at_, learning_ ? learn_until_ : kNever);
+      bridge_.wait(nanoseconds(next == kNever ? -1 : next - now));
     }
   } catch (...) {
     // The wait set failed, for instance because the context was shut down while it was filled.
@@ -700,7 +712,8 @@ Workload ReDAGExecutor::Core::as_workload(std::vector<std::vector<std::uint32_t>
       Task task = record.task;
       const std::string wanted = record.configured ? task.name : to_string(record.id);
       task.name = wanted;
-      for (int n = 2; !names.insert(dag.name + "." + task.name).second; ++n) task.name = fmt::format("{}_{}", wanted, n);
+      for (int n = 2; !names.insert(dag.name + "." + task.name).second; ++n)
+        task.name = fmt::format("{}_{}", wanted, n);
       if (record.callback) {
         task.wcet = std::max(task.wcet, record.callback->execution().longest());
       }

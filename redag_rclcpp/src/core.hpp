@@ -2,7 +2,8 @@
 // when they have something to do. Knows rclcpp's entities, not its Executor (see Host).
 //
 // Threads: collect() and the spin functions are serialised by their callers' rules (one spinner; collect_lock_).
-// Callbacks' hooks come from anywhere. Lock order: collect_lock_, rclcpp's, callbacks', the timer queue's, the engine's.
+// Callbacks' hooks come from anywhere. Lock order: collect_lock_, rclcpp's, callbacks', the timer queue's, the
+// engine's.
 #pragma once
 
 #include <atomic>
@@ -105,6 +106,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
 
   void start();
   void raise_middleware();
+  void report_unmatched();
   void stop_workers();
   void time_releases() noexcept;
   redag::Time expire_timers();
@@ -127,13 +129,14 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   redag::runtime::Mode mode_;
   redag::runtime::PriorityBand band_;
   std::vector<std::string> warnings_;  // lock: records_lock_
-  redag::Time origin_ = 0;  // of the engine's clock, on CLOCK_MONOTONIC
+  redag::Time origin_ = 0;             // of the engine's clock, on CLOCK_MONOTONIC
   std::unique_ptr<redag::runtime::Engine> engine_;
   TimerQueue timers_;
   Bridge bridge_;
   std::optional<redag::CallbackMatcher> matcher_;
 
-  mutable std::recursive_mutex collect_lock_;  // the next five; recursive because destructors of users' objects run below it
+  mutable std::recursive_mutex
+      collect_lock_;  // the next five; recursive because destructors of users' objects run below it
   std::vector<NodeBase::WeakPtr> nodes_;
   std::map<const void *, std::shared_ptr<Callback>> callbacks_;  // by entity
   std::map<rclcpp::CallbackGroup::WeakPtr, std::string, std::owner_less<rclcpp::CallbackGroup::WeakPtr>> group_names_;
@@ -154,6 +157,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   std::atomic<bool> direct_{false};
   std::atomic<bool> learning_{false};
   redag::Time learn_until_ = redag::kNever;
+  redag::Time report_unmatched_at_ = redag::kNever;
   bool started_ = false;
   bool closed_ = false;
 

@@ -105,8 +105,8 @@ void ReDAGExecutor::spin_once(nanoseconds timeout) {
   core_->spin_one(timeout);
 }
 
-// Called by spin_until_future_complete, which has claimed the executor. What completes the future need not be one of our
-// callbacks, so that no wait is long.
+// Called by spin_until_future_complete, which has claimed the executor. What completes the future need not be one of
+// our callbacks, so that no wait is long.
 void ReDAGExecutor::spin_once_impl(nanoseconds timeout) {
   constexpr nanoseconds kLongest = std::chrono::milliseconds(10);
   const bool is_long = timeout < nanoseconds(0) || timeout > kLongest;
@@ -127,7 +127,8 @@ rclcpp::FutureReturnCode ReDAGExecutor::spin_until_future_complete_impl(
   const Spinning claimed(spinning, "spin_until_future_complete");
   while (rclcpp::ok(context_) && spinning.load()) {
     nanoseconds left = timeout;
-    if (timeout >= nanoseconds(0)) left = std::max(nanoseconds(0), timeout - (std::chrono::steady_clock::now() - start));
+    if (timeout >= nanoseconds(0))
+      left = std::max(nanoseconds(0), timeout - (std::chrono::steady_clock::now() - start));
     spin_once_impl(left);
     if (is_complete()) return FutureReturnCode::SUCCESS;
     if (timeout >= nanoseconds(0) && std::chrono::steady_clock::now() - start >= timeout) {

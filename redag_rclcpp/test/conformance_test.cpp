@@ -209,11 +209,10 @@ TYPED_TEST(Conformance, EveryMessageArrivesInOrder) {
     std::mutex mutex;
     std::vector<std::string> received;
     const rclcpp::QoS qos = rclcpp::QoS(1000).reliable();
-    auto subscription =
-        other->create_subscription<Strings>("strings", qos, [&](Strings::ConstSharedPtr message) {
-          const std::lock_guard guard(mutex);
-          received.push_back(message->string_value);
-        });
+    auto subscription = other->create_subscription<Strings>("strings", qos, [&](Strings::ConstSharedPtr message) {
+      const std::lock_guard guard(mutex);
+      received.push_back(message->string_value);
+    });
     auto publisher = other->create_publisher<Strings>("strings", qos);
     this->executor->add_node(other);
     {
@@ -240,11 +239,11 @@ TYPED_TEST(Conformance, EveryMessageArrivesInOrder) {
 TYPED_TEST(Conformance, OverwrittenMessagesAreNotWaitedFor) {
   std::atomic<int> last{-1};
   std::atomic<int> count{0};
-  auto subscription = this->node->template create_subscription<Strings>(
-      "strings", rclcpp::QoS(2), [&](Strings::ConstSharedPtr message) {
-        ++count;
-        last = std::stoi(message->string_value);
-      });
+  auto subscription = this->node->template create_subscription<Strings>("strings", rclcpp::QoS(2),
+                                                                        [&](Strings::ConstSharedPtr message) {
+                                                                          ++count;
+                                                                          last = std::stoi(message->string_value);
+                                                                        });
   auto publisher = this->node->template create_publisher<Strings>("strings", rclcpp::QoS(2));
   this->executor->add_node(this->node);
   ASSERT_TRUE(eventually([&] { return publisher->get_subscription_count() > 0; }));
@@ -472,9 +471,10 @@ TYPED_TEST(Conformance, EntitiesAndGroupsCreatedWhileSpinningAreServed) {
   });
   EXPECT_TRUE(eventually([&] { return first > 2 && second > 2; }));
   auto group = this->node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
-  auto in_group = this->node->create_wall_timer(2ms, [&] { ++third; }, group);
-  auto subscription =
-      this->node->template create_subscription<Empty>("late", rclcpp::QoS(10), [&](Empty::ConstSharedPtr) { ++received; });
+  auto in_group = this->node->create_wall_timer(
+      2ms, [&] { ++third; }, group);
+  auto subscription = this->node->template create_subscription<Empty>("late", rclcpp::QoS(10),
+                                                                      [&](Empty::ConstSharedPtr) { ++received; });
   auto publisher = this->node->template create_publisher<Empty>("late", rclcpp::QoS(10));
   EXPECT_TRUE(eventually([&] {
     publisher->publish(Empty());
@@ -485,7 +485,8 @@ TYPED_TEST(Conformance, EntitiesAndGroupsCreatedWhileSpinningAreServed) {
 TYPED_TEST(Conformance, AManuallyAddedGroupIsServedUntilItIsRemoved) {
   auto group = this->node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive, false);
   std::atomic<int> count{0};
-  auto timer = this->node->create_wall_timer(2ms, [&] { ++count; }, group);
+  auto timer = this->node->create_wall_timer(
+      2ms, [&] { ++count; }, group);
   Spinner spinner(*this->executor);
   this->executor->add_callback_group(group, this->node->get_node_base_interface());
   EXPECT_TRUE(eventually([&] { return count >= 3; }));
@@ -560,8 +561,8 @@ TYPED_TEST(Conformance, SpinSomeRunsWhatIsReadyOnTheCallingThread) {
 
 TYPED_TEST(Conformance, SpinAllRunsUntilNothingIsLeft) {
   int count = 0;
-  auto subscription =
-      this->node->template create_subscription<Empty>("empty", rclcpp::QoS(100), [&](Empty::ConstSharedPtr) { ++count; });
+  auto subscription = this->node->template create_subscription<Empty>("empty", rclcpp::QoS(100),
+                                                                      [&](Empty::ConstSharedPtr) { ++count; });
   auto publisher = this->node->template create_publisher<Empty>("empty", rclcpp::QoS(100));
   this->executor->add_node(this->node);
   ASSERT_TRUE(eventually([&] { return publisher->get_subscription_count() > 0; }));
@@ -573,8 +574,8 @@ TYPED_TEST(Conformance, SpinAllRunsUntilNothingIsLeft) {
 
 TYPED_TEST(Conformance, SpinOnceRunsOneAndTimesOut) {
   int count = 0;
-  auto subscription =
-      this->node->template create_subscription<Empty>("empty", rclcpp::QoS(100), [&](Empty::ConstSharedPtr) { ++count; });
+  auto subscription = this->node->template create_subscription<Empty>("empty", rclcpp::QoS(100),
+                                                                      [&](Empty::ConstSharedPtr) { ++count; });
   auto publisher = this->node->template create_publisher<Empty>("empty", rclcpp::QoS(100));
   this->executor->add_node(this->node);
   ASSERT_TRUE(eventually([&] { return publisher->get_subscription_count() > 0; }));
@@ -683,8 +684,8 @@ TYPED_TEST(Conformance, QosEventsAreDelivered) {
   rclcpp::SubscriptionOptions options;
   options.event_callbacks.deadline_callback = [&](rclcpp::QOSDeadlineRequestedInfo &) { ++matched; };
   const rclcpp::QoS qos = rclcpp::QoS(10).deadline(20ms);
-  auto subscription =
-      this->node->template create_subscription<Empty>("events", qos, [](Empty::ConstSharedPtr) {}, options);
+  auto subscription = this->node->template create_subscription<Empty>(
+      "events", qos, [](Empty::ConstSharedPtr) {}, options);
   auto publisher = this->node->template create_publisher<Empty>("events", qos);
   this->executor->add_node(this->node);
   Spinner spinner(*this->executor);

@@ -59,8 +59,8 @@ class ExecutorTest : public ::testing::TestWithParam<redag::PreemptionMode> {
   rclcpp::Subscription<Empty>::SharedPtr subscribe(const std::string &topic, std::function<void()> body) {
     rclcpp::SubscriptionOptions subscription;
     subscription.callback_group = new_group();
-    return node->create_subscription<Empty>(topic, rclcpp::QoS(10), [body](Empty::ConstSharedPtr) { body(); },
-                                            subscription);
+    return node->create_subscription<Empty>(
+        topic, rclcpp::QoS(10), [body](Empty::ConstSharedPtr) { body(); }, subscription);
   }
   rclcpp::Publisher<Empty>::SharedPtr publisher(const std::string &topic) {
     return node->create_publisher<Empty>(topic, rclcpp::QoS(10));
@@ -191,8 +191,7 @@ TEST_P(ExecutorTest, SpinThrowsACallbacksException) {
   auto timer = node->create_wall_timer(1ms, [] { throw std::domain_error("from a callback"); });
   executor.add_node(node);
   EXPECT_THROW(executor.spin(), std::domain_error);
-  EXPECT_THROW(
-      while (true) executor.spin_once(1s), std::domain_error);
+  EXPECT_THROW(while (true) executor.spin_once(1s), std::domain_error);
   EXPECT_FALSE(executor.is_spinning());
 }
 
@@ -245,7 +244,8 @@ TEST_P(ExecutorTest, MissedPeriodsOfATimerAreCounted) {
     if (s.id.kind == redag::Callback::Kind::Timer) stats = s;
   }
   EXPECT_EQ(stats.period, 10'000'000);
-  EXPECT_EQ(stats.jobs.released, stats.jobs.finished + stats.jobs.skipped + stats.jobs.aborted + stats.jobs.in_flight());
+  EXPECT_EQ(stats.jobs.released,
+            stats.jobs.finished + stats.jobs.skipped + stats.jobs.aborted + stats.jobs.in_flight());
   // The long run spans ten points of the grid at least; the last of them ran, late or not.
   EXPECT_GE(stats.jobs.skipped, 8U);
   EXPECT_GE(stats.misses, 9U);
@@ -270,12 +270,52 @@ TEST_P(ExecutorTest, OverwrittenMessagesAreCounted) {
   EXPECT_EQ(stats.jobs.skipped, 7U);
 }
 
+TEST_P(ExecutorTest, WhatOneExecutorLeavesTheNextOneTakes) {
+  for (const bool intra_process : {false, true}) {
+    SCOPED_TRACE(intra_process);
+    auto other = std::make_shared<rclcpp::Node>("other", rclcpp::NodeOptions().use_intra_process_comms(intra_process));
+    int count = 0;
+    auto subscription =
+        other->create_subscription<Empty>("/x", rclcpp::QoS(10), [&](Empty::ConstSharedPtr) { ++count; });
+    auto to_x = other->create_publisher<Empty>("/x", rclcpp::QoS(10));
+    ASSERT_TRUE(eventually([&] { return intra_process || to_x->get_subscription_count() > 0; }));
+    {
+      ReDAGExecutor first(rclcpp::ExecutorOptions(), options);
+      first.add_node(other);
+      for (int i = 0; i < 3; ++i) to_x->publish(Empty());
+      std::this_thread::sleep_for(20ms);
+    }
+    ReDAGExecutor second(rclcpp::ExecutorOptions(), options);
+    second.add_node(other);
+    to_x->publish(Empty());
+    std::this_thread::sleep_for(20ms);
+    second.spin_all(kLimit);
+    EXPECT_EQ(count, 4);
+  }
+}
+
+TEST_P(ExecutorTest, WhatIsCreatedInAnEmptyGroupIsServed) {
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  auto group = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive, false);
+  executor.add_callback_group(group, node->get_node_base_interface());
+  std::atomic<int> count{0};
+  auto timer = node->create_wall_timer(
+      1ms,
+      [&] {
+        if (++count == 3) executor.cancel();
+      },
+      group);
+  executor.spin();
+  EXPECT_GE(count, 3);
+}
+
 TEST_P(ExecutorTest, LearnsRatesAndEdges) {
   options.learn = 400ms;
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
   auto out = publisher("/b");
   auto b_out = publisher("/c");
-  auto source = node->create_wall_timer(20ms, [&] { out->publish(Empty()); }, new_group());
+  auto source = node->create_wall_timer(
+      20ms, [&] { out->publish(Empty()); }, new_group());
   auto b = subscribe("/b", [&] { b_out->publish(Empty()); });
   auto c = subscribe("/c", [] {});
   executor.add_node(node);
@@ -334,12 +374,16 @@ dags:
     const auto end = steady_clock::now() + time;
     while (steady_clock::now() < end) redag::preemption_point();
   };
-  auto source = node->create_wall_timer(2ms, [&] {
-    burn(200us);
-    to_sink->publish(Empty());
-  }, new_group());
+  auto source = node->create_wall_timer(
+      2ms,
+      [&] {
+        burn(200us);
+        to_sink->publish(Empty());
+      },
+      new_group());
   auto sink = subscribe("/sink", [&] { burn(300us); });
-  auto load = node->create_wall_timer(15ms, [&] { burn(6ms); }, new_group());
+  auto load = node->create_wall_timer(
+      15ms, [&] { burn(6ms); }, new_group());
   executor.add_node(node);
   std::vector<redag::JobEvent> events;
   std::thread thread([&] { executor.spin(); });
@@ -352,8 +396,8 @@ dags:
   EXPECT_EQ(trace.info.lost_events, 0U);
   EXPECT_GT(trace.events.size(), 1000U);
   EXPECT_FALSE(has_errors(redag::validate(trace.info.workload))) << to_string(redag::validate(trace.info.workload));
-  const auto report = redag::metrics::check_trace(
-      trace, redag::metrics::RuleSet::all().without(redag::metrics::Rule::Grid));
+  const auto report =
+      redag::metrics::check_trace(trace, redag::metrics::RuleSet::all().without(redag::metrics::Rule::Grid));
   EXPECT_TRUE(report.ok()) << report.to_string();
 }
 

@@ -32,14 +32,13 @@ using ReDAGCooperative = ReDAGWith<redag::PreemptionMode::Cooperative>;
 using ReDAGOs = ReDAGWith<redag::PreemptionMode::Os>;
 
 using OurTypes = ::testing::Types<ReDAGNone, ReDAGCooperative, ReDAGOs>;
-using AllTypes =
-    ::testing::Types<ReDAGNone, ReDAGCooperative, ReDAGOs, rclcpp::executors::SingleThreadedExecutor,
-                     rclcpp::executors::MultiThreadedExecutor
+using AllTypes = ::testing::Types<ReDAGNone, ReDAGCooperative, ReDAGOs, rclcpp::executors::SingleThreadedExecutor,
+                                  rclcpp::executors::MultiThreadedExecutor
 #if RCLCPP_VERSION_MAJOR >= 21
-                     ,
-                     rclcpp::experimental::executors::EventsExecutor
+                                  ,
+                                  rclcpp::experimental::executors::EventsExecutor
 #endif
-                     >;
+                                  >;
 
 struct TypeNames {
   template <class T>
