@@ -91,7 +91,8 @@ void Engine::main(Thread &self) noexcept {
       self.has_mail.store(false, std::memory_order_relaxed);
       // A job that was dispatched to this very thread when the last one ended needs no wake-up.
       Next next{Next::Kind::Start, first};
-      while (next.kind == Next::Kind::Start) next = run(self, next.assignment, JobSlot());
+      Duration cpu = thread_cpu_now();
+      while (next.kind == Next::Kind::Start) next = run(self, next.assignment, JobSlot(), cpu);
       continue;
     }
     if (exit_.load(std::memory_order_acquire)) return;
@@ -116,21 +117,24 @@ std::optional<TaskId> Engine::current_task() const noexcept {
 
 // ---- jobs, on their threads ----
 
-// Runs a job to its end, on top of `below` if that is one. Returns what this thread is to do next.
-Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot below) noexcept {
+// Runs a job to its end, on top of `below` if that is one. `cpu`: the thread's processor time when it begins, and then
+// when it ends; reading that clock is a system call, so that a job which follows another on its thread is charged for
+// the decision between the two. Returns what this thread is to do next.
+Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot below, Duration &cpu) noexcept {
   const Job &job = assignment.job;
-  const Time begun = now();
   if (options_.trace_capacity > 0) {
+    const Time begun = now();
     self.events.push(
         JobEvent{begun, begun, job.task, job.number, job.worker.value, JobEventKind::Started, Reason::None, 0});
   }
-  RunningJob running{
-      this, self.index,           &self.outranked, job.task, job.slot, assignment.entry->budget, thread_cpu_now(),
-      0,    RunningJob::current()};
+  RunningJob running{this, self.index, &self.outranked,      job.task, job.slot, assignment.entry->budget,
+                     cpu,  0,          RunningJob::current()};
   RunningJob::set_current(&running);
   const Outcome outcome = call(assignment);
   RunningJob::set_current(running.below);
-  return finish(self, assignment, outcome, running.total >= 0 ? running.total : running.cpu_time(), below);
+  const Duration used = running.total >= 0 ? running.total : running.cpu_time();
+  cpu += running.cpu_on_top + used;
+  return finish(self, assignment, outcome, used, below);
 }
 
 Outcome Engine::call(const Assignment &assignment) {
@@ -177,9 +181,10 @@ void Engine::preemption_point(RunningJob &job) {
   }
   if (next.kind != Next::Kind::Start) return;
   const Duration before = thread_cpu_now();
-  while (next.kind == Next::Kind::Start) next = run(self, next.assignment, job.slot);
+  Duration cpu = before;
+  while (next.kind == Next::Kind::Start) next = run(self, next.assignment, job.slot, cpu);
   REDAG_CHECK(next.kind == Next::Kind::Resume, "a suspended job was not resumed");
-  job.cpu_on_top += thread_cpu_now() - before;
+  job.cpu_on_top += cpu - before;
 }
 
 // ---- events from outside ----
@@ -257,7 +262,8 @@ bool Engine::run_one() {
     next = decide(locked, at, caller_.get(), JobSlot());
   }
   if (next.kind != Next::Kind::Start) return false;
-  run(*caller_, next.assignment, JobSlot());
+  Duration cpu = thread_cpu_now();
+  run(*caller_, next.assignment, JobSlot(), cpu);
   return true;
 }
 

@@ -157,7 +157,7 @@ class Engine {
   class Locked;
 
   void main(Thread &self) noexcept;
-  Next run(Thread &self, const Assignment &assignment, JobSlot below) noexcept;
+  Next run(Thread &self, const Assignment &assignment, JobSlot below, Duration &cpu) noexcept;
   sched::Outcome call(const Assignment &assignment);
   Next finish(Thread &self, const Assignment &assignment, sched::Outcome outcome, Duration used, JobSlot below);
   void preemption_point(RunningJob &job);
