@@ -2,7 +2,10 @@
 // round in one process. Prints a table of medians over the rounds, and ratios to the best of rclcpp's.
 //
 //   ros2 run redag_rclcpp bench_executors [--rounds 5] [--seconds 1] [--only timer_idle,...]
+#include <sched.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -49,9 +52,10 @@ struct Kind {
   bool is_ours = false;
 };
 
-std::unique_ptr<rclcpp::Executor> make_redag(redag::PreemptionMode mode) {
+std::unique_ptr<rclcpp::Executor> make_redag(redag::PreemptionMode mode, bool raise_middleware = true) {
   redag_rclcpp::ReDAGOptions options;
   options.preemption = mode;
+  options.raise_middleware = raise_middleware;
   return std::make_unique<redag_rclcpp::ReDAGExecutor>(options);
 }
 
@@ -217,6 +221,63 @@ Figures saturation(rclcpp::Executor &executor, double seconds, int count) {
   return figures;
 }
 
+// The publishing side of arrivals_loaded, in a process of its own: 100 Hz, above everything it competes with.
+int publish_for(double seconds) {
+  sched_param priority{95};
+  sched_setscheduler(0, SCHED_FIFO, &priority);  // refused: then it is as late as everybody
+  rclcpp::init(0, nullptr);
+  auto node = std::make_shared<rclcpp::Node>("publishing");
+  auto publisher = node->create_publisher<Message>("arrivals", rclcpp::QoS(10));
+  const auto end = steady_clock::now() + std::chrono::duration<double>(seconds);
+  while (steady_clock::now() < end) {
+    Message message;
+    message.data = static_cast<std::uint64_t>(now_ns());
+    publisher->publish(message);
+    std::this_thread::sleep_for(10ms);
+  }
+  rclcpp::shutdown();
+  return 0;
+}
+
+// From publish() in another process to the callback's begin, while callbacks of lower rate compute 90 % of the time on
+// each of two processors.
+Figures arrivals_loaded(rclcpp::Executor &executor, double seconds) {
+  const pid_t child = fork();
+  if (child == 0) {
+    const std::string duration = std::to_string(seconds + 1.5);
+    execl("/proc/self/exe", "bench_executors", "--publish", duration.c_str(), nullptr);
+    _exit(2);
+  }
+  auto node = std::make_shared<rclcpp::Node>("bench");
+  Sample latency;
+  rclcpp::SubscriptionOptions own_group;
+  own_group.callback_group = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
+  auto subscription = node->create_subscription<Message>(
+      "arrivals", rclcpp::QoS(10),
+      [&](Message::UniquePtr message) {
+        latency.add(static_cast<double>(now_ns() - static_cast<std::int64_t>(message->data)) / 1e3);
+      },
+      own_group);
+  std::vector<rclcpp::TimerBase::SharedPtr> loads;
+  std::vector<rclcpp::CallbackGroup::SharedPtr> groups;
+  for (int i = 0; i < 2; ++i) {
+    groups.push_back(node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive));
+    loads.push_back(node->create_wall_timer(
+        200ms, [] { burn(180ms); }, groups.back()));
+  }
+  executor.add_node(node);
+  {
+    Spinning spinning(executor);
+    std::this_thread::sleep_for(1s);  // discovery
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  }
+  executor.remove_node(node);
+  waitpid(child, nullptr, 0);
+  return {{"p50_us", latency.at(0.5)},
+          {"p99_us", latency.at(0.99)},
+          {"received", static_cast<double>(latency.values.size())}};
+}
+
 struct Measurement {
   std::string name;
   std::function<Figures(rclcpp::Executor &, double)> run;
@@ -228,6 +289,7 @@ std::vector<Measurement> measurements() {
       {"timer_loaded", [](auto &e, double s) { return timer_lateness(e, s, true); }},
       {"intra_process", [](auto &e, double s) { return publish_latency(e, s, true); }},
       {"dds", [](auto &e, double s) { return publish_latency(e, s, false); }},
+      {"arrivals_loaded", [](auto &e, double s) { return arrivals_loaded(e, s); }},
       {"saturation_1", [](auto &e, double s) { return saturation(e, s, 1); }},
       {"saturation_50", [](auto &e, double s) { return saturation(e, s, 50); }},
   };
@@ -241,6 +303,7 @@ double median(std::vector<double> values) {
 }  // namespace
 
 int main(int argc, char **argv) {
+  if (argc == 3 && std::string(argv[1]) == "--publish") return publish_for(std::atof(argv[2]));
   int rounds = 5;
   double seconds = 1;
   std::string only;
@@ -252,8 +315,11 @@ int main(int argc, char **argv) {
   }
   rclcpp::init(0, nullptr);
   rclcpp::get_logger("redag_rclcpp").set_level(rclcpp::Logger::Level::Error);
-  const auto all = kinds();
   for (const Measurement &measurement : measurements()) {
+    auto all = kinds();
+    if (measurement.name == "arrivals_loaded" && all.back().name == "redag-os") {
+      all.push_back({"redag-os-not-raised", [] { return make_redag(redag::PreemptionMode::Os, false); }, true});
+    }
     if (!only.empty() && ("," + only + ",").find("," + measurement.name + ",") == std::string::npos) continue;
     std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, by executor
     for (int round = 0; round < rounds; ++round) {
