@@ -412,7 +412,8 @@ bool ReferenceScheduler::can_start(std::size_t job, Time now) {
 
 void ReferenceScheduler::place(std::size_t job, std::uint32_t worker, Time now) {
   Job &j = jobs_[job];
-  Dispatch decision{JobSlot(job), TaskId(j.task), j.number, WorkerId(worker), JobSlot::none(), false, level_of(job)};
+  Dispatch decision{JobSlot(job),     TaskId(j.task),  j.number, j.release,
+                    WorkerId(worker), JobSlot::none(), false,    level_of(job)};
   Stack &stack = workers_[worker];
   if (!stack.empty()) {
     Job &under = jobs_[stack.back()];
