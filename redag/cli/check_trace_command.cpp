@@ -80,7 +80,7 @@ class Checking {
       report_unreadable(file, trace.error());
       return;
     }
-    const metrics::CheckReport report = metrics::check_trace(*trace, rules_for(trace->info.executor));
+    const metrics::CheckReport report = metrics::check_trace(*trace, metrics::rules_for(trace->info));
     lawful_ = lawful_ && report.ok();
     if (options_.json) {
       traces_.push_back(

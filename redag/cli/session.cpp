@@ -179,13 +179,9 @@ Result<Session> run_session(const Workload &workload, const Variant &variant, co
                                 ? simulate(configured, variant, options, progress)
                                 : run_on_threads(configured, variant, options, progress);
   if (!session) return session;
-  session->check = metrics::check_trace(session->trace, rules_for(variant.executor));
+  session->check = metrics::check_trace(session->trace, metrics::rules_for(session->trace.info));
   session->elapsed = since(begin);
   return session;
-}
-
-metrics::RuleSet rules_for(const std::string &executor) {
-  return executor == "mte" || executor == "ste" ? metrics::RuleSet::wait_set() : metrics::RuleSet::all();
 }
 
 std::optional<std::string> busy_machine_warning() {

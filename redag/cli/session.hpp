@@ -69,9 +69,6 @@ struct Session {
 [[nodiscard]] Result<Session> run_session(const Workload &workload, const Variant &variant,
                                           const SessionOptions &options, const ProgressHook &progress = {});
 
-/// The rules that an executor's traces are held to: those of rclcpp's models follow no priorities.
-[[nodiscard]] metrics::RuleSet rules_for(const std::string &executor);
-
 /// What to say of a machine that other programs keep busy before a run on threads; nothing if it is quiet.
 [[nodiscard]] std::optional<std::string> busy_machine_warning();
 

@@ -135,7 +135,7 @@ void DispatchRules::resumed(const JobEvent &event, const LiveJob &job) {
 
 void DispatchRules::ended(const JobEvent &event, const LiveJob &job) {
   // Real preemption: the operating system may run a job that the scheduler counts as preempted.
-  const bool may_end_suspended = context_.info.driver == trace::Driver::Threads && mode() == Preemption::Full;
+  const bool may_end_suspended = context_.info.driver != trace::Driver::Simulator && mode() == Preemption::Full;
   context_.expect(Rule::Life, job.state != State::Suspended || may_end_suspended, event.task, event.job,
                   [] { return std::string("it ended while it was preempted"); });
   context_.expect(Rule::Life, event.value >= job.release && event.value <= event.time, event.task, event.job,

@@ -149,7 +149,7 @@ void ReleaseRules::ready(const JobEvent &event, const LiveJob &job) {
 // A release that the driver skips itself, without a look at the task's other jobs: a period slept through (overrun), a
 // message overwritten (queue_full). No job of the model is skipped as `overrun` right after its own release.
 bool ReleaseRules::is_miss(const JobEvent &event) const {
-  if (context_.info.driver != trace::Driver::Threads) return false;
+  if (context_.info.driver == trace::Driver::Simulator) return false;
   if (event.task != just_released_.task || event.job != just_released_.number) return false;
   if (event.reason == Reason::Overrun) return true;
   return event.reason == Reason::QueueFull &&

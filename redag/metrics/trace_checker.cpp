@@ -95,6 +95,18 @@ class Checker {
 
 }  // namespace
 
+RuleSet rules_for(const trace::RunInfo &info) {
+  switch (info.driver) {
+    case trace::Driver::Simulator:
+    case trace::Driver::Threads:
+      return info.executor == "mte" || info.executor == "ste" ? RuleSet::wait_set() : RuleSet::all();
+    case trace::Driver::Ros: return RuleSet::all().without(Rule::Grid);
+    case trace::Driver::RosNodes:
+      return RuleSet::wait_set().without(Rule::Precedence).without(Rule::Admission).without(Rule::Worker);
+  }
+  return RuleSet::all();
+}
+
 CheckReport check_trace(const trace::Trace &trace, const RuleSet &rules) { return Checker(trace, rules).run(); }
 
 }  // namespace redag::metrics

@@ -11,6 +11,11 @@
 
 namespace redag::metrics {
 
+/// The rules that a run's trace can be held to. Those of rclcpp's executors and their models follow no priorities. What
+/// is between a release and a body (threads, messages under way) the nodes of a ROS 2 workload do not see, so that
+/// nothing is said about priorities or idle workers there.
+[[nodiscard]] RuleSet rules_for(const trace::RunInfo &info);
+
 /// A trace with lost events has holes: that is its one violation, and nothing else is checked.
 [[nodiscard]] CheckReport check_trace(const trace::Trace &trace, const RuleSet &rules = RuleSet::all());
 

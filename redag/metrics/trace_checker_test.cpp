@@ -121,6 +121,32 @@ TEST(CheckTrace, GridOfTimers) {
   expect_broken(two_tasks_run().until(12), Rule::Grid);  // hi#1 of 10 ms is missing
 }
 
+TEST(RulesFor, DependOnWhoSawTheRun) {
+  const auto broken = [](trace::Trace trace, Rule rule, trace::Driver driver, const char *executor) {
+    trace.info.driver = driver;
+    trace.info.executor = executor;
+    const CheckReport report = check_trace(trace, rules_for(trace.info));
+    EXPECT_EQ(report.violation_count, report.violated(rule)) << report.to_string();
+    return !report.ok();
+  };
+  TraceBuilder less_urgent(two_tasks());
+  less_urgent.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("lo", 0, 0, 20);
+  less_urgent.at(4).finished("lo", 0, 0).dispatched("hi", 0, 0, 10).at(5).finished("hi", 0, 0);
+  const trace::Trace order = less_urgent.until(10);
+  EXPECT_TRUE(broken(order, Rule::Priority, trace::Driver::Simulator, "redag"));
+  EXPECT_TRUE(broken(order, Rule::Priority, trace::Driver::Threads, "redag"));
+  EXPECT_TRUE(broken(order, Rule::Priority, trace::Driver::Ros, "redag"));
+  EXPECT_FALSE(broken(order, Rule::Priority, trace::Driver::RosNodes, "redag"));
+  EXPECT_FALSE(broken(order, Rule::Priority, trace::Driver::Threads, "mte"));
+
+  TraceBuilder own_grid(two_tasks());  // the timer's first expiry is not at time 0 + offset
+  own_grid.at(3).released_for("hi", 0, 3).ready("hi", 0, 3).dispatched("hi", 0, 0, 13).at(4).finished("hi", 0, 0);
+  const trace::Trace grid = own_grid.until(10);
+  EXPECT_TRUE(broken(grid, Rule::Grid, trace::Driver::Threads, "redag"));
+  EXPECT_FALSE(broken(grid, Rule::Grid, trace::Driver::Ros, "redag"));
+  EXPECT_TRUE(broken(grid, Rule::Grid, trace::Driver::RosNodes, "ste"));
+}
+
 // src (T 10, C 1) -> aligned (T 10, same grid), slower (T 20) and data.
 Workload diamond() {
   return make_workload(

@@ -72,6 +72,20 @@ TEST_F(EventsFile, ReadsBackEverything) {
   EXPECT_EQ(after->info.preemption_why, before.info.preemption_why);
 }
 
+TEST_F(EventsFile, EveryDriverIsReadBack) {
+  for (const char *name : {"simulator", "threads", "ros", "ros_nodes"}) {
+    std::string text = written(example());
+    const std::string before = R"("driver":"threads")";
+    const std::size_t place = text.find(before);
+    ASSERT_NE(place, std::string::npos);
+    text.replace(place, before.size(), std::string(R"("driver":")") + name + '"');
+    const Result<Trace> read = parse_trace(text, "run.jsonl");
+    ASSERT_TRUE(read) << to_string(read.error());
+    EXPECT_STREQ(to_string(read->info.driver), name);
+    EXPECT_EQ(written(*read), text);
+  }
+}
+
 TEST_F(EventsFile, EndAndLossesAreKnownAtTheEnd) {
   const Trace trace = example();
   auto writer = EventsWriter::create(path_, trace.info);

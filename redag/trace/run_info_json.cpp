@@ -19,7 +19,7 @@ constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::Deadlin
                                   PolicyKind::Fixed,         PolicyKind::Edf,
                                   PolicyKind::Fifo,          PolicyKind::ChainAware};
 constexpr std::array kPreemptions = {sched::Preemption::None, sched::Preemption::Cooperative, sched::Preemption::Full};
-constexpr std::array kDrivers = {Driver::Simulator, Driver::Threads};
+constexpr std::array kDrivers = {Driver::Simulator, Driver::Threads, Driver::Ros, Driver::RosNodes};
 
 // Thrown inside this file only; run_info_from_json() turns it into a Diagnostic.
 struct BadValue : std::runtime_error {

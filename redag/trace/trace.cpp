@@ -22,7 +22,15 @@ std::string processor_name() {
 
 }  // namespace
 
-const char *to_string(Driver driver) { return driver == Driver::Simulator ? "simulator" : "threads"; }
+const char *to_string(Driver driver) {
+  switch (driver) {
+    case Driver::Simulator: return "simulator";
+    case Driver::Threads: return "threads";
+    case Driver::Ros: return "ros";
+    case Driver::RosNodes: return "ros_nodes";
+  }
+  return "?";
+}
 
 const char *preemption_name(sched::Preemption mode) {
   switch (mode) {

@@ -13,10 +13,13 @@
 
 namespace redag::trace {
 
-/// What moved time forward.
+/// What moved time forward, and who saw it. All but the simulator have a real clock: stamps have noise, and decisions
+/// follow each other within nanoseconds.
 enum class Driver : std::uint8_t {
   Simulator,  // virtual time: exact, and equal for equal seeds
-  Threads,    // a real clock: stamps have noise, and decisions follow each other within nanoseconds
+  Threads,    // the threaded runtime
+  Ros,        // our executor under rclcpp: timers have no common grid, and messages release
+  RosNodes,   // callbacks of ROS 2 nodes on any executor: they see when they begin and end, but no decision
 };
 
 /// The machine of a real-time run; defaults where nobody looked.

@@ -532,6 +532,11 @@ class CheckTrace(Case):
         document = self.document(redag("check-trace", "--json", self.folder / "lie.jsonl"), "redag.check-trace/1", 1)
         self.assertGreater(document["traces"][0]["check"]["violation_count"], 0)
 
+        # Nodes see no decisions: of them nobody can say that.
+        nodes = lie.replace('"driver":"simulator"', '"driver":"ros_nodes"', 1)
+        self.assertNotEqual(nodes, lie)
+        self.expect(redag("check-trace", self.write("nodes.jsonl", nodes)), 0)
+
     def test_folder_without_traces(self):
         self.expect(redag("check-trace", self.folder), 2, "no events.jsonl")
 
