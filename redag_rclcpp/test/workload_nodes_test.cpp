@@ -54,8 +54,9 @@ class Bodies {
   [[nodiscard]] std::vector<JobRecord> jobs(const Workload &workload, double end, bool timers_queue = false) const {
     return redag::metrics::fold_jobs(workload, stream(workload, end, timers_queue));
   }
-  [[nodiscard]] std::vector<JobEvent> stream(const Workload &workload, double end, bool timers_queue = false) const {
-    return node_events(workload, events_, {ms(end), timers_queue});
+  [[nodiscard]] std::vector<JobEvent> stream(const Workload &workload, double end, bool timers_queue = false,
+                                             redag::Duration phase_error = 0) const {
+    return node_events(workload, events_, {ms(end), phase_error, timers_queue});
   }
   static Time ms(double value) { return static_cast<Time>(value * kMillisecond); }
 
@@ -83,6 +84,18 @@ constexpr auto kOpen = JobOutcome::InFlight;
 constexpr auto kNone = Reason::None;
 
 const char *const kTimer = "{dags: [{name: d, tasks: [{name: a, wcet: 1ms, period: 10ms, offset: 2ms}]}]}";
+const char *const kChain =
+    "{dags: [{name: d, tasks: [{name: a, wcet: 1ms, period: 10ms}, {name: b, wcet: 1ms, activation: data, after: "
+    "a}]}]}";
+
+redag::metrics::CheckReport check(const Workload &workload, std::vector<JobEvent> events, Time end) {
+  redag::trace::Trace trace;
+  trace.info.workload = workload;
+  trace.info.driver = redag::trace::Driver::RosNodes;
+  trace.info.end = end;
+  trace.events = std::move(events);
+  return redag::metrics::check_trace(trace, redag::metrics::rules_for(trace.info));
+}
 
 TEST(NodeEvents, ExpiriesThatNeverRanAreSkippedAtTheNextOne) {
   const Workload workload = workload_of(kTimer);
@@ -104,13 +117,46 @@ TEST(NodeEvents, AJobThatBeganAfterTheNextReleaseIsNotSkipped) {
   const auto bodies = Bodies().ran(0, 0, 12.5, 13).ran(0, 1, 13.1, 14);
   EXPECT_THAT(rows(bodies.jobs(workload, 20)),
               ElementsAre(Row{0, 0, 2, 12.5, kDone, kNone}, Row{0, 1, 12, 13.1, kDone, kNone}));
-  redag::trace::Trace trace;
-  trace.info.workload = workload;
-  trace.info.driver = redag::trace::Driver::Threads;
-  trace.info.end = Bodies::ms(20);
-  trace.events = bodies.stream(workload, 20);
-  const auto report = redag::metrics::check_trace(
-      trace, redag::metrics::RuleSet::all().without(redag::metrics::Rule::WorkConservation));
+  const auto report = check(workload, bodies.stream(workload, 20), Bodies::ms(20));
+  EXPECT_TRUE(report.ok()) << report.to_string();
+}
+
+// Called in time, then kept from the processor for more than a period: the releases of two jobs are overlooked, and the
+// second ends the first.
+TEST(NodeEvents, ReleasesOverlookedTogetherFollowEachOther) {
+  const Workload workload = workload_of(kTimer);
+  const auto bodies = Bodies().ran(0, 0, 32.5, 33).ran(0, 3, 33.1, 34);
+  EXPECT_THAT(rows(bodies.jobs(workload, 40)),
+              ElementsAre(Row{0, 0, 2, 32.5, kDone, kNone}, Row{0, 1, 12, -1, kSkipped, Reason::Overrun},
+                          Row{0, 2, 22, -1, kSkipped, Reason::Overrun}, Row{0, 3, 32, 33.1, kDone, kNone}));
+  const auto report = check(workload, bodies.stream(workload, 40), Bodies::ms(40));
+  EXPECT_TRUE(report.ok()) << report.to_string();
+}
+
+TEST(NodeEvents, MessagesOverlookedTogetherFollowEachOther) {
+  const Workload workload = workload_of(kChain);
+  const auto bodies = Bodies()
+                          .ran(0, 0, 0, 1)
+                          .ran(0, 1, 10, 11)
+                          .ran(0, 2, 20, 21)
+                          .ran(1, 0, 25, 26, 1, 1)  // took its message at 1
+                          .ran(1, 2, 26, 27, 21, 1);
+  const auto all = rows(bodies.jobs(workload, 30));
+  EXPECT_THAT(std::vector<Row>(all.begin() + 3, all.end()),
+              ElementsAre(Row{1, 0, 1, 25, kDone, kNone}, Row{1, 1, 11, -1, kSkipped, Reason::Overrun},
+                          Row{1, 2, 21, 26, kDone, kNone}));
+  const auto report = check(workload, bodies.stream(workload, 30), Bodies::ms(30));
+  EXPECT_TRUE(report.ok()) << report.to_string();
+}
+
+TEST(NodeEvents, ACallJustBeforeItsPointIsOnTime) {
+  const Workload workload = workload_of(kTimer);
+  const auto bodies = Bodies().ran(0, 0, 1.99, 4).ran(0, 1, 13, 14);
+  EXPECT_FALSE(check(workload, bodies.stream(workload, 20), Bodies::ms(20)).ok());  // timers are not so early
+  const auto events = bodies.stream(workload, 20, false, Bodies::ms(0.01));
+  EXPECT_THAT(rows(redag::metrics::fold_jobs(workload, events)),
+              ElementsAre(Row{0, 0, 2, 2, kDone, kNone}, Row{0, 1, 12, 13, kDone, kNone}));
+  const auto report = check(workload, events, Bodies::ms(20));
   EXPECT_TRUE(report.ok()) << report.to_string();
 }
 
@@ -118,10 +164,6 @@ TEST(NodeEvents, WhatEndsAfterTheHorizonIsInFlight) {
   EXPECT_THAT(rows(Bodies().ran(0, 0, 3, 14).jobs(workload_of(kTimer), 10)),
               ElementsAre(Row{0, 0, 2, 3, kOpen, kNone}));
 }
-
-const char *const kChain =
-    "{dags: [{name: d, tasks: [{name: a, wcet: 1ms, period: 10ms}, {name: b, wcet: 1ms, activation: data, after: "
-    "a}]}]}";
 
 TEST(NodeEvents, AnOverwrittenMessageIsASkippedJob) {
   const auto jobs = Bodies()
@@ -201,7 +243,7 @@ class Nodes : public testing::Test {
 
 struct Collected {
   std::vector<JobEvent> bodies;
-  Time end = 0;
+  redag::Duration phase_error = 0;
 };
 
 // Runs on a rclcpp executor for `duration`.
@@ -221,6 +263,7 @@ Collected collect(const Workload &workload, Executor &executor, NodesOptions opt
   executor.cancel();
   spinning.join();
   Collected collected;
+  collected.phase_error = nodes.phase_error();
   nodes.drain(collected.bodies);
   EXPECT_EQ(nodes.lost_events(), 0U);
   for (const auto &node : nodes.nodes()) executor.remove_node(node);
@@ -262,14 +305,9 @@ TEST_F(Nodes, EveryPointOfTheGridIsAJob) {
     NodesOptions options;
     options.intra_process = intra_process;
     const Collected collected = collect(workload, executor, options, 400 * kMillisecond);
-    const auto events = node_events(workload, collected.bodies, {400 * kMillisecond, false});
+    const auto events = node_events(workload, collected.bodies, {400 * kMillisecond, collected.phase_error});
     expect_jobs_add_up(workload, redag::metrics::fold_jobs(workload, events));
-    redag::trace::Trace trace;
-    trace.info.workload = workload;
-    trace.info.driver = redag::trace::Driver::Threads;
-    trace.info.end = 400 * kMillisecond;
-    trace.events = events;
-    const auto report = redag::metrics::check_trace(trace, node_rules());
+    const auto report = check(workload, events, 400 * kMillisecond);
     EXPECT_TRUE(report.ok()) << report.to_string();
   }
 }
@@ -314,8 +352,8 @@ TEST_F(Nodes, ExpiriesThatATimerDropsAreCounted) {
       workload_of("{dags: [{name: d, tasks: [{name: a, wcet: 25ms, period: 10ms, deadline: 10ms}]}]}");
   rclcpp::executors::SingleThreadedExecutor executor;
   const Collected collected = collect(workload, executor, {}, 300 * kMillisecond);
-  const auto jobs =
-      redag::metrics::fold_jobs(workload, node_events(workload, collected.bodies, {300 * kMillisecond, false}));
+  const auto jobs = redag::metrics::fold_jobs(
+      workload, node_events(workload, collected.bodies, {300 * kMillisecond, collected.phase_error}));
   ASSERT_EQ(jobs.size(), 30U);
   std::size_t skipped = 0;
   for (const JobRecord &job : jobs) skipped += job.outcome == JobOutcome::Skipped ? 1 : 0;

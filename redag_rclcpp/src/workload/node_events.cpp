@@ -171,8 +171,12 @@ class Assembly {
     for (Time release = task.task->offset; release < options_.end; release += task.task->period) {
       task.jobs.push_back(Job{release, release, release, nullptr});
     }
-    for (const Body &body : task.bodies) {
-      if (body.job < task.jobs.size()) task.jobs[body.job].body = &body;
+    for (Body &body : task.bodies) {
+      if (body.job >= task.jobs.size()) continue;
+      Job &job = task.jobs[body.job];
+      job.body = &body;
+      if (body.start < job.release && body.start >= job.release - options_.phase_error) body.start = job.release;
+      body.end = std::max(body.end, body.start);
     }
   }
 
@@ -219,7 +223,7 @@ class Assembly {
     for (std::size_t k = 0; k < task.jobs.size(); ++k) {
       if (task.jobs[k].body != nullptr) last_run = k + 1;
     }
-    Time not_before = 0;  // right after the start of the job before
+    Time not_before = 0;  // right after the start of the job before, and what it overlooked so far
     for (std::size_t k = 0; k < task.jobs.size(); ++k) {
       const Job &job = task.jobs[k];
       const auto number = static_cast<std::uint32_t>(k);
@@ -229,6 +233,8 @@ class Assembly {
       constexpr std::uint32_t kNobody = redag::WorkerId::kNoneValue;
       const Time released = std::max(job.release, not_before);
       add(released, JobEventKind::Released, job.release, kNobody, Reason::None);
+      // Of several releases overlooked, each ends the one before: at one time they would say so of all at once.
+      if (released > job.release) not_before = released + 1;
       const Time next = k + 1 < task.jobs.size() ? std::max(task.jobs[k + 1].release, not_before) : kNever;
       if (job.ready != kNever && (job.body != nullptr || job.ready < next)) {
         add(std::max(job.ready, released), JobEventKind::Ready, job.origin, kNobody, Reason::None);

@@ -12,8 +12,9 @@
 namespace redag_rclcpp {
 
 struct NodeEventsOptions {
-  redag::Time end = 0;        // nothing is released at or after it; later events are left out
-  bool timers_queue = false;  // the executor keeps every expiry: those that have not run at the end are in flight
+  redag::Time end = 0;              // nothing is released at or after it; later events are left out
+  redag::Duration phase_error = 0;  // the timers' grid is off its points by at most this: a call so early is on time
+  bool timers_queue = false;        // the executor keeps every expiry: those that have not run at the end are in flight
 };
 
 /// `bodies`: Started and Finished or Aborted of each body that began, in any order. `job` of a timer task is the point
@@ -21,7 +22,7 @@ struct NodeEventsOptions {
 /// from the origin of the grid. The result is a stream as other drivers make it: job numbers, Released to Finished, in
 /// order of time. Dispatched has the time of Started: when the executor decided, the nodes do not see. A release that
 /// the executor overlooked while it began the job before (its timer was called in time, its message taken) is noted
-/// right after that beginning.
+/// right after that beginning, several one after the other.
 [[nodiscard]] std::vector<redag::JobEvent> node_events(const redag::Workload &workload,
                                                        std::span<const redag::JobEvent> bodies,
                                                        const NodeEventsOptions &options);

@@ -289,6 +289,7 @@ void WorkloadNodes::create_timer(TaskNode &task) {
   task.timer = task.node->create_wall_timer(std::chrono::nanoseconds(task.task->period), callback, task.group);
   const std::shared_ptr<const rcl_timer_t> handle = task.timer->get_timer_handle();
   const Time wanted = origin_ + task.task->offset;
+  Duration unsure = 0;
   for (int attempt = 0; attempt < kPhaseAttempts; ++attempt) {
     std::int64_t old = 0;
     if (rcl_timer_exchange_period(handle.get(), wanted - timer_clock_now(), &old) != RCL_RET_OK) {
@@ -301,10 +302,11 @@ void WorkloadNodes::create_timer(TaskNode &task) {
     const Time before = timer_clock_now();
     const Duration until = task.timer->time_until_trigger().count();
     const Time after = timer_clock_now();
-    task.first_expiry = before + until + (after - before) / 2;
+    unsure = (after - before + 1) / 2;
+    task.first_expiry = before + until + unsure;
     if (after + until - wanted <= kPhaseTolerance) break;
   }
-  phase_error_ = std::max(phase_error_, std::abs(task.first_expiry - wanted));
+  phase_error_ = std::max(phase_error_, std::abs(task.first_expiry - wanted) + unsure);
 }
 
 // The point of the timer's grid that was called: the one before its next.

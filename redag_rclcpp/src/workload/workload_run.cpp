@@ -29,8 +29,6 @@ using redag::Duration;
 using redag::JobEvent;
 using redag::PreemptionMode;
 using redag::Time;
-using redag::metrics::Rule;
-using redag::metrics::RuleSet;
 
 namespace {
 
@@ -191,7 +189,7 @@ class Run {
       if (cooperative) info.config.preemption = redag::sched::Preemption::Cooperative;
       for (std::string &warning : redag_->warnings()) result_.warnings.push_back(std::move(warning));
     }
-    info.driver = redag::trace::Driver::Threads;
+    info.driver = redag::trace::Driver::RosNodes;
     info.seed = options_.seed;
     info.end = end_;
     info.warm_up = options_.warm_up;
@@ -206,16 +204,17 @@ class Run {
   }
 
   void evaluate() {
-    result_.trace.events = node_events(workload_, bodies_, {end_, options_.executor == "events"});
+    result_.trace.events =
+        node_events(workload_, bodies_, {end_, nodes_->phase_error(), options_.executor == "events"});
     result_.summary = redag::metrics::summarize(result_.trace);
-    result_.check = redag::metrics::check_trace(result_.trace, node_rules());
+    result_.check = redag::metrics::check_trace(result_.trace, redag::metrics::rules_for(result_.trace.info));
     if (redag_ == nullptr) return;
     SchedulerTrace scheduler;
     redag_->renumber(decisions_);
     scheduler.trace.info = redag_->trace_info();
     scheduler.trace.info.seed = options_.seed;
     scheduler.trace.events = std::move(decisions_);
-    scheduler.check = redag::metrics::check_trace(scheduler.trace, scheduler_rules());
+    scheduler.check = redag::metrics::check_trace(scheduler.trace, redag::metrics::rules_for(scheduler.trace.info));
     result_.scheduler = std::move(scheduler);
   }
 
@@ -253,14 +252,6 @@ redag::Result<void> check_executor(const std::string &name) {
   }
   return {};
 }
-
-RuleSet node_rules() {
-  RuleSet rules = RuleSet::wait_set();
-  for (const Rule rule : {Rule::Precedence, Rule::Admission, Rule::Worker}) rules = rules.without(rule);
-  return rules;
-}
-
-RuleSet scheduler_rules() { return RuleSet::all().without(Rule::Grid); }
 
 redag::Result<WorkloadRun> run_as_nodes(const redag::Workload &workload, const WorkloadRunOptions &options) {
   return Run(workload, options).execute();

@@ -41,19 +41,11 @@ struct SchedulerTrace {
 struct WorkloadRun {
   redag::trace::Trace trace;  // as the nodes saw it
   redag::metrics::Summary summary;
-  redag::metrics::CheckReport check;  // of `trace`, by node_rules()
+  redag::metrics::CheckReport check;  // of `trace`
   std::optional<SchedulerTrace> scheduler;
   std::vector<std::string> warnings;
   bool stopped = false;
 };
-
-/// The rules of docs/model.md that can be seen from within callbacks, for any executor: what is between a release and
-/// a body (threads, messages under way) is not, so that nothing is said about priorities or idle workers.
-[[nodiscard]] redag::metrics::RuleSet node_rules();
-
-/// Those that our executor's own trace is held to: all but the grid, which what messages release has not, and whose
-/// origin for the timers is theirs.
-[[nodiscard]] redag::metrics::RuleSet scheduler_rules();
 
 /// `workload` must be valid. Errors: what ROS or the machine refuse.
 [[nodiscard]] redag::Result<WorkloadRun> run_as_nodes(const redag::Workload &workload,
