@@ -793,7 +793,7 @@ redag::trace::RunInfo ReDAGExecutor::Core::trace_info() const {
   info.config = engine_->options().config;
   info.preemption = to_string(mode_.mode);
   info.preemption_why = mode_.reason;
-  info.driver = redag::trace::Driver::Threads;
+  info.driver = redag::trace::Driver::Ros;
   info.stepped = true;  // spinning begins and ends
   info.end = engine_->now();
   info.lost_events = engine_->lost_events();
