@@ -187,16 +187,17 @@ bool Callback::alive() const {
 // ---- arrivals ----
 
 void Callback::arrived(std::size_t count, Source source, int part, bool seen_only) {
-  const Time now = engine_.now();
   std::shared_ptr<Intake> to_wake;
   {
     const std::lock_guard release_guard(release_lock_);
+    Time now = 0;
     bool release = false;
     Time arrival = 0;
     std::size_t overwritten = 0;
     {
       const std::lock_guard guard(lock_);
-      if (!intake_) return;
+      if (!intake_) return;  // and perhaps there is no engine any more
+      now = engine_.now();
       if (intake_->learning()) learn_from_arrival(now, count);
       const bool direct = intake_->direct();
       if (depth_ > 0) count = std::min(count, depth_);

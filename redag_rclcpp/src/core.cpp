@@ -161,44 +161,46 @@ void ReDAGExecutor::Core::close() {
 
 // ---- nodes, groups, entities ----
 
-void ReDAGExecutor::Core::add_node(const NodeBase::SharedPtr &node) {
+void ReDAGExecutor::Core::change(const std::function<void()> &change) {
   {
     const std::lock_guard guard(collect_lock_);
-    nodes_.push_back(node);
-    node->get_notify_guard_condition().set_on_trigger_callback([weak = weak_from_this()](std::size_t) {
-      if (const auto core = weak.lock()) core->mark_dirty();
-    });
+    change();
   }
   collect();
+}
+
+void ReDAGExecutor::Core::add_node(const NodeBase::SharedPtr &node) {
+  forget_gone_nodes();
+  nodes_.push_back(node);
+  node->get_notify_guard_condition().set_on_trigger_callback([weak = weak_from_this()](std::size_t) {
+    if (const auto core = weak.lock()) core->mark_dirty();
+  });
 }
 
 void ReDAGExecutor::Core::remove_node(const NodeBase::SharedPtr &node) {
-  {
-    const std::lock_guard guard(collect_lock_);
-    const auto gone = [&](const NodeBase::WeakPtr &weak) { return weak.expired() || weak.lock() == node; };
-    nodes_.erase(std::remove_if(nodes_.begin(), nodes_.end(), gone), nodes_.end());
-    for (const Kind kind : {Kind::Timer, Kind::Waitable}) {
-      next_index_.erase({node->get_fully_qualified_name(), static_cast<int>(kind)});
-    }
-    node->get_notify_guard_condition().set_on_trigger_callback(nullptr);
-  }
-  collect();
+  std::erase_if(nodes_, [&](const NodeBase::WeakPtr &weak) { return weak.lock() == node; });
+  forget_gone_nodes();
+  node->get_notify_guard_condition().set_on_trigger_callback(nullptr);
 }
 
 void ReDAGExecutor::Core::add_group(const rclcpp::CallbackGroup::SharedPtr &group, const NodeBase::SharedPtr &node) {
-  {
-    const std::lock_guard guard(collect_lock_);
-    manual_groups_[group] = node;
-  }
-  collect();
+  forget_gone_nodes();
+  manual_groups_[group] = node;
 }
 
-void ReDAGExecutor::Core::remove_group(const rclcpp::CallbackGroup::SharedPtr &group) {
-  {
-    const std::lock_guard guard(collect_lock_);
-    manual_groups_.erase(group);
-  }
-  collect();
+void ReDAGExecutor::Core::remove_group(const rclcpp::CallbackGroup::SharedPtr &group) { manual_groups_.erase(group); }
+
+// Nodes need not be removed, only dropped. One that comes under the same name then begins to count anew.
+void ReDAGExecutor::Core::forget_gone_nodes() {
+  std::erase_if(nodes_, [](const NodeBase::WeakPtr &weak) { return weak.expired(); });
+  std::erase_if(manual_groups_, [](const auto &entry) { return entry.first.expired() || entry.second.expired(); });
+  std::set<std::string> names;
+  const auto insert_name = [&](const NodeBase::WeakPtr &weak) {
+    if (const auto node = weak.lock()) names.insert(node->get_fully_qualified_name());
+  };
+  for (const auto &weak : nodes_) insert_name(weak);
+  for (const auto &[group, weak] : manual_groups_) insert_name(weak);
+  std::erase_if(next_index_, [&](const auto &entry) { return names.count(entry.first.first) == 0; });
 }
 
 void ReDAGExecutor::Core::mark_dirty() {
@@ -230,6 +232,8 @@ void ReDAGExecutor::Core::collect() {
 }
 
 std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
+  // Before the nodes are asked: a group that is created meanwhile waits for the next time, rather than have no node.
+  const auto groups = host_.groups();
   std::map<const rclcpp::CallbackGroup *, std::string> nodes;
   for (const auto &weak : nodes_) {
     if (const auto node = weak.lock()) {
@@ -246,7 +250,7 @@ std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
   }
 
   std::vector<Found> result;
-  for (const auto &weak : host_.groups()) {
+  for (const auto &weak : groups) {
     const auto group = weak.lock();
     if (!group) continue;
     (void)group_name(group);  // also an empty one is watched: something may be created in it
@@ -370,6 +374,10 @@ void ReDAGExecutor::Core::remove(const std::shared_ptr<Callback> &gone) {
   const auto entry = std::find_if(callbacks_.begin(), callbacks_.end(), [&](auto &e) { return e.second == callback; });
   if (entry != callbacks_.end()) callbacks_.erase(entry);
   callback->detach();
+  {
+    // Releases that were taken out of the timer queue before have been passed on: the id can be another task's now.
+    const std::lock_guard guard(expire_lock_);
+  }
   bridge_.remove(*callback);
   const redag::TaskId task = callback->task();
   {

@@ -43,6 +43,9 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   /// Disconnects everything and ends all threads. Before the executor's own members go.
   void close();
 
+  /// Runs `change`, which tells rclcpp and us (by the next four) what is to be executed, as one step: a thread that
+  /// collects sees all of it or nothing. Then collects.
+  void change(const std::function<void()> &change);
   void add_node(const NodeBase::SharedPtr &node);
   void remove_node(const NodeBase::SharedPtr &node);
   void add_group(const rclcpp::CallbackGroup::SharedPtr &group, const NodeBase::SharedPtr &node);
@@ -97,6 +100,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   };
   struct Found;
 
+  void forget_gone_nodes();
   void add(const Found &found);
   void remove(const std::shared_ptr<Callback> &callback);
   void place(Record &record, const Found &found);

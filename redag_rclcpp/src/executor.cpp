@@ -32,6 +32,7 @@ ReDAGExecutor::ReDAGExecutor(const rclcpp::ExecutorOptions &options, ReDAGOption
   Host host;
   host.groups = [this] {
 #if RCLCPP_VERSION_MAJOR < 21
+    forget_expired();
     {
       // Newer ones do this when they are asked for the groups.
       const std::lock_guard<std::mutex> guard(mutex_);
@@ -58,25 +59,58 @@ ReDAGExecutor::~ReDAGExecutor() { core_->close(); }
 // ---- nodes and groups ----
 
 void ReDAGExecutor::add_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
-  rclcpp::Executor::add_node(node, notify);
-  core_->add_node(node);
+  core_->change([&] {
+    rclcpp::Executor::add_node(node, notify);
+    core_->add_node(node);
+  });
 }
 
 void ReDAGExecutor::remove_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
-  rclcpp::Executor::remove_node(node, notify);
-  core_->remove_node(node);
+  std::vector<rclcpp::CallbackGroup::SharedPtr> kept;
+  core_->change([&] {
+#if RCLCPP_VERSION_MAJOR < 21
+    // It throws half-way if one of the node's groups is gone, and none of them must go now.
+    for (const auto &group : get_all_callback_groups()) kept.push_back(group.lock());
+    forget_expired();
+#endif
+    rclcpp::Executor::remove_node(node, notify);
+    core_->remove_node(node);
+  });
 }
 
 void ReDAGExecutor::add_callback_group(rclcpp::CallbackGroup::SharedPtr group,
                                        rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
-  rclcpp::Executor::add_callback_group(group, node, notify);
-  core_->add_group(group, node);
+  core_->change([&] {
+    rclcpp::Executor::add_callback_group(group, node, notify);
+    core_->add_group(group, node);
+  });
 }
 
 void ReDAGExecutor::remove_callback_group(rclcpp::CallbackGroup::SharedPtr group, bool notify) {
-  rclcpp::Executor::remove_callback_group(group, notify);
-  core_->remove_group(group);
+  core_->change([&] {
+    rclcpp::Executor::remove_callback_group(group, notify);
+    core_->remove_group(group);
+  });
 }
+
+#if RCLCPP_VERSION_MAJOR < 21
+// rclcpp does this when it waits, which it never does for us.
+void ReDAGExecutor::forget_expired() {
+  const std::lock_guard<std::mutex> guard(mutex_);
+  const auto is_gone = [](const auto &entry) { return entry.first.expired() || entry.second.expired(); };
+  for (const auto &entry : weak_groups_to_nodes_) {
+    if (!is_gone(entry)) continue;
+    const auto condition = weak_groups_to_guard_conditions_.find(entry.first);
+    if (condition == weak_groups_to_guard_conditions_.end()) continue;
+    memory_strategy_->remove_guard_condition(condition->second);
+    weak_groups_to_guard_conditions_.erase(condition);
+  }
+  std::erase_if(weak_groups_to_nodes_, is_gone);
+  std::erase_if(weak_groups_to_nodes_associated_with_executor_, is_gone);
+  std::erase_if(weak_groups_associated_with_executor_to_nodes_, is_gone);
+  weak_nodes_.remove_if([](const auto &node) { return node.expired(); });
+}
+#endif
 
 // ---- spinning ----
 

@@ -143,6 +143,9 @@ class ReDAGExecutor : public rclcpp::Executor {
 
  private:
   RCLCPP_DISABLE_COPY(ReDAGExecutor)
+#if RCLCPP_VERSION_MAJOR < 21
+  void forget_expired();
+#endif
 
   class Core;
   std::shared_ptr<Core> core_;

@@ -1,0 +1,584 @@
+// Nodes, groups and entities come and go, from several threads and from callbacks, while the executor is busy: what
+// stays goes on, what goes is let go of, and nothing runs that nobody asked for. REDAG_SEED chooses what happens,
+// REDAG_CHURN_SECONDS how long for each mode.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <random>
+#include <set>
+#include <stdexcept>
+#include <thread>
+#include <tuple>
+#include <vector>
+
+#include "process_tasks.hpp"
+#include "rclcpp/rclcpp.hpp"
+#include "redag/runtime/preemption_point.hpp"
+#include "redag_rclcpp/executor.hpp"
+#include "test_msgs/msg/strings.hpp"
+#include "test_msgs/srv/empty.hpp"
+
+namespace redag_rclcpp {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+using test_msgs::msg::Strings;
+using EmptyService = test_msgs::srv::Empty;
+using Random = std::mt19937_64;
+
+constexpr auto kLimit = 30s;
+constexpr int kThreads = 3;
+constexpr std::size_t kNodesOfAThread = 3;
+constexpr std::size_t kEntitiesOfANode = 12;
+
+template <class Condition>
+bool eventually(Condition condition) {
+  const auto end = steady_clock::now() + kLimit;
+  while (!condition()) {
+    if (steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(1ms);
+  }
+  return true;
+}
+
+std::uint64_t from_environment(const char *name, std::uint64_t otherwise) {
+  const char *value = std::getenv(name);
+  return value == nullptr ? otherwise : std::strtoull(value, nullptr, 10);
+}
+
+std::uint64_t below(Random &random, std::uint64_t end) { return random() % end; }
+
+void burn(std::chrono::microseconds time) {
+  for (const auto end = steady_clock::now() + time; steady_clock::now() < end;) redag::preemption_point();
+}
+
+/// A node with what it has, which its own callbacks change too.
+struct Patch {
+  rclcpp::Node::SharedPtr node;
+  std::mutex lock;  // the rest
+  Random random;
+  std::vector<rclcpp::CallbackGroup::SharedPtr> groups;
+  std::vector<rclcpp::TimerBase::SharedPtr> timers;
+  std::vector<rclcpp::SubscriptionBase::SharedPtr> subscriptions;
+  std::vector<rclcpp::Publisher<Strings>::SharedPtr> publishers;
+  std::vector<rclcpp::ServiceBase::SharedPtr> services;
+  std::vector<rclcpp::Client<EmptyService>::SharedPtr> clients;
+};
+
+struct Counts {
+  std::atomic<std::uint64_t> operations{0};
+  std::atomic<std::uint64_t> callbacks{0};
+  std::atomic<std::uint64_t> thrown{0};
+  std::atomic<std::uint64_t> silent{0};  // callbacks that nothing calls
+};
+
+/// The changes, at random.
+class Churn {
+ public:
+  explicit Churn(Counts &counts) : counts_(counts) {}
+
+  std::shared_ptr<Patch> make_patch(std::uint64_t seed) {
+    auto patch = std::make_shared<Patch>();
+    patch->random.seed(seed);
+    Random &random = patch->random;
+    // No parameter events: where they arrive they use the node's time source, which Humble destroys under them when a
+    // node is dropped, whatever the executor.
+    const auto options = rclcpp::NodeOptions()
+                             .use_intra_process_comms(below(random, 2) == 0)
+                             .start_parameter_services(below(random, 8) == 0)
+                             .start_parameter_event_publisher(false);
+    patch->node = std::make_shared<rclcpp::Node>("patch" + std::to_string(next_++), options);
+    {
+      const std::lock_guard guard(lock_);
+      nodes_.push_back(patch->node);
+    }
+    add_silent(*patch);
+    const std::lock_guard guard(patch->lock);
+    for (int i = 0; i < 5; ++i) add(patch);
+    return patch;
+  }
+
+  // With the patch's lock held, from here on.
+
+  void add(const std::shared_ptr<Patch> &patch) {
+    const std::size_t entities =
+        patch->timers.size() + patch->subscriptions.size() + patch->services.size() + patch->clients.size();
+    if (entities >= kEntitiesOfANode) return;
+    switch (below(patch->random, 6)) {
+      case 0:
+      case 1: return add_timer(patch);
+      case 2: return add_subscription(patch);
+      case 3: patch->publishers.push_back(patch->node->create_publisher<Strings>(topic(*patch), depth(*patch))); return;
+      case 4: return add_service(*patch);
+      default: patch->clients.push_back(patch->node->create_client<EmptyService>("~/work"));
+    }
+  }
+
+  void take_away(Patch &patch) {
+    switch (below(patch.random, 6)) {
+      case 0: return drop(patch, patch.timers);
+      case 1: return drop(patch, patch.subscriptions);
+      case 2: return drop(patch, patch.publishers);
+      case 3: return drop(patch, patch.services);
+      case 4: return drop(patch, patch.clients);
+      default: drop(patch, patch.groups);
+    }
+  }
+
+  void use(Patch &patch) {
+    if (!patch.timers.empty()) {
+      auto &timer = *patch.timers[below(patch.random, patch.timers.size())];
+      below(patch.random, 2) == 0 ? timer.cancel() : timer.reset();
+    }
+    if (!patch.publishers.empty()) {
+      auto &publisher = *patch.publishers[below(patch.random, patch.publishers.size())];
+      for (int i = 0; i < 3; ++i) publisher.publish(std::make_unique<Strings>());
+    }
+    if (!patch.clients.empty()) {
+      auto &client = *patch.clients[below(patch.random, patch.clients.size())];
+      client.async_send_request(std::make_shared<EmptyService::Request>(),
+                                [this](rclcpp::Client<EmptyService>::SharedFuture) { ++counts_.callbacks; });
+    }
+  }
+
+  /// Nodes that somebody still holds.
+  [[nodiscard]] std::size_t living() {
+    const std::lock_guard guard(lock_);
+    return static_cast<std::size_t>(std::count_if(nodes_.begin(), nodes_.end(), [](auto &n) { return !n.expired(); }));
+  }
+
+ private:
+  static std::string topic(Patch &patch) { return "/churn" + std::to_string(below(patch.random, 3)); }
+  static rclcpp::QoS depth(Patch &patch) { return rclcpp::QoS(1 + below(patch.random, 10)); }
+
+  template <class Entities>
+  static void drop(Patch &patch, Entities &entities) {
+    if (!entities.empty()) {
+      entities.erase(entities.begin() + static_cast<std::ptrdiff_t>(below(patch.random, entities.size())));
+    }
+  }
+
+  rclcpp::CallbackGroup::SharedPtr group(Patch &patch) {
+    const std::uint64_t choice = below(patch.random, 4);
+    if (choice == 0) return nullptr;
+    if (choice == 1 || patch.groups.empty()) {
+      patch.groups.push_back(patch.node->create_callback_group(below(patch.random, 2) == 0
+                                                                   ? rclcpp::CallbackGroupType::MutuallyExclusive
+                                                                   : rclcpp::CallbackGroupType::Reentrant));
+    }
+    return patch.groups[below(patch.random, patch.groups.size())];
+  }
+
+  void add_timer(const std::shared_ptr<Patch> &patch) {
+    const std::chrono::milliseconds period(2 + below(patch->random, 20));
+    // Now and then longer than the period.
+    const std::chrono::microseconds longest = below(patch->random, 8) == 0 ? period * 3 / 2 : 200us;
+    std::weak_ptr<Patch> weak = patch;
+    patch->timers.push_back(patch->node->create_wall_timer(
+        period, [this, weak, longest] { run(weak, longest); }, group(*patch)));
+  }
+
+  void add_subscription(const std::shared_ptr<Patch> &patch) {
+    rclcpp::SubscriptionOptions options;
+    options.callback_group = group(*patch);
+    patch->subscriptions.push_back(patch->node->create_subscription<Strings>(
+        topic(*patch), depth(*patch),
+        [this, weak = std::weak_ptr<Patch>(patch)](Strings::ConstSharedPtr) { run(weak, 100us); }, options));
+  }
+
+  void add_service(Patch &patch) {
+    // Names of life-cycle nodes' services: these are watched by a wait set.
+    const std::string name = below(patch.random, 3) == 0 ? "~/get_state" : "~/work";
+    patch.services.push_back(patch.node->create_service<EmptyService>(
+        name, [this](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) { ++counts_.callbacks; }));
+  }
+
+  /// Nothing ever calls these. Were a task's id used for another's arrivals, they would be given jobs.
+  void add_silent(Patch &patch) {
+    patch.services.push_back(patch.node->create_service<EmptyService>(
+        "~/silent", [this](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) { ++counts_.silent; }));
+    patch.timers.push_back(patch.node->create_wall_timer(1h, [this] { ++counts_.silent; }));
+    patch.subscriptions.push_back(patch.node->create_subscription<Strings>(
+        "/silent", rclcpp::QoS(1), [this](Strings::ConstSharedPtr) { ++counts_.silent; }));
+  }
+
+  void run(const std::weak_ptr<Patch> &weak, std::chrono::microseconds longest) {
+    ++counts_.callbacks;
+    const auto patch = weak.lock();  // perhaps the last to hold it, and its node
+    if (!patch) return;
+    burn(longest);
+    const std::unique_lock guard(patch->lock, std::try_to_lock);
+    if (!guard) return;
+    switch (below(patch->random, 64)) {
+      case 0: return add(patch);
+      case 1: return take_away(*patch);
+      case 2: ++counts_.thrown; throw std::runtime_error("as callbacks do");
+      default: use(*patch);
+    }
+  }
+
+  Counts &counts_;
+  std::atomic<std::uint64_t> next_{0};
+  std::mutex lock_;
+  std::vector<std::weak_ptr<rclcpp::Node>> nodes_;
+};
+
+/// A thread that changes what the executor has, until stopped; then it drops everything.
+class Gardener {
+ public:
+  Gardener(ReDAGExecutor &executor, Churn &churn, Counts &counts, std::uint64_t seed)
+      : executor_(executor), churn_(churn), counts_(counts), random_(seed), thread_([this] { work(); }) {}
+  ~Gardener() {
+    stop_ = true;
+    thread_.join();
+  }
+
+ private:
+  struct Bed {
+    std::shared_ptr<Patch> patch;
+    std::vector<rclcpp::CallbackGroup::SharedPtr> manual;  // added without the node
+  };
+
+  void work() {
+    while (!stop_) {
+      step();
+      ++counts_.operations;
+      std::this_thread::sleep_for(std::chrono::microseconds(below(random_, 500)));
+    }
+    while (!beds_.empty()) dig_up();
+  }
+
+  void step() {
+    const std::uint64_t choice = below(random_, 32);
+    if (beds_.empty() || (choice < 2 && beds_.size() < kNodesOfAThread)) return plant();
+    if (choice < 4) return dig_up();
+    Bed &bed = beds_[below(random_, beds_.size())];
+    if (choice < 5) {
+      executor_.remove_node(bed.patch->node);
+      executor_.add_node(bed.patch->node);
+      return;
+    }
+    if (choice < 7) return change_manual(bed);
+    if (choice < 8) return look();
+    const std::lock_guard guard(bed.patch->lock);
+    if (choice < 16) return churn_.add(bed.patch);
+    if (choice < 22) return churn_.take_away(*bed.patch);
+    churn_.use(*bed.patch);
+  }
+
+  void plant() {
+    beds_.push_back(Bed{churn_.make_patch(random_()), {}});
+    executor_.add_node(beds_.back().patch->node);
+  }
+
+  void dig_up() {
+    const std::size_t position = below(random_, beds_.size());
+    const Bed bed = beds_[position];
+    beds_.erase(beds_.begin() + static_cast<std::ptrdiff_t>(position));
+    // Else it is dropped as it is.
+    if (below(random_, 2) == 0) executor_.remove_node(bed.patch->node);
+  }
+
+  void change_manual(Bed &bed) {
+    if (!bed.manual.empty()) {
+      const auto group = bed.manual.back();
+      bed.manual.pop_back();
+      if (below(random_, 2) == 0) executor_.remove_callback_group(group);
+      return;
+    }
+    const auto group = bed.patch->node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive, false);
+    bed.manual.push_back(group);
+    const std::lock_guard guard(bed.patch->lock);
+    bed.patch->timers.push_back(bed.patch->node->create_wall_timer(
+        3ms, [counts = &counts_] { ++counts->callbacks; }, group));
+    executor_.add_callback_group(group, bed.patch->node->get_node_base_interface());
+  }
+
+  void look() {
+    for (const CallbackStats &stats : executor_.stats()) {
+      EXPECT_LE(stats.jobs.finished + stats.jobs.skipped + stats.jobs.aborted, stats.jobs.released) << stats.task;
+      EXPECT_FALSE(stats.id.node.empty()) << stats.task;
+    }
+    (void)executor_.learned();
+    (void)executor_.warnings();
+  }
+
+  ReDAGExecutor &executor_;
+  Churn &churn_;
+  Counts &counts_;
+  Random random_;
+  std::vector<Bed> beds_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+enum class Driver { Spin, Pull, Restart };
+
+/// The thread that drives the executor.
+class Spinner {
+ public:
+  Spinner(ReDAGExecutor &executor, Driver driver, std::uint64_t seed)
+      : executor_(executor), done_(std::async(std::launch::async, [this, driver, seed] { work(driver, seed); })) {}
+  ~Spinner() {
+    if (done_.valid()) stop();
+  }
+  /// False: a spin function did not return.
+  bool stop() {
+    stop_ = true;
+    // A cancel() between two spins is lost.
+    for (const auto end = steady_clock::now() + kLimit; steady_clock::now() < end;) {
+      executor_.cancel();
+      if (done_.wait_for(10ms) == std::future_status::ready) {
+        done_.get();
+        return true;
+      }
+    }
+    return false;
+  }
+
+ private:
+  void work(Driver driver, std::uint64_t seed) {
+    Random random(seed);
+    while (!stop_) {
+      switch (driver == Driver::Spin ? 0 : driver == Driver::Restart ? below(random, 4) : 1 + below(random, 3)) {
+        case 0: executor_.spin(); break;
+        case 1: executor_.spin_some(); break;
+        case 2: executor_.spin_all(2ms); break;
+        default: executor_.spin_once(std::chrono::milliseconds(below(random, 3)));
+      }
+    }
+  }
+
+  ReDAGExecutor &executor_;
+  std::atomic<bool> stop_{false};
+  std::future<void> done_;
+};
+
+/// A node that stays, and what it did.
+struct Steady {
+  static constexpr std::chrono::nanoseconds kPeriod = 2ms;
+
+  Steady() {
+    rclcpp::PublisherOptions here;
+    here.use_intra_process_comm = rclcpp::IntraProcessSetting::Enable;
+    rclcpp::SubscriptionOptions from_here;
+    from_here.use_intra_process_comm = rclcpp::IntraProcessSetting::Enable;
+    const rclcpp::QoS qos = rclcpp::QoS(2000).reliable();
+    inner = node->create_publisher<Strings>("/steady_inner", qos, here);
+    outer = node->create_publisher<Strings>("/steady_outer", qos);
+    inner_subscription = node->create_subscription<Strings>(
+        "/steady_inner", qos, [this](Strings::ConstSharedPtr) { ++inner_received; }, from_here);
+    outer_subscription =
+        node->create_subscription<Strings>("/steady_outer", qos, [this](Strings::ConstSharedPtr) { ++outer_received; });
+    service = node->create_service<EmptyService>(
+        "/steady", [](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) {});
+    client = node->create_client<EmptyService>("/steady");
+    timer = node->create_wall_timer(kPeriod, [this] {
+      ++ticks;
+      inner->publish(std::make_unique<Strings>());
+      outer->publish(Strings());
+      ++sent;
+      if (ticks % 4 == 0) {
+        client->async_send_request(std::make_shared<EmptyService::Request>(),
+                                   [this](rclcpp::Client<EmptyService>::SharedFuture) { ++answered; });
+      }
+    });
+  }
+
+  [[nodiscard]] bool goes_on() const {
+    const std::uint64_t before[] = {ticks, inner_received, outer_received, answered};
+    return eventually([&] {
+      return ticks > before[0] && inner_received > before[1] && outer_received > before[2] && answered > before[3];
+    });
+  }
+
+  rclcpp::Node::SharedPtr node = std::make_shared<rclcpp::Node>("steady");
+  std::atomic<std::uint64_t> ticks{0}, sent{0}, inner_received{0}, outer_received{0}, answered{0};
+  rclcpp::Publisher<Strings>::SharedPtr inner, outer;
+  rclcpp::SubscriptionBase::SharedPtr inner_subscription, outer_subscription;
+  rclcpp::ServiceBase::SharedPtr service;
+  rclcpp::Client<EmptyService>::SharedPtr client;
+  rclcpp::TimerBase::SharedPtr timer;
+};
+
+using Parameters = std::tuple<redag::PreemptionMode, Driver>;
+
+class ChurnTest : public ::testing::TestWithParam<Parameters> {
+ protected:
+  void SetUp() override {
+    if (std::get<0>(GetParam()) == redag::PreemptionMode::Os && redag::runtime::probe_priority_band().top_job == 0) {
+      GTEST_SKIP() << "SCHED_FIFO is not to be had here";
+    }
+    rclcpp::init(0, nullptr);
+    steady = std::make_unique<Steady>();
+  }
+  void TearDown() override {
+    steady.reset();
+    if (rclcpp::ok()) rclcpp::shutdown();
+  }
+
+  std::unique_ptr<ReDAGExecutor> make_executor() {
+    ReDAGOptions options;
+    options.preemption = std::get<0>(GetParam());
+    options.workers = 2;
+    options.on_exception = [](const ExceptionInfo &) { return OnException::Continue; };
+    return std::make_unique<ReDAGExecutor>(options);
+  }
+
+  static std::chrono::milliseconds duration() {
+    const std::chrono::milliseconds all(1000 * from_environment("REDAG_CHURN_SECONDS", 5));
+    return std::get<1>(GetParam()) == Driver::Spin ? all * 3 / 5 : all / 5;
+  }
+
+  /// Everything but the steady node comes and goes.
+  void churn(ReDAGExecutor &executor, std::chrono::milliseconds time) {
+    const std::uint64_t seed = from_environment("REDAG_SEED", 20240607);
+    Counts counts;
+    Churn churn(counts);
+    executor.add_node(steady->node);
+    Spinner spinner(executor, std::get<1>(GetParam()), seed);
+    {
+      std::vector<std::unique_ptr<Gardener>> gardeners;
+      for (int i = 1; i <= kThreads; ++i) {
+        gardeners.push_back(std::make_unique<Gardener>(executor, churn, counts, seed + static_cast<std::uint64_t>(i)));
+      }
+      for (const auto end = steady_clock::now() + time; steady_clock::now() < end;) {
+        std::this_thread::sleep_for(50ms);
+        if (std::get<1>(GetParam()) == Driver::Restart) executor.cancel();
+        ASSERT_TRUE(steady->goes_on());
+      }
+    }
+    if (std::get<1>(GetParam()) == Driver::Restart) {
+      ASSERT_TRUE(spinner.stop());
+      Spinner last(executor, Driver::Spin, seed);
+      settle(executor, churn, counts);
+      ASSERT_TRUE(last.stop());
+    } else {
+      settle(executor, churn, counts);
+      ASSERT_TRUE(spinner.stop());
+    }
+    check_jobs(executor);
+    executor.remove_node(steady->node);
+    EXPECT_TRUE(executor.stats().empty());
+    std::printf("%lu operations, %lu callbacks, %lu threw, %lu ticks\n", counts.operations.load(),
+                counts.callbacks.load(), counts.thrown.load(), steady->ticks.load());
+  }
+
+  /// Every node but the steady one was dropped; nothing is under way when this returns.
+  void settle(ReDAGExecutor &executor, Churn &churn, Counts &counts) {
+    EXPECT_TRUE(steady->goes_on());
+    EXPECT_TRUE(eventually([&] { return churn.living() == 0; })) << churn.living() << " nodes are still held";
+    EXPECT_EQ(counts.silent, 0);
+    EXPECT_GT(counts.callbacks, 0);
+    steady->timer->cancel();
+    EXPECT_TRUE(eventually([&] {
+      return steady->inner_received >= steady->sent && steady->outer_received >= steady->sent;
+    })) << steady->sent
+        << " sent, " << steady->inner_received << " and " << steady->outer_received << " received";
+    // What was dropped is forgotten with the next change.
+    EXPECT_TRUE(eventually([&] {
+      steady->node->create_wall_timer(1h, [] {});
+      const auto stats = executor.stats();
+      return std::all_of(stats.begin(), stats.end(), [](const CallbackStats &s) { return s.id.node == "/steady"; });
+    }));
+  }
+
+  /// At rest every job has ended, and who counted for himself counted the same.
+  void check_jobs(ReDAGExecutor &executor) {
+    std::uint64_t inner = 0;
+    std::uint64_t ticks = 0;
+    for (const CallbackStats &stats : executor.stats()) {
+      SCOPED_TRACE(stats.task);
+      const auto &jobs = stats.jobs;
+      EXPECT_EQ(jobs.released, jobs.finished + jobs.skipped + jobs.aborted);
+      if (stats.id.name == "/steady_inner") inner = jobs.released;
+      if (stats.period == Steady::kPeriod.count()) ticks = jobs.finished;
+    }
+    EXPECT_EQ(inner, steady->sent);
+    EXPECT_EQ(ticks, steady->ticks);
+  }
+
+  std::unique_ptr<Steady> steady;
+};
+
+TEST_P(ChurnTest, WhatStaysGoesOnAndWhatGoesIsLetGoOf) {
+  // The middleware starts threads as it needs them: a first round has it start them all.
+  {
+    const auto executor = make_executor();
+    churn(*executor, 200ms);
+  }
+  if (HasFatalFailure()) return;
+  steady = nullptr;
+  steady = std::make_unique<Steady>();
+  const std::size_t threads = process_tasks().size();
+  {
+    const auto executor = make_executor();
+    churn(*executor, duration());
+  }
+  if (HasFatalFailure()) return;
+  EXPECT_TRUE(eventually([&] { return process_tasks().size() <= threads; }))
+      << process_tasks().size() << " threads, " << threads << " before";
+
+  // The node is as it was, for another executor.
+  const auto second = make_executor();
+  second->add_node(steady->node);
+  Spinner spinner(*second, Driver::Spin, 0);
+  steady->timer->reset();
+  EXPECT_TRUE(steady->goes_on());
+  EXPECT_TRUE(spinner.stop());
+}
+
+class DroppedTest : public ::testing::Test {
+ protected:
+  void SetUp() override { rclcpp::init(0, nullptr); }
+  void TearDown() override { rclcpp::shutdown(); }
+};
+
+TEST_F(DroppedTest, ANodeThatLostAGroupCanBeRemovedAndAddedAgain) {
+  ReDAGExecutor executor;
+  auto node = std::make_shared<rclcpp::Node>("node");
+  {
+    auto group = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
+    auto timer = node->create_wall_timer(
+        1ms, [] {}, group);
+    executor.add_node(node);
+  }
+  EXPECT_NO_THROW(executor.remove_node(node));
+  EXPECT_NO_THROW(executor.add_node(node));
+}
+
+TEST_F(DroppedTest, ANodeOfTheSameNameCountsItsTimersAnew) {
+  ReDAGExecutor executor;
+  for (int round = 0; round < 2; ++round) {
+    auto node = std::make_shared<rclcpp::Node>("node");
+    auto timer = node->create_wall_timer(1h, [] {});
+    executor.add_node(node);
+    std::vector<std::uint32_t> timers;
+    for (const CallbackStats &stats : executor.stats()) {
+      if (stats.id.kind == redag::Callback::Kind::Timer) timers.push_back(stats.id.index);
+    }
+    EXPECT_EQ(timers, std::vector<std::uint32_t>{0}) << "round " << round;
+  }
+}
+
+std::string name_of(const ::testing::TestParamInfo<Parameters> &test) {
+  const auto [mode, driver] = test.param;
+  constexpr const char *kNames[] = {"spin", "pull", "restart"};
+  return std::string(to_string(mode)) + "_" + kNames[static_cast<int>(driver)];
+}
+
+constexpr auto kModes = {redag::PreemptionMode::None, redag::PreemptionMode::Cooperative, redag::PreemptionMode::Os};
+constexpr auto kDrivers = {Driver::Spin, Driver::Pull, Driver::Restart};
+INSTANTIATE_TEST_SUITE_P(Modes, ChurnTest,
+                         ::testing::Combine(::testing::ValuesIn(kModes), ::testing::ValuesIn(kDrivers)), name_of);
+
+}  // namespace
+}  // namespace redag_rclcpp

@@ -1,0 +1,33 @@
+// The threads of this process as the kernel shows them, for tests of what an executor leaves behind or wakes.
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+
+namespace redag_rclcpp {
+
+struct ProcessTask {
+  std::string name;
+  std::uint64_t switches = 0;  // voluntary: how often it has gone to sleep
+};
+
+/// By thread id. Threads that end meanwhile are left out.
+inline std::map<int, ProcessTask> process_tasks() {
+  std::map<int, ProcessTask> tasks;
+  std::error_code ignored;
+  for (const auto &entry : std::filesystem::directory_iterator("/proc/self/task", ignored)) {
+    ProcessTask task;
+    std::ifstream comm(entry.path() / "comm");
+    std::ifstream status(entry.path() / "status");
+    if (!std::getline(comm, task.name)) continue;
+    for (std::string key; status >> key;) {
+      if (key == "voluntary_ctxt_switches:") status >> task.switches;
+    }
+    tasks[std::stoi(entry.path().filename())] = task;
+  }
+  return tasks;
+}
+
+}  // namespace redag_rclcpp

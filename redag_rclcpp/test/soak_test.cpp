@@ -1,0 +1,236 @@
+// What an executor costs while nothing happens, and what it holds on to in the long run. REDAG_SOAK_SECONDS says how
+// long the busy part is (10); REDAG_SOAK_EXECUTOR=multi_threaded does the same with rclcpp's, to compare with.
+#include <gtest/gtest.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "process_tasks.hpp"
+#include "rclcpp/rclcpp.hpp"
+#include "redag_rclcpp/executor.hpp"
+#include "test_msgs/msg/strings.hpp"
+#include "test_msgs/srv/empty.hpp"
+
+namespace redag_rclcpp {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+using test_msgs::msg::Strings;
+using EmptyService = test_msgs::srv::Empty;
+
+template <class Condition>
+bool eventually(Condition condition) {
+  const auto end = steady_clock::now() + 20s;
+  while (!condition()) {
+    if (steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(1ms);
+  }
+  return true;
+}
+
+/// Spins in a thread of its own for as long as it lives.
+class Spinner {
+ public:
+  explicit Spinner(rclcpp::Executor &executor)
+      : executor_(executor), thread_([&] {
+          thread_id_ = static_cast<int>(syscall(SYS_gettid));
+          executor.spin();
+        }) {
+    eventually([&] { return executor.is_spinning(); });
+  }
+  ~Spinner() {
+    executor_.cancel();
+    thread_.join();
+  }
+  [[nodiscard]] int thread_id() const { return thread_id_; }
+
+ private:
+  rclcpp::Executor &executor_;
+  std::atomic<int> thread_id_{0};
+  std::thread thread_;
+};
+
+std::size_t resident_kib() {
+  std::ifstream statm("/proc/self/statm");
+  std::size_t total = 0;
+  std::size_t resident = 0;
+  statm >> total >> resident;
+  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE)) / 1024;
+}
+
+/// Wake-ups of our threads, and of the one that spins.
+std::uint64_t wake_ups(const Spinner &spinner) {
+  std::uint64_t all = 0;
+  for (const auto &[id, task] : process_tasks()) {
+    if (id == spinner.thread_id() || task.name.rfind("redag", 0) == 0) all += task.switches;
+  }
+  return all;
+}
+
+class SoakTest : public ::testing::Test {
+ protected:
+  void SetUp() override { rclcpp::init(0, nullptr); }
+  void TearDown() override { rclcpp::shutdown(); }
+};
+
+class IdleTest : public SoakTest, public ::testing::WithParamInterface<redag::PreemptionMode> {};
+
+TEST_P(IdleTest, NothingWakesTheExecutor) {
+  if (GetParam() == redag::PreemptionMode::Os && redag::runtime::probe_priority_band().top_job == 0) {
+    GTEST_SKIP() << "SCHED_FIFO is not to be had here";
+  }
+  auto node = std::make_shared<rclcpp::Node>("idle");
+  std::atomic<int> received{0};
+  auto subscription =
+      node->create_subscription<Strings>("/idle", rclcpp::QoS(10), [&](Strings::ConstSharedPtr) { ++received; });
+  auto publisher = node->create_publisher<Strings>("/idle", rclcpp::QoS(10));
+  auto service = node->create_service<EmptyService>(
+      "~/service", [](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) {});
+  ReDAGOptions options;
+  options.preemption = GetParam();
+  options.workers = 2;
+  ReDAGExecutor executor(options);
+  executor.add_node(node);
+  const Spinner spinner(executor);
+  // It does work, and sees to what happens at the start.
+  ASSERT_TRUE(eventually([&] {
+    publisher->publish(Strings());
+    std::this_thread::sleep_for(10ms);
+    return received > 0;
+  }));
+  std::this_thread::sleep_for(500ms);
+  const std::uint64_t before = wake_ups(spinner);
+  EXPECT_GT(before, 0);
+  std::this_thread::sleep_for(2s);
+  const std::uint64_t woken = wake_ups(spinner) - before;
+  std::printf("%lu wake-ups in 2 s\n", woken);
+  EXPECT_LE(woken, 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, IdleTest,
+                         ::testing::Values(redag::PreemptionMode::None, redag::PreemptionMode::Cooperative,
+                                           redag::PreemptionMode::Os),
+                         [](const auto &test) { return std::string(to_string(test.param)); });
+
+/// A chain of three, a service that is called, and nodes that come and go.
+class Graph {
+ public:
+  explicit Graph(rclcpp::Executor &executor) : executor_(executor) {
+    first_ = node_->create_publisher<Strings>("/first", rclcpp::QoS(10));
+    second_ = node_->create_publisher<Strings>("/second", rclcpp::QoS(10));
+    filter_ = node_->create_subscription<Strings>(
+        "/first", rclcpp::QoS(10), [this](Strings::ConstSharedPtr message) { second_->publish(*message); });
+    sink_ = node_->create_subscription<Strings>("/second", rclcpp::QoS(10),
+                                                [this](Strings::ConstSharedPtr) { ++received; });
+    service_ = node_->create_service<EmptyService>(
+        "~/service", [](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) {});
+    client_ = node_->create_client<EmptyService>("~/service");
+    timer_ = node_->create_wall_timer(20ms, [this] {
+      first_->publish(Strings());
+      if (++ticks_ % 5 == 0) {
+        client_->async_send_request(std::make_shared<EmptyService::Request>(),
+                                    [this](rclcpp::Client<EmptyService>::SharedFuture) { ++answered; });
+      }
+    });
+    executor_.add_node(node_);
+  }
+
+  /// One node more and one less; every other one is only dropped.
+  void churn() {
+    auto node = std::make_shared<rclcpp::Node>("guest" + std::to_string(guests_++),
+                                               rclcpp::NodeOptions().start_parameter_event_publisher(false));
+    auto group = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
+    rclcpp::SubscriptionOptions options;
+    options.callback_group = group;
+    auto subscription = node->create_subscription<Strings>(
+        "/second", rclcpp::QoS(10), [](Strings::ConstSharedPtr) {}, options);
+    auto timer = node->create_wall_timer(
+        20ms, [] {}, group);
+    executor_.add_node(node);
+    std::this_thread::sleep_for(60ms);
+    if (guests_ % 2 == 0) executor_.remove_node(node);
+  }
+
+  std::atomic<std::uint64_t> received{0};
+  std::atomic<std::uint64_t> answered{0};
+
+ private:
+  rclcpp::Executor &executor_;
+  rclcpp::Node::SharedPtr node_ = std::make_shared<rclcpp::Node>("soak");
+  rclcpp::Publisher<Strings>::SharedPtr first_, second_;
+  rclcpp::SubscriptionBase::SharedPtr filter_, sink_;
+  rclcpp::ServiceBase::SharedPtr service_;
+  rclcpp::Client<EmptyService>::SharedPtr client_;
+  rclcpp::TimerBase::SharedPtr timer_;
+  std::uint64_t ticks_ = 0;
+  std::uint64_t guests_ = 0;
+};
+
+/// Least-squares slope, a minute.
+double slope(const std::vector<double> &minutes, const std::vector<double> &values, std::size_t from) {
+  const auto n = static_cast<double>(values.size() - from);
+  double x = 0;
+  double y = 0;
+  double xx = 0;
+  double xy = 0;
+  for (std::size_t i = from; i < values.size(); ++i) {
+    x += minutes[i] / n;
+    y += values[i] / n;
+    xx += minutes[i] * minutes[i] / n;
+    xy += minutes[i] * values[i] / n;
+  }
+  return xx > x * x ? (xy - x * y) / (xx - x * x) : 0;
+}
+
+TEST_F(SoakTest, ABusyGraphGoesOnAndThreadsDoNotPileUp) {
+  const char *text = std::getenv("REDAG_SOAK_SECONDS");
+  const std::chrono::seconds time(text == nullptr ? 10 : std::atoi(text));
+  const char *kind = std::getenv("REDAG_SOAK_EXECUTOR");
+  std::unique_ptr<rclcpp::Executor> executor;
+  if (kind != nullptr && std::string(kind) == "multi_threaded") {
+    executor = std::make_unique<rclcpp::executors::MultiThreadedExecutor>(rclcpp::ExecutorOptions(), 2);
+  } else {
+    executor = std::make_unique<ReDAGExecutor>(ReDAGOptions{.workers = 2});
+  }
+  Graph graph(*executor);
+  const Spinner spinner(*executor);
+  graph.churn();
+  ASSERT_TRUE(eventually([&] { return graph.received > 0 && graph.answered > 0; }));
+
+  const std::size_t threads = process_tasks().size();
+  std::vector<double> minutes;
+  std::vector<double> resident;
+  const auto begin = steady_clock::now();
+  for (auto next = begin; next < begin + time;) {
+    const std::uint64_t before[] = {graph.received, graph.answered};
+    next += 1s;
+    while (steady_clock::now() < next) {
+      graph.churn();
+      std::this_thread::sleep_for(200ms);
+    }
+    ASSERT_TRUE(eventually([&] { return graph.received > before[0] && graph.answered > before[1]; }));
+    minutes.push_back(std::chrono::duration<double>(steady_clock::now() - begin).count() / 60);
+    resident.push_back(static_cast<double>(resident_kib()));
+    if (resident.size() % 60 == 0) {
+      std::printf("%5.1f min: %.0f KiB, %zu threads, %lu wake-ups\n", minutes.back(), resident.back(),
+                  process_tasks().size(), wake_ups(spinner));
+      std::fflush(stdout);
+    }
+  }
+  EXPECT_LE(process_tasks().size(), threads);
+  std::printf("%.0f KiB at first, %.0f KiB at last; in the second half %+.1f KiB a minute\n", resident.front(),
+              resident.back(), slope(minutes, resident, resident.size() / 2));
+}
+
+}  // namespace
+}  // namespace redag_rclcpp
