@@ -68,6 +68,26 @@ TimerReading read_timer(const rcl_timer_t &timer, const redag::runtime::Engine &
   return reading;
 }
 
+/// The timer's clock, if it is ROS time; else null.
+rcl_clock_t *ros_clock_of(const rcl_timer_t &timer) {
+  rcl_clock_t *clock = nullptr;
+  if (rcl_timer_clock(const_cast<rcl_timer_t *>(&timer), &clock) != RCL_RET_OK) rcl_reset_error();
+  return clock != nullptr && clock->type == RCL_ROS_TIME ? clock : nullptr;
+}
+
+/// Does the clock stand still between messages on /clock?
+bool is_simulated(const rcl_timer_t &timer) {
+  rcl_clock_t *clock = ros_clock_of(timer);
+  bool enabled = false;
+  if (clock != nullptr && rcl_is_enabled_ros_time_override(clock, &enabled) != RCL_RET_OK) rcl_reset_error();
+  return enabled;
+}
+
+/// Does only its guard condition tell of resets, or of jumps of time?
+bool has_to_be_waited_for(const rcl_timer_t &timer) {
+  return !compat::kTimersTellOfResets || ros_clock_of(timer) != nullptr;
+}
+
 Duration period_of(const rcl_timer_t &timer) {
   Duration period = 0;
   if (rcl_timer_get_period(&timer, &period) != RCL_RET_OK) rcl_reset_error();
@@ -129,7 +149,7 @@ bool Callback::attach(TaskId task) {
   }
   if (const auto timer = timer_.lock()) {
     compat::set_on_reset(*timer, [self = shared_from_this()] { self->look_at_timer(); });
-    return !compat::kTimersTellOfResets || follows_ros_time();
+    return has_to_be_waited_for(*timer_handle_);
   }
   return by_wait_set_;
 }
@@ -302,7 +322,7 @@ Duration Callback::mean_interval() const {
 Callback::Waited Callback::waited() const {
   Waited waited;
   if (is_timer()) {
-    if (!compat::kTimersTellOfResets || follows_ros_time()) waited.timer = timer_handle_;
+    if (has_to_be_waited_for(*timer_handle_)) waited.timer = timer_handle_;
     return waited;
   }
   {
@@ -347,29 +367,6 @@ void Callback::seen_by_wait_set() {
 }
 
 // ---- timers ----
-
-bool Callback::follows_ros_time() const {
-  rcl_clock_t *clock = nullptr;
-  if (rcl_timer_clock(const_cast<rcl_timer_t *>(timer_handle_.get()), &clock) != RCL_RET_OK) {
-    rcl_reset_error();
-    return false;
-  }
-  return clock->type == RCL_ROS_TIME;
-}
-
-namespace {
-// Does the clock stand still between messages on /clock?
-bool is_simulated(const rcl_timer_t &timer) {
-  rcl_clock_t *clock = nullptr;
-  bool enabled = false;
-  if (rcl_timer_clock(const_cast<rcl_timer_t *>(&timer), &clock) != RCL_RET_OK || clock->type != RCL_ROS_TIME ||
-      rcl_is_enabled_ros_time_override(clock, &enabled) != RCL_RET_OK) {
-    rcl_reset_error();
-    return false;
-  }
-  return enabled;
-}
-}  // namespace
 
 void Callback::look_at_timer() {
   restarted_ = true;
@@ -434,8 +431,9 @@ bool Callback::execute_timer() {
   if (rcl_timer_is_ready(timer_handle_.get(), &due) != RCL_RET_OK) rcl_reset_error();
   uncalled_ = false;
   if (!due) {
-    // Cancelled; or the job before this one started so late that its call consumed this expiry too, which is lost.
-    if (!timer->is_canceled()) late_.fetch_add(1, std::memory_order_relaxed);
+    // Cancelled, or reset meanwhile; or the job before this one started so late that its call consumed this expiry too,
+    // which is lost.
+    if (!restarted_ && !timer->is_canceled()) late_.fetch_add(1, std::memory_order_relaxed);
     reschedule();
     return false;
   }

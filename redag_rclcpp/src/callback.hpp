@@ -132,7 +132,6 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
   void learn_from_arrival(Time now, std::size_t count);
   [[nodiscard]] bool take_token(Token &token);
   void reschedule();
-  [[nodiscard]] bool follows_ros_time() const;
 
   // False: there was nothing to do.
   [[nodiscard]] bool execute_timer();

@@ -293,9 +293,7 @@ std::string ReDAGExecutor::Core::group_name(const rclcpp::CallbackGroup::SharedP
     watch_group(*group, [weak = weak_from_this()](std::size_t) {
       if (const auto core = weak.lock()) core->mark_dirty();
     });
-    for (auto it = group_names_.begin(); it != group_names_.end();) {
-      it = it->first.expired() ? group_names_.erase(it) : std::next(it);
-    }
+    std::erase_if(group_names_, [](const auto &known) { return known.first.expired(); });
   }
   return group->type() == rclcpp::CallbackGroupType::MutuallyExclusive ? entry->second : std::string();
 }
