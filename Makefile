@@ -1,7 +1,7 @@
 # The front door: each target does one everyday thing from a fresh clone on. What it runs is plain CMake and the scripts
 # of tools/; nothing is built here that `cmake --preset` could not build.
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench lint format asan tsan install clean
+.PHONY: help demo test bench lint format asan tsan ros install clean
 PREFIX ?= /usr/local
 
 # ThreadSanitizer of older compilers cannot start where a kernel randomises much of the address space
@@ -57,6 +57,10 @@ tsan: ## the tests of what has threads, under ThreadSanitizer
 	$(NO_RANDOMISATION) cmake --build --preset tsan
 	$(NO_RANDOMISATION) ctest --preset tsan
 
+ros: ## build redag_rclcpp with colcon and run its tests, for each ROS 2 under /opt/ros
+	@tools/bootstrap test
+	tools/test_rclcpp
+
 install: ## install library, headers and program to PREFIX (default /usr/local)
 	@tools/bootstrap run
 	cmake --preset release
@@ -64,4 +68,4 @@ install: ## install library, headers and program to PREFIX (default /usr/local)
 	cmake --install build/release --prefix $(PREFIX)
 
 clean: ## remove what the targets above built; results/ stays
-	rm -rf build/dev build/release build/bench build/asan-ubsan build/tsan
+	rm -rf build/dev build/release build/bench build/asan-ubsan build/tsan build/colcon
