@@ -57,18 +57,14 @@ Result<void> Engine::start() {
   }
   for (auto &thread : threads_) {
     thread->priority = realtime() ? options_.band.top_job : 0;
-    thread->setup = ThreadSetup{options_.name + "-" + std::to_string(thread->index), thread->priority, cpus};
-    thread->handle = std::thread([this, &self = *thread] { main(self); });
-  }
-  Result<void> result;
-  for (auto &thread : threads_) {
-    thread->ready.wait();
-    if (result && !thread->setup_result) result = thread->setup_result;
-  }
-  if (!result) {
-    halt();
-    join();
-    return result;
+    const ThreadSetup setup{options_.name + "-" + std::to_string(thread->index), thread->priority, cpus};
+    Result<std::thread> started = start_thread(setup, [this, &self = *thread] { main(self); });
+    if (!started) {
+      halt();
+      join();
+      return tl::unexpected(started.error());
+    }
+    thread->handle = *std::move(started);
   }
   const Time at = now();
   Locked locked(*this);
@@ -78,14 +74,11 @@ Result<void> Engine::start() {
   }
   running_ = true;
   decide(locked, at, nullptr, JobSlot());
-  return result;
+  return {};
 }
 
 void Engine::main(Thread &self) noexcept {
-  self.setup_result = set_up_this_thread(self.setup);
-  const bool usable = self.setup_result.has_value();
-  self.ready.set();
-  while (usable) {
+  for (;;) {
     if (self.has_mail.load(std::memory_order_acquire)) {
       const Assignment first = self.mail;
       self.has_mail.store(false, std::memory_order_relaxed);

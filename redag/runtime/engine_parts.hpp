@@ -57,9 +57,6 @@ struct alignas(64) Engine::Thread {
   int priority = 0;                    // lock: SCHED_FIFO priority it has now; 0: not real-time
   trace::Ring events;                  // Started; written by the thread
 
-  ThreadSetup setup;
-  Result<void> setup_result;
-  Event ready;
   std::thread handle;
 };
 

@@ -15,7 +15,6 @@ namespace redag::runtime {
 namespace {
 
 constexpr Duration kStartMargin = kMillisecond;  // from the threads being ready to the first release
-constexpr std::uint32_t kSpareThreads = 16;
 
 void throw_if_bad(const Dag &dag, std::uint32_t workers, PolicyKind policy) {
   Workload alone;
@@ -31,25 +30,20 @@ void throw_if_bad(const Dag &dag, std::uint32_t workers, PolicyKind policy) {
 }  // namespace
 
 Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
-  const PriorityBand band = probe_priority_band();
-  Result<Mode> mode = resolve_mode(options_.preemption, options_.policy, band);
-  if (!mode) throw std::runtime_error(to_string(mode.error()));
-  mode_ = *std::move(mode);
-
-  const std::size_t cpus = options_.cpus.empty() ? usable_cpus().size() : options_.cpus.size();
-  if (options_.workers == 0) options_.workers = static_cast<std::uint32_t>(cpus);
-  const std::uint32_t threads = options_.threads > 0 ? options_.threads : options_.workers + kSpareThreads;
-  warnings_ = mode_warnings(mode_, options_.workers, cpus);
+  Result<Setup> setup = set_up(options_.preemption, options_.policy, options_.workers, options_.threads, options_.cpus);
+  if (!setup) throw std::runtime_error(to_string(setup.error()));
+  setup_ = *std::move(setup);
+  options_.workers = setup_.config.workers;
   if (options_.lock_memory) {
     if (const Result<void> locked = redag::runtime::lock_memory(); !locked) {
-      warnings_.push_back(to_string(locked.error()));
+      setup_.warnings.push_back(to_string(locked.error()));
     }
   }
 
   EngineOptions engine;
   engine.name = options_.name;
-  engine.config = make_config(mode_, options_.workers, options_.policy, band, std::max(threads, options_.workers));
-  engine.band = band;
+  engine.config = setup_.config;
+  engine.band = setup_.band;
   engine.cpus = options_.cpus;
   engine.trace_capacity = options_.trace_capacity;
   engine.on_exception = [this](const Job &job, std::exception_ptr e) { on_exception(job, std::move(e)); };
@@ -121,8 +115,7 @@ void Executor::start() {
   const Time origin = monotonic_now() + kStartMargin;
   engine_->set_origin(origin);
   running_ = true;
-  const int priority = mode_.mode == PreemptionMode::Os ? engine_->options().band.timer : 0;
-  const ThreadSetup setup{options_.name + "-timer", priority, {}};
+  const ThreadSetup setup{options_.name + "-timer", setup_.timer_priority(), {}};
   if (const Result<void> ready = timer_->start(origin, kNever, setup); !ready) {
     request_stop();
     throw std::runtime_error(to_string(ready.error()));

@@ -87,8 +87,8 @@ class Executor {
   [[nodiscard]] bool stopping() const noexcept { return engine_->halting(); }
 
   /// Which preemption mode this is, and why.
-  [[nodiscard]] const Mode &mode() const { return mode_; }
-  [[nodiscard]] const std::vector<std::string> &warnings() const { return warnings_; }
+  [[nodiscard]] const Mode &mode() const { return setup_.mode; }
+  [[nodiscard]] const std::vector<std::string> &warnings() const { return setup_.warnings; }
 
   /// Appends the events since the last call; times count from the start. One thread at a time.
   void drain(std::vector<JobEvent> &events);
@@ -108,8 +108,7 @@ class Executor {
   [[nodiscard]] const Added &added(DagId dag) const;
 
   ExecutorOptions options_;
-  Mode mode_;
-  std::vector<std::string> warnings_;
+  Setup setup_;
   std::unique_ptr<Engine> engine_;
   std::unique_ptr<ReleaseTimer> timer_;
   mutable PiMutex lock_;  // guards the three below

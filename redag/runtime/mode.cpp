@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <sched.h>
 
+#include <algorithm>
+
 #include "redag/runtime/threads.hpp"
 
 namespace redag::runtime {
@@ -12,6 +14,7 @@ namespace {
 // one for the release timer, then some room for the user's own urgent threads above the jobs.
 constexpr int kKernelRoom = 9;
 constexpr int kUserRoom = 9;
+constexpr std::uint32_t kSpareThreads = 16;
 
 bool is_static(PolicyKind policy) { return policy != PolicyKind::Edf && policy != PolicyKind::Fifo; }
 
@@ -59,6 +62,21 @@ sched::Config make_config(const Mode &mode, std::uint32_t workers, PolicyKind po
     case PreemptionMode::Auto: config.preemption = sched::Preemption::None; break;
   }
   return config;
+}
+
+Result<Setup> set_up(PreemptionMode wanted, PolicyKind policy, std::uint32_t workers, std::uint32_t threads,
+                     const std::vector<int> &cpus) {
+  Setup setup;
+  setup.band = probe_priority_band();
+  Result<Mode> mode = resolve_mode(wanted, policy, setup.band);
+  if (!mode) return tl::unexpected(mode.error());
+  setup.mode = *std::move(mode);
+  const std::size_t processors = cpus.empty() ? usable_cpus().size() : cpus.size();
+  if (workers == 0) workers = static_cast<std::uint32_t>(processors);
+  threads = std::max(threads == 0 ? workers + kSpareThreads : threads, workers);
+  setup.config = make_config(setup.mode, workers, policy, setup.band, threads);
+  setup.warnings = mode_warnings(setup.mode, workers, processors);
+  return setup;
 }
 
 std::vector<std::string> mode_warnings(const Mode &mode, std::uint32_t workers, std::size_t cpus) {

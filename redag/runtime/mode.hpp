@@ -37,6 +37,22 @@ struct PriorityBand {
 [[nodiscard]] sched::Config make_config(const Mode &mode, std::uint32_t workers, PolicyKind policy,
                                         const PriorityBand &band, std::uint32_t threads);
 
+/// An executor's share of this machine: what it was asked for, as it can be had.
+struct Setup {
+  Mode mode;
+  PriorityBand band;
+  sched::Config config;
+  std::vector<std::string> warnings;
+
+  /// SCHED_FIFO priority of what must not wait for jobs, the release timer first of all; 0: none.
+  [[nodiscard]] int timer_priority() const { return mode.mode == PreemptionMode::Os ? band.timer : 0; }
+};
+
+/// `workers` 0: one for each of `cpus` (empty: of the processors that the process may use). `threads` (jobs that can be
+/// started at once, with os) 0: some more than workers. Error: as resolve_mode().
+[[nodiscard]] Result<Setup> set_up(PreemptionMode wanted, PolicyKind policy, std::uint32_t workers,
+                                   std::uint32_t threads, const std::vector<int> &cpus);
+
 /// What a user should know before trusting the figures: too few processors, real-time throttling.
 [[nodiscard]] std::vector<std::string> mode_warnings(const Mode &mode, std::uint32_t workers, std::size_t cpus);
 

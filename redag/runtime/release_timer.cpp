@@ -38,17 +38,7 @@ void ReleaseTimer::remove(TaskId first_task, std::size_t count) {
 Result<void> ReleaseTimer::start(Time origin, Time horizon, ThreadSetup setup) {
   origin_ = origin;
   horizon_ = horizon;
-  Result<void> result;
-  Event ready;
-  thread_ = std::thread([this, &setup, &result, &ready] {
-    result = set_up_this_thread(setup);
-    const bool usable = result.has_value();
-    ready.set();
-    if (usable) main();
-  });
-  ready.wait();
-  if (!result) join();
-  return result;
+  return start_thread(setup, [this] { main(); }).map([this](std::thread &&thread) { thread_ = std::move(thread); });
 }
 
 void ReleaseTimer::stop() noexcept {

@@ -40,23 +40,23 @@ class Run {
 
  private:
   Result<void> prepare() {
-    const PriorityBand band = probe_priority_band();
     const sched::ExecutorKind *kind = sched::find_executor(options_.executor);
     if (kind == nullptr && !options_.scheduler) {
       return make_error(fmt::format("there is no executor '{}'", options_.executor));
     }
     const bool preemptive = kind == nullptr || kind->preemptive;
     const auto wanted = options_.preemption.value_or(workload_.platform.preemption);
-    Result<Mode> mode = resolve_mode(preemptive ? wanted : PreemptionMode::None, workload_.policy, band);
-    if (!mode) return tl::unexpected(mode.error());
-    if (!preemptive && wanted != PreemptionMode::None) mode->reason = "executor " + options_.executor + " has no other";
-    if (options_.realtime_threads && band.top_job == 0) {
+    Result<Setup> setup = set_up(preemptive ? wanted : PreemptionMode::None, workload_.policy,
+                                 workload_.platform.workers, pool_size(workload_, options_), options_.cpus);
+    if (!setup) return tl::unexpected(setup.error());
+    result_.mode = setup->mode;
+    if (!preemptive && wanted != PreemptionMode::None) {
+      result_.mode.reason = "executor " + options_.executor + " has no other";
+    }
+    if (options_.realtime_threads && setup->band.top_job == 0) {
       return make_error("the workers cannot be SCHED_FIFO threads: this process may not", realtime_hint());
     }
-    result_.mode = *mode;
-    const std::uint32_t workers = workload_.platform.workers;
-    const std::size_t cpus = options_.cpus.empty() ? usable_cpus().size() : options_.cpus.size();
-    result_.warnings = mode_warnings(*mode, workers, cpus);
+    result_.warnings = std::move(setup->warnings);
     if (options_.lock_memory) {
       if (const Result<void> locked = redag::runtime::lock_memory(); !locked) {
         const Diagnostic &why = locked.error().front();
@@ -65,8 +65,8 @@ class Run {
     }
 
     EngineOptions engine;
-    engine.config = make_config(*mode, workers, workload_.policy, band, pool_size(workload_, options_));
-    engine.band = band;
+    engine.config = setup->config;
+    engine.band = setup->band;
     engine.realtime_threads = options_.realtime_threads;
     engine.cpus = options_.cpus;
     engine.trace_capacity = options_.trace_capacity;

@@ -9,7 +9,12 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <functional>
+#include <system_error>
 #include <thread>
+#include <utility>
+
+#include "redag/runtime/parker.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -55,6 +60,27 @@ bool set_fifo_priority(pthread_t thread, int priority) noexcept {
   sched_param parameters{};
   parameters.sched_priority = priority;
   return pthread_setschedparam(thread, SCHED_FIFO, &parameters) == 0;
+}
+
+Result<std::thread> start_thread(const ThreadSetup &setup, std::function<void()> main) {
+  Result<void> result;
+  Event ready;
+  std::thread thread;
+  try {
+    thread = std::thread([&setup, &result, &ready, main = std::move(main)] {
+      result = set_up_this_thread(setup);
+      const bool usable = result.has_value();
+      ready.set();
+      if (usable) main();
+    });
+  } catch (const std::system_error &error) {
+    return make_error(fmt::format("thread '{}' cannot be created: {}", setup.name, error.what()),
+                      "limits on threads: 'ulimit -u', the container's pids limit, memory for stacks ('ulimit -s')");
+  }
+  ready.wait();
+  if (result) return thread;
+  thread.join();
+  return tl::unexpected(result.error());
 }
 
 int fifo_priority(pthread_t thread) noexcept {

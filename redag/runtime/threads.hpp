@@ -5,8 +5,10 @@
 #include <pthread.h>
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "redag/base/result.hpp"
@@ -23,6 +25,10 @@ struct ThreadSetup {
 /// Applies it to the calling thread, with a timer slack of 1 ns (the default of 50 us is most of an idle timer's
 /// lateness). Error: the first thing that the system refused.
 [[nodiscard]] Result<void> set_up_this_thread(const ThreadSetup &setup);
+
+/// A thread that is set up so and then runs `main`; returns once it is set up. Error: as set_up_this_thread(), and
+/// `main` does not run.
+[[nodiscard]] Result<std::thread> start_thread(const ThreadSetup &setup, std::function<void()> main);
 
 /// False if the system refused.
 [[nodiscard]] bool set_fifo_priority(pthread_t thread, int priority) noexcept;

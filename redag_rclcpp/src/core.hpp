@@ -21,6 +21,7 @@
 #include "redag/runtime/mode.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag_rclcpp/executor.hpp"
+#include "task_table.hpp"
 #include "timer_queue.hpp"
 
 namespace redag_rclcpp {
@@ -65,14 +66,11 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   void spin_ready(std::chrono::nanoseconds max_duration, bool exhaustive);
   void spin_one(std::chrono::nanoseconds timeout);
 
-  [[nodiscard]] const redag::runtime::Mode &mode() const { return mode_; }
-  [[nodiscard]] const ReDAGOptions &options() const { return options_; }
+  [[nodiscard]] const redag::runtime::Setup &setup() const { return setup_; }
+  [[nodiscard]] const TaskTable &tasks() const { return tasks_; }
   [[nodiscard]] std::vector<std::string> warnings() const;
-  [[nodiscard]] std::vector<CallbackStats> stats() const;
-  [[nodiscard]] redag::Workload learned() const;
   [[nodiscard]] bool learning_done() const { return !learning_; }
-  [[nodiscard]] redag::trace::RunInfo trace_info() const;
-  void renumber(std::vector<redag::JobEvent> &events) const;
+  [[nodiscard]] redag::trace::Trace as_trace(std::vector<redag::JobEvent> events) const;
 
   // Intake
   redag::runtime::Engine &engine() override { return *engine_; }
@@ -85,25 +83,12 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   [[nodiscard]] bool learning() const override { return learning_; }
 
  private:
-  /// A task that the scheduler has, or had (traces only).
-  struct Record {
-    std::shared_ptr<Callback> callback;  // null once removed
-    redag::CallbackId id;
-    redag::Task task;
-    std::uint32_t dag = 0;   // position in dags_
-    std::uint32_t rank = 0;  // topological, in its DAG
-    bool configured = false;
-  };
-  struct DagInfo {
-    redag::Dag dag;  // without tasks
-    redag::DagId id;
-  };
   struct Found;
 
   void forget_gone_nodes();
   void add(const Found &found);
   void remove(const std::shared_ptr<Callback> &callback);
-  void place(Record &record, const Found &found);
+  void place(TaskTable::Entry &entry, const Found &found);
   void watch_group(rclcpp::CallbackGroup &group, const std::function<void(std::size_t)> &callback);
   [[nodiscard]] std::vector<Found> find_entities();
   [[nodiscard]] std::string group_name(const rclcpp::CallbackGroup::SharedPtr &group);
@@ -122,21 +107,17 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   void throw_failure();
   void begin_learning();
   void stop_learning();
-  [[nodiscard]] redag::Duration learned_period(const Record &record, int depth) const;
-  void add_learned_edges(redag::Workload &workload, const std::vector<std::vector<std::uint32_t>> &ids) const;
-  [[nodiscard]] std::string name_of(const Record &record) const;
-  [[nodiscard]] redag::Workload as_workload(std::vector<std::vector<std::uint32_t>> &tasks, bool with_edges) const;
 
   rclcpp::Context::SharedPtr context_;
-  ReDAGOptions options_;
+  const ReDAGOptions options_;
   Host host_;
-  redag::runtime::Mode mode_;
-  redag::runtime::PriorityBand band_;
-  std::vector<std::string> warnings_;  // lock: records_lock_
-  redag::Time origin_ = 0;             // of the engine's clock, on CLOCK_MONOTONIC
+  redag::runtime::Setup setup_;  // its warnings: notes_lock_
+  redag::Time origin_ = 0;       // of the engine's clock, on CLOCK_MONOTONIC
   std::unique_ptr<redag::runtime::Engine> engine_;
   TimerQueue timers_;
   Bridge bridge_;
+  TaskTable tasks_;
+  std::vector<redag::DagId> dag_ids_;  // of tasks_.dags()
   std::optional<redag::CallbackMatcher> matcher_;
 
   mutable std::recursive_mutex
@@ -149,9 +130,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   std::map<std::pair<std::string, int>, std::uint32_t> next_index_;  // of timers and waitables, by node and kind
   std::uint64_t next_group_ = 0;
 
-  mutable std::mutex records_lock_;  // the next three; innermost
-  std::vector<DagInfo> dags_;
-  std::vector<Record> records_;  // by TaskId
+  mutable std::mutex notes_lock_;  // of the setup's warnings and of the next; innermost
   std::exception_ptr failure_;
 
   enum class FirstSpin : std::uint8_t { Awaited, Cancelled, Begun };

@@ -180,14 +180,16 @@ void ReDAGExecutor::cancel() {
 
 // ---- what can be asked ----
 
-const redag::runtime::Mode &ReDAGExecutor::mode() const { return core_->mode(); }
-std::uint32_t ReDAGExecutor::workers() const { return core_->options().workers; }
+const redag::runtime::Mode &ReDAGExecutor::mode() const { return core_->setup().mode; }
+std::uint32_t ReDAGExecutor::workers() const { return core_->setup().config.workers; }
 std::vector<std::string> ReDAGExecutor::warnings() const { return core_->warnings(); }
-std::vector<CallbackStats> ReDAGExecutor::stats() const { return core_->stats(); }
-redag::Workload ReDAGExecutor::learned() const { return core_->learned(); }
+std::vector<CallbackStats> ReDAGExecutor::stats() const { return core_->tasks().stats(core_->engine()); }
+redag::Workload ReDAGExecutor::learned() const { return core_->tasks().learned(); }
 bool ReDAGExecutor::learning_done() const { return core_->learning_done(); }
 void ReDAGExecutor::drain_trace(std::vector<redag::JobEvent> &events) { core_->engine().drain(events); }
-redag::trace::RunInfo ReDAGExecutor::trace_info() const { return core_->trace_info(); }
-void ReDAGExecutor::renumber(std::vector<redag::JobEvent> &events) const { core_->renumber(events); }
+std::string ReDAGExecutor::task_name(redag::TaskId task) const { return core_->tasks().name_of(task); }
+redag::trace::Trace ReDAGExecutor::as_trace(std::vector<redag::JobEvent> events) const {
+  return core_->as_trace(std::move(events));
+}
 
 }  // namespace redag_rclcpp

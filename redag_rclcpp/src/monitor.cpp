@@ -62,8 +62,7 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
   Impl(rclcpp::Node::SharedPtr node, ReDAGExecutor &executor, MonitorOptions options)
       : node_(std::move(node)), executor_(executor), options_(std::move(options)), keeper_(options_.trace_events) {
     if (options_.workload) bounds_.emplace(*options_.workload);
-    const redag::trace::RunInfo info = executor_.trace_info();
-    config_ = info.config;
+    config_ = executor_.as_trace({}).info.config;
     if (options_.trace.empty()) return;
     const redag::Result<void> ready = prepare_folder(options_.trace);
     if (!ready) throw std::runtime_error(to_string(ready.error()));
@@ -82,7 +81,6 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
   void main();
   void drain();
   void look_at_callbacks();
-  [[nodiscard]] std::string name_of(redag::TaskId task) const;
 
   const rclcpp::Node::SharedPtr node_;
   ReDAGExecutor &executor_;
@@ -260,7 +258,7 @@ void Monitor::Impl::drain() {
   const std::lock_guard guard(bounds_lock_);
   if (!bounds_) return;
   bounds_->count(
-      events_, [this](redag::TaskId task) { return name_of(task); },
+      events_, [this](redag::TaskId task) { return executor_.task_name(task); },
       [this](const std::string &name, const TaskBound &bound) {
         RCLCPP_WARN(node_->get_logger(),
                     "%s responded in %s, above its bound of %s (%s): an execution time or a rate is not what the "
@@ -268,20 +266,6 @@ void Monitor::Impl::drain() {
                     name.c_str(), redag::humanize_duration(bound.worst).c_str(),
                     redag::format_duration(bound.response).c_str(), bound.method.c_str());
       });
-}
-
-// The executor numbers tasks anew for files: DAG by DAG. Callbacks that come meanwhile can move the numbers.
-std::string Monitor::Impl::name_of(redag::TaskId task) const {
-  for (;;) {
-    const redag::Workload workload = executor_.trace_info().workload;
-    JobEvent event;
-    event.task = task;
-    std::vector<JobEvent> events{event};
-    executor_.renumber(events);
-    if (executor_.trace_info().workload.task_count() == workload.task_count()) {
-      return redag::trace::task_name(workload, events.front().task);
-    }
-  }
 }
 
 void Monitor::Impl::stop_thread() {

@@ -37,10 +37,7 @@ redag::Diagnostics TraceKeeper::write(const std::string &folder, const ReDAGExec
   const auto keep = [&problems](const redag::Result<void> &written) {
     if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
   };
-  redag::trace::Trace trace;
-  trace.info = executor.trace_info();
-  trace.events = std::move(events_);
-  executor.renumber(trace.events);
+  redag::trace::Trace trace = executor.as_trace(std::move(events_));
   // What is kept of a longer run is a run that ended earlier.
   if (is_cut_ && !trace.events.empty()) trace.info.end = trace.events.back().time;
 

@@ -226,8 +226,7 @@ TEST_F(ContainerTest, ComponentsRunAndResultsAreWrittenAtTheEnd) {
   }
   const auto trace = redag::trace::read_trace(results / "events.jsonl");
   ASSERT_TRUE(trace) << to_string(trace.error());
-  const auto check =
-      redag::metrics::check_trace(*trace, redag::metrics::RuleSet::all().without(redag::metrics::Rule::Grid));
+  const auto check = redag::metrics::check_trace(*trace, redag::metrics::rules_for(trace->info));
   EXPECT_TRUE(check.ok()) << check.to_string();
   const Json summary = Json::parse(std::ifstream(results / "summary.json"));
   EXPECT_EQ(summary["run"]["preemption"], "cooperative");

@@ -391,13 +391,11 @@ dags:
   executor.cancel();
   thread.join();
   executor.drain_trace(events);
-  executor.renumber(events);
-  const redag::trace::Trace trace{executor.trace_info(), std::move(events)};
+  const redag::trace::Trace trace = executor.as_trace(std::move(events));
   EXPECT_EQ(trace.info.lost_events, 0U);
   EXPECT_GT(trace.events.size(), 1000U);
   EXPECT_FALSE(has_errors(redag::validate(trace.info.workload))) << to_string(redag::validate(trace.info.workload));
-  const auto report =
-      redag::metrics::check_trace(trace, redag::metrics::RuleSet::all().without(redag::metrics::Rule::Grid));
+  const auto report = redag::metrics::check_trace(trace, redag::metrics::rules_for(trace.info));
   EXPECT_TRUE(report.ok()) << report.to_string();
 }
 

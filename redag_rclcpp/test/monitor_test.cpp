@@ -578,8 +578,7 @@ TEST_F(MonitorTest, ResultsAreWrittenWhenSpinningHasEnded) {
   ASSERT_TRUE(trace) << to_string(trace.error());
   EXPECT_GT(trace->events.size(), 20U);
   EXPECT_EQ(trace->info.lost_events, 0U);
-  const auto check =
-      redag::metrics::check_trace(*trace, redag::metrics::RuleSet::all().without(redag::metrics::Rule::Grid));
+  const auto check = redag::metrics::check_trace(*trace, redag::metrics::rules_for(trace->info));
   EXPECT_TRUE(check.ok()) << check.to_string();
   for (const char *name : {"jobs.csv", "trace.json"})
     EXPECT_GT(std::filesystem::file_size(results / name), 100U) << name;

@@ -128,10 +128,11 @@ class ReDAGExecutor : public rclcpp::Executor {
 
   /// Appends the events since the last call; one thread at a time.
   void drain_trace(std::vector<redag::JobEvent> &events);
-  /// What the events' task ids mean, for the file: all callbacks there ever were, as tasks. Events have to be
-  /// renumbered by `renumber` before they are written with it.
-  [[nodiscard]] redag::trace::RunInfo trace_info() const;
-  void renumber(std::vector<redag::JobEvent> &events) const;
+  /// A trace as files and checks want it: all callbacks that there ever were as tasks of its workload, and the events
+  /// with the ids that it gives them.
+  [[nodiscard]] redag::trace::Trace as_trace(std::vector<redag::JobEvent> events) const;
+  /// Of a drained event: "control.ekf", or to_string() of the callback's id.
+  [[nodiscard]] std::string task_name(redag::TaskId task) const;
 
  protected:
   void spin_once_impl(std::chrono::nanoseconds timeout) override;

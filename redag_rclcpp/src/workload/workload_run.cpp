@@ -210,10 +210,8 @@ class Run {
     result_.check = redag::metrics::check_trace(result_.trace, redag::metrics::rules_for(result_.trace.info));
     if (redag_ == nullptr) return;
     SchedulerTrace scheduler;
-    redag_->renumber(decisions_);
-    scheduler.trace.info = redag_->trace_info();
+    scheduler.trace = redag_->as_trace(std::move(decisions_));
     scheduler.trace.info.seed = options_.seed;
-    scheduler.trace.events = std::move(decisions_);
     scheduler.check = redag::metrics::check_trace(scheduler.trace, redag::metrics::rules_for(scheduler.trace.info));
     result_.scheduler = std::move(scheduler);
   }

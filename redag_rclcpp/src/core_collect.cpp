@@ -1,0 +1,247 @@
+// What the executor's callback groups hold, as tasks of the engine.
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "compat.hpp"
+#include "core.hpp"
+#include "redag/model/validate.hpp"
+
+namespace redag_rclcpp {
+
+using redag::Task;
+using Kind = redag::Callback::Kind;
+
+/// An entity as it stands in a callback group.
+struct ReDAGExecutor::Core::Found {
+  const void *key = nullptr;
+  Kind kind = Kind::Timer;
+  std::string node;
+  rclcpp::CallbackGroup::SharedPtr group;
+  rclcpp::TimerBase::SharedPtr timer;
+  rclcpp::SubscriptionBase::SharedPtr subscription;
+  rclcpp::Waitable::SharedPtr intra_process;
+  rclcpp::ServiceBase::SharedPtr service;
+  rclcpp::ClientBase::SharedPtr client;
+  rclcpp::Waitable::SharedPtr waitable;
+};
+
+void ReDAGExecutor::Core::change(const std::function<void()> &change) {
+  {
+    const std::lock_guard guard(collect_lock_);
+    change();
+  }
+  collect();
+}
+
+void ReDAGExecutor::Core::add_node(const NodeBase::SharedPtr &node) {
+  forget_gone_nodes();
+  nodes_.push_back(node);
+  node->get_notify_guard_condition().set_on_trigger_callback([weak = weak_from_this()](std::size_t) {
+    if (const auto core = weak.lock()) core->mark_dirty();
+  });
+}
+
+void ReDAGExecutor::Core::remove_node(const NodeBase::SharedPtr &node) {
+  std::erase_if(nodes_, [&](const NodeBase::WeakPtr &weak) { return weak.lock() == node; });
+  forget_gone_nodes();
+  node->get_notify_guard_condition().set_on_trigger_callback(nullptr);
+}
+
+void ReDAGExecutor::Core::add_group(const rclcpp::CallbackGroup::SharedPtr &group, const NodeBase::SharedPtr &node) {
+  forget_gone_nodes();
+  manual_groups_[group] = node;
+}
+
+void ReDAGExecutor::Core::remove_group(const rclcpp::CallbackGroup::SharedPtr &group) { manual_groups_.erase(group); }
+
+// Nodes need not be removed, only dropped. One that comes under the same name then begins to count anew.
+void ReDAGExecutor::Core::forget_gone_nodes() {
+  std::erase_if(nodes_, [](const NodeBase::WeakPtr &weak) { return weak.expired(); });
+  std::erase_if(manual_groups_, [](const auto &entry) { return entry.first.expired() || entry.second.expired(); });
+  std::set<std::string> names;
+  const auto insert_name = [&](const NodeBase::WeakPtr &weak) {
+    if (const auto node = weak.lock()) names.insert(node->get_fully_qualified_name());
+  };
+  for (const auto &weak : nodes_) insert_name(weak);
+  for (const auto &[group, weak] : manual_groups_) insert_name(weak);
+  std::erase_if(next_index_, [&](const auto &entry) { return names.count(entry.first.first) == 0; });
+}
+
+void ReDAGExecutor::Core::mark_dirty() {
+  if (!dirty_.exchange(true)) bridge_.wake();
+}
+
+void ReDAGExecutor::Core::collect() {
+  // What users own is destroyed after the lock is left, if we are the last to hold it.
+  std::vector<Found> found;
+  const std::lock_guard guard(collect_lock_);
+  if (closed_) return;
+  dirty_ = false;
+  found = find_entities();
+  std::map<const void *, const Found *> present;
+  for (const Found &entity : found) present.emplace(entity.key, &entity);
+
+  std::vector<std::shared_ptr<Callback>> gone;
+  for (const auto &[key, callback] : callbacks_) {
+    if (present.count(key) == 0 || !callback->alive()) gone.push_back(callback);
+  }
+  for (const auto &callback : gone) remove(callback);
+  std::vector<std::shared_ptr<Callback>> added;
+  for (const Found &entity : found) {
+    if (callbacks_.count(entity.key) != 0) continue;
+    add(entity);
+    added.push_back(callbacks_.at(entity.key));
+  }
+  if (!added.empty() && rclcpp::ok(context_)) find_leftovers(context_, added);
+}
+
+std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
+  // Before the nodes are asked: a group that is created meanwhile waits for the next time, rather than have no node.
+  const auto groups = host_.groups();
+  std::map<const rclcpp::CallbackGroup *, std::string> nodes;
+  for (const auto &weak : nodes_) {
+    if (const auto node = weak.lock()) {
+      node->for_each_callback_group([&](const rclcpp::CallbackGroup::SharedPtr &group) {
+        nodes.emplace(group.get(), node->get_fully_qualified_name());
+      });
+    }
+  }
+  for (const auto &[group, weak] : manual_groups_) {
+    const auto node = weak.lock();
+    if (const auto strong = group.lock(); strong && node) {
+      nodes.emplace(strong.get(), node->get_fully_qualified_name());
+    }
+  }
+
+  std::vector<Found> result;
+  for (const auto &weak : groups) {
+    const auto group = weak.lock();
+    if (!group) continue;
+    (void)group_name(group);  // also an empty one is watched: something may be created in it
+    Found base;
+    base.group = group;
+    base.node = nodes[group.get()];
+    std::set<const void *> intra_process;
+    const auto push = [&](const void *key, Kind kind) -> Found & {
+      result.push_back(base);
+      result.back().key = key;
+      result.back().kind = kind;
+      return result.back();
+    };
+    group->collect_all_ptrs(
+        [&](const rclcpp::SubscriptionBase::SharedPtr &subscription) {
+          Found &found = push(subscription.get(), Kind::Subscription);
+          found.subscription = subscription;
+          try {
+            found.intra_process = subscription->get_intra_process_waitable();
+          } catch (const std::runtime_error &) {
+            // Its intra-process manager is gone already.
+          }
+          if (found.intra_process) intra_process.insert(found.intra_process.get());
+        },
+        [&](const rclcpp::ServiceBase::SharedPtr &service) { push(service.get(), Kind::Service).service = service; },
+        [&](const rclcpp::ClientBase::SharedPtr &client) { push(client.get(), Kind::Client).client = client; },
+        [&](const rclcpp::TimerBase::SharedPtr &timer) { push(timer.get(), Kind::Timer).timer = timer; },
+        [&](const rclcpp::Waitable::SharedPtr &waitable) {
+          if (intra_process.count(waitable.get()) == 0) push(waitable.get(), Kind::Waitable).waitable = waitable;
+        });
+  }
+  return result;
+}
+
+// The name under which the scheduler knows a mutually exclusive group. First time: also watches it for new entities.
+std::string ReDAGExecutor::Core::group_name(const rclcpp::CallbackGroup::SharedPtr &group) {
+  const auto [entry, is_new] = group_names_.try_emplace(group);
+  if (is_new) {
+    entry->second = "g" + std::to_string(next_group_++);
+    watch_group(*group, [weak = weak_from_this()](std::size_t) {
+      if (const auto core = weak.lock()) core->mark_dirty();
+    });
+    std::erase_if(group_names_, [](const auto &known) { return known.first.expired(); });
+  }
+  return group->type() == rclcpp::CallbackGroupType::MutuallyExclusive ? entry->second : std::string();
+}
+
+void ReDAGExecutor::Core::watch_group(rclcpp::CallbackGroup &group, const std::function<void(std::size_t)> &callback) {
+  const auto condition = compat::notify_guard_condition(group, context_);
+  if (condition) condition->set_on_trigger_callback(callback);
+}
+
+void ReDAGExecutor::Core::add(const Found &found) {
+  TaskTable::Entry entry;
+  entry.id.kind = found.kind;
+  entry.id.node = found.node;
+  if (found.subscription) entry.id.name = found.subscription->get_topic_name();
+  if (found.service) entry.id.name = found.service->get_service_name();
+  if (found.client) entry.id.name = found.client->get_service_name();
+  if (found.timer) {
+    std::int64_t period = 0;
+    if (rcl_timer_get_period(found.timer->get_timer_handle().get(), &period) == RCL_RET_OK) entry.id.period = period;
+  }
+  if (found.timer || found.waitable) {
+    entry.id.index = next_index_[{found.node, static_cast<int>(found.kind)}]++;
+  }
+  place(entry, found);
+
+  std::shared_ptr<Callback> callback;
+  const auto self = shared_from_this();
+  if (found.timer) callback = std::make_shared<Callback>(self, entry.id, found.timer);
+  if (found.subscription) {
+    callback = std::make_shared<Callback>(self, entry.id, found.subscription, found.intra_process);
+  }
+  if (found.service) callback = std::make_shared<Callback>(self, entry.id, found.service);
+  if (found.client) callback = std::make_shared<Callback>(self, entry.id, found.client);
+  if (found.waitable) {
+    callback = std::make_shared<Callback>(self, entry.id, found.waitable, compat::needs_wait_set(*found.waitable));
+  }
+  entry.callback = callback;
+  callback->set_deadline(entry.task.deadline);
+
+  const redag::TaskId task =
+      engine_->add_task(dag_ids_[entry.dag], entry.rank, entry.task,
+                        [callback](const redag::runtime::Job &job) { return callback->execute(job); });
+  tasks_.set(task, std::move(entry));
+  callbacks_[found.key] = callback;
+  if (callback->attach(task)) bridge_.add(callback);
+}
+
+// Which task of which DAG the callback is, and with which parameters.
+void ReDAGExecutor::Core::place(TaskTable::Entry &entry, const Found &found) {
+  Task &task = entry.task;
+  entry.dag = static_cast<std::uint32_t>(dag_ids_.size() - 1);
+  if (const auto ref = matcher_ ? matcher_->find(entry.id) : std::nullopt) {
+    task = *ref->task;
+    entry.dag = ref->dag.value;
+    entry.rank = redag::topological_ranks(options_.workload->dags[entry.dag])[ref->index];
+    entry.configured = true;
+  }
+  if (task.period == 0) task.period = entry.id.period > 0 ? entry.id.period : options_.default_period.count();
+  if (task.deadline == 0) task.deadline = task.period;
+  // What releases its jobs, and what they must not overlap with, is ROS' business.
+  task.activation = redag::Activation::Timer;
+  task.predecessors.clear();
+  task.offset = 0;
+  task.jitter = 0;
+  task.overrun = redag::Overrun::Skip;
+  task.group = group_name(found.group);
+  task.concurrency = task.group.empty() ? setup_.config.workers : 1;
+}
+
+void ReDAGExecutor::Core::remove(const std::shared_ptr<Callback> &gone) {
+  const std::shared_ptr<Callback> callback = gone;
+  const auto entry = std::find_if(callbacks_.begin(), callbacks_.end(), [&](auto &e) { return e.second == callback; });
+  if (entry != callbacks_.end()) callbacks_.erase(entry);
+  callback->detach();
+  {
+    // Releases that were taken out of the timer queue before have been passed on: the id can be another task's now.
+    const std::lock_guard guard(expire_lock_);
+  }
+  bridge_.remove(*callback);
+  const redag::TaskId task = callback->task();
+  tasks_.drop(task);
+  engine_->remove_task(task);
+}
+
+}  // namespace redag_rclcpp

@@ -1,0 +1,268 @@
+#include "task_table.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "redag/model/validate.hpp"
+
+namespace redag_rclcpp {
+
+using redag::Task;
+using redag::TaskId;
+using redag::Workload;
+using Kind = redag::Callback::Kind;
+
+namespace {
+
+/// Makes tasks of a cycle tasks of their own: what was seen can be one, a DAG cannot.
+void break_cycles(redag::Dag &dag) {
+  std::vector<std::uint8_t> done(dag.tasks.size(), 0);
+  const auto is_ready = [&](const Task &task) {
+    return std::all_of(task.predecessors.begin(), task.predecessors.end(), [&](auto p) { return done[p] != 0; });
+  };
+  for (std::size_t left = dag.tasks.size(); left > 0;) {
+    const std::size_t before = left;
+    for (std::size_t t = 0; t < dag.tasks.size(); ++t) {
+      if (done[t] != 0 || !is_ready(dag.tasks[t])) continue;
+      done[t] = 1;
+      --left;
+    }
+    if (left != before) continue;
+    const auto first = static_cast<std::size_t>(std::find(done.begin(), done.end(), 0) - done.begin());
+    dag.tasks[first].predecessors.clear();
+    dag.tasks[first].activation = redag::Activation::Timer;
+  }
+}
+
+redag::Callback match_of(const redag::CallbackId &id) {
+  redag::Callback callback;
+  callback.kind = id.kind;
+  callback.node = id.node;
+  callback.name = id.name;
+  if (id.kind == Kind::Timer) callback.period = id.period;
+  if (id.kind == Kind::Timer || id.kind == Kind::Waitable) callback.index = id.index;
+  return callback;
+}
+
+}  // namespace
+
+TaskTable::TaskTable(redag::Platform platform, redag::PolicyKind policy, const Workload *configured)
+    : platform_(platform), policy_(policy), configured_(configured) {
+  if (configured != nullptr) dags_ = configured->dags;
+  for (redag::Dag &dag : dags_) dag.tasks.clear();
+  // All that the workload does not name: no bound, and last among equals.
+  dags_.emplace_back().name = "ros";
+}
+
+void TaskTable::set(TaskId task, Entry entry) {
+  const std::lock_guard guard(lock_);
+  if (entries_.size() <= task.value) entries_.resize(task.value + 1);
+  entries_[task.value] = std::move(entry);
+}
+
+void TaskTable::drop(TaskId task) {
+  std::shared_ptr<Callback> gone;  // not destroyed under the lock
+  const std::lock_guard guard(lock_);
+  gone.swap(entries_[task.value].callback);
+}
+
+std::string TaskTable::name_of(TaskId task) const {
+  const std::lock_guard guard(lock_);
+  return name(entries_.at(task.value));
+}
+
+std::string TaskTable::name(const Entry &entry) const {
+  if (entry.configured) return dags_[entry.dag].name + "." + entry.task.name;
+  return to_string(entry.id);
+}
+
+std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine) const {
+  struct Row {
+    TaskId task;
+    std::shared_ptr<Callback> callback;
+    CallbackStats stats;
+  };
+  std::vector<Row> rows;
+  {
+    const std::lock_guard guard(lock_);
+    for (std::size_t i = 0; i < entries_.size(); ++i) {
+      const Entry &entry = entries_[i];
+      if (!entry.callback) continue;
+      CallbackStats stats;
+      stats.id = entry.id;
+      if (entry.configured) stats.dag = dags_[entry.dag].name;
+      stats.task = name(entry);
+      stats.period = entry.task.period;
+      stats.deadline = entry.task.deadline;
+      stats.wcet = entry.configured ? entry.task.wcet : 0;
+      rows.push_back(Row{TaskId(i), entry.callback, std::move(stats)});
+    }
+  }
+  for (Row &row : rows) {
+    CallbackStats &stats = row.stats;
+    const Callback &callback = *row.callback;
+    stats.jobs = engine.accounting(row.task);
+    stats.misses = callback.late() + stats.jobs.skipped;
+    stats.response_p50 = callback.response().percentile(0.5);
+    stats.response_p99 = callback.response().percentile(0.99);
+    stats.response_max = callback.response().longest();
+    stats.execution_p50 = callback.execution().percentile(0.5);
+    stats.execution_p99 = callback.execution().percentile(0.99);
+    stats.execution_max = callback.execution().longest();
+  }
+  std::vector<CallbackStats> result;
+  {
+    // Where the callback has gone meanwhile, the engine may have counted for another task of the same id.
+    const std::lock_guard guard(lock_);
+    for (Row &row : rows) {
+      if (entries_[row.task.value].callback == row.callback) result.push_back(std::move(row.stats));
+    }
+  }
+  std::stable_sort(result.begin(), result.end(),
+                   [](const CallbackStats &a, const CallbackStats &b) { return a.period < b.period; });
+  return result;
+}
+
+// ---- what was seen ----
+
+std::vector<std::pair<TaskId, redag::Duration>> TaskTable::adopt_rates() {
+  const std::lock_guard guard(lock_);
+  std::vector<std::pair<TaskId, redag::Duration>> changed;
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    const Entry &entry = entries_[i];
+    if (!entry.callback || entry.configured || entry.callback->is_timer()) continue;
+    const redag::Duration period = seen_period(entry, 0);
+    if (period > 0 && period != entry.task.period) changed.emplace_back(TaskId(i), period);
+  }
+  for (const auto &[task, period] : changed) {
+    Entry &entry = entries_[task.value];
+    entry.task.period = period;
+    entry.task.deadline = period;
+    entry.callback->set_deadline(period);
+  }
+  return changed;
+}
+
+// The largest period among the tasks whose jobs publish what arrives here (as data tasks inherit it), or else the mean
+// time between arrivals; 0: unknown. `depth` ends cycles.
+redag::Duration TaskTable::seen_period(const Entry &entry, int depth) const {
+  constexpr int kDeepest = 32;
+  if (entry.configured || entry.callback->is_timer()) return entry.task.period;
+  if (is_ros_internal(entry.id)) return 0;  // loading nodes comes in bursts that say nothing of a rate
+  redag::Duration period = 0;
+  for (const TaskId publisher : entry.callback->publishers()) {
+    if (depth >= kDeepest || publisher.value >= entries_.size() || !entries_[publisher.value].callback) continue;
+    period = std::max(period, seen_period(entries_[publisher.value], depth + 1));
+  }
+  return period > 0 ? period : entry.callback->mean_interval();
+}
+
+// `live`: what there is now, for a workload file; else all that there ever was, each with a wcet, for a trace.
+Workload TaskTable::as_workload(Ids &ids, bool live) const {
+  Workload workload;
+  workload.name = configured_ != nullptr ? configured_->name : "ros";
+  workload.platform = platform_;
+  workload.policy = policy_;
+  std::set<std::string> names;
+  for (std::uint32_t d = 0; d < dags_.size(); ++d) {
+    redag::Dag dag = dags_[d];
+    std::vector<std::uint32_t> members;
+    for (std::uint32_t i = 0; i < entries_.size(); ++i) {
+      const Entry &entry = entries_[i];
+      if (entry.dag != d || entry.task.period == 0) continue;
+      if (live && (!entry.callback || is_ros_internal(entry.id))) continue;
+      members.push_back(i);
+    }
+    std::stable_sort(members.begin(), members.end(),
+                     [&](auto a, auto b) { return entries_[a].rank < entries_[b].rank; });
+    for (const std::uint32_t i : members) {
+      const Entry &entry = entries_[i];
+      Task task = entry.task;
+      const std::string wanted = entry.configured ? task.name : to_string(entry.id);
+      task.name = wanted;
+      for (int n = 2; !names.insert(dag.name + "." + task.name).second; ++n)
+        task.name = fmt::format("{}_{}", wanted, n);
+      if (entry.callback) task.wcet = std::max(task.wcet, entry.callback->execution().longest());
+      if (!live) task.wcet = std::clamp<redag::Duration>(task.wcet, 1, task.deadline);
+      task.bcet = std::min(task.bcet, task.wcet);
+      task.execution = {};
+      if (task.budget > 0) task.budget = std::max(task.budget, task.wcet);
+      task.callback = match_of(entry.id);
+      dag.tasks.push_back(std::move(task));
+    }
+    if (dag.tasks.empty()) continue;
+    ids.push_back(std::move(members));
+    workload.dags.push_back(std::move(dag));
+  }
+  return workload;
+}
+
+Workload TaskTable::learned() const {
+  const std::lock_guard guard(lock_);
+  Ids ids;
+  Workload workload = as_workload(ids, true);
+  add_seen_edges(workload, ids);
+  return workload;
+}
+
+// A message's task follows the task that publishes it. With several publishers it runs for each of them, which an
+// AND-join cannot say: it stays a task with a rate of its own.
+void TaskTable::add_seen_edges(Workload &workload, const Ids &ids) const {
+  for (std::size_t d = 0; d < workload.dags.size(); ++d) {
+    redag::Dag &dag = workload.dags[d];
+    for (std::size_t t = 0; t < dag.tasks.size(); ++t) {
+      const Entry &entry = entries_[ids[d][t]];
+      if (entry.configured) {
+        add_configured_edges(dag, t, entry);
+        continue;
+      }
+      const auto publishers = entry.callback->publishers();
+      if (entry.callback->is_timer() || publishers.size() != 1) continue;
+      const auto position = std::find(ids[d].begin(), ids[d].end(), publishers.front().value);
+      if (position == ids[d].end() || *position == ids[d][t]) continue;
+      dag.tasks[t].predecessors = {static_cast<std::uint32_t>(position - ids[d].begin())};
+      dag.tasks[t].activation = redag::Activation::Data;
+    }
+    break_cycles(dag);
+    for (Task &task : dag.tasks) {
+      if (task.activation == redag::Activation::Data) task.period = 0;  // inherited
+    }
+    redag::inherit_periods(dag);
+  }
+}
+
+// As the file has them, between the tasks that there are.
+void TaskTable::add_configured_edges(redag::Dag &dag, std::size_t task, const Entry &entry) const {
+  const std::vector<Task> &configured = configured_->dags[entry.dag].tasks;
+  const auto named = [](const std::vector<Task> &tasks, const std::string &name) {
+    return std::find_if(tasks.begin(), tasks.end(), [&](const Task &candidate) { return candidate.name == name; });
+  };
+  const auto same = named(configured, entry.task.name);
+  for (const std::uint32_t predecessor : same->predecessors) {
+    const auto found = named(dag.tasks, configured[predecessor].name);
+    if (found == dag.tasks.end()) continue;
+    dag.tasks[task].predecessors.push_back(static_cast<std::uint32_t>(found - dag.tasks.begin()));
+  }
+  if (!dag.tasks[task].predecessors.empty()) dag.tasks[task].activation = same->activation;
+}
+
+Workload TaskTable::describe(std::vector<redag::JobEvent> &events) const {
+  Ids ids;
+  std::vector<std::uint32_t> position;
+  Workload workload;
+  {
+    const std::lock_guard guard(lock_);
+    workload = as_workload(ids, false);
+    position.assign(entries_.size(), 0);
+  }
+  std::uint32_t next = 0;
+  for (const auto &members : ids) {
+    for (const std::uint32_t id : members) position[id] = next++;
+  }
+  for (redag::JobEvent &event : events) event.task = TaskId(position.at(event.task.value));
+  return workload;
+}
+
+}  // namespace redag_rclcpp
