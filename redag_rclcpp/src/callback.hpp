@@ -131,6 +131,9 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
   [[nodiscard]] bool drop_oldest(Source source);
   void learn_from_arrival(Time now, std::size_t count);
   [[nodiscard]] bool take_token(Token &token);
+
+  /// Does only the timer's guard condition tell of resets, or of jumps of time?
+  [[nodiscard]] bool has_waited_timer() const;
   void reschedule();
 
   // False: there was nothing to do.

@@ -1,6 +1,8 @@
 // What differs between ROS 2 distributions, behind one set of names. Humble: rclcpp 16; Jazzy: 28.
 #pragma once
 
+#include <tracetools/tracetools.h>
+
 #include <functional>
 #include <memory>
 #include <string>
@@ -16,6 +18,10 @@
 #include "rclcpp_action/server.hpp"
 #if RCLCPP_VERSION_MAJOR < 21
 #include "rclcpp/qos_event.hpp"
+#endif
+
+#ifndef TRACETOOLS_TRACEPOINT  // its name before Jazzy
+#define TRACETOOLS_TRACEPOINT TRACEPOINT
 #endif
 
 namespace redag_rclcpp::compat {

@@ -22,6 +22,7 @@
 #include "rclcpp/rclcpp.hpp"
 #include "redag/runtime/preemption_point.hpp"
 #include "redag_rclcpp/executor.hpp"
+#include "spinning.hpp"
 #include "test_msgs/msg/strings.hpp"
 #include "test_msgs/srv/empty.hpp"
 
@@ -34,20 +35,9 @@ using test_msgs::msg::Strings;
 using EmptyService = test_msgs::srv::Empty;
 using Random = std::mt19937_64;
 
-constexpr auto kLimit = 30s;
 constexpr int kThreads = 3;
 constexpr std::size_t kNodesOfAThread = 3;
 constexpr std::size_t kEntitiesOfANode = 12;
-
-template <class Condition>
-bool eventually(Condition condition) {
-  const auto end = steady_clock::now() + kLimit;
-  while (!condition()) {
-    if (steady_clock::now() > end) return false;
-    std::this_thread::sleep_for(1ms);
-  }
-  return true;
-}
 
 std::uint64_t from_environment(const char *name, std::uint64_t otherwise) {
   const char *value = std::getenv(name);
@@ -323,11 +313,11 @@ class Gardener {
 enum class Driver { Spin, Pull, Restart };
 
 /// The thread that drives the executor.
-class Spinner {
+class Driving {
  public:
-  Spinner(ReDAGExecutor &executor, Driver driver, std::uint64_t seed)
+  Driving(ReDAGExecutor &executor, Driver driver, std::uint64_t seed)
       : executor_(executor), done_(std::async(std::launch::async, [this, driver, seed] { work(driver, seed); })) {}
-  ~Spinner() {
+  ~Driving() {
     if (done_.valid()) stop();
   }
   /// False: a spin function did not return.
@@ -444,7 +434,7 @@ class ChurnTest : public ::testing::TestWithParam<Parameters> {
     Counts counts;
     Churn churn(counts);
     executor.add_node(steady->node);
-    Spinner spinner(executor, std::get<1>(GetParam()), seed);
+    Driving driving(executor, std::get<1>(GetParam()), seed);
     {
       std::vector<std::unique_ptr<Gardener>> gardeners;
       for (int i = 1; i <= kThreads; ++i) {
@@ -457,13 +447,13 @@ class ChurnTest : public ::testing::TestWithParam<Parameters> {
       }
     }
     if (std::get<1>(GetParam()) == Driver::Restart) {
-      ASSERT_TRUE(spinner.stop());
-      Spinner last(executor, Driver::Spin, seed);
+      ASSERT_TRUE(driving.stop());
+      Driving last(executor, Driver::Spin, seed);
       settle(executor, churn, counts);
       ASSERT_TRUE(last.stop());
     } else {
       settle(executor, churn, counts);
-      ASSERT_TRUE(spinner.stop());
+      ASSERT_TRUE(driving.stop());
     }
     check_jobs(executor);
     executor.remove_node(steady->node);
@@ -530,10 +520,10 @@ TEST_P(ChurnTest, WhatStaysGoesOnAndWhatGoesIsLetGoOf) {
   // The node is as it was, for another executor.
   const auto second = make_executor();
   second->add_node(steady->node);
-  Spinner spinner(*second, Driver::Spin, 0);
+  Driving driving(*second, Driver::Spin, 0);
   steady->timer->reset();
   EXPECT_TRUE(steady->goes_on());
-  EXPECT_TRUE(spinner.stop());
+  EXPECT_TRUE(driving.stop());
 }
 
 class DroppedTest : public ::testing::Test {

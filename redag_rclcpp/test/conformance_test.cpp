@@ -18,6 +18,7 @@
 #include "rclcpp_action/rclcpp_action.hpp"
 #include "rclcpp_lifecycle/lifecycle_node.hpp"
 #include "rosgraph_msgs/msg/clock.hpp"
+#include "spinning.hpp"
 #include "test_msgs/action/fibonacci.hpp"
 #include "test_msgs/msg/empty.hpp"
 #include "test_msgs/msg/strings.hpp"
@@ -30,36 +31,6 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 using test_msgs::msg::Empty;
 using test_msgs::msg::Strings;
-
-constexpr auto kLimit = 20s;
-
-template <class Condition>
-bool eventually(Condition condition) {
-  const auto end = steady_clock::now() + kLimit;
-  while (!condition()) {
-    if (steady_clock::now() > end) return false;
-    std::this_thread::sleep_for(1ms);
-  }
-  return true;
-}
-
-/// Spins in a thread of its own for as long as it lives.
-template <class Executor>
-class Spinner {
- public:
-  explicit Spinner(Executor &executor) : executor_(executor), thread_([&] { executor.spin(); }) {
-    eventually([&] { return executor.is_spinning(); });
-  }
-  ~Spinner() { stop(); }
-  void stop() {
-    executor_.cancel();
-    if (thread_.joinable()) thread_.join();
-  }
-
- private:
-  Executor &executor_;
-  std::thread thread_;
-};
 
 template <class T>
 class Conformance : public ::testing::Test {

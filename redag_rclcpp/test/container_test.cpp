@@ -20,6 +20,7 @@
 #include "redag/base/time.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/trace/events_file.hpp"
+#include "spinning.hpp"
 #include "std_msgs/msg/float64.hpp"
 #include "std_srvs/srv/trigger.hpp"
 
@@ -35,8 +36,6 @@ using std_srvs::srv::Trigger;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using Json = nlohmann::json;
-
-constexpr auto kLimit = 60s;
 
 constexpr const char *kWorkload = R"(name: test
 platform: {workers: 2, preemption: cooperative}
@@ -145,12 +144,7 @@ class ContainerTest : public ::testing::Test {
 
   template <class Condition>
   bool eventually(Condition condition) {
-    const auto end = steady_clock::now() + kLimit;
-    while (!condition()) {
-      if (steady_clock::now() > end) return false;
-      spinning_->spin_once(10ms);
-    }
-    return true;
+    return redag_rclcpp::eventually(condition, [&] { spinning_->spin_once(10ms); });
   }
 
   std::filesystem::path folder_;

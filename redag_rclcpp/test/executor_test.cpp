@@ -14,6 +14,7 @@
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/runtime/preemption_point.hpp"
+#include "spinning.hpp"
 #include "test_msgs/msg/empty.hpp"
 
 namespace redag_rclcpp {
@@ -24,18 +25,6 @@ using std::chrono::steady_clock;
 using test_msgs::msg::Empty;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-constexpr auto kLimit = 20s;
-
-template <class Condition>
-bool eventually(Condition condition) {
-  const auto end = steady_clock::now() + kLimit;
-  while (!condition()) {
-    if (steady_clock::now() > end) return false;
-    std::this_thread::sleep_for(1ms);
-  }
-  return true;
-}
 
 class ExecutorTest : public ::testing::TestWithParam<redag::PreemptionMode> {
  protected:
@@ -124,15 +113,13 @@ TEST_P(ExecutorTest, WorkersTakeTheHighestRateFirst) {
     to_fast->publish(Empty());
   });
   executor.add_node(node);
-  std::thread thread([&] { executor.spin(); });
-  ASSERT_TRUE(eventually([&] { return executor.is_spinning(); }));
+  Spinner spinner(executor);
   to_fast->publish(Empty());
   EXPECT_TRUE(eventually([&] {
     const std::lock_guard guard(mutex);
     return order.size() == 4;
   }));
-  executor.cancel();
-  thread.join();
+  spinner.stop();
   EXPECT_THAT(order, ElementsAre("fast", "fast", "middle", "slow"));
 }
 
@@ -163,13 +150,12 @@ dags:
   auto b = subscribe("/b", body);
   auto c = subscribe("/c", body);
   executor.add_node(node);
-  std::thread thread([&] { executor.spin(); });
+  Spinner spinner(executor);
   for (int i = 0; i < 5; ++i) {
     for (const char *topic : {"/a", "/b", "/c"}) publisher(topic)->publish(Empty());
   }
   EXPECT_TRUE(eventually([&] { return count == 15; }));
-  executor.cancel();
-  thread.join();
+  spinner.stop();
   EXPECT_EQ(most, 1);
 }
 
@@ -206,10 +192,9 @@ TEST_P(ExecutorTest, AHandlerCanContinueAfterAnException) {
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
   auto timer = node->create_wall_timer(1ms, [] { throw std::domain_error("from a callback"); });
   executor.add_node(node);
-  std::thread thread([&] { executor.spin(); });
+  Spinner spinner(executor);
   EXPECT_TRUE(eventually([&] { return handled >= 3; }));
-  executor.cancel();
-  thread.join();
+  spinner.stop();
   EXPECT_THAT(task, HasSubstr("/node timer 1"));
   EXPECT_GE(executor.stats().at(0).jobs.aborted, 3U);
 }
@@ -319,7 +304,7 @@ TEST_P(ExecutorTest, LearnsRatesAndEdges) {
   auto b = subscribe("/b", [&] { b_out->publish(Empty()); });
   auto c = subscribe("/c", [] {});
   executor.add_node(node);
-  std::thread thread([&] { executor.spin(); });
+  Spinner spinner(executor);
   EXPECT_TRUE(eventually([&] { return !executor.is_spinning() || executor.learning_done(); }));
   ASSERT_TRUE(eventually([&] {
     for (const CallbackStats &stats : executor.stats()) {
@@ -327,8 +312,7 @@ TEST_P(ExecutorTest, LearnsRatesAndEdges) {
     }
     return false;
   }));
-  executor.cancel();
-  thread.join();
+  spinner.stop();
   const redag::Workload learned = executor.learned();
   EXPECT_FALSE(has_errors(redag::validate(learned, redag::ValidateOptions{.wcet_optional = true})))
       << to_string(redag::validate(learned));
@@ -386,10 +370,9 @@ dags:
       15ms, [&] { burn(6ms); }, new_group());
   executor.add_node(node);
   std::vector<redag::JobEvent> events;
-  std::thread thread([&] { executor.spin(); });
+  Spinner spinner(executor);
   std::this_thread::sleep_for(500ms);
-  executor.cancel();
-  thread.join();
+  spinner.stop();
   executor.drain_trace(events);
   const redag::trace::Trace trace = executor.as_trace(std::move(events));
   EXPECT_EQ(trace.info.lost_events, 0U);

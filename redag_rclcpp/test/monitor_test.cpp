@@ -21,6 +21,7 @@
 #include "redag/runtime/threads.hpp"
 #include "redag/trace/events_file.hpp"
 #include "report.hpp"
+#include "spinning.hpp"
 #include "std_msgs/msg/string.hpp"
 #include "std_srvs/srv/trigger.hpp"
 
@@ -34,15 +35,12 @@ using redag::JobEvent;
 using redag::JobEventKind;
 using redag::kMillisecond;
 using redag::TaskId;
-using std::chrono::steady_clock;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using Json = nlohmann::json;
-
-constexpr auto kLimit = 30s;
 
 redag::Workload parse(const std::string &text) {
   auto workload = redag::parse_workload(text, "test.yaml", redag::LoadOptions{.wcet_optional = true});
@@ -412,12 +410,7 @@ class MonitorTest : public ::testing::Test {
 
   template <class Condition>
   bool eventually(Condition condition) {
-    const auto end = steady_clock::now() + kLimit;
-    while (!condition()) {
-      if (steady_clock::now() > end) return false;
-      watching_->spin_once(10ms);
-    }
-    return true;
+    return redag_rclcpp::eventually(condition, [&] { watching_->spin_once(10ms); });
   }
 
   bool eventually_status(const std::string &name, unsigned char level, const std::string &text) {

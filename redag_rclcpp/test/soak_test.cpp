@@ -17,6 +17,7 @@
 #include "process_tasks.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag_rclcpp/executor.hpp"
+#include "spinning.hpp"
 #include "test_msgs/msg/strings.hpp"
 #include "test_msgs/srv/empty.hpp"
 
@@ -28,51 +29,10 @@ using std::chrono::steady_clock;
 using test_msgs::msg::Strings;
 using EmptyService = test_msgs::srv::Empty;
 
-template <class Condition>
-bool eventually(Condition condition) {
-  const auto end = steady_clock::now() + 20s;
-  while (!condition()) {
-    if (steady_clock::now() > end) return false;
-    std::this_thread::sleep_for(1ms);
-  }
-  return true;
-}
-
-/// Spins in a thread of its own for as long as it lives.
-class Spinner {
- public:
-  explicit Spinner(rclcpp::Executor &executor)
-      : executor_(executor), thread_([&] {
-          thread_id_ = static_cast<int>(syscall(SYS_gettid));
-          executor.spin();
-        }) {
-    eventually([&] { return executor.is_spinning(); });
-  }
-  ~Spinner() {
-    executor_.cancel();
-    thread_.join();
-  }
-  [[nodiscard]] int thread_id() const { return thread_id_; }
-
- private:
-  rclcpp::Executor &executor_;
-  std::atomic<int> thread_id_{0};
-  std::thread thread_;
-};
-
-std::size_t resident_kib() {
-  std::ifstream statm("/proc/self/statm");
-  std::size_t total = 0;
-  std::size_t resident = 0;
-  statm >> total >> resident;
-  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE)) / 1024;
-}
-
-/// Wake-ups of our threads, and of the one that spins.
-std::uint64_t wake_ups(const Spinner &spinner) {
+std::uint64_t wake_ups(int spinning_thread) {
   std::uint64_t all = 0;
   for (const auto &[id, task] : process_tasks()) {
-    if (id == spinner.thread_id() || task.name.rfind("redag", 0) == 0) all += task.switches;
+    if (id == spinning_thread || task.name.rfind("redag", 0) == 0) all += task.switches;
   }
   return all;
 }
@@ -109,10 +69,10 @@ TEST_P(IdleTest, NothingWakesTheExecutor) {
     return received > 0;
   }));
   std::this_thread::sleep_for(500ms);
-  const std::uint64_t before = wake_ups(spinner);
+  const std::uint64_t before = wake_ups(spinner.thread_id());
   EXPECT_GT(before, 0);
   std::this_thread::sleep_for(2s);
-  const std::uint64_t woken = wake_ups(spinner) - before;
+  const std::uint64_t woken = wake_ups(spinner.thread_id()) - before;
   std::printf("%lu wake-ups in 2 s\n", woken);
   EXPECT_LE(woken, 2);
 }
@@ -223,7 +183,7 @@ TEST_F(SoakTest, ABusyGraphGoesOnAndThreadsDoNotPileUp) {
     resident.push_back(static_cast<double>(resident_kib()));
     if (resident.size() % 60 == 0) {
       std::printf("%5.1f min: %.0f KiB, %zu threads, %lu wake-ups\n", minutes.back(), resident.back(),
-                  process_tasks().size(), wake_ups(spinner));
+                  process_tasks().size(), wake_ups(spinner.thread_id()));
       std::fflush(stdout);
     }
   }

@@ -1,0 +1,136 @@
+// Callbacks as jobs: what arrived is taken and handled.
+#include <rcl/wait.h>
+
+#include "callback.hpp"
+#include "compat.hpp"
+#include "rclcpp/executor.hpp"
+#include "rclcpp/logging.hpp"
+#include "redag/runtime/running_job.hpp"
+
+namespace redag_rclcpp {
+
+using redag::sched::Outcome;
+
+namespace {
+
+// rclcpp executes what we have no reason to do otherwise.
+struct Rclcpp : rclcpp::Executor {
+  using rclcpp::Executor::execute_subscription;
+};
+
+/// Takes with `take`, then calls `handle`. False: there was nothing to take. As rclcpp's executors do.
+template <class Take, class Handle>
+bool take_and_handle(const char *what, const char *name, Take take, Handle handle) {
+  bool taken = false;
+  try {
+    taken = take();
+  } catch (const rclcpp::exceptions::RCLError &error) {
+    RCLCPP_ERROR(rclcpp::get_logger("redag_rclcpp"), "taking %s '%s' failed: %s", what, name, error.what());
+  }
+  if (taken) handle();
+  return taken;
+}
+
+}  // namespace
+
+Outcome Callback::execute(const redag::runtime::Job &job) {
+  Token token;
+  const bool executed = is_timer() ? execute_timer() : take_token(token) && execute_token(token);
+  if (!executed) return Outcome::NoData;
+  const Duration response = engine_.now() - job.release;
+  response_.add(response);
+  if (response > deadline_.load(std::memory_order_relaxed)) late_.fetch_add(1, std::memory_order_relaxed);
+  execution_.add(redag::runtime::RunningJob::current()->close());
+  return Outcome::Finished;
+}
+
+bool Callback::execute_token(const Token &token) {
+  // What the wait set saw is dealt with when this is left, however that is.
+  struct Watch {
+    ~Watch() {
+      if (!token.seen_only) return;
+      std::shared_ptr<Intake> intake;
+      {
+        const std::lock_guard guard(self.lock_);
+        self.seen_ = false;
+        intake = self.intake_;
+      }
+      if (intake) intake->wait_set_changed();
+    }
+    Callback &self;
+    const Token &token;
+  } watch{*this, token};
+
+  const bool taken = execute_arrival(token);
+  bool more = false;
+  {
+    const std::lock_guard guard(lock_);
+    bool &leftovers = leftovers_[index_of(token.source)];
+    leftovers = leftovers && taken;
+    more = leftovers && kept_[index_of(token.source)] == 0;
+  }
+  if (more) arrived(1, token.source, 0);
+  return taken;
+}
+
+bool Callback::execute_arrival(const Token &token) {
+  if (token.source == Source::IntraProcess) {
+    const auto waitable = intra_process_.lock();
+    // An empty buffer must not be taken from.
+    rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
+    return waitable && compat::is_ready(*waitable, unused) && execute_waitable(*waitable, token);
+  }
+  if (const auto waitable = waitable_.lock()) return execute_waitable(*waitable, token);
+  return execute_subscription() || execute_service() || execute_client();
+}
+
+bool Callback::execute_waitable(rclcpp::Waitable &waitable, const Token &token) {
+  std::shared_ptr<void> data =
+      token.seen_only ? waitable.take_data() : waitable.take_data_by_entity_id(static_cast<std::size_t>(token.part));
+  compat::execute(waitable, data);
+  return true;
+}
+
+bool Callback::execute_subscription() {
+  const auto subscription = subscription_.lock();
+  if (!subscription) return false;
+  TRACETOOLS_TRACEPOINT(rclcpp_executor_execute,
+                        static_cast<const void *>(subscription->get_subscription_handle().get()));
+  if (subscription->is_serialized() || subscription->can_loan_messages()) {
+    Rclcpp::execute_subscription(subscription);
+    return true;
+  }
+  rclcpp::MessageInfo info;
+  info.get_rmw_message_info().from_intra_process = false;
+  std::shared_ptr<void> message = subscription->create_message();
+  const bool taken = take_and_handle(
+      "a message of topic", subscription->get_topic_name(),
+      [&] { return subscription->take_type_erased(message.get(), info); },
+      [&] { subscription->handle_message(message, info); });
+  subscription->return_message(message);
+  return taken;
+}
+
+bool Callback::execute_service() {
+  const auto service = service_.lock();
+  if (!service) return false;
+  auto header = service->create_request_header();
+  std::shared_ptr<void> request = service->create_request();
+  return take_and_handle(
+      "a request of service", service->get_service_name(),
+      [&] { return service->take_type_erased_request(request.get(), *header); },
+      [&] { service->handle_request(header, request); });
+}
+
+bool Callback::execute_client() {
+  const auto client = client_.lock();
+  if (!client) return false;
+  auto header = client->create_request_header();
+  std::shared_ptr<void> response = client->create_response();
+  return take_and_handle(
+      "a response of service", client->get_service_name(),
+      [&] { return client->take_type_erased_response(response.get(), *header); },
+      [&] { client->handle_response(header, response); });
+}
+
+}  // namespace redag_rclcpp

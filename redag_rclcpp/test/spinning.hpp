@@ -1,0 +1,59 @@
+// What tests need that spin an executor in a thread of its own.
+#pragma once
+
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+namespace redag_rclcpp {
+
+/// How long a test waits for what has to happen: far longer than it ever takes.
+inline constexpr std::chrono::seconds kLimit{60};
+
+/// Does `meanwhile` until `condition` holds. False: it never did.
+template <class Condition, class Meanwhile>
+bool eventually(Condition condition, Meanwhile meanwhile) {
+  const auto end = std::chrono::steady_clock::now() + kLimit;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    meanwhile();
+  }
+  return true;
+}
+
+template <class Condition>
+bool eventually(Condition condition) {
+  return eventually(condition, [] { std::this_thread::sleep_for(std::chrono::milliseconds(1)); });
+}
+
+/// Spins in a thread of its own for as long as it lives.
+template <class Executor>
+class Spinner {
+ public:
+  explicit Spinner(Executor &executor)
+      : executor_(executor), thread_([&] {
+          thread_id_ = static_cast<int>(syscall(SYS_gettid));
+          executor.spin();
+        }) {
+    eventually([&] { return executor.is_spinning(); });
+  }
+  ~Spinner() { stop(); }
+  Spinner(const Spinner &) = delete;
+  Spinner &operator=(const Spinner &) = delete;
+
+  void stop() {
+    executor_.cancel();
+    if (thread_.joinable()) thread_.join();
+  }
+  [[nodiscard]] int thread_id() const { return thread_id_; }
+
+ private:
+  Executor &executor_;
+  std::atomic<int> thread_id_{0};
+  std::thread thread_;
+};
+
+}  // namespace redag_rclcpp
