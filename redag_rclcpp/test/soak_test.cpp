@@ -29,6 +29,15 @@ using std::chrono::steady_clock;
 using test_msgs::msg::Strings;
 using EmptyService = test_msgs::srv::Empty;
 
+std::size_t resident_kib() {
+  std::ifstream statm("/proc/self/statm");
+  std::size_t total = 0;
+  std::size_t resident = 0;
+  statm >> total >> resident;
+  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE)) / 1024;
+}
+
+/// Wake-ups of our threads, and of the one that spins.
 std::uint64_t wake_ups(int spinning_thread) {
   std::uint64_t all = 0;
   for (const auto &[id, task] : process_tasks()) {
