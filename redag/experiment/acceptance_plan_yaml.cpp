@@ -1,8 +1,10 @@
 // The text form of a plan: docs/experiments.md.
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -48,6 +50,9 @@ class Reader : private yaml::ValueReader {
       read();
       if (diagnostics_.empty()) look_at_the_whole();
     }
+    std::stable_sort(diagnostics_.begin(), diagnostics_.end(), [](const Diagnostic &a, const Diagnostic &b) {
+      return std::tie(a.line, a.column) < std::tie(b.line, b.column);
+    });
     if (!diagnostics_.empty()) return tl::unexpected<Diagnostics>(std::move(diagnostics_));
     return std::move(plan_);
   }

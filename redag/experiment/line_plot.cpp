@@ -14,7 +14,7 @@ namespace {
 // Sizes in pixels.
 constexpr double kPanelWidth = 400;
 constexpr double kPanelHeight = 300;
-constexpr double kLeft = 58;    // of a panel: the y axis
+constexpr double kLeft = 66;    // of a panel: the y axis
 constexpr double kBottom = 48;  // the x axis
 constexpr double kTop = 30;     // its title
 constexpr double kRight = 16;
@@ -23,10 +23,10 @@ constexpr double kLegendLine = 20;
 constexpr double kCharacter = 7;  // a wide guess, for the legend's width
 
 // The colours that M. Okabe and K. Ito chose to be told apart with any colour vision, less the yellow; where lines
-// outnumber them, dashes differ.
+// outnumber them, the dashes still differ. Dashes also let a line be seen below another.
 constexpr std::array<std::string_view, 7> kColours = {"#0072b2", "#000000", "#d55e00", "#009e73",
                                                       "#cc79a7", "#e69f00", "#56b4e9"};
-constexpr std::array<std::string_view, 3> kDashes = {"", "7 3", "2 3"};
+constexpr std::array<std::string_view, 4> kDashes = {"", "9 5", "3 4", "10 4 3 4"};
 
 std::string escaped(std::string_view text) {
   std::string safe;
@@ -56,7 +56,7 @@ std::string marker(std::size_t line, double x, double y) {
 }
 
 std::string stroke(std::size_t line) {
-  const std::string_view dash = kDashes[(line / kColours.size()) % kDashes.size()];
+  const std::string_view dash = kDashes[line % kDashes.size()];
   return fmt::format("fill='none' stroke='{}' stroke-width='1.8' stroke-linejoin='round'{}",
                      kColours[line % kColours.size()],
                      dash.empty() ? std::string() : fmt::format(" stroke-dasharray='{}'", dash));
@@ -75,10 +75,10 @@ class Drawing {
 
   std::string run() {
     std::size_t longest = 0;
-    for (const std::string &name : plot_.lines) longest = std::max(longest, name.size());
+    for (std::size_t line = 0; line < plot_.lines.size(); ++line) longest = std::max(longest, label(line).size());
     const std::size_t rows = std::max<std::size_t>(1, (plot_.panels.size() + columns_ - 1) / columns_);
     const double panels_right = static_cast<double>(columns_) * kPanelWidth;
-    const double width = panels_right + 60 + static_cast<double>(longest + 17) * kCharacter;
+    const double width = panels_right + 60 + static_cast<double>(longest) * kCharacter;
     const double panels_height = static_cast<double>(rows) * kPanelHeight;
     const double height = kHead + std::max(panels_height, 40 + static_cast<double>(plot_.lines.size()) * kLegendLine);
     put("<svg xmlns='http://www.w3.org/2000/svg' width='{0:.0f}' height='{1:.0f}' viewBox='0 0 {0:.0f} {1:.0f}' "
@@ -151,14 +151,20 @@ class Drawing {
     put("\n");
   }
 
+  [[nodiscard]] bool is_drawn(std::size_t line) const {
+    return std::any_of(plot_.panels.begin(), plot_.panels.end(),
+                       [&](const LinePlot::Panel &panel) { return !panel.series[line].empty(); });
+  }
+  [[nodiscard]] std::string label(std::size_t line) const {
+    return plot_.lines[line] + (is_drawn(line) ? "" : " (does not apply)");
+  }
+
   void legend(double left) {
     double at = kHead + kTop + 6;
     for (std::size_t line = 0; line < plot_.lines.size(); ++line) {
-      const bool drawn = std::any_of(plot_.panels.begin(), plot_.panels.end(),
-                                     [&](const LinePlot::Panel &panel) { return !panel.series[line].empty(); });
       put("<path d='M{:.1f} {:.1f}h28' {}/>{}", left, at, stroke(line), marker(line, left + 14, at));
-      put("<text x='{:.1f}' y='{:.1f}'{}>{}{}</text>\n", left + 36, at + 4.5, drawn ? "" : " fill='#888'",
-          escaped(plot_.lines[line]), drawn ? "" : " (does not apply)");
+      put("<text x='{:.1f}' y='{:.1f}'{}>{}</text>\n", left + 36, at + 4.5, is_drawn(line) ? "" : " fill='#888'",
+          escaped(label(line)));
       at += kLegendLine;
     }
   }
