@@ -22,10 +22,10 @@ constexpr double kHead = 62;  // the plot's title
 constexpr double kLegendLine = 20;
 constexpr double kCharacter = 7;  // a wide guess, for the legend's width
 
-// The colours that M. Okabe and K. Ito chose to be told apart with any colour vision, less the yellow; where lines
+// The colours that M. Okabe and K. Ito chose to be told apart with any colour vision, grey for the yellow; where lines
 // outnumber them, the dashes still differ. Dashes also let a line be seen below another.
-constexpr std::array<std::string_view, 7> kColours = {"#0072b2", "#000000", "#d55e00", "#009e73",
-                                                      "#cc79a7", "#e69f00", "#56b4e9"};
+constexpr std::array<std::string_view, 8> kColours = {"#0072b2", "#000000", "#d55e00", "#009e73",
+                                                      "#cc79a7", "#e69f00", "#56b4e9", "#808080"};
 constexpr std::array<std::string_view, 4> kDashes = {"", "9 5", "3 4", "10 4 3 4"};
 
 std::string escaped(std::string_view text) {
