@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,6 +23,7 @@ struct Term {
     Interference,  // by more urgent work
     Jitter,        // the release seen late
     Overhead,      // the platform's, for this job; overheads of others are part of their terms
+    Waiting,       // for workers, predecessors and releases together, where nobody's share can be told
   };
   Kind kind = Kind::Own;
   TaskId task;  // whose; neither: nobody in particular
@@ -71,7 +73,7 @@ struct Method {
   std::string_view assumptions;  // when it applies, in words
   std::string_view complexity;
   std::string_view sound_only_if;  // of the paper's own equations; empty: sound wherever it applies
-  Outcome (*apply)(const System &system) = nullptr;
+  std::function<Outcome(const System &system)> apply;
 
   [[nodiscard]] bool is_paper() const { return !sound_only_if.empty(); }
 };

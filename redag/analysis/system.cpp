@@ -81,6 +81,8 @@ class Compiler {
     const Duration lead = add(platform.release_overhead, platform.dispatch_overhead);
     compiled.overhead = system_.mode == sched::Preemption::None ? lead : add(lead, platform.preempt_overhead);
     compiled.wcet = add(task.wcet, compiled.overhead);
+    compiled.bcet = add(std::max<Duration>(1, task.bcet), compiled.overhead);
+    compiled.offset = task.offset;
     compiled.period = task.period;
     compiled.deadline = task.deadline;
     compiled.jitter = task.jitter;

@@ -38,10 +38,12 @@ struct SystemTask {
   DagId dag;
   std::uint32_t unit = 0;
   Duration wcet = 0;         // C as charged: overheads included
+  Duration bcet = 0;         // as charged, > 0; bounds hold for shorter executions too, only the exploration reads it
   Duration overhead = 0;     // the part of `wcet` that is overhead
   Duration period = 0;       // T, least distance of two nominal releases of the unit
   Duration deadline = 0;     // D, from the task's own release
   Duration jitter = 0;       // J
+  Time offset = 0;           // of a timer; bounds hold for all offsets, only the exploration reads it
   Duration limit = 0;        // response up to which no job of the task is skipped (T, or T * queue_depth)
   Duration region = 0;       // longest stretch without a preemption point, overheads included; 0 with full preemption
   Duration last_region = 0;  // stretch after the last preemption point when it executes for its wcet; 0 likewise
