@@ -33,6 +33,7 @@ std::string what(const Term &term) {
     case Term::Kind::Interference: return "interference of";
     case Term::Kind::Jitter: return "release jitter";
     case Term::Kind::Overhead: return "overhead";
+    case Term::Kind::Waiting: return "waiting, for all that comes before";
   }
   return "?";
 }
@@ -67,6 +68,8 @@ std::string advice(const Analysed &analysed, const Term &term) {
     }
     case Term::Kind::Jitter: return "a release that is seen sooner counts most";
     case Term::Kind::Overhead: return "fewer and longer jobs, or cheaper scheduling, count most";
+    case Term::Kind::Waiting:
+      return "the schedule that is worst for it was found by trying all; without --explore the bounds name the causes";
   }
   return {};
 }

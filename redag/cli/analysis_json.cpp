@@ -51,6 +51,39 @@ Json method_json(const MethodReport &report) {
               {"sound_only_if", std::string(method.sound_only_if)}};
 }
 
+const char *to_string(analysis::Exploration::End end) {
+  switch (end) {
+    case analysis::Exploration::End::Complete: return "complete";
+    case analysis::Exploration::End::Overrun: return "overrun";
+    case analysis::Exploration::End::GaveUp: return "gave_up";
+    case analysis::Exploration::End::Stopped: return "stopped";
+  }
+  return "?";
+}
+
+Json exploration_json(const Analysed &analysed) {
+  const analysis::Exploration &exploration = *analysed.exploration;
+  Json document = {{"end", to_string(exploration.end)},
+                   {"exact", exploration.exact},
+                   {"states", exploration.states},
+                   {"merged", exploration.merged},
+                   {"jobs", exploration.jobs},
+                   {"hyperperiod_ns", exploration.hyperperiod},
+                   {"hyperperiods", exploration.hyperperiods},
+                   {"tasks", Json::array()}};
+  if (exploration.end != analysis::Exploration::End::Complete) return document;
+  for (std::size_t t = 0; t < exploration.responses.size(); ++t) {
+    Json jobs = Json::array();
+    for (const analysis::ResponseRange &range : exploration.responses[t]) jobs.push_back({range.best, range.worst});
+    const analysis::ResponseRange all = exploration.of(TaskId(t));
+    document["tasks"].push_back(Json{{"name", task_name(analysed, TaskId(t))},
+                                     {"best_ns", all.best},
+                                     {"worst_ns", all.worst},
+                                     {"jobs_ns", std::move(jobs)}});
+  }
+  return document;
+}
+
 }  // namespace
 
 Json to_json(const Analysed &analysed) {
@@ -79,6 +112,7 @@ Json to_json(const Analysed &analysed) {
   for (const Row &row : dag_rows(analysed)) document["dags"].push_back(row_json(analysed, row));
   document["methods"] = Json::array();
   for (const MethodReport &report : analysed.report.methods) document["methods"].push_back(method_json(report));
+  if (analysed.exploration != nullptr) document["exploration"] = exploration_json(analysed);
   return document;
 }
 

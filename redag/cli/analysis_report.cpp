@@ -152,6 +152,22 @@ std::string method_table(const Analysed &analysed, const StreamTraits &terminal)
   return table.render(terminal.width, terminal.colour);
 }
 
+// Over all schedules there are: what a bound does not tell is the best case.
+std::string exploration_table(const Analysed &analysed, const StreamTraits &terminal, bool all) {
+  const analysis::Exploration &exploration = *analysed.exploration;
+  Table table({{"explored", false, 9}, {"best", true, 5}, {"worst", true, 5}});
+  const std::size_t shown = all ? analysed.system.tasks.size() : std::min(kMostTasks, analysed.system.tasks.size());
+  for (std::size_t t = 0; t < shown; ++t) {
+    const analysis::ResponseRange range = exploration.of(TaskId(t));
+    table.add({{task_name(analysed, TaskId(t))}, {humanize_duration(range.best)}, {humanize_duration(range.worst)}});
+  }
+  return table.render(terminal.width, terminal.colour) +
+         fmt::format(
+             "best and worst response to the source's release over all schedules that are possible with the "
+             "stated\noffsets, jitter and execution times from bcet to wcet, and strictly periodic timers{}\n",
+             exploration.exact ? "" : "; with several\nworkers the range can be too wide, never too narrow");
+}
+
 std::string plural(std::size_t count, const char *noun) {
   return fmt::format("{} {}{}", format_count(count), noun, count == 1 ? "" : "s");
 }
@@ -195,11 +211,23 @@ const char *to_string(Standing standing) {
   return "?";
 }
 
-Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform) {
+Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
+                         const analysis::ExplorationOptions *explore) {
   Result<analysis::System> system = analysis::compile(workload, platform);
   if (!system) return tl::unexpected<Diagnostics>(system.error());
-  analysis::Report report = analysis::analyze(*system);
-  return Analysed{workload, *std::move(system), std::move(report)};
+  auto methods = std::make_shared<std::vector<Method>>(analysis::methods());
+  std::shared_ptr<const analysis::Exploration> exploration;
+  if (explore != nullptr) {
+    std::optional<std::string> reason = analysis::why_not_explore(*system);
+    if (!reason) exploration = std::make_shared<analysis::Exploration>(analysis::explore(*system, *explore));
+    methods->push_back(analysis::exploration());
+    methods->back().apply = [exploration, reason](const analysis::System &asked) -> analysis::Outcome {
+      if (reason) return NotApplicable{*reason};
+      return to_bound(asked, *exploration);
+    };
+  }
+  analysis::Report report = analysis::analyze(*system, *methods);
+  return Analysed{workload, *std::move(system), std::move(report), std::move(methods), std::move(exploration)};
 }
 
 std::string task_name(const Analysed &analysed, TaskId task) {
@@ -317,12 +345,18 @@ std::string describe(const Analysed &analysed, const StreamTraits &terminal, boo
   const std::string words = verdict_in_words(analysed);
   const std::size_t colon = words.find(':');
   text += "\n" + tinted(words.substr(0, colon), yes ? Tint::Good : Tint::Bad, terminal.colour) + words.substr(colon);
-  return text + "\n\n" + method_table(analysed, terminal);
+  text += "\n\n" + method_table(analysed, terminal);
+  if (analysed.exploration != nullptr && analysed.exploration->end == analysis::Exploration::End::Complete) {
+    text += "\n" + exploration_table(analysed, terminal, all);
+  }
+  return text;
 }
 
 std::string describe_methods() {
   std::string text;
-  for (const Method &method : analysis::methods()) {
+  std::vector<Method> all = analysis::methods();
+  all.push_back(analysis::exploration());
+  for (const Method &method : all) {
     text +=
         fmt::format("{} ({}{})\n  assumes: {}\n  cite: {}\n  complexity: {}\n", method.name, to_string(method.subject),
                     method.is_paper() ? ", paper" : "", method.assumptions, method.cite, method.complexity);

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "redag/analysis/analyze.hpp"
+#include "redag/analysis/exploration.hpp"
 #include "redag/cli/console.hpp"
 #include "redag/cli/json.hpp"
 #include "redag/model/workload.hpp"
@@ -20,10 +22,13 @@ struct Analysed {
   Workload workload;
   analysis::System system;
   analysis::Report report;
+  std::shared_ptr<const std::vector<analysis::Method>> methods;  // what the report points into
+  std::shared_ptr<const analysis::Exploration> exploration;      // null: not asked for, or nothing to explore
 };
 
-/// Error: analysis::compile().
-[[nodiscard]] Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform);
+/// With `explore`, exploration() is one of the methods. Error: analysis::compile().
+[[nodiscard]] Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
+                                       const analysis::ExplorationOptions *explore = nullptr);
 
 enum class Standing : std::uint8_t {
   Ok,          // a sound method shows that the deadline is met

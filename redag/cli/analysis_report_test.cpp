@@ -54,6 +54,32 @@ TEST(AnalysisReport, KnownResponsesOnOneWorker) {
   EXPECT_EQ(verdict_in_words(analysed).find("schedulable: every deadline is met, by "), 0U);
 }
 
+// Run to completion, with the offsets as they are: b never comes while a runs, nor a while b does.
+TEST(AnalysisReport, AnExplorationIsAMethodAmongOthers) {
+  Workload workload = two_tasks(PreemptionMode::None);
+  workload.dags[1].tasks[0].offset = 3 * kMillisecond;
+  const analysis::ExplorationOptions options;
+  const Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload), &options);
+  ASSERT_TRUE(analysed);
+  const std::vector<Row> rows = task_rows(*analysed);
+  EXPECT_EQ(rows[0].tightest.response, 3 * kMillisecond);
+  EXPECT_EQ(rows[0].says->name, "exploration");
+  const std::string text = describe(*analysed, StreamTraits{}, false);
+  EXPECT_NE(text.find("4 states, 3 jobs a hyperperiod, exact"), std::string::npos) << text;
+  const Json document = to_json(*analysed)["exploration"];
+  EXPECT_EQ(document["end"], "complete");
+  EXPECT_EQ(document["tasks"][1]["worst_ns"], 7 * kMillisecond);
+  EXPECT_EQ(document["tasks"][0]["jobs_ns"].size(), 2U);
+
+  EXPECT_FALSE(to_json(look_at(workload)).contains("exploration"));
+  workload.platform.preemption = PreemptionMode::Os;
+  const Result<Analysed> preempted = analyse(workload, analysis::platform_of(workload), &options);
+  ASSERT_TRUE(preempted);
+  EXPECT_EQ(preempted->exploration, nullptr);
+  EXPECT_EQ(preempted->report.methods.back().method->name, "exploration");
+  EXPECT_EQ(preempted->report.methods.back().bound(), nullptr);
+}
+
 TEST(AnalysisReport, ATightDeadlineIsNamedNotCalledAMiss) {
   Workload workload = two_tasks(PreemptionMode::Os);
   workload.dags[1].tasks[0].deadline = 9 * kMillisecond;

@@ -1,12 +1,18 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
 #include <memory>
+#include <string>
 
 #include "redag/cli/analysis_explanation.hpp"
 #include "redag/cli/analysis_report.hpp"
 #include "redag/cli/commands.hpp"
 #include "redag/cli/options.hpp"
+#include "redag/cli/progress.hpp"
 #include "redag/cli/run_arguments.hpp"
+#include "redag/cli/signals.hpp"
+#include "redag/cli/table.hpp"
 
 namespace redag::cli {
 namespace {
@@ -16,7 +22,10 @@ struct Options {
   std::uint32_t levels = 0;
   std::string explain;
   bool methods = false;
+  std::uint64_t explore = 0;  // states; 0: not asked for
 };
+
+constexpr std::uint64_t kUsualStates = 1'000'000;
 
 analysis::AnalysisPlatform platform_for(const Workload &workload, const Options &options) {
   analysis::AnalysisPlatform platform = analysis::platform_of(workload);
@@ -53,6 +62,35 @@ bool report(const Analysed &analysed, const Options &options, Console &console) 
   return true;
 }
 
+std::string is_positive_count(const std::string &text) {
+  std::uint64_t count = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+  const bool is_count = error == std::errc{} && end == text.data() + text.size() && count > 0;
+  return is_count ? std::string() : "'" + text + "' is not a number of states, 1 or more";
+}
+
+// With --explore and Ctrl-C, what the other methods say remains.
+Result<Analysed> analyse_configured(const Workload &workload, const Options &options, Console &console) {
+  const analysis::AnalysisPlatform platform = platform_for(workload, options);
+  if (options.explore == 0) return analyse(workload, platform);
+  const InterruptGuard guard;
+  Progress progress(console);
+  progress.set_label("explore");
+  analysis::ExplorationOptions explore;
+  explore.max_states = options.explore;
+  explore.proceed = [&](const analysis::ExplorationProgress &at) {
+    if (progress.due()) {
+      const double round = static_cast<double>(at.jobs) / static_cast<double>(at.jobs_in_a_round);
+      progress.draw(std::min(1.0, round), fmt::format("{} states", format_count(at.states)));
+    }
+    return !InterruptGuard::interrupted();
+  };
+  Result<Analysed> analysed = analyse(workload, platform, &explore);
+  progress.clear();
+  if (InterruptGuard::interrupted()) console.warn("interrupted: the exploration is not complete");
+  return analysed;
+}
+
 int analyze_file(const Options &options, Console &console) {
   if (options.arguments.file.empty()) {
     if (options.methods && !options.arguments.json) {
@@ -64,7 +102,7 @@ int analyze_file(const Options &options, Console &console) {
   }
   const std::optional<Workload> workload = load_configured(options.arguments, console);
   if (!workload) return kExitBad;
-  const Result<Analysed> analysed = analyse(*workload, platform_for(*workload, options));
+  const Result<Analysed> analysed = analyse_configured(*workload, options, console);
   if (!analysed) {
     console.note(analysed.error());
     return kExitBad;
@@ -84,6 +122,12 @@ Action add_analyze(CLI::App &app) {
       ->type_name("TASK");
   app.add_flag("--methods", options->methods,
                "Every method's assumptions, citation and complexity; FILE may be missing");
+  app.add_flag(
+         "--explore{" + std::to_string(kUsualStates) + "}", options->explore,
+         "Try all schedules of strictly periodic jobs that run to completion, in at most STATES states (default " +
+             format_count(kUsualStates) + "): best and worst responses, exact on one worker")
+      ->type_name("[=STATES]")
+      ->check(is_positive_count);
   app.add_flag("--all-tasks", arguments.all_tasks, "A row for every task, however many");
   app.add_flag("--json", arguments.json, "Write one JSON document to standard output, and nothing else");
   app.add_flag("--check", arguments.check, "Exit with 1 if no sound method shows that every deadline is met");
