@@ -74,9 +74,10 @@ bool is_result_name(std::string_view name) {
   if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
     name = name.substr(0, at);
   }
-  constexpr std::array<std::string_view, 10> kNames = {
-      "jobs.csv",        "summary.json",   "trace.json",      "events.jsonl", "workload.yaml",
-      "comparison.json", "comparison.csv", "comparison.html", "report.html",  "check.json"};
+  constexpr std::array<std::string_view, 16> kNames = {
+      "jobs.csv",       "summary.json",    "trace.json",      "events.jsonl",  "workload.yaml", "comparison.json",
+      "comparison.csv", "comparison.html", "report.html",     "check.json",    "plan.yaml",     "units.csv",
+      "runs.jsonl",     "acceptance.csv",  "acceptance.json", "acceptance.svg"};
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
   // Folders of a comparison: one an executor, in it one a repetition; and what `generate` writes.
   const std::vector<std::string> &executors = variant_names();
@@ -86,7 +87,7 @@ bool is_result_name(std::string_view name) {
            name.substr(name.size() - suffix.size()) == suffix &&
            is_number(name.substr(prefix.size(), name.size() - prefix.size() - suffix.size()));
   };
-  return is_numbered("repetition-", "") || is_numbered("workload-", ".yaml");
+  return is_numbered("repetition-", "") || is_numbered("workload-", ".yaml") || is_numbered("violation-", ".yaml");
 }
 
 Result<void> prepare_folder(const std::string &path, bool force) {

@@ -47,6 +47,10 @@ constexpr std::array kCommands = {
           "  redag analyze cart.yaml --explain control.pid\n"
           "  redag analyze cart.yaml --preemption none --explore\n"
           "  redag analyze --methods\n"},
+    Entry{"experiment", "Measure over many random workloads: seeded, parallel, resumable", add_experiment,
+          "  redag experiment acceptance experiments/acceptance_tasks.yaml\n"
+          "  redag experiment acceptance --help\n"
+          "  redag experiment merge --help\n"},
     Entry{"check-trace", "Hold recorded traces to the rules of the model", add_check_trace,
           "  redag check-trace results/demo\n"
           "  redag check-trace --json results/os/events.jsonl\n"},
@@ -80,10 +84,25 @@ int usage_error(Console &console, const std::string &message, const std::string 
   return kExitBad;
 }
 
-// The subcommand that was named, or null.
+// The subcommand that was named, the innermost one, or null.
 CLI::App *chosen(CLI::App &app) {
   const auto parsed = app.get_subcommands();
-  return parsed.empty() ? nullptr : parsed.front();
+  if (parsed.empty()) return nullptr;
+  CLI::App *inner = chosen(*parsed.front());
+  return inner != nullptr ? inner : parsed.front();
+}
+
+// "experiment acceptance", or "" for the program itself.
+std::string name_of(const CLI::App *command) {
+  if (command == nullptr || command->get_parent() == nullptr) return {};
+  const std::string outer = name_of(command->get_parent());
+  return outer.empty() ? command->get_name() : outer + " " + command->get_name();
+}
+
+// What stands before the command's own name in its usage line.
+std::string help_prefix(const CLI::App &command) {
+  const std::string outer = name_of(command.get_parent());
+  return outer.empty() ? "redag" : "redag " + outer;
 }
 
 int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
@@ -115,18 +134,17 @@ int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them last first
   } catch (const CLI::CallForHelp &) {
     CLI::App *command = chosen(app);
-    console.print(command != nullptr ? command->help("redag") : app.help());
+    console.print(command != nullptr ? command->help(help_prefix(*command)) : app.help());
     return kExitOk;
   } catch (const CLI::CallForVersion &version) {
     console.print(std::string(version.what()) + "\n");
     return kExitOk;
   } catch (const CLI::ExtrasError &) {
     CLI::App *command = chosen(app);
-    return usage_error(console, unknown_argument(command != nullptr ? *command : app),
-                       command != nullptr ? command->get_name() : "");
+    return usage_error(console, unknown_argument(command != nullptr ? *command : app), name_of(command));
   } catch (const CLI::ParseError &error) {
     CLI::App *command = chosen(app);
-    return usage_error(console, error.what(), command != nullptr ? command->get_name() : "");
+    return usage_error(console, error.what(), name_of(command));
   }
   for (const auto &[command, action] : actions) {
     if (command->parsed()) return action(console);

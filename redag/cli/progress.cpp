@@ -29,6 +29,20 @@ std::string progress_line(std::string_view label, double done, std::string_view 
   return cut(line, width);
 }
 
+Stopwatch::Stopwatch() : begin_(now()) {}
+
+Duration Stopwatch::elapsed() const { return now() - begin_; }
+
+std::string pace(std::uint64_t done, std::uint64_t total, Duration elapsed) {
+  std::string text = fmt::format("{} of {}", format_count(done), format_count(total));
+  if (done == 0 || elapsed <= 0) return text;
+  const double each = static_cast<double>(elapsed) / static_cast<double>(done);
+  const double rest = each * static_cast<double>(total - std::min(done, total));
+  // Beyond a day nobody cares for seconds, and a first guess can be far off.
+  const std::string left = rest < 86'400e9 ? humanize_duration(static_cast<Duration>(rest)) : "more than a day";
+  return text + fmt::format(", {:.0f}/s, {} left", 1e9 / each, left);
+}
+
 bool Progress::due() const { return console_.err_traits().terminal && now() - last_drawn_ >= kRedrawPeriod; }
 
 void Progress::draw(double done, std::string_view detail) {

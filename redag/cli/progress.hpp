@@ -37,6 +37,19 @@ class Progress {
   bool visible_ = false;
 };
 
+/// Time since it was made.
+class Stopwatch {
+ public:
+  Stopwatch();
+  [[nodiscard]] Duration elapsed() const;
+
+ private:
+  Time begin_;
+};
+
+/// "3 200 of 8 000, 512/s, 9.4s left": how `done` of `total` went, `elapsed` after the first of them began.
+[[nodiscard]] std::string pace(std::uint64_t done, std::uint64_t total, Duration elapsed);
+
 /// "label [#####     ]  50 %  detail", at most `width` columns.
 [[nodiscard]] std::string progress_line(std::string_view label, double done, std::string_view detail,
                                         std::size_t width);

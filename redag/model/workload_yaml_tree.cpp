@@ -198,7 +198,7 @@ Result<Node> parse(std::string_view text, const std::string &file) {
     TreeBuilder rest;
     if (parser.HandleNextDocument(rest)) {
       const Node second = rest.take_root();
-      return error_at(file, second.line, second.column, "a second document", "one workload a file");
+      return error_at(file, second.line, second.column, "a second document", "one document a file");
     }
     return builder.take_root();
   } catch (const Rejected &rejected) {

@@ -1,5 +1,5 @@
-// YAML text as a tree of nodes that know their place, for workload_yaml.cpp only. Built from yaml-cpp's events rather
-// than its Node, because Node loses the place of keys, merges duplicate keys and follows aliases. Pure functions.
+// YAML text as a tree of nodes that know their place, for the readers of YAML files. Built from yaml-cpp's events
+// rather than its Node, because Node loses the place of keys, merges duplicate keys, follows aliases. Pure functions.
 #pragma once
 
 #include <cstdint>

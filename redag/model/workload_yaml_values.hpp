@@ -1,5 +1,5 @@
-// Values of a YAML tree (durations, numbers, names, choices) for workload_yaml.cpp only, and the list of mistakes found
-// on the way. Knows types, not rules: those are in validate.hpp. Not thread-safe.
+// Values of a YAML tree (durations, numbers, names, choices) for the readers of YAML files, and the list of mistakes
+// found on the way. Knows types, not rules: those of workloads are in validate.hpp. Not thread-safe.
 #pragma once
 
 #include <charconv>

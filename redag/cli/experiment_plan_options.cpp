@@ -1,0 +1,182 @@
+#include "redag/cli/experiment_plan_options.hpp"
+
+#include <charconv>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "redag/cli/options.hpp"
+
+namespace redag::cli {
+namespace {
+
+using experiment::AcceptancePlan;
+using experiment::DeadlineKind;
+
+std::vector<std::string> split(const std::string &text) {
+  std::vector<std::string> items(1);
+  for (const char c : text) {
+    if (c == ',') {
+      items.emplace_back();
+    } else {
+      items.back() += c;
+    }
+  }
+  return items;
+}
+
+std::uint32_t count_of(const std::string &name, const std::string &text) {
+  std::uint32_t value = 0;
+  const char *end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || stop != end || value == 0) reject(name, "'" + text + "' is not a whole number above 0");
+  return value;
+}
+
+template <class Value>
+Value choice_of(const std::string &name, const std::string &text, const Choices<Value> &choices) {
+  std::vector<std::string> names;
+  for (const auto &[known, value] : choices) {
+    if (known == text) return value;
+    names.push_back(known);
+  }
+  reject(name, "'" + text + "' is not a choice", suggestion(text, names));
+}
+
+template <class Value>
+Choices<Value> choices_of(std::initializer_list<Value> values) {
+  Choices<Value> choices;
+  for (const Value value : values) choices.emplace_back(to_string(value), value);
+  return choices;
+}
+
+// "a,b,c", each read by `read(name, item)`.
+template <class Value, class Read>
+CLI::Option *add_list(CLI::App &app, const std::string &name, std::vector<Value> &target, const std::string &help,
+                      const std::string &shown, Read read) {
+  const auto set = [&target, name, read](const std::string &text) {
+    target.clear();
+    for (const std::string &item : split(text)) target.push_back(read(name, item));
+  };
+  return app.add_option_function<std::string>(name, set, help)->type_name("LIST")->default_str(shown);
+}
+
+}  // namespace
+
+PlanOptions::PlanOptions(CLI::App &app) {
+  app.add_option("PLAN", file_, "Plan (YAML, docs/experiments.md); options replace what it says")->type_name("FILE");
+  add_points(app);
+  add_workloads(app);
+}
+
+void PlanOptions::on(CLI::Option *option, const std::string &group, Edit edit) {
+  option->group(group);
+  edits_.emplace_back(option, std::move(edit));
+}
+
+void PlanOptions::add_points(CLI::App &app) {
+  const std::string group = "Points";
+  on(app.add_option("--name", given_.name, "Of the experiment")->type_name("NAME")->capture_default_str(), group,
+     [this](AcceptancePlan &plan) { plan.name = given_.name; });
+  on(add_count(app, "--seed", given_.seed, "Of all random draws"), group,
+     [this](AcceptancePlan &plan) { plan.seed = given_.seed; });
+  on(add_count(app, "--sets", given_.sets, "Random workloads at each point"), group,
+     [this](AcceptancePlan &plan) { plan.sets = given_.sets; });
+  const auto set_utilization = [this](const std::string &text) {
+    Result<std::vector<std::uint32_t>> values = experiment::parse_utilization(text);
+    if (!values) reject("--utilization", values.error().front().message, values.error().front().hint);
+    given_.utilization = std::move(*values);
+  };
+  on(app.add_option_function<std::string>("--utilization", set_utilization,
+                                          "Per worker: FROM:TO:STEP, or values with commas")
+         ->type_name("RANGE")
+         ->default_str("0.05:1:0.05"),
+     group, [this](AcceptancePlan &plan) { plan.utilization = given_.utilization; });
+  on(add_list(app, "--dags", given_.dags, "DAGs; by default each has one task", "10", count_of), group,
+     [this](AcceptancePlan &plan) { plan.dags = given_.dags; });
+  on(add_list(app, "--workers", given_.workers, "Workers", "4", count_of), group,
+     [this](AcceptancePlan &plan) { plan.workers = given_.workers; });
+  on(add_list(app, "--deadlines", given_.deadlines, "implicit (D = T), constrained (D / T in 0.5 to 1)", "implicit",
+              [](const std::string &name, const std::string &item) {
+                return choice_of(name, item, choices_of({DeadlineKind::Implicit, DeadlineKind::Constrained}));
+              }),
+     group, [this](AcceptancePlan &plan) { plan.deadlines = given_.deadlines; });
+  on(add_list(
+         app, "--preemption", given_.preemption, "none, os (full preemption)", "none,os",
+         [](const std::string &name, const std::string &item) { return choice_of(name, item, preemption_choices()); }),
+     group, [this](AcceptancePlan &plan) { plan.preemption = given_.preemption; });
+  on(add_list(app, "--methods", given_.methods,
+              "Names of 'redag analyze --methods'; any: all sound ones together; simulation: no miss seen",
+              "any,simulation", [](const std::string & /*name*/, const std::string &item) { return item; }),
+     group, [this](AcceptancePlan &plan) { plan.methods = given_.methods; });
+  on(add_count(app, "--simulation-offsets", given_.simulation.offsets,
+               "Simulated runs with random offsets, beside the synchronous one"),
+     group, [this](AcceptancePlan &plan) { plan.simulation.offsets = given_.simulation.offsets; });
+  on(add_count(app, "--simulation-periods", given_.simulation.periods,
+               "Length of a run in periods of the slowest task"),
+     group, [this](AcceptancePlan &plan) { plan.simulation.periods = given_.simulation.periods; });
+}
+
+void PlanOptions::add_workloads(CLI::App &app) {
+  const std::string group = "Workloads";
+  GenerateOptions &w = given_.workload;
+  on(add_count(app, "--min-tasks", w.min_tasks, "Fewest tasks of a DAG"), group,
+     [&w](AcceptancePlan &plan) { plan.workload.min_tasks = w.min_tasks; });
+  on(add_count(app, "--max-tasks", w.max_tasks, "Most tasks of a DAG"), group,
+     [&w](AcceptancePlan &plan) { plan.workload.max_tasks = w.max_tasks; });
+  on(add_choice(app, "--shape", w.shape,
+                choices_of({DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain,
+                            DagShape::Independent}),
+                "Edges")
+         ->default_str(to_string(w.shape)),
+     group, [&w](AcceptancePlan &plan) { plan.workload.shape = w.shape; });
+  on(add_number(app, "--edge-probability", w.edge_probability, "Of each further edge (layered, erdos_renyi)"), group,
+     [&w](AcceptancePlan &plan) { plan.workload.edge_probability = w.edge_probability; });
+  on(add_choice(app, "--policy", w.policy, policy_choices(), "Policy")->default_str(to_string(w.policy)), group,
+     [&w](AcceptancePlan &plan) { plan.workload.policy = w.policy; });
+  on(add_count(app, "--max-active", w.max_active_max, "Of every DAG; 0: no bound"), group, [&w](AcceptancePlan &plan) {
+    plan.workload.max_active_min = w.max_active_max;
+    plan.workload.max_active_max = w.max_active_max;
+  });
+  on(add_choice(
+         app, "--periods", w.periods,
+         choices_of({PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive, PeriodModel::Robot}),
+         "Periods")
+         ->default_str(to_string(w.periods)),
+     group, [&w](AcceptancePlan &plan) { plan.workload.periods = w.periods; });
+  on(add_duration(app, "--period-min", w.period_min, "Shortest period (log_uniform, harmonic)"), group,
+     [&w](AcceptancePlan &plan) { plan.workload.period_min = w.period_min; });
+  on(add_duration(app, "--period-max", w.period_max, "Longest period (log_uniform, harmonic)"), group,
+     [&w](AcceptancePlan &plan) { plan.workload.period_max = w.period_max; });
+  on(add_duration(app, "--period-granularity", w.period_granularity, "Periods are multiples of it (log_uniform)"),
+     group, [&w](AcceptancePlan &plan) { plan.workload.period_granularity = w.period_granularity; });
+  on(add_number(app, "--jitter", w.jitter, "Release jitter / period of timer tasks"), group,
+     [&w](AcceptancePlan &plan) { plan.workload.jitter = w.jitter; });
+  on(add_number(app, "--max-task-utilization", w.max_task_utilization, "Of one task"), group,
+     [&w](AcceptancePlan &plan) { plan.workload.max_task_utilization = w.max_task_utilization; });
+  on(add_choice(app, "--utilization-method", w.method,
+                choices_of({UtilizationMethod::Drs, UtilizationMethod::UUniFastDiscard}), "How it is shared")
+         ->default_str(to_string(w.method)),
+     group, [&w](AcceptancePlan &plan) { plan.workload.method = w.method; });
+}
+
+std::optional<AcceptancePlan> PlanOptions::plan(Console &console) const {
+  AcceptancePlan plan;
+  if (!file_.empty()) {
+    Result<AcceptancePlan> loaded = experiment::load_acceptance_plan(file_);
+    if (!loaded) {
+      console.note(loaded.error());
+      return std::nullopt;
+    }
+    plan = std::move(*loaded);
+  }
+  for (const auto &[option, edit] : edits_) {
+    if (option->count() > 0) edit(plan);
+  }
+  const std::vector<experiment::PlanMistake> mistakes = experiment::find_mistakes(plan);
+  for (const experiment::PlanMistake &mistake : mistakes) console.error(mistake.message, mistake.hint);
+  if (!mistakes.empty()) return std::nullopt;
+  return plan;
+}
+
+}  // namespace redag::cli

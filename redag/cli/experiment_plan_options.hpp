@@ -1,0 +1,38 @@
+// The plan of `redag experiment acceptance`: a file, options, or a file with some of it replaced by options. Called
+// while the program starts and right after; no threads.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "redag/cli/console.hpp"
+#include "redag/experiment/acceptance_plan.hpp"
+
+namespace redag::cli {
+
+class PlanOptions {
+ public:
+  /// Declares the options; `app` and this must outlive the parsing.
+  explicit PlanOptions(CLI::App &app);
+
+  /// The plan as given. What is wrong with it is printed, by file and line or by option.
+  [[nodiscard]] std::optional<experiment::AcceptancePlan> plan(Console &console) const;
+
+ private:
+  using Edit = std::function<void(experiment::AcceptancePlan &)>;
+
+  void add_points(CLI::App &app);
+  void add_workloads(CLI::App &app);
+  /// `edit` is made where `option` was given.
+  void on(CLI::Option *option, const std::string &group, Edit edit);
+
+  std::string file_;
+  experiment::AcceptancePlan given_;  // what the options say, the defaults elsewhere
+  std::vector<std::pair<const CLI::Option *, Edit>> edits_;
+};
+
+}  // namespace redag::cli

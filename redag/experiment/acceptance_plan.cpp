@@ -1,0 +1,173 @@
+#include "redag/experiment/acceptance_plan.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "redag/analysis/bound.hpp"
+#include "redag/experiment/acceptance.hpp"
+#include "redag/model/workload_yaml_nearest.hpp"
+
+namespace redag::experiment {
+namespace {
+
+constexpr std::uint64_t kMostUnits = 100'000'000;
+
+template <class Value>
+bool has_twice(std::vector<Value> values) {
+  std::sort(values.begin(), values.end());
+  return std::adjacent_find(values.begin(), values.end()) != values.end();
+}
+
+std::vector<std::string_view> method_names() {
+  std::vector<std::string_view> names = {kAnyMethod, kSimulationMethod};
+  for (const analysis::Method &method : analysis::methods()) names.push_back(method.name);
+  return names;
+}
+
+class Checker {
+ public:
+  explicit Checker(const AcceptancePlan &plan) : plan_(plan) {}
+
+  std::vector<PlanMistake> run() {
+    check_name();
+    check_list("utilization", plan_.utilization);
+    check_list("dags", plan_.dags);
+    check_list("workers", plan_.workers);
+    check_list("deadlines", plan_.deadlines);
+    check_list("preemption", plan_.preemption);
+    check_list("methods", plan_.methods);
+    check_methods();
+    if (plan_.sets == 0) say("sets", "sets must be at least 1");
+    if (plan_.simulation.periods == 0) say("simulation", "simulation: periods must be at least 1");
+    for (const PreemptionMode mode : plan_.preemption) {
+      if (mode == PreemptionMode::None || mode == PreemptionMode::Os) continue;
+      say("preemption", fmt::format("preemption '{}' says nothing here", to_string(mode)),
+          mode == PreemptionMode::Auto ? "choose none or os" : "generated tasks have no preemption points: say none");
+    }
+    if (mistakes_.empty()) check_points();
+    return std::move(mistakes_);
+  }
+
+ private:
+  void say(std::string key, std::string message, std::string hint = {}) {
+    mistakes_.push_back(PlanMistake{std::move(key), std::move(message), std::move(hint)});
+  }
+
+  void check_name() {
+    const bool printable = std::all_of(plan_.name.begin(), plan_.name.end(), [](char c) {
+      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+    });
+    if (plan_.name.empty() || !printable) say("name", "a name has letters, digits, - and _, and at least one of them");
+  }
+
+  template <class Value>
+  void check_list(const char *key, const std::vector<Value> &values) {
+    if (values.empty()) say(key, fmt::format("{} has no values", key));
+    if (has_twice(values)) say(key, fmt::format("{} names a value twice", key));
+  }
+
+  void check_methods() {
+    const std::vector<std::string_view> known = method_names();
+    for (const std::string &name : plan_.methods) {
+      if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+      const std::string_view near = yaml::nearest(name, known);
+      say("methods", fmt::format("unknown method '{}'", name),
+          near.empty() ? "'redag analyze --methods' lists them; any and simulation are others"
+                       : fmt::format("did you mean '{}'?", near));
+    }
+  }
+
+  // The generator knows what it can make.
+  void check_points() {
+    const std::vector<AcceptancePoint> points = points_of(plan_);
+    if (points.size() > kMostUnits / plan_.sets) {
+      say("sets", fmt::format("{} points of {} sets are more than {}", points.size(), plan_.sets, kMostUnits));
+      return;
+    }
+    for (const AcceptancePoint &point : points) {
+      const Result<Workload> workload = draw_workload(plan_, point, 0);
+      if (workload) continue;
+      say("workload", fmt::format("{}: {}", describe(point), workload.error().front().message),
+          workload.error().front().hint);
+      return;
+    }
+  }
+
+  const AcceptancePlan &plan_;
+  std::vector<PlanMistake> mistakes_;
+};
+
+// A number in millionths, up to the largest number of workers.
+std::optional<std::uint32_t> millionths(std::string_view text) {
+  double value = 0;
+  const char *end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || stop != end || !(value > 0) || value > 1000) return std::nullopt;
+  const auto scaled = static_cast<std::uint32_t>(std::llround(value * kMillion));
+  if (scaled == 0) return std::nullopt;
+  return scaled;
+}
+
+std::optional<std::vector<std::uint32_t>> split(std::string_view text, char separator) {
+  std::vector<std::uint32_t> values;
+  while (true) {
+    const std::size_t at = text.find(separator);
+    const std::optional<std::uint32_t> value = millionths(text.substr(0, at));
+    if (!value) return std::nullopt;
+    values.push_back(*value);
+    if (at == std::string_view::npos) return values;
+    text.remove_prefix(at + 1);
+  }
+}
+
+}  // namespace
+
+AcceptancePlan::AcceptancePlan() {
+  for (std::uint32_t u = 50'000; u <= kMillion; u += 50'000) utilization.push_back(u);
+  workload.min_tasks = 1;
+  workload.max_tasks = 1;
+}
+
+std::vector<AcceptancePoint> points_of(const AcceptancePlan &plan) {
+  std::vector<AcceptancePoint> points;
+  for (const std::uint32_t dags : plan.dags) {
+    for (const std::uint32_t workers : plan.workers) {
+      for (const DeadlineKind deadlines : plan.deadlines) {
+        for (const PreemptionMode preemption : plan.preemption) {
+          for (const std::uint32_t utilization : plan.utilization) {
+            points.push_back(AcceptancePoint{dags, workers, deadlines, preemption, utilization});
+          }
+        }
+      }
+    }
+  }
+  return points;
+}
+
+std::vector<PlanMistake> find_mistakes(const AcceptancePlan &plan) { return Checker(plan).run(); }
+
+Result<std::vector<std::uint32_t>> parse_utilization(std::string_view text) {
+  constexpr const char *kHint = "from:to:step or a list, each above 0 and per worker: 0.05:1:0.05 or 0.2,0.5,0.8";
+  const bool is_range = text.find(':') != std::string_view::npos;
+  const std::optional<std::vector<std::uint32_t>> values = split(text, is_range ? ':' : ',');
+  if (!values || (is_range && values->size() != 3)) {
+    return make_error(fmt::format("'{}' are no utilizations", text), kHint);
+  }
+  if (!is_range) return *values;
+  const auto [from, to, step] = std::tuple((*values)[0], (*values)[1], (*values)[2]);
+  if (from > to || (to - from) / step > 10'000) {
+    return make_error(fmt::format("'{}' is no range of at most 10000 utilizations", text), kHint);
+  }
+  std::vector<std::uint32_t> range;
+  for (std::uint64_t u = from; u <= to; u += step) range.push_back(static_cast<std::uint32_t>(u));
+  return range;
+}
+
+const char *to_string(DeadlineKind value) { return value == DeadlineKind::Implicit ? "implicit" : "constrained"; }
+
+}  // namespace redag::experiment

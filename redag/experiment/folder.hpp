@@ -1,0 +1,46 @@
+// The folder of an experiment: plan.yaml (what it is), units.csv (what is finished; journal.hpp), runs.jsonl (who
+// worked on it, when and where). All else in it is made of these. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "redag/base/result.hpp"
+#include "redag/base/time.hpp"
+#include "redag/experiment/journal.hpp"
+#include "redag/experiment/shard.hpp"
+
+namespace redag::experiment {
+
+/// Opens the units of `folder`, which must exist, for `plan` (canonical text). Errors: those of Journal::open(), and a
+/// folder that holds another plan, with the first line that differs.
+[[nodiscard]] Result<Journal> open_folder(const std::string &folder, const std::string &plan);
+
+/// The plan of a folder with results.
+[[nodiscard]] Result<std::string> read_plan(const std::string &folder);
+
+/// All finished units of several folders, which must hold the same plan, by unit. Errors: as open_folder().
+[[nodiscard]] Result<std::vector<FinishedUnit>> read_folders(const std::vector<std::string> &folders,
+                                                             const std::string &plan);
+
+/// Two lines a run in runs.jsonl: one when it begins and one when it ends, unless it was killed.
+struct RunBegin {
+  Shard shard;
+  std::uint32_t jobs = 1;
+  std::uint64_t units = 0;  // to do
+};
+struct RunEnd {
+  std::uint64_t units = 0;  // done
+  Duration elapsed = 0;
+  bool interrupted = false;
+};
+/// Adds this machine, the version of redag and the time of day.
+[[nodiscard]] Result<void> log_run(const std::string &folder, const RunBegin &run);
+[[nodiscard]] Result<void> log_run(const std::string &folder, const RunEnd &run);
+/// The lines of all folders, one after the other; empty where there is no such file.
+[[nodiscard]] std::vector<std::string> read_runs(const std::vector<std::string> &folders);
+/// Adds lines of other folders.
+[[nodiscard]] Result<void> add_runs(const std::string &folder, const std::vector<std::string> &lines);
+
+}  // namespace redag::experiment

@@ -1,0 +1,72 @@
+// units.csv: the finished units of an experiment, a line each, only ever appended to, so that a killed run goes on
+// where it was. Lines reach the kernel within kWriteEvery and the disk within kSyncEvery. Of one process at a time
+// (flock); not thread-safe.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "redag/base/result.hpp"
+
+namespace redag::experiment {
+
+struct FinishedUnit {
+  std::uint64_t unit = 0;
+  std::string result;  // what the experiment says of it, without line breaks
+
+  friend bool operator==(const FinishedUnit &, const FinishedUnit &) = default;
+};
+
+class Journal {
+ public:
+  static constexpr std::chrono::milliseconds kWriteEvery{200};
+  static constexpr std::chrono::seconds kSyncEvery{2};
+
+  /// Opens the file, or makes it. `subject` is what its lines are results of, one line of text: a file of another
+  /// subject is refused. A last line without its end (the process was killed) is cut off. Errors: the file cannot be
+  /// used, another process uses it, a line that is none, a unit with two results. A unit that stands there twice with
+  /// the same result counts once.
+  [[nodiscard]] static Result<Journal> open(std::string path, std::string_view subject);
+
+  Journal(Journal &&other) noexcept;
+  Journal &operator=(Journal &&) = delete;
+  Journal(const Journal &) = delete;
+  Journal &operator=(const Journal &) = delete;
+  /// Writes what is left; to see whether that worked call sync().
+  ~Journal();
+
+  /// What was in the file when it was opened, by unit.
+  [[nodiscard]] const std::vector<FinishedUnit> &found() const { return found_; }
+
+  /// The result must be one line. After an error nothing more is written.
+  [[nodiscard]] Result<void> append(std::uint64_t unit, std::string_view result);
+  /// All lines are on the disk.
+  [[nodiscard]] Result<void> sync();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  Journal(std::string path, int descriptor) : path_(std::move(path)), descriptor_(descriptor) {}
+  [[nodiscard]] Result<void> begin(std::string_view subject);
+  [[nodiscard]] Result<void> write();
+  [[nodiscard]] tl::unexpected<Diagnostics> failure(std::string_view what) const;
+
+  std::string path_;
+  int descriptor_ = -1;
+  bool broken_ = false;
+  std::string buffer_;
+  Clock::time_point last_write_ = Clock::now();
+  Clock::time_point last_sync_ = last_write_;
+  std::vector<FinishedUnit> found_;
+};
+
+/// What open() would find, without touching the file: for merging.
+[[nodiscard]] Result<std::vector<FinishedUnit>> read_journal(const std::string &path, std::string_view subject);
+
+/// Sorts by unit; a unit that stands there twice with the same result is kept once. Error: with two results.
+[[nodiscard]] Result<void> sort_and_unite(std::vector<FinishedUnit> &units, const std::string &file);
+
+}  // namespace redag::experiment

@@ -1,0 +1,92 @@
+#include "redag/experiment/runner.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <set>
+#include <thread>
+#include <vector>
+
+namespace redag::experiment {
+namespace {
+
+std::vector<std::uint64_t> first(std::uint64_t count) {
+  std::vector<std::uint64_t> units(count);
+  std::iota(units.begin(), units.end(), std::uint64_t{0});
+  return units;
+}
+
+// Early units take longest, so that later ones finish before them.
+Result<std::string> slow_at_first(std::uint64_t unit) {
+  if (unit < 4) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  return std::to_string(unit * unit);
+}
+
+TEST(Runner, HandsOverInOrderForAnyNumberOfJobs) {
+  for (const std::uint32_t jobs : {1U, 2U, 5U}) {
+    std::vector<std::uint64_t> seen;
+    const auto done = run_units(first(300), {jobs, nullptr}, slow_at_first,
+                                [&](std::uint64_t unit, const std::string &result) -> Result<void> {
+                                  EXPECT_EQ(result, std::to_string(unit * unit));
+                                  seen.push_back(unit);
+                                  return {};
+                                });
+    EXPECT_EQ(done, 300U);
+    EXPECT_EQ(seen, first(300)) << jobs;
+  }
+}
+
+TEST(Runner, EvaluatesOnSeveralThreads) {
+  std::atomic<int> inside{0};
+  std::atomic<bool> met{false};
+  const auto meet = [&](std::uint64_t) -> Result<std::string> {
+    ++inside;
+    // Waits for another, however long that takes to come; a runner with one thread never ends this.
+    for (int i = 0; i < 5000 && inside < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    if (inside >= 2) met = true;
+    return "";
+  };
+  EXPECT_TRUE(run_units(first(2), {2, nullptr}, meet, [](auto, const auto &) { return Result<void>{}; }));
+  EXPECT_TRUE(met);
+}
+
+TEST(Runner, StopKeepsAPrefix) {
+  std::atomic<bool> stop{false};
+  std::uint64_t accepted = 0;
+  const auto done = run_units(first(100'000), {2, &stop}, slow_at_first, [&](std::uint64_t unit, const std::string &) {
+    EXPECT_EQ(unit, accepted++);
+    if (unit == 10) stop = true;
+    return Result<void>{};
+  });
+  ASSERT_TRUE(done);
+  EXPECT_EQ(*done, accepted);
+  EXPECT_GT(*done, 10U);
+  EXPECT_LT(*done, 100'000U);
+}
+
+TEST(Runner, FirstErrorInOrderEndsIt) {
+  std::uint64_t accepted = 0;
+  const auto done = run_units(
+      first(1000), {3, nullptr},
+      [](std::uint64_t unit) -> Result<std::string> {
+        if (unit >= 50 && unit % 2 == 0) return make_error("unit " + std::to_string(unit));
+        return "";
+      },
+      [&](std::uint64_t, const std::string &) {
+        ++accepted;
+        return Result<void>{};
+      });
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().front().message, "unit 50");
+  EXPECT_EQ(accepted, 50U);
+}
+
+TEST(Runner, WhatCannotBeKeptEndsIt) {
+  const auto done = run_units(first(1000), {2, nullptr}, slow_at_first,
+                              [](std::uint64_t, const std::string &) -> Result<void> { return make_error("full"); });
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().size(), 1U);
+}
+
+}  // namespace
+}  // namespace redag::experiment

@@ -1,0 +1,25 @@
+// A share of the units of an experiment, for one of several machines: shard i of n has the units u with
+// u mod n = i - 1. Plain values.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "redag/base/result.hpp"
+
+namespace redag::experiment {
+
+struct Shard {
+  std::uint32_t index = 1;  // from 1
+  std::uint32_t count = 1;
+
+  [[nodiscard]] constexpr bool owns(std::uint64_t unit) const { return unit % count == index - 1; }
+  friend bool operator==(const Shard &, const Shard &) = default;
+};
+
+/// "2/4". Error: not of this form, or not 1 <= i <= n.
+[[nodiscard]] Result<Shard> parse_shard(std::string_view text);
+[[nodiscard]] std::string to_string(const Shard &shard);
+
+}  // namespace redag::experiment

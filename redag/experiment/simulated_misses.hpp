@@ -1,0 +1,34 @@
+// A necessary test by simulation: a workload in which a deadline miss was seen is not schedulable; one in which none
+// was seen may be. It ends at the first miss. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "redag/analysis/system.hpp"
+#include "redag/model/workload.hpp"
+
+namespace redag::experiment {
+
+struct SimulationEffort {
+  std::uint32_t offsets = 5;  // runs with random offsets, beside the one in which all is released together
+  std::uint32_t periods = 5;  // length of a run in periods of the slowest task
+
+  friend bool operator==(const SimulationEffort &, const SimulationEffort &) = default;
+};
+
+/// A run with a miss, as it can be run again: `redag simulate`, with this duration and seed.
+struct SeenMiss {
+  Workload workload;
+  Duration duration = 0;
+  std::uint64_t seed = 0;
+  std::string what;  // "dag0.t1: job 3 answered after 12ms, its deadline is 10ms"
+};
+
+/// Every job executes for its wcet. A miss: a response above the deadline, a DAG's instance above its end-to-end
+/// deadline, or a job that was skipped. `system` is `workload` compiled on the platform that it states.
+[[nodiscard]] std::optional<SeenMiss> find_miss(const Workload &workload, const analysis::System &system,
+                                                const SimulationEffort &effort, std::uint64_t seed);
+
+}  // namespace redag::experiment

@@ -1,0 +1,90 @@
+#include "redag/experiment/simulated_misses.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "redag/model/workload_yaml.hpp"
+
+namespace redag::experiment {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::optional<SeenMiss> miss_of(const std::string &text, SimulationEffort effort = {}) {
+  const Result<LoadedWorkload> loaded = parse_workload(text, "test.yaml");
+  EXPECT_TRUE(loaded) << to_string(loaded.error());
+  const auto system = analysis::compile(loaded->workload, analysis::platform_of(loaded->workload));
+  EXPECT_TRUE(system);
+  return find_miss(loaded->workload, *system, effort, 1);
+}
+
+std::string workload(const std::string &dags, const std::string &preemption = "os") {
+  return "name: w\nplatform: {workers: 1, preemption: " + preemption + "}\ndags:\n" + dags;
+}
+
+TEST(SimulatedMisses, NoneWhereEverythingFits) {
+  EXPECT_FALSE(
+      miss_of(workload("  - {name: a, tasks: [{name: t, wcet: 5ms, period: 10ms}]}\n"
+                       "  - {name: b, tasks: [{name: t, wcet: 10ms, period: 20ms}]}\n")));
+}
+
+TEST(SimulatedMisses, LateJob) {
+  const auto miss =
+      miss_of(workload("  - {name: a, tasks: [{name: t, wcet: 5ms, period: 10ms}]}\n"
+                       "  - {name: b, tasks: [{name: t, wcet: 6ms, period: 20ms, deadline: 15ms}]}\n"));
+  ASSERT_TRUE(miss);
+  EXPECT_EQ(miss->what, "b.t: job 0 answered after at least 16ms, its deadline is 15ms");
+  EXPECT_EQ(miss->duration, 100 * kMillisecond);
+}
+
+TEST(SimulatedMisses, ExecutesForTheWcet) {
+  EXPECT_TRUE(
+      miss_of(workload("  - {name: a, tasks: [{name: t, wcet: 8ms, bcet: 1us, period: 10ms, deadline: 8ms}]}\n"
+                       "  - {name: b, tasks: [{name: t, wcet: 2ms, bcet: 1us, period: 9ms}]}\n")));
+}
+
+TEST(SimulatedMisses, SkippedJob) {
+  const auto miss = miss_of(workload("  - {name: a, tasks: [{name: t, wcet: 25ms, period: 100ms}]}\n"
+                                     "  - {name: b, tasks: [{name: t, wcet: 1ms, period: 10ms}]}\n",
+                                     "none"),
+                            {5, 5});
+  ASSERT_TRUE(miss);
+  EXPECT_THAT(miss->what, HasSubstr("b.t: job"));
+}
+
+// Released together, the urgent task is first, and nothing goes wrong: only other offsets show it.
+TEST(SimulatedMisses, RandomOffsetsSeeMore) {
+  const std::string text = workload(
+      "  - {name: a, tasks: [{name: t, wcet: 60ms, period: 100ms}]}\n"
+      "  - {name: b, tasks: [{name: t, wcet: 1ms, period: 100ms, deadline: 30ms}]}\n"
+      "policy: deadline_monotonic\n",
+      "none");
+  EXPECT_FALSE(miss_of(text, {0, 5}));
+  EXPECT_TRUE(miss_of(text, {20, 5}));
+}
+
+TEST(SimulatedMisses, EndToEndDeadline) {
+  const std::string dag =
+      "  - {name: a, deadline: DEADLINE, tasks: [{name: s, wcet: 5ms, period: 20ms},"
+      " {name: d, wcet: 5ms, activation: data, after: [s]}]}\n";
+  const auto with = [&](const char *deadline) {
+    std::string text = dag;
+    text.replace(text.find("DEADLINE"), 8, deadline);
+    return miss_of(workload(text));
+  };
+  EXPECT_FALSE(with("10ms"));
+  const auto miss = with("9ms");
+  ASSERT_TRUE(miss);
+  EXPECT_THAT(miss->what, HasSubstr("a.d: job 0 answered after at least 10ms, its DAG's end-to-end deadline is 9ms"));
+}
+
+TEST(SimulatedMisses, UnfinishedAtTheEnd) {
+  // One period long: the job that is late has not ended when the run does.
+  const auto miss = miss_of(workload("  - {name: a, tasks: [{name: t, wcet: 9ms, period: 10ms}]}\n"
+                                     "  - {name: b, tasks: [{name: t, wcet: 8ms, period: 40ms, deadline: 10ms}]}\n"),
+                            {0, 1});
+  EXPECT_TRUE(miss);
+}
+
+}  // namespace
+}  // namespace redag::experiment
