@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
+#include <optional>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <iterator>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -88,8 +88,9 @@ class Drawing {
     put("<text x='{}' y='26' font-size='17' font-weight='bold'>{}</text>\n", 16, escaped(plot_.title));
     put("<text x='{}' y='46' fill='#555'>{}</text>\n", 16, escaped(plot_.subtitle));
     for (std::size_t p = 0; p < plot_.panels.size(); ++p) {
+      const std::size_t row = p / columns_;
       left_ = static_cast<double>(p % columns_) * kPanelWidth + kLeft;
-      top_ = kHead + static_cast<double>(p / columns_) * kPanelHeight + kTop;
+      top_ = kHead + static_cast<double>(row) * kPanelHeight + kTop;
       axes(plot_.panels[p].title);
       for (std::size_t line = 0; line < plot_.panels[p].series.size(); ++line) band(line, plot_.panels[p].series[line]);
       for (std::size_t line = 0; line < plot_.panels[p].series.size(); ++line) draw(line, plot_.panels[p].series[line]);
