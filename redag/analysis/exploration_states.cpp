@@ -75,6 +75,11 @@ bool StateSet::add(std::uint32_t node, std::span<const Interval> state) {
     is_new = false;
     link = &nodes_[node].first;
   }
+  keep(node, scratch_);
+  return is_new;
+}
+
+void StateSet::keep(std::uint32_t node, std::span<const Interval> state) {
   std::uint32_t place = unused_;
   if (place == kNone) {
     place = static_cast<std::uint32_t>(next_.size());
@@ -83,10 +88,9 @@ bool StateSet::add(std::uint32_t node, std::span<const Interval> state) {
   } else {
     unused_ = next_[place];
   }
-  std::copy(scratch_.begin(), scratch_.end(), rows_.begin() + static_cast<std::ptrdiff_t>(place * width_));
+  std::copy(state.begin(), state.end(), rows_.begin() + static_cast<std::ptrdiff_t>(place * width_));
   next_[place] = nodes_[node].first;
   nodes_[node].first = place;
-  return is_new;
 }
 
 bool StateSet::covers(std::span<const std::uint32_t> counts, std::uint64_t hash,

@@ -33,6 +33,9 @@ class StateSet {
   /// False: it went up in another.
   bool add(std::uint32_t node, std::span<const Interval> state);
 
+  /// Adds the state as it is: what it covers was really followed.
+  void keep(std::uint32_t node, std::span<const Interval> state);
+
   /// Does a state of the same node, of the other set, include this one?
   [[nodiscard]] bool covers(std::span<const std::uint32_t> counts, std::uint64_t hash,
                             std::span<const Interval> state) const;

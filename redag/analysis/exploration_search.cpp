@@ -1,0 +1,363 @@
+// explore(): breadth first, a level for each number of jobs dispatched.
+#include <algorithm>
+#include <limits>
+
+#include "redag/analysis/exploration.hpp"
+#include "redag/analysis/exploration_model.hpp"
+#include "redag/analysis/exploration_states.hpp"
+#include "redag/base/check.hpp"
+
+namespace redag::analysis {
+namespace {
+
+constexpr std::uint32_t kNone = 0xffffffff;
+constexpr std::uint32_t kNodesBetweenCalls = 256;  // of ExplorationOptions::proceed
+constexpr Interval kForgotten{std::numeric_limits<Time>::min(), std::numeric_limits<Time>::min()};
+
+const ExploredTask kAlone;
+
+template <class Value>
+bool contains(const std::vector<Value> &values, const Value &value) {
+  return std::find(values.begin(), values.end(), value) != values.end();
+}
+
+class Explorer {
+ public:
+  Explorer(const System &system, const ExplorationOptions &options)
+      : system_(system),
+        options_(options),
+        model_(exploration_model(system, options.max_states)),
+        workers_(model_.workers),
+        tasks_(model_.tasks) {
+    result_.hyperperiod = model_.hyperperiod;
+    result_.jobs = model_.jobs;
+    result_.exact = workers_ == 1;
+    for (const ExploredTask &task : tasks_) result_.responses.emplace_back(task.jobs);
+  }
+
+  Exploration run() {
+    if (result_.jobs > options_.max_states) return std::move(result_);
+    StateSet now(tasks_.size(), model_.width, workers_);
+    StateSet next = now;
+    StateSet seen = now;  // at the ends of hyperperiods
+    start(now);
+    seen = now;
+    for (std::uint64_t level = 1;; ++level) {
+      next.clear();
+      next_earliest_.clear();
+      for (std::uint32_t node = 0; node < now.size(); ++node) {
+        if ((node % kNodesBetweenCalls == 0 && !proceed(level)) || !follow(now, node, next)) return std::move(result_);
+      }
+      if (level % result_.jobs == 0) {
+        ++result_.hyperperiods;
+        forget_covered(next, seen);
+        if (!next.has_states()) break;
+      }
+      std::swap(now, next);
+    }
+    result_.end = Exploration::End::Complete;
+    return std::move(result_);
+  }
+
+ private:
+  // The next job of a task, all of whose predecessors have been dispatched.
+  struct Candidate {
+    std::uint32_t task = 0;
+    std::uint32_t number = 0;
+    Time nominal = 0;
+    Interval ready;            // as far as its release goes
+    bool waits = false;        // for predecessors or gates as well: `ready` depends on the state
+    std::int64_t urgency = 0;  // edf
+  };
+
+  bool proceed(std::uint64_t level) {
+    if (!options_.proceed || options_.proceed({result_.states, level - 1, result_.jobs})) return true;
+    result_.end = Exploration::End::Stopped;
+    return false;
+  }
+
+  void start(StateSet &states) {
+    counts_.assign(tasks_.size(), 0);
+    row_.assign(model_.width, Interval{0, 0});
+    for (const ExploredTask &task : tasks_) {
+      if (task.finish != kNowhere) row_[task.finish] = kForgotten;
+    }
+    raise(earliest_release(), row_);
+    states.add(states.find_or_add(counts_, 0), row_);
+    ++result_.states;
+  }
+
+  [[nodiscard]] bool is_candidate(std::uint32_t t) const {
+    for (const std::uint32_t p : tasks_[t].predecessors) {
+      if (counts_[p] <= counts_[t]) return false;
+    }
+    return true;
+  }
+
+  // Nothing is dispatched before it after `counts_`.
+  [[nodiscard]] Time earliest_release() const {
+    Time earliest = kNever;
+    for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
+      const Time nominal = tasks_[t].offset + counts_[t] * tasks_[t].period;
+      if (nominal < earliest && is_candidate(t)) earliest = nominal;
+    }
+    return earliest;
+  }
+
+  // What happens before `time` might as well happen then: nothing is decided in between.
+  static void raise(Time time, std::vector<Interval> &row) {
+    for (Interval &interval : row) {
+      if (interval == kForgotten) continue;
+      interval.earliest = std::max(interval.earliest, time);
+      interval.latest = std::max(interval.latest, time);
+    }
+  }
+
+  // All ways in which the schedules of a node go on. False: the exploration ends.
+  bool follow(const StateSet &states, std::uint32_t node, StateSet &next) {
+    const auto counts = states.counts(node);
+    counts_.assign(counts.begin(), counts.end());
+    find_candidates();
+    children_.assign(candidates_.size(), kNone);
+    bool goes_on = true;
+    states.for_each(
+        node, [&](std::span<const Interval> state) { goes_on = goes_on && dispatch(states.hash(node), state, next); });
+    return goes_on;
+  }
+
+  // Most urgent first.
+  void find_candidates() {
+    candidates_.clear();
+    for (const std::uint32_t t : system_.by_rank) {
+      if (!is_candidate(t)) continue;
+      const ExploredTask &task = tasks_[t];
+      Candidate candidate;
+      candidate.task = t;
+      candidate.number = counts_[t];
+      candidate.nominal = task.offset + candidate.number * task.period;
+      candidate.ready = {candidate.nominal, candidate.nominal + task.jitter};
+      candidate.waits = workers_ > 1 && !(task.predecessors.empty() && task.gates.empty());
+      candidate.urgency = candidate.nominal + task.deadline;
+      candidates_.push_back(candidate);
+    }
+    if (system_.policy == PolicyKind::Edf) {
+      std::stable_sort(candidates_.begin(), candidates_.end(),
+                       [](const Candidate &a, const Candidate &b) { return a.urgency < b.urgency; });
+    }
+    ready_.resize(candidates_.size());
+    starved_ = 0;
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      ready_[c] = candidates_[c].ready;
+      if (latest_start(candidates_[c]) < latest_start(candidates_[starved_])) starved_ = c;
+    }
+  }
+
+  // Not to end after the next release.
+  [[nodiscard]] Time latest_start(const Candidate &candidate) const {
+    const ExploredTask &task = tasks_[candidate.task];
+    return candidate.nominal + task.period - task.bcet;
+  }
+
+  bool overrun(std::uint32_t task) {
+    result_.end = Exploration::End::Overrun;
+    result_.late = TaskId(task);
+    return false;
+  }
+
+  // When the candidate is eligible but for the workers.
+  [[nodiscard]] Interval eligible(const Candidate &candidate, std::span<const Interval> state) const {
+    const ExploredTask &task = tasks_[candidate.task];
+    Interval result = candidate.ready;
+    const auto wait_for = [&](const Interval &end) {
+      result.earliest = std::max(result.earliest, end.earliest);
+      result.latest = std::max(result.latest, end.latest);
+    };
+    for (const std::uint32_t p : task.predecessors) wait_for(state[tasks_[p].finish]);
+    for (const Gate &gate : task.gates) wait_for(state[gate.first]);
+    return result;
+  }
+
+  // From when on the candidate is surely eligible if a worker is free and `other` eligible. Of what it waits for that
+  // need not count which has ended by then: what a job that has started, or `other`, waited for, too; and what ends
+  // before two workers can be free, as it ended before the last start or leaves the worker that is free first.
+  [[nodiscard]] Time eligible_beside(const Candidate &candidate, const ExploredTask &other,
+                                     std::span<const Interval> state) const {
+    const ExploredTask &task = tasks_[candidate.task];
+    Time result = candidate.ready.latest;
+    const auto wait_for = [&](const Interval &end) {
+      if (end.latest >= state[1].earliest) result = std::max(result, end.latest);
+    };
+    for (const std::uint32_t p : task.predecessors) {
+      if (!has_ended(p) && !contains(other.predecessors, p)) wait_for(state[tasks_[p].finish]);
+    }
+    for (const Gate &gate : task.gates) {
+      if (!contains(other.gates, gate)) wait_for(state[gate.first]);
+    }
+    return result;
+  }
+
+  // The latest start of the candidate for which every more urgent one can be without something that it waits for.
+  [[nodiscard]] Time before_more_urgent(std::size_t c, std::span<const Interval> state) const {
+    const ExploredTask &task = tasks_[candidates_[c].task];
+    Time until = kNever;
+    for (std::size_t x = 0; x < c; ++x) {
+      const Candidate &other = candidates_[x];
+      until = std::min(until, other.waits ? eligible_beside(other, task, state) : other.ready.latest);
+    }
+    return until - 1;
+  }
+
+  [[nodiscard]] bool has_ended(std::uint32_t t) const {
+    const auto &successors = tasks_[t].successors;
+    return std::any_of(successors.begin(), successors.end(), [&](std::uint32_t s) { return counts_[s] == counts_[t]; });
+  }
+
+  // Which candidates can be the next to start, and when: with a worker free and the job eligible; not after an instant
+  // at which a worker is surely free and some job surely eligible (work conserving); before any more urgent one surely
+  // is (priority).
+  bool dispatch(std::uint64_t hash, std::span<const Interval> state, StateSet &next) {
+    Time surely_eligible = kNever;
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      if (candidates_[c].waits) ready_[c] = eligible(candidates_[c], state);
+      surely_eligible = std::min(surely_eligible, ready_[c].latest);
+    }
+    // A job that waits for ever is never dispatched: it is late as soon as the rest leaves it no time.
+    if (state[0].earliest > latest_start(candidates_[starved_])) return overrun(candidates_[starved_].task);
+    const Time work_conserving = std::max(state[0].latest, surely_eligible);
+    Time more_urgent = kNever;  // one of them surely is eligible from then on
+    for (std::size_t c = 0; c < candidates_.size() && more_urgent > state[0].earliest; ++c) {
+      const Candidate &candidate = candidates_[c];
+      const Time earliest = std::max(state[0].earliest, ready_[c].earliest);
+      Time latest = std::min(work_conserving, more_urgent - 1);
+      if (candidate.waits && earliest <= latest) latest = std::min(latest, before_more_urgent(c, state));
+      if (earliest <= latest && !begin(c, {earliest, latest}, hash, state, next)) return false;
+      more_urgent =
+          std::min(more_urgent, candidate.waits ? eligible_beside(candidate, kAlone, state) : candidate.ready.latest);
+    }
+    return true;
+  }
+
+  bool begin(std::size_t c, Interval start, std::uint64_t hash, std::span<const Interval> state, StateSet &next) {
+    const Candidate &candidate = candidates_[c];
+    const ExploredTask &task = tasks_[candidate.task];
+    const Interval finish{start.earliest + task.bcet, start.latest + task.wcet};
+    ResponseRange &range = result_.responses[candidate.task][candidate.number % task.jobs];
+    range.best = std::min(range.best, finish.earliest - candidate.nominal);
+    range.worst = std::max(range.worst, finish.latest - candidate.nominal);
+    if (finish.latest - candidate.nominal > task.period) return overrun(candidate.task);
+
+    // Nothing starts before this job does.
+    row_.assign(state.begin(), state.end());
+    raise(start.earliest, row_);
+    take(Gate{0, workers_}, finish);
+    for (const Gate &gate : task.gates) take(gate, finish);
+    ++counts_[candidate.task];
+    if (workers_ > 1) remember(candidate.task, start, finish);
+    const std::uint32_t child = child_of(c, hash, next);
+    raise(next_earliest_[child], row_);
+    --counts_[candidate.task];
+
+    if (!next.add(child, row_)) {
+      ++result_.merged;
+      return true;
+    }
+    if (result_.states == options_.max_states) return false;
+    ++result_.states;
+    return true;
+  }
+
+  // The job takes the first place that is free, and gives it back when it ends.
+  void take(const Gate &gate, Interval finish) {
+    Interval *places = row_.data() + gate.first;
+    std::uint32_t at = 0;
+    for (; at + 1 < gate.places && places[at + 1].earliest < finish.earliest; ++at) {
+      places[at].earliest = places[at + 1].earliest;
+    }
+    places[at].earliest = finish.earliest;
+    for (at = 0; at + 1 < gate.places && places[at + 1].latest < finish.latest; ++at) {
+      places[at].latest = places[at + 1].latest;
+    }
+    places[at].latest = finish.latest;
+  }
+
+  // When a job ends counts until its successors have started; when the first of them starts, it has ended.
+  void remember(std::uint32_t t, Interval start, Interval finish) {
+    const ExploredTask &task = tasks_[t];
+    if (task.finish != kNowhere) row_[task.finish] = finish;
+    for (const std::uint32_t p : task.predecessors) {
+      const auto &successors = tasks_[p].successors;
+      const bool used =
+          std::all_of(successors.begin(), successors.end(), [&](std::uint32_t s) { return counts_[s] == counts_[p]; });
+      Interval &end = row_[tasks_[p].finish];
+      end = used ? kForgotten : Interval{end.earliest, std::min(end.latest, start.latest)};
+    }
+  }
+
+  // The node that `counts_` leads to; once all tasks are a hyperperiod further, time starts anew.
+  std::uint32_t child_of(std::size_t c, std::uint64_t hash, StateSet &next) {
+    const std::uint32_t t = candidates_[c].task;
+    const bool wraps = counts_[t] == tasks_[t].jobs && is_round_over();
+    if (wraps) {
+      for (Interval &interval : row_) {
+        if (interval == kForgotten) continue;
+        interval.earliest -= result_.hyperperiod;
+        interval.latest -= result_.hyperperiod;
+      }
+    }
+    if (children_[c] != kNone) return children_[c];
+    std::uint64_t child_hash = hash + tasks_[t].hash;
+    saved_counts_ = counts_;
+    if (wraps) {
+      child_hash -= model_.round_hash;
+      for (std::size_t i = 0; i < tasks_.size(); ++i) counts_[i] -= tasks_[i].jobs;
+    }
+    const std::uint32_t child = next.find_or_add(counts_, child_hash);
+    if (child == next_earliest_.size()) next_earliest_.push_back(earliest_release());
+    counts_ = saved_counts_;
+    return children_[c] = child;
+  }
+
+  [[nodiscard]] bool is_round_over() const {
+    for (std::size_t t = 0; t < tasks_.size(); ++t) {
+      if (counts_[t] < tasks_[t].jobs) return false;
+    }
+    return true;
+  }
+
+  // What starts a hyperperiod as another one did goes on as that one did.
+  static void forget_covered(StateSet &states, StateSet &seen) {
+    states.remove_if([&](std::uint32_t node, std::span<const Interval> state) {
+      return seen.covers(states.counts(node), states.hash(node), state);
+    });
+    for (std::uint32_t node = 0; node < states.size(); ++node) {
+      const std::uint32_t same = seen.find_or_add(states.counts(node), states.hash(node));
+      states.for_each(node, [&](std::span<const Interval> state) { seen.keep(same, state); });
+    }
+  }
+
+  const System &system_;
+  const ExplorationOptions &options_;
+  const ExplorationModel model_;
+  const std::uint32_t workers_;
+  const std::vector<ExploredTask> &tasks_;
+  Exploration result_;
+
+  // Of the node that is followed, and of those it leads to.
+  std::vector<std::uint32_t> counts_;
+  std::vector<std::uint32_t> saved_counts_;
+  std::vector<Candidate> candidates_;
+  std::vector<Interval> ready_;          // by candidate
+  std::size_t starved_ = 0;              // candidate that must start first
+  std::vector<std::uint32_t> children_;  // by candidate: node of the next set
+  std::vector<Time> next_earliest_;      // by node of the next set
+  std::vector<Interval> row_;
+};
+
+}  // namespace
+
+Exploration explore(const System &system, const ExplorationOptions &options) {
+  REDAG_CHECK(!why_not_explore(system), "nothing to explore");
+  return Explorer(system, options).run();
+}
+
+}  // namespace redag::analysis
