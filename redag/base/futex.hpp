@@ -6,16 +6,16 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
 #include <cstdint>
 #include <ctime>
 
+#include "redag/base/atomic.hpp"
 #include "redag/base/time.hpp"
 
 namespace redag {
 
-using FutexWord = std::atomic<std::uint32_t>;
+using FutexWord = Atomic<std::uint32_t>;
 static_assert(sizeof(FutexWord) == sizeof(std::uint32_t) && FutexWord::is_always_lock_free);
 
 /// Sleeps while `word` holds `expected`.

@@ -1,15 +1,16 @@
 // A mutex whose owner inherits the priority of the most urgent thread that waits for it (PTHREAD_PRIO_INHERIT): a
 // preempted low-priority owner delays a high-priority waiter by its critical section only. BasicLockable and Lockable,
-// for std::lock_guard and std::unique_lock. Use it for data that callbacks of different rates share.
+// for LockGuard, std::lock_guard and std::unique_lock. Use it for data that callbacks of different rates share.
 #pragma once
 
 #include <pthread.h>
 
 #include "redag/base/check.hpp"
+#include "redag/base/thread_annotations.hpp"
 
 namespace redag {
 
-class PiMutex {
+class REDAG_CAPABILITY("mutex") PiMutex {
  public:
   PiMutex() {
     pthread_mutexattr_t attributes;
@@ -23,9 +24,9 @@ class PiMutex {
   PiMutex(const PiMutex &) = delete;
   PiMutex &operator=(const PiMutex &) = delete;
 
-  void lock() noexcept { REDAG_CHECK(pthread_mutex_lock(&mutex_) == 0, "a mutex cannot be locked"); }
-  [[nodiscard]] bool try_lock() noexcept { return pthread_mutex_trylock(&mutex_) == 0; }
-  void unlock() noexcept {
+  void lock() noexcept REDAG_ACQUIRE() { REDAG_CHECK(pthread_mutex_lock(&mutex_) == 0, "a mutex cannot be locked"); }
+  [[nodiscard]] bool try_lock() noexcept REDAG_TRY_ACQUIRE(true) { return pthread_mutex_trylock(&mutex_) == 0; }
+  void unlock() noexcept REDAG_RELEASE() {
     REDAG_CHECK(pthread_mutex_unlock(&mutex_) == 0, "a mutex is unlocked by who does not own it");
   }
 

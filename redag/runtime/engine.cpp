@@ -1,14 +1,12 @@
 #include "redag/runtime/engine.hpp"
 
-#include <pthread.h>
-
 #include <algorithm>
 #include <array>
 #include <climits>
-#include <thread>
 #include <utility>
 
 #include "redag/base/check.hpp"
+#include "redag/base/lock_guard.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/engine_parts.hpp"
 #include "redag/runtime/preemption_point.hpp"
@@ -58,7 +56,7 @@ Result<void> Engine::start() {
   for (auto &thread : threads_) {
     thread->priority = realtime() ? options_.band.top_job : 0;
     const ThreadSetup setup{options_.name + "-" + std::to_string(thread->index), thread->priority, cpus};
-    Result<std::thread> started = start_thread(setup, [this, &self = *thread] { main(self); });
+    Result<ThreadHandle> started = start_thread(setup, [this, &self = *thread] { main(self); });
     if (!started) {
       halt();
       join();
@@ -372,12 +370,12 @@ bool Engine::wait_idle(Time deadline) {
 // ---- what can be asked ----
 
 Time Engine::halted_at() const {
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   return halted_at_;
 }
 
 std::vector<Job> Engine::started() const {
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   std::vector<Job> jobs;
   for (const auto &thread : threads_) jobs.insert(jobs.end(), thread->stack.begin(), thread->stack.end());
   jobs.insert(jobs.end(), caller_->stack.begin(), caller_->stack.end());
@@ -400,14 +398,14 @@ std::uint64_t Engine::lost_events() const {
 }
 
 sched::Accounting Engine::accounting(TaskId task) const {
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   sched::Accounting accounting = scheduler_->accounting(task);
   accounting.skipped -= tasks_[task.value].withdrawn;
   return accounting;
 }
 
 Usage Engine::usage(TaskId task) const {
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   return tasks_[task.value].usage;
 }
 

@@ -6,7 +6,6 @@
 // drain(); drain() is for one thread at a time; halt() is async-signal-safe. No lock is held while a body runs.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <exception>
@@ -17,9 +16,11 @@
 #include <string>
 #include <vector>
 
+#include "redag/base/atomic.hpp"
 #include "redag/base/futex.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/result.hpp"
+#include "redag/base/thread_annotations.hpp"
 #include "redag/runtime/event_merge.hpp"
 #include "redag/runtime/mode.hpp"
 #include "redag/runtime/parker.hpp"
@@ -162,44 +163,43 @@ class Engine {
   Next finish(Thread &self, const Assignment &assignment, sched::Outcome outcome, Duration used, JobSlot below);
   void preemption_point(RunningJob &job);
 
-  // Under the lock.
-  Next decide(Locked &locked, Time now, Thread *self, JobSlot below);
-  Next place_on_workers(Locked &locked, const sched::Step &step, Thread *self, JobSlot below);
-  Next place_on_pool(Locked &locked, const sched::Step &step, Thread *self);
-  Assignment assign(Thread &thread, const sched::Dispatch &dispatch);
-  void hand(Locked &locked, Thread &thread, const Assignment &assignment);
-  void set_level(Thread &thread, std::uint32_t level);
-  void refresh_outranked();
-  void register_task(TaskId id, const Task &task, Body &body);
-  void remove_entry(TaskId id, std::vector<Body> &doomed);
-  void withdraw_if_halting();
-  void wake_pause_waiters();
-  [[nodiscard]] bool may_start() const { return running_ && !paused_; }
+  Next decide(Locked &locked, Time now, Thread *self, JobSlot below) REDAG_REQUIRES(lock_);
+  Next place_on_workers(Locked &locked, const sched::Step &step, Thread *self, JobSlot below) REDAG_REQUIRES(lock_);
+  Next place_on_pool(Locked &locked, const sched::Step &step, Thread *self) REDAG_REQUIRES(lock_);
+  Assignment assign(Thread &thread, const sched::Dispatch &dispatch) REDAG_REQUIRES(lock_);
+  void hand(Locked &locked, Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
+  void set_level(Thread &thread, std::uint32_t level) REDAG_REQUIRES(lock_);
+  void refresh_outranked() REDAG_REQUIRES(lock_);
+  void register_task(TaskId id, const Task &task, Body &body) REDAG_REQUIRES(lock_);
+  void remove_entry(TaskId id, std::vector<Body> &doomed) REDAG_REQUIRES(lock_);
+  void withdraw_if_halting() REDAG_REQUIRES(lock_);
+  void wake_pause_waiters() REDAG_REQUIRES(lock_);
+  [[nodiscard]] bool may_start() const REDAG_REQUIRES(lock_) { return running_ && !paused_; }
 
   [[nodiscard]] bool os() const { return options_.config.preemption == sched::Preemption::Full; }
   [[nodiscard]] bool realtime() const { return os() || options_.realtime_threads; }
 
   EngineOptions options_;
-  std::unique_ptr<sched::Scheduler> scheduler_;
-  mutable PiMutex lock_;  // guards the scheduler and everything below that says so
+  mutable PiMutex lock_;
+  std::unique_ptr<sched::Scheduler> scheduler_ REDAG_PT_GUARDED_BY(lock_);
   std::vector<std::unique_ptr<Thread>> threads_;
-  std::unique_ptr<Thread> caller_;   // whoever is in run_one()
-  std::vector<Thread *> idle_;       // lock: os, threads without a job
-  std::deque<TaskEntry> tasks_;      // lock; by TaskId; entries stay where they are
-  std::size_t most_started_ = 0;     // lock: jobs that all tasks together can have in progress
-  std::uint32_t unfinished_ = 0;     // lock: jobs dispatched and not ended
-  bool running_ = false;             // lock: the threads are there
-  bool paused_;                      // lock
-  std::uint32_t pause_waiters_ = 0;  // lock
-  FutexWord pause_changes_{0};       // counts what wait_paused() waits for; written under the lock
-  Time halted_at_ = kNever;          // lock
-  trace::Ring decisions_;            // written under the lock
-  EventMerge merge_;                 // drain() only
+  std::unique_ptr<Thread> caller_;                        // whoever is in run_one()
+  std::vector<Thread *> idle_ REDAG_GUARDED_BY(lock_);    // os: threads without a job
+  std::deque<TaskEntry> tasks_ REDAG_GUARDED_BY(lock_);   // by TaskId; entries stay where they are
+  std::size_t most_started_ REDAG_GUARDED_BY(lock_) = 0;  // jobs that all tasks together can have in progress
+  std::uint32_t unfinished_ REDAG_GUARDED_BY(lock_) = 0;  // jobs dispatched and not ended
+  bool running_ REDAG_GUARDED_BY(lock_) = false;          // the threads are there
+  bool paused_ REDAG_GUARDED_BY(lock_);
+  std::uint32_t pause_waiters_ REDAG_GUARDED_BY(lock_) = 0;
+  FutexWord pause_changes_{0};  // counts what wait_paused() waits for; written under the lock
+  Time halted_at_ REDAG_GUARDED_BY(lock_) = kNever;
+  trace::Ring decisions_;  // written under the lock
+  EventMerge merge_;       // drain() only
   Event idle_event_;
-  std::atomic<Time> origin_{kNever};
-  std::atomic<bool> halting_{false};
-  std::atomic<bool> exit_{false};
-  std::atomic<std::uint64_t> refused_priorities_{0};
+  Atomic<Time> origin_{kNever};
+  Atomic<bool> halting_{false};
+  Atomic<bool> exit_{false};
+  Atomic<std::uint64_t> refused_priorities_{0};
 };
 
 }  // namespace redag::runtime

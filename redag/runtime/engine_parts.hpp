@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <thread>
 
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/threads.hpp"
@@ -51,22 +50,22 @@ struct alignas(64) Engine::Thread {
   Parker parker;
   // Written under the lock by whoever dispatches, while the thread has no job; read by the thread without it.
   Assignment mail;
-  std::atomic<bool> has_mail{false};
-  std::atomic<bool> outranked{false};  // written under the lock
-  std::vector<Job> stack;              // lock: the jobs started here, the running one last
-  int priority = 0;                    // lock: SCHED_FIFO priority it has now; 0: not real-time
-  trace::Ring events;                  // Started; written by the thread
+  Atomic<bool> has_mail{false};
+  Atomic<bool> outranked{false};  // written under the lock
+  std::vector<Job> stack;         // lock: the jobs started here, the running one last
+  int priority = 0;               // lock: SCHED_FIFO priority it has now; 0: not real-time
+  trace::Ring events;             // Started; written by the thread
 
-  std::thread handle;
+  ThreadHandle handle;
 };
 
 /// Holds the engine's lock, and wakes after it. Real-time threads are woken under the lock instead: one that were
 /// preempted between its decision and the wake-up would leave an urgent job asleep, and only as the lock's owner is it
 /// raised when the next decision is due.
-class Engine::Locked {
+class REDAG_SCOPED_CAPABILITY Engine::Locked {
  public:
-  explicit Locked(Engine &engine) : engine_(engine) { engine_.lock_.lock(); }
-  ~Locked() {
+  explicit Locked(Engine &engine) REDAG_ACQUIRE(engine.lock_) : engine_(engine) { engine_.lock_.lock(); }
+  ~Locked() REDAG_RELEASE() {
     engine_.lock_.unlock();
     for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
   }

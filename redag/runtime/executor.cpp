@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "redag/base/lock_guard.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/threads.hpp"
@@ -77,7 +78,7 @@ DagId Executor::add(DagBuilder builder) {
       return sched::Outcome::Finished;
     });
   }
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   const AddedDag ids = engine_->add_dag(dag, std::move(bodies));
   const TaskId first = ids.tasks.empty() ? TaskId(0) : ids.tasks.front();  // the others follow: ids are not reused
   dags_.push_back(Added{dag.name, std::move(names), first});
@@ -87,7 +88,7 @@ DagId Executor::add(DagBuilder builder) {
 
 void Executor::remove(DagId dag) {
   {
-    const std::lock_guard guard(lock_);
+    const LockGuard guard(lock_);
     const Added &gone = added(dag);
     timer_->remove(gone.first, gone.tasks.size());
   }
@@ -111,7 +112,7 @@ void Executor::run_for(nanoseconds duration) {
 void Executor::start() {
   if (started_.exchange(true)) throw std::logic_error("an Executor runs once");
   if (const Result<void> ready = engine_->start(); !ready) throw std::runtime_error(to_string(ready.error()));
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   const Time origin = monotonic_now() + kStartMargin;
   engine_->set_origin(origin);
   running_ = true;
@@ -135,7 +136,7 @@ void Executor::wait() {
   finish();
   std::exception_ptr failure;
   {
-    const std::lock_guard guard(lock_);
+    const LockGuard guard(lock_);
     failure = std::exchange(failure_, nullptr);
   }
   if (failure) std::rethrow_exception(failure);
@@ -147,7 +148,7 @@ void Executor::stop() {
 }
 
 void Executor::finish() {
-  const std::lock_guard guard(finishing_);
+  const LockGuard guard(finishing_);
   if (finished_) return;
   timer_->join();
   if (!engine_->wait_idle(monotonic_now() + options_.stop_timeout.count())) {
@@ -166,7 +167,7 @@ void Executor::on_exception(const Job &job, std::exception_ptr exception) {
     if (options_.on_exception(info) == OnException::Continue) return;
   }
   {
-    const std::lock_guard guard(lock_);
+    const LockGuard guard(lock_);
     if (!failure_) failure_ = std::move(exception);
   }
   request_stop();
@@ -182,7 +183,7 @@ const Executor::Added &Executor::added(DagId dag) const {
 }
 
 std::vector<TaskStats> Executor::stats(DagId dag) const {
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   const Added &of = added(dag);
   std::vector<TaskStats> result;
   for (std::size_t i = 0; i < of.tasks.size(); ++i) {
@@ -193,7 +194,7 @@ std::vector<TaskStats> Executor::stats(DagId dag) const {
 }
 
 std::string Executor::task_name(TaskId task) const {
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   for (const Added &dag : dags_) {
     if (task.value - dag.first.value < dag.tasks.size() && task.value >= dag.first.value) {
       return dag.name + "." + dag.tasks[task.value - dag.first.value];

@@ -5,16 +5,17 @@
 // request_stop() also from a signal handler. An Executor runs once.
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <exception>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "redag/base/atomic.hpp"
+#include "redag/base/mutex.hpp"
 #include "redag/base/pi_mutex.hpp"
+#include "redag/base/thread_annotations.hpp"
 #include "redag/runtime/dag_builder.hpp"
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/mode.hpp"
@@ -105,19 +106,19 @@ class Executor {
   };
   void finish();
   void on_exception(const Job &job, std::exception_ptr exception);
-  [[nodiscard]] const Added &added(DagId dag) const;
+  [[nodiscard]] const Added &added(DagId dag) const REDAG_REQUIRES(lock_);
 
   ExecutorOptions options_;
   Setup setup_;
   std::unique_ptr<Engine> engine_;
   std::unique_ptr<ReleaseTimer> timer_;
-  mutable PiMutex lock_;  // guards the three below
-  std::vector<Added> dags_;
-  std::exception_ptr failure_;  // the first that stopped us
-  bool running_ = false;
-  std::mutex finishing_;  // one thread at a time ends the run
-  std::atomic<bool> started_{false};
-  std::atomic<bool> finished_{false};
+  mutable PiMutex lock_;
+  std::vector<Added> dags_ REDAG_GUARDED_BY(lock_);
+  std::exception_ptr failure_ REDAG_GUARDED_BY(lock_);  // the first that stopped us
+  bool running_ REDAG_GUARDED_BY(lock_) = false;
+  Mutex finishing_;  // one thread at a time ends the run
+  Atomic<bool> started_{false};
+  Atomic<bool> finished_{false};
   Event stop_;
 };
 

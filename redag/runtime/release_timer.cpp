@@ -1,9 +1,9 @@
 #include "redag/runtime/release_timer.hpp"
 
 #include <algorithm>
-#include <mutex>
 #include <utility>
 
+#include "redag/base/lock_guard.hpp"
 #include "redag/runtime/clock.hpp"
 
 namespace redag::runtime {
@@ -24,21 +24,21 @@ ReleaseTimer::~ReleaseTimer() {
 
 void ReleaseTimer::add(const Dag &dag, TaskId first_task, Time base) {
   {
-    const std::lock_guard guard(lock_);
+    const LockGuard guard(lock_);
     for (std::size_t i = 0; i < dag.tasks.size(); ++i) heap_.add(dag.tasks[i], TaskId(first_task.value + i), base);
   }
   parker_.unpark();
 }
 
 void ReleaseTimer::remove(TaskId first_task, std::size_t count) {
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   heap_.remove(first_task, count);
 }
 
 Result<void> ReleaseTimer::start(Time origin, Time horizon, ThreadSetup setup) {
   origin_ = origin;
   horizon_ = horizon;
-  return start_thread(setup, [this] { main(); }).map([this](std::thread &&thread) { thread_ = std::move(thread); });
+  return start_thread(setup, [this] { main(); }).map([this](ThreadHandle &&thread) { thread_ = std::move(thread); });
 }
 
 void ReleaseTimer::stop() noexcept {
@@ -58,7 +58,7 @@ void ReleaseTimer::main() noexcept {
     Time next = kNever;
     due_.clear();
     {
-      const std::lock_guard guard(lock_);
+      const LockGuard guard(lock_);
       heap_.pop_due(std::min(now, horizon_ - 1), due_);
       next = heap_.next();
     }

@@ -3,15 +3,15 @@
 // ReleaseHeap. add(), remove(): any thread; stop(): async-signal-safe.
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <span>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "redag/base/atomic.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/result.hpp"
+#include "redag/base/thread_annotations.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/release_heap.hpp"
 #include "redag/runtime/threads.hpp"
@@ -46,13 +46,13 @@ class ReleaseTimer {
 
   Sink sink_;
   PiMutex lock_;
-  ReleaseHeap heap_;  // guarded by lock_
+  ReleaseHeap heap_ REDAG_GUARDED_BY(lock_);
   std::vector<Release> due_;
   Parker parker_;
-  std::atomic<bool> stopping_{false};
+  Atomic<bool> stopping_{false};
   Time origin_ = 0;
   Time horizon_ = kNever;
-  std::thread thread_;
+  ThreadHandle thread_;
 };
 
 }  // namespace redag::runtime

@@ -1,9 +1,9 @@
 // The job that a thread runs now, for preemption_point() and job_cpu_time(). Internal to the engine.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 
+#include "redag/base/atomic.hpp"
 #include "redag/base/ids.hpp"
 #include "redag/base/time.hpp"
 
@@ -13,8 +13,8 @@ class Engine;
 
 struct RunningJob {
   Engine *engine = nullptr;
-  std::uint32_t thread = 0;                      // position among the engine's threads
-  const std::atomic<bool> *outranked = nullptr;  // set while a more urgent job could run on top
+  std::uint32_t thread = 0;                 // position among the engine's threads
+  const Atomic<bool> *outranked = nullptr;  // set while a more urgent job could run on top
   TaskId task;
   JobSlot slot;
   Duration budget = 0;      // 0: none

@@ -62,7 +62,7 @@ bool set_fifo_priority(pthread_t thread, int priority) noexcept {
   return pthread_setschedparam(thread, SCHED_FIFO, &parameters) == 0;
 }
 
-Result<std::thread> start_thread(const ThreadSetup &setup, std::function<void()> main) {
+Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()> main) {
   Result<void> result;
   Event ready;
   std::thread thread;

@@ -15,6 +15,8 @@
 
 namespace redag::runtime {
 
+using ThreadHandle = std::thread;
+
 /// How a thread of the runtime is set up.
 struct ThreadSetup {
   std::string name;       // shown by top -H and ps; cut to 15 characters
@@ -28,7 +30,7 @@ struct ThreadSetup {
 
 /// A thread that is set up so and then runs `main`; returns once it is set up. Error: as set_up_this_thread(), and
 /// `main` does not run.
-[[nodiscard]] Result<std::thread> start_thread(const ThreadSetup &setup, std::function<void()> main);
+[[nodiscard]] Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()> main);
 
 /// False if the system refused.
 [[nodiscard]] bool set_fifo_priority(pthread_t thread, int priority) noexcept;

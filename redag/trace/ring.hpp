@@ -4,13 +4,13 @@
 #pragma once
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "redag/base/atomic.hpp"
 #include "redag/model/job_event.hpp"
 
 namespace redag::trace {
@@ -73,7 +73,7 @@ class Ring {
 
   // An end of the ring: its own index, which the other end reads, and what it last saw of the other end's.
   struct alignas(kCacheLine) End {
-    std::atomic<std::uint64_t> index{0};
+    Atomic<std::uint64_t> index{0};
     std::uint64_t other = 0;
   };
 
@@ -81,7 +81,7 @@ class Ring {
   std::size_t mask_;
   End producer_;
   End consumer_;
-  alignas(kCacheLine) std::atomic<std::uint64_t> dropped_{0};
+  alignas(kCacheLine) Atomic<std::uint64_t> dropped_{0};
 };
 
 }  // namespace redag::trace

@@ -1,0 +1,20 @@
+// std::lock_guard that clang's -Wthread-safety understands: libstdc++'s is not annotated.
+#pragma once
+
+#include "redag/base/thread_annotations.hpp"
+
+namespace redag {
+
+template <class M>
+class REDAG_SCOPED_CAPABILITY LockGuard {
+ public:
+  explicit LockGuard(M &mutex) REDAG_ACQUIRE(mutex) : mutex_(mutex) { mutex_.lock(); }
+  ~LockGuard() REDAG_RELEASE() { mutex_.unlock(); }
+  LockGuard(const LockGuard &) = delete;
+  LockGuard &operator=(const LockGuard &) = delete;
+
+ private:
+  M &mutex_;
+};
+
+}  // namespace redag

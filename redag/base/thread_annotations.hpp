@@ -1,0 +1,27 @@
+// What clang's -Wthread-safety is told: which mutex guards a member, which one a function needs. Nothing for other
+// compilers. tools/thread_safety (make lint) checks it.
+// https://clang.llvm.org/docs/ThreadSafetyAnalysis.html
+#pragma once
+
+#if defined(__clang__)
+#define REDAG_THREAD_ANNOTATION(x) __attribute__((x))
+#else
+#define REDAG_THREAD_ANNOTATION(x)
+#endif
+
+// Of a class: it is a mutex; it holds one for as long as it lives.
+#define REDAG_CAPABILITY(name) REDAG_THREAD_ANNOTATION(capability(name))
+#define REDAG_SCOPED_CAPABILITY REDAG_THREAD_ANNOTATION(scoped_lockable)
+// Of a member: used only under that mutex; what it points to is.
+#define REDAG_GUARDED_BY(mutex) REDAG_THREAD_ANNOTATION(guarded_by(mutex))
+#define REDAG_PT_GUARDED_BY(mutex) REDAG_THREAD_ANNOTATION(pt_guarded_by(mutex))
+// Of a function: its caller holds the mutex; must not hold it; gets it; gives it back.
+#define REDAG_REQUIRES(...) REDAG_THREAD_ANNOTATION(requires_capability(__VA_ARGS__))
+#define REDAG_EXCLUDES(...) REDAG_THREAD_ANNOTATION(locks_excluded(__VA_ARGS__))
+#define REDAG_ACQUIRE(...) REDAG_THREAD_ANNOTATION(acquire_capability(__VA_ARGS__))
+#define REDAG_TRY_ACQUIRE(...) REDAG_THREAD_ANNOTATION(try_acquire_capability(__VA_ARGS__))
+#define REDAG_RELEASE(...) REDAG_THREAD_ANNOTATION(release_capability(__VA_ARGS__))
+// Tells the analysis that the mutex is held where it cannot see that: the comment there says why.
+#define REDAG_ASSERT_CAPABILITY(mutex) REDAG_THREAD_ANNOTATION(assert_capability(mutex))
+#define REDAG_RETURN_CAPABILITY(mutex) REDAG_THREAD_ANNOTATION(lock_returned(mutex))
+#define REDAG_NO_THREAD_SAFETY_ANALYSIS REDAG_THREAD_ANNOTATION(no_thread_safety_analysis)
