@@ -77,6 +77,8 @@ Result<void> Engine::start() {
 
 void Engine::main(Thread &self) noexcept {
   for (;;) {
+    // Read before the mail: all that was handed out was so before this was set.
+    const bool exiting = exit_.load(std::memory_order_acquire);
     if (self.has_mail.load(std::memory_order_acquire)) {
       const Assignment first = self.mail;
       self.has_mail.store(false, std::memory_order_relaxed);
@@ -86,12 +88,18 @@ void Engine::main(Thread &self) noexcept {
       while (next.kind == Next::Kind::Start) next = run(self, next.assignment, JobSlot(), cpu);
       continue;
     }
-    if (exit_.load(std::memory_order_acquire)) return;
+    if (exiting) return;
     self.parker.park();
   }
 }
 
 void Engine::join() {
+  halt();
+  {
+    // A decision that was under way has handed out its jobs; no other starts one.
+    Locked locked(*this);
+    withdraw_if_halting();
+  }
   exit_.store(true, std::memory_order_release);
   for (auto &thread : threads_) thread->parker.unpark();
   for (auto &thread : threads_) {

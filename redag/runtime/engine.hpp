@@ -130,7 +130,7 @@ class Engine {
   [[nodiscard]] Time halted_at() const;  // on the origin's clock; kNever before
   /// Jobs that have started and not ended.
   [[nodiscard]] std::vector<Job> started() const;
-  /// Ends the threads; waits for the bodies that run. Not from a body.
+  /// halt(), and ends the threads once all that has started has ended. Not from a body.
   void join();
 
   /// Appends the events since the last call, merged into one stream whose times do not decrease. `last`: nothing

@@ -376,6 +376,7 @@ TEST_P(EngineInEveryMode, TasksComeAndGoWhileItRuns) {
   std::thread source([&] {
     while (!stop) engine.release(steady, engine.now());
   });
+  while (engine.accounting(steady).finished == 0) std::this_thread::yield();
   std::thread stepper([&] {
     while (!stop) {
       engine.pause();
