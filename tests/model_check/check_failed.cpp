@@ -1,0 +1,14 @@
+// In place of redag/base/check.cpp: a broken invariant ends the exploration, with the run that breaks it.
+#include "redag/base/check.hpp"
+
+#include <string>
+
+#include "redag/testing/explorer.hpp"
+
+namespace redag::detail {
+
+void check_failed(const char *condition, const char *message, const char *file, int line) noexcept {
+  testing::explored::fail(std::string(message) + " [" + condition + "] " + file + ":" + std::to_string(line));
+}
+
+}  // namespace redag::detail

@@ -1,0 +1,332 @@
+// Every interleaving of small uses of the engine: how jobs are released, handed to threads, run, preempted, and how the
+// engine is halted.
+#include <stdexcept>
+
+#include "protocol.hpp"
+#include "redag/runtime/threads.hpp"
+
+namespace redag::model_check {
+namespace {
+
+std::uint32_t thread(std::function<void()> body) { return explored::spawn(std::move(body)); }
+
+std::string name_of(Preemption preemption) {
+  if (preemption == Preemption::None) return "none";
+  return preemption == Preemption::Cooperative ? "cooperative" : "os";
+}
+
+class EngineProtocol : public ::testing::TestWithParam<Preemption> {
+ protected:
+  static Platform platform(std::uint32_t workers) { return {GetParam(), workers, workers + 1, false, 0}; }
+};
+INSTANTIATE_TEST_SUITE_P(Modes, EngineProtocol,
+                         ::testing::Values(Preemption::None, Preemption::Cooperative, Preemption::Full),
+                         [](const auto &instance) { return name_of(instance.param); });
+
+// Nothing but a job's own wake-up makes it run: if one is lost, the wait does not end.
+TEST_P(EngineProtocol, WhatIsReleasedRunsOnce) {
+  expect_holds([] {
+    Countdown all(3);
+    const auto work = [&](const Job &) {
+      all.count();
+      return Outcome::Finished;
+    };
+    Machine machine(ladder(3), platform(2), {work, work, work});
+    machine.start_calmly();
+    const std::uint32_t source = thread([&] { machine.release(0); });
+    machine.release(1);
+    machine.release(2);
+    all.wait();
+    explored::join(source);
+    machine.finish_calmly();
+    for (std::size_t t = 0; t < 3; ++t) explored::check(machine.ran(t) == 1, "a job did not run");
+  });
+}
+
+TEST_P(EngineProtocol, WhatIsReleasedRunsThoughSleepersWakeForNoReason) {
+  expect_holds(
+      [] {
+        Countdown all(2);
+        const auto work = [&](const Job &) {
+          all.count();
+          return Outcome::Finished;
+        };
+        Machine machine(ladder(2), platform(1), {work, work});
+        machine.start_calmly();
+        machine.release(0);
+        machine.release(1);
+        all.wait();
+        machine.finish_calmly();
+      },
+      ExploreOptions{true, 50'000'000, 1, false});
+}
+
+// Started before there are threads, while they come, and after.
+TEST_P(EngineProtocol, AReleaseDuringTheStartIsNotLost) {
+  expect_holds([] {
+    Countdown all(1);
+    Machine machine(ladder(1), platform(2), {[&](const Job &) {
+                      all.count();
+                      return Outcome::Finished;
+                    }});
+    const std::uint32_t source = thread([&] { machine.release(0); });
+    machine.start();
+    all.wait();
+    explored::join(source);
+    machine.finish_calmly();
+  });
+}
+
+// The halt, and the end of the threads, at every point of a run.
+TEST_P(EngineProtocol, NothingRunsOnceItIsIdleAfterAHalt) {
+  expect_holds([] {
+    Machine machine(ladder(2), platform(1), {nullptr, nullptr});
+    machine.start_calmly();
+    const std::uint32_t source = thread([&] { machine.release(0); });
+    machine.release(1);
+    machine.finish();
+    explored::join(source);
+    machine.release(1);  // ignored
+  });
+}
+
+TEST_P(EngineProtocol, AHaltFindsTwoThreadsAtWork) {
+  expect_holds([] {
+    Machine machine(ladder(2), platform(2), {nullptr, nullptr});
+    machine.start_calmly();
+    machine.release(0);
+    machine.release(1);
+    machine.finish();
+  });
+}
+
+// As the destructor does it: without waiting first.
+TEST_P(EngineProtocol, JoinWaitsForWhatHasStarted) {
+  expect_holds([] {
+    Machine machine(ladder(2), platform(1), {nullptr, nullptr});
+    machine.start_calmly();
+    const std::uint32_t source = thread([&] { machine.release(0); });
+    machine.release(1);
+    explored::join(source);
+    machine.engine->halt();
+    machine.engine->join();
+    machine.quiet.begin();
+    explored::check(machine.engine->started().empty(), "its threads have ended, and a job has not");
+    explored::check(machine.engine->accounting(TaskId(0)).finished == machine.ran(0), "a job that ran is not counted");
+  });
+}
+
+TEST_P(EngineProtocol, AHaltFromABodyEndsTheRun) {
+  expect_holds([] {
+    Countdown halted(1);
+    bool over = false;
+    Machine machine(ladder(3), platform(2), {nullptr, nullptr, nullptr});
+    machine.work(2) = [&](const Job &) {
+      machine.release(0);
+      machine.engine->halt();
+      over = true;
+      machine.release(0);
+      halted.count();
+      return Outcome::Finished;
+    };
+    machine.work(0) = [&](const Job &job) {
+      explored::check(!over || job.number == 0, "a job was released after the halt, and ran");
+      return Outcome::Finished;
+    };
+    machine.start_calmly();
+    const std::uint32_t source = thread([&] {
+      machine.release(1);
+      machine.release(2);
+    });
+    halted.wait();
+    explored::check(machine.engine->wait_idle(kNever), "wait_idle() for ever came back without");
+    machine.quiet.begin();
+    explored::join(source);
+    machine.quiet.end();
+    machine.finish_calmly();
+  });
+}
+
+// Three tasks, two of them of a DAG that runs one job at a time; two of the three in one group.
+TEST_P(EngineProtocol, BoundsAndGroupsHold) {
+  expect_holds([] {
+    Room dag(1);
+    Room group(1);
+    Countdown all(3);
+    Workload workload = ladder(2);
+    workload.dags[0].max_active = 1;
+    workload.dags.push_back(ladder(1).dags[0]);
+    workload.dags[1].name = "other";
+    workload.dags[0].tasks[1].group = "g";
+    workload.dags[1].tasks[0].group = "g";
+    workload.dags[1].tasks[0].priority = 2;
+    const auto in = [&](bool first_dag, bool grouped) {
+      return [&, first_dag, grouped](const Job &) {
+        if (first_dag) dag.enter();
+        if (grouped) group.enter();
+        preemption_point();
+        if (grouped) group.leave();
+        if (first_dag) dag.leave();
+        all.count();
+        return Outcome::Finished;
+      };
+    };
+    Machine machine(workload, platform(2), {in(true, false), in(true, true), in(false, true)});
+    machine.start_calmly();
+    const std::uint32_t source = thread([&] { machine.release(1); });
+    machine.release(2);
+    machine.release(0);
+    all.wait();
+    explored::join(source);
+    machine.finish_calmly();
+  });
+}
+
+// One worker: the low job is preempted wherever the mode allows it, and always goes on.
+TEST_P(EngineProtocol, PreemptedJobsResume) {
+  expect_holds([] {
+    Countdown all(3);
+    std::vector<std::size_t> open;  // cooperative: jobs on the one stack
+    const auto work = [&](std::size_t t) {
+      return [&, t](const Job &) {
+        open.push_back(t);
+        preemption_point();
+        preemption_point();
+        explored::check(GetParam() != Preemption::Cooperative || open.back() == t, "resumed out of order");
+        open.pop_back();
+        all.count();
+        return Outcome::Finished;
+      };
+    };
+    Machine machine(ladder(3), Platform{GetParam(), 1, 3, false, 0}, {work(0), work(1), work(2)});
+    machine.start_calmly();
+    machine.release(0);
+    const std::uint32_t source = thread([&] { machine.release(2); });
+    machine.release(1);
+    all.wait();
+    explored::join(source);
+    machine.finish_calmly();
+  });
+}
+
+// A task's next job waits for the one before it; successors get their data.
+TEST_P(EngineProtocol, ChainsRunInTheirOrder) {
+  expect_holds([] {
+    Workload workload = ladder(2);
+    workload.dags[0].tasks[1].activation = Activation::Data;
+    workload.dags[0].tasks[1].predecessors = {0};
+    Countdown ends(1);
+    int begun = 0;
+    int done = 0;
+    Room first(1);
+    Machine machine(workload, platform(2),
+                    {[&](const Job &) {
+                       first.enter();
+                       ++begun;
+                       first.leave();
+                       return Outcome::Finished;
+                     },
+                     [&](const Job &) {
+                       explored::check(++done <= begun, "a successor ran before its predecessor");
+                       ends.count();
+                       return Outcome::Finished;
+                     }});
+    machine.start_calmly();
+    machine.release(0);
+    const std::uint32_t source = thread([&] { machine.release(0); });
+    machine.engine->miss(TaskId(0), 0, Reason::Overrun);
+    ends.wait();
+    explored::join(source);
+    machine.finish_calmly();
+  });
+}
+
+TEST_P(EngineProtocol, AnExceptionEndsItsJobAlone) {
+  expect_holds([] {
+    Countdown all(2);
+    Machine machine(ladder(2), platform(1),
+                    {[&](const Job &) {
+                       all.count();
+                       return Outcome::Finished;
+                     },
+                     [&](const Job &) -> Outcome {
+                       all.count();
+                       throw std::runtime_error("on purpose");
+                     }});
+    machine.start_calmly();
+    const std::uint32_t source = thread([&] { machine.release(1); });
+    machine.release(0);
+    all.wait();
+    explored::join(source);
+    machine.finish_calmly();
+    explored::check(machine.exceptions == 1, "an exception was told more or less than once");
+  });
+}
+
+// wait_idle() with an end: either way the truth is told.
+TEST_P(EngineProtocol, WaitIdleWithADeadline) {
+  expect_holds(
+      [] {
+        Machine machine(ladder(2), platform(1), {nullptr, nullptr});
+        machine.start_calmly();
+        machine.release(0);
+        machine.release(1);
+        machine.engine->halt();
+        if (machine.engine->wait_idle(5)) {
+          machine.quiet.begin();
+          machine.quiet.end();
+        }
+        machine.finish();
+      },
+      ExploreOptions{true, 50'000'000, 0, true});
+}
+
+// Events drained while jobs run: none lost, and each job's in order.
+TEST_P(EngineProtocol, EventsAreDrainedInOrder) {
+  expect_holds([] {
+    Countdown all(2);
+    const auto work = [&](const Job &) {
+      all.count();
+      return Outcome::Finished;
+    };
+    Platform with_trace = platform(1);
+    with_trace.trace_capacity = 64;
+    Machine machine(ladder(2), with_trace, {work, work});
+    machine.start_calmly();
+    machine.release(0);
+    machine.release(1);
+    std::vector<JobEvent> events;
+    machine.engine->drain(events);
+    all.wait();
+    machine.finish_calmly();
+    machine.engine->drain(events, true);
+    for (std::size_t t = 0; t < 2; ++t) {
+      std::vector<JobEventKind> kinds;
+      for (const JobEvent &event : events) {
+        if (event.task.value == t && event.kind != JobEventKind::Preempted && event.kind != JobEventKind::Resumed) {
+          kinds.push_back(event.kind);
+        }
+      }
+      const std::vector<JobEventKind> expected{JobEventKind::Released, JobEventKind::Ready, JobEventKind::Dispatched,
+                                               JobEventKind::Started, JobEventKind::Finished};
+      explored::check(kinds == expected, "the events of a job are not in their order");
+    }
+    explored::check(machine.engine->lost_events() == 0, "an event was lost");
+  });
+}
+
+TEST(EngineStart, AThreadThatCannotBeHadEndsTheOthers) {
+  runtime::thread_that_fails = "redag-1";
+  expect_holds([] {
+    Machine machine(ladder(1), Platform{Preemption::None, 3, 0, false, 0}, {nullptr});
+    const std::uint32_t source = thread([&] { machine.release(0); });
+    explored::check(!machine.engine->start().has_value(), "a thread failed, and nobody says so");
+    explored::join(source);
+    explored::check(machine.engine->halting(), "not halted");
+    explored::check(machine.ran(0) == 0, "a job ran");
+  });
+  runtime::thread_that_fails.reset();
+}
+
+}  // namespace
+}  // namespace redag::model_check

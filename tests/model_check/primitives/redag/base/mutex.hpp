@@ -1,0 +1,10 @@
+// In place of redag/base/mutex.hpp.
+#pragma once
+
+#include "redag/base/pi_mutex.hpp"
+
+namespace redag {
+
+using Mutex = PiMutex;
+
+}  // namespace redag

@@ -1,0 +1,22 @@
+// In place of redag/base/pi_mutex.hpp: a mutex of the explorer. It knows no priorities: every order is tried.
+#pragma once
+
+#include "redag/base/thread_annotations.hpp"
+#include "redag/testing/explorer.hpp"
+
+namespace redag {
+
+class REDAG_CAPABILITY("mutex") PiMutex {
+ public:
+  PiMutex() = default;
+  PiMutex(const PiMutex &) = delete;
+  PiMutex &operator=(const PiMutex &) = delete;
+
+  void lock() noexcept REDAG_ACQUIRE() { testing::explored::lock(id_); }
+  void unlock() noexcept REDAG_RELEASE() { testing::explored::unlock(id_); }
+
+ private:
+  testing::ObjectId id_ = testing::explored::new_object();
+};
+
+}  // namespace redag

@@ -1,0 +1,64 @@
+// In place of redag/runtime/threads.hpp: the explorer's threads, which can do all that is asked of them, save that
+// thread_that_fails is refused.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "redag/base/result.hpp"
+#include "redag/testing/explorer.hpp"
+
+namespace redag::runtime {
+
+class ThreadHandle {
+ public:
+  ThreadHandle() = default;
+  explicit ThreadHandle(std::uint32_t thread) : thread_(thread) {}
+  ThreadHandle(ThreadHandle &&other) noexcept : thread_(std::exchange(other.thread_, std::nullopt)) {}
+  ThreadHandle &operator=(ThreadHandle &&other) noexcept {
+    testing::explored::check(!thread_, "a thread is forgotten that was not joined");
+    thread_ = std::exchange(other.thread_, std::nullopt);
+    return *this;
+  }
+  ~ThreadHandle() { testing::explored::check(!thread_, "a thread is destroyed that was not joined"); }
+
+  [[nodiscard]] bool joinable() const noexcept { return thread_.has_value(); }
+  void join() {
+    testing::explored::check(joinable(), "a thread is joined twice");
+    testing::explored::join(*thread_);
+    thread_.reset();
+  }
+  [[nodiscard]] std::uint32_t native_handle() const noexcept { return thread_.value_or(0); }
+
+ private:
+  std::optional<std::uint32_t> thread_;
+};
+
+struct ThreadSetup {
+  std::string name;
+  int fifo_priority = 0;
+  std::vector<int> cpus;
+};
+
+inline std::optional<std::string> thread_that_fails;  // by name
+
+[[nodiscard]] inline Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()> main) {
+  if (thread_that_fails == setup.name) return make_error("thread '" + setup.name + "' cannot be created");
+  return ThreadHandle(testing::explored::spawn(std::move(main)));
+}
+[[nodiscard]] inline bool set_fifo_priority(std::uint32_t, int) noexcept { return true; }
+[[nodiscard]] inline std::vector<int> usable_cpus() { return {0, 1, 2, 3}; }
+[[nodiscard]] inline int available_fifo_priority(int wanted) { return wanted; }
+[[nodiscard]] inline const char *realtime_hint() { return ""; }
+[[nodiscard]] inline Result<void> lock_memory() { return {}; }
+struct Throttling {
+  std::int64_t runtime_us = 0;
+  std::int64_t period_us = 0;
+};
+[[nodiscard]] inline std::optional<Throttling> realtime_throttling() { return std::nullopt; }
+
+}  // namespace redag::runtime

@@ -1,0 +1,224 @@
+// What the protocol tests share: an engine whose every job is watched, and the exploration of a scenario with it.
+//
+// Watching makes an operation of the explorer only where the engine itself has to keep two things apart: there it costs
+// no execution as long as the engine does so, and shows every order in which it does not.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "redag/runtime/engine.hpp"
+#include "redag/runtime/preemption_point.hpp"
+#include "redag/runtime/running_job.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+#include "redag/testing/explorer.hpp"
+
+namespace redag::model_check {
+
+using runtime::Engine;
+using runtime::Job;
+using sched::Outcome;
+using sched::Preemption;
+using testing::Exploration;
+using testing::ExploreOptions;
+namespace explored = testing::explored;
+
+/// Explores all of `scenario`, prints how much that was, and expects that nothing breaks.
+inline Exploration expect_holds(const std::function<void()> &scenario, ExploreOptions options = {}) {
+  if (const char *most = std::getenv("REDAG_EXPLORE")) options.max_executions = std::strtoull(most, nullptr, 10);
+  const testing::ThreadState running_job{
+      [] { return static_cast<void *>(runtime::RunningJob::current()); },
+      [](void *job) { runtime::RunningJob::set_current(static_cast<runtime::RunningJob *>(job)); }};
+  const Exploration all = testing::explore(scenario, options, running_job);
+  const auto *test = ::testing::UnitTest::GetInstance()->current_test_info();
+  std::printf(
+      "[  STATES  ] %s.%s: %llu executions (+ %llu cut short), %llu transitions, up to %u in one, %u threads%s\n",
+      test->test_suite_name(), test->name(), static_cast<unsigned long long>(all.executions),
+      static_cast<unsigned long long>(all.redundant), static_cast<unsigned long long>(all.transitions), all.longest,
+      all.threads, all.complete ? "" : " (not complete)");
+  EXPECT_EQ(all.failure, "");
+  EXPECT_TRUE(all.complete);
+  return all;
+}
+
+/// How many are somewhere at a time. Where it is an object, entering and leaving are operations.
+class Room {
+ public:
+  explicit Room(int most) : most_(most) {}
+  void enter() {
+    explored::write(object_, "enter");
+    explored::check(++count_ <= most_, "more jobs at a time than the bound allows");
+  }
+  void leave() {
+    explored::write(object_, "leave");
+    --count_;
+  }
+
+ private:
+  int most_;
+  int count_ = 0;
+  testing::ObjectId object_ = explored::new_object();
+};
+
+/// A promise that from some moment on no job is in progress.
+class Quiet {
+ public:
+  void begin() {
+    explored::write(object_, "quiet");
+    explored::check(inside_ == 0, "a job is in progress after it was promised that none is");
+    quiet_ = true;
+  }
+  void end() {
+    explored::write(object_, "quiet ends");
+    quiet_ = false;
+  }
+  void job_begins() {
+    explored::read(object_, "job begins");
+    explored::check(!quiet_, "a job begins after it was promised that none does");
+    ++inside_;
+  }
+  void job_ends() {
+    explored::read(object_, "job ends");
+    explored::check(!quiet_, "a job ends after it was promised that none is in progress");
+    --inside_;
+  }
+
+ private:
+  bool quiet_ = false;
+  int inside_ = 0;
+  testing::ObjectId object_ = explored::new_object();
+};
+
+/// Lets a thread wait until something has happened so many times. Not of the engine's own making, so that an error
+/// there is not hidden by the same error here.
+class Countdown {
+ public:
+  explicit Countdown(int count) : left_(count) {}
+  void count() {
+    explored::write(object_, "count");
+    --left_;
+    if (left_ == 0) explored::wake(object_, 100);
+  }
+  void wait() {
+    while (explored::wait(
+               object_, [this] { return left_ > 0; }, explored::kForever) &&
+           left_ > 0) {
+    }
+  }
+
+ private:
+  int left_;
+  testing::ObjectId object_ = explored::new_object();
+};
+
+/// One DAG of independent timer tasks; task t has priority t: the last one is the most urgent.
+inline Workload ladder(std::size_t tasks) {
+  Workload workload;
+  workload.policy = PolicyKind::Fixed;
+  workload.dags.emplace_back();
+  for (std::size_t t = 0; t < tasks; ++t) {
+    Task task;
+    task.name = "t" + std::to_string(t);
+    task.period = task.deadline = task.wcet = kSecond;
+    task.priority = static_cast<int>(t);
+    workload.dags[0].tasks.push_back(task);
+  }
+  return workload;
+}
+
+struct Platform {
+  Preemption preemption = Preemption::None;
+  std::uint32_t workers = 1;
+  std::uint32_t threads = 0;  // Full: jobs that can be in progress
+  bool start_paused = false;
+  std::size_t trace_capacity = 0;
+};
+
+/// An engine that is told what its tasks do. Every job is checked to run once, as what the scheduler counted.
+class Machine {
+ public:
+  using Work = std::function<Outcome(const Job &)>;
+
+  Machine(const Workload &workload, const Platform &platform, std::vector<Work> works)
+      : works_(std::move(works)), ran_(works_.size()) {
+    runtime::EngineOptions options;
+    options.config.workers = platform.workers;
+    options.config.preemption = platform.preemption;
+    options.config.policy = workload.policy;
+    if (platform.preemption == Preemption::Full) {
+      options.config.max_started = platform.threads;
+      options.config.levels = 8;
+      options.band = runtime::PriorityBand{8, 9};
+    }
+    options.start_paused = platform.start_paused;
+    options.trace_capacity = platform.trace_capacity;
+    options.on_exception = [this](const Job &, const std::exception_ptr &) { ++exceptions; };
+    engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+    std::vector<runtime::Body> bodies;
+    for (std::size_t t = 0; t < works_.size(); ++t) {
+      bodies.emplace_back([this, t](const Job &job) { return run(t, job); });
+    }
+    engine->bind(workload, std::move(bodies));
+  }
+
+  void start() { explored::check(engine->start().has_value(), "the engine does not start"); }
+  /// start(), until the threads sleep; not explored.
+  void start_calmly() {
+    explored::calm(true);
+    start();
+    explored::settle();
+    explored::calm(false);
+  }
+  /// Once nobody can go on: finish(), not explored.
+  void finish_calmly() {
+    explored::settle();
+    explored::calm(true);
+    finish();
+  }
+  void release(std::size_t task) { engine->release(TaskId(task), 0); }
+
+  /// Halts, waits, ends the threads, and checks that what ran is what was counted.
+  void finish() {
+    engine->halt();
+    explored::check(engine->wait_idle(kNever), "wait_idle() for ever came back without");
+    quiet.begin();
+    explored::check(engine->started().empty(), "idle, and a job has started and not ended");
+    engine->join();
+    for (std::size_t t = 0; t < works_.size(); ++t) {
+      const sched::Accounting jobs = engine->accounting(TaskId(t));
+      explored::check(jobs.finished + jobs.aborted == ran_[t].size(),
+                      "not every job that ended has run, or vice versa");
+      explored::check(jobs.in_flight() <= 1, "more than one job of a task waits");
+    }
+  }
+  /// What a task does from its next job on.
+  [[nodiscard]] Work &work(std::size_t task) { return works_[task]; }
+  [[nodiscard]] std::size_t ran(std::size_t task) const { return ran_[task].size(); }
+
+  std::unique_ptr<Engine> engine;
+  Quiet quiet;
+  int exceptions = 0;
+
+ private:
+  Outcome run(std::size_t t, const Job &job) {
+    quiet.job_begins();
+    explored::check(job.task.value == t, "a job runs another task's body");
+    // Jobs of a task follow each other, and each begins once.
+    explored::check(ran_[t].empty() || ran_[t].back() < job.number, "a job runs twice, or before an earlier one");
+    ran_[t].push_back(job.number);
+    struct Leave {
+      Quiet &quiet;
+      ~Leave() { quiet.job_ends(); }
+    } leave{quiet};
+    return works_[t] ? works_[t](job) : Outcome::Finished;
+  }
+
+  std::vector<Work> works_;
+  std::vector<std::vector<std::uint32_t>> ran_;
+};
+
+}  // namespace redag::model_check

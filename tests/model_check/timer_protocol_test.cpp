@@ -1,0 +1,189 @@
+// Every interleaving of what sleeps by time: the parker, the event, the release timer, and an executor around it all.
+#include "protocol.hpp"
+#include "redag/runtime/executor.hpp"
+#include "redag/runtime/release_timer.hpp"
+
+namespace redag::model_check {
+namespace {
+
+using runtime::Event;
+using runtime::Parker;
+
+std::uint32_t thread(std::function<void()> body) { return explored::spawn(std::move(body)); }
+
+constexpr ExploreOptions kTimed{true, 50'000'000, 0, true};
+
+// Each token ends one park(), whenever it comes; two that come together are one.
+TEST(ParkerProtocol, NoTokenIsLost) {
+  for (const std::uint32_t spurious : {0U, 1U}) {
+    expect_holds(
+        [] {
+          Parker parker;
+          Atomic<int> sent{0};
+          const auto send = [&] {
+            sent.fetch_add(1);
+            parker.unpark();
+          };
+          const std::uint32_t a = thread(send);
+          const std::uint32_t b = thread([&] {
+            send();
+            send();
+          });
+          // What was sent before a token is seen once it was taken: else this waits for ever.
+          while (sent.load() < 3) parker.park();
+          explored::join(a);
+          explored::join(b);
+        },
+        ExploreOptions{true, 50'000'000, spurious, false});
+  }
+}
+
+TEST(ParkerProtocol, ATokenThatIsNotTakenInTimeIsTakenLater) {
+  expect_holds(
+      [] {
+        Parker parker;
+        const std::uint32_t a = thread([&] { parker.unpark(); });
+        int taken = parker.park_until(3) ? 1 : 0;
+        taken += parker.park_until(5) ? 1 : 0;
+        explored::join(a);
+        taken += parker.park_until(7) ? 1 : 0;
+        explored::check(taken == 1, "a token was lost, or taken twice");
+        parker.unpark();
+        parker.park();
+      },
+      kTimed);
+}
+
+TEST(ParkerProtocol, ParkingForATimeOnlySleepsThatLong) {
+  expect_holds(
+      [] {
+        Parker parker;
+        bool sent = false;
+        const std::uint32_t a = thread([&] {
+          explored::tick(2);
+          sent = true;
+          parker.unpark();
+        });
+        const bool taken = parker.park_until(4);
+        explored::check(taken || explored::now() >= 4, "timed out early");
+        explored::check(!taken || sent, "a token that nobody sent");
+        explored::join(a);
+      },
+      kTimed);
+}
+
+TEST(EventProtocol, EveryWaiterSeesIt) {
+  expect_holds(
+      [] {
+        Event event;
+        const std::uint32_t a = thread([&] { event.wait(); });
+        const std::uint32_t b = thread([&] {
+          if (!event.wait_until(3)) explored::check(explored::now() >= 3, "timed out early");
+        });
+        const std::uint32_t c = thread([&] { event.set(); });
+        event.set();
+        event.wait();
+        explored::check(event.is_set(), "set, and not set");
+        explored::join(a);
+        explored::join(b);
+        explored::join(c);
+      },
+      kTimed);
+}
+
+Dag one_timer_task(Duration period) {
+  Dag dag;
+  dag.tasks.emplace_back();
+  dag.tasks[0].name = "t";
+  dag.tasks[0].period = dag.tasks[0].deadline = period;
+  return dag;
+}
+
+// Every point of the grid before the stop, once and in order, none early.
+TEST(TimerProtocol, ReleasesAreOnTheGridUntilTheStop) {
+  expect_holds(
+      [] {
+        std::vector<Time> released;
+        bool joined = false;
+        runtime::ReleaseTimer timer(
+            [&](std::span<const runtime::Release> releases) {
+              for (const runtime::Release &release : releases) {
+                explored::check(release.nominal <= explored::now(), "released early");
+                released.push_back(release.nominal);
+              }
+              explored::check(!joined, "a release after the timer's end");
+            },
+            0);
+        timer.add(one_timer_task(10), TaskId(0), 0);
+        explored::check(timer.start(0, 35, {}).has_value(), "the timer does not start");
+        explored::tick(12);
+        const Time stopped = explored::now();
+        timer.stop();
+        timer.join();
+        joined = true;
+        for (std::size_t i = 0; i < released.size(); ++i) {
+          explored::check(released[i] == static_cast<Time>(i) * 10, "a release is off the grid");
+        }
+        explored::check(released.size() > static_cast<std::size_t>(std::min<Time>(stopped, 34) / 10),
+                        "a release that was due before the stop is missing");
+      },
+      kTimed);
+}
+
+// A task that is added while the timer sleeps for longer wakes it.
+TEST(TimerProtocol, AnAdditionIsNotSleptThrough) {
+  expect_holds([] {
+    Countdown seen(2);
+    runtime::ReleaseTimer timer(
+        [&](std::span<const runtime::Release> releases) {
+          for (std::size_t i = 0; i < releases.size(); ++i) seen.count();
+        },
+        0);
+    explored::check(timer.start(0, 5, {}).has_value(), "the timer does not start");
+    const std::uint32_t other = thread([&] { timer.add(one_timer_task(100), TaskId(1), 0); });
+    timer.add(one_timer_task(100), TaskId(0), 0);
+    seen.wait();
+    explored::join(other);
+    timer.remove(TaskId(0), 2);
+  });
+}
+
+// A whole executor: the timer's releases, a body that stops it or another thread that does, and the end of both.
+TEST(ExecutorProtocol, NothingRunsAfterStop) {
+  for (const bool from_body : {false, true}) {
+    expect_holds(
+        [&] {
+          runtime::ExecutorOptions options;
+          options.workers = 1;
+          options.preemption = PreemptionMode::None;
+          options.stop_timeout = std::chrono::nanoseconds(kNever / 4);
+          runtime::Executor executor(options);
+          Quiet quiet;
+          runtime::DagBuilder dag("dag");
+          dag.timer("t", std::chrono::nanoseconds(3600 * kSecond),
+                    [&] {  // one release, and none that a sleep of this length leads to
+                      quiet.job_begins();
+                      if (from_body) executor.stop();
+                      quiet.job_ends();
+                    });
+          executor.add(std::move(dag));
+          explored::calm(true);
+          executor.start();
+          explored::settle();
+          explored::calm(false);
+          if (from_body) {
+            executor.wait();
+          } else {
+            const std::uint32_t other = thread([&] { executor.stop(); });
+            executor.wait();
+            explored::join(other);
+          }
+          quiet.begin();
+          explored::check(executor.stopping(), "stopped, and not stopping");
+        },
+        kTimed);
+  }
+}
+
+}  // namespace
+}  // namespace redag::model_check
