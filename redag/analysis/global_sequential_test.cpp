@@ -110,6 +110,13 @@ TEST(GlobalSequential, TasksInPhaseWasteWorkers) {
   for (const Method &method : {guan(), bertogna_cirinei()}) EXPECT_GE(responses(method, system)[2].value(), 15);
 }
 
+// What a job from before carries in is all of it but a tick: with less the last response would be 8. Worked out apart
+// from this code, from the formula of the paper.
+TEST(GlobalSequential, WhatIsCarriedInIsCutByOneTickOnly) {
+  const System system = compiled(independent(2, {{2, 3}, {1, 3}, {4, 6}, {1, 9}}), sched::Preemption::Full);
+  EXPECT_EQ(responses(guan(), system), (std::vector<std::optional<Duration>>{2, 1, 6, 9}));
+}
+
 TEST(GlobalSequential, TheMostUrgentOfEachWorkerNeverWait) {
   const System system = compiled(independent(3, {{4, 9}, {5, 9}, {6, 9}, {1, 90}}), sched::Preemption::Full);
   for (const Method &method : {bertogna_cirinei(), guan()}) {
