@@ -1,7 +1,7 @@
 # The front door: each target does one everyday thing from a fresh clone on. What it runs is plain CMake and the scripts
 # of tools/; nothing is built here that `cmake --preset` could not build.
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench lint format asan tsan ros install clean
+.PHONY: help demo test bench lint format asan tsan coverage mutate ros install clean
 PREFIX ?= /usr/local
 
 # ThreadSanitizer of older compilers cannot start where a kernel randomises much of the address space
@@ -34,11 +34,12 @@ bench: ## build and run the benchmarks; JSON goes to results/bench/
 	  "$$program" --benchmark_out=results/bench/$$(basename "$$program").json --benchmark_out_format=json || exit 1; \
 	done
 
-lint: ## layers, formatting, and clang-tidy on the files that differ from the last commit or the main branch
+lint: ## layers, formatting, locks, and clang-tidy on the files that differ from the last commit or the main branch
 	@tools/bootstrap lint
 	tools/check_layers
 	tools/format --check
 	cmake --preset dev
+	tools/thread_safety
 	tools/tidy
 
 format: ## rewrite all C++ files as .clang-format says
@@ -57,6 +58,20 @@ tsan: ## the tests of what has threads, under ThreadSanitizer
 	$(NO_RANDOMISATION) cmake --build --preset tsan
 	$(NO_RANDOMISATION) ctest --preset tsan
 
+coverage: ## lines and branches of redag/ that the tests run; a page in results/coverage/
+	@tools/bootstrap coverage
+	cmake --preset coverage
+	cmake --build --preset coverage
+	find build/coverage -name '*.gcda' -delete
+	ctest --preset coverage
+	@mkdir -p results/coverage
+	gcovr --config tools/gcovr.cfg --html-details results/coverage/index.html --json-summary results/coverage/summary.json \
+	  build/coverage
+
+mutate: ## break redag/ on purpose, as tests/mutations.yaml says, and see whether the tests notice
+	@tools/bootstrap test
+	tools/mutate
+
 ros: ## build redag_rclcpp with colcon and run its tests, for each ROS 2 under /opt/ros
 	@tools/bootstrap test
 	tools/test_rclcpp
@@ -68,4 +83,5 @@ install: ## install library, headers and program to PREFIX (default /usr/local)
 	cmake --install build/release --prefix $(PREFIX)
 
 clean: ## remove what the targets above built; results/ stays
-	rm -rf build/dev build/release build/bench build/asan-ubsan build/tsan build/colcon
+	rm -rf build/dev build/release build/bench build/asan-ubsan build/tsan build/coverage build/mutate build/colcon
+	git worktree prune
