@@ -11,12 +11,13 @@ NO_RANDOMISATION := $(shell setarch -R true 2>/dev/null && echo setarch -R)
 help: ## this list
 	@grep -E '^[a-z]+: .*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+): .*## (.*)/  make \1\t\2/' | expand -t 18
 
-demo: ## build the program and compare the executors on one workload; pages and figures go to results/demo/
+demo: ## build the program, compare the executors on one workload, and make results/demo/report.html of it
 	@tools/bootstrap run
 	cmake --preset release
 	cmake --build --preset release
 	build/release/bin/redag compare workloads/contention.yaml --executors redag,mte,ste --repeat 3 --duration 5s \
 	  --out results/demo --force
+	build/release/bin/redag report results/demo
 
 test: ## build everything and run all tests
 	@tools/bootstrap test

@@ -1,11 +1,9 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <filesystem>
 #include <memory>
-#include <system_error>
 
 #include "redag/cli/commands.hpp"
+#include "redag/cli/files.hpp"
 #include "redag/cli/run_report.hpp"
 #include "redag/cli/table.hpp"
 #include "redag/metrics/trace_checker.hpp"
@@ -14,27 +12,10 @@
 namespace redag::cli {
 namespace {
 
-namespace fs = std::filesystem;
-
 struct Options {
   std::vector<std::string> places;
   bool json = false;
 };
-
-// The traces at a place: the file itself, or every events.jsonl in the folder and below, sorted.
-Result<std::vector<std::string>> find_traces(const std::string &place) {
-  std::error_code error;
-  if (!fs::is_directory(place, error)) return std::vector<std::string>{place};
-  std::vector<std::string> files;
-  fs::recursive_directory_iterator entry(place, error);
-  for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error)) {
-    if (entry->path().filename() == "events.jsonl") files.push_back(entry->path().string());
-  }
-  if (error) return trace::file_error(place, 0, fmt::format("cannot list the folder: {}", error.message()));
-  if (files.empty()) return trace::file_error(place, 0, "no events.jsonl in this folder or below");
-  std::sort(files.begin(), files.end());
-  return files;
-}
 
 Json describe_run(const trace::Trace &trace) {
   return Json{{"workload", trace.info.workload.name},

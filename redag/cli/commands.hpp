@@ -24,5 +24,6 @@ Action add_compare(CLI::App &app);
 Action add_analyze(CLI::App &app);
 Action add_experiment(CLI::App &app);
 Action add_check_trace(CLI::App &app);
+Action add_report(CLI::App &app);
 
 }  // namespace redag::cli

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "redag/base/check.hpp"
 #include "redag/cli/table.hpp"
 
 namespace redag::cli {
@@ -28,37 +27,16 @@ template <class Value>
 Spread spread_over(const ExecutorResults &results, std::size_t dag, Value value) {
   std::vector<double> values;
   for (const auto &repetition : results.repetitions) values.push_back(static_cast<double>(value(repetition[dag])));
-  return spread_of(std::move(values));
-}
-
-std::string join(const std::vector<std::string> &names) {
-  std::string text;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (i > 0) text += i + 1 == names.size() ? " and " : ", ";
-    text += names[i];
-  }
-  return text;
+  return report::spread_of(std::move(values));
 }
 
 // Who misses fewest, and who cannot be told from that.
 std::string conclusion(const Comparison &comparison, std::size_t dag) {
-  const auto best =
-      std::min_element(comparison.executors.begin(), comparison.executors.end(),
-                       [dag](const auto &a, const auto &b) { return a.miss(dag).median < b.miss(dag).median; });
-  const Spread least = best->miss(dag);
-  std::vector<std::string> alike = {best->variant.name};
-  std::vector<std::string> worse;
+  std::vector<report::Contender> contenders;
   for (const ExecutorResults &results : comparison.executors) {
-    if (&results == &*best) continue;
-    const Spread miss = results.miss(dag);
-    // Ranges that touch say nothing about the next repetition.
-    (miss.min > least.max ? worse : alike).push_back(results.variant.name);
+    contenders.push_back({results.variant.name, results.miss(dag)});
   }
-  if (worse.empty()) return "no clear difference";
-  const std::string rest = join(worse) + (worse.size() == 1 ? " misses more" : " miss more");
-  if (alike.size() == 1) return alike.front() + " misses fewest";
-  if (least.max == 0) return fmt::format("{} miss none, {}", join(alike), rest);
-  return fmt::format("{} do not differ clearly, {}", join(alike), rest);
+  return report::ranking(contenders);
 }
 
 std::string time_text(const Spread &spread) { return humanize_duration(static_cast<Duration>(spread.median)); }
@@ -143,14 +121,6 @@ std::string comparison_table(const Comparison &comparison, const StreamTraits &t
 
 }  // namespace
 
-Spread spread_of(std::vector<double> values) {
-  REDAG_CHECK(!values.empty(), "a spread of nothing");
-  std::sort(values.begin(), values.end());
-  const std::size_t middle = values.size() / 2;
-  const double median = values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
-  return {median, values.front(), values.back()};
-}
-
 void ExecutorResults::add(const Session &session) {
   std::vector<Observation> seen;
   for (const metrics::DagSummary &dag : session.summary.dags)
@@ -211,7 +181,7 @@ std::string caveat(const Comparison &comparison) {
   return fmt::format(
       "{} had real-time (SCHED_FIFO) threads, {} had not: on a busy machine part of the difference is that alone; "
       "mte-fifo and ste-fifo, or --realtime, give them to everybody",
-      join(with), join(without));
+      report::join(with), report::join(without));
 }
 
 std::string describe(const Comparison &comparison, const StreamTraits &terminal) {

@@ -10,6 +10,7 @@
 #include "redag/cli/json.hpp"
 #include "redag/cli/session.hpp"
 #include "redag/cli/variant.hpp"
+#include "redag/report/verdict.hpp"
 
 namespace redag::cli {
 
@@ -26,15 +27,7 @@ struct Observation {
   metrics::Distribution end_to_end;
 };
 
-/// Of one number over repetitions.
-struct Spread {
-  double median = 0;
-  double min = 0;
-  double max = 0;
-};
-
-/// Requires a value.
-[[nodiscard]] Spread spread_of(std::vector<double> values);
+using report::Spread;
 
 struct ExecutorResults {
   Variant variant;

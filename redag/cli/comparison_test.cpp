@@ -34,11 +34,11 @@ std::string verdict(std::vector<ExecutorResults> executors) {
 }
 
 TEST(Spread, MedianAndRange) {
-  const Spread odd = spread_of({3, 1, 2});
+  const Spread odd = report::spread_of({3, 1, 2});
   EXPECT_EQ(odd.median, 2);
   EXPECT_EQ(odd.min, 1);
   EXPECT_EQ(odd.max, 3);
-  EXPECT_EQ(spread_of({4, 1, 2, 3}).median, 2.5);
+  EXPECT_EQ(report::spread_of({4, 1, 2, 3}).median, 2.5);
 }
 
 TEST(Verdict, OneIsBest) {

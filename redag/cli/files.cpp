@@ -69,6 +69,23 @@ Result<void> write_text(const std::string &path, std::string_view text) {
   return file->commit();
 }
 
+Result<std::vector<std::string>> find_traces(const std::string &place) {
+  std::error_code error;
+  if (!fs::is_directory(place, error)) return std::vector<std::string>{place};
+  std::vector<std::string> files;
+  fs::recursive_directory_iterator entry(place, error);
+  for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error)) {
+    if (entry->path().filename() == "events.jsonl") files.push_back(entry->path().string());
+  }
+  if (error) return trace::file_error(place, 0, fmt::format("cannot list the folder: {}", error.message()));
+  if (files.empty()) {
+    return trace::file_error(place, 0, "no events.jsonl in this folder or below",
+                             "'redag run', 'simulate' and 'compare' write one with --out");
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
 bool is_result_name(std::string_view name) {
   // What a killed command left behind ends in ".tmp.<pid>".
   if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {

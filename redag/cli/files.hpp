@@ -21,6 +21,10 @@ namespace redag::cli {
 /// not write, by name (unless `force`), or cannot be made or written. Nothing is deleted.
 [[nodiscard]] Result<void> prepare_folder(const std::string &path, bool force);
 
+/// The traces at a place, sorted: the file itself, or every events.jsonl in the folder and below. Error if there is
+/// none.
+[[nodiscard]] Result<std::vector<std::string>> find_traces(const std::string &place);
+
 /// Is this the name of something that a command writes into a result folder?
 [[nodiscard]] bool is_result_name(std::string_view name);
 

@@ -54,6 +54,10 @@ constexpr std::array kCommands = {
     Entry{"check-trace", "Hold recorded traces to the rules of the model", add_check_trace,
           "  redag check-trace results/demo\n"
           "  redag check-trace --json results/os/events.jsonl\n"},
+    Entry{"report", "Make one HTML page of recorded runs: verdict, tables, figures, schedule", add_report,
+          "  redag report results/demo\n"
+          "  redag report results/none results/os -o report.html\n"
+          "  redag report results/demo --json | jq .groups[].total\n"},
 };
 
 std::vector<std::string> command_names() {

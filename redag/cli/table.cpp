@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 
 #include "redag/base/check.hpp"
@@ -31,20 +30,6 @@ std::string cut(std::string_view text, std::size_t width) {
     if (starts_character && ++columns == width) break;
   }
   return std::string(text.substr(0, bytes)) + "…";
-}
-
-std::string format_percent(double ratio) {
-  if (!std::isfinite(ratio)) return "-";
-  // Never let a miss read as none: 3 of 100 000 is 0.003 %.
-  const double percent = 100 * ratio;
-  if (percent > 0 && percent < 0.05) return fmt::format("{:.2g} %", percent);
-  return fmt::format("{:.1f} %", percent);
-}
-
-std::string format_count(std::uint64_t count) {
-  std::string text = fmt::format("{}", count);
-  for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, " ");
-  return text;
 }
 
 void Table::add(std::vector<Cell> row) {

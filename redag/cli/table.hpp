@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "redag/base/text.hpp"
 #include "redag/cli/console.hpp"
 
 namespace redag::cli {
@@ -41,10 +42,5 @@ class Table {
 
 /// At most `width` columns of `text`, the end replaced by "…" where it is longer.
 [[nodiscard]] std::string cut(std::string_view text, std::size_t width);
-
-/// "14.2 %", "-" if nothing was counted.
-[[nodiscard]] std::string format_percent(double ratio);
-/// 1234567 -> "1 234 567".
-[[nodiscard]] std::string format_count(std::uint64_t count);
 
 }  // namespace redag::cli

@@ -69,17 +69,6 @@ TEST(Table, CountsCharactersNotBytes) {
   EXPECT_EQ(cut("abc", 0), "");
 }
 
-TEST(Table, FormatsNumbers) {
-  EXPECT_EQ(format_count(0), "0");
-  EXPECT_EQ(format_count(999), "999");
-  EXPECT_EQ(format_count(1000), "1 000");
-  EXPECT_EQ(format_count(1234567), "1 234 567");
-  EXPECT_EQ(format_percent(0), "0.0 %");
-  EXPECT_EQ(format_percent(0.1421), "14.2 %");
-  EXPECT_EQ(format_percent(1), "100.0 %");
-  EXPECT_EQ(format_percent(3e-5), "0.003 %") << "a miss must not read as none";
-}
-
 TEST(ProgressLine, FitsTheTerminal) {
   EXPECT_EQ(progress_line("mte 1/3", 0.5, "1.0 of 2.0 s", 80), "mte 1/3 [##########          ]  50 %  1.0 of 2.0 s");
   EXPECT_EQ(display_width(progress_line("mte 1/3", 2.0, std::string(200, 'x'), 60)), 60U);

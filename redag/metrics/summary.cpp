@@ -14,22 +14,21 @@ void append(std::vector<Duration> &to, const std::vector<Duration> &from) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
-// Counts only; distributions are made from the samples.
-void add_counts(JobStats &to, const JobStats &from) {
-  to.released += from.released;
-  to.finished += from.finished;
-  to.skipped += from.skipped;
-  to.aborted += from.aborted;
-  to.in_flight += from.in_flight;
-  to.deferred += from.deferred;
-  to.late += from.late;
-  to.overdue += from.overdue;
-  to.preemptions += from.preemptions;
-  for (std::size_t i = 0; i < kReasonCount; ++i) to.by_reason[i] += from.by_reason[i];
-  if (from.max_lateness) to.max_lateness = std::max(to.max_lateness.value_or(*from.max_lateness), *from.max_lateness);
-}
-
 }  // namespace
+
+void JobStats::add_counts(const JobStats &other) {
+  released += other.released;
+  finished += other.finished;
+  skipped += other.skipped;
+  aborted += other.aborted;
+  in_flight += other.in_flight;
+  deferred += other.deferred;
+  late += other.late;
+  overdue += other.overdue;
+  preemptions += other.preemptions;
+  for (std::size_t i = 0; i < kReasonCount; ++i) by_reason[i] += other.by_reason[i];
+  if (other.max_lateness) max_lateness = std::max(max_lateness.value_or(*other.max_lateness), *other.max_lateness);
+}
 
 double JobStats::miss_ratio() const { return ratio(late, released); }
 
@@ -123,8 +122,8 @@ Summary Summarizer::finish(Time end) {
   }
   for (std::size_t t = 0; t < refs_.size(); ++t) {
     const std::size_t d = refs_[t].dag.value;
-    add_counts(summary.dags[d].jobs, stats_[t]);
-    add_counts(summary.total, stats_[t]);
+    summary.dags[d].jobs.add_counts(stats_[t]);
+    summary.total.add_counts(stats_[t]);
     of_dag[d].append(samples_[t]);
     all.append(samples_[t]);
     fill(stats_[t], std::move(samples_[t]));

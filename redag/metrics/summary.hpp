@@ -42,6 +42,9 @@ struct JobStats {
   [[nodiscard]] std::uint64_t no_data() const { return by_reason[static_cast<std::size_t>(Reason::NoData)]; }
   /// MR with skipped and aborted jobs counted as misses, save those without data.
   [[nodiscard]] double miss_ratio_with_lost() const;
+
+  /// Everything but the distributions, which cannot be added.
+  void add_counts(const JobStats &other);
 };
 
 /// From a source's release to a sink's finish, over the finished jobs of all sinks of a DAG.

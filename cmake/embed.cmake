@@ -1,0 +1,38 @@
+# Writes page_assets.cpp, which holds the report page's files as text. Run when building, in script mode:
+#   cmake -DOUTPUT=page_assets.cpp -DPAGE=redag/report/page -DECHARTS=third_party/echarts -P embed.cmake
+cmake_minimum_required(VERSION 3.22)
+
+# Raw strings, in pieces that every compiler takes; none of the files contains the delimiter.
+function(add_text name)
+  set(text "")
+  foreach(file IN LISTS ARGN)
+    file(READ ${file} content)
+    string(APPEND text "${content}")
+  endforeach()
+  if(text MATCHES "\\)redag_asset\"" OR (text MATCHES "</[sS][cC][rR][iI][pP][tT]" AND NOT name STREQUAL "kTemplate"))
+    message(FATAL_ERROR "${ARGN}: contains what would end it early")
+  endif()
+  set(pieces "")
+  string(LENGTH "${text}" length)
+  set(at 0)
+  while(at LESS length)
+    string(SUBSTRING "${text}" ${at} 8000 piece)
+    string(APPEND pieces "R\"redag_asset(${piece})redag_asset\"\n")
+    math(EXPR at "${at} + 8000")
+  endwhile()
+  file(APPEND ${OUTPUT}.new "const std::string_view ${name} =\n${pieces};\n")
+endfunction()
+
+file(WRITE ${OUTPUT}.new "// Made by cmake/embed.cmake out of redag/report/page and third_party/echarts.
+#include \"redag/report/page_assets.hpp\"
+
+#pragma GCC diagnostic ignored \"-Woverlength-strings\"
+namespace redag::report::assets {
+")
+add_text(kTemplate ${PAGE}/page.html)
+add_text(kStyle ${PAGE}/page.css)
+add_text(kEcharts ${ECHARTS}/echarts.min.js)
+add_text(kScript ${PAGE}/format.js ${PAGE}/elements.js ${PAGE}/charts.js ${PAGE}/figures.js ${PAGE}/schedule.js
+  ${PAGE}/tables.js ${PAGE}/page.js)
+file(APPEND ${OUTPUT}.new "}  // namespace redag::report::assets\n")
+file(RENAME ${OUTPUT}.new ${OUTPUT})

@@ -1,0 +1,144 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <system_error>
+
+#include "redag/cli/commands.hpp"
+#include "redag/cli/files.hpp"
+#include "redag/cli/progress.hpp"
+#include "redag/cli/recorded_runs.hpp"
+#include "redag/cli/signals.hpp"
+#include "redag/report/document.hpp"
+#include "redag/report/page.hpp"
+#include "redag/report/verdict.hpp"
+#include "redag/trace/events_file.hpp"
+
+namespace redag::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::vector<std::string> places;
+  std::string output;
+  bool json = false;
+};
+
+class Reporting {
+ public:
+  Reporting(const Options &options, Console &console) : options_(options), console_(console), progress_(console) {}
+
+  int run() {
+    Result<RecordedPlaces> found = find_recorded_runs(options_.places);
+    if (!found) {
+      console_.note(found.error());
+      return kExitBad;
+    }
+    notes_ = std::move(found->notes);
+    const InterruptGuard guard;
+    if (!read(*found)) return kExitBad;
+    progress_.clear();
+    if (groups_.empty()) {
+      console_.error("interrupted before a run was read: there is nothing to report");
+      return kExitBad;
+    }
+    for (report::Group &group : groups_) group.finish();
+    return write();
+  }
+
+ private:
+  // False: an error was printed. Stops early, with what was read, when interrupted.
+  bool read(const RecordedPlaces &found) {
+    const report::DigestOptions sizes = report::digest_options(found.runs.size());
+    const std::size_t count = found.traces();
+    std::size_t done = 0;
+    for (const RecordedRuns &runs : found.runs) {
+      report::Group group(runs.label, sizes);
+      bool any = false;
+      for (const std::string &file : runs.traces) {
+        if (InterruptGuard::interrupted()) break;
+        progress_.draw(static_cast<double>(done) / static_cast<double>(count), file);
+        const Result<trace::Trace> trace = trace::read_trace(file);
+        if (!trace) {
+          progress_.clear();
+          console_.note(trace.error());
+          return false;
+        }
+        if (!group.fits(trace->info)) {
+          progress_.clear();
+          console_.error(
+              fmt::format("{}: is no repetition of the runs beside it: its executor, mode or tasks differ", file),
+              "name folders with one kind of run each");
+          return false;
+        }
+        group.add(fs::path(file).parent_path().string(), *trace);
+        any = true;
+        ++done;
+      }
+      if (any) groups_.push_back(std::move(group));
+    }
+    // One alone is named by what it is, not by where it lies.
+    if (groups_.size() == 1) groups_.front().set_label(groups_.front().info().executor);
+    if (done < count) {
+      notes_.push_back(fmt::format("interrupted: {} of {} runs were read", done, count));
+      console_.warn(notes_.back());
+    }
+    return true;
+  }
+
+  int write() {
+    report::DocumentOptions options;
+    options.notes = notes_;
+    const std::string document = report::to_json(groups_, options);
+    if (options_.json) {
+      console_.print(document + "\n");
+      if (options_.output.empty()) return kExitOk;
+    }
+    const std::string path = output();
+    const std::string html = report::page(document, report::title_of(groups_));
+    const Result<void> written = write_text(path, html);
+    if (!written) {
+      console_.note(written.error());
+      return kExitBad;
+    }
+    std::string text;
+    for (const report::Group &group : groups_) {
+      text += (groups_.size() > 1 ? group.label() + ": " : "") + report::verdict_of(group).front().text + "\n";
+    }
+    text += fmt::format("{}: {:.1f} MB, opens in any browser, without a network\n", path,
+                        static_cast<double>(html.size()) / 1e6);
+    if (options_.json) {
+      console_.note(text);
+    } else {
+      console_.print(text);
+    }
+    return kExitOk;
+  }
+
+  [[nodiscard]] std::string output() const {
+    if (!options_.output.empty()) return options_.output;
+    std::error_code ignored;
+    const fs::path first(options_.places.front());
+    return ((fs::is_directory(first, ignored) ? first : first.parent_path()) / "report.html").string();
+  }
+
+  const Options &options_;
+  Console &console_;
+  Progress progress_;
+  std::vector<report::Group> groups_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace
+
+Action add_report(CLI::App &app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("DIR", options->places, "Folders that run, simulate or compare wrote with --out; also with such below")
+      ->required();
+  app.add_option("-o,--output", options->output, "The page; default: report.html in the first DIR")->type_name("FILE");
+  app.add_flag("--json", options->json, "Write the report's data to standard output; a page only with -o");
+  return [options](Console &console) { return Reporting(*options, console).run(); };
+}
+
+}  // namespace redag::cli

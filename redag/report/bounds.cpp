@@ -1,0 +1,92 @@
+#include "redag/report/bounds.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string_view>
+
+#include "redag/analysis/analyze.hpp"
+#include "redag/analysis/wait_set.hpp"
+
+namespace redag::report {
+namespace {
+
+// Beyond, the dearest methods take longer than reading a report should.
+constexpr std::size_t kMostTasks = 1000;
+
+// "release 2us, dispatch 1us, preempt 0", as the simulator notes it. False: something else.
+bool read_overheads(std::string_view text, analysis::AnalysisPlatform &platform) {
+  while (!text.empty()) {
+    const std::size_t comma = std::min(text.find(", "), text.size());
+    const std::string_view part = text.substr(0, comma);
+    text.remove_prefix(std::min(text.size(), comma + 2));
+    const std::size_t blank = part.find(' ');
+    if (blank == std::string_view::npos) return false;
+    const Result<Duration> value = parse_duration(part.substr(blank + 1));
+    const std::string_view what = part.substr(0, blank);
+    Duration *target = what == "release"    ? &platform.release_overhead
+                       : what == "dispatch" ? &platform.dispatch_overhead
+                       : what == "preempt"  ? &platform.preempt_overhead
+                                            : nullptr;
+    if (!value || target == nullptr) return false;
+    *target = *value;
+  }
+  return true;
+}
+
+std::string describe(const analysis::AnalysisPlatform &platform, const std::string &overheads) {
+  return fmt::format("{} worker{}, {} preemption, {}", platform.workers, platform.workers == 1 ? "" : "s",
+                     trace::preemption_name(platform.preemption),
+                     overheads.empty() ? "no overheads" : "overheads " + overheads);
+}
+
+RunBounds none(std::string why) {
+  RunBounds bounds;
+  bounds.absent = std::move(why);
+  return bounds;
+}
+
+std::vector<BoundOf> by_id(const std::vector<analysis::Tightest> &all) {
+  std::vector<BoundOf> bounds;
+  for (const analysis::Tightest &one : all) {
+    bounds.push_back({one.response, one.response ? std::string(one.method->name) : std::string()});
+  }
+  return bounds;
+}
+
+}  // namespace
+
+RunBounds bounds_of(const trace::RunInfo &run) {
+  const bool wait_set = run.executor == "mte" || run.executor == "ste";
+  if (!wait_set && run.executor != "redag") return none("there is no analysis of the executor '" + run.executor + "'");
+  if (run.workload.task_count() > kMostTasks) {
+    return none(fmt::format("more than {} tasks: 'redag analyze' takes its time for them", kMostTasks));
+  }
+  analysis::AnalysisPlatform platform;
+  platform.workers = run.config.workers;
+  platform.preemption = run.config.preemption;
+  platform.levels = run.config.levels;
+  platform.max_started = run.config.max_started;
+  if (!read_overheads(run.overheads, platform)) return none("the run's overheads are not understood: " + run.overheads);
+  Workload workload = run.workload;
+  workload.policy = run.config.policy;
+  const Result<analysis::System> system = analysis::compile(workload, platform);
+  if (!system) return none(system.error().front().message);
+
+  const analysis::Report report =
+      wait_set ? analysis::analyze(*system, {analysis::wait_set()}) : analysis::analyze(*system);
+  RunBounds bounds;
+  bounds.assumes = describe(platform, run.overheads);
+  bounds.tasks = by_id(report.tasks);
+  bounds.dags = by_id(report.dags);
+  bounds.schedulable = report.verdict == analysis::Verdict::Schedulable;
+  for (const analysis::Method *method : report.by) bounds.by.emplace_back(method->name);
+  const auto bounded = [](const BoundOf &bound) { return bound.response.has_value(); };
+  if (!bounds.schedulable && std::none_of(bounds.tasks.begin(), bounds.tasks.end(), bounded)) {
+    bounds.absent = system->not_analysable.empty() ? "no sound method bounds a response here; 'redag analyze' says why"
+                                                   : system->not_analysable;
+  }
+  return bounds;
+}
+
+}  // namespace redag::report

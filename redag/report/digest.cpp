@@ -1,0 +1,110 @@
+#include "redag/report/digest.hpp"
+
+#include <algorithm>
+
+#include "redag/base/check.hpp"
+#include "redag/metrics/trace_checker.hpp"
+
+namespace redag::report {
+namespace {
+
+using metrics::JobOutcome;
+using metrics::JobRecord;
+
+double relative_lateness(const JobRecord &job) {
+  return static_cast<double>(job.lateness()) / static_cast<double>(std::max<Duration>(1, job.deadline - job.release));
+}
+
+bool same_tasks(const Workload &a, const Workload &b) {
+  const auto same_task = [](const Task &x, const Task &y) { return x.name == y.name; };
+  const auto same_dag = [&](const Dag &x, const Dag &y) {
+    return x.name == y.name && std::equal(x.tasks.begin(), x.tasks.end(), y.tasks.begin(), y.tasks.end(), same_task);
+  };
+  return std::equal(a.dags.begin(), a.dags.end(), b.dags.begin(), b.dags.end(), same_dag);
+}
+
+void append(std::vector<Duration> &to, const std::vector<Duration> &from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+}  // namespace
+
+bool Group::fits(const trace::RunInfo &run) const {
+  if (runs_.empty()) return true;
+  return run.executor == info().executor && run.preemption == info().preemption && run.driver == info().driver &&
+         run.config.workers == info().config.workers && same_tasks(run.workload, workload());
+}
+
+void Group::add(const std::string &path, const trace::Trace &trace) {
+  REDAG_CHECK(fits(trace.info), "jobs of different runs counted together");
+  const std::vector<JobRecord> jobs = metrics::fold_jobs(trace.info.workload, trace.events);
+  if (runs_.empty()) take_first(trace, jobs);
+  take(path, trace.info, jobs);
+  runs_.push_back(RunDigest{path, trace.info, metrics::summarize(trace),
+                            metrics::check_trace(trace, metrics::rules_for(trace.info))});
+}
+
+void Group::take_first(const trace::Trace &trace, const std::vector<JobRecord> &jobs) {
+  const std::vector<TaskRef> refs = flatten(trace.info.workload);
+  is_sink_.assign(refs.size(), true);
+  for (std::size_t t = 0; t < refs.size(); ++t) {
+    dag_of_.push_back(refs[t].dag);
+    for (const std::uint32_t p : refs[t].task->predecessors) is_sink_[t - refs[t].index + p] = false;
+  }
+  samples_.resize(refs.size());
+  end_to_end_.resize(trace.info.workload.dags.size());
+  bounds_ = bounds_of(trace.info);
+  schedule_ = schedule_of(trace, jobs, options_.most_slices, options_.most_views);
+  timeline_ = timeline_of(trace, slices_of(trace), jobs, options_.most_bins);
+}
+
+void Group::take(const std::string &path, const trace::RunInfo &info, const std::vector<JobRecord> &jobs) {
+  for (const JobRecord &job : jobs) {
+    if (job.release < info.start + info.warm_up || job.outcome != JobOutcome::Finished) continue;
+    Samples &samples = samples_[job.task.value];
+    samples.response.push_back(job.response());
+    samples.lateness.add(job.lateness(), std::max<Duration>(1, job.deadline - job.release));
+    samples.execution_max = std::max(samples.execution_max, job.on_worker);
+    if (is_sink_[job.task.value]) end_to_end_[dag_of_[job.task.value].value].push_back(job.finish - job.origin);
+    if (!latest_ || relative_lateness(job) > relative_lateness(latest_->record)) {
+      latest_ = LatestJob{job, path, job.release - info.start};
+    }
+  }
+}
+
+void Group::finish() {
+  REDAG_CHECK(!runs_.empty(), "a group without runs");
+  const std::size_t dags = workload().dags.size();
+  task_stats_.assign(samples_.size(), {});
+  dag_stats_.assign(dags, {});
+  end_to_end_stats_.assign(dags, {});
+  std::vector<std::vector<Duration>> of_dag(dags);
+  std::vector<Duration> all;
+  for (std::size_t t = 0; t < samples_.size(); ++t) {
+    const std::size_t d = dag_of_[t].value;
+    for (const RunDigest &run : runs_) task_stats_[t].add_counts(run.summary.tasks[t].jobs);
+    dag_stats_[d].add_counts(task_stats_[t]);
+    total_.add_counts(task_stats_[t]);
+    std::vector<Duration> &response = samples_[t].response;
+    std::sort(response.begin(), response.end());
+    task_stats_[t].response = metrics::distribution_of(response);
+    append(of_dag[d], response);
+    append(all, response);
+  }
+  for (std::size_t d = 0; d < dags; ++d) {
+    dag_stats_[d].response = metrics::distribution_of(std::move(of_dag[d]));
+    metrics::EndToEnd &end_to_end = end_to_end_stats_[d];
+    end_to_end.deadline = workload().dags[d].deadline;
+    for (const RunDigest &run : runs_) end_to_end.late += run.summary.dags[d].end_to_end.late;
+    end_to_end.response = metrics::distribution_of(std::move(end_to_end_[d]));
+  }
+  total_.response = metrics::distribution_of(std::move(all));
+}
+
+std::uint32_t Group::peak_active(DagId dag) const {
+  std::uint32_t peak = 0;
+  for (const RunDigest &run : runs_) peak = std::max(peak, run.summary.dags[dag.value].peak_active);
+  return peak;
+}
+
+}  // namespace redag::report

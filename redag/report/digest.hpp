@@ -1,0 +1,101 @@
+// A run cut down to what a report shows of it: everything that grows with its length is counted, sampled or cut here,
+// so that the trace itself can be forgotten. Runs of one executor on one workload form a group, whose figures are those
+// of all its jobs together. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "redag/metrics/check_report.hpp"
+#include "redag/metrics/jobs.hpp"
+#include "redag/metrics/summary.hpp"
+#include "redag/report/bounds.hpp"
+#include "redag/report/curves.hpp"
+#include "redag/report/schedule.hpp"
+#include "redag/report/timeline.hpp"
+#include "redag/trace/trace.hpp"
+
+namespace redag::report {
+
+struct DigestOptions {
+  std::size_t most_slices = 20'000;  // of the schedule, all windows together
+  std::size_t most_views = 6;
+  std::size_t most_bins = 400;
+};
+
+/// What of a task needs every job: 8 bytes each.
+struct Samples {
+  std::vector<Duration> response;  // f - r of finished jobs; sorted once the group is finished
+  LatenessHistogram lateness;      // the same jobs
+  Duration execution_max = 0;      // longest time on a worker
+};
+
+struct RunDigest {
+  std::string path;  // folder that it was read from
+  trace::RunInfo info;
+  metrics::Summary summary;
+  metrics::CheckReport check;
+};
+
+/// The job with the largest lateness, relative to its deadline.
+struct LatestJob {
+  metrics::JobRecord record;
+  std::string path;  // of its run
+  Time since = 0;    // release, from the start of the run
+};
+
+class Group {
+ public:
+  /// Without runs; add() the first before anything else.
+  Group(std::string label, const DigestOptions &options) : label_(std::move(label)), options_(options) {}
+
+  /// The schedule and the timeline are those of the first run. Requires fits(trace.info).
+  void add(const std::string &path, const trace::Trace &trace);
+  /// The same executor, mode and tasks: its jobs can be counted with the others'.
+  [[nodiscard]] bool fits(const trace::RunInfo &info) const;
+  /// After the last run: sorts, and makes the figures of all runs together.
+  void finish();
+
+  [[nodiscard]] const std::string &label() const { return label_; }
+  void set_label(std::string label) { label_ = std::move(label); }
+  [[nodiscard]] const std::vector<RunDigest> &runs() const { return runs_; }
+  [[nodiscard]] const trace::RunInfo &info() const { return runs_.front().info; }
+  [[nodiscard]] const Workload &workload() const { return info().workload; }
+  [[nodiscard]] const RunBounds &bounds() const { return bounds_; }
+  [[nodiscard]] const Schedule &schedule() const { return schedule_; }
+  [[nodiscard]] const Timeline &timeline() const { return timeline_; }
+  [[nodiscard]] const std::optional<LatestJob> &latest() const { return latest_; }
+
+  // Of all runs together: counts, and of the distributions only `response`.
+  [[nodiscard]] const metrics::JobStats &task(TaskId task) const { return task_stats_[task.value]; }
+  [[nodiscard]] const metrics::JobStats &dag(DagId dag) const { return dag_stats_[dag.value]; }
+  [[nodiscard]] const metrics::JobStats &total() const { return total_; }
+  [[nodiscard]] const metrics::EndToEnd &end_to_end(DagId dag) const { return end_to_end_stats_[dag.value]; }
+  [[nodiscard]] const Samples &samples(TaskId task) const { return samples_[task.value]; }
+  [[nodiscard]] std::uint32_t peak_active(DagId dag) const;
+
+ private:
+  void take_first(const trace::Trace &trace, const std::vector<metrics::JobRecord> &jobs);
+  void take(const std::string &path, const trace::RunInfo &info, const std::vector<metrics::JobRecord> &jobs);
+
+  std::string label_;
+  DigestOptions options_;
+  std::vector<RunDigest> runs_;
+  std::vector<bool> is_sink_;                      // by TaskId
+  std::vector<DagId> dag_of_;                      // by TaskId
+  std::vector<Samples> samples_;                   // by TaskId
+  std::vector<std::vector<Duration>> end_to_end_;  // by DagId: f - origin at the sinks
+  std::optional<LatestJob> latest_;
+  RunBounds bounds_;
+  Schedule schedule_;
+  Timeline timeline_;
+  std::vector<metrics::JobStats> task_stats_;
+  std::vector<metrics::JobStats> dag_stats_;
+  metrics::JobStats total_;
+  std::vector<metrics::EndToEnd> end_to_end_stats_;
+};
+
+}  // namespace redag::report

@@ -1,0 +1,59 @@
+#include "redag/report/page.hpp"
+
+#include <utility>
+
+#include "redag/base/check.hpp"
+#include "redag/report/page_assets.hpp"
+
+namespace redag::report {
+
+std::string script_safe(std::string_view json) {
+  std::string safe;
+  safe.reserve(json.size());
+  for (const char c : json) {
+    if (c == '<') {
+      safe += "\\u003c";  // neither "</script>" nor "<!--" can end or change the element
+    } else {
+      safe += c;
+    }
+  }
+  return safe;
+}
+
+std::string html_escaped(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&': escaped += "&amp;"; break;
+      case '<': escaped += "&lt;"; break;
+      case '>': escaped += "&gt;"; break;
+      case '"': escaped += "&quot;"; break;
+      case '\'': escaped += "&#39;"; break;
+      default: escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string page(std::string_view document, std::string_view title) {
+  // In the order in which they stand in the template, so that nothing that was put in is looked at again.
+  const std::string safe_title = html_escaped(title);
+  const std::string safe_document = script_safe(document);
+  const std::pair<std::string_view, std::string_view> parts[] = {
+      {"{{title}}", safe_title},         {"{{style}}", assets::kStyle},   {"{{document}}", safe_document},
+      {"{{echarts}}", assets::kEcharts}, {"{{script}}", assets::kScript},
+  };
+  std::string html;
+  std::string_view rest = assets::kTemplate;
+  for (const auto &[place, text] : parts) {
+    const std::size_t at = rest.find(place);
+    REDAG_CHECK(at != std::string_view::npos, "the page's template lacks a place");
+    html += rest.substr(0, at);
+    html += text;
+    rest.remove_prefix(at + place.size());
+  }
+  html += rest;
+  return html;
+}
+
+}  // namespace redag::report

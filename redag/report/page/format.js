@@ -1,0 +1,40 @@
+// Numbers and times as people read them. Times are nanoseconds.
+
+const UNITS = [['s', 1e9], ['ms', 1e6], ['\u00b5s', 1e3], ['ns', 1]];
+
+/** "12.35 ms": four significant digits and the unit that fits; a dash where there is no time. */
+function formatTime(ns) {
+  if (ns === null || ns === undefined) return '\u2013';
+  if (ns === 0) return '0';
+  const size = Math.abs(ns);
+  const [unit, factor] = UNITS.find(([, f]) => size >= f) || UNITS[3];
+  return `${Number((ns / factor).toPrecision(4))}\u00a0${unit}`;
+}
+
+/** A time on an axis on which `step` is the least distance that can be told apart. */
+function formatAxisTime(ns, step) {
+  if (ns === 0) return '0';
+  const [unit, factor] = UNITS.find(([, f]) => Math.abs(ns) >= f) || UNITS[3];
+  const digits = Math.min(9, Math.max(0, Math.ceil(Math.log10(factor / Math.max(step, 1)))));
+  return `${Number((ns / factor).toFixed(digits))} ${unit}`;
+}
+
+/** 1234567 -> "1 234 567". */
+const formatCount = (count) => String(count).replace(/\B(?=(\d{3})+$)/g, '\u202f');
+
+/** "14.2 %"; a miss never reads as none. */
+function formatPercent(ratio) {
+  const percent = 100 * ratio;
+  if (percent > 0 && percent < 0.05) return `${Number(percent.toPrecision(2))}\u00a0%`;
+  return `${percent.toFixed(1)}\u00a0%`;
+}
+
+const DRIVERS = {
+  simulator: 'in virtual time', threads: 'on threads of this machine', ros: 'under ROS 2, as the executor saw it',
+  ros_nodes: 'under ROS 2, as the nodes saw it',
+};
+const OUTCOMES = ['in progress', 'finished', 'skipped', 'aborted'];
+const REASONS = [
+  '', 'not started when the next was released', 'not ready when the next was released', 'its queue was full',
+  'its DAG was full', 'its task was removed', 'exception', 'over its budget', 'nothing to do',
+];

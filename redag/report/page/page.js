@@ -1,0 +1,157 @@
+// The page: what stands where, and what the reader has chosen.
+
+const report = JSON.parse(document.getElementById('data').textContent);
+const {groups} = report;
+const state = {executor: 0, task: null, tail: false, log: false, view: 0, rows: 'tasks'};
+const several = groups.length > 1;
+
+const MARKS = {good: '\u2713', bad: '\u2717', caution: '!', plain: '\u2022'};
+const verdictList = (sentences) => element('ul.verdict', {},
+  ...sentences.map(({tone, text}) => element(`li.${tone}`, {}, element('b', {'aria-hidden': 'true'}, MARKS[tone]), text)));
+
+/** A place whose content is made again by its `fill`. */
+function place(fill) {
+  const node = element('div');
+  node.refill = () => node.replaceChildren(...[].concat(fill()));
+  return node;
+}
+const places = [];
+function filled(fill) {
+  const node = place(fill);
+  places.push(node);
+  return node;
+}
+
+function header() {
+  const run = groups[0].run;
+  const seconds = (run.end_ns - run.start_ns) / 1e9;
+  const runs = groups.reduce((sum, group) => sum + group.runs.length, 0);
+  const facts = [
+    several ? groups.map((group) => group.label).join(', ') : run.executor,
+    `${run.config.workers} worker${run.config.workers === 1 ? '' : 's'}`,
+    DRIVERS[run.driver], `${runs > 1 ? `${runs} runs of ` : ''}${Number(seconds.toPrecision(3))} s`,
+    `${formatCount(groups.reduce((sum, group) => sum + group.total.released, 0))} jobs`,
+  ];
+  const names = ['auto', 'light', 'dark'];
+  const theme = choice(names, 0, (i) => {
+    forced = i === 0 ? null : names[i];
+    applyTheme();
+  });
+  return [
+    element('div.head', {}, element('h1', {}, report.title), element('div.controls', {}, theme)),
+    element('p.facts', {}, facts.join(' \u00b7 ')),
+  ];
+}
+
+function comparisonSection() {
+  if (!several) return [];
+  const rows = report.comparison.dags;
+  const parts = [element('h2', {id: 'comparison'}, 'Executors side by side')];
+  if (rows.length === 0) return [...parts, element('p', {}, 'The runs have no DAG in common.')];
+  const figures = [
+    comparisonFigure({
+      name: 'missed', title: 'missed', groups, rows, value: (row, cell) => cell.missed, log: false, format: formatPercent,
+      formatAxis: (share) => `${Number((100 * share).toPrecision(3))} %`,
+      caption: 'Share of the released jobs that were late, skipped or aborted: median over repetitions, lines from the lowest to the highest.',
+    }),
+    comparisonFigure({
+      name: 'p99', title: 'p99 response', groups, rows, value: (row, cell) => cell.p99_ns, log: true,
+      format: (ns) => (ns > 0 ? formatTime(Number(ns.toPrecision(3))) : ''), formatAxis: (ns) => formatAxisTime(ns, ns),
+      caption: '99th percentile of the responses of all jobs of the DAG, logarithmic; lines from the lowest to the highest repetition.',
+    }),
+  ];
+  return [...parts, element('div.side-by-side', {}, ...figures.map((fig) => fig.box)), filled(() => comparisonTable(groups, rows))];
+}
+
+function taskChoice(refresh) {
+  return filled(() => {
+    const group = groups[state.executor];
+    const tasks = group.tasks.map((task, i) => i).filter((i) => hasCurve(group.tasks[i]));
+    const names = ['all tasks, as a share of their deadlines', ...tasks.map((i) => taskName(group, i))];
+    return dropdown('task', names, 1 + tasks.indexOf(state.task), (i) => {
+      state.task = i === 0 ? null : tasks[i - 1];
+      places.forEach((node) => node.refill());
+      refresh();
+    });
+  });
+}
+
+function detailSections() {
+  const responses = responseFigure(groups, state);
+  const lateness = latenessFigure(groups, state);
+  const timeline = timelineFigure(groups, state);
+  const schedule = scheduleFigure(groups, state);
+  const redraw = () => { responses.draw(); lateness.draw(); };
+
+  const pick = several ? [element('div.row.executors', {}, element('span.soft', {}, 'what follows is of'),
+    choice(groups.map((group) => group.label), 0, (i) => {
+      const name = state.task === null ? null : taskName(groups[state.executor], state.task);
+      state.executor = i;
+      // The same task, where the other one has it.
+      const same = name === null ? -1 : groups[i].tasks.findIndex((task, k) => taskName(groups[i], k) === name);
+      state.task = same < 0 ? null : same;
+      state.view = 0;
+      places.forEach((node) => node.refill());
+      redraw();
+      timeline.draw();
+      schedule.look();
+    }))] : [];
+
+  return [
+    ...pick,
+    several ? filled(() => verdictList(groups[state.executor].verdict)) : null,
+    element('h2', {id: 'dags'}, 'DAGs'), filled(() => dagTable(groups[state.executor])),
+    element('h2', {id: 'tasks'}, 'Tasks: measured and proven'),
+    filled(() => {
+      const {bounds} = groups[state.executor];
+      return element('p.soft', {}, bounds.absent ? `No bounds: ${bounds.absent}.`
+        : `Bounds for ${bounds.assumes}; the method stands in the tooltip of a bound.`);
+    }),
+    filled(() => taskTable(groups[state.executor])),
+    element('h2', {id: 'responses'}, 'Response times'),
+    element('div.row.controls', {}, taskChoice(redraw),
+      choice(['distribution', 'tail'], 0, (i) => { state.tail = i === 1; responses.draw(); }),
+      choice(['linear time', 'logarithmic'], 0, (i) => { state.log = i === 1; responses.draw(); })),
+    responses.box,
+    element('h3', {}, 'Lateness'), lateness.box,
+    element('h2', {id: 'schedule'}, 'Schedule'), timeline.box,
+    element('h3', {}, 'In detail'),
+    element('div.row.controls', {},
+      filled(() => dropdown('show', viewNames(groups[state.executor]), state.view, (i) => { state.view = i; schedule.look(); })),
+      choice(['tasks', 'workers'], 0, (i) => { state.rows = i === 1 ? 'workers' : 'tasks'; schedule.draw(); }),
+      element('span.switch', {}, element('button', {type: 'button', 'aria-label': 'zoom in', onclick: () => schedule.zoom(2)}, '+'),
+        element('button', {type: 'button', 'aria-label': 'zoom out', onclick: () => schedule.zoom(0.5)}, '\u2212'))),
+    schedule.box,
+  ];
+}
+
+function howItWasRun() {
+  const facts = () => {
+    const {run} = groups[state.executor];
+    const {config, machine} = run;
+    const rows = [
+      ['Executor', run.executor], ['World', DRIVERS[run.driver]],
+      ['Preemption', run.preemption + (run.preemption_why ? ` (${run.preemption_why})` : '')],
+      ['Workers', `${config.workers}${config.levels ? `, ${config.levels} priority levels` : ''}`], ['Policy', config.policy],
+      ['Length', `${formatTime(run.end_ns - run.start_ns)}${run.warm_up_ns ? `, of which ${formatTime(run.warm_up_ns)} warm-up are not counted` : ''}`],
+      ['Overheads', run.overheads || 'none added'],
+      ['Machine', [machine.model, machine.cpus ? `${machine.cpus} processors` : '', machine.kernel].filter(Boolean).join(', ') || 'not recorded'],
+    ];
+    if (run.lost_events > 0) rows.push(['Lost events', formatCount(run.lost_events)]);
+    return [element('dl', {}, ...rows.flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])),
+      element('details', {}, element('summary', {}, 'The workload'), element('pre', {}, run.workload))];
+  };
+  return [
+    element('h2', {id: 'how'}, 'How it was run'), filled(facts), runTable(groups),
+    ...(report.cuts.length === 0 ? [] : [element('h3', {}, 'What is not shown'), element('ul.soft', {}, ...report.cuts.map((cut) => element('li', {}, cut)))]),
+    element('footer', {}, `Made by redag ${report.version}. Figures: Apache ECharts ${echarts.version} (Apache License 2.0). `
+      + 'This file uses no network. Each figure can be saved as PNG or SVG with the buttons above it.'),
+  ];
+}
+
+document.documentElement.dataset.theme = themeName();
+themed.push(() => places.forEach((node) => node.refill()));
+const all = [...header(), verdictList(several ? report.comparison.words : groups[0].verdict), ...comparisonSection(), ...detailSections(), ...howItWasRun()];
+document.getElementById('report').append(...all.filter((node) => node !== null));
+applyTheme();
+document.documentElement.dataset.ready = 'true';

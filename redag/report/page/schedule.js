@@ -1,0 +1,186 @@
+// The schedule: what ran where and when. Rows are tasks (with releases, deadlines and misses) or workers.
+
+const OPEN = 3;       // Slice::End
+const PREEMPTED = 2;
+const SKIPPED = 2;    // JobOutcome
+const ROW_HEIGHT = 30;
+const ROOM_FOR_ARROWS = 9;  // pixels from release to deadline; where there are fewer, only misses are marked
+
+function scheduleFigure(groups, state) {
+  let zoom = null;   // what the reader looks at, kept when the theme changes
+
+  // Jobs and slices of the window that is looked at, as rows for ECharts; times in ns since the start of the run.
+  function contents() {
+    const group = groups[state.executor];
+    const view = group.schedule.views[state.view] || group.schedule.views[0];
+    const seen = group.schedule.windows[view.window];
+    const {jobs, slices} = seen;
+    const start = group.run.start_ns;
+    const from = seen.begin_ns - start;
+    const used = state.rows === 'workers' ? [] : [...new Set([...jobs.task, ...slices.task])].sort((a, b) => a - b);
+    const rows = state.rows === 'workers'
+      ? Array.from({length: group.run.config.workers}, (_, w) => `worker ${w}`)
+      : used.map((task) => taskName(group, task));
+    const rowOf = new Map(used.map((task, i) => [task, i]));
+    const row = (task, worker) => (state.rows === 'workers' ? worker : rowOf.get(task));
+    const bars = slices.task.map((task, i) => [
+      row(task, slices.worker[i]), from + slices.begin[i], from + slices.begin[i] + slices.length[i], i]);
+    const marks = state.rows === 'workers' ? [] : jobs.task.map((task, i) => [
+      rowOf.get(task), from + jobs.release[i], from + jobs.release[i] + jobs.deadline[i], i]);
+    return {group, view, jobs, slices, rows, bars, marks, from, to: seen.end_ns - start, start};
+  }
+
+  function describeJob(c, j) {
+    const {jobs} = c;
+    const task = c.group.tasks[jobs.task[j]];
+    const reason = REASONS[jobs.reason[j]];
+    const finished = jobs.finish[j] !== null && jobs.outcome[j] === 1;
+    const late = finished ? jobs.finish[j] - jobs.deadline[j] : 0;
+    return [
+      `${taskName(c.group, jobs.task[j])} #${jobs.number[j]}`,
+      `released ${formatTime(c.from + jobs.release[j])}, deadline ${formatTime(jobs.deadline[j])} later`,
+      finished ? `response ${formatTime(jobs.finish[j])}${task.bound_ns ? `, bound ${formatTime(task.bound_ns)}` : ''}`
+        : `${OUTCOMES[jobs.outcome[j]]}${reason ? `: ${reason}` : ''}`,
+      late > 0 ? `late by ${formatTime(late)}` : null,
+    ];
+  }
+
+  const fig = figure({
+    name: 'schedule', height: 300, canvas: true, label: 'Schedule',
+    caption: 'Drag to move; Ctrl and the wheel, or two fingers, to zoom. Colour: the DAG. \u2191 release, \u2193 deadline; red: a missed deadline, '
+      + '\u00d7 a job that was lost. A stretch that ends with a notch was preempted.',
+    build(t) {
+      const c = contents();
+      const inTasks = state.rows === 'tasks';
+      const clip = (params, shape) => echarts.clipRectByRect(shape, params.coordSys);
+      if (zoom === null) zoom = firstLook(c);
+      fig.resize(Math.max(160, 96 + ROW_HEIGHT * c.rows.length));
+      const missed = (i) => c.slices.job[i] !== null && c.jobs.missed[c.slices.job[i]] === 1;
+      return {
+        grid: {left: 8, right: 16, top: 34, bottom: 52, containLabel: true},
+        tooltip: {
+          trigger: 'item',
+          formatter: (item) => {
+            const i = item.value[3];
+            if (item.seriesName === 'jobs') return tip(describeJob(c, i));
+            const j = c.slices.job[i];
+            const job = j === null ? [taskName(c.group, c.slices.task[i])] : describeJob(c, j);
+            return tip([...job, `worker ${c.slices.worker[i]}: ${formatTime(c.slices.length[i])} from ${formatTime(item.value[1])}`,
+              ['finished here', 'aborted here', 'preempted here', 'goes on'][c.slices.how[i]]]);
+          },
+        },
+        dataZoom: [
+          {type: 'inside', startValue: zoom[0], endValue: zoom[1], filterMode: 'weakFilter', minValueSpan: 100,
+            zoomOnMouseWheel: 'ctrl', preventDefaultMouseMove: false},
+          {type: 'slider', startValue: zoom[0], endValue: zoom[1], filterMode: 'weakFilter', height: 18, bottom: 4,
+            showDetail: false, brushSelect: false, borderColor: t.line, backgroundColor: t.raised,
+            fillerColor: t.dark ? 'rgba(108,178,255,.18)' : 'rgba(11,98,196,.14)', handleStyle: {color: t.paper, borderColor: t.soft},
+            moveHandleStyle: {color: t.line}},
+        ],
+        xAxis: {
+          type: 'value', min: c.from, max: c.to, splitNumber: 6,
+          axisLabel: {showMaxLabel: false, formatter: (value) => formatAxisTime(value, (zoom[1] - zoom[0]) / 50)},
+        },
+        yAxis: {
+          type: 'category', data: c.rows, inverse: true, axisTick: {show: false}, splitLine: {show: true},
+          axisLabel: {color: t.ink, width: Math.min(170, window.innerWidth * 0.24), overflow: 'truncate', interval: 0, fontSize: 11.5},
+        },
+        series: [
+          {
+            type: 'custom', name: 'jobs', data: c.marks, encode: {x: [1, 2], y: 0}, z: 3, progressive: 0,
+            renderItem: (params, api) => {
+              const i = api.value(3);
+              const [x0, y] = api.coord([api.value(1), api.value(0)]);
+              const [x1] = api.coord([api.value(2), api.value(0)]);
+              const half = ROW_HEIGHT * 0.46;
+              const {x: left, width} = params.coordSys;
+              const bad = c.jobs.missed[i] === 1;
+              const children = [];
+              const arrow = (x, up, colour) => {
+                if (x < left - 0.5 || x > left + width + 0.5) return;
+                const head = up ? y - half : y + half - 1;
+                const d = up ? 4 : -4;
+                children.push({type: 'line', shape: {x1: x, x2: x, y1: y - half, y2: y + half - 1}, style: {stroke: colour, lineWidth: bad && !up ? 1.6 : 1}});
+                children.push({type: 'polygon', shape: {points: [[x, head], [x - 2.6, head + d], [x + 2.6, head + d]]}, style: {fill: colour}});
+              };
+              if (x1 - x0 < ROOM_FOR_ARROWS) {
+                if (!bad || x1 < left || x1 > left + width) return null;
+                return {type: 'line', shape: {x1, x2: x1, y1: y + 2, y2: y + half}, style: {stroke: t.bad, lineWidth: 1, opacity: 0.7}};
+              }
+              arrow(x0, true, t.soft);
+              arrow(x1, false, bad ? t.bad : t.soft);
+              const lost = c.jobs.outcome[i] >= SKIPPED && bad;
+              if (lost) {
+                const x = Math.max(x0 + 7, left + 5);
+                if (x < left + width - 4) children.push({type: 'path', shape: {pathData: 'M0 0L8 8M8 0L0 8', x: x - 4, y: y - 4, width: 8, height: 8},
+                  style: {stroke: t.bad, lineWidth: 2, fill: 'none'}});
+              }
+              return children.length === 0 ? null : {type: 'group', children};
+            },
+          },
+          {
+            type: 'custom', name: 'schedule', data: c.bars, encode: {x: [1, 2], y: 0}, z: 2, progressive: 0,
+            renderItem: (params, api) => {
+              const i = api.value(3);
+              const [x0, y] = api.coord([api.value(1), api.value(0)]);
+              const [x1] = api.coord([api.value(2), api.value(0)]);
+              const height = ROW_HEIGHT * (inTasks ? 0.56 : 0.74);
+              const box = clip(params, {x: x0, y: y - height / 2, width: Math.max(1, x1 - x0), height});
+              if (!box) return null;
+              const bad = missed(i);
+              const colour = colourOf(t, c.group.tasks[c.slices.task[i]].dag);
+              const children = [{type: 'rect', shape: {...box, r: box.width > 4 ? 2 : 0},
+                style: {fill: colour, opacity: c.slices.how[i] === OPEN ? 0.55 : 0.92, stroke: bad ? t.bad : 'transparent', lineWidth: bad && box.width > 2 ? 2 : 0}}];
+              if (c.slices.how[i] === PREEMPTED && box.width > 5) {
+                const right = box.x + box.width;
+                children.push({type: 'polygon', shape: {points: [[right + 0.5, box.y], [right - 4, y], [right + 0.5, box.y + height]]}, style: {fill: t.paper}});
+              }
+              if (!inTasks && box.width > 34) {
+                children.push({type: 'text', silent: true, style: {text: c.group.tasks[c.slices.task[i]].name, x: box.x + 4, y, fontSize: 11,
+                  width: box.width - 8, overflow: 'truncate', ellipsis: '', textVerticalAlign: 'middle', fill: t.paper}});
+              }
+              return {type: 'group', children};
+            },
+          },
+        ],
+      };
+    },
+    onready(chart) {
+      chart.on('datazoom', () => {
+        const {startValue, endValue} = chart.getOption().dataZoom[0];
+        zoom = [startValue, endValue];
+      });
+    },
+  });
+
+  // Of the beginning: as much as there is room for; of a worst job: its surroundings.
+  function firstLook(c) {
+    if (state.view > 0) return [c.view.begin_ns - c.start, c.view.end_ns - c.start];
+    const count = window.innerWidth < 640 ? 50 : 120;
+    const {release} = c.jobs;
+    const until = release.length > count ? c.from + release[count] : c.to;
+    return [c.from, until > c.from ? until : c.to];
+  }
+
+  fig.zoom = (factor) => {
+    const middle = (zoom[0] + zoom[1]) / 2;
+    const half = (zoom[1] - zoom[0]) / 2 / factor;
+    zoom = [middle - half, middle + half];
+    fig.chart().dispatchAction({type: 'dataZoom', startValue: zoom[0], endValue: zoom[1]});
+  };
+  fig.look = () => {
+    zoom = null;
+    fig.draw();
+  };
+  return fig;
+}
+
+/** What the list of views says: "the beginning", "control.pid #12: late by 2.1 ms". */
+function viewNames(group) {
+  const all = group.schedule.slices_shown === group.schedule.slices_in_all;
+  return group.schedule.views.map((view) => {
+    if (view.task === undefined) return all ? 'the whole run' : 'the beginning';
+    const how = view.lateness_ns > 0 ? `${formatTime(view.lateness_ns)} late` : `${formatTime(-view.lateness_ns)} to spare`;
+    return `${taskName(group, view.task)} #${view.job}, ${how}`;
+  });
+}

@@ -1,0 +1,112 @@
+// Tables: per DAG, per task, executors side by side, the runs.
+
+const column = (title, help, text = false) => ({title, help, text});
+const swatch = (t, index) => element('span.swatch', {style: `background:${colourOf(t, index)}`});
+
+function missCell(jobs) {
+  const lost = Object.entries(jobs.lost_by_reason).map(([reason, count]) => `${formatCount(count)} ${reason}`);
+  return {
+    text: formatPercent(jobs.miss_ratio), kind: jobs.missed > 0 ? 'bad' : 'good',
+    title: `${formatCount(jobs.missed)} of ${formatCount(jobs.released)}: ${[`${formatCount(jobs.late)} late`, ...lost].join(', ')}`,
+  };
+}
+
+/** Median to maximum as a bar against the deadline (the end of the track), with the bound as a tick. */
+function meter(t, response, deadline, bound, colour) {
+  if (!response || !deadline) return '';
+  const most = Math.max(deadline, response.max_ns, bound || 0) * 1.04;
+  const x = (ns) => (100 * ns / most).toFixed(2);
+  const late = response.max_ns > deadline;
+  const title = `p50 ${formatTime(response.p50_ns)}, p99 ${formatTime(response.p99_ns)}, max ${formatTime(response.max_ns)}; `
+    + `deadline ${formatTime(deadline)}${bound ? `, bound ${formatTime(bound)}` : ''}`;
+  const svg = svgElement('svg', {class: 'meter', viewBox: '0 0 100 16', preserveAspectRatio: 'none', role: 'img', 'aria-label': title},
+    svgElement('rect', {x: 0, y: 5, width: x(deadline), height: 6, fill: t.line}),
+    svgElement('rect', {x: 0, y: 5, width: x(response.max_ns), height: 6, fill: late ? t.bad : colour, opacity: 0.45}),
+    svgElement('rect', {x: 0, y: 5, width: x(response.p99_ns), height: 6, fill: late && response.p99_ns > deadline ? t.bad : colour, opacity: 0.6}),
+    svgElement('rect', {x: 0, y: 5, width: x(response.p50_ns), height: 6, fill: colour}),
+    svgElement('rect', {x: Math.max(0, x(deadline) - 0.5), y: 1, width: 0.9, height: 14, fill: t.bad}));
+  if (bound) svg.append(svgElement('rect', {x: Math.max(0, x(bound) - 0.5), y: 1, width: 0.9, height: 14, fill: t.good}));
+  return element('span', {title}, svg);
+}
+
+const meterHelp = 'Solid: median; lighter: p99 and max; grey: the time until the deadline. Red tick: deadline, green tick: bound';
+
+function boundCell(bound, measured, method) {
+  if (bound === null || bound === undefined) return '\u2013';
+  return {text: formatTime(bound), kind: measured > bound ? 'bad' : '', title: `by ${method}${measured > bound ? '; exceeded' : ''}`};
+}
+
+function taskTable(group) {
+  const t = theme();
+  const columns = [
+    column('task'), column('period'), column('deadline'), column('jobs', 'Released'), column('missed', 'Late, skipped or aborted, of all released'),
+    column('p50', 'Response f \u2212 r, median'), column('p99'), column('max'), column('bound', 'Tightest sound bound on the response'),
+    column('measured, bound, deadline', meterHelp, true), column('L max', 'Largest lateness; negative: how close a job came'),
+    column('ran / wcet', 'Longest time of a job on a worker, and what it was stated to take at most'), column('preempted', 'How often jobs lost their worker'),
+  ];
+  let dag = -1;
+  const rows = group.tasks.filter((task) => task.jobs !== undefined).map((task) => {
+    const first = task.dag !== dag;
+    dag = task.dag;
+    const r = task.jobs.response;
+    const name = `${group.dags[task.dag].name}.${task.name}`;
+    return {first, cells: [
+      {text: element('span', {title: name}, swatch(t, task.dag), name)}, formatTime(task.period_ns), formatTime(task.deadline_ns), formatCount(task.jobs.released),
+      missCell(task.jobs), formatTime(r && r.p50_ns), formatTime(r && r.p99_ns),
+      {text: formatTime(r && r.max_ns), kind: r && r.max_ns > task.deadline_ns ? 'bad' : ''},
+      boundCell(task.bound_ns, r ? r.max_ns : 0, task.method),
+      {text: meter(t, r, task.deadline_ns, task.bound_ns, colourOf(t, task.dag))},
+      {text: formatTime(task.jobs.max_lateness_ns), kind: task.jobs.max_lateness_ns > 0 ? 'bad' : ''},
+      {text: `${formatTime(task.execution_max_ns)} / ${task.wcet_ns > 0 ? formatTime(task.wcet_ns) : '\u2013'}`,
+        kind: task.wcet_ns > 0 && task.execution_max_ns > task.wcet_ns && group.run.driver !== 'simulator' ? 'bad' : ''},
+      formatCount(task.jobs.preemptions),
+    ]};
+  });
+  return table(columns, rows);
+}
+
+function dagTable(group) {
+  const t = theme();
+  const columns = [
+    column('DAG'), column('tasks'), column('rate', 'Of its fastest task'), column('jobs'), column('missed', 'Late, skipped or aborted, of all released'),
+    column('end to end p50', 'From a source\u2019s release to a sink\u2019s finish'), column('p99'), column('max'), column('bound'), column('deadline', 'End to end'),
+    column('active / bound', 'Most jobs in progress at any time, and max_active'),
+  ];
+  return table(columns, group.dags.map((dag, d) => {
+    const r = dag.end_to_end.response;
+    return {cells: [
+      {text: element('span', {}, swatch(t, d), dag.name)}, String(dag.tasks), dag.period_ns > 0 ? `${Number((1e9 / dag.period_ns).toPrecision(3))} Hz` : '\u2013',
+      formatCount(dag.jobs.released), missCell(dag.jobs), formatTime(r && r.p50_ns), formatTime(r && r.p99_ns), formatTime(r && r.max_ns),
+      boundCell(dag.bound_ns, r ? r.max_ns : 0, dag.method),
+      dag.deadline_ns > 0 ? {text: formatTime(dag.deadline_ns), kind: r && r.max_ns > dag.deadline_ns ? 'bad' : ''} : '\u2013',
+      `${dag.peak_active} / ${dag.max_active > 0 ? dag.max_active : '\u221e'}`,
+    ]};
+  }));
+}
+
+function comparisonTable(groups, rows) {
+  const t = theme();
+  const columns = [
+    column('DAG'), column('executor', '', true), column('jobs'), column('late', 'Late, of all released'), column('missed', 'Late, skipped or aborted, of all released'),
+    column('p50', 'Response of all jobs of the DAG'), column('p95'), column('p99'), column('max'),
+  ];
+  const range = ({min, max}) => (formatPercent(min) === formatPercent(max) ? undefined : `repetitions: ${formatPercent(min)} to ${formatPercent(max)}`);
+  return table(columns, rows.flatMap((row) => row.groups.map((cell, g) => ({first: g === 0, cells: [
+    g === 0 ? row.name : '', {text: element('span', {}, swatch(t, g), groups[g].label)}, formatCount(cell.released), formatPercent(cell.late.median),
+    {text: formatPercent(cell.missed.median), kind: cell.missed.median > 0 ? 'bad' : 'good', title: range(cell.missed)},
+    ...['p50_ns', 'p95_ns', 'p99_ns', 'max_ns'].map((key) => formatTime(cell[key].median)),
+  ]}))));
+}
+
+function runTable(groups) {
+  const columns = [
+    column('run'), column('seed'), column('jobs'), column('missed'), column('workers busy'), column('rules checked'), column('violations'),
+    column('priority inversions', 'Stretches in which a more urgent job waited while a less urgent one ran'), column('longest'),
+  ];
+  return table(columns, groups.flatMap((group) => group.runs.map((run) => ({cells: [
+    {text: element('span', {title: run.path}, run.path.split('/').slice(-2).join('/'))}, String(run.seed), formatCount(run.released), formatPercent(run.miss_ratio),
+    run.worker_busy.map((share) => `${(100 * share).toFixed(0)}\u00a0%`).join(', '), formatCount(run.checks),
+    {text: formatCount(run.violation_count), kind: run.violation_count > 0 ? 'bad' : 'good', title: run.violations.join('\n')},
+    formatCount(run.inversions.count), formatTime(run.inversions.longest_ns),
+  ]}))));
+}

@@ -1,0 +1,13 @@
+// The files of redag/report/page and third_party/echarts, put into the library when it is built (cmake/embed.cmake).
+#pragma once
+
+#include <string_view>
+
+namespace redag::report::assets {
+
+extern const std::string_view kTemplate;
+extern const std::string_view kStyle;
+extern const std::string_view kEcharts;
+extern const std::string_view kScript;
+
+}  // namespace redag::report::assets

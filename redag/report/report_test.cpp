@@ -1,0 +1,201 @@
+// Runs to document: bounds, verdicts, what is pooled, what is cut.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "redag/report/document.hpp"
+#include "redag/report/verdict.hpp"
+#include "redag/sched/executors.hpp"
+#include "redag/testing/timeline.hpp"
+#include "redag/testing/trace_builder.hpp"
+
+namespace redag::report {
+namespace {
+
+using nlohmann::json;
+using testing::TraceBuilder;
+
+Workload hi_and_lo(PreemptionMode mode) {
+  Workload workload = testing::make_workload(
+      {testing::make_dag("hi", {{"h", 10, 2}}), testing::make_dag("lo", {{"l", 50, 20}})}, 1, mode);
+  workload.name = "two rates";
+  return workload;
+}
+
+trace::Trace simulated(const Workload &workload, Duration length, const std::string &executor = "redag",
+                       std::uint64_t seed = 1) {
+  trace::Trace trace = TraceBuilder(workload).until(length / kMillisecond);
+  trace.info.executor = executor;
+  trace.info.seed = seed;
+  trace.info.config = sched::effective_config(*sched::find_executor(executor), trace.info.config);
+  trace.info.preemption = trace::preemption_name(trace.info.config.preemption);
+  sim::Options options;
+  options.horizon = length;
+  options.seed = seed;
+  const auto scheduler = sched::make_scheduler(executor, workload, trace.info.config);
+  sim::simulate(workload, *scheduler, trace.info.config.workers, options, [&](std::span<const JobEvent> events) {
+    trace.events.insert(trace.events.end(), events.begin(), events.end());
+    return true;
+  });
+  return trace;
+}
+
+Group group_of(const std::string &label, const std::vector<trace::Trace> &traces, DigestOptions options = {}) {
+  Group group(label, options);
+  for (std::size_t i = 0; i < traces.size(); ++i) group.add(fmt::format("{}/repetition-{}", label, i + 1), traces[i]);
+  group.finish();
+  return group;
+}
+
+std::vector<Group> groups(Group first) {
+  std::vector<Group> all;
+  all.push_back(std::move(first));
+  return all;
+}
+
+TEST(Bounds, AreThoseOfThePlatformThatRan) {
+  const RunBounds preemptive = bounds_of(simulated(hi_and_lo(PreemptionMode::Os), kSecond).info);
+  EXPECT_TRUE(preemptive.schedulable);
+  ASSERT_EQ(preemptive.tasks.size(), 2U);
+  EXPECT_EQ(preemptive.tasks[0].response, 2 * kMillisecond);
+  EXPECT_EQ(preemptive.tasks[1].response, 26 * kMillisecond) << "20 ms and three of 2 ms";
+
+  const RunBounds jobs_run_to_their_end = bounds_of(simulated(hi_and_lo(PreemptionMode::None), kSecond).info);
+  EXPECT_FALSE(jobs_run_to_their_end.schedulable) << "20 ms of blocking, deadline 10 ms";
+}
+
+TEST(Bounds, ChargeTheRecordedOverheads) {
+  trace::RunInfo run = simulated(hi_and_lo(PreemptionMode::Os), kSecond).info;
+  run.overheads = "release 100us, dispatch 50us, preempt 0";
+  const RunBounds bounds = bounds_of(run);
+  ASSERT_EQ(bounds.tasks.size(), 2U) << bounds.absent;
+  EXPECT_EQ(bounds.tasks[0].response, 2 * kMillisecond + 150 * kMicrosecond);
+  run.overheads = "some";
+  EXPECT_NE(bounds_of(run).absent.find("overheads"), std::string::npos) << "rather none than one that ignores them";
+}
+
+TEST(Bounds, OtherExecutorsHaveTheirOwnOrNone) {
+  const trace::Trace ste = simulated(hi_and_lo(PreemptionMode::None), kSecond, "ste");
+  const RunBounds bounds = bounds_of(ste.info);
+  for (const BoundOf &bound : bounds.tasks) EXPECT_TRUE(!bound.response || bound.method == "wait_set") << bound.method;
+  trace::RunInfo unknown = ste.info;
+  unknown.executor = "SingleThreadedExecutor";
+  EXPECT_FALSE(bounds_of(unknown).absent.empty());
+}
+
+TEST(Verdict, ACleanRunIsGoodAndProven) {
+  const Group group = group_of("redag", {simulated(hi_and_lo(PreemptionMode::Os), kSecond)});
+  const std::vector<Sentence> sentences = verdict_of(group);
+  EXPECT_EQ(sentences[0].tone, Tone::Good);
+  EXPECT_EQ(sentences[0].text,
+            "Every deadline was met: 120 jobs, none late, none lost. The closest was lo.l, 24ms before its deadline.");
+  EXPECT_EQ(sentences[1].tone, Tone::Good) << sentences[1].text;
+  EXPECT_NE(sentences[1].text.find("every deadline is met"), std::string::npos);
+  EXPECT_EQ(sentences[2].tone, Tone::Good) << "the trace checker: " << sentences[2].text;
+}
+
+TEST(Verdict, MissesAreCountedNamedAndNotProvenAway) {
+  const Group group = group_of("none", {simulated(hi_and_lo(PreemptionMode::None), kSecond)});
+  const std::vector<Sentence> sentences = verdict_of(group);
+  EXPECT_EQ(sentences[0].tone, Tone::Bad);
+  EXPECT_NE(sentences[0].text.find("hi "), std::string::npos) << sentences[0].text;
+  EXPECT_NE(sentences[0].text.find(", the other one none."), std::string::npos) << sentences[0].text;
+  EXPECT_NE(sentences[1].text.find("not shown"), std::string::npos) << sentences[1].text;
+}
+
+TEST(Verdict, AResponseAboveItsBoundIsSaid) {
+  TraceBuilder run(hi_and_lo(PreemptionMode::Os));
+  run.at(0).arrives("h", 0).dispatched("h", 0, 0, 10);
+  run.at(5).finished("h", 0, 0);  // wcet and bound are 2 ms
+  trace::Trace trace = run.until(10);
+  trace.info.driver = trace::Driver::Threads;
+  const std::vector<Sentence> sentences = verdict_of(group_of("late", {trace}));
+  EXPECT_EQ(sentences[1].tone, Tone::Bad);
+  EXPECT_NE(sentences[1].text.find("Above its bound: hi.h (5ms, bound 2ms)"), std::string::npos) << sentences[1].text;
+  EXPECT_NE(sentences[2].text.find("longer than the stated wcet: hi.h (5ms, wcet 2ms)"), std::string::npos)
+      << sentences[2].text;
+}
+
+TEST(Verdict, RankingTellsOnlyWhatTheRangesTell) {
+  const Contender a{"a", {0.1, 0.08, 0.12}};
+  const Contender b{"b", {0.2, 0.15, 0.3}};
+  const Contender touches{"c", {0.15, 0.12, 0.2}};
+  const Contender clean{"d", {0, 0, 0}};
+  const Contender clean_too{"e", {0, 0, 0}};
+  EXPECT_EQ(ranking(std::vector{a, b}), "a misses fewest");
+  EXPECT_EQ(ranking(std::vector{b, a, touches}), "a and c do not differ clearly, b misses more");
+  EXPECT_EQ(ranking(std::vector{a, touches}), "no clear difference");
+  EXPECT_EQ(ranking(std::vector{a, clean, b, clean_too}), "d and e miss none, a and b miss more");
+}
+
+TEST(Group, PoolsRepetitionsAndRefusesStrangers) {
+  const Workload workload = hi_and_lo(PreemptionMode::Os);
+  const trace::Trace one = simulated(workload, kSecond);
+  const Group both = group_of("redag", {one, simulated(workload, kSecond, "redag", 2)});
+  EXPECT_EQ(both.total().released, 240U);
+  EXPECT_EQ(both.task(TaskId(std::size_t{0})).response.count, 200U);
+  EXPECT_EQ(both.task(TaskId(std::size_t{0})).response.max, 2 * kMillisecond);
+  EXPECT_FALSE(both.fits(simulated(workload, kSecond, "mte").info));
+  EXPECT_FALSE(both.fits(simulated(hi_and_lo(PreemptionMode::None), kSecond).info));
+  Workload renamed = workload;
+  renamed.dags[0].tasks[0].name = "other";
+  EXPECT_FALSE(both.fits(simulated(renamed, kSecond).info));
+}
+
+TEST(Document, SaysWhatTheRunsWere) {
+  std::vector<Group> all = groups(group_of("redag", {simulated(hi_and_lo(PreemptionMode::Os), kSecond)}));
+  all.push_back(group_of("ste", {simulated(hi_and_lo(PreemptionMode::Os), kSecond, "ste")}));
+  const json document = json::parse(to_json(all));
+  EXPECT_EQ(document["format"], "redag.report/1");
+  EXPECT_EQ(document["title"], "two rates");
+  ASSERT_EQ(document["groups"].size(), 2U);
+  const json &redag = document["groups"][0];
+  EXPECT_EQ(redag["tasks"][0]["bound_ns"], 2'000'000);
+  EXPECT_EQ(redag["total"]["released"], 120);
+  EXPECT_EQ(redag["schedule"]["windows"][0]["slices"]["task"].size(), redag["schedule"]["slices_in_all"]);
+  EXPECT_EQ(document["comparison"]["dags"].size(), 2U);
+  EXPECT_EQ(document["comparison"]["dags"][0]["groups"][0]["missed"]["max"], 0.0);
+  EXPECT_GT(document["comparison"]["dags"][0]["groups"][1]["missed"]["max"], 0.0);
+  EXPECT_NE(document["comparison"]["words"][0]["text"].get<std::string>().find("redag misses fewest"),
+            std::string::npos);
+  EXPECT_EQ(to_json(all), to_json(all));
+}
+
+TEST(Document, SaysWhatItCut) {
+  DigestOptions few;
+  few.most_slices = 50;
+  const std::vector<Group> all =
+      groups(group_of("redag", {simulated(hi_and_lo(PreemptionMode::Os), 10 * kSecond)}, few));
+  DocumentOptions options;
+  options.most_tasks = 1;  // never less than 10 a group: nothing to cut here
+  const json document = json::parse(to_json(all, options));
+  ASSERT_EQ(document["cuts"].size(), 1U);
+  EXPECT_NE(document["cuts"][0].get<std::string>().find("the schedule shows"), std::string::npos);
+}
+
+TEST(Document, OfManyTasksKeepsThoseClosestToAMiss) {
+  std::vector<testing::TestTask> tasks;
+  for (int i = 0; i < 40; ++i) tasks.push_back({fmt::format("t{}", i), 1000, 1});
+  Workload workload = testing::make_workload({testing::make_dag("wide", tasks)}, 1, PreemptionMode::None);
+  DocumentOptions options;
+  options.most_tasks = 10;
+  options.most_curves = 5;
+  const json document = json::parse(to_json(groups(group_of("redag", {simulated(workload, kSecond)})), options));
+  const json &rows = document["groups"][0]["tasks"];
+  ASSERT_EQ(rows.size(), 40U) << "positions are TaskIds";
+  EXPECT_FALSE(rows[0].contains("jobs"));
+  EXPECT_TRUE(rows[39].contains("jobs")) << "the last one to run";
+  EXPECT_TRUE(rows[39].contains("responses"));
+  EXPECT_FALSE(rows[31].contains("responses"));
+  EXPECT_EQ(document["cuts"].size(), 2U);
+}
+
+TEST(Document, HoldsNamesThatAreNoUtf8) {
+  Workload workload = hi_and_lo(PreemptionMode::Os);
+  const std::vector<Group> all = groups(group_of("\xff</script>", {simulated(workload, kSecond)}));
+  EXPECT_EQ(json::parse(to_json(all))["groups"][0]["label"], "\xef\xbf\xbd</script>");
+}
+
+}  // namespace
+}  // namespace redag::report

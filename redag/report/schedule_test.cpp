@@ -1,0 +1,137 @@
+#include "redag/report/schedule.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "redag/report/timeline.hpp"
+#include "redag/testing/timeline.hpp"
+#include "redag/testing/trace_builder.hpp"
+
+namespace redag::report {
+namespace {
+
+using metrics::JobRecord;
+using testing::TraceBuilder;
+
+constexpr Time ms(Time count) { return count * kMillisecond; }
+
+Workload hi_and_lo() {
+  return testing::make_workload({testing::make_dag("hi", {{"h", 10, 2}}), testing::make_dag("lo", {{"l", 50, 20}})}, 1,
+                                PreemptionMode::Os);
+}
+
+trace::Trace simulated(const Workload &workload, Duration length) {
+  TraceBuilder builder(workload);
+  trace::Trace trace = builder.until(length / kMillisecond);
+  sim::Options options;
+  options.horizon = length;
+  trace.events = testing::simulate_events(workload, length, options);
+  return trace;
+}
+
+std::vector<JobRecord> jobs_of(const trace::Trace &trace) {
+  return metrics::fold_jobs(trace.info.workload, trace.events);
+}
+
+TEST(Slices, APreemptedJobHasTwoAndTellsHowEachEnded) {
+  TraceBuilder run(hi_and_lo());
+  run.at(0).arrives("l", 0).dispatched("l", 0, 0, 50);
+  run.at(5).arrives("h", 0).preempted("l", 0, 0).dispatched("h", 0, 0, 15).started("h", 0, 0);
+  run.at(7).finished("h", 0, 0).resumed("l", 0, 0);
+  const std::vector<Slice> slices = slices_of(run.until(9));
+  const TaskId h = run.id("h");
+  const TaskId l = run.id("l");
+  EXPECT_EQ(slices, (std::vector<Slice>{{0, ms(5), l, 0, 0, Slice::End::Preempted},
+                                        {ms(5), ms(7), h, 0, 0, Slice::End::Finished},
+                                        {ms(7), ms(9), l, 0, 0, Slice::End::Open}}));
+}
+
+TEST(Schedule, OfAShortRunIsWholeWithAViewForEachDag) {
+  const trace::Trace trace = simulated(hi_and_lo(), ms(200));
+  const Schedule schedule = schedule_of(trace, jobs_of(trace), 1000, 6);
+  ASSERT_EQ(schedule.windows.size(), 1U);
+  EXPECT_EQ(schedule.slices_shown, schedule.slices_in_all);
+  EXPECT_EQ(schedule.windows[0].jobs.size(), jobs_of(trace).size());
+  ASSERT_EQ(schedule.views.size(), 3U);
+  for (const View &view : schedule.views) {
+    EXPECT_LT(view.begin, view.end);
+    EXPECT_GE(view.begin, 0);
+  }
+  EXPECT_FALSE(schedule.views[0].task.valid());
+}
+
+TEST(Schedule, OfALongRunStaysSmallAndShowsTheWorstJobs) {
+  const trace::Trace trace = simulated(hi_and_lo(), ms(20'000));
+  const std::vector<JobRecord> jobs = jobs_of(trace);
+  constexpr std::size_t kMost = 300;
+  const Schedule schedule = schedule_of(trace, jobs, kMost, 6);
+  ASSERT_EQ(schedule.windows.size(), 3U) << "the beginning, and one for each DAG";
+  EXPECT_LE(schedule.slices_shown, kMost + 10) << "those that only touch a window are in it too";
+  EXPECT_GT(schedule.slices_in_all, 10 * kMost);
+  for (std::size_t i = 1; i < schedule.views.size(); ++i) {
+    const View &view = schedule.views[i];
+    const Window &window = schedule.windows[view.window];
+    const auto job = std::find_if(window.jobs.begin(), window.jobs.end(), [&](const JobRecord &each) {
+      return each.task == view.task && each.number == view.job;
+    });
+    ASSERT_NE(job, window.jobs.end()) << "the job that the view is about";
+    EXPECT_EQ(job->lateness(), view.lateness);
+    for (const JobRecord &other : jobs) {
+      if (other.task == view.task && other.finish != kNever) {
+        EXPECT_LE(other.lateness(), view.lateness);
+      }
+    }
+    const auto drawn = [&](const Slice &slice) { return slice.task == view.task && slice.job == view.job; };
+    EXPECT_TRUE(std::any_of(window.slices.begin(), window.slices.end(), drawn));
+  }
+}
+
+TEST(Schedule, OfAnEmptyTraceIsEmpty) {
+  const trace::Trace trace = TraceBuilder(hi_and_lo()).until(10);
+  const Schedule schedule = schedule_of(trace, {}, 100, 6);
+  ASSERT_EQ(schedule.views.size(), 1U);
+  EXPECT_TRUE(schedule.windows[schedule.views[0].window].slices.empty());
+}
+
+TEST(Timeline, BusyTimeAndJobsAddUp) {
+  const trace::Trace trace = simulated(hi_and_lo(), ms(777));
+  const std::vector<Slice> slices = slices_of(trace);
+  const std::vector<JobRecord> jobs = jobs_of(trace);
+  const Timeline timeline = timeline_of(trace, slices, jobs, 100);
+  EXPECT_LE(timeline.bins, 100U);
+  Duration drawn = 0;
+  for (const auto &dag : timeline.busy) {
+    for (const Duration busy : dag) {
+      EXPECT_LE(busy, timeline.bin);
+      drawn += busy;
+    }
+  }
+  Duration executed = 0;
+  for (const Slice &slice : slices) executed += std::min(slice.end, trace.info.end) - slice.begin;
+  EXPECT_EQ(drawn, executed);
+  std::uint64_t released = 0;
+  for (const auto &dag : timeline.released) {
+    for (const std::uint64_t count : dag) released += count;
+  }
+  EXPECT_EQ(released, jobs.size());
+}
+
+TEST(Timeline, MissesStandWhereTheirJobsWereReleased) {
+  TraceBuilder run(hi_and_lo());
+  run.at(0).arrives("h", 0).dispatched("h", 0, 0, 10);
+  run.at(15).finished("h", 0, 0);                                                           // late
+  run.at(20).arrives("h", 1).skipped("h", 1, Reason::Overrun);                              // lost
+  run.at(40).arrives("h", 2).dispatched("h", 2, 0, 50).aborted("h", 2, 0, Reason::NoData);  // nobody waited for it
+  run.at(60).arrives("h", 3).dispatched("h", 3, 0, 70);                                     // overdue at the end
+  run.at(95).arrives("l", 0);                                                               // not yet
+  const trace::Trace trace = run.until(100);
+  const Timeline timeline = timeline_of(trace, slices_of(trace), jobs_of(trace), 10);
+  ASSERT_EQ(timeline.bins, 10U);
+  EXPECT_EQ(timeline.missed[0], (std::vector<std::uint64_t>{1, 0, 1, 0, 0, 0, 1, 0, 0, 0}));
+  EXPECT_EQ(timeline.missed[1], std::vector<std::uint64_t>(10, 0));
+}
+
+}  // namespace
+}  // namespace redag::report

@@ -1,0 +1,250 @@
+#include "redag/report/verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "redag/base/check.hpp"
+#include "redag/base/text.hpp"
+
+namespace redag::report {
+namespace {
+
+using metrics::JobStats;
+
+std::uint64_t missed(const JobStats &jobs) { return jobs.late + jobs.skipped + jobs.aborted - jobs.no_data(); }
+
+std::string plural(std::uint64_t count, const std::string &noun) {
+  return fmt::format("{} {}{}", format_count(count), noun, count == 1 ? "" : "s");
+}
+
+// "3 late, 2 skipped": only what there was.
+std::string how_missed(const JobStats &jobs) {
+  std::vector<std::string> parts;
+  if (jobs.late > 0) parts.push_back(format_count(jobs.late) + " late");
+  if (jobs.skipped > 0) parts.push_back(format_count(jobs.skipped) + " skipped");
+  if (jobs.aborted > jobs.no_data()) parts.push_back(format_count(jobs.aborted - jobs.no_data()) + " aborted");
+  return join(parts);
+}
+
+std::string closest(const Group &group) {
+  if (!group.latest()) return {};
+  const metrics::JobRecord &job = group.latest()->record;
+  const std::string name = trace::task_name(group.workload(), job.task);
+  const Duration lateness = job.lateness();
+  if (lateness > 0) {
+    return fmt::format(" The worst for its deadline was {}, {} late at {}.", name, humanize_duration(lateness),
+                       humanize_duration(group.latest()->since));
+  }
+  return fmt::format(" The closest was {}, {} before its deadline.", name, humanize_duration(-lateness));
+}
+
+Sentence on_deadlines(const Group &group) {
+  const JobStats &total = group.total();
+  if (total.released == 0) return {Tone::Caution, "No job was released: there is nothing to judge."};
+  const std::uint64_t misses = missed(total);
+  if (misses == 0) {
+    const std::string open = total.in_flight > 0 ? fmt::format(" ({} still in progress)", total.in_flight) : "";
+    return {Tone::Good, fmt::format("Every deadline was met: {}{}, none late, none lost.{}",
+                                    plural(total.released, "job"), open, closest(group))};
+  }
+  std::vector<std::string> where;
+  std::size_t clean = 0;
+  for (std::size_t d = 0; d < group.workload().dags.size(); ++d) {
+    const JobStats &jobs = group.dag(DagId(d));
+    if (missed(jobs) == 0) {
+      ++clean;
+      continue;
+    }
+    where.push_back(fmt::format("{} {}", group.workload().dags[d].name, format_percent(jobs.miss_ratio_with_lost())));
+  }
+  constexpr std::size_t kMostNamed = 4;
+  if (where.size() > kMostNamed) {
+    const std::size_t more = where.size() - kMostNamed;
+    where.resize(kMostNamed);
+    where.push_back(plural(more, "other DAG"));
+  }
+  const std::string others = clean == 0   ? ""
+                             : clean == 1 ? ", the other one none"
+                                          : fmt::format(", the other {} none", clean);
+  return {Tone::Bad, fmt::format("{} of {} missed their deadline ({}): {}. By DAG: {}{}.{}", format_count(misses),
+                                 plural(total.released, "job"), format_percent(total.miss_ratio_with_lost()),
+                                 how_missed(total), join(where), others, closest(group))};
+}
+
+// Tasks whose jobs took longer than their stated wcet: "control.pid (3.2ms, wcet 3ms)".
+std::vector<std::string> over_wcet(const Group &group) {
+  std::vector<std::string> names;
+  if (group.info().driver == trace::Driver::Simulator) return names;  // never; its overheads are not execution
+  for (const TaskRef &ref : flatten(group.workload())) {
+    const Duration longest = group.samples(ref.id).execution_max;
+    if (ref.task->wcet == 0 || longest <= ref.task->wcet) continue;
+    names.push_back(fmt::format("{} ({}, wcet {})", trace::task_name(group.workload(), ref.id),
+                                humanize_duration(longest), humanize_duration(ref.task->wcet)));
+  }
+  return names;
+}
+
+std::string first_of(std::vector<std::string> names, std::size_t most) {
+  const std::size_t more = names.size() > most ? names.size() - most : 0;
+  names.resize(names.size() - more);
+  if (more > 0) names.push_back(format_count(more) + " more");
+  return join(names);
+}
+
+Sentence on_bounds(const Group &group) {
+  const RunBounds &bounds = group.bounds();
+  if (!bounds.absent.empty())
+    return {Tone::Plain, fmt::format("There are no bounds to compare with: {}.", bounds.absent)};
+  std::vector<std::string> above;
+  std::size_t bounded = 0;
+  for (std::size_t t = 0; t < bounds.tasks.size(); ++t) {
+    if (!bounds.tasks[t].response) continue;
+    ++bounded;
+    const Duration longest = group.task(TaskId(t)).response.max;
+    if (longest <= *bounds.tasks[t].response) continue;
+    above.push_back(fmt::format("{} ({}, bound {})", trace::task_name(group.workload(), TaskId(t)),
+                                humanize_duration(longest), humanize_duration(*bounds.tasks[t].response)));
+  }
+  for (std::size_t d = 0; d < bounds.dags.size(); ++d) {
+    const Duration longest = group.end_to_end(DagId(d)).response.max;
+    if (!bounds.dags[d].response || longest <= *bounds.dags[d].response) continue;
+    above.push_back(fmt::format("DAG {} ({}, bound {})", group.workload().dags[d].name, humanize_duration(longest),
+                                humanize_duration(*bounds.dags[d].response)));
+  }
+  if (!above.empty()) {
+    const bool simulated = group.info().driver == trace::Driver::Simulator;
+    return {Tone::Bad, fmt::format("Above its bound: {}. {}", first_of(above, 3),
+                                   simulated ? "A bound was broken in virtual time: one of the two is wrong."
+                                             : "A bound holds for the stated execution times and no overheads of the "
+                                               "machine: one of these was exceeded.")};
+  }
+  const std::string within = bounded == 0 ? ""
+                                          : fmt::format(" Every response was within its bound ({} of {} have one).",
+                                                        bounded, plural(bounds.tasks.size(), "task"));
+  if (bounds.schedulable) {
+    return {Tone::Good, fmt::format("Analysis, {}: every deadline is met, by {}.{}", bounds.assumes,
+                                    first_of(bounds.by, 2), within)};
+  }
+  return {Tone::Plain, fmt::format("Analysis, {}: not shown that every deadline is met; bounds are safe, not exact.{}",
+                                   bounds.assumes, within)};
+}
+
+void add_remarks(const Group &group, std::vector<Sentence> &sentences) {
+  if (const std::vector<std::string> names = over_wcet(group); !names.empty()) {
+    sentences.push_back(
+        {Tone::Caution, fmt::format("On a worker for longer than the stated wcet: {}. On threads this is "
+                                    "wall time, with what else the machine did.",
+                                    first_of(names, 3))});
+  }
+  std::uint64_t violations = 0;
+  std::uint64_t checks = 0;
+  std::uint64_t lost = 0;
+  bool enforced = true;
+  std::string first;
+  for (const RunDigest &run : group.runs()) {
+    violations += run.check.violation_count;
+    for (const std::uint64_t count : run.check.checks_by_rule) checks += count;
+    if (first.empty() && !run.check.violations.empty()) first = run.check.violations.front().to_string();
+    lost += run.info.lost_events;
+    enforced = enforced && run.summary.all_enforced;
+  }
+  if (violations > 0) {
+    sentences.push_back(
+        {Tone::Bad, fmt::format("The trace breaks rules of the model {}: {}", plural(violations, "time"), first)});
+  } else {
+    sentences.push_back({Tone::Good, fmt::format("The trace checker found every rule of the model kept, in {}.",
+                                                 plural(checks, "check"))});
+  }
+  if (!enforced) sentences.push_back({Tone::Bad, "A bound on jobs in progress or a group was not kept."});
+  if (lost > 0) {
+    sentences.push_back({Tone::Caution, fmt::format("{} lost: the figures have holes.", plural(lost, "event"))});
+  }
+}
+
+}  // namespace
+
+const char *to_string(Tone tone) {
+  switch (tone) {
+    case Tone::Good: return "good";
+    case Tone::Bad: return "bad";
+    case Tone::Caution: return "caution";
+    case Tone::Plain: return "plain";
+  }
+  REDAG_CHECK(false, "an unknown tone");
+  return "";
+}
+
+std::string join(const std::vector<std::string> &names) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i > 0) text += i + 1 == names.size() ? " and " : ", ";
+    text += names[i];
+  }
+  return text;
+}
+
+std::vector<Sentence> verdict_of(const Group &group) {
+  std::vector<Sentence> sentences = {on_deadlines(group), on_bounds(group)};
+  add_remarks(group, sentences);
+  return sentences;
+}
+
+Spread spread_of(std::vector<double> values) {
+  REDAG_CHECK(!values.empty(), "a spread of nothing");
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  const double median = values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
+  return {median, values.front(), values.back()};
+}
+
+std::string ranking(std::span<const Contender> contenders) {
+  REDAG_CHECK(!contenders.empty(), "a ranking of nobody");
+  const auto best = std::min_element(contenders.begin(), contenders.end(), [](const Contender &a, const Contender &b) {
+    return a.misses.median < b.misses.median;
+  });
+  const Spread least = best->misses;
+  std::vector<std::string> alike = {best->name};
+  std::vector<std::string> worse;
+  for (const Contender &contender : contenders) {
+    if (&contender == &*best) continue;
+    // Ranges that touch say nothing about the next repetition.
+    (contender.misses.min > least.max ? worse : alike).push_back(contender.name);
+  }
+  if (worse.empty()) return "no clear difference";
+  const std::string rest = join(worse) + (worse.size() == 1 ? " misses more" : " miss more");
+  if (alike.size() == 1) return alike.front() + " misses fewest";
+  if (least.max == 0) return fmt::format("{} miss none, {}", join(alike), rest);
+  return fmt::format("{} do not differ clearly, {}", join(alike), rest);
+}
+
+std::vector<Sentence> compare(std::span<const Group> groups) {
+  std::vector<Sentence> sentences;
+  if (groups.size() < 2) return sentences;
+  for (const Dag &dag : groups.front().workload().dags) {
+    std::vector<Contender> contenders;
+    for (const Group &group : groups) {
+      const std::vector<Dag> &dags = group.workload().dags;
+      const auto same = std::find_if(dags.begin(), dags.end(), [&](const Dag &d) { return d.name == dag.name; });
+      if (same == dags.end()) break;
+      std::vector<double> misses;
+      for (const RunDigest &run : group.runs()) {
+        misses.push_back(run.summary.dags[static_cast<std::size_t>(same - dags.begin())].jobs.miss_ratio_with_lost());
+      }
+      contenders.push_back({group.label(), spread_of(misses)});
+    }
+    if (contenders.size() < groups.size()) continue;
+    std::string line = dag.name + ": ";
+    bool any = false;
+    for (const Contender &contender : contenders) {
+      any = any || contender.misses.max > 0;
+      const bool first = &contender == &contenders.front();
+      line += fmt::format("{}{} {}{}", first ? "" : ", ", contender.name, first ? "misses " : "",
+                          format_percent(contender.misses.median));
+    }
+    sentences.push_back({Tone::Plain, line + ": " + (any ? ranking(contenders) : "nobody misses") + "."});
+  }
+  return sentences;
+}
+
+}  // namespace redag::report

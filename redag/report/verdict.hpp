@@ -1,0 +1,51 @@
+// A report's first lines: what the runs showed, in sentences that can be quoted. Everything here is also in the tables;
+// nothing is here that they do not say. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "redag/report/digest.hpp"
+
+namespace redag::report {
+
+enum class Tone : std::uint8_t { Good, Bad, Caution, Plain };
+
+[[nodiscard]] const char *to_string(Tone tone);
+
+struct Sentence {
+  Tone tone = Tone::Plain;
+  std::string text;
+};
+
+/// Of one group: deadlines, bounds, the trace checker, execution times, what disturbs its figures.
+[[nodiscard]] std::vector<Sentence> verdict_of(const Group &group);
+
+/// One number over repetitions.
+struct Spread {
+  double median = 0;
+  double min = 0;
+  double max = 0;
+};
+
+/// Requires a value.
+[[nodiscard]] Spread spread_of(std::vector<double> values);
+
+struct Contender {
+  std::string name;
+  Spread misses;  // share of its jobs
+};
+
+/// Who misses fewest, and who cannot be told from that: "redag misses fewest". Ranges that touch say nothing about the
+/// next repetition. Requires a contender.
+[[nodiscard]] std::string ranking(std::span<const Contender> contenders);
+
+/// A sentence for each DAG that all groups have; none for a single group.
+[[nodiscard]] std::vector<Sentence> compare(std::span<const Group> groups);
+
+/// "a, b and c".
+[[nodiscard]] std::string join(const std::vector<std::string> &names);
+
+}  // namespace redag::report

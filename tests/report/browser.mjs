@@ -1,0 +1,191 @@
+// Opens report pages in Chromium: every figure draws, nothing is logged as an error, nothing is requested from anywhere,
+// nothing is wider than a phone, hostile names stay text, figures can be saved. Leaves screenshots to look at.
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import path from 'node:path';
+import {pathToFileURL} from 'node:url';
+import {chromium} from 'playwright-core';
+
+const [executable, scratch] = process.argv.slice(2);
+const shot = (name) => path.join(scratch, 'screenshots', `${name}.png`);
+const FIGURES = {comparison: ['missed', 'p99', 'responses', 'lateness', 'timeline', 'schedule']};
+FIGURES.single = FIGURES.hostile = FIGURES.long = FIGURES.comparison.slice(2);
+
+const browser = await chromium.launch({executablePath: executable, args: ['--no-sandbox', '--disable-gpu']});
+let failures = 0;
+async function test(name, body) {
+  try {
+    await body();
+    console.log(`ok       ${name}`);
+  } catch (error) {
+    failures += 1;
+    console.log(`FAILED   ${name}: ${error.message}`);
+  }
+}
+
+/** Opens a page; `problems` collects what must not happen. */
+async function open(name, options = {}) {
+  const context = await browser.newContext({viewport: {width: 1280, height: 900}, colorScheme: 'light', acceptDownloads: true, ...options});
+  const page = await context.newPage();
+  const problems = [];
+  const url = pathToFileURL(path.join(scratch, `${name}.html`)).href;
+  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) problems.push(message.text()); });
+  page.on('pageerror', (error) => problems.push(String(error)));
+  page.on('request', (request) => { if (!/^(data|blob):/.test(request.url()) && request.url() !== url) problems.push(`request: ${request.url()}`); });
+  const began = Date.now();
+  await page.goto(url);
+  await page.waitForSelector('html[data-ready=true]', {timeout: 60000});
+  return {page, problems, took: Date.now() - began, close: () => context.close()};
+}
+
+/** How much each figure draws: shapes of an SVG, or distinct colours of a canvas. */
+const drawn = (page) => page.evaluate(() => Object.fromEntries([...document.querySelectorAll('figure[data-figure]')].map((box) => {
+  const svg = box.querySelector('.chart svg');
+  if (svg) return [box.dataset.figure, [...svg.querySelectorAll('path')].filter((shape) => shape.getBBox().width + shape.getBBox().height > 0).length];
+  const colours = new Set();
+  for (const canvas of box.querySelectorAll('.chart canvas')) {
+    const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 0) colours.add((data[i] << 16) | (data[i + 1] << 8) | data[i + 2]);
+  }
+  return [box.dataset.figure, colours.size];
+})));
+
+async function assertAllDrawn(page, figures) {
+  const counts = await drawn(page);
+  assert.deepEqual(Object.keys(counts).sort(), [...figures].sort());
+  for (const [name, count] of Object.entries(counts)) assert.ok(count >= 10, `figure ${name} is empty (${count})`);
+}
+const none = (problems) => assert.deepEqual(problems, []);
+const figureShot = (page, name, file) => page.locator(`figure[data-figure=${name}]`).screenshot({path: shot(file)});
+
+for (const [name, figures] of Object.entries(FIGURES)) {
+  await test(`${name}: every figure draws, without an error or a request`, async () => {
+    const {page, problems, took, close} = await open(name);
+    await assertAllDrawn(page, figures);
+    await page.screenshot({path: shot(name), fullPage: true});
+    none(problems);
+    const size = fs.statSync(path.join(scratch, `${name}.html`)).size;
+    console.log(`         ${(size / 1e6).toFixed(2)} MB, ready after ${took} ms`);
+    assert.ok(size < 10e6, 'a report is at most 10 MB');
+    await close();
+  });
+}
+
+await test('dark: figures and page follow the system, and the reader', async () => {
+  const {page, problems, close} = await open('comparison', {colorScheme: 'dark'});
+  const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const dark = await background();
+  await assertAllDrawn(page, FIGURES.comparison);
+  await page.screenshot({path: shot('dark'), fullPage: true});
+  await page.getByRole('button', {name: 'light', exact: true}).click();
+  assert.notEqual(await background(), dark);
+  await page.getByRole('button', {name: 'auto', exact: true}).click();
+  assert.equal(await background(), dark);
+  await page.emulateMedia({colorScheme: 'light'});
+  await page.waitForFunction((old) => getComputedStyle(document.body).backgroundColor !== old, dark, {timeout: 5000});
+  await assertAllDrawn(page, FIGURES.comparison);
+  none(problems);
+  await close();
+});
+
+await test('phone: nothing is wider than the screen', async () => {
+  for (const name of Object.keys(FIGURES)) {
+    const {page, problems, close} = await open(name, {viewport: {width: 390, height: 844}, isMobile: true, hasTouch: true, deviceScaleFactor: 2});
+    const width = await page.evaluate(() => document.documentElement.scrollWidth);
+    assert.ok(width <= 390, `${name} is ${width} wide`);
+    await assertAllDrawn(page, FIGURES[name]);
+    if (name === 'comparison') await page.screenshot({path: shot('phone'), fullPage: true});
+    none(problems);
+    await close();
+  }
+});
+
+await test('print: white paper, all figures, also from a dark screen', async () => {
+  const {page, problems, close} = await open('comparison', {colorScheme: 'dark'});
+  await page.emulateMedia({media: 'print', colorScheme: 'dark'});
+  await page.setViewportSize({width: 700, height: 990});
+  await page.evaluate(() => window.dispatchEvent(new Event('beforeprint')));
+  assert.equal(await page.evaluate(() => getComputedStyle(document.body).backgroundColor), 'rgb(255, 255, 255)');
+  assert.equal(await page.locator('button:visible').count(), 0);
+  await assertAllDrawn(page, FIGURES.comparison);
+  await page.screenshot({path: shot('print'), fullPage: true});
+  await page.evaluate(() => window.dispatchEvent(new Event('afterprint')));
+  assert.notEqual(await page.evaluate(() => getComputedStyle(document.body).backgroundColor), 'rgb(255, 255, 255)');
+  const pdf = await page.pdf({path: path.join(scratch, 'screenshots', 'print.pdf'), format: 'A4', preferCSSPageSize: true});
+  assert.ok(pdf.length > 20000);
+  none(problems);
+  await close();
+});
+
+await test('controls: each changes what it says', async () => {
+  const {page, problems, close} = await open('comparison');
+  const figure = (name) => page.locator(`figure[data-figure=${name}] .chart`);
+  const markup = (name) => figure(name).innerHTML();
+  const pixels = async () => Buffer.from(await figure('schedule').screenshot()).toString('base64');
+  const changes = async (read, act, what) => {
+    const before = await read();
+    await act();
+    assert.notEqual(await read(), before, what);
+  };
+  const responses = () => markup('responses');
+  const button = (name) => () => page.getByRole('button', {name, exact: true}).click();
+  await changes(responses, button('tail'), 'tail');
+  await figureShot(page, 'responses', 'tail');
+  await changes(responses, button('logarithmic'), 'logarithmic');
+  await changes(responses, () => page.getByLabel('task', {exact: true}).selectOption('control.pid'), 'a task');
+  await figureShot(page, 'responses', 'tail-of-task');
+  await button('distribution')();
+  await figureShot(page, 'responses', 'distribution-of-task');
+  await changes(() => page.locator('h2#tasks ~ div .table').first().innerText(), button('ste'), 'an executor');
+  assert.equal(await page.getByLabel('task', {exact: true}).inputValue(), 'control.pid', 'the task stays chosen');
+  await changes(pixels, () => page.getByLabel('show', {exact: true}).selectOption({index: 1}), 'a view');
+  await figureShot(page, 'schedule', 'worst-job');
+  await changes(pixels, button('zoom out'), 'zooming');
+  await changes(pixels, button('workers'), 'rows');
+  await figureShot(page, 'schedule', 'workers');
+  await assertAllDrawn(page, FIGURES.comparison);
+  none(problems);
+  await close();
+});
+
+await test('hostile names stay text, also in tooltips', async () => {
+  const {page, problems, close} = await open('hostile');
+  for (const [name, y] of [['schedule', 55], ['timeline', 90], ['lateness', 160]]) {
+    const figure = page.locator(`figure[data-figure=${name}] .chart`);
+    const {width} = await figure.boundingBox();
+    let seen = '';
+    for (let x = 0.1; x < 0.95 && seen === ''; x += 0.01) {
+      await figure.hover({position: {x: width * x, y}});
+      await page.waitForTimeout(10);
+      seen = (await page.locator('.tip:visible').allInnerTexts()).join(' ');
+    }
+    assert.match(seen, /onerror|constructor/, `a tooltip shows in ${name}`);
+  }
+  assert.equal(await page.evaluate(() => window.attacked), undefined);
+  assert.equal(await page.locator('img').count(), 0);
+  assert.match(await page.locator('h1').innerText(), /^<\/script><script>/);
+  none(problems);
+  await close();
+});
+
+await test('every figure is saved as PNG and SVG', async () => {
+  const {page, problems, close} = await open('comparison');
+  for (const name of FIGURES.comparison) {
+    for (const [kind, magic] of [['svg', '<svg'], ['png', '\x89PNG']]) {
+      const waiting = page.waitForEvent('download', {timeout: 10000});
+      await page.getByRole('button', {name: `${name} as ${kind}`, exact: true}).click();
+      const file = path.join(scratch, 'screenshots', `saved-${name}.${kind}`);
+      const download = await waiting;
+      assert.equal(download.suggestedFilename(), `redag-${name}.${kind}`);
+      await download.saveAs(file);
+      const bytes = fs.readFileSync(file);
+      assert.equal(bytes.subarray(0, 4).toString('latin1'), magic);
+      assert.ok(bytes.length > 3000, `${name}.${kind} has ${bytes.length} bytes`);
+    }
+  }
+  none(problems);
+  await close();
+});
+
+await browser.close();
+process.exit(failures > 0 ? 1 : 0);
