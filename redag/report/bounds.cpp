@@ -73,8 +73,8 @@ RunBounds bounds_of(const trace::RunInfo &run) {
   const Result<analysis::System> system = analysis::compile(workload, platform);
   if (!system) return none(system.error().front().message);
 
-  const analysis::Report report =
-      wait_set ? analysis::analyze(*system, {analysis::wait_set()}) : analysis::analyze(*system);
+  static const std::vector<analysis::Method> kWaitSet = {analysis::wait_set()};  // the report points into it
+  const analysis::Report report = wait_set ? analysis::analyze(*system, kWaitSet) : analysis::analyze(*system);
   RunBounds bounds;
   bounds.assumes = describe(platform, run.overheads);
   bounds.tasks = by_id(report.tasks);

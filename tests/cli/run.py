@@ -23,8 +23,8 @@ import xml.etree.ElementTree
 PROGRAM = pathlib.Path()
 SOURCE = pathlib.Path()
 
-COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["compare"], ["analyze"], ["check-trace"], ["experiment"],
-            ["experiment", "acceptance"], ["experiment", "merge"]]
+COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["compare"], ["analyze"], ["check-trace"], ["report"],
+            ["experiment"], ["experiment", "acceptance"], ["experiment", "merge"]]
 CART = """\
 name: cart
 platform: {workers: 1, preemption: none}
@@ -720,6 +720,66 @@ class CheckTrace(Case):
 
     def test_folder_without_traces(self):
         self.expect(redag("check-trace", self.folder), 2, "no events.jsonl")
+
+
+class Report(Case):
+    def results(self, name, *arguments):
+        out = self.folder / name
+        self.expect(redag("simulate", self.cart, "--duration", "1s", "--out", out, *arguments), 0)
+        return out
+
+    def test_one_run(self):
+        out = self.results("out")
+        result = self.expect(redag("report", out), 0)
+        self.assertRegex(result.stdout, r"missed their deadline .*\n.*report\.html: [\d.]+ MB")
+        page = (out / "report.html").read_text()
+        self.assertTrue(page.startswith("<!doctype html>") and page.rstrip().endswith("</html>"))
+        self.expect(redag("report", out, "-o", self.folder / "again.html"), 0)
+        self.assertEqual((self.folder / "again.html").read_text(), page, "equal results make equal bytes")
+        # A page among the results does not keep the next run from writing there.
+        self.results("out")
+
+    def test_data(self):
+        document = self.document(redag("report", self.results("out"), "--json"), "redag.report/1")
+        group = document["groups"][0]
+        self.assertEqual(group["label"], "redag")
+        summary = json.loads((self.folder / "out" / "summary.json").read_text())
+        for key in ["released", "finished", "late", "skipped", "in_flight", "max_lateness_ns"]:
+            self.assertEqual(group["total"][key], summary["total"][key], key)
+        self.assertEqual(group["total"]["response"], group["total"]["response"] | summary["total"]["response"])
+        self.assertFalse((self.folder / "out" / "report.html").exists(), "--json alone writes no page")
+
+    def test_comparison(self):
+        out = self.folder / "cmp"
+        self.expect(redag("compare", self.cart, "--simulate", "--executors", "ste,redag", "--repeat", "2", "--duration", "1s",
+                          "--out", out), 0)
+        document = self.document(redag("report", out, "--json"), "redag.report/1")
+        self.assertEqual([group["label"] for group in document["groups"]], ["ste", "redag"], "as they were listed")
+        self.assertEqual([len(group["runs"]) for group in document["groups"]], [2, 2])
+        self.assertEqual([row["name"] for row in document["comparison"]["dags"]], ["fast", "slow"])
+
+    def test_folders_are_told_apart_by_name(self):
+        first, second = self.results("before/redag"), self.results("after/redag", "--executor", "mte")
+        document = self.document(redag("report", first, second, first, "--json"), "redag.report/1")
+        self.assertEqual([group["label"] for group in document["groups"]], ["before/redag", "after/redag"])
+
+    def test_mistakes(self):
+        self.expect(redag("report"), 2, "DIR")
+        self.expect(redag("report", self.folder), 2, "no events.jsonl", "--out")
+        self.expect(redag("report", self.folder / "nowhere"), 2, "nowhere")
+        out = self.results("out")
+        self.expect(redag("report", out, "-o", "/nowhere/report.html"), 2, "/nowhere/report.html")
+        (out / "comparison.json").write_text("{}")
+        self.expect(redag("report", out), 2, "comparison.json:1", "not a comparison")
+        (out / "comparison.json").unlink()
+        events = (out / "events.jsonl").read_text().splitlines(keepends=True)
+        (out / "events.jsonl").write_text("".join(events[:-1]))
+        self.expect(redag("report", out), 2, f"events.jsonl:{len(events) - 1}", "ends too early")
+
+    def test_repetitions_of_different_things(self):
+        self.results("out/repetition-1")
+        self.results("out/repetition-2", "--executor", "mte")
+        self.expect(redag("report", self.folder / "out"), 2, "repetition-2/events.jsonl: is no repetition")
 
 
 if __name__ == "__main__":
