@@ -9,7 +9,7 @@ import {chromium} from 'playwright-core';
 const [executable, scratch] = process.argv.slice(2);
 const shot = (name) => path.join(scratch, 'screenshots', `${name}.png`);
 const FIGURES = {comparison: ['missed', 'p99', 'responses', 'lateness', 'timeline', 'schedule']};
-FIGURES.single = FIGURES.hostile = FIGURES.long = FIGURES.comparison.slice(2);
+FIGURES.single = FIGURES.hostile = FIGURES.long = FIGURES.wide = FIGURES.comparison.slice(2);
 
 const browser = await chromium.launch({executablePath: executable, args: ['--no-sandbox', '--disable-gpu']});
 let failures = 0;

@@ -2,6 +2,8 @@
 
 const LATENESS_CLASSES = 80;  // on [-1, 1) deadlines; the last count is what lies beyond
 
+const MOST_LINES = 24;        // of a figure that people can read
+
 const taskName = (group, task) => `${group.dags[group.tasks[task].dag].name}.${group.tasks[task].name}`;
 const hasCurve = (task) => task.responses !== undefined && task.responses.value_ns.length > 0;
 
@@ -33,7 +35,7 @@ function responseFigure(groups, state) {
   return figure({
     name: 'responses', height: 360, label: 'Distribution of response times',
     caption: 'Response: from the nominal release to the finish. Jobs that were lost never answer: where some were, a '
-      + 'curve ends below 1. Executors can be taken away and brought back in the legend.',
+      + `curve ends below 1. Of all tasks, the ${MOST_LINES} that came closest to their deadlines. The legend takes lines away and back.`,
     build(t, width) {
       const one = state.task !== null;
       const name = one ? taskName(groups[state.executor], state.task) : null;
@@ -45,6 +47,10 @@ function responseFigure(groups, state) {
           lines.push({group, g, task, i});
         });
       });
+      if (lines.length > MOST_LINES) {
+        const closeness = ({task}) => task.jobs.response.max_ns / task.deadline_ns;
+        lines.sort((a, b) => closeness(b) - closeness(a)).splice(MOST_LINES);
+      }
       if (lines.length === 0) return 'No job of this task finished.';
       const mark = one ? groups[state.executor].tasks[state.task] : null;
       const marks = one
@@ -209,7 +215,7 @@ function comparisonFigure({name, title, groups, rows, value, log, format, format
           ...groups.map((group, g) => ({
             type: 'bar', name: group.label, barGap: '12%', barMaxWidth: 46, itemStyle: {color: colourOf(t, g), borderRadius: [3, 3, 0, 0]},
             data: rows.map((row) => spread(row, g).median),
-            label: {show: groups.length * rows.length * 56 <= width, position: 'top', color: t.soft, fontSize: 11, distance: 6,
+            label: {show: groups.length * rows.length * 66 <= width, position: 'top', color: t.soft, fontSize: 11, distance: 6,
               formatter: (item) => format(item.value)},
           })),
           ...groups.map((group, g) => ({

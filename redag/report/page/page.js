@@ -121,6 +121,7 @@ function detailSections() {
       choice(['tasks', 'workers'], 0, (i) => { state.rows = i === 1 ? 'workers' : 'tasks'; schedule.draw(); }),
       element('span.switch', {}, element('button', {type: 'button', 'aria-label': 'zoom in', onclick: () => schedule.zoom(2)}, '+'),
         element('button', {type: 'button', 'aria-label': 'zoom out', onclick: () => schedule.zoom(0.5)}, '\u2212'))),
+    filled(() => element('p.keys.soft', {}, ...groups[state.executor].dags.slice(0, 24).map((dag, d) => element('span', {}, swatch(theme(), d), dag.name)))),
     schedule.box,
   ];
 }

@@ -4,6 +4,7 @@ const OPEN = 3;       // Slice::End
 const PREEMPTED = 2;
 const SKIPPED = 2;    // JobOutcome
 const ROW_HEIGHT = 30;
+const MOST_ROWS = 64;
 const ROOM_FOR_ARROWS = 9;  // pixels from release to deadline; where there are fewer, only misses are marked
 
 function scheduleFigure(groups, state) {
@@ -17,17 +18,26 @@ function scheduleFigure(groups, state) {
     const {jobs, slices} = seen;
     const start = group.run.start_ns;
     const from = seen.begin_ns - start;
-    const used = state.rows === 'workers' ? [] : [...new Set([...jobs.task, ...slices.task])].sort((a, b) => a - b);
+    const used = state.rows === 'workers' ? [] : tasksOf(jobs, slices, view.task);
     const rows = state.rows === 'workers'
-      ? Array.from({length: group.run.config.workers}, (_, w) => `worker ${w}`)
+      ? Array.from({length: Math.min(group.run.config.workers, MOST_ROWS)}, (_, w) => `worker ${w}`)
       : used.map((task) => taskName(group, task));
     const rowOf = new Map(used.map((task, i) => [task, i]));
     const row = (task, worker) => (state.rows === 'workers' ? worker : rowOf.get(task));
+    const shown = ([place]) => place !== undefined && place < rows.length;
     const bars = slices.task.map((task, i) => [
-      row(task, slices.worker[i]), from + slices.begin[i], from + slices.begin[i] + slices.length[i], i]);
+      row(task, slices.worker[i]), from + slices.begin[i], from + slices.begin[i] + slices.length[i], i]).filter(shown);
     const marks = state.rows === 'workers' ? [] : jobs.task.map((task, i) => [
-      rowOf.get(task), from + jobs.release[i], from + jobs.release[i] + jobs.deadline[i], i]);
+      rowOf.get(task), from + jobs.release[i], from + jobs.release[i] + jobs.deadline[i], i]).filter(shown);
     return {group, view, jobs, slices, rows, bars, marks, from, to: seen.end_ns - start, start};
+  }
+
+  // Tasks with a row: all, or those that missed deadlines and then the first ones.
+  function tasksOf(jobs, slices, wanted) {
+    const missing = new Set(jobs.task.filter((_, i) => jobs.missed[i] === 1));
+    const rank = (task) => (task === wanted ? 0 : missing.has(task) ? 1 : 2);
+    return [...new Set([...jobs.task, ...slices.task])].sort((a, b) => rank(a) - rank(b) || a - b).slice(0, MOST_ROWS)
+      .sort((a, b) => a - b);
   }
 
   function describeJob(c, j) {
@@ -48,7 +58,7 @@ function scheduleFigure(groups, state) {
   const fig = figure({
     name: 'schedule', height: 300, canvas: true, label: 'Schedule',
     caption: 'Drag to move; Ctrl and the wheel, or two fingers, to zoom. Colour: the DAG. \u2191 release, \u2193 deadline; red: a missed deadline, '
-      + '\u00d7 a job that was lost. A stretch that ends with a notch was preempted.',
+      + `\u00d7 a job that was lost. A stretch that ends with a notch was preempted. At most ${MOST_ROWS} rows, misses first.`,
     build(t) {
       const c = contents();
       const inTasks = state.rows === 'tasks';
