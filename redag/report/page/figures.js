@@ -215,7 +215,7 @@ function comparisonFigure({name, title, groups, rows, value, log, format, format
           ...groups.map((group, g) => ({
             type: 'bar', name: group.label, barGap: '12%', barMaxWidth: 46, itemStyle: {color: colourOf(t, g), borderRadius: [3, 3, 0, 0]},
             data: rows.map((row) => spread(row, g).median),
-            label: {show: groups.length * rows.length * 66 <= width, position: 'top', color: t.soft, fontSize: 11, distance: 6,
+            label: {show: groups.length * rows.length * 62 <= width, position: 'top', color: t.soft, fontSize: 11, distance: 6,
               formatter: (item) => format(item.value)},
           })),
           ...groups.map((group, g) => ({

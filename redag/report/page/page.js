@@ -2,7 +2,7 @@
 
 const report = JSON.parse(document.getElementById('data').textContent);
 const {groups} = report;
-const state = {executor: 0, task: null, tail: false, log: false, view: 0, rows: 'tasks'};
+const state = {executor: 0, task: null, tail: false, log: false, view: 0, rows: 'tasks', unfolded: false};
 const several = groups.length > 1;
 
 const MARKS = {good: '\u2713', bad: '\u2717', caution: '!', plain: '\u2022'};
@@ -107,7 +107,10 @@ function detailSections() {
       return element('p.soft', {}, bounds.absent ? `No bounds: ${bounds.absent}.`
         : `Bounds for ${bounds.assumes}; the method stands in the tooltip of a bound.`);
     }),
-    filled(() => taskTable(groups[state.executor])),
+    filled(() => taskTable(groups[state.executor], state.unfolded, () => {
+      state.unfolded = true;
+      places.forEach((node) => node.refill());
+    })),
     element('h2', {id: 'responses'}, 'Response times'),
     element('div.row.controls', {}, taskChoice(redraw),
       choice(['distribution', 'tail'], 0, (i) => { state.tail = i === 1; responses.draw(); }),

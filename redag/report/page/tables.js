@@ -1,5 +1,7 @@
 // Tables: per DAG, per task, executors side by side, the runs.
 
+const MOST_ROWS_AT_ONCE = 40;
+
 const column = (title, help, text = false) => ({title, help, text});
 const swatch = (t, index) => element('span.swatch', {style: `background:${colourOf(t, index)}`});
 
@@ -36,7 +38,7 @@ function boundCell(bound, measured, method) {
   return {text: formatTime(bound), kind: measured > bound ? 'bad' : '', title: `by ${method}${measured > bound ? '; exceeded' : ''}`};
 }
 
-function taskTable(group) {
+function taskTable(group, unfolded, unfold) {
   const t = theme();
   const columns = [
     column('task'), column('period'), column('deadline'), column('jobs', 'Released'), column('missed', 'Late, skipped or aborted, of all released'),
@@ -44,8 +46,13 @@ function taskTable(group) {
     column('measured, bound, deadline', meterHelp, true), column('L max', 'Largest lateness; negative: how close a job came'),
     column('ran / wcet', 'Longest time of a job on a worker, and what it was stated to take at most'), column('preempted', 'How often jobs lost their worker'),
   ];
+  // Of many, first only those that came closest to a miss.
+  const all = group.tasks.filter((task) => task.jobs !== undefined);
+  const closeness = ({jobs, deadline_ns: deadline}) => [jobs.miss_ratio, jobs.max_lateness_ns === null ? -1 : jobs.max_lateness_ns / deadline];
+  const few = [...all].sort((a, b) => closeness(b)[0] - closeness(a)[0] || closeness(b)[1] - closeness(a)[1]).slice(0, MOST_ROWS_AT_ONCE);
+  const shown = unfolded || all.length <= MOST_ROWS_AT_ONCE ? all : few;
   let dag = -1;
-  const rows = group.tasks.filter((task) => task.jobs !== undefined).map((task) => {
+  const rows = shown.map((task) => {
     const first = task.dag !== dag;
     dag = task.dag;
     const r = task.jobs.response;
@@ -62,7 +69,9 @@ function taskTable(group) {
       formatCount(task.jobs.preemptions),
     ]};
   });
-  return table(columns, rows);
+  if (shown.length === all.length) return [table(columns, rows)];
+  return [table(columns, rows), element('p.row.soft', {}, `The ${shown.length} tasks closest to a miss, of ${all.length}.`,
+    element('button.controls', {type: 'button', onclick: unfold}, `all ${all.length} tasks`))];
 }
 
 function dagTable(group) {
