@@ -116,6 +116,20 @@ TEST_P(EngineProtocol, JoinWaitsForWhatHasStarted) {
   });
 }
 
+// A release that met no halt yet decides while the threads are told to end.
+TEST_P(EngineProtocol, JoinWaitsForADecisionUnderWay) {
+  expect_holds([] {
+    Machine machine(ladder(1), platform(1), {nullptr});
+    machine.start_calmly();
+    const std::uint32_t source = thread([&] { machine.release(0); });
+    machine.engine->halt();
+    machine.engine->join();
+    machine.quiet.begin();
+    explored::join(source);
+    explored::check(machine.engine->started().empty(), "its threads have ended, and a job was handed to one");
+  });
+}
+
 TEST_P(EngineProtocol, AHaltFromABodyEndsTheRun) {
   expect_holds([] {
     Countdown halted(1);

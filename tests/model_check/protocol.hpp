@@ -33,7 +33,7 @@ inline Exploration expect_holds(const std::function<void()> &scenario, ExploreOp
   const testing::ThreadState running_job{
       [] { return static_cast<void *>(runtime::RunningJob::current()); },
       [](void *job) { runtime::RunningJob::set_current(static_cast<runtime::RunningJob *>(job)); }};
-  const Exploration all = testing::explore(scenario, options, running_job);
+  Exploration all = testing::explore(scenario, options, running_job);
   const auto *test = ::testing::UnitTest::GetInstance()->current_test_info();
   std::printf(
       "[  STATES  ] %s.%s: %llu executions (+ %llu cut short), %llu transitions, up to %u in one, %u threads%s\n",

@@ -16,8 +16,6 @@ class Atomic {
   Atomic(const Atomic &) = delete;
   Atomic &operator=(const Atomic &) = delete;
 
-  static constexpr bool is_always_lock_free = std::atomic<T>::is_always_lock_free;
-
   T load(std::memory_order = std::memory_order_seq_cst) const noexcept {
     testing::explored::read(id_, "load");
     return value_;
