@@ -1,4 +1,6 @@
 // Every interleaving of pausing, stepping and reconfiguring an engine that is at work.
+#include <deque>
+
 #include "protocol.hpp"
 
 namespace redag::model_check {
@@ -144,13 +146,12 @@ TEST(TaskProtocol, ATaskThatIsRemovedEndsItsJobsAndThenItsBody) {
         options.config.levels = 8;
         options.band = runtime::PriorityBand{8, 9};
       }
-      struct Alive {
+      struct Record {
         testing::ObjectId object = explored::new_object();
-        int running = 0;
         bool destroyed = false;
-        ~Alive() { destroyed = true; }
       };
-      std::vector<std::weak_ptr<Alive>> bodies;
+      std::deque<Record> records;
+      std::vector<std::weak_ptr<Record>> bodies;
       int ran = 0;
       {
         Engine engine(std::make_unique<sched::PriorityScheduler>(Workload{}, options.config), options);
@@ -162,15 +163,17 @@ TEST(TaskProtocol, ATaskThatIsRemovedEndsItsJobsAndThenItsBody) {
         Task task;
         task.period = task.deadline = kSecond;
         const auto add = [&] {
-          auto alive = std::make_shared<Alive>();
+          std::shared_ptr<Record> alive(&records.emplace_back(), [](Record *it) { it->destroyed = true; });
           bodies.emplace_back(alive);
           return engine.add_task(dag, 0, task, [&ran, alive = std::move(alive)](const Job &) {
-            const Alive *it = alive.get();
-            explored::write(it->object, "body begins");
+            // If the body is destroyed while it runs, nothing that it holds is there any more.
+            Record &record = *alive;
+            int &count = ran;
+            explored::write(record.object, "body begins");
             preemption_point();
-            explored::write(it->object, "body ends");
-            explored::check(!alive->destroyed, "a body was destroyed while it ran");
-            ++ran;
+            explored::write(record.object, "body ends");
+            explored::check(!record.destroyed, "a body was destroyed while it ran");
+            ++count;
             return Outcome::Finished;
           });
         };
