@@ -48,6 +48,7 @@ RunBounds none(std::string why) {
 
 std::vector<BoundOf> by_id(const std::vector<analysis::Tightest> &all) {
   std::vector<BoundOf> bounds;
+  bounds.reserve(all.size());
   for (const analysis::Tightest &one : all) {
     bounds.push_back({one.response, one.response ? std::string(one.method->name) : std::string()});
   }

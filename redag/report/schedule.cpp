@@ -123,6 +123,7 @@ class Chooser {
     std::stable_sort(worst.begin(), worst.end(), [](const Worst &a, const Worst &b) { return a.share > b.share; });
     worst.resize(std::min(worst.size(), most_views));
     std::vector<const JobRecord *> jobs;
+    jobs.reserve(worst.size());
     for (const Worst &dag : worst) jobs.push_back(dag.job);
     return jobs;
   }
