@@ -26,6 +26,7 @@ const char *to_string(Term::Kind kind) {
     case Term::Kind::Blocking: return "blocking";
     case Term::Kind::Interference: return "interference";
     case Term::Kind::Jitter: return "jitter";
+    case Term::Kind::Wait: return "wait";
     case Term::Kind::Overhead: return "overhead";
     case Term::Kind::Waiting: return "waiting";
   }

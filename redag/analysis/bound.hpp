@@ -22,6 +22,7 @@ struct Term {
     Blocking,  // by less urgent work that cannot be preempted, or that holds the group
     Interference,  // by more urgent work
     Jitter,        // the release seen late
+    Wait,          // for data of predecessors of other rates; of a DAG, also the age of that data
     Overhead,      // the platform's, for this job; overheads of others are part of their terms
     Waiting,       // for workers, predecessors and releases together, where nobody's share can be told
   };
@@ -40,6 +41,9 @@ struct ResponseBound {
   std::optional<Duration> response;  // nothing: no bound, see `absent`
   std::string_view absent;           // why there is none: a sentence without a period
   std::vector<Term> terms;
+  /// From readiness (the release as seen) to the finish, where a method finds that to be more than `response` less
+  /// jitter.
+  Duration from_ready = 0;
 
   [[nodiscard]] Duration sum(Term::Kind kind) const;
 };

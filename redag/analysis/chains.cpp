@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
 
 namespace redag::analysis {
@@ -52,6 +53,7 @@ std::variant<NotApplicable, ChainBound> chain_bound(const System &system, std::s
                                                     const Bound &bound) {
   if (chain.empty()) return NotApplicable{"a chain without tasks"};
   if (!system.not_analysable.empty()) return NotApplicable{system.not_analysable};
+  if (auto reason = why_not_directly(system)) return NotApplicable{*reason};
   ChainBound result;
   for (std::size_t i = 0; i < chain.size(); ++i) {
     if (i > 0 && hands_over(system, chain[i - 1], chain[i])) {

@@ -6,6 +6,7 @@
 
 #include "redag/analysis/arithmetic.hpp"
 #include "redag/analysis/global.hpp"
+#include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
 
 namespace redag::analysis {
@@ -40,6 +41,7 @@ Duration graham_response(const Unit &unit, std::uint32_t workers) {
 }
 
 std::optional<std::string> why_not_alone(const System &system) {
+  if (auto reason = why_not_directly(system)) return reason;
   if (system.units.size() != 1) return "for a DAG that has the platform to itself";
   if (system.mode == sched::Preemption::Cooperative)
     return "cooperative mode: a suspended job waits beside idle workers";
@@ -113,6 +115,7 @@ std::uint32_t own_workers(const System &system, std::size_t dag) {
 }
 
 Outcome apply_isolated(const System &system) {
+  if (auto reason = why_not_directly(system)) return NotApplicable{*reason};
   if (!system.groups.empty()) return NotApplicable{"exclusive groups: a worker can idle while a job waits"};
   std::vector<ResponseBound> responses(system.units.size());
   bool any = false;

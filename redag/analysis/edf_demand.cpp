@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/rate_edges.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -23,6 +24,7 @@ std::optional<std::string> why_not(const System &system) {
     return "for one worker; the platform has " + std::to_string(system.platform.workers);
   if (system.policy != PolicyKind::Edf) return std::string("for edf; the policy is ") + to_string(system.policy);
   if (system.has_edges()) return "tasks have predecessors";
+  if (auto reason = why_not_directly(system)) return reason;
   if (system.mode != sched::Preemption::None) {
     if (!system.groups.empty()) return "groups together with preemption";
     for (const SystemDag &dag : system.dags) {

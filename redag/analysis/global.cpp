@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
 
 namespace redag::analysis::global {
@@ -21,6 +22,7 @@ std::optional<std::string> why_not_mode(const System &system, const Needs &needs
 }
 
 std::optional<std::string> why_not_structure(const System &system, const Needs &needs) {
+  if (auto reason = why_not_directly(system)) return reason;
   if (!needs.edges && system.has_edges()) return "tasks have predecessors: see the bounds for DAGs";
   if (!needs.groups && !system.groups.empty()) return "exclusive groups: a worker can idle while a job waits";
   for (const SystemDag &dag : system.dags) {

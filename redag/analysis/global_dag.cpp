@@ -1,6 +1,7 @@
 #include "redag/analysis/global_dag.hpp"
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/rate_edges.hpp"
 
 namespace redag::analysis {
 namespace global {
@@ -222,10 +223,10 @@ Method melani() {
       "conditional "
       "DAG tasks in multiprocessor systems, ECRTS 2015";
   method.assumptions =
-      "m workers, full preemption, static priorities that keep DAGs together, one rate a DAG, R <= T; release jitter; "
+      "m workers, full preemption, static priorities that keep DAGs together, R <= T; release jitter; "
       "no max_active, shared groups or levels";
   method.complexity = "pseudo-polynomial; O(DAGs) a step";
-  method.apply = apply_melani;
+  method.apply = [](const System &system) { return across_rates(system, apply_melani); };
   return method;
 }
 
@@ -238,7 +239,7 @@ Method dag_bounded() {
       "m workers, full preemption, static priorities that keep DAGs together, one rate a DAG, R <= T; release jitter, "
       "max_active of DAGs in one part; no shared groups or levels";
   method.complexity = "pseudo-polynomial; O(DAGs) a step";
-  method.apply = apply_preemptive;
+  method.apply = [](const System &system) { return across_rates(system, apply_preemptive); };
   return method;
 }
 
@@ -253,7 +254,7 @@ Method dag_nonpreemptive() {
       "m workers, jobs run to completion, static priorities that keep DAGs together, one rate a DAG, R <= T; release "
       "jitter, max_active of DAGs in one part; no shared groups";
   method.complexity = "pseudo-polynomial; O(DAGs) a step";
-  method.apply = apply_nonpreemptive;
+  method.apply = [](const System &system) { return across_rates(system, apply_nonpreemptive); };
   return method;
 }
 

@@ -6,6 +6,7 @@
 #include "redag/analysis/arithmetic.hpp"
 #include "redag/analysis/global.hpp"
 #include "redag/analysis/global_dag.hpp"
+#include "redag/analysis/rate_edges.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -186,7 +187,7 @@ Method dag_groups() {
       "m workers, jobs run to completion, static priorities that keep DAGs together, one rate a DAG, R <= T; release "
       "jitter, exclusive groups within and across DAGs; no max_active";
   method.complexity = "pseudo-polynomial; O(DAGs^2 groups) a step";
-  method.apply = apply_groups;
+  method.apply = [](const System &system) { return across_rates(system, apply_groups); };
   return method;
 }
 

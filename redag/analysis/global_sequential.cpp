@@ -4,6 +4,7 @@
 #include <array>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/rate_edges.hpp"
 
 namespace redag::analysis {
 namespace global {
@@ -305,7 +306,7 @@ Method bertogna_cirinei() {
   method.assumptions =
       "m workers, full preemption, static priorities, no edges, R <= T; release jitter; no shared groups or levels";
   method.complexity = "pseudo-polynomial; O(n) a step";
-  method.apply = apply_bertogna_cirinei;
+  method.apply = [](const System &system) { return across_rates(system, apply_bertogna_cirinei); };
   return method;
 }
 
@@ -329,7 +330,7 @@ Method guan() {
   method.assumptions =
       "m workers, full preemption, static priorities, no edges, R <= T; release jitter; no shared groups or levels";
   method.complexity = "pseudo-polynomial; O(n m) a step";
-  method.apply = apply_guan;
+  method.apply = [](const System &system) { return across_rates(system, apply_guan); };
   return method;
 }
 
@@ -340,7 +341,7 @@ Method sequential_nonpreemptive() {
   method.assumptions =
       "m workers, jobs run to completion, static priorities, no edges, R <= T; release jitter; no shared groups";
   method.complexity = "pseudo-polynomial; O(n) a step";
-  method.apply = apply_nonpreemptive;
+  method.apply = [](const System &system) { return across_rates(system, apply_nonpreemptive); };
   return method;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
 
 namespace redag::analysis::one_worker {
@@ -122,6 +123,7 @@ Duration last_region_of(const System &system, const Unit &unit) {
 }  // namespace
 
 std::optional<std::string> why_not(const System &system) {
+  if (auto reason = why_not_directly(system)) return reason;
   if (system.platform.workers != 1)
     return "for one worker; the platform has " + std::to_string(system.platform.workers);
   if (!sched::is_static(system.policy)) {
@@ -170,7 +172,10 @@ FixedPoint preemptive_response(const Own &own, std::span<const Interferer> more_
     w = std::max(w, saturate(start));
     if (!fixed_point<false>(start, more_urgent, stop_of(own, q), w, steps)) return none(steps);
     const auto response = static_cast<Duration>(Int128{own.jitter} + w - Int128{q} * own.period);
-    if (response > worst.response) worst = Response{response, w, q};
+    const auto from_ready = static_cast<Duration>(w - std::max(Int128{0}, Int128{q} * own.period - own.jitter));
+    const Duration longest = std::max(worst.from_ready, from_ready);
+    if (response > worst.response) worst = Response{response, w, q, 0};
+    worst.from_ready = longest;
     // The next job comes when all work of this level is done: the busy period is over.
     if (response <= own.period) return FixedPoint{worst, {}};
   }
@@ -187,7 +192,11 @@ FixedPoint deferred_response(const Own &own, std::span<const Interferer> more_ur
     w = std::max(w, saturate(start));
     if (!fixed_point<true>(start, more_urgent, stop_of(own, q) - own.last_region, w, steps)) return none(steps);
     const auto response = static_cast<Duration>(Int128{own.jitter} + w - Int128{q} * own.period + own.last_region);
-    if (response > worst.response) worst = Response{response, w, q};
+    const auto from_ready =
+        static_cast<Duration>(Int128{w} + own.last_region - std::max(Int128{0}, Int128{q} * own.period - own.jitter));
+    const Duration longest = std::max(worst.from_ready, from_ready);
+    if (response > worst.response) worst = Response{response, w, q, 0};
+    worst.from_ready = longest;
     // With q + 1 jobs of its own, does the busy period end before the next one arrives?
     const Int128 all = Int128{own.blocking} + (Int128{q} + 1) * own.wcet;
     const Duration next_arrival = saturate((Int128{q} + 1) * own.period - own.jitter);
@@ -211,6 +220,7 @@ Bound bound_units(const System &system, bool deferred) {
       continue;
     }
     responses[u].response = result.found->response;
+    responses[u].from_ready = result.found->from_ready;
     responses[u].terms = terms_of(system, unit, view, *result.found, deferred);
   }
   return from_units(system, std::move(responses));

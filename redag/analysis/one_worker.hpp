@@ -55,8 +55,9 @@ struct Own {
 
 struct Response {
   Duration response = 0;
-  Duration window = 0;   // from the start of the busy period to the finish, or to the start of the last region
-  std::int64_t job = 0;  // q, which job of the busy period has it
+  Duration window = 0;      // from the start of the busy period to the finish, or to the start of the last region
+  std::int64_t job = 0;     // q, which job of the busy period has it
+  Duration from_ready = 0;  // largest of w(q) + F - max(0, q T - J): from readiness, which is never before t0
 };
 
 /// Why a fixed point gave nothing.

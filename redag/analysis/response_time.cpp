@@ -1,6 +1,7 @@
 #include "redag/analysis/response_time.hpp"
 
 #include "redag/analysis/one_worker.hpp"
+#include "redag/analysis/rate_edges.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -56,10 +57,11 @@ Method rta_preemptive() {
       "K. Tindell, A. Burns, A. Wellings, An extendible approach for analysing fixed priority hard real-time tasks, "
       "Real-Time Systems 6(2), 1994";
   method.assumptions =
-      "one worker, full preemption, static priorities, no edges; any deadlines, release jitter, shared groups with "
+      "one worker, full preemption, static priorities, edges only between rates; any deadlines, release jitter, shared "
+      "groups with "
       "priority inheritance, shared levels";
   method.complexity = "pseudo-polynomial; O(n) a step";
-  method.apply = independent_full;
+  method.apply = [](const System &system) { return across_rates(system, independent_full); };
   return method;
 }
 
@@ -71,9 +73,10 @@ Method rta_nonpreemptive() {
       "R. Davis, A. Burns, R. Bril, J. Lukkien, Controller Area Network (CAN) schedulability analysis: Refuted, "
       "revisited and revised, Real-Time Systems 35(3), 2007";
   method.assumptions =
-      "one worker, jobs run to completion, static priorities, no edges; any deadlines, release jitter, groups";
+      "one worker, jobs run to completion, static priorities, edges only between rates; any deadlines, release jitter, "
+      "groups";
   method.complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period";
-  method.apply = independent_none;
+  method.apply = [](const System &system) { return across_rates(system, independent_none); };
   return method;
 }
 
@@ -85,10 +88,11 @@ Method rta_deferred() {
       "R. Bril, J. Lukkien, W. Verhaegh, Worst-case response time analysis of real-time tasks under fixed-priority "
       "scheduling with deferred preemption, Real-Time Systems 42, 2009";
   method.assumptions =
-      "one worker, cooperative preemption points every `region`, static priorities, no edges, no shared groups; any "
+      "one worker, cooperative preemption points every `region`, static priorities, edges only between rates, no "
+      "shared groups; any "
       "deadlines, release jitter, shared levels";
   method.complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period";
-  method.apply = independent_cooperative;
+  method.apply = [](const System &system) { return across_rates(system, independent_cooperative); };
   return method;
 }
 
@@ -98,10 +102,11 @@ Method dag_one_worker_preemptive() {
   method.subject = Subject::Dag;
   method.cite = "as rta_preemptive, with C = volume of the DAG (docs/analysis.md, \"DAGs on one worker\")";
   method.assumptions =
-      "one worker, full preemption, static priorities; the tasks that edges join have one rate and one offset; R <= T "
-      "for DAGs; jitter, groups with inheritance, shared levels, max_active";
+      "one worker, full preemption, static priorities; R <= T for DAGs; timers that keep their periods where edges "
+      "join "
+      "rates; jitter, groups with inheritance, shared levels, max_active";
   method.complexity = "pseudo-polynomial; O(n) a step";
-  method.apply = dags_full;
+  method.apply = [](const System &system) { return across_rates(system, dags_full); };
   return method;
 }
 
@@ -111,10 +116,10 @@ Method dag_one_worker_deferred() {
   method.subject = Subject::Dag;
   method.cite = "as rta_deferred, with C = volume of the DAG (docs/analysis.md, \"DAGs on one worker\")";
   method.assumptions =
-      "one worker, jobs run to completion or to a preemption point, static priorities; the tasks that edges join have "
-      "one rate and one offset; R <= T for DAGs; jitter, max_active; groups unless cooperative";
+      "one worker, jobs run to completion or to a preemption point, static priorities; R <= T for DAGs; timers that "
+      "keep their periods where edges join rates; jitter, max_active; groups unless cooperative";
   method.complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period";
-  method.apply = dags_deferred;
+  method.apply = [](const System &system) { return across_rates(system, dags_deferred); };
   return method;
 }
 

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/jobs_in_progress.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/sched/policy.hpp"
 
@@ -30,14 +31,14 @@ class Compiler {
     for (const Dag &dag : workload_.dags) add_dag(dag);
     assign_ranks();
     keep_shared_groups();
-    for (std::uint32_t d = 0; d < system_.dags.size(); ++d) form_units(d);
+    for (std::uint32_t d = 0; d < system_.dags.size(); ++d) {
+      find_grids(d);
+      form_units(d);
+    }
     for (const SystemTask &task : system_.tasks) {
       system_.utilization += static_cast<double>(task.wcet) / static_cast<double>(task.period);
     }
-    const std::uint32_t threads = system_.platform.max_started;
-    if (system_.mode == sched::Preemption::Full && threads > 0 && threads < system_.tasks.size()) {
-      refuse("fewer threads than tasks: a job can wait for a thread that less urgent jobs hold");
-    }
+    check_threads();
     // With several workers the preempted job pays in its own time, which no interference divided by m covers.
     if (system_.platform.workers > 1 && system_.mode != sched::Preemption::None &&
         system_.platform.preempt_overhead > 0) {
@@ -49,6 +50,19 @@ class Compiler {
  private:
   void refuse(std::string reason) {
     if (system_.not_analysable.empty()) system_.not_analysable = std::move(reason);
+  }
+
+  // A started job keeps its thread while it is preempted.
+  void check_threads() {
+    const std::uint32_t threads = system_.platform.max_started;
+    if (system_.mode != sched::Preemption::Full || threads == 0 || threads >= system_.tasks.size()) return;
+    std::size_t most = 0;
+    for (std::uint32_t d = 0; d < system_.dags.size(); ++d) most += most_jobs_in_progress(system_, DagId(d));
+    if (threads < most) {
+      refuse(std::to_string(threads) + " threads for up to " + std::to_string(most) +
+             " jobs in progress: a job can wait for a thread that less urgent jobs hold");
+    }
+    system_.threads_suffice_if_bounded = true;
   }
 
   void add_dag(const Dag &dag) {
@@ -145,14 +159,30 @@ class Compiler {
                                    [&](std::uint32_t t) { return !system_.tasks[t].predecessors.empty(); });
     if (edges && is_released_together(dag, order)) return {order};
 
-    // Connected parts: each task points at a representative.
-    std::vector<std::uint32_t> part(order.size());
+    const std::vector<std::vector<std::uint32_t>> parts = connected_parts(order);
+    std::vector<std::vector<std::uint32_t>> lists;
+    for (const std::vector<std::uint32_t> &part : parts) {
+      if (is_unit(part)) {
+        lists.push_back(part);
+      } else {
+        for (const std::uint32_t t : part) lists.push_back({t});
+      }
+    }
+    std::sort(lists.begin(), lists.end());
+    return lists;
+  }
+
+  // Joined by edges other than rate edges.
+  [[nodiscard]] std::vector<std::vector<std::uint32_t>> connected_parts(const std::vector<std::uint32_t> &order) const {
+    const std::uint32_t first = *std::min_element(order.begin(), order.end());
+    std::vector<std::uint32_t> part(order.size());  // each task points at a representative
     std::iota(part.begin(), part.end(), 0);
     const auto find = [&](std::uint32_t i) {
       while (part[i] != i) i = part[i] = part[part[i]];
       return i;
     };
     for (const std::uint32_t t : order) {
+      if (joins_rates(t)) continue;
       for (const std::uint32_t p : system_.tasks[t].predecessors) part[find(t - first)] = find(p - first);
     }
     std::map<std::uint32_t, std::vector<std::uint32_t>> parts;
@@ -160,8 +190,42 @@ class Compiler {
     std::vector<std::vector<std::uint32_t>> lists;
     lists.reserve(parts.size());
     for (auto &[representative, tasks] : parts) lists.push_back(std::move(tasks));
-    std::sort(lists.begin(), lists.end());
     return lists;
+  }
+
+  [[nodiscard]] bool joins_rates(std::uint32_t t) const {
+    const SystemTask &task = system_.tasks[t];
+    return std::any_of(task.predecessors.begin(), task.predecessors.end(), [&](std::uint32_t p) {
+      return system_.tasks[p].period != task.period || system_.tasks[p].offset != task.offset;
+    });
+  }
+
+  // A part without rate edges is released together; one with them, if all of it follows the one task that waits.
+  [[nodiscard]] bool is_unit(const std::vector<std::uint32_t> &part) const {
+    if (std::none_of(part.begin(), part.end(), [&](std::uint32_t t) { return joins_rates(t); })) return true;
+    return std::all_of(part.begin() + 1, part.end(),
+                       [&](std::uint32_t t) { return !joins_rates(t) && !system_.tasks[t].predecessors.empty(); });
+  }
+
+  // The grid of a task: a timer's own; a data task's is that of its predecessor with the largest period, of several the
+  // latest. In topological order.
+  void find_grids(std::uint32_t dag) {
+    const std::uint32_t first = system_.dags[dag].tasks.empty() ? 0 : system_.dags[dag].tasks.front();
+    const std::vector<std::uint32_t> ranks = topological_ranks(workload_.dags[dag]);
+    std::vector<std::uint32_t> order = system_.dags[dag].tasks;
+    std::sort(order.begin(), order.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return ranks[a - first] < ranks[b - first]; });
+    for (const std::uint32_t t : order) {
+      SystemTask &task = system_.tasks[t];
+      task.offset = workload_.dags[dag].tasks[t - first].offset;
+      if (!task.data) continue;
+      std::optional<Duration> latest;
+      for (const std::uint32_t p : task.predecessors) {
+        const SystemTask &before = system_.tasks[p];
+        if (before.period == task.period) latest = std::max(latest.value_or(before.offset), before.offset);
+      }
+      task.offset = latest.value_or(0);
+    }
   }
 
   [[nodiscard]] bool is_released_together(std::uint32_t dag, const std::vector<std::uint32_t> &tasks) const {
@@ -179,9 +243,6 @@ class Compiler {
 
   void form_units(std::uint32_t dag) {
     for (std::vector<std::uint32_t> &tasks : split(dag)) {
-      if (tasks.size() > 1 && !is_released_together(dag, tasks)) {
-        refuse("DAG '" + system_.dags[dag].name + "': edges join tasks of different periods or offsets");
-      }
       const auto id = static_cast<std::uint32_t>(system_.units.size());
       for (const std::uint32_t t : tasks) system_.tasks[t].unit = id;
       system_.dags[dag].units.push_back(id);
@@ -195,7 +256,11 @@ class Compiler {
     unit.dag = dag;
     unit.period = first.period;
     unit.deadline = first.deadline;
-    unit.limit = tasks.size() > 1 ? first.period : first.limit;
+    unit.offset = first.offset;
+    for (const std::uint32_t p : first.predecessors) {
+      if (std::find(tasks.begin(), tasks.end(), p) == tasks.end()) unit.awaits.push_back(p);
+    }
+    unit.limit = tasks.size() > 1 || !unit.awaits.empty() ? first.period : first.limit;
     unit.first_rank = unit.last_rank = first.rank;
     std::map<std::uint32_t, Duration> path;  // longest path that ends with the task
     for (const std::uint32_t t : tasks) {
@@ -238,6 +303,10 @@ AnalysisPlatform platform_of(const Workload &workload) {
 
 bool System::has_edges() const {
   return std::any_of(units.begin(), units.end(), [](const Unit &unit) { return unit.has_edges; });
+}
+
+bool System::has_rate_edges() const {
+  return std::any_of(units.begin(), units.end(), [](const Unit &unit) { return !unit.awaits.empty(); });
 }
 
 Result<System> compile(const Workload &workload, const AnalysisPlatform &platform) {

@@ -1,5 +1,6 @@
 // What the bounds see: a workload on a platform, compiled once into numbers. Execution times are charged with the
-// platform's overheads, priorities are those of sched::assign_priorities, and tasks joined by edges form one unit.
+// platform's overheads, priorities are those of sched::assign_priorities, and tasks of one rate joined by edges form
+// one unit.
 // Plain values, immutable once compiled; safe to share among threads.
 #pragma once
 
@@ -41,6 +42,7 @@ struct SystemTask {
   Duration bcet = 0;         // as charged, > 0; bounds hold for shorter executions too, only the exploration reads it
   Duration overhead = 0;     // the part of `wcet` that is overhead
   Duration period = 0;       // T, least distance of two nominal releases of the unit
+  Duration offset = 0;       // of the grid whose points its unit's jobs are numbered by, see Unit
   Duration deadline = 0;     // D, from the task's own release
   Duration jitter = 0;       // J
   Time offset = 0;           // of a timer; bounds hold for all offsets, only the exploration reads it
@@ -56,12 +58,16 @@ struct SystemTask {
 };
 
 /// What is released as a whole: a task without edges, or tasks joined by edges, all of one rate and released together.
-/// A DAG with edges and one rate is one unit; otherwise each connected part of a DAG is one. The response time of a
-/// unit runs from its nominal release to the finish of its last task.
+/// A DAG with edges and one rate is one unit; otherwise each connected part of a DAG is one, cut at *rate edges*: those
+/// into a task with a predecessor of another period or offset. The response time of a unit runs from its nominal
+/// release to the finish of its last task. That of a unit behind rate edges is the point of its grid, `offset` + k
+/// `period`: the timer's own, or that of the predecessor with the largest period (rate_edges.hpp).
 struct Unit {
   DagId dag;
-  std::vector<std::uint32_t> tasks;  // TaskIds in topological order
+  std::vector<std::uint32_t> tasks;   // TaskIds in topological order
+  std::vector<std::uint32_t> awaits;  // TaskIds of other units whose data its first task waits for: rate edges
   Duration period = 0;
+  Duration offset = 0;
   Duration deadline = 0;         // least of its tasks and the DAG's end-to-end one: met, all of these are met
   Duration jitter = 0;           // largest of its tasks
   Duration limit = 0;            // least of its tasks; with edges never above the period
@@ -89,14 +95,17 @@ struct System {
   std::vector<std::uint32_t> by_rank;              // TaskIds, most urgent first
   std::vector<std::vector<std::uint32_t>> groups;  // TaskIds of each group
   double utilization = 0;                          // sum of wcet / period, overheads included; for people
-  /// Features that no bound covers (edges between rates, a budget below the wcet, a queue too small, ...): every method
-  /// answers NotApplicable with this.
+  /// Features that no bound covers (a budget below the wcet, a queue too small, ...): every method answers
+  /// NotApplicable with this.
   std::string not_analysable;
+  /// Fewer threads than tasks, which is enough as long as every response is within its period (jobs_in_progress.hpp).
+  bool threads_suffice_if_bounded = false;
 
   /// The platform's mode, or None where it is cooperative and no task has a preemption point.
   sched::Preemption mode = sched::Preemption::Full;
 
-  [[nodiscard]] bool has_edges() const;  // some unit has
+  [[nodiscard]] bool has_edges() const;       // some unit has
+  [[nodiscard]] bool has_rate_edges() const;  // some unit awaits data of another
 };
 
 /// Errors: what validate() calls an error (periods of data tasks must be set: inherit_periods()), a platform without

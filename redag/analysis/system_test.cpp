@@ -70,17 +70,39 @@ TEST(System, RatesThatNoEdgeJoinsAreUnitsOfTheirOwn) {
   EXPECT_THAT(system.dags[0].units, ElementsAre(0, 1));
 }
 
-TEST(System, EdgesBetweenRatesAndOffsetsAreNotAnalysed) {
-  const System rates = compiled(
-      make_workload({make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 10, .after = {0}}})}, 1),
-      mode(sched::Preemption::Full));
-  EXPECT_THAT(rates.not_analysable, HasSubstr("different periods or offsets"));
-  const System offsets = compiled(
-      make_workload(
-          {make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 5, .after = {0}, .offset_ms = 1}})},
-          1),
-      mode(sched::Preemption::Full));
-  EXPECT_THAT(offsets.not_analysable, HasSubstr("different periods or offsets"));
+// What follows the one task that waits goes with it; it waits for data of others.
+TEST(System, UnitsAreCutAtRateEdges) {
+  const Workload workload = make_workload({make_dag("d", {{.name = "fast", .period_ms = 5},
+                                                          {.name = "slow", .period_ms = 20, .offset_ms = 3},
+                                                          {.name = "fuse", .after = {0, 1}},
+                                                          {.name = "track", .after = {2}},
+                                                          {.name = "late", .period_ms = 20, .after = {1}}})},
+                                          1);
+  const System system = compiled(workload, mode(sched::Preemption::Full));
+  ASSERT_EQ(system.units.size(), 4U);
+  EXPECT_THAT(system.units[0].tasks, ElementsAre(0));
+  EXPECT_THAT(system.units[1].tasks, ElementsAre(1));
+  EXPECT_THAT(system.units[2].tasks, ElementsAre(2, 3));
+  EXPECT_THAT(system.units[2].awaits, ElementsAre(0, 1));
+  EXPECT_EQ(system.units[2].offset, 3 * kMillisecond) << "that of its slowest predecessor";
+  EXPECT_EQ(system.tasks[3].offset, 3 * kMillisecond);
+  EXPECT_THAT(system.units[3].awaits, ElementsAre(1)) << "a timer of another offset";
+  EXPECT_EQ(system.units[3].offset, 0);
+  EXPECT_TRUE(system.has_rate_edges());
+  EXPECT_FALSE(compiled(two_dags(), mode(sched::Preemption::Full)).has_rate_edges());
+}
+
+// One of them brings a second task that waits, so that none of the part is released together.
+TEST(System, SeveralTasksThatWaitAreUnitsOfTheirOwn) {
+  const Workload workload = make_workload({make_dag("d", {{.name = "fast", .period_ms = 5},
+                                                          {.name = "slow", .period_ms = 20},
+                                                          {.name = "b", .after = {0, 1}},
+                                                          {.name = "c", .after = {0, 1}},
+                                                          {.name = "join", .after = {2, 3}}})},
+                                          1);
+  const System system = compiled(workload, mode(sched::Preemption::Full));
+  ASSERT_EQ(system.units.size(), 5U);
+  EXPECT_THAT(system.units[4].awaits, ElementsAre(2, 3));
 }
 
 TEST(System, WhatCutsOrRefusesJobsIsNotAnalysed) {
@@ -91,9 +113,14 @@ TEST(System, WhatCutsOrRefusesJobsIsNotAnalysed) {
   pending.dags[0].max_pending = 2;
   EXPECT_THAT(compiled(pending, mode(sched::Preemption::Full)).not_analysable, HasSubstr("max_pending"));
   AnalysisPlatform threads = mode(sched::Preemption::Full);
+  threads.max_started = 2;
+  EXPECT_THAT(compiled(two_dags(), threads).not_analysable, HasSubstr("2 threads for up to 3 jobs in progress"));
   threads.max_started = 3;
-  EXPECT_THAT(compiled(two_dags(), threads).not_analysable, HasSubstr("threads"));
+  EXPECT_EQ(compiled(two_dags(), threads).not_analysable, "");
+  EXPECT_TRUE(compiled(two_dags(), threads).threads_suffice_if_bounded);
+  EXPECT_THAT(refusal(liu_layland(), two_dags(), threads), HasSubstr("fewer threads than tasks"));
   threads.max_started = 4;
+  EXPECT_FALSE(compiled(two_dags(), threads).threads_suffice_if_bounded);
   EXPECT_EQ(compiled(two_dags(), threads).not_analysable, "");
   AnalysisPlatform preempt = mode(sched::Preemption::Full, 2);
   preempt.preempt_overhead = 1;

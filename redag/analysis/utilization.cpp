@@ -6,6 +6,7 @@
 
 #include "redag/analysis/arithmetic.hpp"
 #include "redag/analysis/one_worker.hpp"
+#include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
 
 namespace redag::analysis {
@@ -219,6 +220,7 @@ Outcome apply_hyperbolic_blocking(const System &system) {
 
 // m workers, full preemption, independent tasks, nothing that holds up a started or ready job but priority.
 std::optional<std::string> why_not_global(const System &system) {
+  if (auto reason = why_not_directly(system)) return reason;
   // With m = 1 the limits would be 1 and more, which no fixed priorities reach.
   if (system.platform.workers < 2) return "for two workers or more";
   if (!sched::is_static(system.policy)) {

@@ -5,6 +5,7 @@
 
 #include "redag/analysis/arithmetic.hpp"
 #include "redag/analysis/global.hpp"
+#include "redag/analysis/rate_edges.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -54,6 +55,7 @@ ResponseBound bound_of(const System &system, const Unit &unit, const std::vector
 }
 
 Outcome apply_wait_set(const System &system) {
+  if (auto reason = why_not_directly(system)) return NotApplicable{*reason};
   if (system.mode != sched::Preemption::None) return NotApplicable{"rclcpp's executors do not preempt"};
   if (!system.groups.empty()) return NotApplicable{"exclusive groups: a busy group's callbacks can miss every window"};
   const std::vector<Duration> from_ready = responses_from_ready(system);

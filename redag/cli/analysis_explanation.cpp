@@ -32,6 +32,7 @@ std::string what(const Term &term) {
     case Term::Kind::Blocking: return "blocking by";
     case Term::Kind::Interference: return "interference of";
     case Term::Kind::Jitter: return "release jitter";
+    case Term::Kind::Wait: return "data of other rates, waited for";
     case Term::Kind::Overhead: return "overhead";
     case Term::Kind::Waiting: return "waiting, for all that comes before";
   }
@@ -67,6 +68,7 @@ std::string advice(const Analysed &analysed, const Term &term) {
       return fmt::format("{}{}: shorten it, release it less often, or add a worker", who, times);
     }
     case Term::Kind::Jitter: return "a release that is seen sooner counts most";
+    case Term::Kind::Wait: return "a shorter period or response of its predecessors counts most";
     case Term::Kind::Overhead: return "fewer and longer jobs, or cheaper scheduling, count most";
     case Term::Kind::Waiting:
       return "the schedule that is worst for it was found by trying all; without --explore the bounds name the causes";

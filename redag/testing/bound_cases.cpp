@@ -44,7 +44,11 @@ class CaseGenerator {
         result.platform.workers *
         (limits_.min_utilization + rng_.uniform01() * (limits_.max_utilization - limits_.min_utilization));
     for (const double share : shares(rng_, count, total)) {
-      limits_.edges ? add_graph(workload, share) : add_single(workload, share);
+      if (limits_.rates) {
+        add_rates(workload, share);
+      } else {
+        limits_.edges ? add_graph(workload, share) : add_single(workload, share);
+      }
     }
     for (Dag &dag : workload.dags) finish(dag);
     if (limits_.levels && chance(rng_, 0.5)) {
@@ -125,6 +129,52 @@ class CaseGenerator {
     workload.dags.push_back(std::move(dag));
   }
 
+  // A few periods and offsets, so that tasks of one grid meet too; data tasks, and timers that wait.
+  void add_rates(Workload &workload, double utilization) {
+    Dag dag = named_dag(workload);
+    const std::vector<Duration> periods = related_periods();
+    const auto last_period = static_cast<std::uint32_t>(periods.size() - 1);
+    const Duration latest = chance(rng_, 0.5) ? 0 : limits_.max_period / 2;
+    const Duration offsets[] = {rng_.uniform(0, latest), rng_.uniform(0, latest)};
+    const double join = 0.2 + 0.3 * rng_.uniform01();
+    const double data_share = 0.3 + 0.7 * rng_.uniform01();
+    for (const double share : shares(rng_, between(rng_, 1, limits_.max_tasks), utilization)) {
+      std::vector<std::uint32_t> predecessors;
+      Duration slowest = 0;
+      for (std::uint32_t p = 0; p < dag.tasks.size(); ++p) {
+        if (!chance(rng_, join)) continue;
+        predecessors.push_back(p);
+        slowest = std::max(slowest, dag.tasks[p].period);
+      }
+      const bool is_data = !predecessors.empty() && chance(rng_, data_share);
+      Duration own = periods[between(rng_, 0, last_period)];
+      if (is_data || (!predecessors.empty() && chance(rng_, 0.7))) own = slowest;
+      Task next = task(own, share);
+      next.predecessors = std::move(predecessors);
+      next.activation = is_data ? Activation::Data : Activation::Timer;
+      next.deadline = deadline(next, 1);
+      if (!is_data) next.offset = offsets[between(rng_, 0, 1)];
+      if (limits_.jitter && !is_data && chance(rng_, 0.3)) next.jitter = rng_.uniform(0, next.period / 3);
+      if (limits_.queues && chance(rng_, 0.2)) {
+        next.overrun = Overrun::Queue;
+        next.queue_depth = between(rng_, 1, 3);
+      }
+      dag.tasks.push_back(std::move(next));
+    }
+    workload.dags.push_back(std::move(dag));
+  }
+
+  // Multiples of each other or not.
+  std::vector<Duration> related_periods() {
+    std::vector<Duration> periods = {period()};
+    const bool harmonic = chance(rng_, 0.5);
+    for (std::uint32_t i = between(rng_, 1, 2); i > 0; --i) {
+      const Duration next = harmonic ? periods.back() * rng_.uniform(1, 3) : period();
+      periods.push_back(std::min(next, limits_.max_period));
+    }
+    return periods;
+  }
+
   static Dag named_dag(const Workload &workload) {
     Dag dag;
     dag.name = fmt::format("d{}", workload.dags.size());
@@ -145,6 +195,10 @@ class CaseGenerator {
 };
 
 }  // namespace
+
+std::vector<PolicyKind> priorities_of_tasks() {
+  return {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed};
+}
 
 BoundCase random_bound_case(Rng &rng, const BoundCaseLimits &limits) { return CaseGenerator(rng, limits).run(); }
 

@@ -139,12 +139,22 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
                   Observed &observed) {
   Workload workload = bound_case.workload;
   std::vector<std::uint32_t> unit_of;
+  std::vector<bool> can_pause;  // by TaskId
   Duration longest = 0;
   for (Dag &dag : workload.dags) {
+    const std::vector<std::uint32_t> &units = system.dags[static_cast<std::size_t>(&dag - workload.dags.data())].units;
+    const bool joins_rates =
+        std::any_of(units.begin(), units.end(), [&](std::uint32_t u) { return !system.units[u].awaits.empty(); });
     for (Task &task : dag.tasks) {
       unit_of.push_back(system.tasks[unit_of.size()].unit);
-      if (task.activation == Activation::Timer) task.offset = run.offsets[unit_of.back()];
-      longest = std::max(longest, task.period);
+      can_pause.push_back(!joins_rates);
+      if (joins_rates) {
+        // Its offsets are part of what is analysed: they move together.
+        if (task.activation == Activation::Timer) task.offset += run.offsets[units.front()];
+      } else if (task.activation == Activation::Timer) {
+        task.offset = run.offsets[unit_of.back()];
+      }
+      longest = std::max(longest, task.period + task.offset);
     }
   }
 
@@ -156,7 +166,8 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
     Rng rng = Rng::stream(run.seed, id.value, number);
     return rng.uniform01() < run.full_demand ? task.wcet : rng.uniform(1, task.wcet);
   };
-  options.gap = [&](const Task &task, TaskId id, std::uint32_t number) {
+  options.gap = [&](const Task &task, TaskId id, std::uint32_t number) -> Duration {
+    if (!can_pause[id.value]) return 0;
     Rng rng = Rng::stream(run.seed + 1, unit_of[id.value], number);
     return rng.uniform01() < run.gap ? rng.uniform(1, task.period) : 0;
   };

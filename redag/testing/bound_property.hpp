@@ -20,13 +20,17 @@ struct BoundCase {
 };
 using BoundGenerator = std::function<BoundCase(Rng &)>;
 
+/// rate_monotonic, deadline_monotonic, fixed.
+[[nodiscard]] std::vector<PolicyKind> priorities_of_tasks();
+
 /// What random_bound_case() draws from. Times are a few ticks (nanoseconds), so that corners are met often.
 struct BoundCaseLimits {
   std::uint32_t min_workers = 1;
   std::uint32_t max_workers = 1;
   sched::Preemption preemption = sched::Preemption::Full;
-  std::vector<PolicyKind> policies = {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed};
+  std::vector<PolicyKind> policies = priorities_of_tasks();
   bool edges = false;            // each DAG one rate, data tasks and aligned timers; otherwise independent tasks
+  bool rates = false;            // with edges: tasks of a DAG have several periods and offsets
   std::uint32_t max_dags = 6;    // with edges; otherwise tasks, a DAG each or a few to a DAG
   std::uint32_t max_tasks = 5;   // of a DAG
   double min_utilization = 0.3;  // per worker

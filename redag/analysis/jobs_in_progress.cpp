@@ -1,0 +1,74 @@
+#include "redag/analysis/jobs_in_progress.hpp"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+#include <vector>
+
+namespace redag::analysis {
+namespace {
+
+// The largest antichain of a grid's tasks is as large as the least number of chains that cover them (R. Dilworth,
+// Annals of Mathematics 51(1), 1950): those that a maximum matching between tasks and tasks that follow them leaves
+// (Kuhn).
+class Antichain {
+ public:
+  Antichain(const System &system, const std::vector<std::uint32_t> &tasks)
+      : count_(tasks.size()), follows_(count_, std::vector<bool>(count_, false)), next_(count_, kNone) {
+    for (std::size_t b = 0; b < count_; ++b) {
+      for (const std::uint32_t p : system.tasks[tasks[b]].predecessors) {
+        const auto a = std::find(tasks.begin(), tasks.end(), p);
+        if (a != tasks.end()) follows_[static_cast<std::size_t>(a - tasks.begin())][b] = true;
+      }
+    }
+    for (std::size_t via = 0; via < count_; ++via) {
+      for (std::size_t a = 0; a < count_; ++a) {
+        if (!follows_[a][via]) continue;
+        for (std::size_t b = 0; b < count_; ++b) follows_[a][b] = follows_[a][b] || follows_[via][b];
+      }
+    }
+  }
+
+  std::size_t size() {
+    std::size_t chains = count_;
+    for (std::size_t a = 0; a < count_; ++a) {
+      visited_.assign(count_, false);
+      if (extend(a)) --chains;
+    }
+    return chains;
+  }
+
+ private:
+  static constexpr std::size_t kNone = SIZE_MAX;
+
+  bool extend(std::size_t a) {
+    for (std::size_t b = 0; b < count_; ++b) {
+      if (visited_[b] || !follows_[a][b]) continue;
+      visited_[b] = true;
+      if (next_[b] == kNone || extend(next_[b])) {
+        next_[b] = a;
+        return true;
+      }
+    }
+    return false;
+  }
+
+  std::size_t count_;
+  std::vector<std::vector<bool>> follows_;
+  std::vector<std::size_t> next_;  // by task: the one before it in its chain
+  std::vector<bool> visited_;
+};
+
+}  // namespace
+
+std::size_t most_jobs_in_progress(const System &system, DagId dag) {
+  std::map<std::pair<Duration, Duration>, std::vector<std::uint32_t>> grids;
+  for (const std::uint32_t t : system.dags[dag.value].tasks) {
+    grids[{system.tasks[t].period, system.tasks[t].offset}].push_back(t);
+  }
+  std::size_t most = 0;
+  for (const auto &[grid, tasks] : grids) most += Antichain(system, tasks).size();
+  return most;
+}
+
+}  // namespace redag::analysis

@@ -1,0 +1,46 @@
+#include "redag/analysis/jobs_in_progress.hpp"
+
+#include <gtest/gtest.h>
+
+#include "redag/testing/timeline.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using redag::testing::make_dag;
+using redag::testing::make_workload;
+using redag::testing::TestTask;
+
+std::size_t most(const std::vector<TestTask> &tasks) {
+  const auto system = compile(make_workload({make_dag("d", tasks)}, 1), AnalysisPlatform{});
+  return most_jobs_in_progress(system.value(), DagId(0));
+}
+
+TEST(JobsInProgress, TasksThatFollowEachOtherAreNeverInProgressTogether) {
+  EXPECT_EQ(most({{.name = "a", .period_ms = 10}}), 1U);
+  EXPECT_EQ(most({{.name = "a", .period_ms = 10}, {.name = "b", .after = {0}}, {.name = "c", .after = {1}}}), 1U);
+  EXPECT_EQ(most({{.name = "a", .period_ms = 10}, {.name = "b", .period_ms = 10}}), 2U) << "no edge";
+}
+
+// a -> {b, c} -> d and b -> e: b and c, or c, e; d follows b and c but not e.
+TEST(JobsInProgress, TheWidthOfAGraph) {
+  const std::vector<TestTask> graph = {{.name = "a", .period_ms = 10},
+                                       {.name = "b", .after = {0}},
+                                       {.name = "c", .after = {0}},
+                                       {.name = "d", .after = {1, 2}},
+                                       {.name = "e", .after = {1}}};
+  EXPECT_EQ(most(graph), 2U);
+  std::vector<TestTask> wider = graph;
+  wider.push_back({.name = "f", .after = {0}});
+  EXPECT_EQ(most(wider), 3U);
+}
+
+// What is fused has the grid of its slowest predecessor, which it follows; another offset is another grid.
+TEST(JobsInProgress, OneChainAGrid) {
+  EXPECT_EQ(most({{.name = "fast", .period_ms = 5}, {.name = "slow", .period_ms = 20}, {.name = "f", .after = {0, 1}}}),
+            2U);
+  EXPECT_EQ(most({{.name = "a", .period_ms = 20}, {.name = "b", .period_ms = 20, .after = {0}, .offset_ms = 1}}), 2U);
+}
+
+}  // namespace
+}  // namespace redag::analysis

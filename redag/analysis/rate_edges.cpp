@@ -1,0 +1,308 @@
+#include "redag/analysis/rate_edges.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/jobs_in_progress.hpp"
+
+namespace redag::analysis {
+namespace {
+
+constexpr std::string_view kFasterThanData =
+    "a predecessor of a larger period delivers data less often than the task is released: jobs are skipped by design";
+constexpr std::string_view kNoData = "a predecessor of another rate has no bound";
+constexpr std::string_view kLateData = "data of its predecessors can come later than its next release";
+constexpr std::string_view kGaveUp = "gave up: waits and responses did not agree in a thousand steps";
+constexpr std::string_view kBinds =
+    "a max_active over several parts of the DAG is known not to bind only if all its tasks have a bound";
+constexpr std::string_view kFewThreads = "fewer threads than tasks are known to suffice only if all tasks have a bound";
+
+constexpr int kMaxRounds = 1000;
+
+// What a unit that waits is told of a predecessor: data of job k comes within [offset + k period, ... + response].
+struct Data {
+  std::uint32_t task = 0;
+  Duration period = 0;
+  Duration offset = 0;
+  Duration response = 0;
+};
+
+// How late the first task of a unit can become ready after the point of its grid; docs/analysis.md has the cases.
+// `seen`: of data on its own grid, and of its own timer, the latest. `others`: of other grids, none of a larger period.
+std::optional<Duration> wait_for(const Unit &unit, Duration seen, const std::vector<Data> &others) {
+  if (others.empty()) return seen;
+  const Duration period = unit.period;
+  Duration first = seen;  // of the first job, which finds no data from before
+  Duration between = 0;   // two data of another grid
+  for (const Data &data : others) {
+    first = std::max(first, data.offset - unit.offset + data.response);
+    between = std::max(between, add(data.period, data.response) - 1);
+  }
+  if (between <= period) return first;
+  Duration wait = std::max(first, add(seen, between));
+  if (others.size() == 1) {
+    const Data &other = others.front();
+    const Duration behind = std::max(other.offset - unit.offset, seen - 1 + other.period - period);
+    wait = std::min(wait, std::max(seen, behind + other.response));
+  }
+  return wait;
+}
+
+class Resolver {
+ public:
+  Resolver(const System &system, Outcome (*apply)(const System &)) : system_(system), alone_(system), apply_(apply) {
+    take_away();
+    absent_.resize(system.units.size());
+    responses_.resize(system.units.size());
+    for (std::uint32_t u = 0; u < system.units.size(); ++u) responses_[u] = system.units[u].length;
+  }
+
+  Outcome run() {
+    for (int round = 0; update_waits(round); ++round) {
+      Outcome outcome = apply_(alone_);
+      const Bound *bound = std::get_if<Bound>(&outcome);
+      if (bound == nullptr) return outcome;
+      found_ = *bound;
+      for (std::uint32_t u = 0; u < system_.units.size(); ++u) {
+        responses_[u] = absent_[u].empty() ? of_unit(u).response : std::nullopt;
+      }
+    }
+    return result();
+  }
+
+ private:
+  [[nodiscard]] const ResponseBound &of_unit(std::uint32_t u) const {
+    return found_.tasks[system_.units[u].tasks.front()];
+  }
+
+  void take_away() {
+    alone_.threads_suffice_if_bounded = false;
+    if (system_.threads_suffice_if_bounded) alone_.platform.max_started = 0;
+    conditional_.resize(system_.dags.size());
+    for (std::uint32_t d = 0; d < system_.dags.size(); ++d) {
+      SystemDag &dag = alone_.dags[d];
+      if (dag.max_active == 0 || dag.units.size() < 2) continue;
+      if (most_jobs_in_progress(system_, DagId(d)) > dag.max_active) continue;
+      dag.max_active = 0;
+      conditional_[d] = true;
+    }
+    const auto leaves_unit = [&](std::uint32_t t) {
+      return [&, t](std::uint32_t other) { return system_.tasks[other].unit != system_.tasks[t].unit; };
+    };
+    for (std::uint32_t t = 0; t < alone_.tasks.size(); ++t) {
+      std::erase_if(alone_.tasks[t].predecessors, leaves_unit(t));
+      std::erase_if(alone_.tasks[t].successors, leaves_unit(t));
+    }
+    for (Unit &unit : alone_.units) {
+      unit.awaits.clear();
+      unit.has_edges = std::any_of(unit.tasks.begin(), unit.tasks.end(),
+                                   [&](std::uint32_t t) { return !alone_.tasks[t].predecessors.empty(); });
+    }
+  }
+
+  // Waits that the latest responses imply; false if no more than those assumed. Waits only grow, and a unit that once
+  // has none never gets one.
+  bool update_waits(int round) {
+    bool changed = round == 0;  // not asked yet
+    for (std::uint32_t u = 0; u < system_.units.size(); ++u) {
+      const Unit &unit = system_.units[u];
+      if (unit.awaits.empty() || !absent_[u].empty()) continue;
+      std::optional<Duration> wait = round < kMaxRounds ? wait_of(u) : std::nullopt;
+      if (!wait && round >= kMaxRounds) absent_[u] = kGaveUp;
+      if (wait && *wait > unit.limit) {
+        absent_[u] = kLateData;
+        wait.reset();
+      }
+      Duration &jitter = alone_.units[u].jitter;
+      const Duration larger = std::max(jitter, wait ? *wait : jitter_of_number(u));
+      changed = changed || larger > jitter || !wait;
+      jitter = larger;
+    }
+    return changed;
+  }
+
+  // Sets absent_ where there is none.
+  std::optional<Duration> wait_of(std::uint32_t u) {
+    const Unit &unit = system_.units[u];
+    const SystemTask &first = system_.tasks[unit.tasks.front()];
+    Duration seen = unit.jitter;
+    std::vector<Data> others;
+    for (const std::uint32_t p : unit.awaits) {
+      const SystemTask &before = system_.tasks[p];
+      if (before.period > first.period) {
+        absent_[u] = kFasterThanData;
+        return std::nullopt;
+      }
+      const std::optional<Duration> response = responses_[before.unit];
+      if (!response) {
+        absent_[u] = kNoData;
+        return std::nullopt;
+      }
+      if (before.period == unit.period && before.offset == unit.offset) {
+        seen = std::max(seen, *response);
+      } else {
+        others.push_back(Data{p, before.period, before.offset, *response});
+      }
+    }
+    return wait_for(unit, seen, others);
+  }
+
+  // Jitter that explains how many jobs become ready in any interval, whatever the responses are. Not below the period.
+  Duration jitter_of_number(std::uint32_t u) const {
+    const Unit &unit = system_.units[u];
+    const SystemTask &first = system_.tasks[unit.tasks.front()];
+    // A timer's job is ready before the next release is seen, or skipped.
+    if (!first.data) return add(unit.period, unit.jitter);
+    // Each job takes a datum of every predecessor, one of which can be from before the interval. Data in an interval:
+    // of jobs that became ready in it, that were ready before, and of one that had started.
+    Duration least = kUnbounded;
+    for (const std::uint32_t p : unit.awaits) {
+      const SystemTask &before = system_.tasks[p];
+      if (before.period != unit.period) continue;
+      const Unit &from = system_.units[before.unit];
+      const Duration number = from.awaits.empty() ? from.jitter : std::max(from.jitter, jitter_of_number(before.unit));
+      const auto hops = static_cast<Duration>(from.tasks.size());
+      const Duration ready = std::max<Duration>(1, before.limit / before.period);
+      least = std::min(least, add(number, multiply(unit.period, hops * (ready + 2))));
+    }
+    return least;
+  }
+
+  // ---- the answer ----
+
+  Outcome result() {
+    const bool all = std::all_of(responses_.begin(), responses_.end(), [](const auto &r) { return r.has_value(); });
+    if (system_.threads_suffice_if_bounded && !all) return nothing(kFewThreads);
+    for (std::uint32_t u = 0; u < system_.units.size(); ++u) {
+      if (conditional_[system_.units[u].dag.value] && !responses_[u]) return nothing(kBinds);
+    }
+    Bound bound = found_;
+    for (std::uint32_t u = 0; u < system_.units.size(); ++u) {
+      if (!system_.units[u].awaits.empty()) bound_tasks(u, bound);
+    }
+    ages_.resize(system_.units.size());
+    for (std::uint32_t d = 0; d < system_.dags.size(); ++d) {
+      const auto waits = [&](std::uint32_t u) { return !system_.units[u].awaits.empty(); };
+      const std::vector<std::uint32_t> &units = system_.dags[d].units;
+      if (std::any_of(units.begin(), units.end(), waits)) bound.dags[d] = end_to_end(d);
+    }
+    return bound;
+  }
+
+  [[nodiscard]] Bound nothing(std::string_view why) const {
+    ResponseBound none;
+    none.absent = why;
+    return from_units(system_, std::vector<ResponseBound>(system_.units.size(), none));
+  }
+
+  // From the first task's readiness to the end of the unit. Further timers of the unit can be seen later than that, so
+  // that the unit's window need not have begun.
+  [[nodiscard]] Duration from_ready(std::uint32_t u) const {
+    const ResponseBound &bound = of_unit(u);
+    const std::vector<std::uint32_t> &tasks = system_.units[u].tasks;
+    const bool is_seen_later = std::any_of(tasks.begin() + 1, tasks.end(), [&](std::uint32_t t) {
+      return !system_.tasks[t].data && system_.tasks[t].jitter > 0;
+    });
+    if (is_seen_later) return *bound.response;
+    return std::max(bound.from_ready, *bound.response - alone_.units[u].jitter);
+  }
+
+  // The unit's bound, with all that goes by before it is ready replaced by a term that makes it `response`.
+  [[nodiscard]] ResponseBound with_wait(std::uint32_t u, Duration response) const {
+    ResponseBound bound = of_unit(u);
+    std::erase_if(bound.terms, [](const Term &term) { return term.kind == Term::Kind::Jitter; });
+    const Duration wait = response - (*bound.response - alone_.units[u].jitter);
+    const TaskId first(system_.units[u].tasks.front());
+    if (wait > 0) bound.terms.push_back(Term{Term::Kind::Wait, first, system_.units[u].dag, wait, 0});
+    bound.response = response;
+    return bound;
+  }
+
+  void bound_tasks(std::uint32_t u, Bound &bound) const {
+    for (const std::uint32_t t : system_.units[u].tasks) {
+      ResponseBound &task = bound.tasks[t];
+      if (!absent_[u].empty()) {
+        task = ResponseBound{};
+        task.absent = absent_[u];
+      } else if (task.response) {
+        task = with_wait(u, system_.tasks[t].data ? from_ready(u) : *task.response);
+      }
+    }
+  }
+
+  // How much earlier than the point of its grid the data of a unit's job can have been released.
+  Duration age_of(std::uint32_t u) {
+    if (ages_[u]) return *ages_[u];
+    const Unit &unit = system_.units[u];
+    Duration age = 0;
+    for (const std::uint32_t p : unit.awaits) {
+      const std::uint32_t before = system_.tasks[p].unit;
+      const Duration origin = age_of(before);
+      age = std::max(age, is_on_grid(u, p) ? origin : add(origin, oldest(before)));
+    }
+    ages_[u] = age;
+    return age;
+  }
+
+  [[nodiscard]] bool is_on_grid(std::uint32_t u, std::uint32_t task) const {
+    const SystemTask &before = system_.tasks[task];
+    return before.period == system_.units[u].period && before.offset == system_.units[u].offset;
+  }
+
+  // Of a datum that is the latest when it is taken: the next one comes later, or at the same instant after it.
+  [[nodiscard]] Duration oldest(std::uint32_t u) const { return add(system_.units[u].period, *responses_[u]); }
+
+  ResponseBound end_to_end(std::uint32_t dag) {
+    ResponseBound worst;
+    for (const std::uint32_t u : system_.dags[dag].units) {
+      const Unit &unit = system_.units[u];
+      if (!responses_[u] || !absent_[u].empty()) {
+        worst = ResponseBound{};
+        worst.absent = absent_[u].empty() ? of_unit(u).absent : absent_[u];
+        return worst;
+      }
+      ResponseBound bound = of_unit(u);
+      if (!unit.awaits.empty()) {
+        Duration response = 0;
+        for (const std::uint32_t p : unit.awaits) {
+          const std::uint32_t before = system_.tasks[p].unit;
+          const Duration since_data = is_on_grid(u, p) ? *responses_[u] : add(from_ready(u), oldest(before));
+          response = std::max(response, add(since_data, age_of(before)));
+        }
+        bound = with_wait(u, response);
+      }
+      if (!worst.response || *bound.response > *worst.response) worst = bound;
+    }
+    return worst;
+  }
+
+  const System &system_;
+  System alone_;  // without rate edges; the jitter of a unit that waits includes its wait
+  Outcome (*apply_)(const System &);
+  std::vector<bool> conditional_;                   // by DagId: its max_active was taken away
+  std::vector<std::optional<Duration>> responses_;  // by unit
+  std::vector<std::string_view> absent_;            // by unit: why it has no wait
+  std::vector<std::optional<Duration>> ages_;
+  Bound found_;
+};
+
+bool shares_max_active(const System &system) {
+  return std::any_of(system.dags.begin(), system.dags.end(),
+                     [](const SystemDag &dag) { return dag.max_active > 0 && dag.units.size() > 1; });
+}
+
+}  // namespace
+
+std::optional<std::string> why_not_directly(const System &system) {
+  if (system.has_rate_edges()) return "edges join tasks of different periods or offsets: see the bounds for DAGs";
+  if (system.threads_suffice_if_bounded) return "fewer threads than tasks: see the bounds on response times";
+  return std::nullopt;
+}
+
+Outcome across_rates(const System &system, Outcome (*apply)(const System &system)) {
+  if (!why_not_directly(system) && !shares_max_active(system)) return apply(system);
+  return Resolver(system, apply).run();
+}
+
+}  // namespace redag::analysis

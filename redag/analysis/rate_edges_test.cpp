@@ -1,0 +1,254 @@
+#include "redag/analysis/rate_edges.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string_view>
+
+#include "redag/analysis/analyze.hpp"
+#include "redag/analysis/global_dag.hpp"
+#include "redag/analysis/global_groups.hpp"
+#include "redag/analysis/global_sequential.hpp"
+#include "redag/analysis/response_time.hpp"
+#include "redag/model/workload_yaml.hpp"
+#include "redag/testing/bound_property.hpp"
+#include "redag/testing/timeline.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using testing::BoundCase;
+using testing::BoundCaseLimits;
+using testing::expect_bound_holds;
+
+BoundCaseLimits rates(sched::Preemption preemption, std::uint32_t workers) {
+  BoundCaseLimits limits;
+  limits.preemption = preemption;
+  limits.min_workers = workers == 1 ? 1 : 2;
+  limits.max_workers = workers;
+  limits.edges = limits.rates = true;
+  limits.max_dags = 3;
+  limits.min_utilization = 0.1;
+  limits.max_utilization = workers == 1 ? 0.9 : 0.6;
+  limits.jitter = limits.overheads = true;
+  return limits;
+}
+
+testing::BoundGenerator cases(const BoundCaseLimits &limits) {
+  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
+}
+
+// Threads for fewer jobs than tasks.
+testing::BoundGenerator few_threads(const BoundCaseLimits &limits) {
+  return [limits](Rng &rng) {
+    BoundCase bound_case = testing::random_bound_case(rng, limits);
+    const auto tasks = static_cast<int>(bound_case.workload.task_count());
+    bound_case.platform.max_started = static_cast<std::uint32_t>(rng.uniform((tasks + 1) / 2, tasks));
+    return bound_case;
+  };
+}
+
+BoundCaseLimits with_queues_and_groups(BoundCaseLimits limits) {
+  limits.queues = limits.groups = limits.levels = true;
+  return limits;
+}
+
+BoundCaseLimits with_max_active(BoundCaseLimits limits) {
+  limits.caps = true;
+  limits.max_dags = 2;
+  return limits;
+}
+
+constexpr testing::BoundPropertyOptions kFew{.workloads = 300, .runs = 6};
+
+TEST(BoundProperty, RatesOneWorkerPreemptive) {
+  expect_bound_holds(dag_one_worker_preemptive(), cases(rates(sched::Preemption::Full, 1)), kFew);
+}
+
+TEST(BoundProperty, RatesOneWorkerPreemptiveWithEverything) {
+  expect_bound_holds(dag_one_worker_preemptive(), cases(with_queues_and_groups(rates(sched::Preemption::Full, 1))),
+                     kFew);
+}
+
+TEST(BoundProperty, RatesOneWorkerPreemptiveMaxActive) {
+  expect_bound_holds(dag_one_worker_preemptive(), cases(with_max_active(rates(sched::Preemption::Full, 1))), kFew);
+}
+
+TEST(BoundProperty, RatesOneWorkerNonpreemptive) {
+  BoundCaseLimits limits = with_queues_and_groups(rates(sched::Preemption::None, 1));
+  limits.levels = false;
+  expect_bound_holds(dag_one_worker_deferred(), cases(limits), kFew);
+}
+
+TEST(BoundProperty, RatesOneWorkerCooperative) {
+  BoundCaseLimits limits = rates(sched::Preemption::Cooperative, 1);
+  limits.queues = limits.levels = true;
+  expect_bound_holds(dag_one_worker_deferred(), cases(limits), kFew);
+}
+
+TEST(BoundProperty, RatesOfSingleTasksOneWorker) {
+  expect_bound_holds(rta_preemptive(), cases(rates(sched::Preemption::Full, 1)), kFew);
+  expect_bound_holds(rta_nonpreemptive(), cases(rates(sched::Preemption::None, 1)), kFew);
+  expect_bound_holds(rta_deferred(), cases(rates(sched::Preemption::Cooperative, 1)), kFew);
+}
+
+TEST(BoundProperty, RatesMelani) { expect_bound_holds(melani(), cases(rates(sched::Preemption::Full, 4)), kFew); }
+
+TEST(BoundProperty, RatesDagBounded) {
+  expect_bound_holds(dag_bounded(), cases(rates(sched::Preemption::Full, 4)), kFew);
+}
+
+TEST(BoundProperty, RatesDagBoundedMaxActive) {
+  expect_bound_holds(dag_bounded(), cases(with_max_active(rates(sched::Preemption::Full, 4))), kFew);
+}
+
+TEST(BoundProperty, RatesDagBoundedFewThreads) {
+  expect_bound_holds(dag_bounded(), few_threads(rates(sched::Preemption::Full, 4)), kFew);
+}
+
+TEST(BoundProperty, RatesDagNonpreemptive) {
+  expect_bound_holds(dag_nonpreemptive(), cases(rates(sched::Preemption::None, 4)), kFew);
+}
+
+TEST(BoundProperty, RatesDagNonpreemptiveMaxActive) {
+  expect_bound_holds(dag_nonpreemptive(), cases(with_max_active(rates(sched::Preemption::None, 4))), kFew);
+}
+
+TEST(BoundProperty, RatesDagGroups) {
+  BoundCaseLimits limits = rates(sched::Preemption::None, 4);
+  limits.groups = true;
+  expect_bound_holds(dag_groups(), cases(limits), kFew);
+}
+
+TEST(BoundProperty, RatesOfSingleTasks) {
+  BoundCaseLimits limits = rates(sched::Preemption::Full, 4);
+  expect_bound_holds(guan(), cases(limits), kFew);
+  expect_bound_holds(bertogna_cirinei(), cases(limits), kFew);
+  limits.preemption = sched::Preemption::None;
+  expect_bound_holds(sequential_nonpreemptive(), cases(limits), kFew);
+}
+
+// ---- by hand ----
+
+using redag::testing::make_dag;
+using redag::testing::make_workload;
+
+System compiled(const Workload &workload, std::uint32_t workers = 1, std::uint32_t threads = 0) {
+  AnalysisPlatform platform;
+  platform.workers = workers;
+  platform.max_started = threads;
+  const auto system = compile(workload, platform);
+  EXPECT_TRUE(system) << to_string(system.error());
+  return system.value_or(System{});
+}
+
+Bound bound_of(const Method &method, const System &system) {
+  const Outcome outcome = method.apply(system);
+  const auto *bound = std::get_if<Bound>(&outcome);
+  EXPECT_NE(bound, nullptr) << std::get<NotApplicable>(outcome).reason;
+  return bound == nullptr ? Bound{} : *bound;
+}
+
+std::optional<Duration> milliseconds(const ResponseBound &bound) {
+  if (!bound.response) return std::nullopt;
+  Duration sum = 0;
+  for (const Term &term : bound.terms) sum += term.amount;
+  EXPECT_EQ(sum, *bound.response) << "the terms add up";
+  return *bound.response / kMillisecond;
+}
+
+// Camera every 10 ms (R = 1), lidar every 40 ms (R = 5), fused: ready as soon as the lidar's data are there, because
+// a picture comes within 10 + 1 of the last, so the first wait counts alone.
+TEST(RateEdges, DataOfAFastPredecessorAreThereWhenTheSlowOneEnds) {
+  const System system =
+      compiled(make_workload({make_dag("d", {{.name = "camera", .period_ms = 10},
+                                             {.name = "lidar", .period_ms = 40, .wcet_ms = 4},
+                                             {.name = "fuse", .wcet_ms = 3, .after = {0, 1}, .deadline_ms = 5}})},
+                             1));
+  const Bound bound = bound_of(rta_preemptive(), system);
+  EXPECT_EQ(milliseconds(bound.tasks[0]), 1);
+  EXPECT_EQ(milliseconds(bound.tasks[1]), 5);
+  // Camera and lidar can come while it executes: from its own release, 3 + 1 + 4.
+  EXPECT_EQ(milliseconds(bound.tasks[2]), 8);
+  EXPECT_FALSE(meets_deadline(system.tasks[2], bound.tasks[2]));
+  // The picture it takes is the latest: the next comes at most 10 + 1 after that one's release.
+  EXPECT_EQ(milliseconds(bound.dags[0]), 8 + 11);
+  EXPECT_EQ(bound.dags[0].sum(Term::Kind::Wait), 11 * kMillisecond);
+}
+
+// Released 3 before its predecessor, which answers after 2: it waits 5 in its first period, and so in all.
+TEST(RateEdges, ATimerWaitsForDataOfAnotherOffset) {
+  const System system =
+      compiled(make_workload({make_dag("d", {{.name = "a", .period_ms = 20, .wcet_ms = 2, .offset_ms = 3},
+                                             {.name = "b", .period_ms = 20, .wcet_ms = 4, .after = {0}}})},
+                             1));
+  const Bound bound = bound_of(rta_preemptive(), system);
+  EXPECT_EQ(milliseconds(bound.tasks[1]), 5 + 4 + 2);
+  EXPECT_EQ(bound.tasks[1].sum(Term::Kind::Wait), 5 * kMillisecond);
+}
+
+// It is skipped for lack of data by design; others are bounded with as many jobs of it as can become ready.
+TEST(RateEdges, ATimerThatIsFasterThanItsDataIsNotBoundedAndOthersAre) {
+  const System system =
+      compiled(make_workload({make_dag("d", {{.name = "a", .period_ms = 20, .wcet_ms = 2},
+                                             {.name = "b", .period_ms = 10, .wcet_ms = 1, .after = {0}}}),
+                              make_dag("e", {{.name = "c", .period_ms = 40, .wcet_ms = 1}})},
+                             1));
+  const Bound bound = bound_of(rta_preemptive(), system);
+  EXPECT_FALSE(bound.tasks[1].response);
+  EXPECT_THAT(bound.tasks[1].absent, ::testing::HasSubstr("skipped by design"));
+  EXPECT_EQ(milliseconds(bound.tasks[2]), 1 + 2 + 2) << "two jobs of b: one was released a period before";
+  EXPECT_FALSE(bound.dags[0].response);
+  EXPECT_EQ(verdict(system, bound), Verdict::NotShown);
+}
+
+// Two chains of one job in progress each: two threads, or a max_active of two, are enough if all is bounded.
+TEST(RateEdges, WhatCannotBindIsNoObstacle) {
+  const auto workload = [](std::uint32_t max_active) {
+    return make_workload({make_dag("d",
+                                   {{.name = "a", .period_ms = 10},
+                                    {.name = "b", .after = {0}},
+                                    {.name = "c", .period_ms = 30},
+                                    {.name = "e", .after = {2, 0}}},
+                                   max_active)},
+                         2);
+  };
+  const System two = compiled(workload(2), 2, 2);
+  EXPECT_EQ(verdict(two, bound_of(dag_bounded(), two)), Verdict::Schedulable);
+  const Outcome one = dag_bounded().apply(compiled(workload(1), 2));
+  ASSERT_TRUE(std::holds_alternative<NotApplicable>(one));
+  EXPECT_THAT(std::get<NotApplicable>(one).reason, ::testing::HasSubstr("max_active"));
+  EXPECT_THAT(compiled(workload(0), 2, 1).not_analysable, ::testing::HasSubstr("threads"));
+
+  Workload slow = workload(2);
+  slow.dags[0].tasks[3].wcet = 30 * kMillisecond;
+  for (const ResponseBound &none : bound_of(dag_bounded(), compiled(slow, 2)).tasks) EXPECT_FALSE(none.response);
+}
+
+TEST(RateEdges, OtherMethodsRefuseThem) {
+  const Workload workload =
+      make_workload({make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 10, .after = {0}}})}, 1);
+  constexpr std::string_view kKnow[] = {"rta_preemptive", "dag_one_worker_preemptive", "melani", "dag_bounded",
+                                        "guan",           "bertogna_cirinei"};
+  for (const std::uint32_t workers : {1U, 2U}) {
+    for (const MethodReport &report : analyze(compiled(workload, workers)).methods) {
+      if (std::find(std::begin(kKnow), std::end(kKnow), report.method->name) != std::end(kKnow)) continue;
+      EXPECT_FALSE(report.trusted) << report.method->name;
+    }
+  }
+}
+
+TEST(RateEdges, TheProjectsOwnWorkloadsAreSchedulable) {
+  for (const char *name :
+       {"contention", "paper/harmonic_u06", "paper/harmonic_u08", "paper/nonharmonic_u06", "paper/nonharmonic_u08"}) {
+    const auto loaded = load_workload(std::string(REDAG_SOURCE_DIR) + "/workloads/" + name + ".yaml");
+    ASSERT_TRUE(loaded) << name;
+    const auto system = compile(loaded->workload, platform_of(loaded->workload));
+    ASSERT_TRUE(system) << name;
+    EXPECT_EQ(analyze(*system).verdict, Verdict::Schedulable) << name;
+  }
+}
+
+}  // namespace
+}  // namespace redag::analysis
