@@ -289,6 +289,15 @@ class Compiler {
 
 }  // namespace
 
+AnalysisPlatform platform_of(const sched::Config &config) {
+  AnalysisPlatform platform;
+  platform.workers = config.workers;
+  platform.preemption = config.preemption;
+  platform.levels = config.levels;
+  platform.max_started = config.max_started;
+  return platform;
+}
+
 AnalysisPlatform platform_of(const Workload &workload) {
   AnalysisPlatform platform;
   platform.workers = workload.platform.workers;

@@ -28,6 +28,9 @@ struct AnalysisPlatform {
   friend bool operator==(const AnalysisPlatform &, const AnalysisPlatform &) = default;
 };
 
+/// What a scheduler was told, no overheads.
+[[nodiscard]] AnalysisPlatform platform_of(const sched::Config &config);
+
 /// As the simulator runs the workload: `os` and `auto` mean full preemption, no overheads.
 [[nodiscard]] AnalysisPlatform platform_of(const Workload &workload);
 

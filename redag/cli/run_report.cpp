@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "redag/cli/bound_check.hpp"
 #include "redag/cli/table.hpp"
 #include "redag/metrics/jobs.hpp"
 #include "redag/metrics/jobs_csv.hpp"
@@ -113,6 +114,11 @@ std::string dag_table(const Session &session, const StreamTraits &terminal) {
   return table.render(terminal.width, terminal.colour);
 }
 
+// Bounds are for our own scheduler; its simulation is held to them by the property tests.
+bool has_bounds(const Session &session) {
+  return session.info.driver == trace::Driver::Threads && session.info.executor == "redag";
+}
+
 std::string headline(const Session &session) {
   const trace::RunInfo &info = session.info;
   const bool simulated = info.driver == trace::Driver::Simulator;
@@ -161,6 +167,7 @@ std::string describe(const Session &session, const StreamTraits &terminal, const
                   inversions.count > 0 ? fmt::format(", longest {}, in all {}", humanize_duration(inversions.longest),
                                                      humanize_duration(inversions.total))
                                        : "");
+  if (has_bounds(session)) text += describe(check_bounds(session), session.summary.tasks.size(), terminal);
   text += describe_check(session.check, terminal);
   if (session.cut_at) {
     text += fmt::format("the first {} events were checked and kept: {} of {}; --max-events raises that\n",
@@ -194,6 +201,7 @@ Json to_json(const Session &session) {
   Json check = to_json(session.check);
   check["until_ns"] = session.cut_at.value_or(session.info.end);
   document["check"] = std::move(check);
+  if (has_bounds(session)) document["bounds"] = to_json(check_bounds(session));
   document["stopped"] = session.stopped;
   document["warnings"] = session.warnings;
   return document;

@@ -10,15 +10,12 @@
 namespace redag_rclcpp {
 
 using redag::JobEvent;
-using redag::JobEventKind;
 using redag::Task;
 using redag::Workload;
 
 namespace {
 
 std::string name_of(const redag::Dag &dag, const Task &task) { return dag.name + "." + task.name; }
-
-std::uint64_t key_of(const JobEvent &event) { return std::uint64_t{event.task.value} << 32U | event.job; }
 
 // The group in which ROS executes the task's callback.
 std::string group_of(const Workload &learned, const std::string &name) {
@@ -43,8 +40,7 @@ bool Bounds::update(const std::vector<CallbackStats> &stats, const redag::sched:
   analysed_ = std::move(now);
 
   const std::map<std::string, TaskBound> before = std::exchange(bounds_, {});
-  names_.clear();
-  releases_.clear();
+  watch_ = {};
   absent_.clear();
   Workload workload;
   if (as_executed(stats, learned(), workload)) analyse(workload, config);
@@ -90,14 +86,10 @@ bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload
 }
 
 void Bounds::analyse(const Workload &workload, const redag::sched::Config &config) {
-  redag::analysis::AnalysisPlatform platform;
-  platform.workers = config.workers;
-  platform.preemption = config.preemption;
-  platform.levels = config.levels;
-  platform.max_started = config.max_started;
   Workload analysed = workload;
   analysed.policy = config.policy;
-  const redag::Result<redag::analysis::System> system = redag::analysis::compile(analysed, platform);
+  const redag::Result<redag::analysis::System> system =
+      redag::analysis::compile(analysed, redag::analysis::platform_of(config));
   if (!system) {
     absent_ = to_string(system.error());
     return;
@@ -123,32 +115,16 @@ void Bounds::analyse(const Workload &workload, const redag::sched::Config &confi
 void Bounds::count(std::span<const JobEvent> events, const std::function<std::string(redag::TaskId)> &name_of,
                    const std::function<void(const std::string &, const TaskBound &)> &first) {
   if (bounds_.empty()) return;
-  for (const JobEvent &event : events) {
-    auto known = names_.find(event.task.value);
-    if (known == names_.end()) {
-      std::string name = name_of(event.task);
-      if (bounds_.count(name) == 0) name.clear();
-      known = names_.emplace(event.task.value, std::move(name)).first;
-    }
-    if (known->second.empty()) continue;
-    switch (event.kind) {
-      case JobEventKind::Released: releases_[key_of(event)] = event.value; break;
-      case JobEventKind::Skipped:
-      case JobEventKind::Aborted: releases_.erase(key_of(event)); break;
-      case JobEventKind::Finished: {
-        const auto release = releases_.find(key_of(event));
-        if (release == releases_.end()) break;  // released before there was a bound
-        const redag::Duration response = event.value - release->second;
-        releases_.erase(release);
-        TaskBound &bound = bounds_[known->second];
-        if (response <= bound.response) break;
-        bound.worst = std::max(bound.worst, response);
-        if (++bound.exceeded == 1) first(known->second, bound);
-        break;
-      }
-      default: break;
-    }
-  }
+  const auto bound_of = [&](redag::TaskId task) {
+    const auto bound = bounds_.find(name_of(task));
+    return bound == bounds_.end() ? redag::Duration{0} : bound->second.response;
+  };
+  watch_.add(events, bound_of, [&](redag::TaskId task, const redag::metrics::BoundCount &count) {
+    const std::string name = name_of(task);
+    TaskBound &bound = bounds_[name];
+    bound.worst = std::max(bound.worst, count.worst);
+    if (++bound.exceeded == 1) first(name, bound);
+  });
 }
 
 }  // namespace redag_rclcpp

@@ -7,9 +7,9 @@
 #include <map>
 #include <span>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
+#include "redag/metrics/bound_watch.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/scheduler.hpp"
@@ -56,8 +56,7 @@ class Bounds {
   std::map<std::string, TaskBound> bounds_;
   std::string absent_ = "no callback was seen yet";
 
-  std::unordered_map<std::uint32_t, std::string> names_;     // by task id; "": has no bound to compare with
-  std::unordered_map<std::uint64_t, redag::Time> releases_;  // of jobs in flight, by task id and number
+  redag::metrics::BoundWatch watch_;  // against bounds_; begins anew with them
 };
 
 }  // namespace redag_rclcpp

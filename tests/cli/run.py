@@ -339,6 +339,13 @@ class Interrupts(Case):
     def start(self, *arguments):
         return subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
+    def test_run_is_held_to_its_bounds(self):
+        document = json.loads(redag("run", self.cart, "--duration", "300ms", "--preemption", "none", "--json").stdout)
+        self.assertEqual(document["bounds"]["bounded"], len(document["bounds"]["tasks"]), document["bounds"])
+        self.assertNotIn("bounds", json.loads(redag("run", self.cart, "--duration", "300ms", "--executor", "mte",
+                                                    "--json").stdout))
+        self.assertIn("\nbounds: ", redag("run", self.cart, "--duration", "300ms", "--preemption", "none").stdout)
+
     def test_run_is_finished_and_written(self):
         out = self.folder / "out"
         process = self.start("run", self.cart, "--duration", "1h", "--json", "--out", out)
@@ -435,6 +442,12 @@ class Analyze(Case):
         self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--policy", "fixed"), 0)
         self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--workers", "2"), 0)
         self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--overhead-dispatch", "5ms"), 1)
+
+    def test_edges_between_rates_are_analysed(self):
+        contention = SOURCE / "workloads" / "contention.yaml"
+        self.expect(redag("analyze", contention, "--check"), 0)
+        self.assertIn("data of other rates, waited for",
+                      self.expect(redag("analyze", contention, "--explain", "perception"), 0).stdout)
 
     def test_auto_is_said(self):
         self.assertIn("auto is analysed as os", redag("analyze", SOURCE / "workloads" / "hello.yaml").stdout)
