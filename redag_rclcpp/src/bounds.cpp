@@ -98,6 +98,10 @@ void Bounds::analyse(const Workload &workload, const redag::sched::Config &confi
     absent_ = system->not_analysable;
     return;
   }
+  if (system->has_rate_edges()) {
+    absent_ = "edges join tasks of different periods, whose waits depend on when the nodes' timers were created";
+    return;
+  }
   const redag::analysis::Report report = redag::analysis::analyze(*system);
   std::vector<std::string> without;
   for (const redag::TaskRef &ref : redag::flatten(analysed)) {

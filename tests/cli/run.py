@@ -340,11 +340,13 @@ class Interrupts(Case):
         return subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     def test_run_is_held_to_its_bounds(self):
-        document = json.loads(redag("run", self.cart, "--duration", "300ms", "--preemption", "none", "--json").stdout)
-        self.assertEqual(document["bounds"]["bounded"], len(document["bounds"]["tasks"]), document["bounds"])
-        self.assertNotIn("bounds", json.loads(redag("run", self.cart, "--duration", "300ms", "--executor", "mte",
+        light = self.write("light.yaml", CART.replace("25ms", "5ms"))
+        document = json.loads(redag("run", light, "--duration", "300ms", "--preemption", "none", "--json").stdout)
+        self.assertEqual(document["bounds"]["bounded"], 3, document["bounds"])
+        self.assertEqual([task["bound_ns"] for task in document["bounds"]["tasks"][:2]], [6_999_999] * 2)
+        self.assertNotIn("bounds", json.loads(redag("run", light, "--duration", "300ms", "--executor", "mte",
                                                     "--json").stdout))
-        self.assertIn("\nbounds: ", redag("run", self.cart, "--duration", "300ms", "--preemption", "none").stdout)
+        self.assertIn("\nbounds: 3 of 3 tasks", redag("run", light, "--duration", "300ms", "--preemption", "none").stdout)
 
     def test_run_is_finished_and_written(self):
         out = self.folder / "out"
