@@ -22,7 +22,6 @@ constexpr int kMaxRounds = 1000;
 
 // What a unit that waits is told of a predecessor: data of job k comes within [offset + k period, ... + response].
 struct Data {
-  std::uint32_t task = 0;
   Duration period = 0;
   Duration offset = 0;
   Duration response = 0;
@@ -30,6 +29,7 @@ struct Data {
 
 // How late the first task of a unit can become ready after the point of its grid; docs/analysis.md has the cases.
 // `seen`: of data on its own grid, and of its own timer, the latest. `others`: of other grids, none of a larger period.
+// Completions of one instant have an order: the next datum of a task can come when another is taken.
 std::optional<Duration> wait_for(const Unit &unit, Duration seen, const std::vector<Data> &others) {
   if (others.empty()) return seen;
   const Duration period = unit.period;
@@ -142,7 +142,7 @@ class Resolver {
       if (before.period == unit.period && before.offset == unit.offset) {
         seen = std::max(seen, *response);
       } else {
-        others.push_back(Data{p, before.period, before.offset, *response});
+        others.push_back(Data{before.period, before.offset, *response});
       }
     }
     return wait_for(unit, seen, others);
