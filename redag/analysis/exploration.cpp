@@ -62,6 +62,7 @@ ResponseRange Exploration::of(TaskId task) const {
 
 std::optional<std::string> why_not_explore(const System &system) {
   if (!system.not_analysable.empty()) return system.not_analysable;
+  if (system.has_rate_edges()) return "edges join tasks of different periods or offsets: see the bounds for DAGs";
   if (system.mode != sched::Preemption::None) return "for jobs that run to completion; here they can be preempted";
   if (system.policy == PolicyKind::Fifo) return "fifo: the order of two jobs depends on when they became ready";
   const bool has_data =

@@ -96,7 +96,6 @@ class Compiler {
     compiled.overhead = system_.mode == sched::Preemption::None ? lead : add(lead, platform.preempt_overhead);
     compiled.wcet = add(task.wcet, compiled.overhead);
     compiled.bcet = add(std::max<Duration>(1, task.bcet), compiled.overhead);
-    compiled.offset = task.offset;
     compiled.period = task.period;
     compiled.deadline = task.deadline;
     compiled.jitter = task.jitter;

@@ -41,21 +41,21 @@ struct SystemTask {
   std::string name;  // "dag/task"
   DagId dag;
   std::uint32_t unit = 0;
-  Duration wcet = 0;         // C as charged: overheads included
-  Duration bcet = 0;         // as charged, > 0; bounds hold for shorter executions too, only the exploration reads it
-  Duration overhead = 0;     // the part of `wcet` that is overhead
-  Duration period = 0;       // T, least distance of two nominal releases of the unit
-  Duration offset = 0;       // of the grid whose points its unit's jobs are numbered by, see Unit
-  Duration deadline = 0;     // D, from the task's own release
-  Duration jitter = 0;       // J
-  Time offset = 0;           // of a timer; bounds hold for all offsets, only the exploration reads it
-  Duration limit = 0;        // response up to which no job of the task is skipped (T, or T * queue_depth)
-  Duration region = 0;       // longest stretch without a preemption point, overheads included; 0 with full preemption
-  Duration last_region = 0;  // stretch after the last preemption point when it executes for its wcet; 0 likewise
-  std::uint32_t rank = 0;    // place in the total order, 0 the most urgent
-  std::uint32_t level = 0;   // tasks of one level do not preempt each other
-  std::uint32_t group = kNoGroup;           // only groups that two or more tasks share
-  bool data = false;                        // released by its predecessors' completion
+  Duration wcet = 0;      // C as charged: overheads included
+  Duration bcet = 0;      // as charged, > 0; bounds hold for shorter executions too, only the exploration reads it
+  Duration overhead = 0;  // the part of `wcet` that is overhead
+  Duration period = 0;    // T, least distance of two nominal releases of the unit
+  Duration offset = 0;    // of a timer; of a data task that of its grid, see Unit. Bounds of units without rate edges
+                          // hold for all offsets
+  Duration deadline = 0;  // D, from the task's own release
+  Duration jitter = 0;    // J
+  Duration limit = 0;     // response up to which no job of the task is skipped (T, or T * queue_depth)
+  Duration region = 0;    // longest stretch without a preemption point, overheads included; 0 with full preemption
+  Duration last_region = 0;        // stretch after the last preemption point when it executes for its wcet; 0 likewise
+  std::uint32_t rank = 0;          // place in the total order, 0 the most urgent
+  std::uint32_t level = 0;         // tasks of one level do not preempt each other
+  std::uint32_t group = kNoGroup;  // only groups that two or more tasks share
+  bool data = false;               // released by its predecessors' completion
   std::vector<std::uint32_t> predecessors;  // TaskIds
   std::vector<std::uint32_t> successors;    // TaskIds
 };
