@@ -24,10 +24,10 @@ MethodReport run(const System &system, const Method &method) {
 }
 
 // The tightest bounds together, as if one method had given them.
-Bound combine(const Report &report) {
+Bound combine(const std::vector<Tightest> &tasks, const std::vector<Tightest> &dags) {
   Bound bound;
-  for (const Tightest &best : report.tasks) bound.tasks.push_back(best.bound);
-  for (const Tightest &best : report.dags) bound.dags.push_back(best.bound);
+  for (const Tightest &best : tasks) bound.tasks.push_back(best.bound);
+  for (const Tightest &best : dags) bound.dags.push_back(best.bound);
   return bound;
 }
 
@@ -46,7 +46,7 @@ Report analyze(const System &system, const std::vector<Method> &methods) {
     if (last.bound()->accepts == true) report.by.push_back(&method);
   }
 
-  if (verdict(system, combine(report)) == Verdict::Schedulable) {
+  if (verdict(system, combine(report.tasks, report.dags)) == Verdict::Schedulable) {
     for (const Tightest &best : report.tasks) {
       if (best.method != nullptr && std::find(report.by.begin(), report.by.end(), best.method) == report.by.end()) {
         report.by.push_back(best.method);
@@ -58,5 +58,19 @@ Report analyze(const System &system, const std::vector<Method> &methods) {
 }
 
 Report analyze(const System &system) { return analyze(system, methods()); }
+
+bool is_shown_schedulable(const System &system) {
+  if (!system.not_analysable.empty()) return false;
+  std::vector<Tightest> tasks(system.tasks.size());
+  std::vector<Tightest> dags(system.dags.size());
+  for (const Method &method : methods()) {
+    const MethodReport report = run(system, method);
+    if (!report.trusted) continue;
+    if (report.verdict == Verdict::Schedulable) return true;
+    keep_tightest(tasks, report.bound()->tasks, method);
+    keep_tightest(dags, report.bound()->dags, method);
+  }
+  return verdict(system, combine(tasks, dags)) == Verdict::Schedulable;
+}
 
 }  // namespace redag::analysis

@@ -38,4 +38,7 @@ struct Report {
 [[nodiscard]] Report analyze(const System &system);
 [[nodiscard]] Report analyze(const System &system, const std::vector<Method> &methods);
 
+/// Is analyze(system).verdict Schedulable? Stops at the first method that says so: for those who ask it often.
+[[nodiscard]] bool is_shown_schedulable(const System &system);
+
 }  // namespace redag::analysis

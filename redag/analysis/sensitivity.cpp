@@ -1,0 +1,278 @@
+#include "redag/analysis/sensitivity.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+#include <set>
+
+#include "redag/analysis/analyze.hpp"
+#include "redag/analysis/arithmetic.hpp"
+
+namespace redag::analysis {
+namespace {
+
+constexpr std::int64_t kSlowest = 1024;                // periods are made at most this much longer,
+constexpr Duration kLongestPeriod = 86'400 * kSecond;  // and at most this long
+
+// Utilization above the workers, in exact arithmetic rounded in favour of the workload.
+bool is_overloaded(const System &system) {
+  constexpr unsigned kBits = 40;
+  Int128 sum = 0;
+  for (const SystemTask &task : system.tasks) sum += (Int128{task.wcet} << kBits) / task.period;
+  return sum > Int128{system.platform.workers} << kBits;
+}
+
+// "dag.task", as the commands name it.
+std::string label(const System &system, std::uint32_t task) {
+  const std::string &dag = system.dags[system.tasks[task].dag.value].name;
+  return dag + "." + system.tasks[task].name.substr(dag.size() + 1);
+}
+
+// What analyze() finds in the way of a workload that it does not accept.
+std::string obstacle_of(const Workload &workload, const AnalysisPlatform &platform) {
+  const Result<System> system = compile(workload, platform);
+  if (!system) return system.error().front().message;
+  if (!system->not_analysable.empty()) return system->not_analysable;
+  if (const std::optional<std::string> why = why_impossible(*system)) return *why;
+  const Report report = analyze(*system);
+  std::optional<std::uint32_t> worst;
+  Duration missing = 0;
+  for (std::uint32_t t = 0; t < system->tasks.size(); ++t) {
+    const SystemTask &task = system->tasks[t];
+    if (meets_deadline(task, report.tasks[t].bound)) continue;
+    if (!report.tasks[t].response) return "no bound for " + label(*system, t);
+    const Duration late = *report.tasks[t].response - std::min(task.deadline, task.limit);
+    if (worst && late <= missing) continue;
+    worst = t;
+    missing = late;
+  }
+  if (worst) return "bound of " + label(*system, *worst) + " above its deadline";
+  for (std::size_t d = 0; d < system->dags.size(); ++d) {
+    const SystemDag &dag = system->dags[d];
+    if (dag.deadline > 0 && report.dags[d].response.value_or(kNever) > dag.deadline) {
+      return "end-to-end deadline of " + dag.name;
+    }
+  }
+  return "not accepted";
+}
+
+// The search over one knob's positions.
+class Search {
+ public:
+  Search(const Workload &workload, const AnalysisPlatform &platform, const Knob &knob, const Accepts &accepts,
+         const SensitivityOptions &options)
+      : workload_(workload), platform_(platform), accepts_(accepts), options_(options) {
+    margin_.knob = knob;
+    margin_.nominal = nominal_position(workload, knob);
+  }
+
+  std::optional<Margin> run() {
+    if (accepts(margin_.nominal)) {
+      between(margin_.nominal, first_impossible(margin_.nominal));
+    } else if (const std::optional<std::int64_t> start = light_start(); start && !stopped_) {
+      between(*start, margin_.nominal);
+    } else {
+      margin_.obstacle = obstacle_of(turned(workload_, margin_.knob, lightest()), platform_);
+    }
+    if (stopped_) return std::nullopt;
+    if (margin_.position) {
+      margin_.factor = load_factor(workload_, margin_.knob, *margin_.position);
+      const bool at_end = margin_.knob.kind == Knob::Kind::Period && *margin_.position == -1;
+      margin_.obstacle = at_end ? "the clock's resolution"
+                                : obstacle_of(turned(workload_, margin_.knob, *margin_.position + 1), platform_);
+    }
+    return margin_;
+  }
+
+ private:
+  bool accepts(std::int64_t position) {
+    stopped_ = stopped_ || (options_.stop && options_.stop());
+    if (stopped_) return false;
+    ++margin_.tested;
+    const Workload candidate = turned(workload_, margin_.knob, position);
+    const Result<System> system = compile(candidate, platform_);
+    return system && !why_impossible(*system) && accepts_(candidate, *system);
+  }
+
+  [[nodiscard]] bool is_impossible(std::int64_t position) const {
+    if (margin_.knob.kind == Knob::Kind::Period && position >= 0) return true;
+    const Result<System> system = compile(turned(workload_, margin_.knob, position), platform_);
+    return !system || why_impossible(*system);
+  }
+
+  // More load never makes an impossible workload possible, so bisection is exact here. Requires that `from` is not.
+  [[nodiscard]] std::int64_t first_impossible(std::int64_t from) const {
+    std::int64_t low = from;
+    std::int64_t high = 0;
+    if (margin_.knob.kind != Knob::Kind::Period) {
+      high = 2 * from;
+      while (high < kMaxDuration / 2 && !is_impossible(high)) {
+        low = high;
+        high *= 2;
+      }
+    }
+    while (high - low > 1) {
+      const std::int64_t middle = std::midpoint(low, high);
+      (is_impossible(middle) ? high : low) = middle;
+    }
+    return high;
+  }
+
+  // The position of the least load that is looked at.
+  [[nodiscard]] std::int64_t lightest() const {
+    if (margin_.knob.kind == Knob::Kind::Wcet || margin_.knob.kind == Knob::Kind::AllWcets) return 1;
+    const std::vector<TaskRef> tasks = flatten(workload_);
+    Duration longest = 1;
+    for (const std::uint32_t t : margin_.knob.tasks) longest = std::max(longest, tasks[t].task->period);
+    const std::int64_t slower = std::clamp<std::int64_t>(kLongestPeriod / longest, 1, kSlowest);
+    return margin_.knob.kind == Knob::Kind::Period ? margin_.nominal * slower : margin_.nominal / slower;
+  }
+
+  // An accepted position below the nominal one: the lightest, or else the lightest of the probes that is.
+  std::optional<std::int64_t> light_start() {
+    const std::int64_t least = lightest();
+    if (least >= margin_.nominal) return std::nullopt;
+    if (accepts(least)) return least;
+    // What is schedulable for its wcets is so for shorter ones: there is nothing to look for.
+    if (margin_.knob.kind == Knob::Kind::Wcet || margin_.knob.kind == Knob::Kind::AllWcets) return std::nullopt;
+    for (const std::int64_t position : spread(least, margin_.nominal)) {
+      if (accepts(position)) return position;
+    }
+    return std::nullopt;
+  }
+
+  // Requires that `low` is accepted and `high` is not.
+  void between(std::int64_t low, std::int64_t high) {
+    const std::vector<std::int64_t> even = spread(low, high);
+    std::set<std::int64_t> positions(even.begin(), even.end());
+    add_changes_of_order(low, high, positions);
+    const std::int64_t end = high;
+    for (const std::int64_t position : positions) {
+      if (accepts(position)) {
+        low = position;
+      } else {
+        high = position;
+        break;
+      }
+    }
+    for (const std::int64_t position : even) {
+      if (position <= high || position >= end || margin_.again) continue;
+      if (accepts(position)) margin_.again = position;
+    }
+    while (high - low > 1 && !stopped_) {
+      const std::int64_t middle = std::midpoint(low, high);
+      (accepts(middle) ? low : high) = middle;
+    }
+    margin_.position = low;
+  }
+
+  // Evenly spread positions inside (low, high), ascending; of periods, even in the rate.
+  [[nodiscard]] std::vector<std::int64_t> spread(std::int64_t low, std::int64_t high) const {
+    std::vector<std::int64_t> positions;
+    const auto count = static_cast<std::int64_t>(options_.probes);
+    for (std::int64_t i = 1; i <= count; ++i) {
+      std::int64_t position = 0;
+      if (margin_.knob.kind == Knob::Kind::Period) {
+        const double slow = 1.0 / static_cast<double>(-low);
+        const double fast = high < 0 ? 1.0 / static_cast<double>(-high) : 1.0;
+        const double rate = slow + (fast - slow) * static_cast<double>(i) / static_cast<double>(count + 1);
+        position = -static_cast<std::int64_t>(1.0 / rate);
+      } else {
+        position = low + static_cast<std::int64_t>(Int128{high - low} * i / (count + 1));
+      }
+      if (position > low && position < high && (positions.empty() || position > positions.back())) {
+        positions.push_back(position);
+      }
+    }
+    return positions;
+  }
+
+  // Where periods or deadlines decide on priorities, between two neighbouring positions of these the order stays the
+  // same: accepted at the larger load, with bounds that hold for sporadic releases, the smaller ones are safe as well.
+  void add_changes_of_order(std::int64_t low, std::int64_t high, std::set<std::int64_t> &positions) const {
+    const bool is_rate = margin_.knob.kind == Knob::Kind::Period || margin_.knob.kind == Knob::Kind::Rates;
+    const bool order_follows = workload_.policy == PolicyKind::RateMonotonic ||
+                               workload_.policy == PolicyKind::DeadlineMonotonic ||
+                               workload_.policy == PolicyKind::ChainAware;
+    if (!is_rate || !order_follows) return;
+    const auto offer = [&](std::int64_t position) {
+      if (position > low && position < high) positions.insert(position);
+    };
+    const std::vector<TaskRef> tasks = flatten(workload_);
+    std::set<Duration> others;
+    for (const TaskRef &ref : tasks) {
+      others.insert(ref.task->period);
+      others.insert(ref.task->deadline);
+    }
+    std::set<Duration> own;
+    for (const std::uint32_t t : margin_.knob.tasks) own.insert(tasks[t].task->period);
+    for (const Duration other : others) {
+      if (margin_.knob.kind == Knob::Kind::Period) {
+        for (const std::int64_t step : {-1, 0, 1}) offer(-other + step);
+        continue;
+      }
+      for (const Duration period : own) {
+        // The last factors at which the rounded period is still above, and still equal to, the other one.
+        for (const Duration edge : {other + 1, other}) {
+          const auto last = static_cast<std::int64_t>(saturate(Int128{period} * kFactorUnit / edge));
+          offer(last);
+          offer(last + 1);
+        }
+      }
+    }
+  }
+
+  const Workload &workload_;
+  const AnalysisPlatform &platform_;
+  const Accepts &accepts_;
+  const SensitivityOptions &options_;
+  Margin margin_;
+  bool stopped_ = false;
+};
+
+}  // namespace
+
+std::optional<std::string> why_impossible(const System &system) {
+  for (std::uint32_t t = 0; t < system.tasks.size(); ++t) {
+    const SystemTask &task = system.tasks[t];
+    // Jobs of a task that can overlap (concurrency) may take longer than the limit; those are not analysed.
+    const Duration due = system.not_analysable.empty() ? std::min(task.deadline, task.limit) : task.deadline;
+    if (task.wcet > due) return label(system, t) + " alone takes longer than it has";
+  }
+  if (is_overloaded(system)) return fmt::format("utilization above {}", system.platform.workers);
+  return std::nullopt;
+}
+
+std::optional<Margin> margin_of(const Workload &workload, const AnalysisPlatform &platform, const Knob &knob,
+                                const Accepts &accepts, const SensitivityOptions &options) {
+  return Search(workload, platform, knob, accepts, options).run();
+}
+
+namespace {
+
+// The rate of these tasks: their period where they share one.
+Knob rate_of(const std::vector<TaskRef> &tasks, const std::vector<std::uint32_t> &which) {
+  const bool is_one = std::all_of(which.begin(), which.end(), [&](std::uint32_t t) {
+    return tasks[t].task->period == tasks[which.front()].task->period;
+  });
+  return Knob{is_one ? Knob::Kind::Period : Knob::Kind::Rates, which};
+}
+
+}  // namespace
+
+std::vector<Knob> knobs_of(const Workload &workload, const System &system) {
+  const std::vector<TaskRef> tasks = flatten(workload);
+  std::vector<std::uint32_t> all(tasks.size());
+  std::iota(all.begin(), all.end(), 0);
+  std::vector<Knob> knobs = {{Knob::Kind::AllWcets, all}, {Knob::Kind::Rates, all}};
+  for (const std::uint32_t t : all) knobs.push_back({Knob::Kind::Wcet, {t}});
+  for (const SystemDag &dag : system.dags) {
+    knobs.push_back(rate_of(tasks, dag.tasks));
+    if (dag.units.size() < 2) continue;
+    for (const std::uint32_t unit : dag.units) knobs.push_back(rate_of(tasks, system.units[unit].tasks));
+  }
+  return knobs;
+}
+
+}  // namespace redag::analysis
