@@ -5,12 +5,11 @@
 #include <memory>
 #include <string>
 
+#include "redag/cli/analysis_arguments.hpp"
 #include "redag/cli/analysis_explanation.hpp"
 #include "redag/cli/analysis_report.hpp"
 #include "redag/cli/commands.hpp"
-#include "redag/cli/options.hpp"
 #include "redag/cli/progress.hpp"
-#include "redag/cli/run_arguments.hpp"
 #include "redag/cli/signals.hpp"
 #include "redag/cli/table.hpp"
 
@@ -18,8 +17,7 @@ namespace redag::cli {
 namespace {
 
 struct Options {
-  RunArguments arguments;
-  std::uint32_t levels = 0;
+  AnalysisArguments analysis;
   std::string explain;
   bool methods = false;
   std::uint64_t explore = 0;  // states; 0: not asked for
@@ -27,34 +25,25 @@ struct Options {
 
 constexpr std::uint64_t kUsualStates = 1'000'000;
 
-analysis::AnalysisPlatform platform_for(const Workload &workload, const Options &options) {
-  analysis::AnalysisPlatform platform = analysis::platform_of(workload);
-  platform.levels = options.levels;
-  platform.release_overhead = options.arguments.overheads.release;
-  platform.dispatch_overhead = options.arguments.overheads.dispatch;
-  platform.preempt_overhead = options.arguments.overheads.preempt;
-  return platform;
-}
-
 // One task or DAG in words, or all of it. False if the one is not there.
 bool report(const Analysed &analysed, const Options &options, Console &console) {
   Json document;
-  if (options.arguments.json) document = to_json(analysed);
+  if (options.analysis.run.json) document = to_json(analysed);
   if (!options.explain.empty()) {
     const Result<Row> row = find_row(analysed, options.explain);
     if (!row) {
       console.error("--explain: " + row.error().front().message, row.error().front().hint);
       return false;
     }
-    if (options.arguments.json) {
+    if (options.analysis.run.json) {
       document["explanation"] = {{"name", row->name}, {"text", explain(analysed, *row, StreamTraits{})}};
     } else {
       console.print(explain(analysed, *row, console.out_traits()));
     }
-  } else if (!options.arguments.json) {
-    console.print(describe(analysed, console.out_traits(), options.arguments.all_tasks));
+  } else if (!options.analysis.run.json) {
+    console.print(describe(analysed, console.out_traits(), options.analysis.run.all_tasks));
   }
-  if (options.arguments.json) {
+  if (options.analysis.run.json) {
     console.print(to_text(document));
   } else if (options.methods) {
     console.print("\n" + describe_methods());
@@ -71,7 +60,7 @@ std::string is_positive_count(const std::string &text) {
 
 // With --explore and Ctrl-C, what the other methods say remains.
 Result<Analysed> analyse_configured(const Workload &workload, const Options &options, Console &console) {
-  const analysis::AnalysisPlatform platform = platform_for(workload, options);
+  const analysis::AnalysisPlatform platform = platform_for(workload, options.analysis);
   if (options.explore == 0) return analyse(workload, platform);
   const InterruptGuard guard;
   Progress progress(console);
@@ -92,15 +81,15 @@ Result<Analysed> analyse_configured(const Workload &workload, const Options &opt
 }
 
 int analyze_file(const Options &options, Console &console) {
-  if (options.arguments.file.empty()) {
-    if (options.methods && !options.arguments.json) {
+  if (options.analysis.run.file.empty()) {
+    if (options.methods && !options.analysis.run.json) {
       console.print(describe_methods());
       return kExitOk;
     }
     console.error("FILE is required", "only --methods does without, and not with --json");
     return kExitBad;
   }
-  const std::optional<Workload> workload = load_configured(options.arguments, console);
+  const std::optional<Workload> workload = load_configured(options.analysis.run, console);
   if (!workload) return kExitBad;
   const Result<Analysed> analysed = analyse_configured(*workload, options, console);
   if (!analysed) {
@@ -109,15 +98,14 @@ int analyze_file(const Options &options, Console &console) {
   }
   if (!report(*analysed, options, console)) return kExitBad;
   const bool yes = analysed->report.verdict == analysis::Verdict::Schedulable;
-  return options.arguments.check && !yes ? kExitNo : kExitOk;
+  return options.analysis.run.check && !yes ? kExitNo : kExitOk;
 }
 
 }  // namespace
 
 Action add_analyze(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  RunArguments &arguments = options->arguments;
-  app.add_option("FILE", arguments.file, "Workload (YAML); - is standard input");
+  app.add_option("FILE", options->analysis.run.file, "Workload (YAML); - is standard input");
   app.add_option("--explain", options->explain, "Where the bound of one task (dag.task) or DAG comes from")
       ->type_name("TASK");
   app.add_flag("--methods", options->methods,
@@ -128,13 +116,7 @@ Action add_analyze(CLI::App &app) {
              format_count(kUsualStates) + "): best and worst responses, exact on one worker")
       ->type_name("[=STATES]")
       ->check(is_positive_count);
-  app.add_flag("--all-tasks", arguments.all_tasks, "A row for every task, however many");
-  app.add_flag("--json", arguments.json, "Write one JSON document to standard output, and nothing else");
-  app.add_flag("--check", arguments.check, "Exit with 1 if no sound method shows that every deadline is met");
-  add_platform_arguments(app, arguments);
-  add_count(app, "--levels", options->levels, "Priority levels; tasks that share one do not preempt; 0: one a task")
-      ->group("Platform");
-  add_overhead_arguments(app, arguments.overheads, "Platform");
+  add_analysis_arguments(app, options->analysis, "Exit with 1 if no sound method shows that every deadline is met");
   return [options](Console &console) { return analyze_file(*options, console); };
 }
 

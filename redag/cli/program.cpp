@@ -47,6 +47,11 @@ constexpr std::array kCommands = {
           "  redag analyze cart.yaml --explain control.pid\n"
           "  redag analyze cart.yaml --preemption none --explore\n"
           "  redag analyze --methods\n"},
+    Entry{"sensitivity", "How far execution times and rates can grow, or have to shrink, by the bounds",
+          add_sensitivity,
+          "  redag sensitivity cart.yaml\n"
+          "  redag sensitivity cart.yaml --preemption none --task control.pid\n"
+          "  redag sensitivity cart.yaml --simulate --json\n"},
     Entry{"experiment", "Measure over many random workloads: seeded, parallel, resumable", add_experiment,
           "  redag experiment acceptance experiments/acceptance_tasks.yaml\n"
           "  redag experiment acceptance --help\n"

@@ -1,0 +1,147 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "redag/cli/analysis_arguments.hpp"
+#include "redag/cli/analysis_explanation.hpp"
+#include "redag/cli/commands.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/cli/progress.hpp"
+#include "redag/cli/sensitivity_report.hpp"
+#include "redag/cli/signals.hpp"
+#include "redag/cli/simulated_verdict.hpp"
+
+namespace redag::cli {
+namespace {
+
+constexpr std::uint32_t kMostProbes = 100'000;
+constexpr Duration kPeriods = 20;  // length of a simulation in longest periods
+
+struct Options {
+  AnalysisArguments analysis;
+  std::string task;
+  std::uint32_t probes = analysis::SensitivityOptions{}.probes;
+  bool simulate = false;
+};
+
+// Those that turn nothing but the named task or DAG. Nothing, with an error, if there is no such thing.
+std::optional<std::vector<analysis::Knob>> chosen_knobs(const Analysed &analysed, const std::string &name,
+                                                        Console &console) {
+  std::vector<analysis::Knob> knobs = analysis::knobs_of(analysed.workload, analysed.system);
+  if (name.empty()) return knobs;
+  const Result<Row> row = find_row(analysed, name);
+  if (!row) {
+    console.error("--task: " + row.error().front().message, row.error().front().hint);
+    return std::nullopt;
+  }
+  // A DAG that is released as a whole has its rate as a DAG: the task's row is that.
+  std::vector<std::uint32_t> wanted;
+  std::vector<std::uint32_t> released;
+  for (std::uint32_t t = 0; t < analysed.system.tasks.size(); ++t) {
+    const analysis::SystemTask &task = analysed.system.tasks[t];
+    if (task_name(analysed, TaskId(t)) == row->name) released = analysed.system.units[task.unit].tasks;
+    if (task_name(analysed, TaskId(t)) == row->name || analysed.system.dags[task.dag.value].name == row->name) {
+      wanted.push_back(t);
+    }
+  }
+  const auto is_within = [](const std::vector<std::uint32_t> &part, const std::vector<std::uint32_t> &whole) {
+    return std::all_of(part.begin(), part.end(),
+                       [&](std::uint32_t t) { return std::find(whole.begin(), whole.end(), t) != whole.end(); });
+  };
+  const auto is_other = [&](const analysis::Knob &knob) {
+    if (knob.kind == analysis::Knob::Kind::AllWcets) return true;
+    if (knob.kind == analysis::Knob::Kind::Wcet) return !is_within(knob.tasks, wanted);
+    return !is_within(knob.tasks, wanted) && !is_within(knob.tasks, released);
+  };
+  knobs.erase(std::remove_if(knobs.begin(), knobs.end(), is_other), knobs.end());
+  return knobs;
+}
+
+Duration simulated_length(const Workload &workload) {
+  Duration longest = 1;
+  for (const TaskRef &ref : flatten(workload)) longest = std::max(longest, ref.task->period + ref.task->offset);
+  return std::min(kMaxDuration / kPeriods, longest) * kPeriods;
+}
+
+// False if it was interrupted; what was found so far stays.
+bool search(Sensitivity &sensitivity, const std::vector<analysis::Knob> &knobs, const Options &options,
+            Console &console) {
+  const analysis::AnalysisPlatform &platform = sensitivity.analysed.system.platform;
+  const Workload &workload = sensitivity.analysed.workload;
+  const analysis::Accepts simulated = [&](const Workload &candidate, const analysis::System &) {
+    return misses_nothing(candidate, platform, sensitivity.simulated_for, &InterruptGuard::flag());
+  };
+  Progress progress(console);
+  analysis::SensitivityOptions searching;
+  searching.probes = options.probes;
+  searching.stop = [&] {
+    if (progress.due()) {
+      const std::size_t done = sensitivity.results.size();
+      progress.draw(static_cast<double>(done) / static_cast<double>(knobs.size()),
+                    knob_name(sensitivity.analysed, knobs[done]));
+    }
+    return InterruptGuard::interrupted();
+  };
+  for (const analysis::Knob &knob : knobs) {
+    KnobResult result;
+    const auto margin = analysis::margin_of(workload, platform, knob, analysis::accepted_by_analysis, searching);
+    if (!margin) return false;
+    result.margin = *margin;
+    if (options.simulate) {
+      result.simulated = analysis::margin_of(workload, platform, knob, simulated, searching);
+      if (!result.simulated) return false;
+    }
+    sensitivity.results.push_back(std::move(result));
+  }
+  return true;
+}
+
+int sensitivity_of_file(const Options &options, Console &console) {
+  if (options.probes > kMostProbes) {
+    console.error(fmt::format("--probes: {} is above {}", options.probes, kMostProbes));
+    return kExitBad;
+  }
+  const std::optional<Workload> workload = load_configured(options.analysis.run, console);
+  if (!workload) return kExitBad;
+  Result<Analysed> analysed = analyse(*workload, platform_for(*workload, options.analysis));
+  if (!analysed) {
+    console.note(analysed.error());
+    return kExitBad;
+  }
+  const auto knobs = chosen_knobs(*analysed, options.task, console);
+  if (!knobs) return kExitBad;
+
+  Sensitivity sensitivity;
+  sensitivity.analysed = *std::move(analysed);
+  sensitivity.knobs = knobs->size();
+  sensitivity.probes = options.probes;
+  if (options.simulate) {
+    sensitivity.simulated_for = options.analysis.run.duration.value_or(simulated_length(*workload));
+  }
+  const InterruptGuard guard;  // until the results are written
+  if (!search(sensitivity, *knobs, options, console)) console.warn("interrupted: these are the results so far");
+  if (options.analysis.run.json) {
+    console.print(to_text(to_json(sensitivity)));
+  } else {
+    console.print(describe(sensitivity, console.out_traits(), options.analysis.run.all_tasks));
+  }
+  const bool yes = sensitivity.analysed.report.verdict == analysis::Verdict::Schedulable;
+  return options.analysis.run.check && !yes ? kExitNo : kExitOk;
+}
+
+}  // namespace
+
+Action add_sensitivity(CLI::App &app) {
+  auto options = std::make_shared<Options>();
+  RunArguments &run = options->analysis.run;
+  app.add_option("FILE", run.file, "Workload (YAML); - is standard input")->required();
+  app.add_option("--task", options->task, "Only what concerns one task (dag.task) or DAG")->type_name("TASK");
+  add_count(app, "--probes", options->probes, "Positions tested besides, to see whether acceptance is monotone");
+  app.add_flag("--simulate", options->simulate, "How far the simulator would go, beside the bounds: no proof");
+  add_duration(app, "--duration", run.duration, "Of each simulation; default: 20 longest periods");
+  add_analysis_arguments(app, options->analysis, "Exit with 1 if the workload is not shown schedulable as it is");
+  return [options](Console &console) { return sensitivity_of_file(*options, console); };
+}
+
+}  // namespace redag::cli

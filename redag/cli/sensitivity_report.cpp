@@ -1,0 +1,274 @@
+#include "redag/cli/sensitivity_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "redag/cli/table.hpp"
+
+namespace redag::cli {
+namespace {
+
+using analysis::Knob;
+using analysis::Margin;
+using Kind = analysis::Knob::Kind;
+
+constexpr std::size_t kMostRows = 50;
+
+bool is_schedulable(const Sensitivity &sensitivity) {
+  return sensitivity.analysed.report.verdict == analysis::Verdict::Schedulable;
+}
+
+bool is_of_rates(const Knob &knob) { return knob.kind == Kind::Period || knob.kind == Kind::Rates; }
+
+bool is_of_all(const Sensitivity &sensitivity, const Knob &knob) {
+  const std::size_t tasks = sensitivity.analysed.system.tasks.size();
+  return knob.kind == Kind::AllWcets || (is_of_rates(knob) && knob.tasks.size() == tasks);
+}
+
+// Rounded down, so that nobody reads more room than there is.
+std::string format_factor(double factor) {
+  constexpr double kDigits = 1e4;
+  return fmt::format("{:.4f}", std::floor(factor * kDigits + 1e-6) / kDigits);
+}
+
+// A single value as people read it; nothing for knobs that turn several.
+std::optional<Duration> value_at(const Knob &knob, std::int64_t position) {
+  if (knob.kind == Kind::Wcet) return position;
+  if (knob.kind == Kind::Period) return -position;
+  return std::nullopt;
+}
+
+std::string value_text(const Knob &knob, std::optional<std::int64_t> position) {
+  if (!position) return "none";
+  const std::optional<Duration> value = value_at(knob, *position);
+  return value ? format_duration(*value) : "-";
+}
+
+std::string factor_text(const std::optional<Margin> &margin) {
+  if (!margin) return "";
+  return margin->position ? format_factor(margin->factor) : "none";
+}
+
+// Where the search of `margin` showed acceptance to come back.
+std::string again_text(const Analysed &analysed, const Margin &margin) {
+  const std::optional<Duration> value = value_at(margin.knob, *margin.again);
+  return value ? format_duration(*value)
+               : "a factor of " + format_factor(load_factor(analysed.workload, margin.knob, *margin.again));
+}
+
+std::string table_of(const Sensitivity &sensitivity, const std::vector<const KnobResult *> &rows,
+                     const StreamTraits &terminal) {
+  const bool simulated = sensitivity.simulated_for > 0;
+  std::vector<Column> columns = {{"what", false, 9, true}, {"now", true, 5}, {"limit", true, 7}, {"factor", true, 8}};
+  if (simulated) columns.push_back({"simulated", true, 6});
+  columns.push_back({"what ends it", false, 1});
+  Table table(columns);
+  for (const KnobResult *row : rows) {
+    const Margin &margin = row->margin;
+    const Tint tint = !margin.position ? Tint::Bad : margin.factor < 1 ? Tint::Caution : Tint::Plain;
+    std::vector<Cell> cells = {{knob_name(sensitivity.analysed, margin.knob)},
+                               {value_text(margin.knob, margin.nominal)},
+                               {value_text(margin.knob, margin.position)},
+                               {factor_text(margin), tint}};
+    if (simulated) cells.push_back({factor_text(row->simulated), Tint::Faint});
+    cells.push_back({margin.obstacle + (margin.again ? " (not monotone)" : ""), Tint::Faint});
+    table.add(std::move(cells));
+  }
+  return table.render(terminal.width, terminal.colour);
+}
+
+// All, in order, or those with the least room; what is of all tasks always.
+std::vector<const KnobResult *> shown_rows(const Sensitivity &sensitivity, bool all) {
+  std::vector<const KnobResult *> rows;
+  for (const KnobResult &result : sensitivity.results) rows.push_back(&result);
+  if (all || rows.size() <= kMostRows) return rows;
+  const auto room = [&](const KnobResult *row) {
+    return is_of_all(sensitivity, row->margin.knob) ? -1.0 : row->margin.factor;
+  };
+  std::stable_sort(rows.begin(), rows.end(),
+                   [&](const KnobResult *a, const KnobResult *b) { return room(a) < room(b); });
+  rows.resize(kMostRows);
+  return rows;
+}
+
+// The one of these that is nearest to its limit (or has to shrink least), of those that have one.
+const Margin *nearest(const Sensitivity &sensitivity, bool rates) {
+  const bool yes = is_schedulable(sensitivity);
+  const Margin *best = nullptr;
+  for (const KnobResult &result : sensitivity.results) {
+    const Margin &margin = result.margin;
+    if (is_of_rates(margin.knob) != rates || is_of_all(sensitivity, margin.knob) || !margin.position) continue;
+    if (best == nullptr || (yes ? margin.factor < best->factor : margin.factor > best->factor)) best = &margin;
+  }
+  return best;
+}
+
+std::string change_of(const Analysed &analysed, const Margin &margin) {
+  const std::string name = knob_name(analysed, margin.knob);
+  const std::optional<Duration> now = value_at(margin.knob, margin.nominal);
+  if (!now) return fmt::format("{}, to {} of what it is", name, format_factor(margin.factor));
+  return fmt::format("{}, from {} to {}", name, format_duration(*now),
+                     format_duration(*value_at(margin.knob, *margin.position)));
+}
+
+std::string words_of_room(const Sensitivity &sensitivity) {
+  std::string text;
+  for (const KnobResult &result : sensitivity.results) {
+    const Margin &margin = result.margin;
+    if (!is_of_all(sensitivity, margin.knob)) continue;
+    text += fmt::format("all {} together can grow to {} times what they are\n",
+                        is_of_rates(margin.knob) ? "rates" : "execution times", format_factor(margin.factor));
+  }
+  if (const Margin *least = nearest(sensitivity, false)) {
+    text += "the execution time with the least room: " + change_of(sensitivity.analysed, *least) + "\n";
+  }
+  if (const Margin *least = nearest(sensitivity, true)) {
+    text += "the rate with the least room: " + change_of(sensitivity.analysed, *least) + "\n";
+  }
+  return text;
+}
+
+std::string words_of_lack(const Sensitivity &sensitivity) {
+  std::string text;
+  bool tried_wcet = false;
+  bool tried_rate = false;
+  for (const KnobResult &result : sensitivity.results) {
+    const Margin &margin = result.margin;
+    const bool rates = is_of_rates(margin.knob);
+    const char *what = rates ? "rates" : "execution times";
+    if (!is_of_all(sensitivity, margin.knob)) {
+      (rates ? tried_rate : tried_wcet) = true;
+    } else if (margin.position) {
+      text += fmt::format("to be shown schedulable, all {} together have to shrink to {} of what they are\n", what,
+                          format_factor(margin.factor));
+    } else {
+      text += fmt::format("shrinking all {} together, however far, does not suffice: {}\n", what, margin.obstacle);
+    }
+  }
+  const auto say = [&](bool tried, bool rates) {
+    if (!tried) return;
+    const Margin *least = nearest(sensitivity, rates);
+    text += least == nullptr
+                ? fmt::format("none of the {} looked at suffices alone\n", rates ? "rates" : "execution times")
+                : fmt::format("alone suffices, with the least change: {}\n", change_of(sensitivity.analysed, *least));
+  };
+  say(tried_wcet, false);
+  say(tried_rate, true);
+  return text;
+}
+
+Json margin_json(const Margin &margin) {
+  const auto value = [&](std::optional<std::int64_t> position) {
+    const std::optional<Duration> found = position ? value_at(margin.knob, *position) : std::nullopt;
+    return found ? Json(*found) : Json();
+  };
+  return Json{{"limit_ns", value(margin.position)},
+              {"factor", margin.position ? Json(margin.factor) : Json()},
+              {"monotone", !margin.again},
+              {"again_ns", value(margin.again)},
+              {"tests", margin.tested}};
+}
+
+const char *kind_name(Kind kind) {
+  switch (kind) {
+    case Kind::Wcet: return "wcet";
+    case Kind::AllWcets: return "all_wcets";
+    case Kind::Period: return "period";
+    case Kind::Rates: return "rates";
+  }
+  return "?";
+}
+
+}  // namespace
+
+std::string knob_name(const Analysed &analysed, const Knob &knob) {
+  if (knob.kind == Kind::AllWcets) return "all wcets";
+  if (knob.kind == Kind::Wcet) return "wcet of " + task_name(analysed, TaskId(knob.tasks.front()));
+  if (knob.kind == Kind::Rates && knob.tasks.size() == analysed.system.tasks.size()) return "all rates";
+  const std::string what = knob.kind == Kind::Period ? "period of " : "rates of ";
+  const analysis::SystemDag &dag = analysed.system.dags[analysed.system.tasks[knob.tasks.front()].dag.value];
+  if (knob.tasks.size() == dag.tasks.size()) return what + dag.name;
+  const std::string more = knob.tasks.size() > 1 ? fmt::format(" and {} more", knob.tasks.size() - 1) : "";
+  return what + task_name(analysed, TaskId(knob.tasks.front())) + more;
+}
+
+std::string in_words(const Sensitivity &sensitivity) {
+  std::string text = is_schedulable(sensitivity) ? words_of_room(sensitivity) : words_of_lack(sensitivity);
+  for (const KnobResult &result : sensitivity.results) {
+    if (!result.margin.again) continue;
+    text += fmt::format("not monotone: {} is accepted again at {}; the limit is that below which all tests accept\n",
+                        knob_name(sensitivity.analysed, result.margin.knob),
+                        again_text(sensitivity.analysed, result.margin));
+  }
+  if (sensitivity.results.size() < sensitivity.knobs) {
+    text += fmt::format("stopped after {} of {}\n", sensitivity.results.size(), sensitivity.knobs);
+  }
+  return text;
+}
+
+std::string describe(const Sensitivity &sensitivity, const StreamTraits &terminal, bool all) {
+  const Analysed &analysed = sensitivity.analysed;
+  const std::string reason = mode_reason(analysed);
+  std::string text = fmt::format("{}: {}, {} worker{}, utilization {:.3f}\npreemption: {}{}\n", analysed.workload.name,
+                                 to_string(analysed.workload.policy), analysed.system.platform.workers,
+                                 analysed.system.platform.workers == 1 ? "" : "s", analysed.system.utilization,
+                                 mode_name(analysed), reason.empty() ? "" : " (" + reason + ")");
+  const std::string verdict = verdict_in_words(analysed);
+  const std::size_t colon = verdict.find(':');
+  const Tint tint = is_schedulable(sensitivity) ? Tint::Good : Tint::Bad;
+  text += tinted(verdict.substr(0, colon), tint, terminal.colour) + verdict.substr(colon) + "\n\n";
+  const std::vector<const KnobResult *> rows = shown_rows(sensitivity, all);
+  text += table_of(sensitivity, rows, terminal);
+  if (rows.size() < sensitivity.results.size()) {
+    text += fmt::format("(the {} of {} with the least room; --all-tasks shows every one)\n", rows.size(),
+                        format_count(sensitivity.results.size()));
+  }
+  std::uint64_t tests = 0;
+  for (const KnobResult &result : sensitivity.results) tests += result.margin.tested;
+  text += fmt::format(
+      "\nlimit: shown schedulable there and in every test below; the next step (1ns, or a factor of 0.000001) is not\n"
+      "factor: load at the limit over the load now, rounded down; {} analyses\n",
+      format_count(tests));
+  if (sensitivity.simulated_for > 0) {
+    text += fmt::format("simulated: no miss in {} with these offsets and full execution times: no proof\n",
+                        format_duration(sensitivity.simulated_for));
+  }
+  return text + "\n" + in_words(sensitivity);
+}
+
+Json to_json(const Sensitivity &sensitivity) {
+  const Analysed &analysed = sensitivity.analysed;
+  Json document = {{"format", "redag.sensitivity/1"},
+                   {"workload", analysed.workload.name},
+                   {"policy", to_string(analysed.workload.policy)},
+                   {"workers", analysed.system.platform.workers},
+                   {"preemption", mode_name(analysed)},
+                   {"preemption_why", mode_reason(analysed)},
+                   {"utilization", analysed.system.utilization},
+                   {"schedulable", is_schedulable(sensitivity)},
+                   {"verdict", verdict_in_words(analysed)},
+                   {"resolution", {{"time_ns", 1}, {"factor", 1.0 / analysis::kFactorUnit}}},
+                   {"probes", sensitivity.probes},
+                   {"simulated_ns", sensitivity.simulated_for > 0 ? Json(sensitivity.simulated_for) : Json()},
+                   {"stopped", sensitivity.results.size() < sensitivity.knobs},
+                   {"text", in_words(sensitivity)}};
+  document["limits"] = Json::array();
+  for (const KnobResult &result : sensitivity.results) {
+    const Margin &margin = result.margin;
+    const std::optional<Duration> now = value_at(margin.knob, margin.nominal);
+    Json row = {{"name", knob_name(analysed, margin.knob)},
+                {"kind", kind_name(margin.knob.kind)},
+                {"now_ns", now ? Json(*now) : Json()}};
+    row.update(margin_json(margin));
+    row["obstacle"] = margin.obstacle;
+    row["tasks"] = Json::array();
+    for (const std::uint32_t t : margin.knob.tasks) row["tasks"].push_back(task_name(analysed, TaskId(t)));
+    row["simulated"] = result.simulated ? margin_json(*result.simulated) : Json();
+    document["limits"].push_back(std::move(row));
+  }
+  return document;
+}
+
+}  // namespace redag::cli
