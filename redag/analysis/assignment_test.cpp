@@ -1,0 +1,320 @@
+#include "redag/analysis/assignment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <limits>
+#include <numeric>
+
+#include "redag/model/workload_yaml.hpp"
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using testing::BoundCase;
+using testing::BoundCaseLimits;
+
+Dag single(const std::string &name, Duration wcet, Duration period, Duration deadline) {
+  Task task;
+  task.name = "t";
+  task.wcet = wcet;
+  task.period = period;
+  task.deadline = deadline;
+  if (deadline > period) {
+    task.overrun = Overrun::Queue;
+    task.queue_depth = 2;
+  }
+  Dag dag;
+  dag.name = name;
+  dag.tasks = {task};
+  return dag;
+}
+
+Workload workload_of(std::vector<Dag> dags, std::uint32_t workers = 1, PreemptionMode mode = PreemptionMode::Os) {
+  Workload workload;
+  workload.name = "w";
+  workload.platform = {workers, mode};
+  workload.dags = std::move(dags);
+  return workload;
+}
+
+Assignment assigned(const Workload &workload, const AssignmentOptions &options = {}) {
+  return assign(workload, platform_of(workload), options).value();
+}
+
+// One source and `width` tasks after it, all of one period.
+Dag fork(const std::string &name, Duration wcet, std::uint32_t width, Duration period) {
+  Dag dag = single(name, wcet, period, period);
+  for (std::uint32_t i = 0; i < width; ++i) {
+    Task task = dag.tasks[0];
+    task.name = "f" + std::to_string(i);
+    task.activation = Activation::Data;
+    task.predecessors = {0};
+    dag.tasks.push_back(task);
+  }
+  return dag;
+}
+
+TEST(Assignment, ShortDeadlinesGoFirst) {
+  // By rate b waits for a and answers after 5; by deadline it answers after 2.
+  const Assignment result = assigned(workload_of({single("a", 3, 10, 10), single("b", 2, 20, 4)}));
+  EXPECT_FALSE(result.present.score.schedulable);
+  EXPECT_EQ(result.present.score.worst_lateness, 1);
+  EXPECT_TRUE(result.best.score.schedulable);
+  EXPECT_EQ(result.best.order, "deadline_monotonic");
+  EXPECT_EQ(result.best.score.worst_lateness, -2);
+  EXPECT_EQ(result.best.workload.policy, PolicyKind::DeadlineMonotonic);
+}
+
+TEST(Assignment, AudsleyBeatsDeadlinesLongerThanPeriods) {
+  // J. Lehoczky, RTSS 1990: with D > T neither rates nor deadlines decide. (52, 100, D = 110) above (52, 140, D = 154)
+  // lets the second answer after 156; the other way round they answer after 108 and 52.
+  const Assignment result = assigned(workload_of({single("a", 52, 100, 110), single("b", 52, 140, 154)}));
+  EXPECT_FALSE(result.present.score.schedulable);
+  EXPECT_TRUE(result.audsley_optimal);
+  EXPECT_TRUE(result.audsley_found);
+  EXPECT_EQ(result.best.order, "audsley");
+  EXPECT_TRUE(result.best.score.schedulable);
+  EXPECT_EQ(result.best.units, (UnitOrder{1, 0}));
+  EXPECT_EQ(result.best.score.worst_lateness, -2);
+  EXPECT_EQ(result.best.workload.policy, PolicyKind::Fixed);
+  EXPECT_GT(result.best.workload.dags[1].tasks[0].priority, result.best.workload.dags[0].tasks[0].priority);
+}
+
+TEST(Assignment, LeavesAloneWhatNothingImproves) {
+  const Workload workload = workload_of({single("a", 1, 4, 4), single("b", 1, 8, 8)});
+  for (const Objective objective : {Objective::Lateness, Objective::Slack}) {
+    AssignmentOptions options;
+    options.objective = objective;
+    const Assignment result = assigned(workload, options);
+    EXPECT_EQ(result.best.order, "present");
+    EXPECT_EQ(result.best.workload, workload);
+  }
+}
+
+TEST(Assignment, ObjectivesDiffer) {
+  // (2, 6) above (2, 20): R = 2 and 4, lateness -4 and -16, slack 4/6 and 16/20. The other way round R = 4 and 2: -2.
+  const Score high{true, 0, -4, 0.6, 10};
+  const Score low{true, 0, -2, 0.9, 9};
+  EXPECT_TRUE(is_better(high, low, Objective::Lateness));
+  EXPECT_TRUE(is_better(low, high, Objective::Slack));
+  EXPECT_TRUE(is_better(Score{true, 0, 5, 0, 0}, Score{false, 0, -5, 1, 0}, Objective::Lateness));
+  EXPECT_TRUE(is_better(Score{false, 1, 5, 0, 0}, Score{false, 2, -5, 1, 0}, Objective::Lateness));
+  Score smaller = high;
+  smaller.total = 9;
+  EXPECT_TRUE(is_better(smaller, high, Objective::Lateness));
+  EXPECT_FALSE(improves(smaller, high, Objective::Lateness));
+}
+
+TEST(Assignment, ABoundOfActiveJobsIsolatesADag) {
+  // Run to completion on 3 workers: "wide" can fill all of them and block "quick" for 40; with at most 2 of it at work
+  // and one task in quick, quick always finds a worker.
+  const Workload workload =
+      workload_of({single("quick", 2, 20, 20), fork("wide", 40, 4, 400)}, 3, PreemptionMode::None);
+  const Assignment result = assigned(workload);
+  EXPECT_FALSE(result.present.score.schedulable);
+  EXPECT_TRUE(result.best.score.schedulable);
+  EXPECT_EQ(result.best.caps[0], 0U);
+  EXPECT_EQ(result.best.caps[1], 2U);
+  EXPECT_TRUE(result.exhaustive);
+  EXPECT_EQ(result.trials.size(), 4U);  // none, 1, 2, 3 for "wide"
+  AssignmentOptions keep;
+  keep.caps = false;
+  EXPECT_EQ(assigned(workload, keep).best.caps, (Caps{0, 0}));
+}
+
+TEST(Assignment, LocalSearchIsDeterministicAndNoBetterThanAll) {
+  int compared = 0;
+  for (int i = 0; i < 40; ++i) {
+    Rng rng(mix(static_cast<std::uint64_t>(i) + 5));
+    BoundCaseLimits limits;
+    limits.min_workers = limits.max_workers = 3;
+    limits.edges = limits.caps = true;
+    limits.max_dags = 3;
+    limits.max_utilization = 0.7;
+    limits.preemption = i % 2 == 0 ? sched::Preemption::Full : sched::Preemption::None;
+    const BoundCase bound_case = testing::random_bound_case(rng, limits);
+    AssignmentOptions all;
+    all.priorities = false;
+    AssignmentOptions local = all;
+    local.exhaustive = 0;
+    const auto a = assign(bound_case.workload, bound_case.platform, all);
+    const auto b = assign(bound_case.workload, bound_case.platform, local);
+    const auto c = assign(bound_case.workload, bound_case.platform, local);
+    ASSERT_TRUE(a && b && c);
+    EXPECT_TRUE(a->exhaustive);
+    EXPECT_FALSE(b->exhaustive);
+    EXPECT_EQ(b->best.workload, c->best.workload);
+    EXPECT_FALSE(is_better(b->best.score, a->best.score, Objective::Lateness));
+    EXPECT_FALSE(is_better(a->present.score, b->best.score, Objective::Lateness));
+    compared += improves(a->best.score, a->present.score, Objective::Lateness) ? 1 : 0;
+  }
+  EXPECT_GT(compared, 0);
+}
+
+TEST(Assignment, StopsWithTheBestSoFar) {
+  AssignmentOptions options;
+  int asked = 0;
+  options.stop = [&] { return ++asked > 2; };
+  const Workload workload = workload_of({single("a", 3, 10, 10), single("b", 2, 20, 4)});
+  const Assignment result = assigned(workload, options);
+  EXPECT_TRUE(result.stopped);
+  EXPECT_EQ(result.best.workload, workload);
+}
+
+TEST(Assignment, OfEdfChangesNoOrderThatWorks) {
+  Workload workload = workload_of({single("a", 3, 10, 10), single("b", 2, 20, 4)}, 1, PreemptionMode::Auto);
+  workload.policy = PolicyKind::Edf;
+  const Assignment result = assigned(workload);
+  EXPECT_TRUE(result.present.score.schedulable);
+  EXPECT_EQ(result.best.workload, workload);
+}
+
+// Every response of the order's units under the order-free test, and the largest lateness.
+struct UnderTest {
+  bool all_fit = true;
+  Duration worst = std::numeric_limits<Duration>::min();
+};
+UnderTest under(const OrderFreeTest &test, const BoundCase &bound_case, const System &system, const UnitOrder &order) {
+  UnderTest result;
+  const System ordered = compile(with_order(bound_case.workload, system, order), bound_case.platform).value();
+  for (const std::uint32_t unit : order) {
+    const Duration due = std::min(system.units[unit].deadline, system.units[unit].limit);
+    const std::optional<Duration> response = test.response(ordered, unit);
+    result.all_fit = result.all_fit && response && *response <= due;
+    result.worst = std::max(result.worst, response ? *response - due : kMaxDuration);
+  }
+  return result;
+}
+
+int cases_to_try() {
+  const char *text = std::getenv("REDAG_BOUND_WORKLOADS");
+  return text == nullptr ? 150 : std::atoi(text);
+}
+
+// Where the test is said to suit Audsley's assignment, no order of all n! is better; and what is found is schedulable
+// by analyze() too.
+void expect_optimal(BoundCaseLimits limits) {
+  limits.max_dags = 4;
+  limits.min_utilization = 0.6;
+  limits.policies = {PolicyKind::RateMonotonic};
+  int tried = 0;
+  int found_some = 0;
+  for (int i = 0; i < cases_to_try(); ++i) {
+    Rng rng(mix(static_cast<std::uint64_t>(i) + 31));
+    const BoundCase bound_case = testing::random_bound_case(rng, limits);
+    const System system = compile(bound_case.workload, bound_case.platform).value();
+    const TestChoice choice = order_free_test(bound_case.workload, bound_case.platform);
+    if (!choice.test || system.units.size() > 5) continue;
+    ASSERT_TRUE(choice.test->optimal);
+    SCOPED_TRACE(describe(bound_case));
+    const auto lateness = [](Duration response, Duration due) { return static_cast<double>(response - due); };
+    const auto found = audsley(bound_case.workload, bound_case.platform, *choice.test, lateness);
+    ASSERT_TRUE(found);
+    const UnderTest best = under(*choice.test, bound_case, system, found->order);
+    ASSERT_EQ(best.all_fit, found->found);
+    ++tried;
+    UnitOrder order(system.units.size());
+    std::iota(order.begin(), order.end(), 0);
+    do {
+      const UnderTest other = under(*choice.test, bound_case, system, order);
+      ASSERT_LE(best.worst, other.worst);
+      ASSERT_TRUE(found->found || !other.all_fit);
+    } while (std::next_permutation(order.begin(), order.end()));
+    if (!found->found) continue;
+    ++found_some;
+    const System ordered = compile(with_order(bound_case.workload, system, found->order), bound_case.platform).value();
+    ASSERT_EQ(analyze(ordered).verdict, Verdict::Schedulable);
+  }
+  EXPECT_GT(tried, cases_to_try() / 4);
+  EXPECT_GT(found_some, cases_to_try() / 20);
+  EXPECT_LT(found_some, tried);
+}
+
+TEST(AudsleyProperty, OneWorkerWithJitterAndGroups) {
+  BoundCaseLimits limits;
+  limits.jitter = limits.groups = limits.queues = true;
+  limits.max_deadline = 1.6;
+  expect_optimal(limits);
+}
+
+TEST(AudsleyProperty, OneWorkerRunToCompletion) {
+  BoundCaseLimits limits;
+  limits.preemption = sched::Preemption::None;
+  limits.jitter = limits.queues = true;
+  limits.max_deadline = 1.6;
+  expect_optimal(limits);
+}
+
+TEST(AudsleyProperty, OneWorkerCooperative) {
+  BoundCaseLimits limits;
+  limits.preemption = sched::Preemption::Cooperative;
+  expect_optimal(limits);
+}
+
+TEST(AudsleyProperty, OneWorkerDags) {
+  BoundCaseLimits limits;
+  limits.edges = limits.groups = true;
+  expect_optimal(limits);
+}
+
+TEST(AudsleyProperty, SeveralWorkers) {
+  BoundCaseLimits limits;
+  limits.min_workers = 2;
+  limits.max_workers = 3;
+  limits.jitter = true;
+  expect_optimal(limits);
+}
+
+TEST(AudsleyProperty, SeveralWorkersDags) {
+  BoundCaseLimits limits;
+  limits.min_workers = 2;
+  limits.max_workers = 3;
+  limits.edges = limits.caps = true;
+  limits.max_utilization = 0.8;
+  expect_optimal(limits);
+}
+
+TEST(AssignmentProperty, NeverWorseAndWhatIsWrittenMeansTheSame) {
+  int better = 0;
+  for (int i = 0; i < cases_to_try(); ++i) {
+    Rng rng(mix(static_cast<std::uint64_t>(i) + 901));
+    BoundCaseLimits limits;
+    limits.max_workers = 3;
+    limits.edges = i % 2 == 0;
+    limits.caps = true;
+    limits.max_dags = 4;
+    limits.preemption = i % 3 == 0 ? sched::Preemption::None : sched::Preemption::Full;
+    limits.policies = {PolicyKind::RateMonotonic, PolicyKind::Fixed, PolicyKind::ChainAware, PolicyKind::Edf};
+    const BoundCase bound_case = testing::random_bound_case(rng, limits);
+    SCOPED_TRACE(describe(bound_case));
+    for (const Objective objective : {Objective::Lateness, Objective::Slack}) {
+      AssignmentOptions options;
+      options.objective = objective;
+      const auto result = assign(bound_case.workload, bound_case.platform, options);
+      ASSERT_TRUE(result);
+      ASSERT_FALSE(is_better(result->present.score, result->best.score, objective) &&
+                   improves(result->present.score, result->best.score, objective));
+      better += improves(result->best.score, result->present.score, objective) ? 1 : 0;
+      // As written and read again it has the same score, and nothing but order and caps has changed.
+      const auto read = parse_workload(to_yaml(result->best.workload), "w.yaml");
+      ASSERT_TRUE(read) << to_string(read.error());
+      ASSERT_EQ(score_of(compile(read->workload, bound_case.platform).value()), result->best.score);
+      Workload undone = result->best.workload;
+      undone.policy = bound_case.workload.policy;
+      for (std::size_t d = 0; d < undone.dags.size(); ++d) {
+        undone.dags[d].max_active = bound_case.workload.dags[d].max_active;
+        for (std::size_t t = 0; t < undone.dags[d].tasks.size(); ++t) {
+          undone.dags[d].tasks[t].priority = bound_case.workload.dags[d].tasks[t].priority;
+        }
+      }
+      ASSERT_EQ(undone, bound_case.workload);
+    }
+  }
+  EXPECT_GT(better, 0);
+}
+
+}  // namespace
+}  // namespace redag::analysis

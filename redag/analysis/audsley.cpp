@@ -1,0 +1,201 @@
+#include "redag/analysis/audsley.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <tuple>
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/global_dag.hpp"
+#include "redag/analysis/global_sequential.hpp"
+#include "redag/analysis/response_time.hpp"
+#include "redag/base/check.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using global::GlobalUnit;
+
+Duration due_of(const Unit &unit) { return std::min(unit.deadline, unit.limit); }
+
+template <class Key>
+UnitOrder sorted_by(const System &system, Key key) {
+  UnitOrder order(system.units.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return key(system.units[a]) < key(system.units[b]); });
+  return order;
+}
+
+const std::vector<Method> &one_worker_methods() {
+  static const std::vector<Method> kMethods = {rta_preemptive(), rta_nonpreemptive(), rta_deferred(),
+                                               dag_one_worker_preemptive(), dag_one_worker_deferred()};
+  return kMethods;
+}
+
+// One worker: fixed points that see of the others only which are more urgent. As a unit moves up past another, at most
+// C - 1 of that one blocks it where at least C interfered before.
+std::optional<Duration> one_worker_response(const System &system, std::uint32_t unit) {
+  std::optional<Duration> best;
+  for (const Method &method : one_worker_methods()) {
+    const Outcome outcome = method.apply(system);
+    const Bound *bound = std::get_if<Bound>(&outcome);
+    if (bound == nullptr) continue;
+    const std::optional<Duration> &found = bound->tasks[system.units[unit].tasks.front()].response;
+    if (found && (!best || *found < *best)) best = found;
+  }
+  return best;
+}
+
+// Several workers: the same fixed points as the bounds, with every more urgent unit as late as it may be instead of as
+// late as it is: work in a window only grows with it, and the order of the more urgent no longer shows.
+std::optional<Duration> global_response(const System &system, std::uint32_t unit) {
+  const bool edges = system.has_edges();
+  const bool bounds =
+      std::any_of(system.dags.begin(), system.dags.end(), [](const SystemDag &dag) { return dag.max_active > 0; });
+  const bool sequential = !edges && !bounds;
+  global::Units view = global::units_of(system, {.mode = system.mode, .edges = !sequential, .bounds = !sequential});
+  if (view.reason) return std::nullopt;
+  const auto own = std::find_if(view.units.begin(), view.units.end(),
+                                [&](const GlobalUnit &candidate) { return candidate.unit == unit; });
+  const auto k = static_cast<std::size_t>(own - view.units.begin());
+  for (std::size_t i = 0; i < k; ++i) {
+    GlobalUnit &other = view.units[i];
+    const Duration least = other.jitter + other.volume;  // what the workload formulas need of a response
+    if (least > other.period) return std::nullopt;
+    other.response = std::clamp(due_of(system.units[other.unit]), least, other.period);
+  }
+  const std::span<GlobalUnit> units(view.units);
+  bool found = false;
+  if (sequential) {
+    found = system.mode == sched::Preemption::Full
+                ? global::guan_response(units, k, view.workers)
+                : global::sequential_nonpreemptive_response(
+                      units, k, view.workers, global::largest_remaining(system, view.units, k + 1, view.workers));
+  } else {
+    const Duration blocking =
+        system.mode == sched::Preemption::Full ? 0 : global::blocking_of(system, view.units, k, view.workers);
+    global::Waiting waiting;
+    waiting.works.resize(units.size());
+    found = global::bounded_response(units, k, view.workers, blocking, waiting);
+  }
+  if (!found) return std::nullopt;
+  return units[k].response;
+}
+
+// Compiled with priorities in this order. The workload was compiled before, so this cannot fail.
+System compiled(const Workload &workload, const AnalysisPlatform &platform, const System &before,
+                const UnitOrder &order) {
+  Result<System> system = compile(with_order(workload, before, order), platform);
+  REDAG_CHECK(system.has_value(), "other priorities make a valid workload invalid");
+  return *std::move(system);
+}
+
+}  // namespace
+
+Workload with_order(const Workload &workload, const System &system, const UnitOrder &order) {
+  std::vector<int> priority(system.tasks.size(), 0);
+  for (std::size_t place = 0; place < order.size(); ++place) {
+    for (const std::uint32_t t : system.units[order[place]].tasks) {
+      priority[t] = static_cast<int>(order.size() - place);
+    }
+  }
+  Workload result = workload;
+  result.policy = PolicyKind::Fixed;
+  std::size_t t = 0;
+  for (Dag &dag : result.dags) {
+    for (Task &task : dag.tasks) task.priority = priority[t++];
+  }
+  return result;
+}
+
+UnitOrder present_order(const System &system) {
+  return sorted_by(system, [](const Unit &unit) { return unit.first_rank; });
+}
+
+UnitOrder deadline_order(const System &system) {
+  return sorted_by(system, [](const Unit &unit) { return std::tuple(due_of(unit), unit.period); });
+}
+
+UnitOrder dkc_order(const System &system) {
+  const double m = system.platform.workers;
+  const double k = (m - 1 + std::sqrt(5 * m * m - 6 * m + 1)) / (2 * m);
+  return sorted_by(system, [k](const Unit &unit) {
+    return static_cast<double>(due_of(unit)) - k * static_cast<double>(unit.length);
+  });
+}
+
+TestChoice order_free_test(const Workload &workload, const AnalysisPlatform &platform) {
+  const Result<System> before = compile(workload, platform);
+  if (!before) return {std::nullopt, before.error().front().message};
+  if (!before->not_analysable.empty()) return {std::nullopt, before->not_analysable};
+  const System system = compiled(workload, platform, *before, deadline_order(*before));
+  OrderFreeTest test;
+  if (platform.workers == 1) {
+    // Which of them applies does not depend on the order. Where levels are shared, who shares with whom does.
+    std::string why;
+    for (const Method &method : one_worker_methods()) {
+      const Outcome outcome = method.apply(system);
+      if (std::holds_alternative<Bound>(outcome)) {
+        test = {std::string(method.name), platform.levels == 0, one_worker_response};
+        return {std::move(test), {}};
+      }
+      if (why.empty()) why = std::get<NotApplicable>(outcome).reason;
+    }
+    return {std::nullopt, why};
+  }
+  const bool full = system.mode == sched::Preemption::Full;
+  if (system.mode == sched::Preemption::Cooperative) {
+    return {std::nullopt, "no bound for several workers covers cooperative preemption"};
+  }
+  const global::Units view = global::units_of(system, {.mode = system.mode, .bounds = true});
+  if (view.reason) return {std::nullopt, *view.reason};
+  // With run-to-completion jobs a unit that moves up past a long one can wait longer for it than before: its deadline
+  // may let in less than C - 1 of interference. So nothing is claimed there.
+  const bool edges = system.has_edges();
+  test.name = full ? (edges ? "dag_bounded with deadlines for responses" : "guan with deadlines for responses")
+                   : (edges ? "dag_nonpreemptive with deadlines for responses"
+                            : "sequential_nonpreemptive with deadlines for responses");
+  test.optimal = full;
+  test.response = global_response;
+  return {std::move(test), {}};
+}
+
+std::optional<AudsleyResult> audsley(const Workload &workload, const AnalysisPlatform &platform,
+                                     const OrderFreeTest &test, const Badness &badness,
+                                     const std::function<bool()> &stop) {
+  const Result<System> before = compile(workload, platform);
+  REDAG_CHECK(before.has_value(), "audsley() needs a valid workload");
+  AudsleyResult result;
+  result.found = true;
+  UnitOrder open = deadline_order(*before);
+  UnitOrder placed;  // most urgent first
+  while (!open.empty()) {
+    std::size_t best = open.size() - 1;
+    double least = std::numeric_limits<double>::infinity();
+    bool fits = false;
+    for (std::size_t i = open.size(); i-- > 0;) {  // longest deadline first: it stays where others are not better
+      if (stop && stop()) return std::nullopt;
+      UnitOrder order = open;
+      order.erase(order.begin() + static_cast<std::ptrdiff_t>(i));
+      order.push_back(open[i]);
+      order.insert(order.end(), placed.begin(), placed.end());
+      const System system = compiled(workload, platform, *before, order);
+      const std::optional<Duration> response = test.response(system, open[i]);
+      const Duration due = due_of(before->units[open[i]]);
+      const double late = response ? badness(*response, due) : std::numeric_limits<double>::infinity();
+      if (late >= least) continue;
+      best = i;
+      least = late;
+      fits = *response <= due;
+    }
+    result.found = result.found && fits;
+    placed.insert(placed.begin(), open[best]);
+    open.erase(open.begin() + static_cast<std::ptrdiff_t>(best));
+  }
+  result.order = std::move(placed);
+  return result;
+}
+
+}  // namespace redag::analysis
