@@ -198,7 +198,7 @@ int cases_to_try() {
 // by analyze() too.
 void expect_optimal(BoundCaseLimits limits) {
   limits.max_dags = 4;
-  limits.min_utilization = 0.6;
+  limits.min_utilization = limits.max_workers > 1 ? 0.2 : 0.6;
   limits.policies = {PolicyKind::RateMonotonic};
   int tried = 0;
   int found_some = 0;
@@ -273,6 +273,7 @@ TEST(AudsleyProperty, SeveralWorkersDags) {
   limits.min_workers = 2;
   limits.max_workers = 3;
   limits.edges = limits.caps = true;
+  limits.min_deadline = 0.8;
   limits.max_utilization = 0.8;
   expect_optimal(limits);
 }

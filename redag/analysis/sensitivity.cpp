@@ -29,6 +29,15 @@ std::string label(const System &system, std::uint32_t task) {
   return dag + "." + system.tasks[task].name.substr(dag.size() + 1);
 }
 
+std::string why_no_bound(const Report &report, std::uint32_t task) {
+  for (const MethodReport &method : report.methods) {
+    const Bound *bound = method.bound();
+    if (!method.trusted || bound == nullptr || task >= bound->tasks.size()) continue;
+    if (!bound->tasks[task].absent.empty()) return std::string(bound->tasks[task].absent);
+  }
+  return "no method that bounds response times applies";
+}
+
 // What analyze() finds in the way of a workload that it does not accept.
 std::string obstacle_of(const Workload &workload, const AnalysisPlatform &platform) {
   const Result<System> system = compile(workload, platform);
@@ -41,7 +50,7 @@ std::string obstacle_of(const Workload &workload, const AnalysisPlatform &platfo
   for (std::uint32_t t = 0; t < system->tasks.size(); ++t) {
     const SystemTask &task = system->tasks[t];
     if (meets_deadline(task, report.tasks[t].bound)) continue;
-    if (!report.tasks[t].response) return "no bound for " + label(*system, t);
+    if (!report.tasks[t].response) return label(*system, t) + ": " + why_no_bound(report, t);
     const Duration late = *report.tasks[t].response - std::min(task.deadline, task.limit);
     if (worst && late <= missing) continue;
     worst = t;

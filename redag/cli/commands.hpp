@@ -23,6 +23,7 @@ Action add_run(CLI::App &app);
 Action add_compare(CLI::App &app);
 Action add_analyze(CLI::App &app);
 Action add_sensitivity(CLI::App &app);
+Action add_assign(CLI::App &app);
 Action add_experiment(CLI::App &app);
 Action add_check_trace(CLI::App &app);
 Action add_report(CLI::App &app);

@@ -52,6 +52,10 @@ constexpr std::array kCommands = {
           "  redag sensitivity cart.yaml\n"
           "  redag sensitivity cart.yaml --preemption none --task control.pid\n"
           "  redag sensitivity cart.yaml --simulate --json\n"},
+    Entry{"assign", "Find better priorities and max_active, judged by the bounds", add_assign,
+          "  redag assign cart.yaml\n"
+          "  redag assign cart.yaml --objective slack -o tuned.yaml\n"
+          "  redag assign cart.yaml --keep priorities --workers 4 --json\n"},
     Entry{"experiment", "Measure over many random workloads: seeded, parallel, resumable", add_experiment,
           "  redag experiment acceptance experiments/acceptance_tasks.yaml\n"
           "  redag experiment acceptance --help\n"

@@ -197,6 +197,12 @@ std::string knob_name(const Analysed &analysed, const Knob &knob) {
 std::string in_words(const Sensitivity &sensitivity) {
   std::string text = is_schedulable(sensitivity) ? words_of_room(sensitivity) : words_of_lack(sensitivity);
   for (const KnobResult &result : sensitivity.results) {
+    if (!result.simulated || !result.simulated->position || !is_of_all(sensitivity, result.margin.knob)) continue;
+    text += fmt::format("in simulation, which proves nothing, all {} together go to {} times what they are\n",
+                        is_of_rates(result.margin.knob) ? "rates" : "execution times",
+                        format_factor(result.simulated->factor));
+  }
+  for (const KnobResult &result : sensitivity.results) {
     if (!result.margin.again) continue;
     text += fmt::format("not monotone: {} is accepted again at {}; the limit is that below which all tests accept\n",
                         knob_name(sensitivity.analysed, result.margin.knob),

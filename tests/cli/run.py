@@ -548,6 +548,189 @@ class Analyze(Case):
         self.assertLessEqual(max(map(len, rows)), 50, text)
 
 
+# Harmonic, U = 1/4 + 1/8 + 1/8: with rate-monotonic priorities on one worker everything up to U = 1 is schedulable.
+HARMONIC = """\
+name: harmonic
+platform: {workers: 1, preemption: os}
+dags:
+  - name: a
+    tasks: [{name: t, wcet: 1ms, period: 4ms}]
+  - name: b
+    tasks: [{name: t, wcet: 1ms, period: 8ms}]
+  - name: c
+    tasks: [{name: t, wcet: 2ms, period: 16ms}]
+"""
+# By rate b answers after 5 ms, by deadline after 2 ms.
+SHORT_DEADLINE = """\
+name: short
+platform: {workers: 1, preemption: os}
+# a comment, which is not kept
+dags:
+  - name: a
+    tasks: [{name: t, wcet: 3ms, bcet: 1ms, period: 10ms}]
+  - name: b
+    tasks: [{name: t, wcet: 2ms, period: 20ms, deadline: 4ms, group: bus}]
+"""
+
+
+class Sensitivity(Case):
+    def limits(self, result):
+        document = self.document(result, "redag.sensitivity/1")
+        return document, {row["name"]: row for row in document["limits"]}
+
+    def test_harmonic_periods(self):
+        file = self.write("harmonic.yaml", HARMONIC)
+        text = self.expect(redag("sensitivity", file), 0).stdout
+        self.assertIn("schedulable: every deadline is met", text)
+        self.assertRegex(text, r"all wcets +- +- +2\.0000 +utilization above 1")
+        self.assertRegex(text, r"wcet of b\.t +1ms +5ms +5\.0000")
+        self.assertIn("all execution times together can grow to 2.0000 times what they are", text)
+        self.assertNotIn("not monotone", text)
+        document, rows = self.limits(redag("sensitivity", file, "--json"))
+        self.assertTrue(document["schedulable"])
+        self.assertEqual(rows["all rates"]["factor"], 2)
+        self.assertEqual(rows["wcet of b.t"]["limit_ns"], 5_000_000)
+        self.assertTrue(all(row["monotone"] for row in rows.values()))
+
+    def test_what_has_to_shrink(self):
+        file = self.write("heavy.yaml", HARMONIC.replace("wcet: 2ms", "wcet: 14ms"))  # U = 5/4
+        text = self.expect(redag("sensitivity", file), 0).stdout
+        self.assertIn("all execution times together have to shrink to 0.8000 of what they are", text)
+        self.assertIn("alone suffices, with the least change: wcet of c.t, from 14ms to 10ms", text)
+        self.expect(redag("sensitivity", file, "--check"), 1)
+        hopeless = self.write("hopeless.yaml", HARMONIC.replace("wcet: 2ms", "wcet: 17ms").replace("1ms", "9ms"))
+        self.assertIn("none of the execution times looked at suffices alone", redag("sensitivity", hopeless).stdout)
+
+    def test_limits_hold_in_the_analysis(self):
+        _, rows = self.limits(redag("sensitivity", self.cart, "--preemption", "os", "--json"))
+        limit = rows["wcet of slow.plan"]["limit_ns"]
+        for wcet, status in ((limit, 0), (limit + 1, 1)):
+            changed = self.write("changed.yaml", CART.replace("25ms", f"{wcet}ns"))
+            self.expect(redag("analyze", changed, "--preemption", "os", "--check"), status)
+        period = rows["period of fast"]["limit_ns"]
+        for value, status in ((period, 0), (period - 1, 1)):
+            changed = self.write("changed.yaml", CART.replace("period: 10ms", f"period: {value}ns"))
+            self.expect(redag("analyze", changed, "--preemption", "os", "--check"), status)
+
+    def test_the_simulator_is_never_behind_the_bounds(self):
+        compared = 0
+        for seed in range(1, 9):
+            text = redag("generate", "--seed", seed, "--dags", 3, "--utilization", "0.8", "--workers", 1 + seed % 2).stdout
+            for mode in ("none", "os"):
+                result = redag("sensitivity", "-", "--preemption", mode, "--simulate", "--probes", "4", "--json", text=text)
+                document, rows = self.limits(result)
+                for row in rows.values():
+                    if document["schedulable"] and row["kind"] in ("wcet", "all_wcets"):
+                        compared += 1
+                        self.assertGreaterEqual(row["simulated"]["factor"], row["factor"], (seed, mode, row["name"]))
+        self.assertGreater(compared, 10)
+
+    def test_where_no_bound_speaks_the_simulator_does(self):
+        text = self.expect(redag("sensitivity", SOURCE / "workloads" / "robot.yaml", "--simulate"), 0).stdout
+        self.assertIn("no method that bounds response times applies", text)
+        self.assertRegex(text, r"in simulation, which proves nothing, all execution times together go to 1\.\d+ times")
+
+    def test_one_task(self):
+        _, rows = self.limits(redag("sensitivity", self.cart, "--task", "fast.act", "--json"))
+        self.assertEqual(set(rows), {"wcet of fast.act", "period of fast"})
+        _, rows = self.limits(redag("sensitivity", self.cart, "--task", "fast", "--json"))
+        self.assertEqual(set(rows), {"wcet of fast.sense", "wcet of fast.act", "period of fast"})
+        self.expect(redag("sensitivity", self.cart, "--task", "slow.plam"), 2, "did you mean 'slow.plan'?")
+
+    def test_bad_input(self):
+        self.expect(redag("sensitivity"), 2, "FILE is required")
+        self.expect(redag("sensitivity", self.write("bad.yaml", MISTAKEN)), 2, "bad.yaml:6")
+        self.expect(redag("sensitivity", self.cart, "--probes", "1000000"), 2, "--probes")
+
+    def test_interrupt_keeps_what_was_found(self):
+        many = redag("generate", "--seed", 3, "--dags", 60, "--shape", "independent", "--utilization", "2.4",
+                     "--workers", 4, "--preemption", "os").stdout
+        process = subprocess.Popen([PROGRAM, "sensitivity", "-", "--simulate", "--probes", "20000", "--json"],
+                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process.stdin.write(many)
+        process.stdin.close()
+        time.sleep(2)
+        process.send_signal(signal.SIGINT)
+        out, err = process.stdout.read(), process.stderr.read()
+        self.assertEqual(process.wait(timeout=60), 0, err)
+        process.stdout.close()
+        process.stderr.close()
+        self.assertIn("interrupted", err)
+        self.assertTrue(json.loads(out)["stopped"])
+
+
+class Assign(Case):
+    def test_by_deadline(self):
+        file = self.write("short.yaml", SHORT_DEADLINE)
+        tuned = self.folder / "tuned.yaml"
+        result = self.expect(redag("assign", file, "-o", tuned), 0, "wrote")
+        self.assertIn("change policy: rate_monotonic -> deadline_monotonic", result.stdout)
+        self.assertIn("gain: the workload is shown schedulable", result.stdout)
+        self.assertIn("worst lateness (bound - deadline): 1ms -> -2ms", result.stdout)
+        self.expect(redag("analyze", file, "--check"), 1)
+        self.expect(redag("analyze", tuned, "--check"), 0)
+        self.expect(redag("validate", "--strict", tuned), 0)
+        self.assertIn("bcet: 1ms", tuned.read_text())
+        self.assertIn("group: bus", tuned.read_text())
+        again = self.expect(redag("assign", tuned, "--check"), 0)
+        self.assertIn("nothing to change", again.stdout)
+
+    def test_audsley(self):
+        # J. Lehoczky, RTSS 1990: deadlines beyond periods, where neither rates nor deadlines decide.
+        file = self.write("lehoczky.yaml", """\
+name: lehoczky
+platform: {workers: 1, preemption: os}
+dags:
+  - name: a
+    tasks: [{name: t, wcet: 52ms, period: 100ms, deadline: 110ms, overrun: {queue: 2}}]
+  - name: b
+    tasks: [{name: t, wcet: 52ms, period: 140ms, deadline: 154ms, overrun: {queue: 2}}]
+""")
+        tuned = self.folder / "tuned.yaml"
+        text = self.expect(redag("assign", file, "-o", tuned), 0).stdout
+        self.assertIn("change policy: rate_monotonic -> fixed", text)
+        self.assertIn("change priority of b.t: none -> 2", text)
+        self.assertIn("Audsley's assignment, by rta_preemptive: finds an order that passes", text)
+        self.expect(redag("analyze", tuned, "--check"), 0)
+        run = json.loads(self.expect(redag("simulate", tuned, "--json", "--check"), 0).stdout)
+        self.assertTrue(run["check"]["ok"])
+
+    def test_max_active(self):
+        wide = "".join(f", {{name: f{i}, wcet: 40ms, activation: data, after: s}}" for i in range(4))
+        file = self.write("wide.yaml", f"""\
+name: wide
+platform: {{workers: 3, preemption: none}}
+dags:
+  - name: quick
+    tasks: [{{name: t, wcet: 2ms, period: 20ms}}]
+  - name: wide
+    tasks: [{{name: s, wcet: 40ms, period: 400ms}}{wide}]
+""")
+        document = self.document(redag("assign", file, "--json"), "redag.assignment/1")
+        self.assertEqual(document["changes"], ["max_active of wide: none -> 2"])
+        self.assertTrue(document["exhaustive"])
+        self.assertEqual([trial["max_active"]["wide"] for trial in document["trials"]], [0, 1, 2, 3])
+        self.assertEqual([trial["schedulable"] for trial in document["trials"]], [False, True, True, False])
+        kept = self.document(redag("assign", file, "--keep", "max_active", "--json"), "redag.assignment/1")
+        self.assertFalse(kept["schedulable"])
+        self.expect(redag("assign", file, "--keep", "max_active", "--check"), 1)
+        local = redag("assign", file, "--exhaustive", "0", "--seed", "7", "--json")
+        self.assertEqual(json.loads(local.stdout)["best"], document["best"])
+        self.assertEqual(local.stdout, redag("assign", file, "--exhaustive", "0", "--seed", "7", "--json").stdout)
+
+    def test_bad_input(self):
+        self.expect(redag("assign"), 2, "FILE is required")
+        self.expect(redag("assign", self.write("bad.yaml", MISTAKEN)), 2, "bad.yaml:6")
+        self.expect(redag("assign", self.cart, "--objective", "latenes"), 2, "did you mean 'lateness'?")
+        self.expect(redag("assign", self.cart, "-o", self.folder / "no" / "where.yaml"), 2)
+
+    def test_workloads_of_the_repository(self):
+        for file in sorted((SOURCE / "workloads").rglob("*.yaml")):
+            tuned = self.folder / "tuned.yaml"
+            self.expect(redag("assign", file, "--preemption", "none", "--exhaustive", "50", "-o", tuned), 0)
+            self.expect(redag("validate", tuned), 0)
+        text = self.expect(redag("assign", SOURCE / "workloads" / "robot.yaml"), 0).stdout
+        self.assertIn("nothing to compare: no method bounds any response time", text)
 class Experiment(Case):
     """`redag experiment`: the same results however it was run."""
     PLAN = ["--dags", "6", "--workers", "2", "--utilization", "0.2:0.8:0.2", "--methods", "any,simulation,melani"]

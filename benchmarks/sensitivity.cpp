@@ -1,0 +1,77 @@
+// Speed of what acts on the bounds: the critical scaling factor of all wcets, all knobs, and Audsley's assignment, on
+// sets of 20 independent tasks. Rates are task sets a second.
+#include <benchmark/benchmark.h>
+
+#include <vector>
+
+#include "redag/analysis/assignment.hpp"
+#include "redag/analysis/sensitivity.hpp"
+#include "redag/model/generate.hpp"
+
+namespace {
+
+using redag::Workload;
+namespace analysis = redag::analysis;
+
+std::vector<Workload> sets(std::uint32_t workers) {
+  constexpr std::size_t kSets = 32;
+  std::vector<Workload> result;
+  for (std::uint64_t seed = 0; result.size() < kSets; ++seed) {
+    redag::GenerateOptions options;
+    options.shape = redag::DagShape::Independent;
+    options.workers = workers;
+    options.preemption = redag::PreemptionMode::Os;
+    options.dags = 20;
+    options.min_tasks = options.max_tasks = 1;
+    options.utilization = 0.5 * workers;
+    if (const redag::Result<Workload> workload = redag::generate(options, seed)) result.push_back(*workload);
+  }
+  return result;
+}
+
+// Calls run(workload, platform) on the sets in turn.
+template <class Run>
+void on_sets(benchmark::State &state, Run run) {
+  const std::vector<Workload> all = sets(static_cast<std::uint32_t>(state.range(0)));
+  std::size_t next = 0;
+  for (auto _ : state) {
+    const Workload &workload = all[next++ % all.size()];
+    run(workload, analysis::platform_of(workload));
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+
+void BM_ShownSchedulable(benchmark::State &state) {
+  on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
+    benchmark::DoNotOptimize(analysis::is_shown_schedulable(*analysis::compile(workload, platform)));
+  });
+}
+
+void BM_CriticalScalingFactor(benchmark::State &state) {
+  on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
+    const auto system = analysis::compile(workload, platform);
+    benchmark::DoNotOptimize(analysis::margin_of(workload, platform, analysis::knobs_of(workload, *system).front()));
+  });
+}
+
+void BM_Sensitivity(benchmark::State &state) {
+  on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
+    const auto system = analysis::compile(workload, platform);
+    for (const analysis::Knob &knob : analysis::knobs_of(workload, *system)) {
+      benchmark::DoNotOptimize(analysis::margin_of(workload, platform, knob));
+    }
+  });
+}
+
+void BM_Assign(benchmark::State &state) {
+  on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
+    benchmark::DoNotOptimize(analysis::assign(workload, platform));
+  });
+}
+
+}  // namespace
+
+BENCHMARK(BM_ShownSchedulable)->Arg(1)->Arg(4);
+BENCHMARK(BM_CriticalScalingFactor)->Arg(1)->Arg(4);
+BENCHMARK(BM_Sensitivity)->Arg(1)->Arg(4)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_Assign)->Arg(1)->Arg(4)->Unit(benchmark::kMillisecond);

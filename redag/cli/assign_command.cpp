@@ -1,0 +1,97 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "redag/cli/analysis_arguments.hpp"
+#include "redag/cli/assignment_report.hpp"
+#include "redag/cli/commands.hpp"
+#include "redag/cli/files.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/cli/progress.hpp"
+#include "redag/cli/signals.hpp"
+#include "redag/model/workload_yaml.hpp"
+
+namespace redag::cli {
+namespace {
+
+enum class Keep : std::uint8_t { Nothing, Priorities, MaxActive };
+
+struct Options {
+  AnalysisArguments analysis;
+  std::string output;
+  Keep keep = Keep::Nothing;
+  analysis::AssignmentOptions assignment;
+};
+
+Result<analysis::Assignment> search(const Workload &workload, const analysis::AnalysisPlatform &platform,
+                                    analysis::AssignmentOptions options, Console &console) {
+  Progress progress(console);
+  std::uint64_t asked = 0;
+  options.stop = [&] {
+    ++asked;
+    if (progress.due()) progress.draw(0, fmt::format("{} assignments", asked));
+    return InterruptGuard::interrupted();
+  };
+  return analysis::assign(workload, platform, options);
+}
+
+int assign_file(const Options &options, Console &console) {
+  const std::optional<Workload> workload = load_configured(options.analysis.run, console);
+  if (!workload) return kExitBad;
+  Assigned assigned;
+  assigned.platform = platform_for(*workload, options.analysis);
+  assigned.options = options.assignment;
+  assigned.options.priorities = options.keep != Keep::Priorities;
+  assigned.options.caps = options.keep != Keep::MaxActive;
+  const InterruptGuard guard;  // until the results are written
+  Result<analysis::Assignment> found = search(*workload, assigned.platform, assigned.options, console);
+  if (!found) {
+    console.note(found.error());
+    return kExitBad;
+  }
+  assigned.assignment = *std::move(found);
+  if (assigned.assignment.stopped) console.warn("interrupted: this is the best so far");
+  if (options.analysis.run.json) {
+    console.print(to_text(to_json(assigned)));
+  } else {
+    console.print(describe(assigned, console.out_traits(), options.analysis.run.all_tasks));
+  }
+  if (!options.output.empty()) {
+    const Result<void> written = write_text(options.output, to_yaml(assigned.assignment.best.workload));
+    if (!written) {
+      console.note(written.error());
+      return kExitBad;
+    }
+    console.note(fmt::format("wrote {}{}\n", options.output,
+                             changes(assigned.assignment).empty() ? ": the workload as it was" : ""));
+  }
+  return options.analysis.run.check && !assigned.assignment.best.score.schedulable ? kExitNo : kExitOk;
+}
+
+}  // namespace
+
+Action add_assign(CLI::App &app) {
+  auto options = std::make_shared<Options>();
+  analysis::AssignmentOptions &assignment = options->assignment;
+  app.add_option("FILE", options->analysis.run.file, "Workload (YAML); - is standard input")->required();
+  app.add_option("-o,--output", options->output, "File for the workload with the best assignment; without comments")
+      ->type_name("FILE");
+  const auto objective = [](analysis::Objective value) { return std::pair(std::string(to_string(value)), value); };
+  add_choice(
+      app, "--objective", assignment.objective,
+      Choices<analysis::Objective>{objective(analysis::Objective::Lateness), objective(analysis::Objective::Slack)},
+      "The smallest worst bound - deadline, or the largest least share of a deadline that is left")
+      ->default_str(to_string(assignment.objective));
+  add_choice(
+      app, "--keep", options->keep,
+      Choices<Keep>{{"nothing", Keep::Nothing}, {"priorities", Keep::Priorities}, {"max_active", Keep::MaxActive}},
+      "What must stay as it is")
+      ->default_str("nothing");
+  add_count(app, "--exhaustive", assignment.exhaustive, "Combinations of max_active up to which all are tried");
+  add_count(app, "--restarts", assignment.restarts, "Random places from which the local search starts besides");
+  add_count(app, "--seed", assignment.seed, "Of these places: the same seed gives the same answer");
+  add_analysis_arguments(app, options->analysis, "Exit with 1 if no assignment that was tried is shown schedulable");
+  return [options](Console &console) { return assign_file(*options, console); };
+}
+
+}  // namespace redag::cli

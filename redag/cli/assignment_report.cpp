@@ -1,0 +1,261 @@
+#include "redag/cli/assignment_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "redag/cli/table.hpp"
+
+namespace redag::cli {
+namespace {
+
+using analysis::Assignment;
+using analysis::Candidate;
+using analysis::Caps;
+using analysis::Objective;
+using analysis::Score;
+using analysis::Trial;
+
+constexpr std::size_t kMostTrials = 10;
+
+std::string signed_duration(Duration duration) {
+  return duration < 0 ? "-" + humanize_duration(-duration) : humanize_duration(duration);
+}
+
+// Rounded down: no more than there is.
+std::string percent(double share) { return fmt::format("{:.1f} %", std::floor(share * 1000 + 1e-9) / 10); }
+
+bool has_numbers(const Score &score, const Workload &workload) {
+  std::size_t deadlines = workload.task_count();
+  for (const Dag &dag : workload.dags) deadlines += dag.deadline > 0 ? 1 : 0;
+  return score.unbounded < deadlines;
+}
+
+std::string lateness_text(const Score &score, const Workload &workload) {
+  return has_numbers(score, workload) ? signed_duration(score.worst_lateness) : "-";
+}
+
+std::string slack_text(const Score &score, const Workload &workload) {
+  return has_numbers(score, workload) ? percent(score.least_slack) : "-";
+}
+
+std::string cap_text(std::uint32_t cap) { return cap == 0 ? "none" : fmt::format("{}", cap); }
+
+// Of the DAGs that have a choice: those with more than one task.
+std::string caps_text(const Workload &workload, const Caps &caps) {
+  std::string text;
+  for (std::size_t d = 0; d < caps.size(); ++d) {
+    if (workload.dags[d].tasks.size() < 2 && caps[d] == 0) continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", workload.dags[d].name, cap_text(caps[d]));
+  }
+  return text.empty() ? "-" : text;
+}
+
+std::vector<Cell> score_cells(const Score &score, const Workload &workload) {
+  return {{score.schedulable ? "yes" : "not shown", score.schedulable ? Tint::Good : Tint::Caution},
+          {score.unbounded == 0 ? "-" : fmt::format("{}", score.unbounded)},
+          {lateness_text(score, workload), score.worst_lateness > 0 ? Tint::Bad : Tint::Plain},
+          {slack_text(score, workload)}};
+}
+
+Table score_table(const char *title) {
+  return Table({{title, false, 9, true},
+                {"schedulable", false, 8, true},
+                {"unbounded", true, 3},
+                {"worst lateness", true, 7},
+                {"least slack", true, 6},
+                {"max_active", false, 2}});
+}
+
+std::string orders_table(const Assignment &assignment, const StreamTraits &terminal) {
+  Table table = score_table("order");
+  for (const Candidate &candidate : assignment.orders) {
+    std::vector<Cell> cells = {{candidate.order}};
+    for (Cell &cell : score_cells(candidate.score, candidate.workload)) cells.push_back(std::move(cell));
+    cells.push_back({caps_text(candidate.workload, candidate.caps), Tint::Faint});
+    table.add(std::move(cells));
+  }
+  return table.render(terminal.width, terminal.colour);
+}
+
+std::vector<Trial> ranked(const Assigned &assigned) {
+  std::vector<Trial> trials = assigned.assignment.trials;
+  std::stable_sort(trials.begin(), trials.end(), [&](const Trial &a, const Trial &b) {
+    return analysis::is_better(a.score, b.score, assigned.options.objective);
+  });
+  return trials;
+}
+
+// The concurrency bounds tried, best first.
+std::string trials_table(const Assigned &assigned, const StreamTraits &terminal, bool all) {
+  const std::vector<Trial> trials = ranked(assigned);
+  const Workload &workload = assigned.assignment.best.workload;
+  const std::size_t shown = all ? trials.size() : std::min(trials.size(), kMostTrials);
+  Table table({{"max_active", false, 9},
+               {"schedulable", false, 8, true},
+               {"unbounded", true, 3},
+               {"worst lateness", true, 7},
+               {"least slack", true, 6}});
+  const auto add = [&](const Trial &trial) {
+    std::vector<Cell> cells = {{caps_text(workload, trial.caps)}};
+    for (Cell &cell : score_cells(trial.score, workload)) cells.push_back(std::move(cell));
+    table.add(std::move(cells));
+  };
+  for (std::size_t i = 0; i < shown; ++i) add(trials[i]);
+  if (shown < trials.size()) add(trials.back());
+  std::string text = table.render(terminal.width, terminal.colour);
+  if (shown < trials.size()) {
+    text +=
+        fmt::format("(the {} best of {} combinations under this order, and the worst; --all-tasks shows every one)\n",
+                    shown, format_count(trials.size()));
+  }
+  return text;
+}
+
+std::string audsley_words(const Assignment &assignment) {
+  if (assignment.audsley_test.empty()) {
+    return assignment.audsley_reason.empty()
+               ? ""
+               : "Audsley's assignment was not tried: " + assignment.audsley_reason + "\n";
+  }
+  std::string text = "Audsley's assignment, by " + assignment.audsley_test + ": ";
+  text += assignment.audsley_found ? "finds an order that passes" : "finds no order that passes";
+  if (!assignment.audsley_optimal) return text + "; a heuristic here, another order may\n";
+  return text + (assignment.audsley_found ? "\n" : "; by this test there is none\n");
+}
+
+Json score_json(const Score &score, const Workload &workload) {
+  const bool numbers = has_numbers(score, workload);
+  return Json{{"schedulable", score.schedulable},
+              {"unbounded", score.unbounded},
+              {"worst_lateness_ns", numbers ? Json(score.worst_lateness) : Json()},
+              {"least_slack", numbers ? Json(score.least_slack) : Json()}};
+}
+
+Json caps_json(const Workload &workload, const Caps &caps) {
+  Json list = Json::object();
+  for (std::size_t d = 0; d < caps.size(); ++d) list[workload.dags[d].name] = caps[d];
+  return list;
+}
+
+Json candidate_json(const Candidate &candidate) {
+  Json json = {{"order", candidate.order}, {"policy", to_string(candidate.workload.policy)}};
+  json.update(score_json(candidate.score, candidate.workload));
+  json["max_active"] = caps_json(candidate.workload, candidate.caps);
+  json["priorities"] = Json::object();
+  for (const TaskRef &ref : flatten(candidate.workload)) {
+    const std::string name = candidate.workload.dags[ref.dag.value].name + "." + ref.task->name;
+    json["priorities"][name] = ref.task->priority ? Json(*ref.task->priority) : Json();
+  }
+  return json;
+}
+
+}  // namespace
+
+std::vector<std::string> changes(const Assignment &assignment) {
+  const Workload &before = assignment.present.workload;
+  const Workload &after = assignment.best.workload;
+  std::vector<std::string> list;
+  if (before.policy != after.policy) {
+    list.push_back(fmt::format("policy: {} -> {}", to_string(before.policy), to_string(after.policy)));
+  }
+  for (std::size_t d = 0; d < after.dags.size(); ++d) {
+    const Dag &dag = after.dags[d];
+    if (dag.max_active != before.dags[d].max_active) {
+      list.push_back(fmt::format("max_active of {}: {} -> {}", dag.name, cap_text(before.dags[d].max_active),
+                                 cap_text(dag.max_active)));
+    }
+    for (std::size_t t = 0; t < dag.tasks.size(); ++t) {
+      const std::optional<int> old = before.dags[d].tasks[t].priority;
+      const std::optional<int> now = dag.tasks[t].priority;
+      if (old == now) continue;
+      const auto text = [](std::optional<int> priority) {
+        return priority ? fmt::format("{}", *priority) : std::string("none");
+      };
+      list.push_back(fmt::format("priority of {}.{}: {} -> {}", dag.name, dag.tasks[t].name, text(old), text(now)));
+    }
+  }
+  return list;
+}
+
+std::string in_words(const Assigned &assigned) {
+  const Assignment &assignment = assigned.assignment;
+  const Score &before = assignment.present.score;
+  const Score &after = assignment.best.score;
+  const Workload &workload = assignment.best.workload;
+  std::string text;
+  const bool is_unchanged = assignment.best.workload == assignment.present.workload;
+  if (is_unchanged && !after.schedulable && !has_numbers(after, workload)) {
+    text += "nothing to compare: no method bounds any response time, whatever was tried; see redag analyze\n";
+  } else if (is_unchanged) {
+    text += fmt::format(
+        "nothing to change: no other assignment that was tried has {}\n",
+        assigned.options.objective == Objective::Lateness ? "a smaller worst lateness" : "a larger least slack");
+  } else {
+    if (!before.schedulable && after.schedulable) {
+      text += "gain: the workload is shown schedulable, which it is not as it stands\n";
+    }
+    if (before.unbounded != after.unbounded) {
+      text += fmt::format("gain: deadlines without a bound: {} -> {}\n", before.unbounded, after.unbounded);
+    }
+    text += fmt::format("worst lateness (bound - deadline): {} -> {}\n", lateness_text(before, workload),
+                        lateness_text(after, workload));
+    text += fmt::format("least slack (of a deadline): {} -> {}\n", slack_text(before, workload),
+                        slack_text(after, workload));
+  }
+  if (!after.schedulable) text += "no assignment that was tried is shown schedulable\n";
+  text += audsley_words(assignment);
+  if (!assignment.exhaustive) {
+    text += fmt::format("max_active: local search (seed {}), not every combination\n", assigned.options.seed);
+  }
+  if (assignment.stopped) text += fmt::format("stopped after {} analyses\n", format_count(assignment.analyses));
+  return text;
+}
+
+std::string describe(const Assigned &assigned, const StreamTraits &terminal, bool all) {
+  const Assignment &assignment = assigned.assignment;
+  const Workload &workload = assignment.present.workload;
+  std::string text = fmt::format("{}: {}, {} worker{}; objective: {}\n\n", workload.name, to_string(workload.policy),
+                                 assigned.platform.workers, assigned.platform.workers == 1 ? "" : "s",
+                                 to_string(assigned.options.objective));
+  text += orders_table(assignment, terminal);
+  if (assignment.trials.size() > 1) {
+    text += fmt::format("\nmax_active under {}, {}\n", assignment.best.order,
+                        assignment.exhaustive ? "every combination" : "those met by the local search");
+    text += trials_table(assigned, terminal, all);
+  }
+  text +=
+      fmt::format("\nworst lateness and least slack: of the bounds, which hold for every execution; {} analyses\n\n",
+                  format_count(assignment.analyses));
+  for (const std::string &change : changes(assignment)) {
+    text += tinted("change ", Tint::Strong, terminal.colour) + change + "\n";
+  }
+  return text + in_words(assigned);
+}
+
+Json to_json(const Assigned &assigned) {
+  const Assignment &assignment = assigned.assignment;
+  Json document = {{"format", "redag.assignment/1"},         {"workload", assignment.present.workload.name},
+                   {"workers", assigned.platform.workers},   {"objective", to_string(assigned.options.objective)},
+                   {"seed", assigned.options.seed},          {"schedulable", assignment.best.score.schedulable},
+                   {"changes", changes(assignment)},         {"text", in_words(assigned)},
+                   {"exhaustive", assignment.exhaustive},    {"stopped", assignment.stopped},
+                   {"analyses", assignment.analyses},        {"present", candidate_json(assignment.present)},
+                   {"best", candidate_json(assignment.best)}};
+  document["orders"] = Json::array();
+  for (const Candidate &candidate : assignment.orders) document["orders"].push_back(candidate_json(candidate));
+  document["trials"] = Json::array();
+  for (const Trial &trial : assignment.trials) {
+    Json row = {{"max_active", caps_json(assignment.best.workload, trial.caps)}};
+    row.update(score_json(trial.score, assignment.best.workload));
+    document["trials"].push_back(std::move(row));
+  }
+  document["audsley"] = {{"test", assignment.audsley_test},
+                         {"optimal", assignment.audsley_optimal},
+                         {"found", assignment.audsley_found},
+                         {"reason", assignment.audsley_reason}};
+  return document;
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,30 @@
+// What `assign` says about an assignment of redag/analysis: what it would change, what that gains, what else was tried.
+// Pure functions.
+#pragma once
+
+#include <string>
+
+#include "redag/analysis/assignment.hpp"
+#include "redag/cli/console.hpp"
+#include "redag/cli/json.hpp"
+
+namespace redag::cli {
+
+struct Assigned {
+  analysis::Assignment assignment;
+  analysis::AnalysisPlatform platform;
+  analysis::AssignmentOptions options;
+};
+
+/// One change a line: "policy: rate_monotonic -> fixed". Empty if nothing is better.
+[[nodiscard]] std::vector<std::string> changes(const analysis::Assignment &assignment);
+
+/// What is gained, and how sure it is that there is nothing better. Sentences, one a line.
+[[nodiscard]] std::string in_words(const Assigned &assigned);
+
+[[nodiscard]] std::string describe(const Assigned &assigned, const StreamTraits &terminal, bool all);
+
+/// `redag.assignment/1`.
+[[nodiscard]] Json to_json(const Assigned &assigned);
+
+}  // namespace redag::cli
