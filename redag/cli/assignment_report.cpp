@@ -220,7 +220,8 @@ std::string describe(const Assigned &assigned, const StreamTraits &terminal, boo
                                  assigned.platform.workers, assigned.platform.workers == 1 ? "" : "s",
                                  to_string(assigned.options.objective));
   text += orders_table(assignment, terminal);
-  if (assignment.trials.size() > 1) {
+  const Score &best = assignment.best.score;
+  if (assignment.trials.size() > 1 && (best.schedulable || has_numbers(best, workload))) {
     text += fmt::format("\nmax_active under {}, {}\n", assignment.best.order,
                         assignment.exhaustive ? "every combination" : "those met by the local search");
     text += trials_table(assigned, terminal, all);

@@ -1,0 +1,86 @@
+#include "redag/cli/assignment_report.hpp"
+
+#include <gtest/gtest.h>
+
+#include "redag/cli/sensitivity_report.hpp"
+
+namespace redag::cli {
+namespace {
+
+Dag single(const std::string &name, Duration wcet, Duration period, Duration deadline) {
+  Task task;
+  task.name = "t";
+  task.wcet = wcet;
+  task.period = period;
+  task.deadline = deadline;
+  Dag dag;
+  dag.name = name;
+  dag.tasks = {task};
+  return dag;
+}
+
+Workload short_deadline() {
+  Workload workload;
+  workload.name = "w";
+  workload.platform = {1, PreemptionMode::Os};
+  workload.dags = {single("a", 3 * kMillisecond, 10 * kMillisecond, 10 * kMillisecond),
+                   single("b", 2 * kMillisecond, 20 * kMillisecond, 4 * kMillisecond)};
+  return workload;
+}
+
+Assigned assigned(const Workload &workload) {
+  Assigned result;
+  result.platform = analysis::platform_of(workload);
+  result.assignment = analysis::assign(workload, result.platform).value();
+  return result;
+}
+
+TEST(AssignmentReport, TellsChangesAndGains) {
+  const Assigned result = assigned(short_deadline());
+  EXPECT_EQ(changes(result.assignment), std::vector<std::string>{"policy: rate_monotonic -> deadline_monotonic"});
+  const std::string words = in_words(result);
+  EXPECT_NE(words.find("worst lateness (bound - deadline): 1ms -> -2ms\n"), std::string::npos) << words;
+  EXPECT_NE(words.find("least slack (of a deadline): -25.0 % -> 50.0 %\n"), std::string::npos) << words;
+  const Json document = to_json(result);
+  EXPECT_EQ(document["best"]["worst_lateness_ns"], -2 * kMillisecond);
+  EXPECT_EQ(document["present"]["schedulable"], false);
+}
+
+TEST(AssignmentReport, PrioritiesAreListedTaskByTask) {
+  Workload workload = short_deadline();
+  workload.policy = PolicyKind::Fixed;
+  workload.dags[0].tasks[0].priority = 7;
+  const Assigned result = assigned(workload);
+  const std::vector<std::string> expected = {"policy: fixed -> deadline_monotonic", "priority of a.t: 7 -> none"};
+  EXPECT_EQ(changes(result.assignment), expected);
+}
+
+TEST(AssignmentReport, WithoutBoundsThereIsNothingToCompare) {
+  Workload workload = short_deadline();
+  workload.dags[0].tasks[0].budget = kMillisecond;
+  const std::string words = in_words(assigned(workload));
+  EXPECT_EQ(words.find("nothing to compare: "), 0U) << words;
+}
+
+TEST(SensitivityReport, FactorsAreNeverRoundedUp) {
+  Workload workload = short_deadline();
+  workload.dags[1].tasks[0].deadline = 20 * kMillisecond;
+  Sensitivity sensitivity;
+  const analysis::AnalysisPlatform platform = analysis::platform_of(workload);
+  sensitivity.analysed = analyse(workload, platform).value();
+  for (const analysis::Knob &knob : analysis::knobs_of(workload, sensitivity.analysed.system)) {
+    sensitivity.results.push_back({analysis::margin_of(workload, platform, knob).value(), {}});
+  }
+  sensitivity.knobs = sensitivity.results.size();
+  // Harmonic with U = 0.4: 2.5, and for b alone 14 ms of the 20.
+  EXPECT_EQ(in_words(sensitivity).find("all execution times together can grow to 2.5000 times"), 0U);
+  sensitivity.results[0].margin.factor = 2.49999;
+  EXPECT_EQ(in_words(sensitivity).find("all execution times together can grow to 2.4999 times"), 0U);
+  EXPECT_EQ(knob_name(sensitivity.analysed, sensitivity.results[3].margin.knob), "wcet of b.t");
+  EXPECT_EQ(to_json(sensitivity)["limits"][3]["limit_ns"], 14 * kMillisecond);
+  sensitivity.results[2].margin.again = 9 * kMillisecond;
+  EXPECT_NE(in_words(sensitivity).find("not monotone: wcet of a.t is accepted again at 9ms"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace redag::cli
