@@ -112,6 +112,24 @@ TEST(Sensitivity, AChangeOfOrderEndsTheRoom) {
   EXPECT_FALSE(found.again);
 }
 
+// Refused at one period only, that of another task: no spread of probes would meet it.
+TEST(Sensitivity, EveryChangeOfOrderIsTested) {
+  Workload workload = workload_of({single("a", 1, 2003), single("b", 1, 9000)});
+  const Accepts not_equal = [](const Workload &candidate, const System &) {
+    return candidate.dags[1].tasks[0].period != 2003;
+  };
+  const AnalysisPlatform platform = platform_of(workload);
+  const auto period = margin_of(workload, platform, {Kind::Period, {1}}, not_equal, {0, {}});
+  ASSERT_TRUE(period);
+  EXPECT_EQ(period->position, -2004);
+  const auto rate = margin_of(workload, platform, {Kind::Rates, {1}}, not_equal, {0, {}});
+  ASSERT_TRUE(rate && rate->position);
+  EXPECT_EQ(turned(workload, rate->knob, *rate->position).dags[1].tasks[0].period, 2004);
+  // With fixed priorities the order stays, and nobody looks there.
+  workload.policy = PolicyKind::Fixed;
+  EXPECT_NE(margin_of(workload, platform, {Kind::Period, {1}}, not_equal, {0, {}})->position, -2004);
+}
+
 TEST(Sensitivity, AcceptanceThatComesBackIsReported) {
   const Workload workload = workload_of({single("a", 10, 1000)});
   const Accepts with_gap = [](const Workload &candidate, const System &) {
