@@ -23,8 +23,8 @@ import xml.etree.ElementTree
 PROGRAM = pathlib.Path()
 SOURCE = pathlib.Path()
 
-COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["compare"], ["analyze"], ["check-trace"], ["report"],
-            ["experiment"], ["experiment", "acceptance"], ["experiment", "merge"]]
+COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["compare"], ["analyze"], ["sensitivity"], ["assign"],
+            ["check-trace"], ["report"], ["experiment"], ["experiment", "acceptance"], ["experiment", "merge"]]
 CART = """\
 name: cart
 platform: {workers: 1, preemption: none}
@@ -731,6 +731,8 @@ dags:
             self.expect(redag("validate", tuned), 0)
         text = self.expect(redag("assign", SOURCE / "workloads" / "robot.yaml"), 0).stdout
         self.assertIn("nothing to compare: no method bounds any response time", text)
+
+
 class Experiment(Case):
     """`redag experiment`: the same results however it was run."""
     PLAN = ["--dags", "6", "--workers", "2", "--utilization", "0.2:0.8:0.2", "--methods", "any,simulation,melani"]
