@@ -42,7 +42,8 @@ TEST(BoundCheck, ARunWithinItsBounds) {
 // Jobs executed for longer than what the bounds are told: both tasks answer too late, the second because of the first.
 TEST(BoundCheck, NamesWhatIsBroken) {
   Session session = simulated(fast_and_slow());
-  session.info.workload.dags[0].tasks[0].wcet = kMillisecond;
+  Task &imu = session.info.workload.dags[0].tasks[0];
+  imu.wcet = imu.bcet = kMillisecond;
   const BoundCheck check = check_bounds(session);
   ASSERT_EQ(check.rows.size(), 2U);
   EXPECT_EQ(check.rows[0].exceeded, 10U);
