@@ -169,10 +169,10 @@ await test('hostile names stay text, also in tooltips', async () => {
 });
 
 await test('every figure is saved as PNG and SVG', async () => {
-  const {page, problems, close} = await open('comparison');
   for (const name of FIGURES.comparison) {
+    const {page, problems, close} = await open('comparison');  // Chromium lets a page save ten files in quick succession
     for (const [kind, magic] of [['svg', '<svg'], ['png', '\x89PNG']]) {
-      const waiting = page.waitForEvent('download', {timeout: 10000});
+      const waiting = page.waitForEvent('download', {timeout: 20000});
       await page.getByRole('button', {name: `${name} as ${kind}`, exact: true}).click();
       const file = path.join(scratch, 'screenshots', `saved-${name}.${kind}`);
       const download = await waiting;
@@ -182,9 +182,9 @@ await test('every figure is saved as PNG and SVG', async () => {
       assert.equal(bytes.subarray(0, 4).toString('latin1'), magic);
       assert.ok(bytes.length > 3000, `${name}.${kind} has ${bytes.length} bytes`);
     }
+    none(problems);
+    await close();
   }
-  none(problems);
-  await close();
 });
 
 await browser.close();

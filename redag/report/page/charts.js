@@ -57,14 +57,16 @@ function withTheme(option, t) {
   };
 }
 
-function download(name, url) {
+function download(name, blob) {
+  const url = URL.createObjectURL(blob);
   const link = element('a', {href: url, download: name});
   document.body.append(link);
   link.click();
   link.remove();
+  setTimeout(() => URL.revokeObjectURL(url), 60000);  // a busy browser begins to read it late
 }
 
-// A picture of `option`: {url, done}.
+// A picture of `option` as a Blob.
 function pictureOf(option, kind, width, height) {
   const plain = {...option, animation: false};
   if (kind === 'svg') {
@@ -72,15 +74,16 @@ function pictureOf(option, kind, width, height) {
     drawing.setOption(plain);
     const text = drawing.renderToSVGString();
     drawing.dispose();
-    const url = URL.createObjectURL(new Blob([text], {type: 'image/svg+xml'}));
-    return {url, done: () => setTimeout(() => URL.revokeObjectURL(url), 1000)};
+    return new Blob([text], {type: 'image/svg+xml'});
   }
   const place = element('div', {style: `width:${width}px;height:${height}px`});
   const drawing = echarts.init(place, null, {renderer: 'canvas', width, height, devicePixelRatio: 3});
   drawing.setOption(plain);
   const url = drawing.getDataURL({type: 'png', pixelRatio: 3, backgroundColor: option.backgroundColor});
   drawing.dispose();
-  return {url, done: () => {}};
+  // Browsers do not save data URLs of any length.
+  const bytes = atob(url.slice(url.indexOf(',') + 1));
+  return new Blob([Uint8Array.from(bytes, (byte) => byte.charCodeAt(0))], {type: 'image/png'});
 }
 
 /**
@@ -100,9 +103,7 @@ function figure({name, height, build, caption, canvas = false, label, onready}) 
     const option = {...drawn, backgroundColor: theme().paper};
     if (drawn.dataZoom) option.dataZoom = now.dataZoom;
     if (drawn.legend) option.legend = {...drawn.legend, selected: now.legend[0].selected};
-    const picture = pictureOf(option, kind, place.clientWidth, height);
-    download(`redag-${name}.${kind}`, picture.url);
-    picture.done();
+    download(`redag-${name}.${kind}`, pictureOf(option, kind, place.clientWidth, height));
   }
   box.prepend(element('span.save.controls', {}, ...['png', 'svg'].map((kind) => element('button', {
     type: 'button', title: `Save this figure as ${kind.toUpperCase()}`, 'aria-label': `${name} as ${kind}`, onclick: () => save(kind),
