@@ -168,6 +168,14 @@ std::string describe(const Session &session, const StreamTraits &terminal, const
                                                      humanize_duration(inversions.total))
                                        : "");
   if (has_bounds(session)) text += describe(check_bounds(session), session.summary.tasks.size(), terminal);
+  if (session.summary.total.exceeded > 0) {
+    text += fmt::format("jobs that used their budget and went on: {}\n", format_count(session.summary.total.exceeded));
+  }
+  const metrics::HighModeTime &high = session.summary.high_mode;
+  if (high.count > 0) {
+    text += fmt::format("HI mode: {} time{}, in all {}\n", format_count(high.count), high.count == 1 ? "" : "s",
+                        humanize_duration(high.total));
+  }
   text += describe_check(session.check, terminal);
   if (session.cut_at) {
     text += fmt::format("the first {} events were checked and kept: {} of {}; --max-events raises that\n",

@@ -21,6 +21,8 @@ void Activity::add(const JobEvent &event) {
   any_ = true;
   time_ = std::max(time_, event.time);
   replay_.apply(event);
+  if (event.kind == JobEventKind::HighMode) high_since_ = event.time;
+  if (event.kind == JobEventKind::LowMode) close_high_mode(event.time);
 
   if (event.kind == JobEventKind::Dispatched) {
     std::uint32_t &peak = peaks_[replay_.dag_of(event.task).value];
@@ -69,8 +71,17 @@ void Activity::close_inversion(Time at) {
   inversions_.longest = std::max(inversions_.longest, length);
 }
 
+void Activity::close_high_mode(Time at) {
+  if (high_since_ != kNever && at >= begin_) {
+    ++high_mode_.count;
+    high_mode_.total += measured(high_since_, at);
+  }
+  high_since_ = kNever;
+}
+
 void Activity::finish(Time end) {
   if (any_) end_of_instant();
+  close_high_mode(end);
   close_inversion(end);
   for (std::size_t w = 0; w < busy_.size(); ++w) {
     if (busy_since_[w] != kNever) busy_[w] += measured(busy_since_[w], end);

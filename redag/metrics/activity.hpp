@@ -20,6 +20,14 @@ struct Inversions {
   friend bool operator==(const Inversions &, const Inversions &) = default;
 };
 
+/// Time in HI mode.
+struct HighModeTime {
+  std::uint64_t count = 0;  // how often it began, or was on at the begin
+  Duration total = 0;
+
+  friend bool operator==(const HighModeTime &, const HighModeTime &) = default;
+};
+
 class Activity {
  public:
   /// Workers and inversions are measured from `begin` on; peaks from the first event. `workload` must outlive this.
@@ -37,6 +45,7 @@ class Activity {
   [[nodiscard]] const std::vector<Duration> &busy() const { return busy_; }
   [[nodiscard]] Time last_time() const { return time_; }
   [[nodiscard]] const Inversions &inversions() const { return inversions_; }
+  [[nodiscard]] const HighModeTime &high_mode() const { return high_mode_; }
 
  private:
   void add(const JobEvent &event);
@@ -44,6 +53,7 @@ class Activity {
   [[nodiscard]] bool is_inverted() const;
   [[nodiscard]] Duration measured(Time from, Time to) const;
   void close_inversion(Time at);
+  void close_high_mode(Time at);
 
   Replay replay_;
   Time begin_;
@@ -51,6 +61,8 @@ class Activity {
   bool any_ = false;
   Time inverted_since_ = kNever;
   Inversions inversions_;
+  Time high_since_ = kNever;
+  HighModeTime high_mode_;
   std::vector<std::uint32_t> peaks_;
   std::uint64_t group_overlaps_ = 0;
   std::vector<Duration> busy_;

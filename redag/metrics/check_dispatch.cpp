@@ -145,8 +145,9 @@ void DispatchRules::ended(const JobEvent &event, const LiveJob &job) {
   const Duration demand = execution_time(task, event.task, event.job, context_.info.seed);
   const bool cut_off = event.kind == JobEventKind::Aborted && event.reason == Reason::Budget;
   if (event.kind == JobEventKind::Aborted && !cut_off) return;
-  context_.expect(Rule::Execution, !cut_off || (task.budget > 0 && demand > task.budget), event.task, event.job,
-                  [&] { return "cut off although it needs " + format_duration(demand); });
+  context_.expect(Rule::Execution,
+                  !cut_off || (task.on_budget == OnBudget::Abort && task.budget > 0 && demand > task.budget),
+                  event.task, event.job, [&] { return "cut off although it needs " + format_duration(demand); });
   const Duration expected = cut_off ? task.budget : demand;
   const Duration executed = job.executed + (event.value - job.on_worker_since);
   context_.expect(Rule::Execution, exact() ? executed == expected : executed >= expected, event.task, event.job, [&] {
@@ -175,7 +176,7 @@ void DispatchRules::end_of_trace() {
     if (job == nullptr) continue;
     const Task &task = context_.replay.task(job->task);
     Duration demand = execution_time(task, job->task, job->number, context_.info.seed);
-    if (task.budget > 0) demand = std::min(demand, task.budget);
+    if (task.budget > 0 && task.on_budget == OnBudget::Abort) demand = std::min(demand, task.budget);
     const Duration executed = job->executed + (context_.info.end - job->on_worker_since);
     context_.expect(Rule::Execution, executed < demand, job->task, job->number,
                     [&] { return "it never ended, although it needs only " + format_duration(demand); });

@@ -1,6 +1,7 @@
 #include "redag/metrics/check_release.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "redag/base/int128.hpp"
 
@@ -45,6 +46,9 @@ void ReleaseRules::before(const JobEvent &event) {
       if (job != nullptr) ready(event, *job);
       break;
     case JobEventKind::Skipped: skipped(event, job); break;
+    case JobEventKind::Exceeded: exceeded(event); break;
+    case JobEventKind::HighMode: mode_begins(); break;
+    case JobEventKind::LowMode: mode_ends(); break;
     case JobEventKind::Finished:
       if (job != nullptr) finished(event, *job);
       break;
@@ -102,6 +106,10 @@ void ReleaseRules::check_data_release(const JobEvent &event) {
 
 // docs/model.md, "Overrun and admission", in its order. The skips must follow within the instant.
 void ReleaseRules::expect_skips(const JobEvent &event) {
+  if (const Reason reason = refusal(event); reason != Reason::None) {
+    expected_skips_.push_back(ExpectedSkip{event.task, event.job, reason});
+    return;
+  }
   const Task &task = context_.replay.task(event.task);
   const DagId dag_id = context_.replay.dag_of(event.task);
   const Dag &dag = context_.info.workload.dags[dag_id.value];
@@ -122,6 +130,65 @@ void ReleaseRules::expect_skips(const JobEvent &event) {
     expected_skips_.push_back(ExpectedSkip{event.task, event.job, Reason::QueueFull});
   } else if (dag.max_pending > 0 && pending >= dag.max_pending) {
     expected_skips_.push_back(ExpectedSkip{event.task, event.job, Reason::DagFull});
+  }
+}
+
+// Why this release is not taken, whatever the task's other jobs do; None: it is.
+Reason ReleaseRules::refusal(const JobEvent &event) {
+  TaskState &task = tasks_[event.task.value];
+  Refusals &refusals = task.refusals;
+  task.before_release = refusals;
+  if (refusals.skips_next) {
+    refusals.skips_next = false;
+    return Reason::Budget;
+  }
+  const Replay &replay = context_.replay;
+  if (!replay.high_mode() || !replay.is_degradable(event.task)) return Reason::None;
+  const Degrade &degrade = context_.info.workload.dags[replay.dag_of(event.task).value].degrade;
+  if (degrade.kind == Degrade::Kind::Stop) return Reason::Degraded;
+  if (!task.timer) return Reason::None;  // its predecessors are held back
+  if (degrade.kind == Degrade::Kind::Skip) {
+    if (refusals.to_skip > 0) {
+      --refusals.to_skip;
+      return Reason::Degraded;
+    }
+    refusals.to_skip = degrade.skip;
+    return Reason::None;
+  }
+  if (event.value < refusals.not_before) return Reason::Degraded;
+  const double distance = std::ceil(degrade.stretch * static_cast<double>(replay.task(event.task).period));
+  refusals.not_before =
+      distance >= static_cast<double>(kNever - event.value) ? kNever : event.value + static_cast<Duration>(distance);
+  return Reason::None;
+}
+
+void ReleaseRules::exceeded(const JobEvent &event) {
+  if (context_.replay.task(event.task).on_budget != OnBudget::SkipNext) return;
+  if (!removed_[context_.replay.dag_of(event.task).value]) tasks_[event.task.value].refusals.skips_next = true;
+}
+
+// What has not started of DAGs of lower criticality is skipped.
+void ReleaseRules::mode_begins() {
+  for (std::size_t t = 0; t < tasks_.size(); ++t) {
+    const TaskId id(t);
+    if (!context_.replay.is_degradable(id)) continue;
+    tasks_[t].refusals.to_skip = 0;
+    tasks_[t].refusals.not_before = std::numeric_limits<Time>::min();
+    for (const LiveJob &job : context_.replay.jobs_of(id)) {
+      if (!job.started()) expected_skips_.push_back(ExpectedSkip{id, job.number, Reason::Degraded});
+    }
+  }
+}
+
+// They begin afresh: what waits for data is skipped, and data of before is forgotten.
+void ReleaseRules::mode_ends() {
+  for (std::size_t t = 0; t < tasks_.size(); ++t) {
+    const TaskId id(t);
+    if (!context_.replay.is_degradable(id)) continue;
+    for (const LiveJob &job : context_.replay.jobs_of(id)) {
+      expected_skips_.push_back(ExpectedSkip{id, job.number, Reason::Degraded});
+    }
+    for (const std::uint32_t edge : tasks_[t].in) edges_[edge].fresh = false;
   }
 }
 
@@ -168,6 +235,7 @@ void ReleaseRules::skipped(const JobEvent &event, const LiveJob *job) {
   }
   if (event.reason == Reason::Removed) return;
   if (is_miss(event)) {
+    task.refusals = task.before_release;
     std::erase_if(expected_skips_, [&](const ExpectedSkip &skip) { return skip.task == event.task; });
     return;
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "redag/metrics/check_context.hpp"
@@ -29,6 +30,12 @@ class ReleaseRules {
     Time finish = 0;          // as measured
     Time finish_decided = 0;  // when the scheduler heard of it
   };
+  // Releases of the task that are not taken (docs/model.md, "Budgets" and "Criticality").
+  struct Refusals {
+    bool skips_next = false;
+    std::uint32_t to_skip = 0;
+    Time not_before = std::numeric_limits<Time>::min();
+  };
   struct TaskState {
     bool timer = true;
     std::vector<std::uint32_t> in;   // edges
@@ -36,6 +43,8 @@ class ReleaseRules {
     std::uint32_t next_number = 0;
     Time data_origin = 0;  // of the data job released last
     bool touched = false;
+    Refusals refusals;
+    Refusals before_release;  // what they were before the last one: a release that the driver missed counts for none
   };
   struct ExpectedSkip {
     TaskId task;
@@ -47,6 +56,10 @@ class ReleaseRules {
   void check_grid(const JobEvent &event);
   void check_data_release(const JobEvent &event);
   void expect_skips(const JobEvent &event);
+  [[nodiscard]] Reason refusal(const JobEvent &event);
+  void exceeded(const JobEvent &event);
+  void mode_begins();
+  void mode_ends();
   void ready(const JobEvent &event, const LiveJob &job);
   void skipped(const JobEvent &event, const LiveJob *job);
   bool is_miss(const JobEvent &event) const;

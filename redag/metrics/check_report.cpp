@@ -21,6 +21,7 @@ const char *to_string(Rule rule) {
     case Rule::Priority: return "priority";
     case Rule::WorkConservation: return "work_conservation";
     case Rule::Deferral: return "deferral";
+    case Rule::Budget: return "budget";
     case Rule::Execution: return "execution";
   }
   return "?";
@@ -33,6 +34,7 @@ RuleSet RuleSet::wait_set() {
       .without(Rule::Priority)
       .without(Rule::WorkConservation)
       .without(Rule::Deferral)
+      .without(Rule::Budget)
       .without(Rule::Preemption)
       .without(Rule::MaxActive);
 }

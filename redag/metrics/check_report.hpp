@@ -30,9 +30,10 @@ enum class Rule : std::uint8_t {
   Priority,          // no eligible job waits while a less urgent one is chosen or (full) runs
   WorkConservation,  // no worker is free while an eligible job waits
   Deferral,          // deferred exactly when max_active alone kept the job from a worker that it could have had
+  Budget,            // jobs are told to have used their budget when they did; HI mode begins and ends by its rules
   Execution,         // simulator: a job held a worker for exactly its execution time
 };
-inline constexpr std::size_t kRuleCount = 16;
+inline constexpr std::size_t kRuleCount = 17;
 
 [[nodiscard]] const char *to_string(Rule rule);
 
@@ -41,8 +42,8 @@ class RuleSet {
  public:
   /// Everything: ReDAG-RT's own executors.
   [[nodiscard]] static RuleSet all();
-  /// Models of rclcpp's wait-set executors: without Priority, WorkConservation, Deferral, Preemption and MaxActive,
-  /// which those do not have.
+  /// Models of rclcpp's wait-set executors: without Priority, WorkConservation, Deferral, Preemption, MaxActive and
+  /// Budget, which those do not have.
   [[nodiscard]] static RuleSet wait_set();
 
   [[nodiscard]] RuleSet without(Rule rule) const;

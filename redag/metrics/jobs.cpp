@@ -36,6 +36,7 @@ void JobFolder::add(const JobEvent &event) {
     ++ignored_;
     return;
   }
+  if (is_mode_change(event.kind)) return;
   TaskJobs &task = tasks_[event.task.value];
   if (event.kind == JobEventKind::Released) {
     Live job;
@@ -76,6 +77,9 @@ void JobFolder::add(const JobEvent &event) {
       found->on_worker_since = kNever;
       break;
     case JobEventKind::Resumed: found->on_worker_since = event.time; break;
+    case JobEventKind::Exceeded: record.exceeded = true; break;
+    case JobEventKind::HighMode:
+    case JobEventKind::LowMode: break;
     case JobEventKind::Finished:
     case JobEventKind::Skipped:
     case JobEventKind::Aborted: end(task, static_cast<std::size_t>(found - task.live.begin()), event); break;

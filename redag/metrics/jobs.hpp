@@ -31,6 +31,7 @@ struct JobRecord {
   Duration on_worker = 0;  // time it held a worker; its execution time where the driver is exact
   std::uint32_t preemptions = 0;
   bool deferred = false;
+  bool exceeded = false;  // used its budget and went on; not in jobs.csv
   JobOutcome outcome = JobOutcome::InFlight;
   Reason reason = Reason::None;
 

@@ -98,7 +98,7 @@ const char *read_row(const std::vector<std::string> &fields, JobRecord &job) {
   if (fields[13] != "0" && fields[13] != "1") return "deferred";
   job.deferred = fields[13] == "1";
   if (!read_name(fields[14], job.outcome, JobOutcome::Aborted)) return "outcome";
-  if (!read_name(fields[15], job.reason, Reason::NoData)) return "reason";
+  if (!read_name(fields[15], job.reason, kLastReason)) return "reason";
   return nullptr;
 }
 

@@ -56,6 +56,9 @@ class PerfettoWriter::Impl {
         if (job != nullptr) close_slice(*job, event.time);
         break;
       case JobEventKind::Deferred: instant(event.task, event.time, "deferred", event.job); break;
+      case JobEventKind::Exceeded: instant(event.task, event.time, "budget used", event.job); break;
+      case JobEventKind::HighMode: instant(event.task, event.time, "HI mode begins", event.job); break;
+      case JobEventKind::LowMode: instant(event.task, event.time, "HI mode ends", event.job); break;
       case JobEventKind::Started: break;
       case JobEventKind::Finished:
       case JobEventKind::Aborted:

@@ -1,6 +1,7 @@
 #include "redag/metrics/replay.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <unordered_map>
 
 namespace redag::metrics {
@@ -12,12 +13,14 @@ Replay::Replay(const Workload &workload, const sched::Config &config)
       priorities_(sched::assign_priorities(workload.dags, config.policy, config.levels)),
       workers_(config.workers),
       free_workers_(config.workers) {
-  level_of_rank_.resize(priorities_.size());
+  level_of_rank_.resize(priorities_.size() + 1);
+  level_of_rank_.back() = config.levels > 0 ? config.levels : static_cast<std::uint32_t>(priorities_.size());
   for (const sched::Priority &priority : priorities_) level_of_rank_[priority.rank] = priority.level;
   std::unordered_map<std::string, std::uint32_t> group_ids;
   for (const Dag &dag : workload.dags) {
     Shared shared;
     shared.capacity = dag.max_active;
+    shared.degradable = dag.criticality != Criticality::High;
     for (const redag::Task &task : dag.tasks) {
       TaskState state;
       state.task = &task;
@@ -25,7 +28,7 @@ Replay::Replay(const Workload &workload, const sched::Config &config)
       const TaskId id(tasks_.size());
       if (!task.group.empty()) {
         state.group = group_ids.try_emplace(task.group, static_cast<std::uint32_t>(groups_.size())).first->second;
-        if (state.group == groups_.size()) groups_.push_back(Shared{0, 0, 1, {}});
+        if (state.group == groups_.size()) groups_.push_back(Shared{0, 0, 1, {}, false});
         groups_[state.group].tasks.push_back(id);
       }
       shared.tasks.push_back(id);
@@ -50,6 +53,7 @@ const LiveJob *Replay::find(TaskId task, std::uint32_t number) const {
 }
 
 const char *Replay::apply(const JobEvent &event) {
+  if (is_mode_change(event.kind)) return change_mode(event);
   if (event.kind == JobEventKind::Released) {
     if (find(event.task, event.job) != nullptr) return "it was released before";
     LiveJob job;
@@ -98,6 +102,14 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
       if (job.body_began) return "its body began twice";
       job.body_began = true;
       return nullptr;
+    case JobEventKind::Exceeded:
+      if (!job.started()) return "only a job that has started can use its budget";
+      if (job.exceeded) return "it used its budget before";
+      job.exceeded = true;
+      if (task(job.task).on_budget == OnBudget::Demote) demote(job);
+      return nullptr;
+    case JobEventKind::HighMode:
+    case JobEventKind::LowMode: break;
     case JobEventKind::Preempted:
       if (before != State::Running) return "only a running job can be preempted";
       job.executed += event.time - job.on_worker_since;
@@ -130,6 +142,41 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
       return problem;
   }
   return "unknown kind of event";
+}
+
+// Started jobs of lower criticality go on below everything else; the others are to be skipped.
+const char *Replay::change_mode(const JobEvent &event) {
+  const bool begins = event.kind == JobEventKind::HighMode;
+  if (begins == high_mode()) return begins ? "it was HI mode before" : "it was LO mode before";
+  high_since_ = begins ? event.time : kNever;
+  if (!begins) return nullptr;
+  for (std::size_t t = 0; t < tasks_.size(); ++t) {
+    if (!is_degradable(TaskId(t))) continue;
+    for (LiveJob &job : tasks_[t].live) {
+      if (job.started()) demote(job);
+    }
+  }
+  return nullptr;
+}
+
+// It loses what it inherited, and inherits from those that still wait for its group.
+void Replay::demote(LiveJob &job) {
+  if (job.demoted) return;
+  job.demoted = true;
+  job.own.key = demoted_key();
+  job.raised = job.own;
+  const std::uint32_t group = group_of(job.task);
+  if (group == kNoGroup || config_.policy == PolicyKind::Fifo) return;
+  for (const TaskId sharer : groups_[group].tasks) {
+    const TaskState &task = tasks_[sharer.value];
+    const bool goes_away = high_mode() && is_degradable(sharer);
+    if (task.gate == Gate::Group && !goes_away) job.raised = std::min(job.raised, task.waiter.urgency);
+  }
+}
+
+std::int64_t Replay::demoted_key() const {
+  return sched::is_static(config_.policy) ? static_cast<std::int64_t>(tasks_.size())
+                                          : std::numeric_limits<std::int64_t>::max();
 }
 
 // Puts the job on the event's worker; a resumed one leaves where it waited.
@@ -247,6 +294,7 @@ void Replay::refresh_sharers(TaskId id) {
 Urgency Replay::urgency_of(const LiveJob &job) {
   const std::uint32_t rank = priorities_[job.task.value].rank;
   const std::uint64_t sequence = next_sequence_++;
+  if (high_mode() && is_degradable(job.task)) return Urgency{demoted_key(), rank, sequence};
   switch (config_.policy) {
     case PolicyKind::Edf: return Urgency{job.deadline, rank, sequence};
     case PolicyKind::Fifo: return Urgency{static_cast<std::int64_t>(sequence), rank, sequence};
@@ -274,7 +322,7 @@ Urgency Replay::inherited(const LiveJob &job) const {
 
 bool Replay::preempts(const Urgency &urgency, const Urgency &running) const {
   switch (config_.policy) {
-    case PolicyKind::Edf: return urgency < running;
+    case PolicyKind::Edf: return urgency < running && urgency.key != demoted_key();
     case PolicyKind::Fifo: return false;  // who became ready later never preempts
     default:
       return level_of_rank_[static_cast<std::size_t>(urgency.key)] <

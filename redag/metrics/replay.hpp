@@ -35,6 +35,8 @@ struct LiveJob {
   State state = State::Waiting;
   bool deferred = false;
   bool body_began = false;  // a Started event was seen
+  bool exceeded = false;    // an Exceeded event was seen
+  bool demoted = false;     // below everything else, save for what it inherits
   std::uint32_t worker = WorkerId::kNoneValue;
   Time release = 0;
   Time deadline = 0;
@@ -84,6 +86,12 @@ class Replay {
   [[nodiscard]] std::uint32_t group_active(std::uint32_t group) const { return groups_[group].active; }
   [[nodiscard]] std::uint32_t started() const { return started_; }
 
+  [[nodiscard]] bool high_mode() const { return high_since_ != kNever; }
+  /// kNever in LO mode.
+  [[nodiscard]] Time high_since() const { return high_since_; }
+  /// Is the task's DAG of lower criticality, so that HI mode degrades it?
+  [[nodiscard]] bool is_degradable(TaskId id) const { return dags_[dag_of(id).value].degradable; }
+
   /// Jobs on a worker, the suspended ones (Cooperative) below.
   [[nodiscard]] std::span<const JobRef> stack(std::uint32_t worker) const { return workers_[worker]; }
   [[nodiscard]] std::uint32_t worker_count() const { return static_cast<std::uint32_t>(workers_.size()); }
@@ -119,10 +127,14 @@ class Replay {
     std::uint32_t pending = 0;
     std::uint32_t capacity = 0;  // 0: no bound
     std::vector<TaskId> tasks;
+    bool degradable = false;
   };
 
   LiveJob *find_mutable(TaskId task, std::uint32_t number);
   const char *apply_to(LiveJob &job, const JobEvent &event);
+  const char *change_mode(const JobEvent &event);
+  void demote(LiveJob &job);
+  [[nodiscard]] std::int64_t demoted_key() const;
   const char *take_worker(LiveJob &job, const JobEvent &event);
   const char *leave_worker(const LiveJob &job);
   void move_to(LiveJob &job, LiveJob::State state);
@@ -144,6 +156,7 @@ class Replay {
   std::set<Waiter> eligible_;
   std::set<TaskId> owed_deferral_;
   const std::set<Waiter> none_;
+  Time high_since_ = kNever;
   std::uint32_t free_workers_ = 0;
   std::uint32_t started_ = 0;
   std::uint64_t next_sequence_ = 0;

@@ -23,6 +23,7 @@ void JobStats::add_counts(const JobStats &other) {
   aborted += other.aborted;
   in_flight += other.in_flight;
   deferred += other.deferred;
+  exceeded += other.exceeded;
   late += other.late;
   overdue += other.overdue;
   preemptions += other.preemptions;
@@ -67,6 +68,7 @@ void Summarizer::count(const JobRecord &job) {
   JobStats &stats = stats_[job.task.value];
   ++stats.released;
   if (job.deferred) ++stats.deferred;
+  if (job.exceeded) ++stats.exceeded;
   stats.preemptions += job.preemptions;
   Samples &samples = samples_[job.task.value];
   if (job.has_started() && job.reason != Reason::NoData) samples.start_latency.push_back(job.start - job.ready);
@@ -141,6 +143,7 @@ Summary Summarizer::finish(Time end) {
   }
   fill(summary.total, std::move(all));
   summary.inversions = activity_.inversions();
+  summary.high_mode = activity_.high_mode();
   summary.group_overlaps = activity_.group_overlaps();
   if (summary.group_overlaps > 0) summary.all_enforced = false;
   // Jobs in progress at the end may have run on.

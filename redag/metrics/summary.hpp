@@ -16,7 +16,7 @@
 
 namespace redag::metrics {
 
-inline constexpr std::size_t kReasonCount = static_cast<std::size_t>(Reason::NoData) + 1;
+inline constexpr std::size_t kReasonCount = static_cast<std::size_t>(kLastReason) + 1;
 
 /// Jobs of a task, of a DAG, or of all. Jobs released before the end of the warm-up are not in it.
 struct JobStats {
@@ -26,6 +26,7 @@ struct JobStats {
   std::uint64_t aborted = 0;
   std::uint64_t in_flight = 0;  // when the run ended
   std::uint64_t deferred = 0;
+  std::uint64_t exceeded = 0;                           // used their budget and were not cut off there
   std::uint64_t late = 0;                               // finished after the deadline, or overdue
   std::uint64_t overdue = 0;                            // in flight with the deadline passed
   std::array<std::uint64_t, kReasonCount> by_reason{};  // skipped and aborted, by Reason
@@ -76,6 +77,7 @@ struct Summary {
   Time begin = 0;  // start + warm-up
   Time end = 0;
   Inversions inversions;
+  HighModeTime high_mode;
   std::vector<double> worker_busy;  // share of [begin, end or the last event after it]
   std::uint64_t group_overlaps = 0;
   bool all_enforced = true;  // every peak_active is within max_active, and no group ever overlapped

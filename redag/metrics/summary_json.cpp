@@ -34,6 +34,7 @@ Json to_json(const JobStats &stats) {
           {"in_flight", stats.in_flight},
           {"lost_by_reason", reasons_to_json(stats)},
           {"deferred", stats.deferred},
+          {"exceeded", stats.exceeded},
           {"late", stats.late},
           {"overdue", stats.overdue},
           {"miss_ratio", stats.miss_ratio()},
@@ -84,6 +85,7 @@ std::string summary_to_json(const Summary &summary, const trace::RunInfo &run) {
                       {{"count", summary.inversions.count},
                        {"total_ns", summary.inversions.total},
                        {"longest_ns", summary.inversions.longest}}},
+                     {"high_mode", {{"count", summary.high_mode.count}, {"total_ns", summary.high_mode.total}}},
                      {"worker_busy", summary.worker_busy},
                      {"lost_events", summary.lost_events},
                      {"ignored_events", summary.ignored_events}};

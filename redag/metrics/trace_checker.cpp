@@ -4,6 +4,7 @@
 
 #include "redag/metrics/check_context.hpp"
 #include "redag/metrics/check_dispatch.hpp"
+#include "redag/metrics/check_overload.hpp"
 #include "redag/metrics/check_release.hpp"
 #include "redag/metrics/replay.hpp"
 
@@ -18,6 +19,7 @@ class Checker {
         context_(trace.info, replay_, rules, report_),
         releases_(context_),
         decisions_(context_),
+        overload_(context_),
         counts_(trace.info.workload.task_count()) {}
 
   CheckReport run() {
@@ -56,6 +58,7 @@ class Checker {
 
     releases_.before(event);
     decisions_.before(event);
+    overload_.before(event);
     Counts &counts = counts_[event.task.value];
     if (event.kind == JobEventKind::Released) ++counts.released;
     if (event.kind == JobEventKind::Finished || event.kind == JobEventKind::Skipped ||
@@ -71,6 +74,7 @@ class Checker {
   void end_of_instant() {
     releases_.end_of_instant();
     decisions_.end_of_instant();
+    overload_.end_of_instant();
   }
 
   void check_conservation() {
@@ -89,6 +93,7 @@ class Checker {
   CheckContext context_;
   ReleaseRules releases_;
   DispatchRules decisions_;
+  OverloadRules overload_;
   std::vector<Counts> counts_;
   Time time_ = std::numeric_limits<Time>::min();
 };

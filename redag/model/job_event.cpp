@@ -14,6 +14,9 @@ const char *to_string(JobEventKind kind) {
     case JobEventKind::Finished: return "finished";
     case JobEventKind::Skipped: return "skipped";
     case JobEventKind::Aborted: return "aborted";
+    case JobEventKind::Exceeded: return "exceeded";
+    case JobEventKind::HighMode: return "high_mode";
+    case JobEventKind::LowMode: return "low_mode";
   }
   return "?";
 }
@@ -29,6 +32,7 @@ const char *to_string(Reason reason) {
     case Reason::Exception: return "exception";
     case Reason::Budget: return "budget";
     case Reason::NoData: return "no_data";
+    case Reason::Degraded: return "degraded";
   }
   return "?";
 }

@@ -13,6 +13,8 @@ namespace redag {
 //   Released -> Ready -> Dispatched -> Finished | Aborted
 //   Dispatched -> Preempted -> Resumed -> ... -> Finished | Aborted
 //   Released -> Skipped, Released -> Ready -> Skipped
+// Exceeded can happen to a job that has started; HighMode and LowMode happen to the run, and name the job that caused
+// them.
 // Where a platform preempts for real, a job can also end while Preempted (the operating system ran it meanwhile).
 enum class JobEventKind : std::uint8_t {
   Released,    // value: nominal release r, the point on the timer's grid (data tasks: the last predecessor's finish)
@@ -25,6 +27,9 @@ enum class JobEventKind : std::uint8_t {
   Finished,    // value: finish f as measured
   Skipped,     // never started; see reason
   Aborted,     // started and ended without a result; see reason; value: when, as measured
+  Exceeded,    // used its budget, and was not cut off there; what follows is its task's `on_budget`
+  HighMode,    // HI mode begins: this job of a high-criticality DAG used its `wcet_low`
+  LowMode,     // HI mode ends: nothing is ready or started; the job is that of HighMode, value: when HI mode began
 };
 
 enum class Reason : std::uint8_t {
@@ -35,9 +40,18 @@ enum class Reason : std::uint8_t {
   DagFull,     // Skipped: `max_pending` jobs of its DAG were waiting
   Removed,     // Skipped: its task or its DAG was removed
   Exception,   // Aborted: the body threw
-  Budget,      // Aborted: cut off at its budget
+  Budget,      // Aborted: cut off at its budget; Skipped: a job of its task used its budget (skip_next)
   NoData,      // Aborted: it found nothing to do (its message was overwritten, its timer cancelled)
+  Degraded,    // Skipped: in HI mode its DAG is degraded
 };
+
+inline constexpr auto kLastJobEventKind = JobEventKind::LowMode;
+inline constexpr auto kLastReason = Reason::Degraded;
+
+/// Events of the whole run and not of the job that they name, which may have ended.
+[[nodiscard]] constexpr bool is_mode_change(JobEventKind kind) {
+  return kind == JobEventKind::HighMode || kind == JobEventKind::LowMode;
+}
 
 /// 32 bytes, trivially copyable: what the rings hold.
 struct JobEvent {

@@ -14,10 +14,10 @@ namespace redag {
 namespace {
 
 constexpr std::array<const char *, kFieldCount> kFieldNames = {
-    "name",        "platform",    "workers",     "preemption", "policy",     "dags",    "tasks",
-    "max_active",  "max_pending", "criticality", "wcet",       "bcet",       "period",  "deadline",
-    "offset",      "jitter",      "region",      "budget",     "activation", "overrun", "priority",
-    "concurrency", "group",       "after",       "execution",  "callback"};
+    "name",        "platform",    "workers", "preemption", "policy",    "dags",       "tasks",   "max_active",
+    "max_pending", "criticality", "degrade", "wcet",       "wcet_low",  "bcet",       "period",  "deadline",
+    "offset",      "jitter",      "region",  "budget",     "on_budget", "activation", "overrun", "priority",
+    "concurrency", "group",       "after",   "execution",  "callback"};
 
 struct DurationRule {
   Field field;
@@ -26,10 +26,11 @@ struct DurationRule {
 };
 
 constexpr std::array kDurationRules = {
-    DurationRule{Field::Wcet, &Task::wcet, 1},     DurationRule{Field::Bcet, &Task::bcet, 0},
-    DurationRule{Field::Period, &Task::period, 1}, DurationRule{Field::Deadline, &Task::deadline, 1},
-    DurationRule{Field::Offset, &Task::offset, 0}, DurationRule{Field::Jitter, &Task::jitter, 0},
-    DurationRule{Field::Region, &Task::region, 0}, DurationRule{Field::Budget, &Task::budget, 0},
+    DurationRule{Field::Wcet, &Task::wcet, 1},        DurationRule{Field::Bcet, &Task::bcet, 0},
+    DurationRule{Field::Period, &Task::period, 1},    DurationRule{Field::Deadline, &Task::deadline, 1},
+    DurationRule{Field::Offset, &Task::offset, 0},    DurationRule{Field::Jitter, &Task::jitter, 0},
+    DurationRule{Field::Region, &Task::region, 0},    DurationRule{Field::Budget, &Task::budget, 0},
+    DurationRule{Field::WcetLow, &Task::wcet_low, 0},
 };
 
 /// Collects findings about one workload; the place is set as the walk goes.
@@ -109,6 +110,7 @@ class Checker {
     if (dag.deadline < 0 || dag.deadline > kMaxDuration) {
       error(Field::Deadline, {}, fmt::format("deadline of DAG '{}' is negative or too large", dag.name));
     }
+    check_degrade(dag);
     if (dag.tasks.empty()) error(Field::Tasks, {}, fmt::format("DAG '{}' has no tasks", dag.name));
     std::unordered_map<std::string_view, std::size_t> seen;
     seen.reserve(dag.tasks.size());
@@ -122,6 +124,7 @@ class Checker {
               "names of tasks are unique in their DAG");
       }
       check_durations(task);
+      check_wcet_low(dag, task);
       check_execution(task);
       check_activation(task);
       check_options(task);
@@ -177,10 +180,49 @@ class Checker {
       warning(Field::Wcet, Field::Period,
               fmt::format("wcet {} of task '{}' exceeds its period {}", wcet, task.name, format_duration(task.period)));
     }
-    if (task.budget > 0 && task.budget < task.wcet) {
-      warning(Field::Budget, Field::Wcet,
+    if (task.budget > 0 && task.budget < task.wcet && task.on_budget != OnBudget::Log) {
+      warning(Field::Budget, Field::Wcet | Field::OnBudget,
               fmt::format("budget {} of task '{}' is below its wcet {}", format_duration(task.budget), task.name, wcet),
-              "jobs within the wcet are cut off");
+              task.on_budget == OnBudget::Abort ? "jobs within the wcet are cut off"
+                                                : "jobs within the wcet are held to it");
+    }
+    if (task.on_budget != OnBudget::Abort && task.budget == 0) {
+      error(Field::OnBudget, Field::Budget,
+            fmt::format("task '{}' has 'on_budget: {}' and no budget", task.name, to_string(task.on_budget)),
+            "add 'budget:', the processor time after which that happens");
+    }
+  }
+
+  // C(LO) and what it sets off, docs/model.md, "Criticality".
+  void check_wcet_low(const Dag &dag, const Task &task) {
+    if (task.wcet_low <= 0) return;
+    if (dag.criticality != Criticality::High) {
+      error(Field::WcetLow, Field::Criticality,
+            fmt::format("task '{}' has a wcet_low, and DAG '{}' is not of high criticality", task.name, dag.name),
+            "add 'criticality: high' to the DAG, or remove it");
+    }
+    if (task.wcet > 0 && task.wcet_low > task.wcet) {
+      error(Field::WcetLow, Field::Wcet,
+            fmt::format("wcet_low {} of task '{}' exceeds its wcet {}", format_duration(task.wcet_low), task.name,
+                        format_duration(task.wcet)),
+            "wcet is C(HI), the longest there is; wcet_low is C(LO), the one that is trusted until it is exceeded");
+    }
+  }
+
+  void check_degrade(const Dag &dag) {
+    const Degrade &degrade = dag.degrade;
+    if (dag.criticality == Criticality::High && degrade != Degrade{}) {
+      error(Field::Degrade, Field::Criticality, fmt::format("DAG '{}' of high criticality is never degraded", dag.name),
+            "remove 'degrade:'");
+    }
+    if (degrade.kind == Degrade::Kind::Skip && (degrade.skip < 1 || degrade.skip > kMaxDegrade)) {
+      error(Field::Degrade, {},
+            fmt::format("skip of DAG '{}' must be from 1 to {}, not {}", dag.name, kMaxDegrade, degrade.skip));
+    }
+    if (degrade.kind == Degrade::Kind::Stretch && !(degrade.stretch >= 1 && degrade.stretch <= kMaxDegrade)) {
+      error(Field::Degrade, {},
+            fmt::format("stretch of DAG '{}' must be from 1 to {}, not {}", dag.name, kMaxDegrade, degrade.stretch),
+            "it is the factor by which periods grow in HI mode");
     }
   }
 

@@ -15,6 +15,7 @@ namespace redag {
 inline constexpr std::uint32_t kMaxWorkers = 4096;
 inline constexpr std::uint32_t kMaxQueueDepth = 65536;
 inline constexpr std::uint32_t kMaxConcurrency = 1024;
+inline constexpr std::uint32_t kMaxDegrade = 1'000'000;  // releases skipped, or periods stretched
 
 /// What a workload is made of; the text is the key of the file format.
 enum class Field : std::uint8_t {
@@ -28,7 +29,9 @@ enum class Field : std::uint8_t {
   MaxActive,
   MaxPending,
   Criticality,
+  Degrade,
   Wcet,
+  WcetLow,
   Bcet,
   Period,
   Deadline,
@@ -36,6 +39,7 @@ enum class Field : std::uint8_t {
   Jitter,
   Region,
   Budget,
+  OnBudget,
   Activation,
   Overrun,
   Priority,
@@ -46,7 +50,7 @@ enum class Field : std::uint8_t {
   Callback,
 };
 
-inline constexpr std::size_t kFieldCount = 26;
+inline constexpr std::size_t kFieldCount = 29;
 
 [[nodiscard]] const char *to_string(Field field);
 

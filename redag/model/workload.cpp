@@ -96,6 +96,16 @@ const char *to_string(Callback::Kind value) {
   return "?";
 }
 
+const char *to_string(OnBudget value) {
+  switch (value) {
+    case OnBudget::Abort: return "abort";
+    case OnBudget::Log: return "log";
+    case OnBudget::Demote: return "demote";
+    case OnBudget::SkipNext: return "skip_next";
+  }
+  return "?";
+}
+
 const char *to_string(PolicyKind value) {
   switch (value) {
     case PolicyKind::RateMonotonic: return "rate_monotonic";

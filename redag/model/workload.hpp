@@ -27,6 +27,14 @@ enum class Overrun : std::uint8_t {
   Queue,  // up to `queue_depth` ready jobs wait, oldest first; a release beyond that is skipped
 };
 
+/// What happens when a job has used its task's budget. It has a result all the same, unless it is cut off.
+enum class OnBudget : std::uint8_t {
+  Abort,     // cut off at its next preemption point
+  Log,       // told in the trace, nothing else
+  Demote,    // goes on below everything else
+  SkipNext,  // goes on; the next release of its task is skipped
+};
+
 /// How long a synthetic job executes, in processor time.
 struct ExecutionTime {
   enum class Kind : std::uint8_t {
@@ -66,7 +74,9 @@ struct Task {
   Duration offset = 0;    // first release (timer tasks)
   Duration jitter = 0;    // a release happens up to this much after its point on the grid (timer tasks)
   Duration region = 0;    // longest stretch without a preemption point (cooperative mode); 0: the whole job
-  Duration budget = 0;    // processor time after which a job is cut off; 0: none
+  Duration budget = 0;    // processor time after which `on_budget` happens to a job; 0: none
+  OnBudget on_budget = OnBudget::Abort;
+  Duration wcet_low = 0;  // C(LO) of a task of a high-criticality DAG, <= wcet = C(HI); 0: none
   Criticality criticality = Criticality::Normal;
   Activation activation = Activation::Timer;
   Overrun overrun = Overrun::Skip;
@@ -81,6 +91,20 @@ struct Task {
   friend bool operator==(const Task &, const Task &) = default;
 };
 
+/// What a DAG of lower criticality is left with in HI mode (docs/model.md, "Criticality").
+struct Degrade {
+  enum class Kind : std::uint8_t {
+    Stop,     // no releases
+    Skip,     // after each release of a timer task that is let through, `skip` ones are skipped
+    Stretch,  // releases of a timer task are let through when `stretch` periods have passed since the last such
+  };
+  Kind kind = Kind::Stop;
+  std::uint32_t skip = 1;
+  double stretch = 2;
+
+  friend bool operator==(const Degrade &, const Degrade &) = default;
+};
+
 /// G_k = (V_k, E_k) (eq. dag). Tasks are in no particular order; the edges are acyclic.
 struct Dag {
   std::string name;
@@ -89,6 +113,7 @@ struct Dag {
   std::uint32_t max_pending = 0;  // jobs released and not started at any time; 0: no bound
   Duration deadline = 0;          // end to end, from a source's release to a sink's finish; 0: none
   Criticality criticality = Criticality::Normal;
+  Degrade degrade;  // not of high criticality
 
   friend bool operator==(const Dag &, const Dag &) = default;
 };
@@ -140,6 +165,7 @@ void inherit_periods(Dag &dag);
 [[nodiscard]] const char *to_string(Criticality value);
 [[nodiscard]] const char *to_string(Activation value);
 [[nodiscard]] const char *to_string(Callback::Kind value);
+[[nodiscard]] const char *to_string(OnBudget value);
 [[nodiscard]] const char *to_string(PolicyKind value);
 [[nodiscard]] const char *to_string(PreemptionMode value);
 

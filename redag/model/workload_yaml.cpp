@@ -26,13 +26,15 @@ using yaml::Node;
 constexpr std::array kTopFields = {Field::Name, Field::Platform, Field::Policy, Field::Dags};
 constexpr std::array kPlatformFields = {Field::Workers, Field::Preemption};
 constexpr std::array kDagFields = {Field::Name,       Field::Period,      Field::Deadline, Field::MaxActive,
-                                   Field::MaxPending, Field::Criticality, Field::Tasks};
-constexpr std::array kTaskFields = {
-    Field::Name,       Field::Wcet,   Field::Bcet,    Field::Period,      Field::Deadline,  Field::Offset,
-    Field::Jitter,     Field::Region, Field::Budget,  Field::Concurrency, Field::Group,     Field::Criticality,
-    Field::Activation, Field::After,  Field::Overrun, Field::Priority,    Field::Execution, Field::Callback};
+                                   Field::MaxPending, Field::Criticality, Field::Degrade,  Field::Tasks};
+constexpr std::array kTaskFields = {Field::Name,       Field::Wcet,        Field::Bcet,     Field::Period,
+                                    Field::Deadline,   Field::Offset,      Field::Jitter,   Field::Region,
+                                    Field::Budget,     Field::Concurrency, Field::Group,    Field::Criticality,
+                                    Field::Activation, Field::After,       Field::Overrun,  Field::Priority,
+                                    Field::Execution,  Field::Callback,    Field::OnBudget, Field::WcetLow};
 
 constexpr std::array kCriticalities = {Criticality::Low, Criticality::Normal, Criticality::High};
+constexpr std::array kOnBudgets = {OnBudget::Abort, OnBudget::Log, OnBudget::Demote, OnBudget::SkipNext};
 constexpr std::array kActivations = {Activation::Timer, Activation::Data};
 constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic,
                                   PolicyKind::Fixed,         PolicyKind::Edf,
@@ -171,6 +173,7 @@ class Reader : private yaml::ValueReader {
     take_count(part, Field::MaxActive, dag.max_active);
     take_count(part, Field::MaxPending, dag.max_pending);
     take_enum(part, Field::Criticality, dag.criticality, kCriticalities);
+    take_degrade(dag.degrade, part);
     const std::vector<Node> *tasks = take_list(part, Field::Tasks);
     if (tasks == nullptr) return;
     dag.tasks.resize(tasks->size());
@@ -197,6 +200,8 @@ class Reader : private yaml::ValueReader {
     take_duration(part, Field::Jitter, task.jitter);
     take_duration(part, Field::Region, task.region);
     take_duration(part, Field::Budget, task.budget);
+    take_enum(part, Field::OnBudget, task.on_budget, kOnBudgets);
+    take_positive_duration(part, Field::WcetLow, task.wcet_low);
     take_count(part, Field::Concurrency, task.concurrency);
     take_text(part, Field::Group, task.group);
     take_enum(part, Field::Criticality, task.criticality, kCriticalities);
@@ -265,6 +270,33 @@ class Reader : private yaml::ValueReader {
       unknown_choice(*node, "overrun", {"skip", "queue", "{queue: N}"});
       part.broken |= Field::Overrun;
     }
+  }
+
+  void take_degrade(Degrade &degrade, DagPart &part) {
+    const Node *node = find(part, Field::Degrade);
+    if (node == nullptr || (node->kind == Node::Kind::Scalar && node->text == "stop")) return;
+    if (node->kind == Node::Kind::Map && check_map(*node, "degrade", {"skip", "stretch"})) {
+      const Node *skip = yaml::find(*node, "skip");
+      const Node *stretch = yaml::find(*node, "stretch");
+      if ((skip == nullptr) == (stretch == nullptr)) {
+        error(*node, "degrade is one of skip and stretch", "write {skip: 3} or {stretch: 2.5}");
+      } else if (skip != nullptr) {
+        degrade.kind = Degrade::Kind::Skip;
+        if (const auto value = integer<std::uint32_t>(*skip, "skip", 1)) {
+          degrade.skip = *value;
+          return;
+        }
+      } else {
+        degrade.kind = Degrade::Kind::Stretch;
+        if (const auto value = real(*stretch, "stretch")) {
+          degrade.stretch = *value;
+          return;
+        }
+      }
+    } else if (node->kind != Node::Kind::Map) {
+      unknown_choice(*node, "degrade", {"stop", "{skip: N}", "{stretch: FACTOR}"});
+    }
+    part.broken |= Field::Degrade;
   }
 
   /// Names become positions once all tasks of the DAG are known.

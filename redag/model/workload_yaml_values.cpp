@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -77,6 +78,17 @@ std::optional<Duration> ValueReader::positive_duration(const Node &node, std::st
 std::optional<std::string> ValueReader::text(const Node &node, std::string_view key) {
   if (node.kind == Node::Kind::Scalar && !node.text.empty()) return node.text;
   wrong_type(node, key, "a name");
+  return std::nullopt;
+}
+
+std::optional<double> ValueReader::real(const Node &node, std::string_view key) {
+  double value = 0;
+  if (node.kind == Node::Kind::Scalar && !node.quoted) {
+    const char *end = node.text.data() + node.text.size();
+    const auto [used, code] = std::from_chars(node.text.data(), end, value);
+    if (code == std::errc() && used == end && std::isfinite(value)) return value;
+  }
+  wrong_type(node, key, "a number such as 2.5");
   return std::nullopt;
 }
 

@@ -58,6 +58,8 @@ class ValueReader {
     return std::nullopt;
   }
 
+  std::optional<double> real(const Node &node, std::string_view key);
+
   /// Choices are written as to_string() writes them.
   template <class Enum>
   std::optional<Enum> one_of(const Node &node, std::string_view key, std::span<const Enum> values) {

@@ -77,6 +77,18 @@ void write_overrun(YAML::Emitter &out, const Task &task) {
   out << YAML::Key << "queue" << YAML::Value << task.queue_depth << YAML::EndMap;
 }
 
+// A factor as it was written: the shortest text that reads back the same.
+void write_degrade(YAML::Emitter &out, const Degrade &degrade) {
+  if (degrade == Degrade{}) return;
+  out << YAML::Key << to_string(Field::Degrade) << YAML::Value << YAML::Flow << YAML::BeginMap;
+  if (degrade.kind == Degrade::Kind::Skip) {
+    out << YAML::Key << "skip" << YAML::Value << degrade.skip;
+  } else {
+    out << YAML::Key << "stretch" << YAML::Value << fmt::format("{}", degrade.stretch);
+  }
+  out << YAML::EndMap;
+}
+
 void write_callback(YAML::Emitter &out, const Callback &callback) {
   out << YAML::Key << to_string(Field::Callback) << YAML::Value << YAML::BeginMap;
   out << YAML::Key << "node" << YAML::Value << callback.node;
@@ -99,6 +111,7 @@ void write_task(YAML::Emitter &out, const Dag &dag, const Task &task, Duration d
   out << YAML::Flow << YAML::BeginMap;
   write(out, Field::Name, task.name);
   write_duration(out, Field::Wcet, task.wcet);
+  write_duration(out, Field::WcetLow, task.wcet_low);
   write_duration(out, Field::Bcet, task.bcet);
   write_execution(out, task);
   if (task.activation == Activation::Data) {
@@ -111,6 +124,7 @@ void write_task(YAML::Emitter &out, const Dag &dag, const Task &task, Duration d
   write_duration(out, Field::Jitter, task.jitter);
   write_duration(out, Field::Region, task.region);
   write_duration(out, Field::Budget, task.budget);
+  if (task.on_budget != OnBudget::Abort) write(out, Field::OnBudget, to_string(task.on_budget));
   if (task.criticality != dag.criticality) write(out, Field::Criticality, to_string(task.criticality));
   write_edges(out, dag, task);
   if (task.concurrency != 1) write_count(out, Field::Concurrency, task.concurrency);
@@ -130,6 +144,7 @@ void write_dag(YAML::Emitter &out, const Dag &dag) {
   if (dag.max_active != 0) write_count(out, Field::MaxActive, dag.max_active);
   if (dag.max_pending != 0) write_count(out, Field::MaxPending, dag.max_pending);
   if (dag.criticality != Criticality::Normal) write(out, Field::Criticality, to_string(dag.criticality));
+  write_degrade(out, dag.degrade);
   out << YAML::Key << to_string(Field::Tasks) << YAML::Value << YAML::BeginSeq;
   for (const Task &task : dag.tasks) write_task(out, dag, task, period);
   out << YAML::EndSeq << YAML::EndMap;

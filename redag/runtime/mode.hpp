@@ -1,6 +1,7 @@
 // Which preemption mode a run can have on this machine, and why. Decides once, before threads exist.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -16,14 +17,15 @@ struct Mode {
   std::string reason;                          // empty: it was asked for
 };
 
-/// SCHED_FIFO priorities: jobs have 1 to `top_job`, level 0 the top; the release timer is above all of them. The
-/// highest priorities are left to the kernel's own threads.
+/// SCHED_FIFO priorities: jobs have 1 to `top_job`, level 0 the top and the last one for demoted jobs; the release
+/// timer is above all of them. The highest priorities are left to the kernel's own threads.
 struct PriorityBand {
   int top_job = 0;  // 0: the process has no real-time rights
   int timer = 0;
 
-  [[nodiscard]] std::uint32_t levels() const { return static_cast<std::uint32_t>(top_job); }
-  [[nodiscard]] int of_level(std::uint32_t level) const { return top_job - static_cast<int>(level); }
+  /// Levels of jobs that are not demoted.
+  [[nodiscard]] std::uint32_t levels() const { return static_cast<std::uint32_t>(std::max(1, top_job - 1)); }
+  [[nodiscard]] int of_level(std::uint32_t level) const { return std::max(1, top_job - static_cast<int>(level)); }
 };
 
 /// What the process may use; tried, not guessed.

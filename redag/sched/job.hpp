@@ -45,6 +45,7 @@ struct Job {
   WorkerId worker;                 // where it runs, or ran last
   JobState state = JobState::Free;
   bool deferred = false;
+  bool demoted = false;  // below everything else, save for what it inherits
 
   [[nodiscard]] bool started() const { return state == JobState::Running || state == JobState::Suspended; }
 };

@@ -1,6 +1,7 @@
 #include "redag/sched/lifecycle.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 #include "redag/base/check.hpp"
@@ -24,7 +25,14 @@ void Lifecycle::release(TaskId task, Time nominal, Time now) {
   REDAG_CHECK(task.value < tasks_.size(), "release of a task that does not exist");
   REDAG_CHECK(tasks_[task.value].timer, "data tasks are released by their predecessors");
   begin(now);
-  if (takes_releases(tasks_[task.value])) admit(task, nominal, nominal);
+  TaskState &state = tasks_[task.value];
+  if (state.life != TaskLife::Live) return;
+  if (restricted_) {
+    if (closed_) return;
+    const Reason reason = refusal(state, nominal);
+    if (reason != Reason::None) return refuse(task, nominal, reason);
+  }
+  admit(task, nominal, nominal);
 }
 
 void Lifecycle::miss(TaskId id, Time nominal, Time now, Reason reason) {
@@ -32,7 +40,11 @@ void Lifecycle::miss(TaskId id, Time nominal, Time now, Reason reason) {
   TaskState &task = tasks_[id.value];
   REDAG_CHECK(task.timer, "data tasks are released by their predecessors");
   begin(now);
-  if (!takes_releases(task)) return;
+  if (takes_releases(task)) refuse(id, nominal, reason);
+}
+
+void Lifecycle::refuse(TaskId id, Time nominal, Reason reason) {
+  TaskState &task = tasks_[id.value];
   Job fresh;
   fresh.task = id;
   fresh.number = task.next_number++;
@@ -61,14 +73,143 @@ void Lifecycle::complete(JobSlot job_slot, Time now, Outcome outcome) {
   if (outcome != Outcome::Finished || !takes_releases(task)) return;
 
   precedence_.on_complete(job.task, job.release, job.origin, [&](TaskId successor) {
-    const TaskState &next = tasks_[successor.value];
+    TaskState &next = tasks_[successor.value];
     if (next.life != TaskLife::Live) return;
     if (!next.timer) {
-      admit(successor, now, precedence_.consume(successor));
+      const Time origin = precedence_.consume(successor);
+      if (restricted_) {
+        const Reason reason = refusal(next, now);
+        if (reason != Reason::None) return refuse(successor, now, reason);
+      }
+      admit(successor, now, origin);
     } else if (next.waiting != kNil) {
       make_ready(next.waiting, precedence_.consume(successor));
     }
   });
+}
+
+// ---- budgets and criticality ----
+
+void Lifecycle::exceed(JobSlot job_slot, Limit limit, Time now) {
+  REDAG_CHECK(job_slot.value < jobs_.size() && jobs_[job_slot.value].started(), "a job that does not run uses nothing");
+  begin(now);
+  const Job &job = jobs_[job_slot.value];
+  if (limit == Limit::WcetLow) return enter_high_mode(job);
+  emit(job, JobEventKind::Exceeded, 0);
+  TaskState &task = tasks_[job.task.value];
+  switch (task.on_budget) {
+    case OnBudget::Abort:  // the driver cuts it off as soon as it can
+    case OnBudget::Log: break;
+    case OnBudget::Demote: demote(job_slot.value); break;
+    case OnBudget::SkipNext:
+      if (task.skips_next || !takes_releases(task)) break;
+      task.skips_next = true;
+      ++owed_skips_;
+      refresh_restricted();
+      break;
+  }
+}
+
+void Lifecycle::forget_skip(TaskState &task) {
+  if (!task.skips_next) return;
+  task.skips_next = false;
+  --owed_skips_;
+  refresh_restricted();
+}
+
+// Why a release of a live task is not taken; None: it is.
+Reason Lifecycle::refusal(TaskState &task, Time nominal) {
+  if (task.skips_next) {
+    forget_skip(task);
+    return Reason::Budget;
+  }
+  const bool taken = !task.degraded || is_let_through(task, dag_states_[task.dag.value].degrade, nominal);
+  return taken ? Reason::None : Reason::Degraded;
+}
+
+bool Lifecycle::is_let_through(TaskState &task, const Degrade &degrade, Time nominal) {
+  switch (degrade.kind) {
+    case Degrade::Kind::Stop: return false;
+    case Degrade::Kind::Skip:
+      if (!task.timer) return true;
+      if (task.to_skip > 0) {
+        --task.to_skip;
+        return false;
+      }
+      task.to_skip = degrade.skip;
+      return true;
+    case Degrade::Kind::Stretch: {
+      if (!task.timer) return true;
+      if (nominal < task.not_before) return false;
+      const double distance = std::ceil(degrade.stretch * static_cast<double>(task.period));
+      const bool is_endless = distance >= static_cast<double>(kNever - nominal);
+      task.not_before = is_endless ? kNever : nominal + static_cast<Duration>(distance);
+      return true;
+    }
+  }
+  return false;
+}
+
+// AMC (Baruah, Burns, Davis, RTSS 2011): from this instant no job of a DAG of lower criticality is in the way of
+// others.
+void Lifecycle::enter_high_mode(const Job &cause) {
+  if (high_mode_ || closed_ || degrades(dag_states_[tasks_[cause.task.value].dag.value])) return;
+  high_mode_ = true;
+  refresh_restricted();
+  mode_cause_ = cause;
+  mode_cause_.worker = WorkerId();
+  high_since_ = now_;
+  emit(cause, JobEventKind::HighMode, 0);
+  for (TaskState &task : tasks_) {
+    if (task.life == TaskLife::Gone || !degrades(dag_states_[task.dag.value])) continue;
+    task.degraded = true;
+    task.to_skip = 0;
+    task.not_before = std::numeric_limits<Time>::min();
+    task.key = demoted_key();
+  }
+  for (std::uint32_t slot = 0; slot < jobs_.size(); ++slot) {
+    const Job &job = jobs_[slot];
+    if (job.state == JobState::Free) continue;
+    if (!tasks_[job.task.value].degraded) {
+      if (job.started() && tasks_[job.priority_of.value].degraded) on_lowered(slot);  // whose place it has goes
+      continue;
+    }
+    if (job.started()) {
+      demote(slot);
+      continue;
+    }
+    const bool unused_data = job.state == JobState::Ready && tasks_[job.task.value].timer;
+    const TaskId task = job.task;
+    skip(slot, Reason::Degraded);
+    if (unused_data) precedence_.give_back(task);
+  }
+}
+
+// Nothing is in progress: the degraded DAGs begin afresh, without data of before and without jobs that wait for some.
+void Lifecycle::restore() {
+  emit(mode_cause_, JobEventKind::LowMode, high_since_);
+  skip_all(Reason::Degraded, [this](const Job &job) { return tasks_[job.task.value].degraded; });
+  for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
+    TaskState &task = tasks_[t];
+    if (!task.degraded) continue;
+    task.degraded = false;
+    task.key = task.priority.rank;
+    if (task.life == TaskLife::Live) precedence_.discard(TaskId(t));
+  }
+  high_mode_ = false;
+  refresh_restricted();
+}
+
+void Lifecycle::demote(std::uint32_t slot) {
+  if (jobs_[slot].demoted) return;
+  jobs_[slot].demoted = true;
+  on_lowered(slot);
+}
+
+std::int64_t Lifecycle::own_key(const Job &job) const {
+  const TaskState &task = tasks_[job.task.value];
+  if (job.demoted || task.degraded) return demoted_key();
+  return is_static(config_.policy) ? task.priority.rank : job.deadline;
 }
 
 // ---- reconfiguration ----
@@ -107,8 +248,11 @@ void Lifecycle::remove_dag(DagId dag, Time now) {
   REDAG_CHECK(dag.value < dag_states_.size(), "removal of a DAG that does not exist");
   begin(now);
   dag_states_[dag.value].removed = true;
-  for (const TaskId task : dag_states_[dag.value].tasks) tasks_[task.value].life = TaskLife::Removed;
-  skip_all([&](const Job &job) { return tasks_[job.task.value].dag == dag; });
+  for (const TaskId task : dag_states_[dag.value].tasks) {
+    tasks_[task.value].life = TaskLife::Removed;
+    forget_skip(tasks_[task.value]);
+  }
+  skip_all(Reason::Removed, [&](const Job &job) { return tasks_[job.task.value].dag == dag; });
 }
 
 void Lifecycle::remove_task(TaskId task, Time now) {
@@ -116,7 +260,8 @@ void Lifecycle::remove_task(TaskId task, Time now) {
   begin(now);
   if (tasks_[task.value].life != TaskLife::Live) return;
   tasks_[task.value].life = TaskLife::Removed;
-  skip_all([&](const Job &job) { return job.task == task; });
+  forget_skip(tasks_[task.value]);
+  skip_all(Reason::Removed, [&](const Job &job) { return job.task == task; });
 }
 
 void Lifecycle::set_timing(TaskId task, Duration period, Duration deadline, Time now) {
@@ -134,14 +279,15 @@ void Lifecycle::set_timing(TaskId task, Duration period, Duration deadline, Time
 void Lifecycle::close(Time now) {
   begin(now);
   closed_ = true;
-  skip_all([](const Job &) { return true; });
+  refresh_restricted();
+  skip_all(Reason::Removed, [](const Job &) { return true; });
 }
 
 template <class Predicate>
-void Lifecycle::skip_all(Predicate which) {
+void Lifecycle::skip_all(Reason reason, Predicate which) {
   for (std::uint32_t slot = 0; slot < jobs_.size(); ++slot) {
     const JobState state = jobs_[slot].state;
-    if ((state == JobState::Waiting || state == JobState::Ready) && which(jobs_[slot])) skip(slot, Reason::Removed);
+    if ((state == JobState::Waiting || state == JobState::Ready) && which(jobs_[slot])) skip(slot, reason);
   }
 }
 
@@ -153,7 +299,7 @@ DagId Lifecycle::append_dag(const Dag &dag) {
     id = free_dags_.back();
     free_dags_.pop_back();
   }
-  dag_states_[id.value] = DagState{dag.max_active, dag.max_pending, 0, dag.criticality, false, false, {}};
+  dag_states_[id.value] = DagState{dag.max_active, dag.max_pending, 0, dag.criticality, false, false, {}, dag.degrade};
   const std::vector<std::uint32_t> topological = topological_ranks(dag);
   for (std::size_t i = 0; i < dag.tasks.size(); ++i) append_task(id, topological[i], dag.tasks[i]);
   precedence_.add_dag(dag, dag_states_[id.value].tasks);
@@ -181,6 +327,8 @@ TaskId Lifecycle::append_task(DagId dag, std::uint32_t rank, const Task &task) {
   state.topological_rank = rank;
   state.fixed_priority = task.priority.value_or(0);
   state.timer = task.activation == Activation::Timer;
+  state.on_budget = task.on_budget;
+  state.degraded = high_mode_ && degrades(dag_states_[dag.value]);
   // The jobs that have started, the ready ones, and one that waits for its predecessors.
   const std::uint32_t slot_count = state.concurrency + std::max(1U, state.queue_depth) + 1;
   for (std::uint32_t i = 0; i < slot_count; ++i) {
@@ -194,10 +342,10 @@ TaskId Lifecycle::append_task(DagId dag, std::uint32_t rank, const Task &task) {
 }
 
 // Room for what one instant can bring: each task's release, the skip of its last job, readiness, deferral, start,
-// preemption.
+// preemption; HI mode, that skips and demotes all there is.
 void Lifecycle::reserve_step() {
-  events_.reserve(2 * jobs_.size() + 64);
-  dispatches_.reserve(2 * std::size_t{config_.workers} + 16);
+  events_.reserve(3 * jobs_.size() + 64);
+  dispatches_.reserve(3 * std::size_t{config_.workers} + 16);
 }
 
 // Removed tasks of which nothing is left leave the order of priority, and with reuse_ids also their places.
@@ -267,17 +415,24 @@ void Lifecycle::prioritise() {
   }
   rank_count_ = ranked.size();
   const std::vector<Priority> priorities = assign_priorities(ranked, config_.policy, config_.levels);
-  for (std::size_t i = 0; i < ranked.size(); ++i) tasks_[ranked[i].task.value].priority = priorities[i];
+  for (std::size_t i = 0; i < ranked.size(); ++i) {
+    TaskState &task = tasks_[ranked[i].task.value];
+    task.priority = priorities[i];
+    task.key = task.degraded ? demoted_key() : task.priority.rank;
+  }
   for (Job &job : jobs_) {
     if (job.state == JobState::Free || job.state == JobState::Waiting) continue;
-    job.rank = tasks_[job.priority_of.value].priority.rank;
-    if (is_static(config_.policy)) job.key = job.rank;
-    // What it inherited may now be less than its own.
     const std::uint32_t own_rank = tasks_[job.task.value].priority.rank;
-    const std::int64_t own_key = is_static(config_.policy) ? own_rank : job.deadline;
-    if (job.priority_of != job.task && std::tie(own_key, own_rank) < std::tie(job.key, job.rank)) {
+    const bool has_inherited = job.priority_of != job.task;
+    job.rank = tasks_[job.priority_of.value].priority.rank;
+    if (is_static(config_.policy)) {
+      job.key = has_inherited ? tasks_[job.priority_of.value].key : own_key(job);
+    }
+    // What it inherited may now be less than its own.
+    const std::int64_t own = own_key(job);
+    if (has_inherited && std::tie(own, own_rank) < std::tie(job.key, job.rank)) {
       job.priority_of = job.task;
-      job.key = own_key;
+      job.key = own;
       job.rank = own_rank;
     }
   }
@@ -387,9 +542,9 @@ void Lifecycle::make_ready(std::uint32_t slot, Time origin) {
   job.priority_of = job.task;
   job.rank = task.priority.rank;
   switch (config_.policy) {
-    case PolicyKind::Edf: job.key = job.deadline; break;
-    case PolicyKind::Fifo: job.key = static_cast<std::int64_t>(job.sequence); break;
-    default: job.key = task.priority.rank; break;
+    case PolicyKind::Edf: job.key = task.degraded ? kDemotedKey : job.deadline; break;
+    case PolicyKind::Fifo: job.key = task.degraded ? kDemotedKey : static_cast<std::int64_t>(job.sequence); break;
+    default: job.key = task.key; break;
   }
   emit(job, JobEventKind::Ready, origin);
   on_ready(slot);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <span>
 #include <string>
@@ -21,6 +22,8 @@ class Lifecycle : public Scheduler {
   void release(TaskId task, Time nominal, Time now) final;
   void miss(TaskId task, Time nominal, Time now, Reason reason) final;
   void complete(JobSlot job, Time now, Outcome outcome) final;
+  void exceed(JobSlot job, Limit limit, Time now) override;
+  [[nodiscard]] bool high_mode() const final { return high_mode_; }
   DagId add_dag(const Dag &dag, Time now) final;
   void remove_dag(DagId dag, Time now) final;
   TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) final;
@@ -53,13 +56,19 @@ class Lifecycle : public Scheduler {
     int fixed_priority = 0;
     bool timer = true;
     TaskLife life = TaskLife::Live;
-    Priority priority;  // not of one that is gone
+    OnBudget on_budget = OnBudget::Abort;
+    bool skips_next = false;  // a job used its budget, and the next release is not taken
+    bool degraded = false;    // its jobs are demoted from the start: HI mode, and its DAG is of lower criticality
+    Priority priority;        // not of one that is gone
+    std::int64_t key = 0;     // static policies: of its jobs that have inherited nothing
 
     std::uint32_t free_slot = kNil;     // list through Job::next
     std::uint32_t waiting = kNil;       // the job whose predecessors are incomplete
     std::uint32_t latest_ready = kNil;  // the job that became ready last; not started if ready_count > 0
     std::uint32_t ready_count = 0;      // ready and not started
     std::uint32_t next_number = 0;
+    std::uint32_t to_skip = 0;  // degraded, Degrade::Skip: releases until the next that is taken
+    Time not_before = 0;        // degraded, Degrade::Stretch: a release before it is skipped
     Accounting accounting;
   };
   struct DagState {
@@ -70,6 +79,7 @@ class Lifecycle : public Scheduler {
     bool removed = false;
     bool free = false;          // its id is to be used again
     std::vector<TaskId> tasks;  // not those that are gone
+    Degrade degrade;
   };
 
   explicit Lifecycle(const Config &config) : config_(config) {}
@@ -81,7 +91,17 @@ class Lifecycle : public Scheduler {
   virtual void on_ready(std::uint32_t slot) = 0;      // the job can be queued
   virtual void on_withdrawn(std::uint32_t slot) = 0;  // a ready, not started job is skipped
   virtual void on_end(std::uint32_t slot) = 0;        // a started job ended; afterwards its slot is free
+  virtual void on_lowered(std::uint32_t slot) = 0;    // a started job is to go on at own_key(), with nothing inherited
   virtual void on_reconfigured() = 0;                 // tasks were added, or timings changed: priorities are new
+
+  /// The key of demoted jobs: after all others.
+  [[nodiscard]] std::int64_t demoted_key() const {
+    return is_static(config_.policy) ? static_cast<std::int64_t>(rank_count_) : kDemotedKey;
+  }
+  /// The key of the job by itself, with nothing inherited.
+  [[nodiscard]] std::int64_t own_key(const Job &job) const;
+  /// HI mode, and nothing is ready or started: LO mode again.
+  void restore();
 
   /// Moves time forward and, after a dispatch, empties the step's buffers. Every verb begins with it.
   void begin(Time now);
@@ -108,13 +128,23 @@ class Lifecycle : public Scheduler {
   std::vector<DagState> dag_states_;
 
  private:
+  static constexpr std::int64_t kDemotedKey = std::numeric_limits<std::int64_t>::max();
+
   void admit(TaskId id, Time nominal, Time origin);
+  void refuse(TaskId id, Time nominal, Reason reason);
+  [[nodiscard]] Reason refusal(TaskState &task, Time nominal);
+  [[nodiscard]] static bool is_let_through(TaskState &task, const Degrade &degrade, Time nominal);
+  void enter_high_mode(const Job &cause);
+  void demote(std::uint32_t slot);
+  void forget_skip(TaskState &task);
+  void refresh_restricted() { restricted_ = closed_ || high_mode_ || owed_skips_ > 0; }
+  [[nodiscard]] bool degrades(const DagState &dag) const { return dag.criticality != Criticality::High; }
   void make_ready(std::uint32_t slot, Time origin);
   void skip(std::uint32_t slot, Reason reason);
   [[nodiscard]] bool takes_releases(const TaskState &task) const { return task.life == TaskLife::Live && !closed_; }
 
   template <class Predicate>
-  void skip_all(Predicate which);
+  void skip_all(Reason reason, Predicate which);
   DagId append_dag(const Dag &dag);
   TaskId append_task(DagId dag, std::uint32_t rank, const Task &task);
   void reserve_step();
@@ -142,6 +172,11 @@ class Lifecycle : public Scheduler {
   std::vector<std::uint32_t> free_slots_;
   std::size_t rank_count_ = 0;
   bool closed_ = false;
+  bool high_mode_ = false;
+  std::uint32_t owed_skips_ = 0;  // tasks with skips_next
+  bool restricted_ = false;       // not every release is taken: closed, HI mode, or a skip is owed
+  Job mode_cause_;                // HI mode: the job that began it
+  Time high_since_ = 0;
   std::vector<JobEvent> events_;
   std::vector<Dispatch> dispatches_;
   Time now_ = 0;

@@ -106,6 +106,12 @@ Time Precedence::consume(TaskId task) {
   return origin;
 }
 
+void Precedence::discard(TaskId task) {
+  Node &node = nodes_[task.value];
+  for (std::uint32_t i = node.first_edge; i < node.last_edge; ++i) edges_[i].fresh = false;
+  node.fresh = 0;
+}
+
 void Precedence::give_back(TaskId task) {
   Node &node = nodes_[task.value];
   for (std::uint32_t i = node.first_edge; i < node.last_edge; ++i) edges_[i].fresh = true;

@@ -33,6 +33,9 @@ class Precedence {
   /// The job that consumed last was skipped before it started: its data is fresh again.
   void give_back(TaskId task);
 
+  /// Data that `task` has not consumed is forgotten.
+  void discard(TaskId task);
+
   /// A job of `task`, released at `release` with data from `origin`, completed. Calls on_fresh(successor) for each
   /// successor all of whose predecessors now have fresh data.
   template <class OnFresh>

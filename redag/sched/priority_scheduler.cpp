@@ -31,6 +31,7 @@ Step PriorityScheduler::dispatch(Time now, std::uint32_t most) {
   }
   put_back();
   close_open_workers();
+  if (high_mode()) restore_if_idle();
   return step();
 }
 
@@ -96,7 +97,8 @@ std::uint32_t PriorityScheduler::least_urgent_running() const {
 
 bool PriorityScheduler::outranks(const Job &a, const Job &b) const {
   if (static_) return level_of(a) < level_of(b);
-  return config_.policy == PolicyKind::Edf && before(a, b);
+  // Demoted jobs do not preempt each other.
+  return config_.policy == PolicyKind::Edf && before(a, b) && a.key != demoted_key();
 }
 
 std::uint32_t PriorityScheduler::level_of(const Job &job) const {
@@ -146,6 +148,15 @@ void PriorityScheduler::close_open_workers() {
   open_workers_.clear();
 }
 
+// A job that is parked waits for one that has started.
+void PriorityScheduler::restore_if_idle() {
+  if (top() != kNil) return;
+  for (const Worker &worker : workers_) {
+    if (worker.stack != kNil) return;
+  }
+  restore();
+}
+
 // ---- eligibility ----
 
 // The job could have a worker: does it find a gate full? The gates are tried in the order task, DAG, group, threads.
@@ -182,6 +193,29 @@ void PriorityScheduler::inherit(std::uint32_t holder_slot, const Job &waiter) {
   holder.sequence = waiter.sequence;
   if (is_queued) push(holder_slot);
   if (holder.state == JobState::Running && level_of(holder) != old_level) change_level(holder_slot, level_of(holder));
+}
+
+void PriorityScheduler::on_lowered(std::uint32_t slot) {
+  Job &job = jobs_[slot];
+  const bool is_queued = job.state == JobState::Suspended && config_.preemption == Preemption::Full;
+  if (is_queued) remove(slot);
+  const std::uint32_t old_level = level_of(job);
+  job.key = own_key(job);
+  job.rank = task_of(job).priority.rank;
+  job.priority_of = job.task;
+  if (is_queued) push(slot);
+  if (job.state == JobState::Running && level_of(job) != old_level) change_level(slot, level_of(job));
+  // Jobs that wait for its group are looked at again, and it inherits from those that are left.
+  const TaskGates &held = task_gates_[job.task.value];
+  for (std::uint32_t i = 0; i < held.count; ++i) {
+    if (held.kinds[i] != GateKind::Group) continue;
+    Gate &gate = gates_[held.gates[i]];
+    for (std::uint32_t waiter = gate.parked.top(); waiter != kNil; waiter = gate.parked.top()) {
+      gate.parked.remove(jobs_, waiter);
+      jobs_[waiter].parked_at = kNil;
+      push(waiter);
+    }
+  }
 }
 
 void PriorityScheduler::on_ready(std::uint32_t slot) { push(slot); }
@@ -248,11 +282,13 @@ void PriorityScheduler::remove(std::uint32_t slot) {
 
 // Gates, levels and the ready queue are built anew; parked jobs go back to the ready queue and find their gates again.
 void PriorityScheduler::on_reconfigured() {
-  level_of_rank_.resize(rank_count());
+  level_of_rank_.resize(rank_count() + 1);
   for (const TaskState &task : tasks_) {
     if (task.life != TaskLife::Gone) level_of_rank_[task.priority.rank] = task.priority.level;
   }
-  levels_ = LevelQueue(static_ ? rank_count() : 0);
+  const auto ranks = static_cast<std::uint32_t>(rank_count());
+  level_of_rank_[ranks] = config_.levels > 0 ? config_.levels : ranks;  // of demoted jobs: below all others
+  levels_ = LevelQueue(static_ ? ranks + 1 : 0);
   heap_ = HeapQueue();
 
   gates_.clear();

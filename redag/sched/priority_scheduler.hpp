@@ -53,6 +53,7 @@ class PriorityScheduler final : public Lifecycle {
   void on_ready(std::uint32_t slot) override;
   void on_withdrawn(std::uint32_t slot) override;
   void on_end(std::uint32_t slot) override;
+  void on_lowered(std::uint32_t slot) override;
   void on_reconfigured() override;
 
   [[nodiscard]] bool find_place(const Job &job, Place &place) const;
@@ -64,6 +65,7 @@ class PriorityScheduler final : public Lifecycle {
   bool park_if_not_eligible(std::uint32_t slot);
   void inherit(std::uint32_t holder, const Job &waiter);
   void close_open_workers();
+  void restore_if_idle();
   bool set_aside(std::uint32_t slot);
   void put_back();
 

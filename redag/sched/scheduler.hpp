@@ -1,8 +1,8 @@
 // The scheduler's interface: events in, decisions out. An implementation is a value: no thread, no clock, no I/O, and
 // after construction no allocation (except in reconfiguration). Not thread-safe: the driver serialises the calls.
 //
-// A driver reports what happened (release, complete, preemption_point), any number at one instant, and then asks for
-// the decisions with dispatch(). Releases and completions of one instant are so decided together.
+// A driver reports what happened (release, complete, exceed, preemption_point), any number at one instant, and then
+// asks for the decisions with dispatch(). Releases and completions of one instant are so decided together.
 #pragma once
 
 #include <cstdint>
@@ -32,6 +32,12 @@ struct Config {
   // Ids, job slots and group positions of removed tasks and DAGs are used again once nothing of them is in flight, so
   // that memory stays flat under endless adding and removing. Otherwise an id names one task for ever, as traces need.
   bool reuse_ids = false;
+};
+
+/// What a job can use up (docs/model.md, "Budgets" and "Criticality").
+enum class Limit : std::uint8_t {
+  Budget,   // Task::budget: `on_budget` happens
+  WcetLow,  // Task::wcet_low: HI mode begins
 };
 
 enum class Outcome : std::uint8_t {
@@ -92,6 +98,12 @@ class Scheduler {
   /// A running job (Preemption::Cooperative) can be suspended until the next dispatch(). If that dispatch puts no job
   /// over it, it simply goes on.
   virtual void preemption_point(JobSlot job, Time now) = 0;
+
+  /// A started job has used `limit` and goes on: for each job and limit at most once. One that is cut off at its budget
+  /// is complete() instead.
+  virtual void exceed(JobSlot job, Limit limit, Time now) = 0;
+  /// Are DAGs of lower criticality degraded now?
+  [[nodiscard]] virtual bool high_mode() const = 0;
 
   /// Decides. Calling it again without a new event yields nothing. Of the jobs that have not started, at most `most` do
   /// now; once that many have, the others are not looked at, and started ones go on as if those were not there.

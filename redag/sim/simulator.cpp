@@ -55,6 +55,7 @@ class Simulation {
     for (std::size_t i = 0; i < tasks_.size(); ++i) {
       const Task &task = *tasks_[i].task;
       has_regions_ = has_regions_ || task.region > 0;
+      has_limits_ = has_limits_ || task.wcet_low > 0 || (task.budget > 0 && task.on_budget != OnBudget::Abort);
       if (task.activation != Activation::Timer || task.offset >= options.horizon) continue;
       const TaskId id(i);
       releases_.push({task.offset + jitter(task, id, 0), task.offset, id, 0});
@@ -68,6 +69,7 @@ class Simulation {
       if (next > options_.horizon || (next == options_.horizon && next_processor_event() > next)) break;
       now_ = next;
       complete_jobs();
+      if (has_limits_) reach_limits();
       release_jobs();
       if (has_regions_) reach_preemption_points();
       goes_on = carry_out(scheduler_.dispatch(now_));
@@ -84,12 +86,15 @@ class Simulation {
     Duration lead = 0;      // overheads, which come before the body and hold no preemption point
     Duration region = 0;
     bool cut_off = false;  // ends at its budget
+    // Processor time of the body at which these are used up; kNever: not watched, or reported.
+    Duration budget = kNever;
+    Duration wcet_low = kNever;
   };
   struct Processor {
     JobSlot job;
     Time since = 0;        // when the job got (or regained) the processor
     Time finish = kNever;  // if nothing intervenes
-    Time point = kNever;   // the next preemption point that matters
+    Time point = kNever;   // the next preemption point that matters, or the next limit
   };
 
   [[nodiscard]] Time next_processor_event() const {
@@ -124,12 +129,35 @@ class Simulation {
     }
   }
 
+  // Processor time of the body so far; negative during the overheads before it.
+  [[nodiscard]] Duration body_of(const Processor &processor) const {
+    const Progress &progress = progress_[processor.job.value];
+    return progress.executed + (now_ - processor.since) - progress.lead;
+  }
+
+  // Jobs that go on although they have used their budget or their wcet_low.
+  void reach_limits() {
+    for (Processor &processor : processors_) {
+      if (!processor.job.valid()) continue;
+      Progress &progress = progress_[processor.job.value];
+      const Duration body = body_of(processor);
+      if (body >= progress.wcet_low) {
+        progress.wcet_low = kNever;
+        scheduler_.exceed(processor.job, sched::Limit::WcetLow, now_);
+      }
+      if (body >= progress.budget) {
+        progress.budget = kNever;
+        scheduler_.exceed(processor.job, sched::Limit::Budget, now_);
+      }
+    }
+  }
+
   // Jobs that stand at a multiple of their region, where that matters.
   void reach_preemption_points() {
     for (Processor &processor : processors_) {
       if (!processor.job.valid() || !scheduler_.outranked(processor.job)) continue;
       const Progress &progress = progress_[processor.job.value];
-      const Duration body = progress.executed + (now_ - processor.since) - progress.lead;
+      const Duration body = body_of(processor);
       if (progress.region > 0 && body > 0 && body % progress.region == 0) {
         scheduler_.preemption_point(processor.job, now_);
       }
@@ -141,7 +169,7 @@ class Simulation {
       if (dispatch.over.valid()) take_processor(dispatch.over);
       give_processor(dispatch);
     }
-    if (has_regions_) plan_preemption_points();
+    if (has_regions_ || has_limits_) plan_points();
     return sink_(step.events);
   }
 
@@ -176,8 +204,11 @@ class Simulation {
                                       : execution_time(task, dispatch.task, dispatch.number, options_.seed);
     REDAG_CHECK(demand > 0, "a job executes for a positive time");
     Progress progress;
-    progress.cut_off = task.budget > 0 && demand > task.budget;
+    const bool cuts_off = task.on_budget == OnBudget::Abort;
+    progress.cut_off = cuts_off && task.budget > 0 && demand > task.budget;
     if (progress.cut_off) demand = task.budget;
+    if (task.budget > 0 && !cuts_off) progress.budget = task.budget;
+    if (task.wcet_low > 0) progress.wcet_low = task.wcet_low;
     progress.lead = options_.overheads.release + options_.overheads.dispatch;
     progress.left = demand + progress.lead;
     progress.region = task.region;
@@ -185,14 +216,17 @@ class Simulation {
   }
 
   // Only a job that another one outranks has a preemption point worth an event.
-  void plan_preemption_points() {
+  void plan_points() {
     for (Processor &processor : processors_) {
       processor.point = kNever;
       if (!processor.job.valid()) continue;
       const Progress &progress = progress_[processor.job.value];
-      if (progress.region == 0 || !scheduler_.outranked(processor.job)) continue;
-      const Duration body = progress.executed + (now_ - processor.since) - progress.lead;
-      const Duration next_body = body < 0 ? progress.region : (body / progress.region + 1) * progress.region;
+      const Duration body = body_of(processor);
+      Duration next_body = std::min(progress.budget, progress.wcet_low);
+      if (progress.region > 0 && scheduler_.outranked(processor.job)) {
+        next_body = std::min(next_body, body < 0 ? progress.region : (body / progress.region + 1) * progress.region);
+      }
+      if (next_body == kNever) continue;
       const Time point = now_ + (next_body - body);
       if (point < processor.finish) processor.point = point;
     }
@@ -212,6 +246,7 @@ class Simulation {
   Result result_;
   Time now_ = 0;
   bool has_regions_ = false;
+  bool has_limits_ = false;
 };
 
 }  // namespace

@@ -42,8 +42,8 @@ struct Result {
 };
 
 /// Simulates `workload` under `scheduler`, which must be fresh and built from the same workload.
-/// Order within one instant: completions by worker, releases by TaskId, preemption points by worker, then the
-/// decisions.
+/// Order within one instant: completions by worker, limits by worker, releases by TaskId, preemption points by worker,
+/// then the decisions.
 Result simulate(const Workload &workload, sched::Scheduler &scheduler, std::uint32_t workers, const Options &options,
                 const EventSink &sink);
 

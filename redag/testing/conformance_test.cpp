@@ -45,9 +45,21 @@ Workload random_workload(std::uint64_t seed) {
   if (!workload) ADD_FAILURE() << to_string(workload.error());
   for (Dag &dag : workload->dags) {
     if (rng.uniform01() < 0.2) dag.max_pending = static_cast<std::uint32_t>(rng.uniform(1, 4));
+    dag.criticality = static_cast<Criticality>(rng.uniform(0, 2));
+    if (dag.criticality != Criticality::High) {
+      dag.degrade.kind = static_cast<Degrade::Kind>(rng.uniform(0, 2));
+      dag.degrade.skip = static_cast<std::uint32_t>(rng.uniform(1, 3));
+      dag.degrade.stretch = 1 + 3 * rng.uniform01();
+    }
+    const bool has_modes = dag.criticality == Criticality::High && rng.uniform01() < 0.5;
     for (Task &task : dag.tasks) {
+      if (has_modes && rng.uniform01() < 0.5) task.wcet_low = rng.uniform(1, task.wcet);
+      if (rng.uniform01() < 0.2) {
+        task.on_budget = static_cast<OnBudget>(rng.uniform(1, 3));
+        task.budget = rng.uniform(1, task.wcet);
+      }
       if (rng.uniform01() < 0.7) task.region = std::max<Duration>(1, task.wcet / rng.uniform(1, 5));
-      if (rng.uniform01() < 0.1) task.budget = std::max<Duration>(1, task.wcet / 2);
+      if (task.budget == 0 && rng.uniform01() < 0.1) task.budget = std::max<Duration>(1, task.wcet / 2);
       if (task.group.empty() && rng.uniform01() < 0.1) task.concurrency = static_cast<std::uint32_t>(rng.uniform(2, 3));
       if (rng.uniform01() < 0.5) task.priority = static_cast<int>(rng.uniform(-2, 2));
     }

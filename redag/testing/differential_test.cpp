@@ -112,6 +112,7 @@ RC_GTEST_PROP(DifferentialProperty, AnySequenceOfEventsIsDecidedAlike, (std::uin
                                                     {2, Kind::Advance},
                                                     {2, Kind::PreemptionPoint},
                                                     {1, Kind::Miss},
+                                                    {1, Kind::Exceed},
                                                     {1, Kind::DispatchSome},
                                                     {1, Kind::AddTask},
                                                     {1, Kind::RemoveTask},

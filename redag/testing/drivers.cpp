@@ -54,8 +54,8 @@ std::vector<Arrival> arrivals(const RunSpec &spec) {
 // Jobs that a driver has started, and what can happen to one of them at random.
 class RandomJobs {
  public:
-  RandomJobs(sched::Scheduler &scheduler, sched::Preemption preemption, std::uint64_t seed)
-      : scheduler_(scheduler), preemption_(preemption), rng_(seed) {}
+  RandomJobs(const Workload &workload, sched::Scheduler &scheduler, sched::Preemption preemption, std::uint64_t seed)
+      : tasks_(flatten(workload)), scheduler_(scheduler), preemption_(preemption), rng_(seed) {}
 
   void carry_out(const sched::Step &step) {
     for (const sched::Dispatch &dispatch : step.dispatches) {
@@ -63,7 +63,7 @@ class RandomJobs {
         if (dispatch.over.valid() && job.slot == dispatch.over) job.runs = false;
       }
       if (!dispatch.resume) {
-        started_.push_back({dispatch.job, true});
+        started_.push_back({dispatch.job, dispatch.task, true, false, false});
         continue;
       }
       for (Started &job : started_) {
@@ -76,15 +76,17 @@ class RandomJobs {
   void something_happens(Time now) {
     if (started_.empty()) return;
     const auto choice = static_cast<std::size_t>(rng_.uniform(0, static_cast<std::int64_t>(started_.size()) - 1));
-    const Started job = started_[choice];
+    Started &job = started_[choice];
     if (!job.runs && preemption_ != sched::Preemption::Full) return;
     const double dice = rng_.uniform01();
+    if (dice < 0.2 && exceed(job, now)) return;
     if (job.runs && preemption_ == sched::Preemption::Cooperative && dice < 0.5) {
       scheduler_.preemption_point(job.slot, now);
       return;
     }
+    const JobSlot slot = job.slot;
     started_.erase(started_.begin() + static_cast<std::ptrdiff_t>(choice));
-    scheduler_.complete(job.slot, now,
+    scheduler_.complete(slot, now,
                         dice > 0.97   ? sched::Outcome::Threw
                         : dice > 0.94 ? sched::Outcome::NoData
                                       : sched::Outcome::Finished);
@@ -95,8 +97,27 @@ class RandomJobs {
  private:
   struct Started {
     JobSlot slot;
+    TaskId task;
     bool runs = true;
+    bool used_budget = false;
+    bool used_wcet_low = false;
   };
+
+  // Uses one of its limits, if there is one left.
+  bool exceed(Started &job, Time now) {
+    const Task &task = *tasks_[job.task.value].task;
+    if (task.wcet_low > 0 && !job.used_wcet_low) {
+      job.used_wcet_low = true;
+      scheduler_.exceed(job.slot, sched::Limit::WcetLow, now);
+      return true;
+    }
+    if (task.budget == 0 || job.used_budget) return false;
+    job.used_budget = true;
+    scheduler_.exceed(job.slot, sched::Limit::Budget, now);
+    return true;
+  }
+
+  std::vector<TaskRef> tasks_;
   sched::Scheduler &scheduler_;
   sched::Preemption preemption_;
   Rng rng_;
@@ -156,7 +177,7 @@ trace::Trace ManualDriver::run(const RunSpec &spec) {
   bool one_is_missing = last_task_is_alone(spec.workload);
   if (one_is_missing) at_first.dags.back().tasks.pop_back();
   sched::PriorityScheduler scheduler(at_first, trace.info.config);
-  RandomJobs jobs(scheduler, spec.preemption, spec.seed);
+  RandomJobs jobs(spec.workload, scheduler, spec.preemption, spec.seed);
   std::uint32_t most = sched::kNoLimit;
   const auto decide = [&](Time instant) {
     if (trace.info.stepped && jobs.rng().uniform01() < 0.3) {

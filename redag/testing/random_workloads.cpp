@@ -58,6 +58,8 @@ Task random_task(Rng &rng, std::size_t index, const RandomWorkloadLimits &limits
   if (chance(rng, 0.4)) task.priority = static_cast<int>(rng.uniform(-2, 2));
   if (limits.groups && chance(rng, 0.4)) task.group = kGroups[between(rng, 0, kGroups.size() - 1)];
   if (limits.overlap && task.group.empty() && chance(rng, 0.15)) task.concurrency = between(rng, 2, 3);
+  task.on_budget = static_cast<OnBudget>(between(rng, 0, 3));
+  task.budget = task.on_budget == OnBudget::Abort ? 0 : kMicrosecond * rng.uniform(1, 6);
   if (limits.bounds && chance(rng, 0.3)) {
     task.overrun = Overrun::Queue;
     task.queue_depth = between(rng, 1, 3);
@@ -73,6 +75,11 @@ Dag random_dag(Rng &rng, const RandomWorkloadLimits &limits) {
   if (limits.bounds && chance(rng, 0.5)) dag.max_active = between(rng, 1, 3);
   if (limits.bounds && chance(rng, 0.3)) dag.max_pending = between(rng, 1, 4);
   dag.criticality = static_cast<Criticality>(between(rng, 0, 2));
+  if (dag.criticality != Criticality::High) {
+    dag.degrade.kind = static_cast<Degrade::Kind>(between(rng, 0, 2));
+    dag.degrade.skip = between(rng, 1, 2);
+    dag.degrade.stretch = 1 + 2 * rng.uniform01();
+  }
   const bool one_rate = chance(rng, 0.5);
   const Duration period = random_period(rng);
   const Duration offset = random_offset(rng);
@@ -121,14 +128,17 @@ std::string describe(const Workload &workload, const sched::Config &config) {
                   static_cast<int>(config.preemption), to_string(config.policy), config.levels, config.max_started);
   std::size_t id = 0;
   for (const Dag &dag : workload.dags) {
-    text += fmt::format("dag {}: max_active {}, max_pending {}, criticality {}\n", dag.name, dag.max_active,
-                        dag.max_pending, to_string(dag.criticality));
+    text += fmt::format("dag {}: max_active {}, max_pending {}, criticality {}, degrade {} {} {}\n", dag.name,
+                        dag.max_active, dag.max_pending, to_string(dag.criticality), static_cast<int>(dag.degrade.kind),
+                        dag.degrade.skip, dag.degrade.stretch);
     for (const Task &task : dag.tasks) {
       text += fmt::format(
-          "  task {}: {}, T {}, D {}, offset {}, after {{{}}}, group '{}', concurrency {}, queue {}, priority {}\n",
+          "  task {}: {}, T {}, D {}, offset {}, after {{{}}}, group '{}', concurrency {}, queue {}, priority {}, "
+          "on_budget "
+          "{}\n",
           id++, to_string(task.activation), format_duration(task.period), format_duration(task.deadline),
           format_duration(task.offset), fmt::join(task.predecessors, ","), task.group, task.concurrency,
-          task.overrun == Overrun::Queue ? task.queue_depth : 0, task.priority.value_or(0));
+          task.overrun == Overrun::Queue ? task.queue_depth : 0, task.priority.value_or(0), to_string(task.on_budget));
     }
   }
   return text;

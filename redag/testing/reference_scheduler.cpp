@@ -1,6 +1,7 @@
 #include "redag/testing/reference_scheduler.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <tuple>
 
@@ -150,6 +151,10 @@ std::size_t ReferenceScheduler::new_job(std::size_t task, Time release, Time now
 void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, const std::vector<Data> &consumed) {
   TaskState &state = tasks_[task];
   const std::size_t job = new_job(task, release, now);
+  if (const Reason reason = refusal(task, release); reason != Reason::None) {
+    skip(job, now, reason);
+    return;
+  }
   jobs_[job].consumed = consumed;
   for (const std::size_t other : jobs_of(task, State::Waiting)) {
     if (other != job) skip(other, now, Reason::Precedence);
@@ -255,6 +260,91 @@ void ReferenceScheduler::deliver(std::size_t job, Time now) {
   }
 }
 
+// ---- "Budgets" and "Criticality"
+// -------------------------------------------------------------------------------------
+
+void ReferenceScheduler::exceed(JobSlot slot, sched::Limit limit, Time now) {
+  const std::size_t job = slot.value;
+  const std::size_t task = jobs_[job].task;
+  if (limit == sched::Limit::WcetLow) {
+    if (!is_degradable(task) && !high_mode_ && !closed_) begin_high_mode(job, now);
+    return;
+  }
+  emit(JobEventKind::Exceeded, job, now, 0, jobs_[job].worker);
+  if (tasks_[task].task.on_budget == OnBudget::Demote) demote(job);
+  const bool has_next = !tasks_[task].removed && !closed_;
+  if (tasks_[task].task.on_budget == OnBudget::SkipNext && has_next) tasks_[task].skips_next = true;
+}
+
+bool ReferenceScheduler::is_degradable(std::size_t task) const {
+  return dags_[tasks_[task].dag].dag.criticality != Criticality::High;
+}
+
+Reason ReferenceScheduler::refusal(std::size_t task, Time release) {
+  TaskState &state = tasks_[task];
+  if (state.skips_next) {
+    state.skips_next = false;
+    return Reason::Budget;
+  }
+  if (!high_mode_ || !is_degradable(task)) return Reason::None;
+  const Degrade &degrade = dags_[state.dag].dag.degrade;
+  if (degrade.kind == Degrade::Kind::Stop) return Reason::Degraded;
+  if (state.task.activation == Activation::Data) return Reason::None;
+  const bool too_soon = degrade.kind == Degrade::Kind::Skip ? state.to_skip > 0 : release < state.not_before;
+  if (too_soon) {
+    if (state.to_skip > 0) --state.to_skip;
+    return Reason::Degraded;
+  }
+  if (degrade.kind == Degrade::Kind::Skip) {
+    state.to_skip = degrade.skip;
+  } else {
+    state.not_before =
+        release + static_cast<Duration>(std::ceil(degrade.stretch * static_cast<double>(state.task.period)));
+  }
+  return Reason::None;
+}
+
+void ReferenceScheduler::begin_high_mode(std::size_t cause, Time now) {
+  emit(JobEventKind::HighMode, cause, now, 0, jobs_[cause].worker);
+  high_mode_ = true;
+  mode_cause_ = cause;
+  high_since_ = now;
+  // The newest first: of the data that nobody used, the newest is left.
+  for (std::size_t job = jobs_.size(); job-- > 0;) {
+    const std::size_t heir_of = jobs_[job].heir_of;
+    if (heir_of != kNone && is_degradable(jobs_[heir_of].task)) jobs_[job].heir_of = kNone;
+    if (jobs_[job].state == State::Done || !is_degradable(jobs_[job].task)) continue;
+    started(jobs_[job]) ? demote(job) : skip(job, now, Reason::Degraded);
+  }
+  for (TaskState &state : tasks_) {
+    state.to_skip = 0;
+    state.not_before = std::numeric_limits<Time>::min();
+  }
+}
+
+void ReferenceScheduler::end_high_mode(Time now) {
+  for (const Job &job : jobs_) {
+    if (job.state == State::Ready || started(job)) return;
+  }
+  emit(JobEventKind::LowMode, mode_cause_, now, high_since_, WorkerId::kNoneValue);
+  for (std::size_t task = 0; task < tasks_.size(); ++task) {
+    if (!is_degradable(task)) continue;
+    for (const std::size_t job : jobs_of(task, State::Waiting)) skip(job, now, Reason::Degraded);
+    for (Data &input : tasks_[task].inputs) input.fresh = false;
+  }
+  high_mode_ = false;
+}
+
+void ReferenceScheduler::demote(std::size_t job) {
+  if (jobs_[job].demoted) return;
+  jobs_[job].demoted = true;
+  jobs_[job].heir_of = kNone;
+}
+
+bool ReferenceScheduler::is_demoted(const Job &job) const {
+  return job.demoted || (high_mode_ && is_degradable(job.task));
+}
+
 void ReferenceScheduler::preemption_point(JobSlot job, Time /*now*/) {
   if (config_.preemption == Preemption::Cooperative) jobs_[job.value].at_point = true;
 }
@@ -307,6 +397,8 @@ const ReferenceScheduler::Job &ReferenceScheduler::effective(std::size_t job) co
 bool ReferenceScheduler::key_before(const Job &a, const Job &b) const {
   const TaskState &ta = tasks_[a.task];
   const TaskState &tb = tasks_[b.task];
+  if (is_demoted(a) != is_demoted(b)) return is_demoted(b);
+  if (is_demoted(a)) return std::tie(ta.rank, a.number) < std::tie(tb.rank, b.number);
   if (config_.policy == PolicyKind::Edf) {
     if (a.deadline != b.deadline) return a.deadline < b.deadline;
   }
@@ -319,12 +411,20 @@ bool ReferenceScheduler::shares_levels() const {
 }
 
 std::uint32_t ReferenceScheduler::level_of(std::size_t job) const {
-  return std::min(tasks_[jobs_[job].task].level, tasks_[effective(job).task].level);
+  const auto level = [this](const Job &j) {
+    const auto below_all = config_.levels > 0
+                               ? config_.levels
+                               : static_cast<std::uint32_t>(std::count_if(
+                                     tasks_.begin(), tasks_.end(), [](const TaskState &task) { return !task.gone; }));
+    return is_demoted(j) ? below_all : tasks_[j.task].level;
+  };
+  return std::min(level(jobs_[job]), level(effective(job)));
 }
 
 /// Does `a` take the worker of `b`, which has started?
 bool ReferenceScheduler::outranks(std::size_t a, std::size_t b) const {
   if (config_.policy == PolicyKind::Fifo) return false;  // what runs became ready earlier, or had to wait
+  if (is_demoted(effective(a)) && is_demoted(effective(b))) return false;  // all on one level
   if (shares_levels()) return level_of(a) < level_of(b);
   return key_before(effective(a), effective(b));
 }
@@ -355,6 +455,7 @@ Step ReferenceScheduler::dispatch(Time now, std::uint32_t most) {
   }
   if (config_.preemption == Preemption::Cooperative) resume_uncovered(now);
   for (Job &job : jobs_) job.at_point = false;
+  if (high_mode_) end_high_mode(now);
   tell_levels();
   step_events_.swap(events_);
   events_.clear();

@@ -19,6 +19,8 @@ class ReferenceScheduler final : public sched::Scheduler {
   void release(TaskId task, Time nominal, Time now) override;
   void miss(TaskId task, Time nominal, Time now, Reason reason) override;
   void complete(JobSlot job, Time now, sched::Outcome outcome) override;
+  void exceed(JobSlot job, sched::Limit limit, Time now) override;
+  [[nodiscard]] bool high_mode() const override { return high_mode_; }
   void preemption_point(JobSlot job, Time now) override;
   sched::Step dispatch(Time now, std::uint32_t most = sched::kNoLimit) override;
   [[nodiscard]] bool outranked(JobSlot job) const override;
@@ -55,6 +57,9 @@ class ReferenceScheduler final : public sched::Scheduler {
     std::uint32_t next_number = 0;
     std::uint32_t rank = 0;
     std::uint32_t level = 0;
+    bool skips_next = false;
+    std::uint32_t to_skip = 0;  // HI mode: releases
+    Time not_before = 0;
     sched::Accounting count;
   };
 
@@ -81,7 +86,8 @@ class ReferenceScheduler final : public sched::Scheduler {
     std::uint32_t told_level = UINT32_MAX;  // what the driver knows
     bool at_point = false;                  // until the next dispatch
     std::size_t heir_of = kNone;            // job whose priority this one has inherited
-    std::vector<Data> consumed;             // parallel to the task's predecessors
+    bool demoted = false;
+    std::vector<Data> consumed;  // parallel to the task's predecessors
   };
 
   /// A worker's jobs, the lowest first; only the last one can be running.
@@ -101,6 +107,13 @@ class ReferenceScheduler final : public sched::Scheduler {
   void resolve(std::size_t job, Time now);
   void deliver(std::size_t job, Time now);
   void skip(std::size_t job, Time now, Reason reason);
+
+  [[nodiscard]] bool is_degradable(std::size_t task) const;
+  [[nodiscard]] Reason refusal(std::size_t task, Time release);
+  void begin_high_mode(std::size_t cause, Time now);
+  void end_high_mode(Time now);
+  void demote(std::size_t job);
+  [[nodiscard]] bool is_demoted(const Job &job) const;
 
   [[nodiscard]] bool started(const Job &job) const;
   [[nodiscard]] std::vector<std::size_t> jobs_of(std::size_t task, State state) const;
@@ -131,6 +144,9 @@ class ReferenceScheduler final : public sched::Scheduler {
   std::vector<Stack> workers_;
   std::uint64_t ready_count_ = 0;
   bool closed_ = false;
+  bool high_mode_ = false;
+  std::size_t mode_cause_ = kNone;
+  Time high_since_ = 0;
   std::vector<JobEvent> events_;
   std::vector<sched::Dispatch> dispatches_;
   std::vector<JobEvent> step_events_;

@@ -42,13 +42,14 @@ std::vector<JobEvent> normalised(const Step &step, const std::set<TaskId> &uncou
   }
   const auto order_class = [](const JobEvent &event) {
     if (event.kind == JobEventKind::Resumed) return 1;
-    return event.reason == Reason::Removed ? 2 : 0;
+    return event.reason == Reason::Removed || event.reason == Reason::Degraded ? 2 : 0;
   };
   for (auto first = events.begin(); first != events.end();) {
     const int its_class = order_class(*first);
-    const auto last = its_class == 0 ? first + 1 : std::find_if(first, events.end(), [&](const JobEvent &e) {
-      return order_class(e) != its_class;
-    });
+    const bool alone = its_class == 0 || first->kind == JobEventKind::Released;
+    const auto last =
+        alone ? first + 1
+              : std::find_if(first, events.end(), [&](const JobEvent &e) { return order_class(e) != its_class; });
     std::sort(first, last, [](const JobEvent &a, const JobEvent &b) {
       return std::tie(a.worker, a.task, a.job) < std::tie(b.worker, b.task, b.job);
     });
@@ -96,6 +97,7 @@ class Run {
       case Kind::Miss: release(step.choice, true); break;
       case Kind::Complete: complete(step.choice); break;
       case Kind::PreemptionPoint: preemption_point(step.choice); break;
+      case Kind::Exceed: exceed(step.choice); break;
       case Kind::Dispatch: return dispatch();
       case Kind::DispatchSome: return dispatch_some(step.choice);
       case Kind::AddDag: add_dag(step.choice); break;
@@ -189,6 +191,19 @@ class Run {
     const JobKey key = jobs[choice % jobs.size()];
     tested_->preemption_point(tested_.slot(key), now_);
     expected_->preemption_point(expected_.slot(key), now_);
+  }
+
+  void exceed(std::uint8_t choice) {
+    std::vector<JobKey> jobs;
+    for (const auto &[key, state] : jobs_) {
+      if (state == State::Running || config_.preemption == Preemption::Full) jobs.push_back(key);
+    }
+    if (jobs.empty()) return;
+    const JobKey key = jobs[choice / 4U % jobs.size()];
+    const auto limit = choice % 4 == 0 ? sched::Limit::WcetLow : sched::Limit::Budget;
+    if (!exceeded_.emplace(key, limit).second) return;
+    tested_->exceed(tested_.slot(key), limit, now_);
+    expected_->exceed(expected_.slot(key), limit, now_);
   }
 
   void add_dag(std::uint8_t choice) {
@@ -295,6 +310,7 @@ class Run {
   std::vector<Time> releases_;  // next one of each task
   std::vector<Duration> periods_;
   std::map<JobKey, State> jobs_;  // started and unfinished
+  std::set<std::pair<JobKey, sched::Limit>> exceeded_;
 };
 
 const char *name_of(Kind kind) {
@@ -304,6 +320,7 @@ const char *name_of(Kind kind) {
     case Kind::Miss: return "miss";
     case Kind::Complete: return "complete";
     case Kind::PreemptionPoint: return "point";
+    case Kind::Exceed: return "exceed";
     case Kind::Dispatch: return "dispatch";
     case Kind::DispatchSome: return "dispatch_some";
     case Kind::AddDag: return "add";
@@ -325,6 +342,7 @@ Script random_script(std::uint64_t seed, std::size_t length, bool reconfigure) {
   const double release = 0.3 + 0.5 * rng.uniform01();
   const double point = 0.2 * rng.uniform01();
   const double advance = 0.1 + 0.5 * rng.uniform01();
+  const double exceed = rng.uniform01() < 0.5 ? 0 : 0.15 * rng.uniform01();
   const double limited = rng.uniform01() < 0.5 ? 0 : 0.5 * rng.uniform01();
   constexpr std::array<Kind, 6> kReconfigurations{Kind::AddDag,     Kind::RemoveDag, Kind::AddTask,
                                                   Kind::RemoveTask, Kind::SetTiming, Kind::SetTiming};
@@ -336,6 +354,8 @@ Script random_script(std::uint64_t seed, std::size_t length, bool reconfigure) {
       step.kind = rng.uniform01() < limited ? Kind::DispatchSome : Kind::Dispatch;
     } else if (reconfigure && rng.uniform01() < 0.06) {
       step.kind = kReconfigurations.at(static_cast<std::size_t>(rng.uniform(0, kReconfigurations.size() - 1)));
+    } else if (rng.uniform01() < exceed) {
+      step.kind = Kind::Exceed;
     } else if (kind < release) {
       step.kind = rng.uniform01() < 0.05 ? Kind::Miss : Kind::Release;
     } else if (kind < release + point) {

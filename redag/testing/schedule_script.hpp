@@ -21,6 +21,7 @@ struct ScriptStep {
     Miss,
     Complete,
     PreemptionPoint,
+    Exceed,  // a budget, or a wcet_low
     Dispatch,
     DispatchSome,  // with a limit
     AddDag,

@@ -17,8 +17,6 @@ namespace redag::trace {
 namespace {
 
 constexpr std::string_view kFormat = "redag.events/1";
-constexpr auto kLastKind = JobEventKind::Aborted;
-constexpr auto kLastReason = Reason::NoData;
 
 // One event: [time,"kind",task,job,worker,value,"reason"]; worker -1: none. Millions of lines are read, so this form is
 // read by hand; it is JSON all the same.
@@ -63,10 +61,11 @@ class LineReader {
 bool read_event(std::string_view line, JobEvent &event) {
   LineReader in(line);
   std::int64_t worker = -1;
-  const bool well_formed = in.skip('[') && in.read(event.time) && in.skip(',') && in.read_name(event.kind, kLastKind) &&
-                           in.skip(',') && in.read(event.task.value) && in.skip(',') && in.read(event.job) &&
-                           in.skip(',') && in.read(worker) && in.skip(',') && in.read(event.value) && in.skip(',') &&
-                           in.read_name(event.reason, kLastReason) && in.skip(']') && in.at_end();
+  const bool well_formed = in.skip('[') && in.read(event.time) && in.skip(',') &&
+                           in.read_name(event.kind, kLastJobEventKind) && in.skip(',') && in.read(event.task.value) &&
+                           in.skip(',') && in.read(event.job) && in.skip(',') && in.read(worker) && in.skip(',') &&
+                           in.read(event.value) && in.skip(',') && in.read_name(event.reason, kLastReason) &&
+                           in.skip(']') && in.at_end();
   if (!well_formed || worker < -1 || worker >= kMaxWorkers) return false;
   event.worker = worker < 0 ? WorkerId::kNoneValue : static_cast<std::uint32_t>(worker);
   return true;

@@ -28,6 +28,8 @@ class WaitSetScheduler final : public Lifecycle {
   /// Requires config.workers > 0 and Preemption::None; 1 worker is the SingleThreadedExecutor.
   WaitSetScheduler(const Workload &workload, const Config &config);
 
+  /// Nothing: these executors know neither budgets nor criticality.
+  void exceed(JobSlot /*job*/, Limit /*limit*/, Time /*now*/) override {}
   void preemption_point(JobSlot job, Time now) override;
   Step dispatch(Time now, std::uint32_t most = kNoLimit) override;
   [[nodiscard]] bool outranked(JobSlot /*job*/) const override { return false; }
@@ -44,6 +46,7 @@ class WaitSetScheduler final : public Lifecycle {
   void on_ready(std::uint32_t slot) override;
   void on_withdrawn(std::uint32_t slot) override;
   void on_end(std::uint32_t slot) override;
+  void on_lowered(std::uint32_t /*slot*/) override {}
   void on_reconfigured() override;
 
   [[nodiscard]] std::uint32_t free_worker() const;

@@ -1,0 +1,32 @@
+// The checker's rules about budgets and modes: who has used what, and when HI mode begins and ends. What is skipped for
+// it is ReleaseRules' business, who is demoted Replay's. Sees each event before the replay applies it. Internal to
+// metrics/.
+#pragma once
+
+#include "redag/metrics/check_context.hpp"
+
+namespace redag::metrics {
+
+class OverloadRules {
+ public:
+  explicit OverloadRules(CheckContext &context) : context_(context) {}
+
+  void before(const JobEvent &event);
+  /// Time is about to move on.
+  void end_of_instant();
+
+ private:
+  void exceeded(const JobEvent &event, const LiveJob &job);
+  void high_mode(const JobEvent &event, const LiveJob *job);
+  void low_mode(const JobEvent &event);
+  void ended(const JobEvent &event, const LiveJob &job);
+  void check_used(const JobEvent &event, const LiveJob &job, Duration limit, const char *what);
+  [[nodiscard]] bool is_idle() const;
+  [[nodiscard]] bool exact() const {
+    return context_.info.driver == trace::Driver::Simulator && context_.info.overheads.empty();
+  }
+
+  CheckContext &context_;
+};
+
+}  // namespace redag::metrics
