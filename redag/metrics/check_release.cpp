@@ -137,7 +137,6 @@ void ReleaseRules::expect_skips(const JobEvent &event) {
 Reason ReleaseRules::refusal(const JobEvent &event) {
   TaskState &task = tasks_[event.task.value];
   Refusals &refusals = task.refusals;
-  task.before_release = refusals;
   if (refusals.skips_next) {
     refusals.skips_next = false;
     return Reason::Budget;
@@ -235,7 +234,6 @@ void ReleaseRules::skipped(const JobEvent &event, const LiveJob *job) {
   }
   if (event.reason == Reason::Removed) return;
   if (is_miss(event)) {
-    task.refusals = task.before_release;
     std::erase_if(expected_skips_, [&](const ExpectedSkip &skip) { return skip.task == event.task; });
     return;
   }

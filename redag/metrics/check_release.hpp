@@ -44,7 +44,6 @@ class ReleaseRules {
     Time data_origin = 0;  // of the data job released last
     bool touched = false;
     Refusals refusals;
-    Refusals before_release;  // what they were before the last one: a release that the driver missed counts for none
   };
   struct ExpectedSkip {
     TaskId task;

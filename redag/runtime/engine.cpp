@@ -126,14 +126,14 @@ Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot bel
     self.events.push(
         JobEvent{begun, begun, job.task, job.number, job.worker.value, JobEventKind::Started, Reason::None, 0});
   }
-  RunningJob running{this, self.index, &self.outranked,      job.task, job.slot, assignment.entry->budget,
-                     cpu,  0,          RunningJob::current()};
+  RunningJob running{this, self.index, &self.outranked, job.task, job.slot, kNever, cpu, 0, RunningJob::current()};
+  running.limit = assignment.entry->next_limit(running);
   RunningJob::set_current(&running);
   const Outcome outcome = call(assignment);
   RunningJob::set_current(running.below);
   const Duration used = running.total >= 0 ? running.total : running.cpu_time();
   cpu += running.cpu_on_top + used;
-  return finish(self, assignment, outcome, used, below);
+  return finish(self, assignment, running, outcome, used, below);
 }
 
 Outcome Engine::call(const Assignment &assignment) {
@@ -147,7 +147,8 @@ Outcome Engine::call(const Assignment &assignment) {
   }
 }
 
-Engine::Next Engine::finish(Thread &self, const Assignment &assignment, Outcome outcome, Duration used, JobSlot below) {
+Engine::Next Engine::finish(Thread &self, const Assignment &assignment, RunningJob &running, Outcome outcome,
+                            Duration used, JobSlot below) {
   Body doomed;  // of a removed task; destroyed without the lock
   const Time at = now();
   Locked locked(*this);
@@ -158,6 +159,10 @@ Engine::Next Engine::finish(Thread &self, const Assignment &assignment, Outcome 
   if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
   self.stack.pop_back();
   --unfinished_;
+  if (used > running.limit) {
+    running.used_budget = running.used_budget || outcome == Outcome::BudgetExceeded;
+    report_limits(running, used, at);
+  }
   scheduler_->complete(assignment.job.slot, at, outcome);
   const Next next = decide(locked, at, &self == caller_.get() ? nullptr : &self, below);
   if (unfinished_ == 0 && halted_at_ != kNever) idle_event_.set();
@@ -166,6 +171,34 @@ Engine::Next Engine::finish(Thread &self, const Assignment &assignment, Outcome 
 }
 
 void RunningJob::reach_preemption_point() { engine->preemption_point(*this); }
+
+void RunningJob::reach_limit(Duration used) { engine->reach_limit(*this, used); }
+
+// At a preemption point: what the job has used is told to the scheduler, or ends the job.
+void Engine::reach_limit(RunningJob &job, Duration used) {
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  const TaskEntry &entry = tasks_[job.task.value];
+  const bool cut_off = entry.cuts_off && entry.budget > 0 && used > entry.budget;
+  job.used_budget = job.used_budget || cut_off;
+  report_limits(job, used, at);
+  decide(locked, at, nullptr, JobSlot());
+  if (cut_off) throw BudgetExceeded{};
+}
+
+void Engine::report_limits(RunningJob &job, Duration used, Time now) {
+  const TaskEntry &entry = tasks_[job.task.value];
+  if (entry.wcet_low > 0 && used > entry.wcet_low && !job.used_wcet_low) {
+    job.used_wcet_low = true;
+    scheduler_->exceed(job.slot, sched::Limit::WcetLow, now);
+  }
+  if (entry.budget > 0 && used > entry.budget && !job.used_budget) {
+    job.used_budget = true;
+    scheduler_->exceed(job.slot, sched::Limit::Budget, now);
+  }
+  job.limit = entry.next_limit(job);
+}
 
 void Engine::preemption_point(RunningJob &job) {
   Thread &self = *threads_[job.thread];
@@ -339,7 +372,9 @@ void Engine::register_task(TaskId id, const Task &task, Body &body) {
   entry = TaskEntry{};
   entry.body.swap(body);
   entry.wcet = task.wcet;
+  entry.wcet_low = task.wcet_low;
   entry.budget = task.budget;
+  entry.cuts_off = task.on_budget == OnBudget::Abort;
   entry.concurrency = task.concurrency;
   for (auto &thread : threads_) thread->stack.reserve(most_started_);
 }

@@ -160,9 +160,12 @@ class Engine {
   void main(Thread &self) noexcept;
   Next run(Thread &self, const Assignment &assignment, JobSlot below, Duration &cpu) noexcept;
   sched::Outcome call(const Assignment &assignment);
-  Next finish(Thread &self, const Assignment &assignment, sched::Outcome outcome, Duration used, JobSlot below);
+  Next finish(Thread &self, const Assignment &assignment, RunningJob &running, sched::Outcome outcome, Duration used,
+              JobSlot below);
   void preemption_point(RunningJob &job);
+  void reach_limit(RunningJob &job, Duration used);
 
+  void report_limits(RunningJob &job, Duration used, Time now) REDAG_REQUIRES(lock_);
   Next decide(Locked &locked, Time now, Thread *self, JobSlot below) REDAG_REQUIRES(lock_);
   Next place_on_workers(Locked &locked, const sched::Step &step, Thread *self, JobSlot below) REDAG_REQUIRES(lock_);
   Next place_on_pool(Locked &locked, const sched::Step &step, Thread *self) REDAG_REQUIRES(lock_);

@@ -17,9 +17,19 @@ struct Engine::TaskEntry {
     if (budget > 0 && used > budget) ++usage.over_budget;
   }
 
+  /// Processor time of the next limit that a job looks at, given what it has used before.
+  [[nodiscard]] Duration next_limit(const RunningJob &job) const {
+    Duration next = kNever;
+    if (wcet_low > 0 && !job.used_wcet_low) next = wcet_low;
+    if (budget > 0 && (cuts_off || !job.used_budget)) next = std::min(next, budget);
+    return next;
+  }
+
   Body body;
   Duration wcet = 0;
+  Duration wcet_low = 0;
   Duration budget = 0;
+  bool cuts_off = false;  // on_budget: abort
   Usage usage;
   std::uint64_t withdrawn = 0;    // jobs taken away at the end
   std::uint32_t concurrency = 0;  // jobs that can be in progress

@@ -21,7 +21,10 @@ Duration RunningJob::cpu_time() const noexcept { return thread_cpu_now() - cpu_s
 void preemption_point() {
   runtime::RunningJob *job = runtime::RunningJob::current();
   if (job == nullptr) return;
-  if (job->budget > 0 && job->cpu_time() > job->budget) throw BudgetExceeded{};
+  if (job->limit != kNever) {
+    const Duration used = job->cpu_time();
+    if (used > job->limit) job->reach_limit(used);
+  }
   if (job->outranked->load(std::memory_order_relaxed)) job->reach_preemption_point();
 }
 

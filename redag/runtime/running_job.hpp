@@ -17,13 +17,16 @@ struct RunningJob {
   const Atomic<bool> *outranked = nullptr;  // set while a more urgent job could run on top
   TaskId task;
   JobSlot slot;
-  Duration budget = 0;      // 0: none
+  Duration limit = kNever;  // processor time of the next of its limits that is to be looked at; kNever: none
   Duration cpu_start = 0;   // of the thread, when the body began
   Duration cpu_on_top = 0;  // used by jobs that ran on top of this one
   RunningJob *below = nullptr;
-  Duration total = -1;  // the whole job's, once that is known
+  Duration total = -1;         // the whole job's, once that is known
+  bool used_wcet_low = false;  // and the scheduler was told; written under the engine's lock
+  bool used_budget = false;
 
   void reach_preemption_point();
+  void reach_limit(Duration used);
   [[nodiscard]] Duration cpu_time() const noexcept;
   /// For a body that is about to return and wants to know: the engine then need not read the clock again.
   Duration close() noexcept { return total = cpu_time(); }

@@ -32,7 +32,7 @@ std::vector<Body> synthetic_bodies(const Workload &workload, std::uint64_t seed,
   for (const TaskRef &ref : flatten(workload)) {
     bodies.emplace_back([task = ref.task, seed, &give_up](const Job &job) {
       const Duration demand = execution_time(*task, job.task, job.number, seed);
-      const bool cut_off = task->budget > 0 && demand > task->budget;
+      const bool cut_off = task->on_budget == OnBudget::Abort && task->budget > 0 && demand > task->budget;
       burn(cut_off ? task->budget : demand, task->region, give_up);
       return cut_off ? sched::Outcome::BudgetExceeded : sched::Outcome::Finished;
     });

@@ -25,14 +25,14 @@ void Lifecycle::release(TaskId task, Time nominal, Time now) {
   REDAG_CHECK(task.value < tasks_.size(), "release of a task that does not exist");
   REDAG_CHECK(tasks_[task.value].timer, "data tasks are released by their predecessors");
   begin(now);
-  TaskState &state = tasks_[task.value];
-  if (state.life != TaskLife::Live) return;
-  if (restricted_) {
-    if (closed_) return;
-    const Reason reason = refusal(state, nominal);
-    if (reason != Reason::None) return refuse(task, nominal, reason);
-  }
-  admit(task, nominal, nominal);
+  if (tasks_[task.value].life != TaskLife::Live) return;
+  restricted_ ? admit_or_refuse(task, nominal, nominal) : admit(task, nominal, nominal);
+}
+
+void Lifecycle::admit_or_refuse(TaskId id, Time nominal, Time origin) {
+  if (closed_) return;
+  const Reason reason = refusal(tasks_[id.value], nominal);
+  reason == Reason::None ? admit(id, nominal, origin) : refuse(id, nominal, reason);
 }
 
 void Lifecycle::miss(TaskId id, Time nominal, Time now, Reason reason) {
@@ -40,7 +40,9 @@ void Lifecycle::miss(TaskId id, Time nominal, Time now, Reason reason) {
   TaskState &task = tasks_[id.value];
   REDAG_CHECK(task.timer, "data tasks are released by their predecessors");
   begin(now);
-  if (takes_releases(task)) refuse(id, nominal, reason);
+  if (!takes_releases(task)) return;
+  const Reason refused = restricted_ ? refusal(task, nominal) : Reason::None;
+  refuse(id, nominal, refused == Reason::None ? reason : refused);
 }
 
 void Lifecycle::refuse(TaskId id, Time nominal, Reason reason) {
@@ -73,15 +75,11 @@ void Lifecycle::complete(JobSlot job_slot, Time now, Outcome outcome) {
   if (outcome != Outcome::Finished || !takes_releases(task)) return;
 
   precedence_.on_complete(job.task, job.release, job.origin, [&](TaskId successor) {
-    TaskState &next = tasks_[successor.value];
+    const TaskState &next = tasks_[successor.value];
     if (next.life != TaskLife::Live) return;
     if (!next.timer) {
       const Time origin = precedence_.consume(successor);
-      if (restricted_) {
-        const Reason reason = refusal(next, now);
-        if (reason != Reason::None) return refuse(successor, now, reason);
-      }
-      admit(successor, now, origin);
+      restricted_ ? admit_or_refuse(successor, now, origin) : admit(successor, now, origin);
     } else if (next.waiting != kNil) {
       make_ready(next.waiting, precedence_.consume(successor));
     }
@@ -156,6 +154,7 @@ void Lifecycle::enter_high_mode(const Job &cause) {
   if (high_mode_ || closed_ || degrades(dag_states_[tasks_[cause.task.value].dag.value])) return;
   high_mode_ = true;
   refresh_restricted();
+  has_chores_ = true;
   mode_cause_ = cause;
   mode_cause_.worker = WorkerId();
   high_since_ = now_;
@@ -170,14 +169,16 @@ void Lifecycle::enter_high_mode(const Job &cause) {
   for (std::uint32_t slot = 0; slot < jobs_.size(); ++slot) {
     const Job &job = jobs_[slot];
     if (job.state == JobState::Free) continue;
-    if (!tasks_[job.task.value].degraded) {
-      if (job.started() && tasks_[job.priority_of.value].degraded) on_lowered(slot);  // whose place it has goes
-      continue;
-    }
     if (job.started()) {
-      demote(slot);
+      // What it inherited from a job that is skipped now goes, too.
+      if (tasks_[job.task.value].degraded && !job.demoted) {
+        demote(slot);
+      } else if (tasks_[job.priority_of.value].degraded) {
+        on_lowered(slot);
+      }
       continue;
     }
+    if (!tasks_[job.task.value].degraded) continue;
     const bool unused_data = job.state == JobState::Ready && tasks_[job.task.value].timer;
     const TaskId task = job.task;
     skip(slot, Reason::Degraded);

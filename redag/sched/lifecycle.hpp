@@ -126,11 +126,14 @@ class Lifecycle : public Scheduler {
   std::vector<Job> jobs_;
   std::vector<TaskState> tasks_;
   std::vector<DagState> dag_states_;
+  bool has_chores_ =
+      false;  // a dispatch has more to do than to decide: HI mode may end, or what the subclass sets it for
 
  private:
   static constexpr std::int64_t kDemotedKey = std::numeric_limits<std::int64_t>::max();
 
   void admit(TaskId id, Time nominal, Time origin);
+  void admit_or_refuse(TaskId id, Time nominal, Time origin);
   void refuse(TaskId id, Time nominal, Reason reason);
   [[nodiscard]] Reason refusal(TaskState &task, Time nominal);
   [[nodiscard]] static bool is_let_through(TaskState &task, const Degrade &degrade, Time nominal);

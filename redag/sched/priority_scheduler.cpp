@@ -29,9 +29,8 @@ Step PriorityScheduler::dispatch(Time now, std::uint32_t most) {
     if (starts) --most;
     run(best, place);
   }
-  put_back();
   close_open_workers();
-  if (high_mode()) restore_if_idle();
+  if (has_chores_) do_chores();
   return step();
 }
 
@@ -42,7 +41,14 @@ bool PriorityScheduler::set_aside(std::uint32_t slot) {
   remove(slot);
   jobs_[slot].next = aside_;
   aside_ = slot;
+  has_chores_ = true;
   return true;
+}
+
+void PriorityScheduler::do_chores() {
+  put_back();
+  if (high_mode()) restore_if_idle();
+  has_chores_ = high_mode();
 }
 
 void PriorityScheduler::put_back() {
@@ -205,10 +211,12 @@ void PriorityScheduler::on_lowered(std::uint32_t slot) {
   job.priority_of = job.task;
   if (is_queued) push(slot);
   if (job.state == JobState::Running && level_of(job) != old_level) change_level(slot, level_of(job));
-  // Jobs that wait for its group are looked at again, and it inherits from those that are left.
+  // Jobs that wait for its group are looked at again, and it inherits from those that are left. Among them are jobs
+  // that wait for a thread: the group comes first when they are looked at.
+  if (task_of(job).group == kNil) return;
   const TaskGates &held = task_gates_[job.task.value];
   for (std::uint32_t i = 0; i < held.count; ++i) {
-    if (held.kinds[i] != GateKind::Group) continue;
+    if (held.kinds[i] != GateKind::Group && held.kinds[i] != GateKind::Threads) continue;
     Gate &gate = gates_[held.gates[i]];
     for (std::uint32_t waiter = gate.parked.top(); waiter != kNil; waiter = gate.parked.top()) {
       gate.parked.remove(jobs_, waiter);

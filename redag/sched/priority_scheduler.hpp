@@ -65,6 +65,7 @@ class PriorityScheduler final : public Lifecycle {
   bool park_if_not_eligible(std::uint32_t slot);
   void inherit(std::uint32_t holder, const Job &waiter);
   void close_open_workers();
+  void do_chores();
   void restore_if_idle();
   bool set_aside(std::uint32_t slot);
   void put_back();

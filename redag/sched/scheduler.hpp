@@ -89,7 +89,8 @@ class Scheduler {
   virtual void release(TaskId task, Time nominal, Time now) = 0;
 
   /// A release of timer task `task` that is skipped at once, as `reason`: a period that the timer missed, a message
-  /// that the middleware overwrote. Nothing else happens to the task's jobs.
+  /// that the middleware overwrote. Nothing else happens to the task's jobs. One that would not be taken anyway (a
+  /// budget, HI mode) is skipped as that.
   virtual void miss(TaskId task, Time nominal, Time now, Reason reason) = 0;
 
   /// A dispatched job ended at `now` as `outcome`. Data tasks whose predecessors are now complete are released.

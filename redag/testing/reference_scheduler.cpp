@@ -131,7 +131,8 @@ void ReferenceScheduler::release(TaskId task, Time nominal, Time now) {
 
 void ReferenceScheduler::miss(TaskId task, Time nominal, Time now, Reason reason) {
   if (tasks_[task.value].removed || closed_) return;
-  skip(new_job(task.value, nominal, now), now, reason);
+  const Reason refused = refusal(task.value, nominal);
+  skip(new_job(task.value, nominal, now), now, refused == Reason::None ? reason : refused);
 }
 
 std::size_t ReferenceScheduler::new_job(std::size_t task, Time release, Time now) {
