@@ -86,6 +86,8 @@ class SchemaTest(unittest.TestCase):
             {"wcet": "1µs"},
             {"wcet": ".5ms"},
             {"concurrency": 2},
+            {"budget": "2ms", "on_budget": "skip_next"},
+            {"wcet_low": "1ms"},
             *({"callback": {"node": "/n", **of}} for of in CALLBACKS),
         ):
             with self.subTest(changes=changes):
@@ -107,10 +109,27 @@ class SchemaTest(unittest.TestCase):
             {"after": ["a", "a"]},
             {"concurrency": 0},
             {"concurrency": 1025},
+            {"on_budget": "kill"},
+            {"wcet_low": 1},
             *({"callback": callback} for callback in BAD_CALLBACKS),
         ):
             with self.subTest(changes=changes):
                 self.assertNotEqual(errors(with_task(**changes)), [])
+
+    def test_degrade(self):
+        for degrade, is_valid in (
+            ("stop", True),
+            ({"skip": 3}, True),
+            ({"stretch": 1.5}, True),
+            ("pause", False),
+            ({"skip": 0}, False),
+            ({"stretch": 0.5}, False),
+            ({"skip": 1, "stretch": 2}, False),
+        ):
+            with self.subTest(degrade=degrade):
+                document = with_task()
+                document["dags"][0]["degrade"] = degrade
+                self.assertEqual(errors(document) == [], is_valid)
 
     def test_only_a_callback_may_be_without_wcet(self):
         document = with_task(callback={"node": "/n", "timer": "any"})

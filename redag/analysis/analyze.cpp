@@ -15,7 +15,8 @@ void keep_tightest(std::vector<Tightest> &best, const std::vector<ResponseBound>
 MethodReport run(const System &system, const Method &method) {
   MethodReport report;
   report.method = &method;
-  report.outcome = system.not_analysable.empty() ? method.apply(system) : NotApplicable{system.not_analysable};
+  const bool is_covered = system.not_analysable.empty() || (system.has_modes && method.knows_modes);
+  report.outcome = is_covered ? method.apply(system) : NotApplicable{system.not_analysable};
   if (const Bound *bound = report.bound()) {
     report.verdict = verdict(system, *bound);
     report.trusted = bound->unsound.empty();

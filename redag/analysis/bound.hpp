@@ -52,9 +52,17 @@ struct NotApplicable {
   std::string reason;
 };
 
+/// What a task answers within in each mode (amc_rtb); nothing: no bound, or none is given in that mode.
+struct ModeResponses {
+  std::optional<Duration> low;     // a job that ends in LO mode
+  std::optional<Duration> high;    // one that is released in HI mode
+  std::optional<Duration> change;  // one that sees HI mode begin
+};
+
 struct Bound {
   std::vector<ResponseBound> tasks;  // by TaskId; empty: the method bounds no response times
   std::vector<ResponseBound> dags;   // by DagId, from the source's release to the finish of the last task; or empty
+  std::vector<ModeResponses> modes;  // by TaskId, of methods that know modes
   /// Tests that answer yes or no for all tasks together. True: every deadline is met. False: nothing is known.
   std::optional<bool> accepts;
   /// What the test compared, for people: "U = 0.812, limit 0.780".
@@ -77,6 +85,7 @@ struct Method {
   std::string_view assumptions;  // when it applies, in words
   std::string_view complexity;
   std::string_view sound_only_if;  // of the paper's own equations; empty: sound wherever it applies
+  bool knows_modes = false;        // applies where there is a HI mode (System::has_modes)
   std::function<Outcome(const System &system)> apply;
 
   [[nodiscard]] bool is_paper() const { return !sound_only_if.empty(); }

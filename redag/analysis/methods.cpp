@@ -1,4 +1,5 @@
 // The registry: one line a method, in the order of a report.
+#include "redag/analysis/amc.hpp"
 #include "redag/analysis/bound.hpp"
 #include "redag/analysis/dag_isolated.hpp"
 #include "redag/analysis/edf_demand.hpp"
@@ -23,6 +24,7 @@ const std::vector<Method> &methods() {
       dag_one_worker_deferred(),
       exact_points(),
       linear_bound(),
+      amc_rtb(),
       // One worker, edf
       edf_demand(),
       edf_demand_nonpreemptive(),

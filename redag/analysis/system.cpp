@@ -44,6 +44,8 @@ class Compiler {
         system_.platform.preempt_overhead > 0) {
       refuse("a preemption overhead on several workers");
     }
+    system_.has_modes = system_.not_analysable.empty() && !modes_.empty();
+    if (system_.has_modes) refuse(std::move(modes_));
     return std::move(system_);
   }
 
@@ -69,6 +71,7 @@ class Compiler {
     SystemDag compiled;
     compiled.name = dag.name;
     compiled.deadline = dag.deadline;
+    compiled.high = dag.criticality == Criticality::High;
     if (dag.max_active < dag.tasks.size()) compiled.max_active = dag.max_active;
     const auto first = static_cast<std::uint32_t>(system_.tasks.size());
     std::uint64_t waiting = 0;
@@ -95,6 +98,7 @@ class Compiler {
     const Duration lead = add(platform.release_overhead, platform.dispatch_overhead);
     compiled.overhead = system_.mode == sched::Preemption::None ? lead : add(lead, platform.preempt_overhead);
     compiled.wcet = add(task.wcet, compiled.overhead);
+    compiled.wcet_low = task.wcet_low > 0 ? add(task.wcet_low, compiled.overhead) : compiled.wcet;
     compiled.bcet = add(std::max<Duration>(1, task.bcet), compiled.overhead);
     compiled.period = task.period;
     compiled.deadline = task.deadline;
@@ -117,8 +121,15 @@ class Compiler {
     if (task.concurrency > 1) {
       refuse("task '" + compiled.name + "': jobs of a task with concurrency above 1 can overlap");
     }
-    if (task.budget > 0 && task.budget < task.wcet) {
-      refuse("task '" + compiled.name + "': its budget is below its wcet, so jobs can be cut off");
+    if (task.budget > 0 && task.budget < task.wcet && task.on_budget != OnBudget::Log) {
+      refuse("task '" + compiled.name + "': its budget is below its wcet, so jobs can be " +
+             (task.on_budget == OnBudget::Abort    ? "cut off"
+              : task.on_budget == OnBudget::Demote ? "demoted"
+                                                   : "skipped"));
+    }
+    if (task.wcet_low > 0 && task.wcet_low < task.wcet) {
+      modes_ = "task '" + compiled.name +
+               "': its wcet_low is below its wcet, so jobs of DAGs of lower criticality can be skipped in HI mode";
     }
     return compiled;
   }
@@ -281,6 +292,7 @@ class Compiler {
     return unit;
   }
 
+  std::string modes_;  // why there is a HI mode
   const Workload &workload_;
   System system_;
   std::map<std::string, std::uint32_t> group_ids_;

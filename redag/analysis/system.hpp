@@ -42,6 +42,7 @@ struct SystemTask {
   DagId dag;
   std::uint32_t unit = 0;
   Duration wcet = 0;      // C as charged: overheads included
+  Duration wcet_low = 0;  // C(LO) as charged; with modes, wcet is C(HI). The same as wcet where there is none
   Duration bcet = 0;      // as charged, > 0; bounds hold for shorter executions too, only the exploration reads it
   Duration overhead = 0;  // the part of `wcet` that is overhead
   Duration period = 0;    // T, least distance of two nominal releases of the unit
@@ -87,6 +88,7 @@ struct SystemDag {
   std::vector<std::uint32_t> tasks;  // TaskIds
   std::uint32_t max_active = 0;      // 0: no bound; never more than it has tasks
   Duration deadline = 0;             // end to end; 0: none
+  bool high = false;                 // of high criticality: never degraded
 };
 
 struct System {
@@ -103,6 +105,9 @@ struct System {
   std::string not_analysable;
   /// Fewer threads than tasks, which is enough as long as every response is within its period (jobs_in_progress.hpp).
   bool threads_suffice_if_bounded = false;
+  /// Some wcet_low is below its wcet, so that there is a HI mode, and that is all that not_analysable is about: methods
+  /// that know modes (Method::knows_modes) apply.
+  bool has_modes = false;
 
   /// The platform's mode, or None where it is cooperative and no task has a preemption point.
   sched::Preemption mode = sched::Preemption::Full;

@@ -107,7 +107,7 @@ std::string explain_bound(const Analysed &analysed, const Row &row, const Stream
 // Why nothing bounds it, what could not be asked, and who uses the workers.
 std::string explain_absence(const Analysed &analysed, const Row &row) {
   std::string text = fmt::format("why there is no bound: {}\n", row.reason);
-  if (!analysed.system.not_analysable.empty()) return text;
+  if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return text;
   std::vector<std::pair<std::string, std::string>> reasons;  // why not, and which methods say so
   for (const MethodReport &report : analysed.report.methods) {
     const auto *reason = std::get_if<analysis::NotApplicable>(&report.outcome);

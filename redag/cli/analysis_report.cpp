@@ -28,7 +28,7 @@ const Method *accepting_test(const Analysed &analysed) {
 
 // Why the trusted methods that could have bounded this response did not: the first to say so.
 std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_dag) {
-  if (!analysed.system.not_analysable.empty()) return analysed.system.not_analysable;
+  if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return analysed.system.not_analysable;
   for (const MethodReport &method : analysed.report.methods) {
     const analysis::Bound *bound = method.bound();
     if (!method.trusted || bound == nullptr) continue;
@@ -132,7 +132,7 @@ std::string remark(const Analysed &analysed, const MethodReport &report) {
 }
 
 std::string method_table(const Analysed &analysed, const StreamTraits &terminal) {
-  if (!analysed.system.not_analysable.empty()) {
+  if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) {
     return fmt::format("none of the {} methods applies: {}\n", analysed.report.methods.size(),
                        analysed.system.not_analysable);
   }
@@ -298,7 +298,7 @@ std::string verdict_in_words(const Analysed &analysed) {
     return fmt::format("not schedulable: the utilization, {:.3f}, is above what {} can do", needed,
                        plural(workers, "worker"));
   }
-  if (!analysed.system.not_analysable.empty()) {
+  if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) {
     return "not shown schedulable: no method takes this workload: " + analysed.system.not_analysable;
   }
   std::size_t late = 0;

@@ -37,6 +37,51 @@ TEST(ParseWorkload, GivesDefaults) {
   EXPECT_EQ(workload.dags.at(0).tasks.at(0), expected);
 }
 
+TEST(ParseWorkload, ReadsBudgetsAndCriticality) {
+  const Workload workload = read(R"(
+dags:
+  - name: hi
+    criticality: high
+    tasks:
+      - {name: a, wcet: 5ms, wcet_low: 2ms, period: 50ms, budget: 6ms, on_budget: demote}
+      - {name: b, wcet: 1ms, period: 50ms, budget: 2ms, on_budget: skip_next}
+  - {name: stopped, degrade: stop, tasks: [{name: t, wcet: 1ms, period: 50ms}]}
+  - {name: skipping, degrade: {skip: 3}, tasks: [{name: t, wcet: 1ms, period: 50ms}]}
+  - {name: stretched, degrade: {stretch: 2.5}, tasks: [{name: t, wcet: 1ms, period: 50ms}]}
+)");
+  EXPECT_EQ(workload.dags.at(0).tasks.at(0).wcet_low, 2 * kMillisecond);
+  EXPECT_EQ(workload.dags.at(0).tasks.at(0).on_budget, OnBudget::Demote);
+  EXPECT_EQ(workload.dags.at(0).tasks.at(1).on_budget, OnBudget::SkipNext);
+  EXPECT_EQ(workload.dags.at(1).degrade, Degrade{});
+  EXPECT_EQ(workload.dags.at(2).degrade, (Degrade{Degrade::Kind::Skip, 3, 2}));
+  EXPECT_EQ(workload.dags.at(3).degrade, (Degrade{Degrade::Kind::Stretch, 1, 2.5}));
+}
+
+TEST(ParseWorkload, ExplainsMistakesInBudgetsAndCriticality) {
+  const auto mistakes = [](std::string_view dag, std::string_view task) {
+    const std::string text =
+        fmt::format("dags:\n- {{name: d, {}tasks: [{{name: t, wcet: 5ms, period: 50ms{}}}]}}\n", dag, task);
+    const Result<LoadedWorkload> loaded = parse_workload(text, "w.yaml");
+    return loaded ? std::string() : to_string(loaded.error());
+  };
+  const auto says = [&](std::string_view dag, std::string_view task, std::string_view what) {
+    EXPECT_NE(mistakes(dag, task).find(what), std::string::npos) << mistakes(dag, task);
+  };
+  EXPECT_EQ(mistakes("criticality: high, ", ", wcet_low: 5ms"), "");
+  says("criticality: high, ", ", wcet_low: 6ms", "wcet_low 6ms of task 't' exceeds its wcet 5ms");
+  says("criticality: high, ", ", wcet_low: 0", "wcet_low must be greater than zero");
+  says("", ", wcet_low: 2ms", "DAG 'd' is not of high criticality");
+  says("", ", on_budget: log", "has 'on_budget: log' and no budget");
+  says("", ", budget: 5ms, on_budget: kill", "on_budget must be one of abort, log, demote, skip_next");
+  says("criticality: high, degrade: {skip: 2}, ", "", "of high criticality is never degraded");
+  says("degrade: {skip: 0}, ", "", "skip must be a whole number from 1");
+  says("degrade: {skip: 1000001}, ", "", "skip of DAG 'd' must be from 1 to 1000000, not 1000001");
+  says("degrade: {stretch: 0.5}, ", "", "stretch of DAG 'd' must be from 1 to 1000000, not 0.5");
+  says("degrade: {stretch: nan}, ", "", "stretch must be a number such as 2.5");
+  says("degrade: {skip: 2, stretch: 2}, ", "", "degrade is one of skip and stretch");
+  says("degrade: pause, ", "", "degrade must be one of stop, {skip: N}, {stretch: FACTOR}");
+}
+
 TEST(ParseWorkload, ReadsEveryKey) {
   const Workload workload = read(R"(
 name: all
@@ -551,11 +596,19 @@ Workload arbitrary_workload() {
   for (Dag &dag : workload.dags) {
     dag.max_pending = *rc::gen::inRange(0U, 3U);
     dag.deadline = *rc::gen::element<Duration>(0, 7 * kMillisecond);
+    if (dag.criticality != Criticality::High) {
+      dag.degrade = *rc::gen::element(Degrade{}, Degrade{Degrade::Kind::Skip, 3, 2},
+                                      Degrade{Degrade::Kind::Stretch, 1, 1.0 / 3 + 1});
+    }
     for (Task &task : dag.tasks) {
       task.name += *rc::gen::element<std::string>("", ": ", "#", " \"", "'", ",", "]", "\\", "\xC3\xA9");
       task.criticality = *rc::gen::element(Criticality::Low, Criticality::Normal, Criticality::High);
       task.region = *rc::gen::element<Duration>(0, 1, 50 * kMicrosecond);
       task.budget = *rc::gen::element<Duration>(0, task.wcet);
+      if (task.budget > 0) {
+        task.on_budget = *rc::gen::element(OnBudget::Abort, OnBudget::Log, OnBudget::Demote, OnBudget::SkipNext);
+      }
+      if (dag.criticality == Criticality::High) task.wcet_low = *rc::gen::element<Duration>(0, 1, task.wcet);
       if (*rc::gen::arbitrary<bool>()) task.execution = {ExecutionTime::Kind::Normal, task.wcet, 3, {}};
       if (*rc::gen::arbitrary<bool>()) task.execution = {ExecutionTime::Kind::Empirical, 0, 0, {task.wcet, task.wcet}};
       if (*rc::gen::arbitrary<bool>()) task.execution = {ExecutionTime::Kind::Constant, 0, 0, {}};

@@ -377,7 +377,8 @@ void WorkloadNodes::execute(TaskNode &task, const Job &job) {
     const auto number = static_cast<std::uint32_t>(job.number);
     record({now(), job.trigger, task.id, number, thread, JobEventKind::Started}, events);
     const Duration demand = redag::execution_time(*task.task, task.id, number, options_.seed);
-    const bool cut_off = task.task->budget > 0 && demand > task.task->budget;
+    const bool cut_off =
+        task.task->on_budget == redag::OnBudget::Abort && task.task->budget > 0 && demand > task.task->budget;
     use_processor(cut_off ? task.task->budget : demand, task.task->region);
     const Time finish = now();
     record({finish, finish, task.id, number, thread, cut_off ? JobEventKind::Aborted : JobEventKind::Finished,
@@ -494,6 +495,7 @@ redag::Workload WorkloadNodes::bound_workload() const {
     for (Task &task : dag.tasks) {
       const TaskNode &node = tasks_[next++];
       task.budget = 0;  // the body keeps it
+      task.on_budget = redag::OnBudget::Abort;
       const auto bind = [&](redag::Callback::Kind kind) -> redag::Callback & {
         Task *to = &task;
         if (task.callback) {

@@ -1,0 +1,150 @@
+#include "redag/analysis/amc.hpp"
+
+#include <algorithm>
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/one_worker.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using one_worker::FixedPoint;
+using one_worker::Interferer;
+using one_worker::Own;
+using one_worker::View;
+
+constexpr std::string_view kOnlyInLowMode = "HI mode degrades it: bounded in LO mode only";
+
+std::optional<std::string> why_not(const System &system) {
+  if (!system.has_modes) return "no task has a wcet_low below its wcet: there is no HI mode";
+  if (auto reason = one_worker::why_not(system)) return reason;
+  if (system.mode != sched::Preemption::Full) {
+    return "for full preemption; here jobs of lower criticality keep the worker in HI mode";
+  }
+  if (!system.groups.empty()) return "groups: a job of lower criticality that holds one runs on in HI mode";
+  if (system.platform.preempt_overhead > 0) return "an overhead of preemption: the change of mode preempts, too";
+  return std::nullopt;
+}
+
+// What a unit executes for in LO mode.
+Duration low_volume(const System &system, const Unit &unit) {
+  Duration sum = 0;
+  for (const std::uint32_t t : unit.tasks) sum = add(sum, system.tasks[t].wcet_low);
+  return sum;
+}
+
+// One job of the unit in the busy period: R <= T.
+Own own_of(const Unit &unit, Duration volume, Duration blocking) {
+  return Own{volume, unit.period, unit.jitter, std::min(unit.limit, unit.period), blocking, 0};
+}
+
+// Who is more urgent than a unit, in each mode.
+struct Others {
+  std::vector<Interferer> low;       // all of them, with C(LO)
+  std::vector<Interferer> high;      // those of high criticality, with C(HI)
+  std::vector<std::uint32_t> units;  // of `low`
+};
+
+Others others_of(const System &system, const View &view) {
+  Others others;
+  for (const std::uint32_t u : view.units) {
+    const Unit &unit = system.units[u];
+    others.units.push_back(u);
+    others.low.push_back(Interferer{low_volume(system, unit), unit.period, unit.jitter});
+    if (system.dags[unit.dag.value].high) others.high.push_back(Interferer{unit.volume, unit.period, unit.jitter});
+  }
+  return others;
+}
+
+// Terms of the bound across the change: lower criticality interferes only until HI mode begins.
+std::vector<Term> terms_of(const System &system, const Unit &unit, const View &view, const Others &others,
+                           Duration low_window, Duration window) {
+  const TaskId self = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
+  std::vector<Term> terms = {Term{Term::Kind::Own, self, unit.dag, unit.volume, 1}};
+  for (const one_worker::Blocker &blocker : view.blockers) {
+    const TaskId task(blocker.task);
+    terms.push_back(Term{Term::Kind::Blocking, task, system.tasks[blocker.task].dag, blocker.amount, 1});
+  }
+  for (std::size_t i = 0; i < others.units.size(); ++i) {
+    const Unit &other = system.units[others.units[i]];
+    const bool high = system.dags[other.dag.value].high;
+    const std::int64_t jobs = one_worker::jobs_in(others.low[i], high ? window : low_window, false);
+    const TaskId task = other.tasks.size() == 1 ? TaskId(other.tasks.front()) : TaskId();
+    terms.push_back(Term{Term::Kind::Interference, task, other.dag, jobs * other.volume, jobs});
+  }
+  if (unit.jitter > 0) terms.push_back(Term{Term::Kind::Jitter, self, unit.dag, unit.jitter, 0});
+  return terms;
+}
+
+// HI mode begins at most R(LO) after the start of a busy period in which the unit has a job: in LO mode that would have
+// ended by then. So from lower criticality there are the releases of R(LO), and no more.
+void bound_unit(const System &system, std::uint32_t u, ResponseBound &bound, ModeResponses &modes) {
+  const Unit &unit = system.units[u];
+  const View view = one_worker::view_of(system, u);
+  const Others others = others_of(system, view);
+
+  const FixedPoint low =
+      one_worker::preemptive_response(own_of(unit, low_volume(system, unit), view.blocking), others.low);
+  bound.absent = system.dags[unit.dag.value].high ? low.absent : kOnlyInLowMode;
+  if (!low.found) return;
+  modes.low = low.found->response;
+  if (!system.dags[unit.dag.value].high) return;
+
+  const FixedPoint high = one_worker::preemptive_response(own_of(unit, unit.volume, view.blocking), others.high);
+  if (high.found) modes.high = high.found->response;
+
+  Duration before_change = view.blocking;
+  for (std::size_t i = 0; i < others.units.size(); ++i) {
+    const Unit &other = system.units[others.units[i]];
+    if (system.dags[other.dag.value].high) continue;
+    const std::int64_t jobs = one_worker::jobs_in(others.low[i], low.found->window, false);
+    before_change = add(before_change, multiply(jobs, other.volume));
+  }
+  const FixedPoint change = one_worker::preemptive_response(own_of(unit, unit.volume, before_change), others.high);
+  bound.absent = change.absent;
+  if (!change.found) return;
+  modes.change = change.found->response;
+  bound.response = change.found->response;
+  bound.terms = terms_of(system, unit, view, others, low.found->window, change.found->window);
+}
+
+Outcome apply(const System &system) {
+  if (auto reason = why_not(system)) return NotApplicable{*reason};
+  std::vector<ResponseBound> units(system.units.size());
+  std::vector<ModeResponses> modes(system.units.size());
+  bool low_is_met = true;
+  bool high_is_met = true;
+  for (std::uint32_t u = 0; u < units.size(); ++u) {
+    bound_unit(system, u, units[u], modes[u]);
+    const Duration deadline = std::min(system.units[u].deadline, system.units[u].limit);
+    low_is_met = low_is_met && modes[u].low.value_or(kNever) <= deadline;
+    if (system.dags[system.units[u].dag.value].high) {
+      high_is_met = high_is_met && units[u].response.value_or(kNever) <= deadline;
+    }
+  }
+  Bound bound = from_units(system, std::move(units));
+  for (const SystemTask &task : system.tasks) bound.modes.push_back(modes[task.unit]);
+  bound.figures = std::string("in LO mode ") +
+                  (low_is_met ? "every deadline is met" : "not every deadline is shown met") +
+                  "; those of high criticality are " + (high_is_met ? "" : "not all shown ") + "met in every mode";
+  return bound;
+}
+
+}  // namespace
+
+Method amc_rtb() {
+  Method method;
+  method.name = "amc_rtb";
+  method.subject = Subject::Task;
+  method.cite =
+      "S. Baruah, A. Burns, R. Davis, Response-time analysis for mixed criticality systems, RTSS 2011 (AMC-rtb)";
+  method.assumptions =
+      "one worker, full preemption, static priorities, some wcet_low below its wcet, no groups, R <= T; any degrade; "
+      "DAGs of one rate as in dag_one_worker_preemptive; jitter, shared levels";
+  method.complexity = "pseudo-polynomial; O(n) a step";
+  method.knows_modes = true;
+  method.apply = apply;
+  return method;
+}
+
+}  // namespace redag::analysis

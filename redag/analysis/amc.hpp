@@ -1,0 +1,14 @@
+// AMC-rtb: response times under adaptive mixed criticality (docs/model.md, "Criticality"), one worker, full preemption.
+// Three bounds a task: in LO mode, in HI mode, and across the change. O(n) a step, pseudo-polynomial in all.
+#pragma once
+
+#include "redag/analysis/bound.hpp"
+
+namespace redag::analysis {
+
+/// S. Baruah, A. Burns, R. Davis, Response-time analysis for mixed criticality systems, RTSS 2011, section IV.A. Tasks
+/// of high criticality get a response that holds for every job; the others only Bound::modes' `low`, for jobs that end
+/// in LO mode. Requires executions of at most wcet, or an `abort` budget that sees to it.
+[[nodiscard]] Method amc_rtb();
+
+}  // namespace redag::analysis
