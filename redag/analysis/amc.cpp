@@ -21,6 +21,8 @@ std::optional<std::string> why_not(const System &system) {
   if (system.mode != sched::Preemption::Full) {
     return "for full preemption; here jobs of lower criticality keep the worker in HI mode";
   }
+  if (system.has_rate_edges()) return "edges between rates";
+  if (system.threads_suffice_if_bounded) return "fewer threads than tasks: a demoted job may hold the last one";
   if (!system.groups.empty()) return "groups: a job of lower criticality that holds one runs on in HI mode";
   if (system.platform.preempt_overhead > 0) return "an overhead of preemption: the change of mode preempts, too";
   return std::nullopt;

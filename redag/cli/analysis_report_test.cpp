@@ -16,7 +16,7 @@ Task timer(std::string name, Duration period, Duration wcet) {
 }
 
 Dag dag_of(std::string name, std::vector<Task> tasks) {
-  return Dag{std::move(name), std::move(tasks), 0, 0, 0, Criticality::Normal};
+  return Dag{std::move(name), std::move(tasks), 0, 0, 0, Criticality::Normal, {}};
 }
 
 // One worker: a (T 10, C 3), b (T 20, C 7), in milliseconds. Preempted: 3 and 7 + 3 = 10, as the second a comes then.

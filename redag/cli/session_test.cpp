@@ -20,8 +20,8 @@ Workload fast_and_slow() {
   Workload workload;
   workload.name = "fast and slow";
   workload.platform = Platform{1, PreemptionMode::None};
-  workload.dags = {Dag{"fast", {timer("f", 10 * kMillisecond, kMillisecond)}, 0, 0, 0, Criticality::Normal},
-                   Dag{"slow", {timer("s", 100 * kMillisecond, 30 * kMillisecond)}, 0, 0, 0, Criticality::Normal}};
+  workload.dags = {Dag{"fast", {timer("f", 10 * kMillisecond, kMillisecond)}, 0, 0, 0, Criticality::Normal, {}},
+                   Dag{"slow", {timer("s", 100 * kMillisecond, 30 * kMillisecond)}, 0, 0, 0, Criticality::Normal, {}}};
   return workload;
 }
 

@@ -474,6 +474,60 @@ TEST(Engine, ABudgetEndsTheJobAtItsNextPreemptionPoint) {
   EXPECT_EQ(bench.engine->usage(TaskId(0)).over_budget, 1U);
 }
 
+void use_processor(Duration time, bool with_points) {
+  while (job_cpu_time() < time) {
+    if (with_points) preemption_point();
+  }
+}
+
+TEST(Engine, ABudgetThatWasUsedIsToldAtTheEndAtTheLatest) {
+  Workload workload = ladder(1);
+  workload.dags[0].tasks[0].budget = kMillisecond;
+  workload.dags[0].tasks[0].on_budget = OnBudget::SkipNext;
+  Bench bench(workload, PreemptionMode::None, 1);
+  bench.bodies[0] = [&](const Job &) {
+    use_processor(2 * kMillisecond, false);
+    return Outcome::Finished;
+  };
+  bench.start();
+  bench.release({0});
+  while (bench.engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+  bench.release({0});
+  EXPECT_EQ(bench.engine->accounting(TaskId(0)).skipped, 1U);
+  bench.release({0});
+  while (bench.engine->accounting(TaskId(0)).finished == 1) std::this_thread::yield();
+  bench.finish();
+  EXPECT_EQ(std::count_if(bench.events.begin(), bench.events.end(),
+                          [](const JobEvent &event) { return event.kind == JobEventKind::Exceeded; }),
+            2);
+}
+
+TEST(Engine, HighModeIsOnWhileTheJobThatBeganItRuns) {
+  Workload workload = ladder(1);
+  workload.dags.push_back(workload.dags[0]);
+  workload.dags[0].criticality = Criticality::High;
+  workload.dags[0].tasks[0].wcet_low = kMillisecond;
+  Bench bench(workload, PreemptionMode::None, 2);
+  Event begun;
+  Event released;
+  bench.bodies[0] = [&](const Job &) {
+    use_processor(2 * kMillisecond, true);
+    begun.set();
+    released.wait();
+    return Outcome::Finished;
+  };
+  bench.start();
+  bench.release({0});
+  begun.wait();
+  bench.release({1});
+  EXPECT_EQ(bench.engine->accounting(TaskId(1)).skipped, 1U);
+  released.set();
+  while (bench.engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+  bench.release({1});
+  while (bench.engine->accounting(TaskId(1)).finished == 0) std::this_thread::yield();
+  bench.finish();
+}
+
 TEST(Engine, OutsideAJobPreemptionPointsDoNothing) {
   preemption_point();
   EXPECT_EQ(job_cpu_time(), 0);

@@ -25,13 +25,13 @@ Workload two_rates(std::uint32_t workers, PreemptionMode mode) {
   Workload workload;
   workload.name = "two rates";
   workload.platform = Platform{workers, mode};
-  Dag fast{"fast", {timer("sense", 10 * kMillisecond, 500 * kMicrosecond)}, 1, 0, 0, Criticality::High};
+  Dag fast{"fast", {timer("sense", 10 * kMillisecond, 500 * kMicrosecond)}, 1, 0, 0, Criticality::High, {}};
   Task act = timer("act", 0, 300 * kMicrosecond);
   act.deadline = 0;
   act.activation = Activation::Data;
   act.predecessors = {0};
   fast.tasks.push_back(act);
-  Dag slow{"slow", {}, 0, 0, 0, Criticality::Low};
+  Dag slow{"slow", {}, 0, 0, 0, Criticality::Low, {}};
   for (std::uint32_t i = 0; i < workers; ++i) {
     slow.tasks.push_back(timer("slow" + std::to_string(i), 100 * kMillisecond, 30 * kMillisecond));
   }

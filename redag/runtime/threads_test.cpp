@@ -76,7 +76,8 @@ TEST(ResolveMode, OsWithoutRightsIsAnErrorThatSaysHowToGetThem) {
 
 TEST(ResolveMode, TheMostUrgentLevelHasTheTopPriorityAndTheLastOneIsValid) {
   EXPECT_EQ(kBand.of_level(0), 80);
-  EXPECT_EQ(kBand.of_level(kBand.levels() - 1), 1);
+  EXPECT_EQ(kBand.of_level(kBand.levels() - 1), 2);
+  EXPECT_EQ(kBand.of_level(kBand.levels()), 1) << "of demoted jobs";
   const PriorityBand band = probe_priority_band();
   EXPECT_TRUE(band.top_job == 0 || band.timer > band.top_job);
 }

@@ -125,8 +125,9 @@ BoundCase random_criticalities(Rng &rng) {
       continue;
     }
     dag.degrade.kind = static_cast<Degrade::Kind>(rng.uniform(0, 2));
-    // A budget holds it to its wcet, whatever it tries.
-    for (Task &task : dag.tasks) task.budget = task.wcet;
+    // A budget holds it to its wcet, whatever it tries. One that is cut off has no output: not where others wait for
+    // it.
+    for (Task &task : dag.tasks) task.budget = limits.edges ? 0 : task.wcet;
   }
   return drawn;
 }
@@ -151,7 +152,8 @@ std::vector<JobEvent> simulate_overruns(const BoundCase &drawn, Duration horizon
   options.demand = [&](const Task &task, TaskId task_id, std::uint32_t number) {
     Rng dice = Rng::stream(seed, task_id.value, number);
     if (task.budget > 0) return dice.uniform01() < overruns ? 3 * task.wcet : task.wcet;
-    return dice.uniform01() < overruns ? dice.uniform(1, task.wcet) : task.wcet_low;
+    const Duration expected = task.wcet_low > 0 ? task.wcet_low : task.wcet;
+    return dice.uniform01() < overruns ? dice.uniform(1, task.wcet) : expected;
   };
   sched::Config config;
   config.policy = drawn.workload.policy;

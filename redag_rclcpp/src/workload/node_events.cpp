@@ -64,6 +64,9 @@ int phase_of(JobEventKind kind) {
     case JobEventKind::Deferred:
     case JobEventKind::Dispatched: return 6;
     case JobEventKind::Started: return 7;
+    case JobEventKind::Exceeded:
+    case JobEventKind::HighMode:
+    case JobEventKind::LowMode: break;  // nodes know nothing of these
   }
   return 8;
 }
