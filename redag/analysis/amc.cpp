@@ -21,7 +21,7 @@ std::optional<std::string> why_not(const System &system) {
   if (system.mode != sched::Preemption::Full) {
     return "for full preemption; here jobs of lower criticality keep the worker in HI mode";
   }
-  if (system.has_rate_edges()) return "edges between rates";
+  if (system.has_edges() || system.has_rate_edges()) return "tasks have predecessors";
   if (system.threads_suffice_if_bounded) return "fewer threads than tasks: a demoted job may hold the last one";
   if (!system.groups.empty()) return "groups: a job of lower criticality that holds one runs on in HI mode";
   if (system.platform.preempt_overhead > 0) return "an overhead of preemption: the change of mode preempts, too";
@@ -142,7 +142,7 @@ Method amc_rtb() {
       "S. Baruah, A. Burns, R. Davis, Response-time analysis for mixed criticality systems, RTSS 2011 (AMC-rtb)";
   method.assumptions =
       "one worker, full preemption, static priorities, some wcet_low below its wcet, no groups, R <= T; any degrade; "
-      "DAGs of one rate as in dag_one_worker_preemptive; jitter, shared levels";
+      "independent tasks, jitter, shared levels";
   method.complexity = "pseudo-polynomial; O(n) a step";
   method.knows_modes = true;
   method.apply = apply;
