@@ -15,12 +15,12 @@
 #include <memory>
 #include <vector>
 
-#include "histogram.hpp"
 #include "rclcpp/client.hpp"
 #include "rclcpp/service.hpp"
 #include "rclcpp/subscription_base.hpp"
 #include "rclcpp/timer.hpp"
 #include "rclcpp/waitable.hpp"
+#include "redag/base/histogram.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/model/callback_match.hpp"
 #include "redag/runtime/engine.hpp"
@@ -103,8 +103,8 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
   [[nodiscard]] bool is_timer() const { return timer_handle_ != nullptr; }
 
   void set_deadline(Duration deadline) { deadline_.store(deadline, std::memory_order_relaxed); }
-  [[nodiscard]] const Histogram &response() const { return response_; }
-  [[nodiscard]] const Histogram &execution() const { return execution_; }
+  [[nodiscard]] const redag::Histogram &response() const { return response_; }
+  [[nodiscard]] const redag::Histogram &execution() const { return execution_; }
   [[nodiscard]] std::uint64_t late() const { return late_.load(std::memory_order_relaxed); }
 
   /// What was learned: tasks that published what arrived here, each once; and the mean time between arrivals (0: fewer
@@ -183,8 +183,8 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
 
   std::atomic<Duration> deadline_{redag::kNever};
   std::atomic<std::uint64_t> late_{0};
-  Histogram response_;
-  Histogram execution_;
+  redag::Histogram response_;
+  redag::Histogram execution_;
 };
 
 }  // namespace redag_rclcpp

@@ -1,4 +1,4 @@
-// The executor's parts that need no ROS: timer queue, token queue, histogram.
+// The executor's parts that need no ROS: timer queue, token queue.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,7 +6,6 @@
 #include <map>
 #include <random>
 
-#include "histogram.hpp"
 #include "timer_queue.hpp"
 #include "token_queue.hpp"
 
@@ -121,27 +120,6 @@ TEST(TokenQueue, IsAFifoThatGrowsAndDropsFromTheMiddle) {
     ASSERT_EQ(queue.size(), expected.size());
     for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_EQ(queue.at(i), expected[i]);
   }
-}
-
-TEST(Histogram, PercentilesAreAtMostAnEighthTooLarge) {
-  std::mt19937_64 random(11);
-  Histogram histogram;
-  std::vector<redag::Duration> values;
-  EXPECT_EQ(histogram.percentile(0.5), 0);
-  for (int i = 0; i < 20'000; ++i) {
-    const auto value = static_cast<redag::Duration>(random() >> (24 + random() % 36));
-    values.push_back(value);
-    histogram.add(value);
-  }
-  std::sort(values.begin(), values.end());
-  for (const double share : {0.01, 0.5, 0.9, 0.99, 0.999}) {
-    const redag::Duration exact = values[static_cast<std::size_t>(share * static_cast<double>(values.size())) - 1];
-    const redag::Duration found = histogram.percentile(share);
-    EXPECT_GE(found, exact) << share;
-    EXPECT_LE(static_cast<double>(found), static_cast<double>(exact) * 1.125 + 1) << share;
-  }
-  EXPECT_EQ(histogram.longest(), values.back());
-  EXPECT_EQ(histogram.percentile(1.0), values.back());
 }
 
 }  // namespace

@@ -1,0 +1,103 @@
+// Durations in buckets that grow with them (8 an octave: a percentile is at most 1/8 above the true one). Any thread;
+// adding allocates nothing and takes no lock.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cstdint>
+
+#include "redag/base/time.hpp"
+
+namespace redag {
+
+/// What a Histogram held at some time. Two of them subtract to what came in between; several add up to all of theirs.
+class HistogramCounts {
+ public:
+  static constexpr unsigned kBits = 3;  // 8 buckets an octave
+  static constexpr unsigned kOctaves = 44;
+  static constexpr std::size_t kBuckets = std::size_t{kOctaves} << kBits;
+
+  [[nodiscard]] std::uint64_t total() const noexcept {
+    std::uint64_t total = 0;
+    for (const std::uint32_t bucket : buckets_) total += bucket;
+    return total;
+  }
+  /// Of all that was ever added, also where these are the counts of a part.
+  [[nodiscard]] Duration longest() const noexcept { return longest_; }
+
+  /// The smallest bound that at least `share` of the values do not exceed; 0 without values.
+  [[nodiscard]] Duration percentile(double share) const noexcept {
+    const auto wanted = static_cast<std::uint64_t>(share * static_cast<double>(total()));
+    std::uint64_t seen = 0;
+    for (std::size_t i = 0; i < kBuckets; ++i) {
+      seen += buckets_[i];
+      if (seen > 0 && seen >= wanted) return std::min(longest_, upper_bound_of(i));
+    }
+    return 0;
+  }
+
+  HistogramCounts &operator+=(const HistogramCounts &other) noexcept {
+    for (std::size_t i = 0; i < kBuckets; ++i) buckets_[i] += other.buckets_[i];
+    longest_ = std::max(longest_, other.longest_);
+    return *this;
+  }
+  /// `other`: of the same histogram, earlier.
+  HistogramCounts &operator-=(const HistogramCounts &other) noexcept {
+    for (std::size_t i = 0; i < kBuckets; ++i) buckets_[i] -= other.buckets_[i];
+    return *this;
+  }
+
+ private:
+  friend class Histogram;
+
+  static std::size_t bucket_of(std::uint64_t value) noexcept {
+    const auto width = static_cast<unsigned>(std::bit_width(value));
+    if (width <= kBits + 1) return static_cast<std::size_t>(value);
+    const unsigned shift = width - kBits - 1;
+    const std::size_t index = (static_cast<std::size_t>(shift) << kBits) + static_cast<std::size_t>(value >> shift);
+    return std::min(index, kBuckets - 1);
+  }
+  static Duration upper_bound_of(std::size_t index) noexcept {
+    if (index == kBuckets - 1) return kNever;  // the last one takes all that is longer
+    if (index < (std::size_t{2} << kBits)) return static_cast<Duration>(index);
+    const std::size_t shift = (index >> kBits) - 1;
+    const std::size_t leading = index - (shift << kBits);
+    return static_cast<Duration>(((leading + 1) << shift) - 1);
+  }
+
+  std::array<std::uint32_t, kBuckets> buckets_{};
+  Duration longest_ = 0;
+};
+
+class Histogram {
+ public:
+  void add(Duration value) noexcept {
+    value = std::max<Duration>(value, 0);
+    // First, so that counts() never knows of a value and not of its length.
+    Duration longest = longest_.load(std::memory_order_relaxed);
+    while (value > longest && !longest_.compare_exchange_weak(longest, value, std::memory_order_release)) {
+    }
+    buckets_[HistogramCounts::bucket_of(static_cast<std::uint64_t>(value))].fetch_add(1, std::memory_order_release);
+  }
+
+  [[nodiscard]] HistogramCounts counts() const noexcept {
+    HistogramCounts counts;
+    for (std::size_t i = 0; i < HistogramCounts::kBuckets; ++i) {
+      counts.buckets_[i] = buckets_[i].load(std::memory_order_acquire);
+    }
+    counts.longest_ = longest();
+    return counts;
+  }
+
+  [[nodiscard]] Duration longest() const noexcept { return longest_.load(std::memory_order_relaxed); }
+  /// As HistogramCounts::percentile().
+  [[nodiscard]] Duration percentile(double share) const noexcept { return counts().percentile(share); }
+
+ private:
+  std::array<std::atomic<std::uint32_t>, HistogramCounts::kBuckets> buckets_{};
+  std::atomic<Duration> longest_{0};
+};
+
+}  // namespace redag

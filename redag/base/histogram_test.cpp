@@ -1,0 +1,78 @@
+#include "redag/base/histogram.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <thread>
+#include <vector>
+
+namespace redag {
+namespace {
+
+TEST(Histogram, PercentilesAreAtMostAnEighthTooLarge) {
+  std::mt19937_64 random(11);
+  Histogram histogram;
+  std::vector<Duration> values;
+  EXPECT_EQ(histogram.percentile(0.5), 0);
+  for (int i = 0; i < 20'000; ++i) {
+    const auto value = static_cast<Duration>(random() >> (24 + random() % 36));
+    values.push_back(value);
+    histogram.add(value);
+  }
+  std::sort(values.begin(), values.end());
+  for (const double share : {0.01, 0.5, 0.9, 0.99, 0.999}) {
+    const Duration exact = values[static_cast<std::size_t>(share * static_cast<double>(values.size())) - 1];
+    const Duration found = histogram.percentile(share);
+    EXPECT_GE(found, exact) << share;
+    EXPECT_LE(static_cast<double>(found), static_cast<double>(exact) * 1.125 + 1) << share;
+  }
+  EXPECT_EQ(histogram.longest(), values.back());
+  EXPECT_EQ(histogram.percentile(1.0), values.back());
+}
+
+TEST(Histogram, CountsSubtractToWhatCameBetween) {
+  Histogram histogram;
+  for (int i = 0; i < 1000; ++i) histogram.add(kSecond);
+  HistogramCounts before = histogram.counts();
+  for (int i = 0; i < 10; ++i) histogram.add(kMillisecond);
+  HistogramCounts recent = histogram.counts();
+  recent -= before;
+  EXPECT_EQ(recent.total(), 10U);
+  EXPECT_GE(recent.percentile(1.0), kMillisecond);
+  EXPECT_LE(recent.percentile(1.0), kMillisecond * 9 / 8 + 1);
+  EXPECT_EQ(recent.longest(), kSecond);
+  before += recent;
+  EXPECT_EQ(before.total(), 1010U);
+  EXPECT_EQ(before.percentile(1.0), kSecond);
+}
+
+TEST(Histogram, WhatIsLongerThanAllBucketsIsNotMadeShorter) {
+  Histogram histogram;
+  histogram.add(kNever - 1);
+  EXPECT_EQ(histogram.percentile(1.0), kNever - 1);
+}
+
+TEST(Histogram, ManyThreadsLoseNothing) {
+  Histogram histogram;
+  constexpr int kEach = 20'000;
+  const auto add = [&](Duration first) {
+    for (int i = 0; i < kEach; ++i) histogram.add(first + i);
+  };
+  std::thread other(add, 1000);
+  std::thread reader([&] {
+    for (int i = 0; i < 100; ++i) {
+      const HistogramCounts counts = histogram.counts();
+      EXPECT_LE(counts.percentile(0.99), counts.longest());
+      EXPECT_EQ(counts.total() > 0, counts.percentile(0.5) > 0);
+    }
+  });
+  add(1);
+  other.join();
+  reader.join();
+  EXPECT_EQ(histogram.counts().total(), 2U * kEach);
+  EXPECT_EQ(histogram.longest(), 1000 + kEach - 1);
+}
+
+}  // namespace
+}  // namespace redag
