@@ -34,6 +34,7 @@ class Lifecycle : public Scheduler {
   [[nodiscard]] std::size_t task_slots() const final { return tasks_.size(); }
   [[nodiscard]] std::size_t dag_slots() const final { return dag_states_.size(); }
   [[nodiscard]] Accounting accounting(TaskId task) const final { return tasks_[task.value].accounting; }
+  [[nodiscard]] std::uint32_t ready(TaskId task) const final { return tasks_[task.value].ready_count; }
 
   [[nodiscard]] const Job &job(JobSlot slot) const { return jobs_[slot.value]; }
   [[nodiscard]] const Config &config() const { return config_; }

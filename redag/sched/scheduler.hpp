@@ -139,6 +139,8 @@ class Scheduler {
   [[nodiscard]] virtual std::size_t dag_slots() const = 0;
 
   [[nodiscard]] virtual Accounting accounting(TaskId task) const = 0;
+  /// Jobs that are ready and have not started; of the others in flight that have not, predecessors are incomplete.
+  [[nodiscard]] virtual std::uint32_t ready(TaskId task) const = 0;
 };
 
 }  // namespace redag::sched

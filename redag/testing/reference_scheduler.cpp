@@ -628,6 +628,10 @@ Accounting ReferenceScheduler::accounting(TaskId task) const {
   return count;
 }
 
+std::uint32_t ReferenceScheduler::ready(TaskId task) const {
+  return static_cast<std::uint32_t>(jobs_of(task.value, State::Ready).size());
+}
+
 void ReferenceScheduler::emit(JobEventKind kind, std::size_t job, Time now, std::int64_t value, std::uint32_t worker,
                               Reason reason) {
   JobEvent event;

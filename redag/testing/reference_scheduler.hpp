@@ -34,6 +34,7 @@ class ReferenceScheduler final : public sched::Scheduler {
   [[nodiscard]] std::size_t task_slots() const override { return tasks_.size(); }
   [[nodiscard]] std::size_t dag_slots() const override { return dags_.size(); }
   [[nodiscard]] sched::Accounting accounting(TaskId task) const override;
+  [[nodiscard]] std::uint32_t ready(TaskId task) const override;
 
  private:
   static constexpr std::size_t kNone = SIZE_MAX;

@@ -274,6 +274,9 @@ class Run {
       if (actual_count != expected_->accounting(TaskId(task))) {
         return fmt::format("  different accounting of task {}", task);
       }
+      if (tested_->ready(TaskId(task)) != expected_->ready(TaskId(task))) {
+        return fmt::format("  different ready jobs of task {}", task);
+      }
     }
     return compare_running();
   }
