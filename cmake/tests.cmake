@@ -39,7 +39,7 @@ endif()
 
 # What has threads of its own, and so is worth a run under ThreadSanitizer.
 add_custom_target(redag_concurrency_tests)
-foreach(folder IN ITEMS base trace runtime)
+foreach(folder IN ITEMS base live trace runtime)
   if(TARGET redag_${folder}_test)
     add_dependencies(redag_concurrency_tests redag_${folder}_test)
   endif()

@@ -151,10 +151,14 @@ Engine::Next Engine::finish(Thread &self, const Assignment &assignment, RunningJ
                             Duration used, JobSlot below) {
   Body doomed;  // of a removed task; destroyed without the lock
   const Time at = now();
+  TaskEntry &entry = *assignment.entry;
+  const bool measured = entry.response && outcome == Outcome::Finished;
+  const Duration response = at - assignment.job.release;
+  if (measured) entry.response->add(response);
   Locked locked(*this);
   withdraw_if_halting();
-  TaskEntry &entry = *assignment.entry;
   entry.count(used);
+  if (measured && response > entry.deadline) ++entry.late;
   --entry.busy;
   if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
   self.stack.pop_back();
@@ -358,6 +362,7 @@ void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
   Locked locked(*this);
   withdraw_if_halting();
   scheduler_->set_timing(task, period, deadline, at);
+  tasks_[task.value].deadline = deadline;
   decide(locked, at, nullptr, JobSlot());
 }
 
@@ -375,6 +380,8 @@ void Engine::register_task(TaskId id, const Task &task, Body &body) {
   entry.wcet_low = task.wcet_low;
   entry.budget = task.budget;
   entry.cuts_off = task.on_budget == OnBudget::Abort;
+  entry.deadline = task.deadline;
+  if (options_.measure) entry.response = std::make_shared<Histogram>();
   entry.concurrency = task.concurrency;
   for (auto &thread : threads_) thread->stack.reserve(most_started_);
 }
@@ -450,6 +457,20 @@ sched::Accounting Engine::accounting(TaskId task) const {
 Usage Engine::usage(TaskId task) const {
   const LockGuard guard(lock_);
   return tasks_[task.value].usage;
+}
+
+TaskFigures Engine::figures(TaskId task) const {
+  const LockGuard guard(lock_);
+  const TaskEntry &entry = tasks_[task.value];
+  TaskFigures figures{scheduler_->accounting(task),
+                      entry.usage,
+                      entry.busy,
+                      scheduler_->ready(task),
+                      entry.late,
+                      entry.preemptions,
+                      entry.response};
+  figures.jobs.skipped -= entry.withdrawn;
+  return figures;
 }
 
 }  // namespace redag::runtime

@@ -18,6 +18,7 @@
 
 #include "redag/base/atomic.hpp"
 #include "redag/base/futex.hpp"
+#include "redag/base/histogram.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/result.hpp"
 #include "redag/base/thread_annotations.hpp"
@@ -59,6 +60,7 @@ struct EngineOptions {
   std::size_t trace_capacity = 0;  // events the rings hold between two drain(); 0: no events
   ExceptionHandler on_exception;   // empty: exceptions are only counted
   bool start_paused = false;       // as after pause()
+  bool measure = false;            // figures() has responses, misses and preemptions
 };
 
 /// Processor time of a task's jobs that ended.
@@ -68,6 +70,18 @@ struct Usage {
   Duration longest = 0;
   std::uint64_t over_wcet = 0;
   std::uint64_t over_budget = 0;
+};
+
+/// What a live view shows of a task.
+struct TaskFigures {
+  sched::Accounting jobs;
+  Usage usage;
+  std::uint32_t active = 0;  // jobs that have started and not ended
+  std::uint32_t ready = 0;
+  // Without EngineOptions::measure nothing:
+  std::uint64_t late = 0;  // finished after the deadline
+  std::uint64_t preemptions = 0;
+  std::shared_ptr<const Histogram> response;  // of finished jobs, from the nominal release
 };
 
 struct AddedDag {
@@ -140,6 +154,7 @@ class Engine {
 
   [[nodiscard]] sched::Accounting accounting(TaskId task) const;
   [[nodiscard]] Usage usage(TaskId task) const;
+  [[nodiscard]] TaskFigures figures(TaskId task) const;
   /// Priority changes that the system refused while running (rights were taken away).
   [[nodiscard]] std::uint64_t refused_priorities() const noexcept { return refused_priorities_.load(); }
   /// Is the calling thread inside one of this engine's bodies?

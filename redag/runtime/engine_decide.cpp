@@ -17,6 +17,11 @@ Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot belo
   if (options_.trace_capacity > 0) {
     for (const JobEvent &event : step.events) decisions_.push(event);
   }
+  if (options_.measure) {
+    for (const JobEvent &event : step.events) {
+      if (event.kind == JobEventKind::Preempted) ++tasks_[event.task.value].preemptions;
+    }
+  }
   const Next next = os() ? place_on_pool(locked, step, self) : place_on_workers(locked, step, self, below);
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
   return next;

@@ -31,6 +31,10 @@ struct Engine::TaskEntry {
   Duration budget = 0;
   bool cuts_off = false;  // on_budget: abort
   Usage usage;
+  Duration deadline = 0;
+  std::shared_ptr<Histogram> response;  // null: not measured
+  std::uint64_t late = 0;
+  std::uint64_t preemptions = 0;
   std::uint64_t withdrawn = 0;    // jobs taken away at the end
   std::uint32_t concurrency = 0;  // jobs that can be in progress
   std::uint32_t busy = 0;         // jobs that have started and not ended

@@ -9,6 +9,7 @@
 #include "redag/base/lock_guard.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
@@ -47,10 +48,19 @@ Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
   engine.band = setup_.band;
   engine.cpus = options_.cpus;
   engine.trace_capacity = options_.trace_capacity;
+  engine.measure = options_.live;
   engine.on_exception = [this](const Job &job, std::exception_ptr e) { on_exception(job, std::move(e)); };
   auto scheduler = std::make_unique<sched::PriorityScheduler>(Workload{}, engine.config);
   engine_ = std::make_unique<Engine>(std::move(scheduler), std::move(engine));
   timer_ = std::make_unique<ReleaseTimer>([this](auto releases) { engine_->release(releases); }, 0);
+  if (!options_.live) return;
+  auto publisher = live::Publisher::start(live_options(options_.name, "threads", setup_.mode, setup_.config),
+                                          [this](live::Sample &sample) { this->sample(sample); });
+  if (publisher) {
+    live_ = *std::move(publisher);
+  } else {
+    setup_.warnings.push_back(to_string(publisher.error()));
+  }
 }
 
 Executor::~Executor() {
@@ -70,8 +80,6 @@ DagId Executor::add(DagBuilder builder) {
   throw_if_bad(dag, options_.workers, options_.policy);
 
   std::vector<Body> bodies;
-  std::vector<std::string> names;
-  for (const Task &task : dag.tasks) names.push_back(task.name);
   for (DagBuilder::Function &body : builder.bodies_) {
     bodies.emplace_back([function = std::move(body)](const Job &) {
       function();
@@ -81,7 +89,7 @@ DagId Executor::add(DagBuilder builder) {
   const LockGuard guard(lock_);
   const AddedDag ids = engine_->add_dag(dag, std::move(bodies));
   const TaskId first = ids.tasks.empty() ? TaskId(0) : ids.tasks.front();  // the others follow: ids are not reused
-  dags_.push_back(Added{dag.name, std::move(names), first});
+  dags_.push_back(Added{dag.name, dag.tasks, dag.max_active, first});
   timer_->add(dag, first, running_ ? std::max<Time>(0, engine_->now()) : 0);
   return ids.dag;
 }
@@ -89,7 +97,8 @@ DagId Executor::add(DagBuilder builder) {
 void Executor::remove(DagId dag) {
   {
     const LockGuard guard(lock_);
-    const Added &gone = added(dag);
+    Added &gone = dags_[added_position(dag)];
+    gone.removed = true;
     timer_->remove(gone.first, gone.tasks.size());
   }
   engine_->remove_dag(dag);  // destroys bodies, which may own anything: not under our lock
@@ -158,6 +167,7 @@ void Executor::finish() {
                                          format_duration(options_.stop_timeout.count()), fmt::join(names, ", ")));
   }
   engine_->join();
+  live_.reset();
   finished_ = true;
 }
 
@@ -177,18 +187,18 @@ void Executor::on_exception(const Job &job, std::exception_ptr exception) {
 
 void Executor::drain(std::vector<JobEvent> &events) { engine_->drain(events, finished_); }
 
-const Executor::Added &Executor::added(DagId dag) const {
+std::size_t Executor::added_position(DagId dag) const {
   if (dag.value >= dags_.size()) throw std::out_of_range("there is no such DAG");
-  return dags_[dag.value];
+  return dag.value;
 }
 
 std::vector<TaskStats> Executor::stats(DagId dag) const {
   const LockGuard guard(lock_);
-  const Added &of = added(dag);
+  const Added &of = dags_[added_position(dag)];
   std::vector<TaskStats> result;
   for (std::size_t i = 0; i < of.tasks.size(); ++i) {
     const TaskId task(of.first.value + i);
-    result.push_back(TaskStats{of.name + "." + of.tasks[i], engine_->accounting(task), engine_->usage(task)});
+    result.push_back(TaskStats{of.name + "." + of.tasks[i].name, engine_->accounting(task), engine_->usage(task)});
   }
   return result;
 }
@@ -197,10 +207,29 @@ std::string Executor::task_name(TaskId task) const {
   const LockGuard guard(lock_);
   for (const Added &dag : dags_) {
     if (task.value - dag.first.value < dag.tasks.size() && task.value >= dag.first.value) {
-      return dag.name + "." + dag.tasks[task.value - dag.first.value];
+      return dag.name + "." + dag.tasks[task.value - dag.first.value].name;
     }
   }
   return fmt::format("task {}", task.value);
+}
+
+void Executor::sample(live::Sample &sample) const {
+  const LockGuard guard(lock_);
+  for (const Added &dag : dags_) {
+    if (dag.removed) continue;
+    sample.dags.push_back({dag.name, dag.max_active});
+    for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+      const TaskId id(dag.first.value + i);
+      live::TaskSample task;
+      fill(task, engine_->figures(id));
+      task.key = id.value;
+      task.name = dag.tasks[i].name;
+      task.dag = static_cast<std::uint32_t>(sample.dags.size() - 1);
+      task.period = dag.tasks[i].period;
+      task.deadline = dag.tasks[i].deadline;
+      sample.tasks.push_back(std::move(task));
+    }
+  }
 }
 
 }  // namespace redag::runtime

@@ -16,6 +16,7 @@
 #include "redag/base/mutex.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/thread_annotations.hpp"
+#include "redag/live/publisher.hpp"
 #include "redag/runtime/dag_builder.hpp"
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/mode.hpp"
@@ -44,6 +45,7 @@ struct ExecutorOptions {
   std::vector<int> cpus{};         // processors for the workers; empty: os takes `workers` of the usable ones
   bool lock_memory = false;        // if it cannot be had, warnings() says so
   std::size_t trace_capacity = 0;  // events kept between two drain(); 0: none are recorded
+  bool live = false;               // `redag top` sees it: a page of shared memory, and a thread that updates it
   nanoseconds stop_timeout = std::chrono::seconds(10);  // how long stopping waits for bodies to return
   // Called on the worker's thread; must not throw. Empty: Stop.
   std::function<OnException(const ExceptionInfo &)> on_exception{};
@@ -101,12 +103,16 @@ class Executor {
  private:
   struct Added {
     std::string name;
-    std::vector<std::string> tasks;
+    std::vector<Task> tasks;
+    std::uint32_t max_active = 0;
     TaskId first;
+    bool removed = false;
   };
   void finish();
+  void sample(live::Sample &sample) const;
   void on_exception(const Job &job, std::exception_ptr exception);
-  [[nodiscard]] const Added &added(DagId dag) const REDAG_REQUIRES(lock_);
+  /// Throws std::out_of_range.
+  [[nodiscard]] std::size_t added_position(DagId dag) const REDAG_REQUIRES(lock_);
 
   ExecutorOptions options_;
   Setup setup_;
@@ -120,6 +126,7 @@ class Executor {
   Atomic<bool> started_{false};
   Atomic<bool> finished_{false};
   Event stop_;
+  std::unique_ptr<live::Publisher> live_;  // last: it asks for figures until it is gone
 };
 
 }  // namespace redag::runtime

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "redag/runtime/clock.hpp"
+#include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/release_timer.hpp"
 #include "redag/runtime/synthetic.hpp"
 #include "redag/runtime/threads.hpp"
@@ -70,6 +71,7 @@ class Run {
     engine.realtime_threads = options_.realtime_threads;
     engine.cpus = options_.cpus;
     engine.trace_capacity = options_.trace_capacity;
+    engine.measure = options_.live;
     if (kind != nullptr) engine.config = sched::effective_config(*kind, engine.config);
     auto scheduler = options_.scheduler ? options_.scheduler(workload_, engine.config)
                                         : sched::make_scheduler(options_.executor, workload_, engine.config);
@@ -81,7 +83,37 @@ class Run {
       timer_->add(dag, first, 0);
       first = TaskId(first.value + dag.tasks.size());
     }
+    if (options_.live) go_live();
     return {};
+  }
+
+  void go_live() {
+    std::vector<Duration> bounds;
+    if (options_.bounds) bounds = options_.bounds(engine_->options().config);
+    bounds.resize(workload_.task_count(), 0);
+    auto publisher =
+        live::Publisher::start(live_options(workload_.name, "threads", result_.mode, engine_->options().config),
+                               [this, bounds = std::move(bounds)](live::Sample &sample) {
+                                 for (const Dag &dag : workload_.dags)
+                                   sample.dags.push_back({dag.name, dag.max_active});
+                                 for (const TaskRef &ref : flatten(workload_)) {
+                                   live::TaskSample task;
+                                   fill(task, engine_->figures(ref.id));
+                                   task.key = ref.id.value;
+                                   task.name = ref.task->name;
+                                   task.dag = ref.dag.value;
+                                   task.period = ref.task->period;
+                                   task.deadline = ref.task->deadline;
+                                   task.bound = bounds[ref.id.value];
+                                   sample.tasks.push_back(std::move(task));
+                                 }
+                               });
+    if (publisher) {
+      live_ = *std::move(publisher);
+    } else {
+      const Diagnostic &why = publisher.error().front();
+      result_.warnings.push_back(fmt::format("{} ({})", why.message, why.hint));
+    }
   }
 
   Result<void> start() {
@@ -119,6 +151,7 @@ class Run {
       give_up_.store(true);
     }
     engine_->join();
+    live_.reset();
     describe();
     cut();
     for (std::size_t t = 0; t < workload_.task_count(); ++t) result_.usage.push_back(engine_->usage(TaskId(t)));
@@ -165,7 +198,8 @@ class Run {
   RunResult result_;
   std::atomic<bool> give_up_{false};
   std::unique_ptr<Engine> engine_;
-  std::unique_ptr<ReleaseTimer> timer_;  // after the engine: it ends first
+  std::unique_ptr<ReleaseTimer> timer_;    // after the engine: it ends first
+  std::unique_ptr<live::Publisher> live_;  // after the engine: it asks for figures until it is gone
   Time origin_ = 0;
   Time end_ = 0;
 };

@@ -35,7 +35,10 @@ struct RunOptions {
   std::vector<int> cpus;          // processors of the workers; empty: os takes m of the usable ones
   std::size_t trace_capacity = std::size_t{1} << 17;  // events between two collections
   Duration drain_timeout = 5 * kSecond;               // for started jobs to end after the horizon
-  const std::atomic<bool> *stop = nullptr;            // ends the run early when set (Ctrl-C)
+  bool live = false;                                  // `redag top` sees the run
+  /// For it: proven bounds on response times by task, 0 where there is none. Asked once, before the start.
+  std::function<std::vector<Duration>(const sched::Config &)> bounds;
+  const std::atomic<bool> *stop = nullptr;  // ends the run early when set (Ctrl-C)
   /// About ten times a second, with all events so far. On the calling thread.
   std::function<void(Time now, std::span<const JobEvent> events)> progress;
 };

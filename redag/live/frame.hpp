@@ -1,0 +1,46 @@
+// What a live page says, as values: an executor with its DAGs and tasks at one moment. No memory shared with anybody.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "redag/base/time.hpp"
+#include "redag/live/page.hpp"
+
+namespace redag::live {
+
+struct DagFrame {
+  std::string name;
+  std::uint32_t max_active = 0;  // 0: no bound
+  page::Figures figures{};
+};
+
+struct TaskFrame {
+  std::string name;  // within its DAG
+  std::uint32_t dag = 0;
+  Duration period = 0;
+  Duration deadline = 0;  // 0: none
+  Duration bound = 0;     // 0: not known
+  page::Figures figures{};
+};
+
+struct Frame {
+  std::string name;
+  std::string program;
+  std::string driver;
+  std::string preemption;
+  std::string policy;
+  std::uint32_t workers = 0;
+  std::uint64_t sequence = 0;
+  Time began = 0;      // CLOCK_MONOTONIC
+  Time published = 0;  // CLOCK_MONOTONIC
+  Duration interval = 0;
+  Duration window = 0;
+  Duration publisher_cpu = 0;
+  std::uint64_t left_out = 0;
+  std::vector<DagFrame> dags;
+  std::vector<TaskFrame> tasks;  // each after those of earlier DAGs
+};
+
+}  // namespace redag::live

@@ -1,0 +1,33 @@
+// Who a process is, beyond a number that is used again: when it began, and in which namespace its number counts.
+// Reads /proc; any thread.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace redag::live {
+
+struct Process {
+  std::int64_t pid = 0;
+  std::uint64_t start = 0;          // clock ticks after boot
+  std::uint64_t pid_namespace = 0;  // inode; 0: not known
+
+  friend bool operator==(const Process &, const Process &) = default;
+};
+
+[[nodiscard]] Process this_process();
+
+enum class Life : std::uint8_t {
+  Alive,
+  Dead,
+  Unknown,  // of another namespace: its number says nothing here
+};
+
+[[nodiscard]] Life life_of(const Process &process);
+
+/// Clock ticks after boot at which the process began, out of the text of /proc/PID/stat, whatever its program is
+/// called. Nothing if it is not such a text.
+[[nodiscard]] std::optional<std::uint64_t> start_time_in(const std::string &stat);
+
+}  // namespace redag::live

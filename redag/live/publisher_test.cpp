@@ -1,0 +1,164 @@
+#include "redag/live/publisher.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include "redag/live/reader.hpp"
+
+namespace redag::live {
+namespace {
+
+using ::testing::SizeIs;
+
+TaskSample task_of(std::uint64_t key, std::uint32_t dag, std::uint64_t finished,
+                   std::shared_ptr<const Histogram> response = nullptr) {
+  TaskSample task;
+  task.key = key;
+  task.name = "t" + std::to_string(key);
+  task.dag = dag;
+  task.released = finished;
+  task.finished = finished;
+  task.response = std::move(response);
+  return task;
+}
+
+TEST(FrameBuilder, RecentIsTheLastWindowOrTwo) {
+  FrameBuilder builder(0, 2 * kSecond);
+  const auto response = std::make_shared<Histogram>();
+  std::uint64_t finished = 0;
+  for (int half = 1; half <= 40; ++half) {
+    // 50 jobs each half second: slow ones for five seconds, then quick ones.
+    for (int i = 0; i < 50; ++i) response->add(half <= 10 ? kSecond : kMillisecond);
+    finished += 50;
+    Sample sample{{{"dag", 0}}, {task_of(1, 0, finished, response)}};
+    sample.tasks[0].misses = half <= 10 ? finished : 500;
+    sample.tasks[0].cpu = static_cast<Duration>(finished) * kMillisecond;
+    sample.tasks[0].preemptions = finished / 2;
+    Frame frame;
+    const Time now = half * (kSecond / 2);
+    builder.build(sample, now, frame);
+    const page::Figures &figures = frame.tasks[0].figures;
+    EXPECT_EQ(figures.finished, finished);
+    EXPECT_EQ(figures.response_max, kSecond);
+    EXPECT_GE(frame.window, std::min<Duration>(now, 2 * kSecond));
+    EXPECT_LE(frame.window, 4 * kSecond);
+    EXPECT_EQ(figures.recent_jobs, static_cast<std::uint64_t>(frame.window / (kSecond / 100)));
+    EXPECT_EQ(figures.recent_cpu, static_cast<Duration>(figures.recent_jobs) * kMillisecond);
+    EXPECT_EQ(figures.recent_preemptions, figures.recent_jobs / 2);
+    const bool slow_in_window = now - frame.window < 5 * kSecond;
+    EXPECT_EQ(figures.recent_misses > 0, slow_in_window) << half;
+    EXPECT_EQ(figures.recent_max > 2 * kMillisecond, slow_in_window) << half;
+  }
+}
+
+TEST(FrameBuilder, ADagIsTheSumOfItsTasks) {
+  FrameBuilder builder(0, kSecond);
+  const auto quick = std::make_shared<Histogram>();
+  const auto slow = std::make_shared<Histogram>();
+  for (int i = 0; i < 98; ++i) quick->add(kMillisecond);
+  slow->add(kSecond);
+  slow->add(kSecond);
+  Sample sample{{{"a", 1}, {"b", 0}}, {task_of(3, 1, 98, quick), task_of(1, 0, 5), task_of(2, 1, 2, slow)}};
+  sample.tasks[0].active = 1;
+  sample.tasks[2].active = 2;
+  sample.tasks[2].ready = 3;
+  sample.tasks[2].waiting = 4;
+  Frame frame;
+  builder.build(sample, kSecond / 2, frame);
+  ASSERT_THAT(frame.dags, SizeIs(2));
+  EXPECT_EQ(frame.dags[0].max_active, 1U);
+  EXPECT_EQ(frame.dags[0].figures.finished, 5U);
+  EXPECT_EQ(frame.dags[0].figures.response_max, 0);
+  EXPECT_EQ(frame.dags[1].figures.finished, 100U);
+  EXPECT_EQ(frame.dags[1].figures.active, 3U);
+  EXPECT_EQ(frame.dags[1].figures.ready, 3U);
+  EXPECT_EQ(frame.dags[1].figures.waiting, 4U);
+  EXPECT_LE(frame.dags[1].figures.response_p50, kMillisecond * 9 / 8);
+  EXPECT_EQ(frame.dags[1].figures.response_p99, kSecond);
+  EXPECT_EQ(frame.dags[1].figures.recent_p99, kSecond);
+  // By DAG, in the order given.
+  EXPECT_EQ(frame.tasks[0].name, "t1");
+  EXPECT_EQ(frame.tasks[1].name, "t3");
+  EXPECT_EQ(frame.tasks[2].name, "t2");
+}
+
+TEST(FrameBuilder, AKeyThatIsUsedAgainBeginsAnew) {
+  FrameBuilder builder(0, kSecond);
+  const auto first = std::make_shared<Histogram>();
+  for (int i = 0; i < 10; ++i) first->add(kSecond);
+  Frame frame;
+  for (int second = 1; second <= 3; ++second)
+    builder.build({{{"a", 0}}, {task_of(1, 0, 10, first)}}, second * kSecond, frame);
+  EXPECT_EQ(frame.tasks[0].figures.recent_jobs, 0U);
+  const auto second = std::make_shared<Histogram>();
+  for (int i = 0; i < 20; ++i) second->add(kMillisecond);
+  builder.build({{{"a", 0}}, {task_of(1, 0, 20, second)}}, 4 * kSecond, frame);
+  EXPECT_EQ(frame.tasks[0].figures.recent_jobs, 20U);
+  EXPECT_LE(frame.tasks[0].figures.recent_max, kMillisecond);
+}
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() : path_(::testing::TempDir() + "redag_publisher_XXXXXX") {
+    EXPECT_NE(::mkdtemp(path_.data()), nullptr);
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  [[nodiscard]] const std::string &path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// Waits until `is_so` says yes; a test that waits in vain ends by its own limit.
+template <class Condition>
+void wait_until(Condition is_so) {
+  while (!is_so()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
+TEST(Publisher, PublishesUntilItIsGone) {
+  const TemporaryFolder folder;
+  PublisherOptions options;
+  options.folder = folder.path();
+  options.name = "cart";
+  options.interval = kMillisecond;
+  const auto response = std::make_shared<Histogram>();
+  std::atomic<std::uint64_t> finished{0};
+  std::atomic<int> samples{0};
+  auto publisher = Publisher::start(options, [&](Sample &sample) {
+    EXPECT_TRUE(sample.dags.empty() && sample.tasks.empty());
+    sample.dags = {{"a", 2}};
+    sample.tasks = {task_of(1, 0, finished, response)};
+    ++samples;
+  });
+  ASSERT_TRUE(publisher) << to_string(publisher.error());
+  const std::string path = (*publisher)->path();
+  // Somebody works meanwhile, as workers do.
+  for (int i = 0; i < 20'000; ++i) {
+    response->add(kMillisecond);
+    ++finished;
+  }
+  wait_until([&] {
+    const Result<Page> page = read_page(path);
+    return page && !page->frame.tasks.empty() && page->frame.tasks[0].figures.finished == 20'000;
+  });
+  const Result<Page> page = read_page(path);
+  ASSERT_TRUE(page);
+  EXPECT_EQ(page->frame.name, "cart");
+  EXPECT_EQ(page->frame.interval, kMillisecond);
+  EXPECT_GT(page->frame.publisher_cpu, 0);
+  EXPECT_GE(page->frame.published, page->frame.began);
+  EXPECT_GE(page->frame.tasks[0].figures.response_p50, kMillisecond);
+  publisher->reset();
+  EXPECT_FALSE(std::filesystem::exists(path));
+  const int before = samples;
+  std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_EQ(samples, before);
+}
+
+}  // namespace
+}  // namespace redag::live

@@ -1,0 +1,426 @@
+#include "redag/live/reader.hpp"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <thread>
+
+#include "redag/live/writer.hpp"
+
+namespace redag::live {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+class LivePage : public ::testing::Test {
+ protected:
+  LivePage() {
+    std::string name = ::testing::TempDir() + "redag_live_XXXXXX";
+    EXPECT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+  }
+  ~LivePage() override { std::filesystem::remove_all(folder_); }
+
+  std::unique_ptr<PageWriter> make_writer(std::size_t slot_size = kSlotSize) {
+    Result<std::unique_ptr<PageWriter>> writer = PageWriter::create(folder_, slot_size);
+    EXPECT_TRUE(writer) << to_string(writer.error());
+    return *std::move(writer);
+  }
+
+  /// A page as `writer` left it, under another name that tests may spoil.
+  std::string copy(const PageWriter &writer) const {
+    const std::string path = page_path(folder_, 1, 0);
+    std::filesystem::copy_file(writer.path(), path, std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::permissions(path, std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+    return path;
+  }
+
+  static void overwrite(const std::string &path, std::size_t offset, const std::string &bytes) {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(offset));
+    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  }
+
+  template <class Value>
+  static void overwrite(const std::string &path, std::size_t offset, Value value) {
+    std::string bytes(sizeof(value), '\0');
+    std::memcpy(bytes.data(), &value, sizeof(value));
+    overwrite(path, offset, bytes);
+  }
+
+  static std::string error_of(const std::string &path) {
+    const Result<Page> page = read_page(path);
+    return page ? "" : to_string(page.error());
+  }
+
+  std::string folder_;
+};
+
+Frame make_frame(std::size_t dags = 2, std::size_t tasks_each = 3, std::uint64_t count = 7) {
+  Frame frame;
+  frame.name = "cart";
+  frame.program = "redag";
+  frame.driver = "threads";
+  frame.preemption = "os";
+  frame.policy = "rate_monotonic";
+  frame.workers = 2;
+  frame.began = 100;
+  frame.published = 5 * kSecond;
+  frame.interval = kSecond / 2;
+  frame.window = 2 * kSecond;
+  frame.publisher_cpu = 12'345;
+  for (std::size_t d = 0; d < dags; ++d) {
+    frame.dags.push_back(DagFrame{"dag" + std::to_string(d), static_cast<std::uint32_t>(d), {}});
+    frame.dags.back().figures.released = count;
+    for (std::size_t t = 0; t < tasks_each; ++t) {
+      TaskFrame task{"task" + std::to_string(t), static_cast<std::uint32_t>(d), kSecond, kSecond / 2, kSecond / 4, {}};
+      task.figures.released = count;
+      task.figures.recent_max = static_cast<std::int64_t>(count);
+      task.figures.waiting = static_cast<std::uint32_t>(t);
+      frame.tasks.push_back(std::move(task));
+    }
+  }
+  return frame;
+}
+
+TEST_F(LivePage, IsReadAsItWasWritten) {
+  const auto writer = make_writer();
+  EXPECT_EQ(writer->path(), page_path(folder_, ::getpid(), 0));
+  const Frame written = make_frame();
+  writer->publish(written);
+  const Result<Page> page = read_page(writer->path());
+  ASSERT_TRUE(page) << to_string(page.error());
+  EXPECT_EQ(page->process, this_process());
+  const Frame &read = page->frame;
+  EXPECT_EQ(read.sequence, 1U);
+  EXPECT_EQ(read.name, "cart");
+  EXPECT_EQ(read.program, "redag");
+  EXPECT_EQ(read.driver, "threads");
+  EXPECT_EQ(read.preemption, "os");
+  EXPECT_EQ(read.policy, "rate_monotonic");
+  EXPECT_EQ(read.workers, 2U);
+  EXPECT_EQ(read.began, written.began);
+  EXPECT_EQ(read.published, written.published);
+  EXPECT_EQ(read.interval, written.interval);
+  EXPECT_EQ(read.window, written.window);
+  EXPECT_EQ(read.publisher_cpu, written.publisher_cpu);
+  EXPECT_EQ(read.left_out, 0U);
+  ASSERT_THAT(read.dags, SizeIs(2));
+  EXPECT_EQ(read.dags[1].name, "dag1");
+  EXPECT_EQ(read.dags[1].max_active, 1U);
+  ASSERT_THAT(read.tasks, SizeIs(6));
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(read.tasks[i].name, written.tasks[i].name);
+    EXPECT_EQ(read.tasks[i].dag, written.tasks[i].dag);
+    EXPECT_EQ(read.tasks[i].deadline, written.tasks[i].deadline);
+    EXPECT_EQ(read.tasks[i].bound, written.tasks[i].bound);
+    EXPECT_EQ(std::memcmp(&read.tasks[i].figures, &written.tasks[i].figures, sizeof(page::Figures)), 0);
+  }
+}
+
+TEST_F(LivePage, GrowsAndShrinksFromFrameToFrame) {
+  const auto writer = make_writer();
+  for (const std::size_t dags : {1U, 40U, 3U, 0U, 200U}) {
+    writer->publish(make_frame(dags, 10));
+    const Result<Page> page = read_page(writer->path());
+    ASSERT_TRUE(page) << to_string(page.error());
+    EXPECT_THAT(page->frame.tasks, SizeIs(dags * 10));
+  }
+}
+
+TEST_F(LivePage, SaysWhatFoundNoRoom) {
+  const auto writer = make_writer(8192);
+  writer->publish(make_frame(4, 100));
+  const Result<Page> page = read_page(writer->path());
+  ASSERT_TRUE(page) << to_string(page.error());
+  EXPECT_LT(page->frame.tasks.size(), 400U);
+  EXPECT_GT(page->frame.tasks.size(), 0U);
+  EXPECT_EQ(page->frame.left_out + page->frame.tasks.size(), 400U);
+}
+
+TEST_F(LivePage, LongNamesAreCutBetweenCharacters) {
+  const auto writer = make_writer();
+  Frame frame = make_frame(1, 1);
+  frame.tasks[0].name = std::string(95, 'x') + "\u00e4";  // the second byte of the last one is beyond the field
+  writer->publish(frame);
+  const Result<Page> page = read_page(writer->path());
+  ASSERT_TRUE(page) << to_string(page.error());
+  EXPECT_EQ(page->frame.tasks[0].name, std::string(95, 'x'));
+}
+
+TEST_F(LivePage, NamesCannotCommandTheTerminal) {
+  const auto writer = make_writer();
+  Frame frame = make_frame(1, 3);
+  frame.tasks[0].name = "a\033[2Jb\x7f\r\n";
+  frame.tasks[1].name = "\u00e4\u20ac\U0001f916 \u0085\u202e\xff\xc0\x80\xed\xa0\x80";
+  frame.name = "\xe2\x82";  // incomplete
+  writer->publish(frame);
+  const Result<Page> page = read_page(writer->path());
+  ASSERT_TRUE(page) << to_string(page.error());
+  EXPECT_EQ(page->frame.tasks[0].name, "a?[2Jb???");
+  EXPECT_EQ(page->frame.tasks[1].name, "\u00e4\u20ac\U0001f916 " + std::string(11, '?'));  // one a byte
+  EXPECT_EQ(page->frame.name, "??");
+}
+
+TEST_F(LivePage, OnlyTheOwnerCanOpenIt) {
+  const mode_t old = ::umask(0);
+  const auto writer = make_writer();
+  ::umask(old);
+  struct stat info {};
+  ASSERT_EQ(::stat(writer->path().c_str(), &info), 0);
+  EXPECT_EQ(info.st_mode & 07777U, 0600U);
+  EXPECT_EQ(info.st_uid, ::geteuid());
+}
+
+TEST_F(LivePage, OthersPagesAreRefused) {
+  const auto writer = make_writer();
+  writer->publish(make_frame());
+  const std::string path = copy(*writer);
+  EXPECT_EQ(error_of(path), "");
+  for (const mode_t mode : {0640, 0604, 0620, 0602, 0666}) {
+    ASSERT_EQ(::chmod(path.c_str(), mode), 0);
+    EXPECT_THAT(error_of(path), HasSubstr("by others"));
+  }
+  ASSERT_EQ(::chmod(path.c_str(), 0600), 0);
+  if (::geteuid() == 0) {
+    ASSERT_EQ(::chown(path.c_str(), 12345, 12345), 0);
+    EXPECT_THAT(error_of(path), HasSubstr("belongs to user 12345"));
+  }
+}
+
+TEST_F(LivePage, WhatIsNoFileIsRefused) {
+  const std::string path = page_path(folder_, 1, 0);
+  EXPECT_THAT(error_of(path), HasSubstr("No such file"));
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  EXPECT_THAT(error_of(path), HasSubstr("not a file"));  // and does not wait for somebody to write into it
+  ::unlink(path.c_str());
+  const auto writer = make_writer();
+  writer->publish(make_frame());
+  ASSERT_EQ(::symlink(writer->path().c_str(), path.c_str()), 0);
+  EXPECT_NE(error_of(path), "");
+  ::unlink(path.c_str());
+  ASSERT_EQ(::mkdir(path.c_str(), 0700), 0);
+  EXPECT_THAT(error_of(path), HasSubstr("not a file"));
+}
+
+TEST_F(LivePage, DamageIsSaid) {
+  const auto writer = make_writer();
+  writer->publish(make_frame());
+  const auto spoilt = [&](std::size_t offset, auto value) {
+    const std::string path = copy(*writer);
+    overwrite(path, offset, value);
+    return error_of(path);
+  };
+  const std::size_t slot = 4096 + kSlotSize;  // of frame 1
+  EXPECT_THAT(spoilt(0, 'x'), HasSubstr("first bytes"));
+  EXPECT_THAT(spoilt(offsetof(page::Header, version), std::uint32_t{2}), HasSubstr("version 2"));
+  EXPECT_THAT(spoilt(offsetof(page::Header, page_size), ~std::uint64_t{0}), HasSubstr("sizes"));
+  EXPECT_THAT(spoilt(offsetof(page::Header, slot_size), ~std::uint64_t{7}), HasSubstr("sizes"));
+  EXPECT_THAT(spoilt(offsetof(page::Header, slot_offset), ~std::uint64_t{0}), HasSubstr("sizes"));
+  EXPECT_THAT(spoilt(offsetof(page::Header, task_row_size), std::uint32_t{8}), HasSubstr("sizes"));
+  EXPECT_THAT(spoilt(offsetof(page::Header, dag_row_size), std::uint32_t{265}), HasSubstr("sizes"));
+  EXPECT_THAT(spoilt(offsetof(page::Header, sequence), std::uint64_t{0}), HasSubstr("no whole frame"));
+  EXPECT_THAT(spoilt(offsetof(page::Header, sequence), std::uint64_t{3}), HasSubstr("no whole frame"));
+  EXPECT_THAT(spoilt(slot + offsetof(page::FrameHeader, tasks), ~std::uint32_t{0}), HasSubstr("no whole frame"));
+  EXPECT_THAT(spoilt(slot + sizeof(page::FrameHeader), 'x'), HasSubstr("no whole frame"));
+  const std::string path = copy(*writer);
+  std::filesystem::resize_file(path, slot + 100);
+  EXPECT_THAT(error_of(path), HasSubstr("sizes"));
+  std::filesystem::resize_file(path, 20);
+  EXPECT_THAT(error_of(path), HasSubstr("too short"));
+}
+
+// A page whose author knows the format: the checksum is right, and the rest is not.
+TEST_F(LivePage, LiesAreFound) {
+  const auto writer = make_writer();
+  Frame frame = make_frame();
+  frame.tasks[1].figures.response_p99 = -1;
+  writer->publish(frame);
+  EXPECT_THAT(error_of(writer->path()), HasSubstr("cannot be"));
+  frame = make_frame();
+  frame.tasks[1].dag = 2;
+  writer->publish(frame);
+  EXPECT_THAT(error_of(writer->path()), HasSubstr("cannot be"));
+  frame = make_frame();
+  frame.published = kNever;
+  writer->publish(frame);
+  EXPECT_THAT(error_of(writer->path()), HasSubstr("cannot be"));
+}
+
+// Bytes at random places, in a page whose checksum is then made right again, and pages of nothing but noise: whatever
+// is there, reading ends, and what it calls a frame keeps its promises.
+TEST_F(LivePage, NoiseDoesNotCrashTheReader) {
+  const auto writer = make_writer(8192);
+  writer->publish(make_frame());
+  const std::string path = copy(*writer);
+  std::string original(std::filesystem::file_size(path), '\0');
+  std::ifstream(path, std::ios::binary).read(original.data(), static_cast<std::streamsize>(original.size()));
+  std::mt19937_64 random(20'251);
+  const std::size_t slot = 4096 + 8192;
+  int read = 0;
+  for (int round = 0; round < 400; ++round) {
+    std::string bytes = original;
+    const bool all = round % 20 == 0;
+    const std::size_t edits = all ? bytes.size() : 1 + random() % 6;
+    for (std::size_t i = 0; i < edits; ++i) {
+      // Most where the structure is; what stands in the header decides what the rest means.
+      const std::size_t at = all ? i : random() % 3 == 0 ? random() % 88 : slot + random() % 2600;
+      bytes[at] = random() % 4 == 0 ? '\xff' : static_cast<char>(random());
+    }
+    if (all) std::memcpy(bytes.data(), original.data(), round % 40 == 0 ? 88 : 0);
+    if (round % 2 == 1) {  // the checksum of a frame of the stated size
+      page::FrameHeader head{};
+      std::memcpy(&head, bytes.data() + slot, sizeof(head));
+      const std::uint64_t size = sizeof(head) + head.dags * sizeof(page::DagRow) + head.tasks * sizeof(page::TaskRow);
+      if (size <= 8192) {
+        const auto *begin = reinterpret_cast<const std::byte *>(bytes.data() + slot);
+        const std::uint64_t sum = page::checksum({begin + 8, begin + size});
+        std::memcpy(bytes.data() + slot, &sum, sizeof(sum));
+      }
+    }
+    if (round % 7 == 0) bytes.resize(random() % bytes.size());
+    std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
+    const Result<Page> page = read_page(path);
+    if (!page) continue;
+    ++read;
+    for (const TaskFrame &task : page->frame.tasks) {
+      EXPECT_LT(task.dag, page->frame.dags.size());
+      EXPECT_GE(task.figures.recent_p99, 0);
+      for (const char c : task.name) EXPECT_GE(static_cast<unsigned char>(c), 0x20);
+    }
+  }
+  EXPECT_GT(read, 20);  // otherwise nothing but the first checks was tried
+}
+
+// Every row of a frame holds the frame's number: a frame out of two would show.
+TEST_F(LivePage, IsWholeWhileItIsWritten) {
+  const auto writer = make_writer();
+  writer->publish(make_frame(5, 40, 1));
+  std::atomic<bool> stop{false};
+  std::thread other([&] {
+    for (std::uint64_t count = 2; !stop; ++count) writer->publish(make_frame(5, 40, count));
+  });
+  int whole = 0;
+  std::uint64_t last = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Result<Page> page = read_page(writer->path());
+    if (!page) continue;  // the writer was faster, ten times: it does nothing else
+    ++whole;
+    EXPECT_GE(page->frame.sequence, last);
+    last = page->frame.sequence;
+    ASSERT_THAT(page->frame.tasks, SizeIs(200));
+    for (const TaskFrame &task : page->frame.tasks) {
+      ASSERT_EQ(task.figures.released, page->frame.sequence);
+      ASSERT_EQ(task.figures.recent_max, static_cast<std::int64_t>(page->frame.sequence));
+    }
+  }
+  stop = true;
+  other.join();
+  EXPECT_GT(whole, 100);
+  EXPECT_GT(last, 1U);
+}
+
+TEST_F(LivePage, SeveralInOneProcess) {
+  const auto first = make_writer();
+  const auto second = make_writer();
+  first->publish(make_frame());
+  second->publish(make_frame());
+  std::vector<Listed> pages = list_pages(folder_);
+  ASSERT_THAT(pages, SizeIs(2));
+  EXPECT_EQ(pages[0].pid, ::getpid());
+  EXPECT_EQ(pages[0].number, 0U);
+  EXPECT_EQ(pages[1].number, 1U);
+  EXPECT_TRUE(pages[0].page);
+}
+
+TEST_F(LivePage, GoesWithItsWriter) {
+  make_writer()->publish(make_frame());
+  EXPECT_THAT(list_pages(folder_), IsEmpty());
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+TEST_F(LivePage, OfADeadProcessIsRemoved) {
+  const auto writer = make_writer();
+  writer->publish(make_frame());
+  const std::string path = copy(*writer);
+  ASSERT_TRUE(read_page(path));
+  // The number lives and is somebody else's: the process began at another time.
+  overwrite(path, offsetof(page::Header, process_start), this_process().start + 1);
+  EXPECT_THAT(list_pages(folder_), SizeIs(1));
+  EXPECT_FALSE(std::filesystem::exists(path));
+
+  // No such process.
+  const std::string gone = copy(*writer);
+  overwrite(gone, offsetof(page::Header, pid), std::int64_t{0x7fffffff});
+  EXPECT_EQ(remove_stale_pages(folder_), 1U);
+  EXPECT_FALSE(std::filesystem::exists(gone));
+
+  // In another namespace the number says nothing.
+  const std::string elsewhere = copy(*writer);
+  overwrite(elsewhere, offsetof(page::Header, process_start), std::uint64_t{1});
+  overwrite(elsewhere, offsetof(page::Header, pid_namespace), std::uint64_t{1});
+  EXPECT_EQ(remove_stale_pages(folder_), 0U);
+  EXPECT_THAT(list_pages(folder_), SizeIs(2));
+
+  // What is no page is not ours to remove.
+  overwrite(elsewhere, 0, 'x');
+  EXPECT_THAT(list_pages(folder_), SizeIs(2));
+  EXPECT_TRUE(std::filesystem::exists(elsewhere));
+}
+
+TEST_F(LivePage, ThatAKilledProcessLeftIsReplaced) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    auto writer = PageWriter::create(folder_);
+    if (!writer) ::_exit(1);
+    (*writer)->publish(make_frame());
+    ::kill(::getpid(), SIGKILL);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  ASSERT_TRUE(std::filesystem::exists(page_path(folder_, child, 0)));
+  const auto writer = make_writer();
+  EXPECT_FALSE(std::filesystem::exists(page_path(folder_, child, 0)));
+}
+
+TEST_F(LivePage, CannotBeMadeEverywhere) {
+  const auto writer = PageWriter::create(folder_ + "/missing");
+  ASSERT_FALSE(writer);
+  EXPECT_THAT(to_string(writer.error()), HasSubstr("no live page"));
+  EXPECT_THAT(list_pages(folder_ + "/missing"), IsEmpty());
+}
+
+TEST(Process, StartIsFieldTwentyTwo) {
+  EXPECT_EQ(start_time_in("23359 (cat) R 1 1 1 0 -1 4194304 97 0 0 0 0 0 0 0 20 0 1 0 1307096 3133440 366"), 1307096U);
+  EXPECT_EQ(start_time_in("1 (a) b) 1 2 3) S 1 1 1 0 -1 4 97 0 0 0 0 0 0 0 20 0 1 0 77 3"), 77U);
+  EXPECT_EQ(start_time_in("1 (a) S 1 1"), std::nullopt);
+  EXPECT_EQ(start_time_in(""), std::nullopt);
+  EXPECT_EQ(start_time_in("1 (a) S 1 1 1 0 -1 4 97 0 0 0 0 0 0 0 20 0 1 0 x 3"), std::nullopt);
+}
+
+TEST(Process, LivesAsLongAsItRuns) {
+  Process self = this_process();
+  EXPECT_GT(self.start, 0U);
+  EXPECT_EQ(life_of(self), Life::Alive);
+  ++self.start;
+  EXPECT_EQ(life_of(self), Life::Dead);
+  ++self.pid_namespace;
+  EXPECT_EQ(life_of(self), Life::Unknown);
+}
+
+}  // namespace
+}  // namespace redag::live

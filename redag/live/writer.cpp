@@ -1,0 +1,195 @@
+#include "redag/live/writer.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include "redag/live/process.hpp"
+#include "redag/live/reader.hpp"
+
+namespace redag::live {
+namespace {
+
+using page::DagRow;
+using page::FrameHeader;
+using page::Header;
+using page::TaskRow;
+
+constexpr std::size_t kFirstSlot = 4096;
+constexpr std::size_t kLeastSlot = sizeof(FrameHeader);
+constexpr unsigned kMostPages = 1000;  // of one process
+
+static_assert(sizeof(Header) <= kFirstSlot);
+static_assert(std::atomic_ref<std::uint64_t>::is_always_lock_free);
+
+/// Cut between two characters, the rest zeros.
+template <std::size_t Size>
+void put_name(char (&target)[Size], const std::string &name) {
+  std::size_t length = std::min(name.size(), Size);
+  const auto continues = [&](std::size_t at) { return (static_cast<unsigned char>(name[at]) & 0xc0U) == 0x80U; };
+  if (length < name.size()) {
+    while (length > 0 && continues(length)) --length;
+  }
+  std::memset(target, 0, Size);
+  std::memcpy(target, name.data(), length);
+}
+
+tl::unexpected<Diagnostics> refused(const std::string &what) {
+  return make_error(fmt::format("no live page: {}: {}", what, std::generic_category().message(errno)),
+                    "redag top will not see this executor; all else works");
+}
+
+/// A new file that only its owner can open, or the error in errno.
+int create_file(const std::string &path) {
+  constexpr mode_t kOwnerOnly = S_IRUSR | S_IWUSR;
+  const int descriptor = ::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC | O_NOFOLLOW, kOwnerOnly);
+  if (descriptor >= 0) (void)::fchmod(descriptor, kOwnerOnly);  // whatever the umask took away
+  return descriptor;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<PageWriter>> PageWriter::create(const std::string &folder, std::size_t slot_size) {
+  (void)remove_stale_pages(folder);
+  const Process self = this_process();
+  slot_size = std::max(slot_size, kLeastSlot) / 8 * 8;
+  std::string path;
+  int descriptor = -1;
+  for (unsigned number = 0; descriptor < 0; ++number) {
+    path = page_path(folder, self.pid, number);
+    descriptor = create_file(path);
+    if (descriptor < 0 && (errno != EEXIST || number == kMostPages)) return refused(path);
+  }
+  const std::size_t size = kFirstSlot + 2 * slot_size;
+  const auto give_up = [&](int error) {
+    ::close(descriptor);
+    ::unlink(path.c_str());
+    errno = error;
+    return refused(path);
+  };
+  if (::ftruncate(descriptor, static_cast<off_t>(size)) != 0) return give_up(errno);
+  // Memory that is not there kills who writes to it (SIGBUS): it is asked for first.
+  if (const int error = ::posix_fallocate(descriptor, 0, kFirstSlot); error != 0) return give_up(error);
+  void *memory = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0);
+  if (memory == MAP_FAILED) return give_up(errno);
+
+  auto writer = std::unique_ptr<PageWriter>(
+      new PageWriter(std::move(path), descriptor, static_cast<std::byte *>(memory), slot_size));
+  Header header{};
+  header.version = page::kVersion;
+  header.header_size = sizeof(Header);
+  header.frame_header_size = sizeof(FrameHeader);
+  header.dag_row_size = sizeof(DagRow);
+  header.task_row_size = sizeof(TaskRow);
+  header.page_size = size;
+  header.slot_offset = kFirstSlot;
+  header.slot_size = slot_size;
+  header.pid = self.pid;
+  header.process_start = self.start;
+  header.pid_namespace = self.pid_namespace;
+  std::memcpy(memory, &header, sizeof(header));
+  std::uint64_t magic = 0;
+  std::memcpy(&magic, page::kMagic, sizeof(magic));
+  writer->store_word(offsetof(Header, magic), magic);
+  return writer;
+}
+
+PageWriter::PageWriter(std::string path, int descriptor, std::byte *memory, std::size_t slot_size)
+    : path_(std::move(path)), descriptor_(descriptor), memory_(memory), slot_size_(slot_size) {}
+
+PageWriter::~PageWriter() {
+  ::unlink(path_.c_str());
+  ::munmap(memory_, kFirstSlot + 2 * slot_size_);
+  ::close(descriptor_);
+}
+
+bool PageWriter::reserve(std::size_t slot, std::size_t size) {
+  if (size > slot_size_) return false;
+  if (size <= reserved_[slot]) return true;
+  constexpr std::size_t kStep = 65536;
+  const std::size_t wanted = std::min(slot_size_, (size + kStep - 1) / kStep * kStep);
+  const auto offset = static_cast<off_t>(kFirstSlot + slot * slot_size_);
+  if (::posix_fallocate(descriptor_, offset, static_cast<off_t>(wanted)) != 0) return false;
+  reserved_[slot] = wanted;
+  return true;
+}
+
+void PageWriter::publish(const Frame &frame) {
+  const std::uint64_t sequence = sequence_ + 1;
+  const std::size_t slot = sequence % 2;
+  std::size_t dags = frame.dags.size();
+  std::size_t tasks = frame.tasks.size();
+  const auto size_of = [](std::size_t d, std::size_t t) {
+    return sizeof(FrameHeader) + d * sizeof(DagRow) + t * sizeof(TaskRow);
+  };
+  while (!reserve(slot, size_of(dags, tasks))) {
+    if (dags == 0 && tasks == 0) return;
+    // A task's row names its DAG's.
+    tasks /= 2;
+    if (tasks == 0) dags /= 2;
+  }
+  std::byte *const begin = memory_ + kFirstSlot + slot * slot_size_;
+  std::byte *at = begin;
+  const auto put = [&at](const auto &row) {
+    std::memcpy(at, &row, sizeof(row));
+    at += sizeof(row);
+  };
+
+  FrameHeader header{};
+  header.sequence = sequence;
+  header.dags = static_cast<std::uint32_t>(dags);
+  header.tasks = static_cast<std::uint32_t>(tasks);
+  header.left_out = frame.left_out + (frame.dags.size() - dags) + (frame.tasks.size() - tasks);
+  header.began = frame.began;
+  header.published = frame.published;
+  header.interval = frame.interval;
+  header.window = frame.window;
+  header.publisher_cpu = frame.publisher_cpu;
+  header.workers = frame.workers;
+  put_name(header.name, frame.name);
+  put_name(header.program, frame.program);
+  put_name(header.driver, frame.driver);
+  put_name(header.preemption, frame.preemption);
+  put_name(header.policy, frame.policy);
+  put(header);
+  for (std::size_t d = 0; d < dags; ++d) {
+    const DagFrame &dag = frame.dags[d];
+    DagRow row{};
+    put_name(row.name, dag.name);
+    row.max_active = dag.max_active;
+    row.figures = dag.figures;
+    put(row);
+  }
+  for (std::size_t t = 0; t < tasks; ++t) {
+    const TaskFrame &task = frame.tasks[t];
+    TaskRow row{};
+    put_name(row.name, task.name);
+    row.dag = task.dag;
+    row.period = task.period;
+    row.deadline = task.deadline;
+    row.bound = task.bound;
+    row.figures = task.figures;
+    put(row);
+  }
+  const std::span<const std::byte> checked(begin + sizeof(header.checksum), at);
+  const std::uint64_t checksum = page::checksum(checked);
+  std::memcpy(begin, &checksum, sizeof(checksum));
+
+  sequence_ = sequence;
+  store_word(offsetof(Header, sequence), sequence);
+}
+
+void PageWriter::store_word(std::size_t offset, std::uint64_t word) {
+  std::atomic_ref<std::uint64_t>(*reinterpret_cast<std::uint64_t *>(memory_ + offset))
+      .store(word, std::memory_order_release);
+}
+
+}  // namespace redag::live

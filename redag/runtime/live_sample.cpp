@@ -1,0 +1,34 @@
+#include "redag/runtime/live_sample.hpp"
+
+namespace redag::runtime {
+
+void fill(live::TaskSample &sample, const TaskFigures &figures) {
+  const sched::Accounting &jobs = figures.jobs;
+  sample.released = jobs.released;
+  sample.finished = jobs.finished;
+  sample.skipped = jobs.skipped;
+  sample.aborted = jobs.aborted;
+  sample.misses = figures.late + jobs.skipped + jobs.aborted;
+  sample.deferred = jobs.deferred;
+  sample.preemptions = figures.preemptions;
+  sample.cpu = figures.usage.total;
+  sample.active = figures.active;
+  sample.ready = figures.ready;
+  const std::uint64_t started_or_ready = std::uint64_t{figures.active} + figures.ready;
+  const std::uint64_t in_flight = jobs.in_flight();
+  sample.waiting = static_cast<std::uint32_t>(in_flight > started_or_ready ? in_flight - started_or_ready : 0);
+  sample.response = figures.response;
+}
+
+live::PublisherOptions live_options(const std::string &name, const std::string &driver, const Mode &mode,
+                                    const sched::Config &config) {
+  live::PublisherOptions options;
+  options.name = name;
+  options.driver = driver;
+  options.preemption = to_string(mode.mode);
+  options.policy = to_string(config.policy);
+  options.workers = config.workers;
+  return options;
+}
+
+}  // namespace redag::runtime

@@ -1,0 +1,198 @@
+// What the engine tells a live page, and that executors make one and take it away.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <thread>
+
+#include "redag/live/reader.hpp"
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/executor.hpp"
+#include "redag/runtime/live_sample.hpp"
+#include "redag/runtime/run_workload.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+
+namespace redag::runtime {
+namespace {
+
+using namespace std::chrono_literals;
+
+Task timer(const std::string &name, Duration period) {
+  Task task;
+  task.name = name;
+  task.period = task.deadline = period;
+  task.wcet = kMillisecond;
+  return task;
+}
+
+std::unique_ptr<Engine> make_engine(const Workload &workload, bool measure, std::vector<Body> bodies) {
+  EngineOptions options;
+  options.config.workers = 1;
+  options.measure = measure;
+  auto engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+  engine->bind(workload, std::move(bodies));
+  return engine;
+}
+
+TEST(Figures, SayWhereJobsAre) {
+  Workload workload;
+  workload.dags = {Dag{"d", {timer("urgent", kSecond), timer("later", 2 * kSecond)}, 0, 0, 0, Criticality::Normal}};
+  Task after = timer("after", kSecond);
+  after.predecessors = {1};
+  workload.dags[0].tasks.push_back(after);
+  Event started;
+  Event go;
+  const Body nothing = [](const Job &) { return sched::Outcome::Finished; };
+  const auto engine = make_engine(workload, true,
+                                  {[&](const Job &) {
+                                     started.set();
+                                     go.wait();
+                                     return sched::Outcome::Finished;
+                                   },
+                                   nothing, nothing});
+  ASSERT_TRUE(engine->start());
+  engine->set_origin(monotonic_now() - 10 * kSecond);
+  const Time now = engine->now();
+  engine->release(TaskId(0), now - 5 * kSecond);  // five seconds late, and so beyond its deadline
+  started.wait();
+  engine->release(TaskId(1), now);
+  engine->release(TaskId(2), now);
+
+  live::TaskSample running;
+  fill(running, engine->figures(TaskId(0)));
+  EXPECT_EQ(running.active, 1U);
+  EXPECT_EQ(running.ready, 0U);
+  EXPECT_EQ(running.waiting, 0U);
+  live::TaskSample ready;
+  fill(ready, engine->figures(TaskId(1)));
+  EXPECT_EQ(ready.active, 0U);
+  EXPECT_EQ(ready.ready, 1U);
+  EXPECT_EQ(ready.waiting, 0U);
+  live::TaskSample waiting;
+  fill(waiting, engine->figures(TaskId(2)));
+  EXPECT_EQ(waiting.ready, 0U);
+  EXPECT_EQ(waiting.waiting, 1U);
+
+  go.set();
+  while (engine->figures(TaskId(2)).jobs.finished == 0) std::this_thread::yield();
+  live::TaskSample late;
+  fill(late, engine->figures(TaskId(0)));
+  EXPECT_EQ(late.finished, 1U);
+  EXPECT_EQ(late.misses, 1U);
+  EXPECT_EQ(late.active, 0U);
+  EXPECT_GE(late.response->longest(), 5 * kSecond);
+  live::TaskSample in_time;
+  fill(in_time, engine->figures(TaskId(1)));
+  EXPECT_EQ(in_time.misses, 0U);
+  EXPECT_EQ(in_time.response->counts().total(), 1U);
+  engine->miss(TaskId(1), engine->now(), Reason::Overrun);
+  fill(in_time, engine->figures(TaskId(1)));
+  EXPECT_EQ(in_time.misses, 1U);
+}
+
+TEST(Figures, AJobThatThrowsIsAMissWithoutAResponse) {
+  Workload workload;
+  workload.dags = {Dag{"d", {timer("bad", kSecond)}, 0, 0, 0, Criticality::Normal}};
+  const auto engine =
+      make_engine(workload, true, {[](const Job &) -> sched::Outcome { throw std::runtime_error("no"); }});
+  ASSERT_TRUE(engine->start());
+  engine->set_origin(monotonic_now());
+  engine->release(TaskId(0), 0);
+  while (engine->figures(TaskId(0)).jobs.aborted == 0) std::this_thread::yield();
+  live::TaskSample task;
+  fill(task, engine->figures(TaskId(0)));
+  EXPECT_EQ(task.misses, 1U);
+  EXPECT_EQ(task.response->counts().total(), 0U);
+}
+
+TEST(Figures, AreNotMeasuredUnasked) {
+  Workload workload;
+  workload.dags = {Dag{"d", {timer("t", kSecond)}, 0, 0, 0, Criticality::Normal}};
+  const auto engine = make_engine(workload, false, {[](const Job &) { return sched::Outcome::Finished; }});
+  EXPECT_EQ(engine->figures(TaskId(0)).response, nullptr);
+}
+
+std::optional<live::Page> own_page(const std::string &name) {
+  for (live::Listed &listed : live::list_pages(live::kFolder)) {
+    if (listed.pid == ::getpid() && listed.page && listed.page->frame.name == name) return std::move(*listed.page);
+  }
+  return std::nullopt;
+}
+
+TEST(LiveExecutor, IsSeenWhileItRuns) {
+  ExecutorOptions options;
+  options.name = "live-test";
+  options.workers = 1;
+  options.preemption = PreemptionMode::None;
+  options.live = true;
+  Executor executor(options);
+  EXPECT_TRUE(executor.warnings().empty()) << executor.warnings().front();
+  DagBuilder control("control", {.max_active = 2});
+  const TaskHandle imu = control.timer("imu", 5ms, [] {}, {.wcet = 300us});
+  control.data("ekf", {imu}, [] {});
+  executor.add(std::move(control));
+  DagBuilder gone("gone");
+  gone.timer("t", 5ms, [] {});
+  executor.remove(executor.add(std::move(gone)));
+  executor.start();
+  std::optional<live::Page> page;
+  while (!page || page->frame.tasks.size() < 2 || page->frame.tasks[1].figures.finished == 0) {
+    page = own_page("live-test");
+    std::this_thread::sleep_for(10ms);
+  }
+  const live::Frame &frame = page->frame;
+  EXPECT_EQ(frame.driver, "threads");
+  EXPECT_EQ(frame.preemption, "none");
+  EXPECT_EQ(frame.workers, 1U);
+  ASSERT_EQ(frame.dags.size(), 1U);
+  EXPECT_EQ(frame.dags[0].name, "control");
+  EXPECT_EQ(frame.dags[0].max_active, 2U);
+  EXPECT_EQ(frame.tasks[0].name, "imu");
+  EXPECT_EQ(frame.tasks[0].deadline, 5 * kMillisecond);
+  EXPECT_GT(frame.tasks[0].figures.response_max, 0);
+  executor.stop();
+  EXPECT_FALSE(own_page("live-test"));
+}
+
+TEST(LiveExecutor, IsNotSeenUnasked) {
+  ExecutorOptions options;
+  options.name = "hidden-test";
+  options.workers = 1;
+  options.preemption = PreemptionMode::None;
+  Executor executor(options);
+  executor.start();
+  EXPECT_FALSE(std::filesystem::exists(live::page_path(live::kFolder, ::getpid(), 0)));
+}
+
+TEST(LiveRun, ShowsTheBoundsItIsGiven) {
+  Workload workload;
+  workload.name = "live-run";
+  workload.platform = Platform{1, PreemptionMode::Cooperative};
+  workload.dags = {Dag{"d", {timer("a", 20 * kMillisecond), timer("b", 10 * kSecond)}, 0, 0, 0, Criticality::Normal}};
+  RunOptions options;
+  options.duration = 20 * kSecond;
+  options.live = true;
+  options.bounds = [](const sched::Config &config) {
+    EXPECT_EQ(config.preemption, sched::Preemption::Cooperative);
+    return std::vector<Duration>{7 * kMillisecond, 0};
+  };
+  std::atomic<bool> stop{false};
+  options.stop = &stop;
+  std::optional<live::Page> page;
+  options.progress = [&](Time, std::span<const JobEvent>) {
+    auto seen = own_page("live-run");
+    if (!seen || seen->frame.tasks.empty() || seen->frame.tasks[0].figures.finished == 0) return;
+    page = std::move(seen);
+    stop = true;
+  };
+  const Result<RunResult> result = run_workload(workload, options);
+  ASSERT_TRUE(result) << to_string(result.error());
+  ASSERT_TRUE(page);
+  EXPECT_EQ(page->frame.tasks[0].bound, 7 * kMillisecond);
+  EXPECT_EQ(page->frame.tasks[1].bound, 0);
+  EXPECT_EQ(page->frame.preemption, "cooperative");
+  EXPECT_FALSE(own_page("live-run"));
+}
+
+}  // namespace
+}  // namespace redag::runtime
