@@ -27,5 +27,6 @@ Action add_assign(CLI::App &app);
 Action add_experiment(CLI::App &app);
 Action add_check_trace(CLI::App &app);
 Action add_report(CLI::App &app);
+Action add_top(CLI::App &app);
 
 }  // namespace redag::cli

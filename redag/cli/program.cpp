@@ -67,6 +67,11 @@ constexpr std::array kCommands = {
           "  redag report results/demo\n"
           "  redag report results/none results/os -o report.html\n"
           "  redag report results/demo --json | jq .groups[].total\n"},
+    Entry{"top", "Watch an executor that runs: rates, response times, misses, queues", add_top,
+          "  redag top\n"
+          "  redag top --list\n"
+          "  redag top 1234 --interval 500ms\n"
+          "  redag top 1234 --once --json\n"},
 };
 
 std::vector<std::string> command_names() {

@@ -94,6 +94,7 @@ std::optional<SessionOptions> session_options(const RunArguments &arguments, tra
   options.overheads = arguments.overheads;
   options.lock_memory = arguments.lock_memory;
   options.realtime_threads = arguments.realtime_threads;
+  options.live = arguments.live;
   if (options.warm_up >= options.duration) {
     console.error(fmt::format("the warm-up of {} leaves nothing of a run of {}", format_duration(options.warm_up),
                               format_duration(options.duration)));

@@ -16,6 +16,9 @@ Action add_run(CLI::App &app) {
   add_result_arguments(app, *arguments);
   app.add_flag("--all-tasks", arguments->all_tasks, "A row for every task, however many");
   add_thread_arguments(app, *arguments);
+  arguments->live = true;
+  app.add_flag("--live,!--no-live", arguments->live, "Let redag top see the run (a page of memory, 2 updates a second)")
+      ->group("Threads");
   return [arguments, executor](Console &console) {
     return run_once(*arguments, *executor, trace::Driver::Threads, console);
   };

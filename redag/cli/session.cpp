@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <memory>
 
+#include "redag/analysis/analyze.hpp"
 #include "redag/base/check.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/runtime/run_workload.hpp"
@@ -103,6 +104,26 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, const
   return session;
 }
 
+/// What each task's response time cannot exceed, 0 where nobody knows: for the live view, which need not wait for the
+/// bounds of large workloads.
+std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant, const sched::Config &config) {
+  constexpr std::size_t kMostTasks = 100;
+  std::vector<Duration> bounds(workload.task_count(), 0);
+  if (variant.executor != "redag" || bounds.size() > kMostTasks) return bounds;
+  Workload configured = workload;
+  for (Dag &dag : configured.dags) inherit_periods(dag);
+  analysis::AnalysisPlatform platform;
+  platform.workers = config.workers;
+  platform.preemption = config.preemption;
+  platform.levels = config.levels;
+  platform.max_started = config.max_started;
+  const Result<analysis::System> system = analysis::compile(configured, platform);
+  if (!system || !system->not_analysable.empty()) return bounds;
+  const analysis::Report report = analysis::analyze(*system);
+  for (std::size_t t = 0; t < bounds.size(); ++t) bounds[t] = report.tasks[t].response.value_or(0);
+  return bounds;
+}
+
 Result<Session> run_on_threads(const Workload &workload, const Variant &variant, const SessionOptions &options,
                                const ProgressHook &progress) {
   runtime::RunOptions run;
@@ -115,6 +136,8 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   run.lock_memory = options.lock_memory;
   run.cpus = options.cpus;
   run.stop = options.stop;
+  run.live = options.live;
+  run.bounds = [&](const sched::Config &config) { return bounds_of(workload, variant, config); };
   run.scheduler = [&](const Workload &w, const sched::Config &config) {
     return sched::make_scheduler(variant.executor, w, config);
   };

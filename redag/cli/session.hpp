@@ -33,6 +33,7 @@ struct SessionOptions {
   std::vector<int> cpus;                    // threads, as the two below
   bool lock_memory = false;
   bool realtime_threads = false;
+  bool live = false;  // `redag top` sees the run
 };
 
 /// Deadline misses while a run goes on, by DAG: jobs that finished late, were skipped or aborted. An estimate for the

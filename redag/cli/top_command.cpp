@@ -1,0 +1,140 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <memory>
+#include <optional>
+
+#include "redag/cli/commands.hpp"
+#include "redag/cli/live_text.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/cli/top_screen.hpp"
+#include "redag/live/writer.hpp"
+#include "redag/runtime/clock.hpp"
+
+namespace redag::cli {
+namespace {
+
+struct Options {
+  std::string target;
+  std::string folder = live::kFolder;
+  Duration interval = kSecond;
+  bool list = false;
+  bool once = false;
+  bool json = false;
+  bool dags_only = false;
+  bool since_start = false;
+};
+
+constexpr const char *kHowTo =
+    "redag run makes one; programs set ExecutorOptions::live, ROS 2 nodes the parameter live";
+
+std::optional<LiveTarget> parse_target(const std::string &text) {
+  LiveTarget target;
+  const char *const end = text.data() + text.size();
+  const auto pid = std::from_chars(text.data(), end, target.pid);
+  if (pid.ec != std::errc() || target.pid <= 0) return std::nullopt;
+  if (pid.ptr == end) return target;
+  std::uint32_t number = 0;
+  const auto rest = std::from_chars(pid.ptr + 1, end, number);
+  if (*pid.ptr != '.' || rest.ec != std::errc() || rest.ptr != end) return std::nullopt;
+  target.number = number;
+  return target;
+}
+
+int list(const Options &options, Console &console) {
+  const std::vector<live::Listed> pages = live::list_pages(options.folder);
+  const Time now = runtime::monotonic_now();
+  if (options.json) {
+    console.print(to_text(to_json(pages, now)));
+  } else if (!pages.empty()) {
+    console.print(describe(pages, console.out_traits(), now));
+  }
+  if (!pages.empty()) return kExitOk;
+  console.note("no executor runs that has a live page\n");
+  return kExitNo;
+}
+
+int show_once(const Options &options, const std::optional<LiveTarget> &target, Console &console) {
+  std::vector<live::Listed> pages = live::list_pages(options.folder);
+  std::erase_if(pages, [&](const live::Listed &listed) { return target && !target->names(listed); });
+  const Time now = runtime::monotonic_now();
+  if (pages.empty()) {
+    if (target) {
+      console.error(fmt::format("process {} has no live page", options.target), kHowTo);
+    } else {
+      console.error("no executor runs that has a live page", kHowTo);
+    }
+    return kExitNo;
+  }
+  if (!target) {
+    // Of what cannot be read there is nothing to choose, unless there is nothing else.
+    const auto readable = std::count_if(pages.begin(), pages.end(), [](const auto &l) { return l.page.has_value(); });
+    if (readable > 0) std::erase_if(pages, [](const live::Listed &listed) { return !listed.page; });
+  }
+  if (pages.size() > 1) {
+    console.note(describe(pages, console.err_traits(), now));
+    console.error("several executors run: say which", fmt::format("redag top {}", pages.front().pid));
+    return kExitBad;
+  }
+  const live::Listed &listed = pages.front();
+  if (!listed.page) {
+    console.note(listed.page.error());
+    return kExitBad;
+  }
+  if (options.json) {
+    console.print(to_text(to_json(listed, *listed.page, now)));
+    return kExitOk;
+  }
+  LiveView view;
+  view.dags_only = options.dags_only;
+  view.since_start = options.since_start;
+  const LiveText text = describe(listed, *listed.page, view, console.out_traits(), now);
+  for (const std::string &line : text.head) console.print(line + "\n");
+  console.print(text.titles + "\n");
+  for (const std::string &line : text.rows) console.print(line + "\n");
+  return kExitOk;
+}
+
+int top(const Options &options, Console &console) {
+  std::optional<LiveTarget> target;
+  if (!options.target.empty()) {
+    target = parse_target(options.target);
+    if (!target) {
+      console.error(fmt::format("'{}' is no process", options.target), "a process id, or PID.N as in redag top --list");
+      return kExitBad;
+    }
+  }
+  if (options.list) return list(options, console);
+  if (options.once || options.json) return show_once(options, target, console);
+  if (!Screen::is_possible()) {
+    console.note("not on a terminal: one frame, as with --once\n");
+    return show_once(options, target, console);
+  }
+  TopOptions screen;
+  screen.folder = options.folder;
+  screen.interval = options.interval;
+  screen.target = target;
+  screen.view.dags_only = options.dags_only;
+  screen.view.since_start = options.since_start;
+  screen.colour = console.out_traits().colour;
+  return run_top(screen);
+}
+
+}  // namespace
+
+Action add_top(CLI::App &app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("PID", options->target,
+                 "Process to watch; without it, the one that there is, or a list to choose from");
+  app.add_flag("--list", options->list, "List the executors that run");
+  app.add_flag("--once", options->once, "Print one frame as text");
+  app.add_flag("--json", options->json, "Print one frame, or the list, as a JSON document");
+  add_duration(app, "--interval", options->interval, "Time from one look to the next");
+  app.add_flag("--dags", options->dags_only, "DAGs without their tasks");
+  app.add_flag("--since-start", options->since_start, "Rates, response times and processor time of the whole run");
+  app.add_option("--folder", options->folder, "Where the pages are")->type_name("DIR")->capture_default_str();
+  return [options](Console &console) { return top(*options, console); };
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,59 @@
+// `redag top` on a terminal: keys, what is chosen, what is shown. Takes the screen until the user has seen enough; one
+// thread.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "redag/base/time.hpp"
+#include "redag/cli/live_text.hpp"
+#include "redag/cli/screen.hpp"
+#include "redag/live/reader.hpp"
+
+namespace redag::cli {
+
+struct LiveTarget {
+  std::int64_t pid = 0;
+  std::optional<std::uint32_t> number;  // of its executors
+
+  [[nodiscard]] bool names(const live::Listed &listed) const {
+    return listed.pid == pid && (!number || *number == listed.number);
+  }
+};
+
+struct TopOptions {
+  std::string folder;
+  Duration interval = kSecond;
+  std::optional<LiveTarget> target;
+  LiveView view;
+  bool colour = true;
+};
+
+/// Which executor is watched, also over its restarts. A value.
+class Attachment {
+ public:
+  explicit Attachment(std::optional<LiveTarget> target) : target_(target) {}
+
+  /// The executor to show, out of those that run; null: it is gone (is_known()), or there is none or several to choose
+  /// from. One that went is followed by the next one of the same name and program.
+  [[nodiscard]] const live::Listed *find(const std::vector<live::Listed> &pages);
+  void attach(const live::Listed &listed);
+  [[nodiscard]] bool is_known() const { return known_.has_value(); }
+  [[nodiscard]] const std::string &name() const { return known_->name; }
+
+ private:
+  struct Known {
+    std::string path;
+    live::Process process;
+    std::string name;
+    std::string program;
+  };
+  std::optional<LiveTarget> target_;
+  std::optional<Known> known_;
+};
+
+/// Exit status.
+[[nodiscard]] int run_top(const TopOptions &options);
+
+}  // namespace redag::cli
