@@ -13,6 +13,7 @@
 #include "rclcpp/logging.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
@@ -84,6 +85,7 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
   engine.band = setup_.band;
   engine.cpus = options_.cpus;
   engine.trace_capacity = options_.trace_capacity;
+  engine.measure = options_.live;
   engine.start_paused = true;
   engine.on_exception = [this](const redag::runtime::Job &job, std::exception_ptr e) { on_exception(job, e); };
   auto scheduler = std::make_unique<redag::sched::PriorityScheduler>(Workload{}, engine.config);
@@ -92,6 +94,31 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
   engine_->set_origin(origin_);
   for (const redag::Dag &dag : tasks_.dags()) dag_ids_.push_back(engine_->add_dag(dag, {}).dag);
   if (options_.workload) matcher_.emplace(*options_.workload);
+  if (options_.live) go_live();
+}
+
+void ReDAGExecutor::Core::go_live() {
+  const std::string name = options_.workload ? options_.workload->name : "";
+  auto publisher = redag::live::Publisher::start(
+      redag::runtime::live_options(name.empty() ? "ros" : name, "ros", setup_.mode, setup_.config),
+      [this](redag::live::Sample &sample) {
+        std::map<std::string, redag::Duration> bounds;
+        {
+          const std::lock_guard guard(notes_lock_);
+          bounds = live_bounds_;
+        }
+        tasks_.sample(*engine_, bounds, sample);
+      });
+  if (publisher) {
+    live_ = *std::move(publisher);
+  } else {
+    setup_.warnings.push_back(to_string(publisher.error()));
+  }
+}
+
+void ReDAGExecutor::Core::set_live_bounds(std::map<std::string, redag::Duration> bounds) {
+  const std::lock_guard guard(notes_lock_);
+  live_bounds_ = std::move(bounds);
 }
 
 ReDAGExecutor::Core::~Core() = default;
@@ -102,6 +129,7 @@ void ReDAGExecutor::Core::open(Host host, const std::vector<const rclcpp::GuardC
 }
 
 void ReDAGExecutor::Core::close() {
+  live_.reset();
   timer_exit_ = true;
   timer_parker_.unpark();
   if (timer_thread_.joinable()) timer_thread_.join();

@@ -18,6 +18,7 @@
 #include "bridge.hpp"
 #include "callback.hpp"
 #include "rclcpp/callback_group.hpp"
+#include "redag/live/publisher.hpp"
 #include "redag/runtime/mode.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag_rclcpp/executor.hpp"
@@ -70,6 +71,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   [[nodiscard]] const TaskTable &tasks() const { return tasks_; }
   [[nodiscard]] std::vector<std::string> warnings() const;
   [[nodiscard]] bool learning_done() const { return !learning_; }
+  void set_live_bounds(std::map<std::string, redag::Duration> bounds);
   [[nodiscard]] redag::trace::Trace as_trace(std::vector<redag::JobEvent> events) const;
 
   // Intake
@@ -93,6 +95,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   [[nodiscard]] std::vector<Found> find_entities();
   [[nodiscard]] std::string group_name(const rclcpp::CallbackGroup::SharedPtr &group);
 
+  void go_live();
   void start();
   void raise_middleware();
   void report_unmatched();
@@ -132,6 +135,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
 
   mutable std::mutex notes_lock_;  // of the setup's warnings and of the next; innermost
   std::exception_ptr failure_;
+  std::map<std::string, redag::Duration> live_bounds_;  // notes_lock_
 
   enum class FirstSpin : std::uint8_t { Awaited, Cancelled, Begun };
   std::atomic<FirstSpin> first_spin_{FirstSpin::Awaited};
@@ -155,6 +159,8 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   redag::PiMutex expire_lock_;  // the next two: of the timer thread, or of who pulls
   std::vector<redag::runtime::Release> due_;
   std::vector<redag::runtime::Release> missed_;
+
+  std::unique_ptr<redag::live::Publisher> live_;  // last: it asks for figures until it is gone
 };
 
 }  // namespace redag_rclcpp

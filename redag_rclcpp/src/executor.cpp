@@ -184,6 +184,9 @@ const redag::runtime::Mode &ReDAGExecutor::mode() const { return core_->setup().
 std::uint32_t ReDAGExecutor::workers() const { return core_->setup().config.workers; }
 std::vector<std::string> ReDAGExecutor::warnings() const { return core_->warnings(); }
 std::vector<CallbackStats> ReDAGExecutor::stats() const { return core_->tasks().stats(core_->engine()); }
+void ReDAGExecutor::set_live_bounds(std::map<std::string, redag::Duration> bounds) {
+  core_->set_live_bounds(std::move(bounds));
+}
 redag::Workload ReDAGExecutor::learned() const { return core_->tasks().learned(); }
 bool ReDAGExecutor::learning_done() const { return core_->learning_done(); }
 void ReDAGExecutor::drain_trace(std::vector<redag::JobEvent> &events) { core_->engine().drain(events); }

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
+#include <map>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -237,6 +238,9 @@ void Monitor::Impl::look_at_callbacks() {
     }
     if (!updated->update(stats, config_, [this] { return executor_.learned(); })) return;
     absent = updated->absent();
+    std::map<std::string, redag::Duration> shown;
+    for (const auto &[name, bound] : updated->tasks()) shown[name] = bound.response;
+    executor_.set_live_bounds(std::move(shown));
     const std::lock_guard guard(bounds_lock_);
     bounds_ = std::move(updated);
   }

@@ -225,6 +225,9 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
                    "than the workers",
                    "allowed are true, false"},
                   true);
+  options.live = reader.flag(
+      {"live", "Let `redag top` see the executor: a page of memory, two updates a second", "allowed are true, false"},
+      true);
   const bool counts_responses = read_bounds(reader) && options.workload && has_all_wcets(*options.workload);
   if (!read_trace(reader).empty() || counts_responses) options.trace_capacity = kTraceCapacity;
   return options;

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "redag/model/validate.hpp"
+#include "redag/runtime/live_sample.hpp"
 
 namespace redag_rclcpp {
 
@@ -123,6 +124,42 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
   std::stable_sort(result.begin(), result.end(),
                    [](const CallbackStats &a, const CallbackStats &b) { return a.period < b.period; });
   return result;
+}
+
+void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std::string, redag::Duration> &bounds,
+                       redag::live::Sample &sample) const {
+  for (const redag::Dag &dag : dags_) sample.dags.push_back({dag.name, dag.max_active});
+  struct Row {
+    std::shared_ptr<Callback> callback;
+    redag::live::TaskSample task;
+  };
+  std::vector<Row> rows;
+  {
+    const std::lock_guard guard(lock_);
+    for (std::size_t i = 0; i < entries_.size(); ++i) {
+      const Entry &entry = entries_[i];
+      if (!entry.callback) continue;
+      redag::live::TaskSample task;
+      task.key = i;
+      task.name = entry.configured ? entry.task.name : to_string(entry.id);
+      task.dag = entry.dag;
+      task.period = entry.task.period;
+      task.deadline = entry.task.deadline;
+      const auto bound = entry.configured ? bounds.find(name(entry)) : bounds.end();
+      if (bound != bounds.end()) task.bound = bound->second;
+      rows.push_back(Row{entry.callback, std::move(task)});
+    }
+  }
+  for (Row &row : rows) {
+    const redag::runtime::TaskFigures figures = engine.figures(TaskId(row.task.key));
+    redag::runtime::fill(row.task, figures);
+    row.task.misses = row.callback->late() + figures.jobs.skipped;  // as in stats(): no data is no miss
+  }
+  // As in stats(): what has gone meanwhile may have been counted with another task.
+  const std::lock_guard guard(lock_);
+  for (Row &row : rows) {
+    if (entries_[row.task.key].callback == row.callback) sample.tasks.push_back(std::move(row.task));
+  }
 }
 
 // ---- what was seen ----

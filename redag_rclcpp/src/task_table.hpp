@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "callback.hpp"
+#include "redag/live/frame_builder.hpp"
 #include "redag/model/callback_match.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/runtime/engine.hpp"
@@ -45,6 +47,10 @@ class TaskTable {
 
   /// Most urgent first.
   [[nodiscard]] std::vector<CallbackStats> stats(const redag::runtime::Engine &engine) const;
+
+  /// For the live page. `bounds`: on response times, by the name of the task.
+  void sample(const redag::runtime::Engine &engine, const std::map<std::string, redag::Duration> &bounds,
+              redag::live::Sample &sample) const;
 
   /// Gives callbacks without a rate of their own the one they were seen to have: the tasks that change, with their
   /// new period and deadline.

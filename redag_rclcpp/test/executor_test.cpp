@@ -3,13 +3,17 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "executor_types.hpp"
 #include "rclcpp/rclcpp.hpp"
+#include "redag/live/reader.hpp"
+#include "redag/live/writer.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
@@ -157,6 +161,44 @@ dags:
   EXPECT_TRUE(eventually([&] { return count == 15; }));
   spinner.stop();
   EXPECT_EQ(most, 1);
+}
+
+TEST_P(ExecutorTest, IsSeenLive) {
+  options.live = true;
+  options.workload = parse(R"(
+name: seen
+dags:
+  - name: control
+    max_active: 3
+    tasks: [{name: tick, period: 10ms, deadline: 8ms, callback: {node: /node, timer: 10ms}}]
+)");
+  const std::string path = redag::live::page_path(redag::live::kFolder, ::getpid(), 0);
+  {
+    ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+    executor.set_live_bounds({{"control.tick", 3 * redag::kMillisecond}});
+    auto timer = node->create_wall_timer(10ms, [] {});
+    executor.add_node(node);
+    Spinner spinner(executor);
+    std::optional<redag::live::Frame> frame;
+    EXPECT_TRUE(eventually([&] {
+      const auto page = redag::live::read_page(path);
+      if (!page || page->frame.tasks.empty() || page->frame.tasks[0].figures.finished == 0) return false;
+      frame = page->frame;
+      return true;
+    }));
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->name, "seen");
+    EXPECT_EQ(frame->driver, "ros");
+    EXPECT_EQ(frame->dags[0].max_active, 3U);
+    EXPECT_EQ(frame->tasks[0].name, "tick");
+    EXPECT_EQ(frame->tasks[0].deadline, 8 * redag::kMillisecond);
+    EXPECT_EQ(frame->tasks[0].bound, 3 * redag::kMillisecond);
+    EXPECT_GT(frame->tasks[0].figures.response_max, 0);
+  }
+  EXPECT_FALSE(redag::live::read_page(path));
+  options.live = false;
+  const ReDAGExecutor hidden(rclcpp::ExecutorOptions(), options);
+  EXPECT_FALSE(redag::live::read_page(path));
 }
 
 TEST_P(ExecutorTest, CancelBeforeTheFirstSpinIsNotLost) {

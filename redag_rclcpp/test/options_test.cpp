@@ -74,6 +74,7 @@ TEST_F(OptionsTest, Defaults) {
   EXPECT_EQ(options.default_period, 100ms);
   EXPECT_EQ(options.learn, 10s);
   EXPECT_TRUE(options.raise_middleware);
+  EXPECT_TRUE(options.live);
   EXPECT_EQ(options.trace_capacity, 0U);
 
   const MonitorOptions monitor = declare_monitor_options(*node, options);
@@ -93,6 +94,7 @@ TEST_F(OptionsTest, ValuesAreRead) {
                                {"default_period", 0.02},
                                {"learn", 1.5},
                                {"raise_middleware", false},
+                               {"live", false},
                                {"trace", "results"},
                                {"metrics_period", 0.25},
                                {"trace_events", 10},
@@ -107,6 +109,7 @@ TEST_F(OptionsTest, ValuesAreRead) {
   EXPECT_EQ(options.default_period, 20ms);
   EXPECT_EQ(options.learn, 1500ms);
   EXPECT_FALSE(options.raise_middleware);
+  EXPECT_FALSE(options.live);
   EXPECT_GT(options.trace_capacity, 0U);
 
   const MonitorOptions monitor = declare_monitor_options(*node, options);

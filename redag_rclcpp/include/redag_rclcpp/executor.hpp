@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -54,6 +55,7 @@ struct ReDAGOptions {
   /// known (Cyclone DDS, Fast DDS). Otherwise busy workers could delay the very messages they wait for.
   bool raise_middleware = true;
   std::size_t trace_capacity = 0;  // events kept between two drain_trace(); 0: none are recorded
+  bool live = false;               // `redag top` sees it: a page of shared memory, and a thread that updates it
   /// Called on the worker's thread; must not throw. Empty: Stop.
   std::function<OnException(const ExceptionInfo &)> on_exception{};
 };
@@ -119,6 +121,9 @@ class ReDAGExecutor : public rclcpp::Executor {
 
   /// Live figures of all callbacks, most urgent first. Cheap enough for once a second.
   [[nodiscard]] std::vector<CallbackStats> stats() const;
+
+  /// Proven bounds on response times, by CallbackStats::task, for `redag top` to show.
+  void set_live_bounds(std::map<std::string, redag::Duration> bounds);
 
   /// The callbacks as a workload, with what was learned: periods, edges, execution times (wcet: the longest seen).
   /// Ready for `redag analyze` once every callback has run.

@@ -32,6 +32,8 @@ constexpr const char *kHelp = R"(A component container that executes callbacks b
   default_period    seconds, where nobody says                                    0.1
   learn             seconds in which rates and edges are learned                  10.0
   raise_middleware  os: the middleware's threads above the workers                true
+  live              let redag top see it (a page of memory that only its owner   true
+                    can read)
   metrics_period    seconds between /diagnostics and ~/metrics; 0: none           1.0
   bounds            compare response times with their bounds                      true
   trace             folder for results, written at the end                        ""
