@@ -189,7 +189,7 @@ TEST_F(LivePage, OthersPagesAreRefused) {
   writer->publish(make_frame());
   const std::string path = copy(*writer);
   EXPECT_EQ(error_of(path), "");
-  for (const mode_t mode : {0640, 0604, 0620, 0602, 0666}) {
+  for (const mode_t mode : {0640U, 0604U, 0620U, 0602U, 0666U}) {
     ASSERT_EQ(::chmod(path.c_str(), mode), 0);
     EXPECT_THAT(error_of(path), HasSubstr("by others"));
   }
