@@ -542,8 +542,9 @@ class Top(Case):
         read_until(f"redag {second.pid}")
         os.write(terminal, b"q")
         read_until("\033[?1049l")
-        os.close(terminal)
+        # Not closed before it has ended: that would hang it up.
         self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), 0)
+        os.close(terminal)
 
 
 class Compare(Case):
