@@ -25,6 +25,13 @@ Task timer(const std::string &name, Duration period) {
   return task;
 }
 
+Dag dag(const char *name, std::vector<Task> tasks) {
+  Dag dag;
+  dag.name = name;
+  dag.tasks = std::move(tasks);
+  return dag;
+}
+
 std::unique_ptr<Engine> make_engine(const Workload &workload, bool measure, std::vector<Body> bodies) {
   EngineOptions options;
   options.config.workers = 1;
@@ -36,7 +43,7 @@ std::unique_ptr<Engine> make_engine(const Workload &workload, bool measure, std:
 
 TEST(Figures, SayWhereJobsAre) {
   Workload workload;
-  workload.dags = {Dag{"d", {timer("urgent", kSecond), timer("later", 2 * kSecond)}, 0, 0, 0, Criticality::Normal}};
+  workload.dags = {dag("d", {timer("urgent", kSecond), timer("later", 2 * kSecond)})};
   Task after = timer("after", kSecond);
   after.predecessors = {1};
   workload.dags[0].tasks.push_back(after);
@@ -92,7 +99,7 @@ TEST(Figures, SayWhereJobsAre) {
 
 TEST(Figures, AJobThatThrowsIsAMissWithoutAResponse) {
   Workload workload;
-  workload.dags = {Dag{"d", {timer("bad", kSecond)}, 0, 0, 0, Criticality::Normal}};
+  workload.dags = {dag("d", {timer("bad", kSecond)})};
   const auto engine =
       make_engine(workload, true, {[](const Job &) -> sched::Outcome { throw std::runtime_error("no"); }});
   ASSERT_TRUE(engine->start());
@@ -107,7 +114,7 @@ TEST(Figures, AJobThatThrowsIsAMissWithoutAResponse) {
 
 TEST(Figures, AreNotMeasuredUnasked) {
   Workload workload;
-  workload.dags = {Dag{"d", {timer("t", kSecond)}, 0, 0, 0, Criticality::Normal}};
+  workload.dags = {dag("d", {timer("t", kSecond)})};
   const auto engine = make_engine(workload, false, {[](const Job &) { return sched::Outcome::Finished; }});
   EXPECT_EQ(engine->figures(TaskId(0)).response, nullptr);
 }
@@ -168,7 +175,7 @@ TEST(LiveRun, ShowsTheBoundsItIsGiven) {
   Workload workload;
   workload.name = "live-run";
   workload.platform = Platform{1, PreemptionMode::Cooperative};
-  workload.dags = {Dag{"d", {timer("a", 20 * kMillisecond), timer("b", 10 * kSecond)}, 0, 0, 0, Criticality::Normal}};
+  workload.dags = {dag("d", {timer("a", 20 * kMillisecond), timer("b", 10 * kSecond)})};
   RunOptions options;
   options.duration = 20 * kSecond;
   options.live = true;
