@@ -5,6 +5,8 @@
 
 #include <pthread.h>
 
+#include <thread>
+
 #include "redag/base/check.hpp"
 #include "redag/base/thread_annotations.hpp"
 
@@ -24,13 +26,32 @@ class REDAG_CAPABILITY("mutex") PiMutex {
   PiMutex(const PiMutex &) = delete;
   PiMutex &operator=(const PiMutex &) = delete;
 
-  void lock() noexcept REDAG_ACQUIRE() { REDAG_CHECK(pthread_mutex_lock(&mutex_) == 0, "a mutex cannot be locked"); }
+  /// Tries for about as long as a short critical section takes on another processor, and then sleeps. A mutex that
+  /// inherits priority is handed to the first who sleeps: once one does, whoever comes before it has woken up sleeps too.
+  void lock() noexcept REDAG_ACQUIRE() {
+    static const int spins = std::thread::hardware_concurrency() > 1 ? kSpins : 0;
+    for (int i = 0; i < spins; ++i) {
+      if (pthread_mutex_trylock(&mutex_) == 0) return;
+      relax();
+    }
+    REDAG_CHECK(pthread_mutex_lock(&mutex_) == 0, "a mutex cannot be locked");
+  }
   [[nodiscard]] bool try_lock() noexcept REDAG_TRY_ACQUIRE(true) { return pthread_mutex_trylock(&mutex_) == 0; }
   void unlock() noexcept REDAG_RELEASE() {
     REDAG_CHECK(pthread_mutex_unlock(&mutex_) == 0, "a mutex is unlocked by who does not own it");
   }
 
  private:
+  static constexpr int kSpins = 80;  // about 2 us
+
+  static void relax() noexcept {
+#if defined(__x86_64__) || defined(__i386__)
+    __builtin_ia32_pause();
+#elif defined(__aarch64__)
+    __asm__ __volatile__("yield");
+#endif
+  }
+
   pthread_mutex_t mutex_;
 };
 
