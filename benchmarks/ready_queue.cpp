@@ -59,8 +59,10 @@ class Ours {
 
  private:
   static Queue make() {
-    if constexpr (std::is_same_v<Queue, redag::sched::LevelQueue>) return Queue(kLevels);
-    else return Queue();
+    if constexpr (std::is_same_v<Queue, redag::sched::LevelQueue>)
+      return Queue(kLevels);
+    else
+      return Queue();
   }
   Lock lock_;
   std::vector<Job> jobs_ = std::vector<Job>(kItems);

@@ -27,7 +27,8 @@ class REDAG_CAPABILITY("mutex") PiMutex {
   PiMutex &operator=(const PiMutex &) = delete;
 
   /// Tries for about as long as a short critical section takes on another processor, and then sleeps. A mutex that
-  /// inherits priority is handed to the first who sleeps: once one does, whoever comes before it has woken up sleeps too.
+  /// inherits priority is handed to the first who sleeps: once one does, whoever comes before it has woken up sleeps
+  /// too.
   void lock() noexcept REDAG_ACQUIRE() {
     static const int spins = std::thread::hardware_concurrency() > 1 ? kSpins : 0;
     for (int i = 0; i < spins; ++i) {
