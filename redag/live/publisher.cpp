@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <ctime>
 #include <system_error>
 #include <utility>
@@ -47,22 +46,18 @@ Publisher::Publisher(const PublisherOptions &options, Sampler sampler, std::uniq
 }
 
 Publisher::~Publisher() {
-  {
-    const std::lock_guard guard(lock_);
-    stop_ = true;
-  }
-  stop_condition_.notify_all();
+  stop_.store(1, std::memory_order_relaxed);
+  futex_wake(stop_, 1);
   if (thread_.joinable()) thread_.join();
 }
 
 void Publisher::main() {
   pthread_setname_np(pthread_self(), "redag-live");
-  std::unique_lock lock(lock_);
-  while (!stop_) {
-    lock.unlock();
-    publish(read_clock(CLOCK_MONOTONIC));
-    lock.lock();
-    stop_condition_.wait_for(lock, std::chrono::nanoseconds(interval_), [this] { return stop_; });
+  while (stop_.load(std::memory_order_relaxed) == 0) {
+    const Time now = read_clock(CLOCK_MONOTONIC);
+    publish(now);
+    while (stop_.load(std::memory_order_relaxed) == 0 && futex_wait_until(stop_, 0, now + interval_)) {
+    }
   }
 }
 

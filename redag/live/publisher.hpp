@@ -4,13 +4,12 @@
 // Threads: the sampler is called on the publisher's thread, and not after the destructor.
 #pragma once
 
-#include <condition_variable>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 
+#include "redag/base/futex.hpp"
 #include "redag/base/result.hpp"
 #include "redag/base/time.hpp"
 #include "redag/live/frame_builder.hpp"
@@ -54,9 +53,7 @@ class Publisher {
   FrameBuilder builder_;
   Frame frame_;
   Sample sample_;
-  std::mutex lock_;
-  std::condition_variable stop_condition_;
-  bool stop_ = false;  // lock_
+  FutexWord stop_{0};  // 1: the thread ends
   std::thread thread_;
 };
 
