@@ -19,7 +19,7 @@ Time read_clock(clockid_t clock) {
 
 }  // namespace
 
-Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, Sampler sampler) {
+Result<std::unique_ptr<Publisher>> Publisher::start(const PublisherOptions &options, Sampler sampler) {
   Result<std::unique_ptr<PageWriter>> writer = PageWriter::create(options.folder);
   if (!writer) return tl::unexpected<Diagnostics>(std::move(writer.error()));
   std::unique_ptr<Publisher> publisher(new Publisher(options, std::move(sampler), *std::move(writer)));

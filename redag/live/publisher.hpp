@@ -34,7 +34,7 @@ using Sampler = std::function<void(Sample &sample)>;
 class Publisher {
  public:
   /// Error: a page or a thread that the system refused; the executor is none the worse.
-  [[nodiscard]] static Result<std::unique_ptr<Publisher>> start(PublisherOptions options, Sampler sampler);
+  [[nodiscard]] static Result<std::unique_ptr<Publisher>> start(const PublisherOptions &options, Sampler sampler);
   ~Publisher();
   Publisher(const Publisher &) = delete;
   Publisher &operator=(const Publisher &) = delete;
