@@ -70,6 +70,8 @@ void Lifecycle::complete(JobSlot job_slot, Time now, Outcome outcome) {
     ++task.accounting.aborted;
     emit(job, JobEventKind::Aborted, now, reason_of(outcome));
   }
+  // It used its budget and ended at one instant: its new level is nobody's business any more.
+  std::erase_if(dispatches_, [&](const Dispatch &change) { return change.job == job_slot; });
   on_end(slot);
   free_slot(slot);
   if (outcome != Outcome::Finished || !takes_releases(task)) return;
