@@ -1,0 +1,63 @@
+#include "redag/metrics/paper_accounting.hpp"
+
+#include <gtest/gtest.h>
+
+namespace redag::metrics {
+namespace {
+
+Workload one_timer() {
+  Workload workload;
+  Task task;
+  task.name = "t";
+  task.period = task.deadline = 10;
+  task.wcet = 1;
+  Dag dag;
+  dag.name = "d";
+  dag.tasks = {task};
+  workload.dags = {dag};
+  return workload;
+}
+
+JobRecord job(std::uint32_t number, JobOutcome outcome, Time finish) {
+  JobRecord record;
+  record.task = TaskId(0);
+  record.number = number;
+  record.release = Time{number} * 10;
+  record.outcome = outcome;
+  record.finish = finish;
+  record.deadline = record.release + 10;
+  return record;
+}
+
+TEST(PaperAccounting, ItsClockFallsBehindWithEveryDroppedRelease) {
+  // On time all of them, but the second release was dropped: to the paper's program the third is the second, and late.
+  const std::vector<JobRecord> jobs = {job(0, JobOutcome::Finished, 5), job(1, JobOutcome::Skipped, 20),
+                                       job(2, JobOutcome::Finished, 25), job(3, JobOutcome::Finished, 35)};
+  const PaperCount count = paper_count(one_timer(), jobs, 0);
+  EXPECT_EQ(count.jobs, 3U);
+  EXPECT_EQ(count.late, 2U);
+  EXPECT_EQ(count.max_lateness, 5);
+}
+
+TEST(PaperAccounting, AnEpochBeforeStartUpMakesJobsLate) {
+  const std::vector<JobRecord> jobs = {job(0, JobOutcome::Finished, 6), job(1, JobOutcome::Finished, 14)};
+  EXPECT_EQ(paper_count(one_timer(), jobs, 0).late, 0U);
+  EXPECT_EQ(paper_count(one_timer(), jobs, -5).late, 1U);
+  EXPECT_EQ(paper_count(one_timer(), jobs, -7).late, 2U);
+}
+
+TEST(PaperAccounting, OnlyTimersOfTheDagThatFinished) {
+  Workload workload = one_timer();
+  workload.dags.push_back(workload.dags[0]);
+  workload.dags[1].tasks[0].activation = Activation::Data;
+  std::vector<JobRecord> jobs = {job(0, JobOutcome::Finished, 6), job(1, JobOutcome::InFlight, kNever)};
+  jobs.push_back(job(0, JobOutcome::Finished, 100));
+  jobs.back().task = TaskId(1);
+  EXPECT_EQ(paper_count(workload, jobs, 0).jobs, 1U);
+  EXPECT_EQ(paper_count(workload, jobs, 0, DagId(0)).jobs, 1U);
+  EXPECT_EQ(paper_count(workload, jobs, 0, DagId(1)).jobs, 0U);
+  EXPECT_EQ(paper_count(workload, jobs, 0, DagId(1)).max_lateness, std::nullopt);
+}
+
+}  // namespace
+}  // namespace redag::metrics
