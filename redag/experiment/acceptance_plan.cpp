@@ -1,16 +1,13 @@
 #include "redag/experiment/acceptance_plan.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
-#include <optional>
-#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "redag/analysis/bound.hpp"
 #include "redag/experiment/acceptance.hpp"
+#include "redag/experiment/plan_yaml.hpp"
 #include "redag/model/workload_yaml_nearest.hpp"
 
 namespace redag::experiment {
@@ -60,10 +57,7 @@ class Checker {
   }
 
   void check_name() {
-    const bool printable = std::all_of(plan_.name.begin(), plan_.name.end(), [](char c) {
-      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
-    });
-    if (plan_.name.empty() || !printable) say("name", "a name has letters, digits, - and _, and at least one of them");
+    if (!is_plan_name(plan_.name)) say("name", "a name has letters, digits, - and _, and at least one of them");
   }
 
   template <class Value>
@@ -103,29 +97,6 @@ class Checker {
   std::vector<PlanMistake> mistakes_;
 };
 
-// A number in millionths, up to the largest number of workers.
-std::optional<std::uint32_t> millionths(std::string_view text) {
-  double value = 0;
-  const char *end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, value);
-  if (error != std::errc() || stop != end || !(value > 0) || value > 1000) return std::nullopt;
-  const auto scaled = static_cast<std::uint32_t>(std::llround(value * kMillion));
-  if (scaled == 0) return std::nullopt;
-  return scaled;
-}
-
-std::optional<std::vector<std::uint32_t>> split(std::string_view text, char separator) {
-  std::vector<std::uint32_t> values;
-  while (true) {
-    const std::size_t at = text.find(separator);
-    const std::optional<std::uint32_t> value = millionths(text.substr(0, at));
-    if (!value) return std::nullopt;
-    values.push_back(*value);
-    if (at == std::string_view::npos) return values;
-    text.remove_prefix(at + 1);
-  }
-}
-
 }  // namespace
 
 AcceptancePlan::AcceptancePlan() {
@@ -152,22 +123,7 @@ std::vector<AcceptancePoint> points_of(const AcceptancePlan &plan) {
 
 std::vector<PlanMistake> find_mistakes(const AcceptancePlan &plan) { return Checker(plan).run(); }
 
-Result<std::vector<std::uint32_t>> parse_utilization(std::string_view text) {
-  constexpr const char *kHint = "from:to:step or a list, each above 0 and per worker: 0.05:1:0.05 or 0.2,0.5,0.8";
-  const bool is_range = text.find(':') != std::string_view::npos;
-  const std::optional<std::vector<std::uint32_t>> values = split(text, is_range ? ':' : ',');
-  if (!values || (is_range && values->size() != 3)) {
-    return make_error(fmt::format("'{}' are no utilizations", text), kHint);
-  }
-  if (!is_range) return *values;
-  const auto [from, to, step] = std::tuple((*values)[0], (*values)[1], (*values)[2]);
-  if (from > to || (to - from) / step > 10'000) {
-    return make_error(fmt::format("'{}' is no range of at most 10000 utilizations", text), kHint);
-  }
-  std::vector<std::uint32_t> range;
-  for (std::uint64_t u = from; u <= to; u += step) range.push_back(static_cast<std::uint32_t>(u));
-  return range;
-}
+Result<std::vector<std::uint32_t>> parse_utilization(std::string_view text) { return parse_range(text); }
 
 const char *to_string(DeadlineKind value) { return value == DeadlineKind::Implicit ? "implicit" : "constrained"; }
 

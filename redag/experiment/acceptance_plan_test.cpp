@@ -72,7 +72,7 @@ TEST(AcceptancePlan, EveryMistakeHasItsPlace) {
   EXPECT_THAT(errors, HasSubstr("plan.yaml:3:11: error: workers must be a whole number"));
   EXPECT_THAT(errors, HasSubstr("plan.yaml:4:20: error: "));
   EXPECT_THAT(errors, HasSubstr("did you mean 'os'?"));
-  EXPECT_THAT(errors, HasSubstr("plan.yaml:5:14: error: '0.1:x' are no utilizations"));
+  EXPECT_THAT(errors, HasSubstr("plan.yaml:5:14: error: utilization: '0.1:x' are no such values"));
   EXPECT_THAT(errors, HasSubstr("plan.yaml:6:"));
   EXPECT_THAT(errors, HasSubstr("did you mean 'layered'?"));
 }
