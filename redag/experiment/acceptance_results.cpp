@@ -146,7 +146,7 @@ std::string to_svg(const Acceptance &acceptance, const AcceptanceResults &result
   for (std::size_t r = 0; r < results.rows.size(); ++r) {
     const AcceptanceRow &row = results.rows[r];
     if (r == 0 || !same_panel(results.rows[r - 1].point, row.point)) {
-      plot.panels.push_back(LinePlot::Panel{panel_title(plan, row.point), {}});
+      plot.panels.push_back(LinePlot::Panel{panel_title(plan, row.point), {}, {}, {}});
       plot.panels.back().series.resize(plan.methods.size());
     }
     for (std::size_t m = 0; m < row.cells.size(); ++m) {

@@ -189,7 +189,9 @@ TEST(LinePlot, NamesAreText) {
   LinePlot plot;
   plot.title = "a < b & c";
   plot.lines = {"<x>"};
-  plot.panels = {{"p", {{{0.1, 1, 0.9, 1}, {0.2, 0, 0, 0.1}}}}};
+  plot.panels.resize(1);
+  plot.panels[0].title = "p";
+  plot.panels[0].series = {{{0.1, 1, 0.9, 1}, {0.2, 0, 0, 0.1}}};
   const std::string svg = to_svg(plot);
   EXPECT_THAT(svg, HasSubstr("a &lt; b &amp; c"));
   EXPECT_THAT(svg, HasSubstr("&lt;x&gt;"));

@@ -67,7 +67,7 @@ class Drawing {
   explicit Drawing(const LinePlot &plot) : plot_(plot) {
     for (const LinePlot::Panel &panel : plot.panels) {
       for (const auto &series : panel.series) {
-        for (const LinePlot::Value &value : series) x_end_ = std::max(x_end_, value.x);
+        for (const LinePlot::Value &value : series) x_largest_ = std::max(x_largest_, value.x);
       }
     }
     columns_ = plot.panels.size() == 1 ? 1 : (plot.panels.size() % 3 == 0 && plot.panels.size() > 3 ? 3 : 2);
@@ -91,7 +91,7 @@ class Drawing {
       const std::size_t row = p / columns_;
       left_ = static_cast<double>(p % columns_) * kPanelWidth + kLeft;
       top_ = kHead + static_cast<double>(row) * kPanelHeight + kTop;
-      axes(plot_.panels[p].title);
+      axes(plot_.panels[p]);
       for (std::size_t line = 0; line < plot_.panels[p].series.size(); ++line) band(line, plot_.panels[p].series[line]);
       for (std::size_t line = 0; line < plot_.panels[p].series.size(); ++line) draw(line, plot_.panels[p].series[line]);
     }
@@ -109,25 +109,31 @@ class Drawing {
   [[nodiscard]] static double inner_width() { return kPanelWidth - kLeft - kRight; }
   [[nodiscard]] static double inner_height() { return kPanelHeight - kTop - kBottom; }
   [[nodiscard]] double x(double value) const { return left_ + value / x_end_ * inner_width(); }
-  [[nodiscard]] double y(double value) const { return top_ + (1 - value) * inner_height(); }
+  [[nodiscard]] double y(double value) const { return top_ + (1 - value / plot_.y_end) * inner_height(); }
 
-  void axes(const std::string &title) {
+  void x_tick(double place, const std::string &text) {
+    put("<path d='M{:.1f} {:.1f}v5' stroke='#333'/>", x(place), y(0));
+    put("<text x='{:.1f}' y='{:.1f}' text-anchor='middle' fill='#333'>{}</text>\n", x(place), y(0) + 19, escaped(text));
+  }
+
+  void axes(const LinePlot::Panel &panel) {
+    x_end_ = panel.ticks.empty() ? x_largest_ : std::max(panel.ticks.back().first, 1e-9);
+    const std::string &title = panel.title;
     put("<text x='{:.1f}' y='{:.1f}' text-anchor='middle' font-weight='bold'>{}</text>\n", x(x_end_ / 2), top_ - 10,
         escaped(title));
     for (int tick = 0; tick <= 5; ++tick) {
-      const double share = tick / 5.0;
+      const double share = tick / 5.0 * plot_.y_end;
       put("<path d='M{:.1f} {:.1f}H{:.1f}' stroke='#ddd'/>", left_, y(share), x(x_end_));
-      put("<text x='{:.1f}' y='{:.1f}' text-anchor='end' fill='#333'>{:.0f} %</text>\n", left_ - 7, y(share) + 4.5,
+      put("<text x='{:.1f}' y='{:.1f}' text-anchor='end' fill='#333'>{:.3g} %</text>\n", left_ - 7, y(share) + 4.5,
           100 * share);
-      put("<path d='M{:.1f} {:.1f}v5' stroke='#333'/>", x(share * x_end_), y(0));
-      put("<text x='{:.1f}' y='{:.1f}' text-anchor='middle' fill='#333'>{:.3g}</text>\n", x(share * x_end_), y(0) + 19,
-          share * x_end_);
+      if (panel.ticks.empty()) x_tick(tick / 5.0 * x_end_, fmt::format("{:.3g}", tick / 5.0 * x_end_));
     }
-    put("<path d='M{:.1f} {:.1f}V{:.1f}H{:.1f}' fill='none' stroke='#333'/>\n", left_, y(1), y(0), x(x_end_));
+    for (const auto &[place, text] : panel.ticks) x_tick(place, text);
+    put("<path d='M{:.1f} {:.1f}V{:.1f}H{:.1f}' fill='none' stroke='#333'/>\n", left_, y(plot_.y_end), y(0), x(x_end_));
     put("<text x='{:.1f}' y='{:.1f}' text-anchor='middle'>{}</text>\n", x(x_end_ / 2), y(0) + 38,
-        escaped(plot_.x_label));
-    put("<text transform='translate({:.1f} {:.1f}) rotate(-90)' text-anchor='middle'>{}</text>\n", left_ - 45, y(0.5),
-        escaped(plot_.y_label));
+        escaped(panel.x_label.empty() ? plot_.x_label : panel.x_label));
+    put("<text transform='translate({:.1f} {:.1f}) rotate(-90)' text-anchor='middle'>{}</text>\n", left_ - 50,
+        y(plot_.y_end / 2), escaped(plot_.y_label));
   }
 
   void band(std::size_t line, const std::vector<LinePlot::Value> &series) {
@@ -171,7 +177,8 @@ class Drawing {
   }
 
   const LinePlot &plot_;
-  double x_end_ = 1;
+  double x_largest_ = 1;
+  double x_end_ = 1;  // of the current panel
   std::size_t columns_ = 1;
   double left_ = 0;  // of the current panel's inside
   double top_ = 0;

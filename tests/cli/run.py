@@ -25,7 +25,7 @@ SOURCE = pathlib.Path()
 
 COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["compare"], ["analyze"], ["sensitivity"], ["assign"],
             ["check-trace"], ["top"], ["report"], ["experiment"], ["experiment", "acceptance"],
-            ["experiment", "merge"]]
+            ["experiment", "factorial"], ["experiment", "merge"]]
 CART = """\
 name: cart
 platform: {workers: 1, preemption: none}

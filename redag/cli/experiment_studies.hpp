@@ -1,0 +1,20 @@
+// The subcommands of `redag experiment` that run a study, and how their plans become studies again, for merging.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+
+#include "redag/cli/commands.hpp"
+#include "redag/cli/experiment_study.hpp"
+
+namespace redag::cli {
+
+[[nodiscard]] Action add_acceptance(CLI::App &app);
+[[nodiscard]] std::unique_ptr<Study> make_acceptance(const std::string &plan, const std::string &file,
+                                                     Console &console);
+
+[[nodiscard]] Action add_factorial(CLI::App &app);
+[[nodiscard]] std::unique_ptr<Study> make_factorial(const std::string &plan, const std::string &file, Console &console);
+
+}  // namespace redag::cli

@@ -1,0 +1,178 @@
+#include "redag/cli/factorial_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "redag/cli/table.hpp"
+
+namespace redag::cli {
+namespace {
+
+using experiment::Factorial;
+using experiment::FactorialEffects;
+using experiment::FactorialResults;
+using experiment::FactorialRow;
+using experiment::FactorKind;
+using experiment::kNoLevel;
+using experiment::Median;
+using experiment::Metric;
+
+constexpr std::size_t kMostRows = 60;  // of combinations; more are read in a file
+
+Median total(const Factorial &factorial, const FactorialResults &results, const FactorialRow &row, Metric metric) {
+  return *median_of(factorial, results, row, row.runs.front().dags.size() - 1, metric);
+}
+
+std::string with_interval(const Median &median) {
+  const std::string middle = format_percent(median.median);
+  const std::string low = format_percent(median.low);
+  const std::string high = format_percent(median.high);
+  return low == high ? middle : fmt::format("{} ({}..{})", middle, low, high);
+}
+
+Duration rounded(double value) { return static_cast<Duration>(value); }
+
+std::string combination_table(const Factorial &factorial, const FactorialResults &results, const StreamTraits &traits) {
+  std::vector<Column> columns;
+  std::vector<FactorKind> shown;
+  for (const experiment::Factor &factor : factorial.factors()) {
+    if (factor.levels.empty() || (factor.levels.size() == 1 && factor.kind != FactorKind::Executor)) continue;
+    shown.push_back(factor.kind);
+    columns.push_back({to_string(factor.kind), factor.numeric, 1000});
+  }
+  for (const char *title : {"missed", "dropped", "paper counts"}) columns.push_back({title, true, 900});
+  columns.push_back({"p50", true, 300});
+  columns.push_back({"p99", true, 500});
+  columns.push_back({"max lateness", true, 200});
+  Table table(std::move(columns));
+  for (const FactorialRow &row : results.rows) {
+    if (row.runs.empty()) continue;
+    std::vector<Cell> cells;
+    for (const FactorKind kind : shown) {
+      const std::uint32_t level = factorial.points()[row.point].of(kind);
+      cells.push_back({level == kNoLevel ? "-" : factorial.factors()[static_cast<std::size_t>(kind)].levels[level]});
+    }
+    const auto value = [&](Metric metric) { return total(factorial, results, row, metric); };
+    cells.push_back({with_interval(value(Metric::MissRatio))});
+    cells.push_back({format_percent(value(Metric::DropRatio).median)});
+    cells.push_back({format_percent(value(Metric::PaperMissRatio).median)});
+    cells.push_back({humanize_duration(rounded(value(Metric::ResponseP50).median))});
+    cells.push_back({humanize_duration(rounded(value(Metric::ResponseP99).median))});
+    cells.push_back({humanize_duration(rounded(value(Metric::MaxLateness).median))});
+    table.add(std::move(cells));
+  }
+  return table.render(traits.width, traits.colour);
+}
+
+// For each workload and executor: the mean over all combinations, and the best and the worst one.
+std::string range_table(const Factorial &factorial, const FactorialResults &results, const StreamTraits &traits) {
+  Table table({{"workload", false, 100},
+               {"executor", false, 1000, true},
+               {"combinations", true, 100},
+               {"mean missed", true, 900},
+               {"least", true, 800},
+               {"at", false, 300},
+               {"most", true, 800},
+               {"at", false, 300}});
+  for (std::uint32_t w = 0; w < factorial.plan().workloads.size(); ++w) {
+    for (std::uint32_t e = 0; e < factorial.plan().executors.size(); ++e) {
+      std::vector<std::pair<double, const FactorialRow *>> rows;
+      double sum = 0;
+      for (const FactorialRow &row : results.rows) {
+        const experiment::FactorialPoint &point = factorial.points()[row.point];
+        if (point.of(FactorKind::Workload) != w || point.of(FactorKind::Executor) != e || row.runs.empty()) continue;
+        rows.emplace_back(total(factorial, results, row, Metric::MissRatio).median, &row);
+        sum += rows.back().first;
+      }
+      if (rows.empty()) continue;
+      const auto by_miss = [](const auto &a, const auto &b) { return a.first < b.first; };
+      const auto least = std::min_element(rows.begin(), rows.end(), by_miss);
+      const auto most = std::max_element(rows.begin(), rows.end(), by_miss);
+      const auto place = [&](const FactorialRow &row) {
+        std::string text;
+        for (const experiment::Factor &factor : factorial.factors()) {
+          const std::uint32_t level = factorial.points()[row.point].of(factor.kind);
+          const bool said = factor.kind == FactorKind::Workload || factor.kind == FactorKind::Executor;
+          if (said || level == kNoLevel || factor.levels.size() < 2) continue;
+          text += fmt::format("{}{} {}", text.empty() ? "" : ", ", to_string(factor.kind), factor.levels[level]);
+        }
+        return text;
+      };
+      const bool same = least->first == most->first;
+      table.add({{factorial.plan().workloads[w].name},
+                 {factorial.plan().executors[e]},
+                 {format_count(rows.size())},
+                 {format_percent(sum / static_cast<double>(rows.size()))},
+                 {format_percent(least->first)},
+                 {same ? "everywhere" : place(*least->second)},
+                 {format_percent(most->first)},
+                 {same ? "everywhere" : place(*most->second)}});
+    }
+  }
+  return table.render(traits.width, traits.colour);
+}
+
+std::string effects_table(const Factorial &factorial, const std::vector<FactorialEffects> &all,
+                          const StreamTraits &traits) {
+  Table table(
+      {{"workload", false, 100}, {"executor", false, 1000, true}, {"what", false, 900, true}, {"explains", true, 900}});
+  bool any = false;
+  for (const FactorialEffects &one : all) {
+    if (one.effects.variance <= 0) continue;
+    any = true;
+    const auto add = [&](const std::string &what, double share) {
+      table.add({{factorial.plan().workloads[one.workload].name},
+                 {factorial.plan().executors[one.executor]},
+                 {what},
+                 {format_percent(share)}});
+    };
+    for (const experiment::Effects::Term &term : one.effects.terms) {
+      std::string what;
+      for (const std::size_t f : term.factors)
+        what += (what.empty() ? "" : " x ") + std::string(to_string(one.factors[f]));
+      add(what, term.share);
+    }
+    if (one.factors.size() > 2) add("three and more together", one.effects.higher);
+    add("chance (between runs of one combination)", one.effects.noise);
+  }
+  return any ? table.render(traits.width, traits.colour) : std::string();
+}
+
+}  // namespace
+
+std::string describe(const Factorial &factorial, const FactorialResults &results, const StreamTraits &traits) {
+  std::string text;
+  const auto heading = [&](const char *words) {
+    text += (text.empty() ? "" : "\n") + tinted(words, Tint::Strong, traits.colour) + "\n";
+  };
+  if (results.done > 0) {
+    if (results.rows.size() <= kMostRows) {
+      heading("Deadlines missed: late or dropped, of all releases (median, confidence interval)");
+      text += combination_table(factorial, results, traits);
+    } else {
+      heading("Deadlines missed: late or dropped, of all releases");
+      text += range_table(factorial, results, traits);
+    }
+  }
+  const std::vector<FactorialEffects> effects = effects_of(factorial, results);
+  if (const std::string table = effects_table(factorial, effects, traits); !table.empty()) {
+    heading("What explains how much of the variation of the miss ratio");
+    text += table;
+  }
+  text += fmt::format(
+      "\n{} runs, {} checks of their traces: {}; {}\n", format_count(results.done), format_count(results.checks),
+      results.violations == 0 ? std::string("no violation of the model")
+                              : fmt::format("{} VIOLATIONS", format_count(results.violations)),
+      results.unenforced == 0 ? std::string("every bound max_active was kept")
+                              : fmt::format("max_active was EXCEEDED in {} runs", format_count(results.unenforced)));
+  if (!results.complete()) {
+    text += fmt::format("\n{} of {} runs are done\n", format_count(results.done), format_count(results.units));
+  }
+  return text;
+}
+
+}  // namespace redag::cli

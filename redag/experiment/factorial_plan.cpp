@@ -1,0 +1,205 @@
+#include "redag/experiment/factorial_plan.hpp"
+
+#include <algorithm>
+#include <set>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "redag/experiment/plan_yaml.hpp"
+#include "redag/model/workload_yaml_nearest.hpp"
+
+namespace redag::experiment {
+namespace {
+
+constexpr std::uint64_t kMostUnits = 10'000'000;
+
+template <class Values, class Text>
+std::vector<std::string> texts(const Values &values, Text text) {
+  std::vector<std::string> result;
+  for (const auto &value : values) result.emplace_back(text(value));
+  return result;
+}
+
+std::string bounds_text(const std::vector<std::uint32_t> &bounds) {
+  if (std::all_of(bounds.begin(), bounds.end(), [](std::uint32_t bound) { return bound == 0; })) return "unbounded";
+  std::string text;
+  for (const std::uint32_t bound : bounds) {
+    text += (text.empty() ? "" : "+") + (bound == 0 ? std::string("inf") : std::to_string(bound));
+  }
+  return text;
+}
+
+bool is_redag(std::string_view executor) { return executor.substr(0, executor.find('-')) == "redag"; }
+
+// Does this factor change anything for this executor?
+bool applies(const FactorialPlan &plan, FactorKind kind, std::string_view executor) {
+  const bool has_workers = executor != kUnlimited && executor.substr(0, executor.find('-')) != "ste";
+  switch (kind) {
+    case FactorKind::Policy:
+    case FactorKind::MaxActive: return is_redag(executor);
+    // The demand of a utilization per worker depends on the workers, whoever uses them.
+    case FactorKind::Workers: return has_workers || !plan.utilization.empty();
+    default: return true;
+  }
+}
+
+class Checker {
+ public:
+  Checker(const FactorialPlan &plan, const std::vector<std::string> &executors) : plan_(plan), executors_(executors) {}
+
+  std::vector<PlanMistake> run() {
+    if (!is_plan_name(plan_.name)) say("name", "a name has letters, digits, - and _, and at least one of them");
+    if (plan_.repetitions == 0) say("repetitions", "repetitions must be at least 1");
+    if (plan_.warm_up >= plan_.duration) say("warm_up", "warm_up takes the whole duration");
+    if (plan_.workloads.empty()) say("workloads", "there is no workload", "name files: workloads: [cart.yaml]");
+    if (plan_.executors.empty()) say("executors", "there is no executor", "such as executors: [ideal, redag, mte]");
+    check_executors();
+    for (const Factor &factor : factors_of(plan_)) {
+      const std::set<std::string> distinct(factor.levels.begin(), factor.levels.end());
+      if (distinct.size() == factor.levels.size()) continue;
+      say(key_of(factor.kind), fmt::format("{} names a value twice", key_of(factor.kind)));
+    }
+    check_workloads();
+    if (mistakes_.empty() && points_of(plan_).size() > kMostUnits / plan_.repetitions) {
+      say("repetitions", fmt::format("{} combinations {} times are more than {} runs", points_of(plan_).size(),
+                                     plan_.repetitions, kMostUnits));
+    }
+    return std::move(mistakes_);
+  }
+
+ private:
+  void say(std::string key, std::string message, std::string hint = {}) {
+    mistakes_.push_back(PlanMistake{std::move(key), std::move(message), std::move(hint)});
+  }
+
+  static std::string key_of(FactorKind kind) {
+    switch (kind) {
+      case FactorKind::Workload: return "workloads";
+      case FactorKind::Policy: return "policies";
+      case FactorKind::Executor: return "executors";
+      default: return to_string(kind);
+    }
+  }
+
+  void check_executors() {
+    std::vector<std::string_view> known = {kIdeal, kUnlimited};
+    known.insert(known.end(), executors_.begin(), executors_.end());
+    for (const std::string &name : plan_.executors) {
+      if (std::find(known.begin(), known.end(), name) == known.end()) {
+        const std::string_view near = yaml::nearest(name, known);
+        say("executors", fmt::format("there is no executor '{}'", name),
+            near.empty() ? fmt::format("known: {}", fmt::join(known, ", ")) : fmt::format("did you mean '{}'?", near));
+      } else if (plan_.world == World::Simulator && name.ends_with("-fifo")) {
+        say("executors",
+            fmt::format("the simulator has no threads: '{}' is '{}' there", name, name.substr(0, name.find('-'))));
+      }
+    }
+    const bool any_bounded = std::any_of(plan_.executors.begin(), plan_.executors.end(),
+                                         [](const std::string &name) { return is_redag(name); });
+    for (const auto &[key, given] : {std::pair<const char *, bool>{"policies", !plan_.policies.empty()},
+                                     {"max_active", !plan_.max_active.empty()}}) {
+      if (given && !any_bounded) say(key, fmt::format("{} mean nothing to the executors of this plan", key));
+    }
+  }
+
+  void check_workloads() {
+    for (const WorkloadSource &source : plan_.workloads) {
+      if (!is_plan_name(source.name)) {
+        say("workloads", fmt::format("'{}': the name of a workload has letters, digits, - and _", source.name));
+      }
+      if (source.random && plan_.utilization.empty()) {
+        say("workloads", fmt::format("'{}': random workloads need utilization", source.name));
+      }
+      const std::size_t dags = source.random ? source.random->dags : source.workload.dags.size();
+      for (const std::vector<std::uint32_t> &bounds : plan_.max_active) {
+        if (bounds.size() <= 1 || bounds.size() == dags) continue;
+        say("max_active", fmt::format("{} bounds, but '{}' has {} DAGs", bounds.size(), source.name, dags));
+        break;
+      }
+    }
+  }
+
+  const FactorialPlan &plan_;
+  const std::vector<std::string> &executors_;
+  std::vector<PlanMistake> mistakes_;
+};
+
+}  // namespace
+
+const char *to_string(World world) { return world == World::Simulator ? "simulator" : "threads"; }
+
+const char *to_string(FactorKind kind) {
+  switch (kind) {
+    case FactorKind::Workload: return "workload";
+    case FactorKind::Policy: return "policy";
+    case FactorKind::Workers: return "workers";
+    case FactorKind::Utilization: return "utilization";
+    case FactorKind::DemandScale: return "demand_scale";
+    case FactorKind::DeadlineScale: return "deadline_scale";
+    case FactorKind::MaxActive: return "max_active";
+    case FactorKind::Executor: return "executor";
+  }
+  return "?";
+}
+
+std::vector<Factor> factors_of(const FactorialPlan &plan) {
+  const auto share = [](std::uint32_t value) { return fmt::format("{}", value / static_cast<double>(kMillion)); };
+  const auto number = [](std::uint32_t value) { return std::to_string(value); };
+  return {
+      {FactorKind::Workload, texts(plan.workloads, [](const WorkloadSource &source) { return source.name; }), false},
+      {FactorKind::Policy, texts(plan.policies, [](PolicyKind policy) { return to_string(policy); }), false},
+      {FactorKind::Workers, texts(plan.workers, number), true},
+      {FactorKind::Utilization, texts(plan.utilization, share), true},
+      {FactorKind::DemandScale, texts(plan.demand_scale, share), true},
+      {FactorKind::DeadlineScale, texts(plan.deadline_scale, share), true},
+      {FactorKind::MaxActive, texts(plan.max_active, bounds_text), false},
+      {FactorKind::Executor, plan.executors, false},
+  };
+}
+
+std::vector<FactorialPoint> points_of(const FactorialPlan &plan) {
+  const std::vector<Factor> factors = factors_of(plan);
+  std::vector<FactorialPoint> points;
+  FactorialPoint point{std::vector<std::uint32_t>(kFactorCount, kNoLevel)};
+  for (std::size_t f = 0; f < kFactorCount; ++f) {
+    if (!factors[f].levels.empty()) point.level[f] = 0;
+  }
+  while (true) {
+    // Of combinations that differ only in what means nothing to the executor, the first stands for all.
+    FactorialPoint clean = point;
+    bool is_first = true;
+    for (std::size_t f = 0; f < kFactorCount; ++f) {
+      if (clean.level[f] == kNoLevel || applies(plan, factors[f].kind, plan.executors[point.level.back()])) continue;
+      is_first = is_first && clean.level[f] == 0;
+      clean.level[f] = kNoLevel;
+    }
+    if (is_first) points.push_back(std::move(clean));
+    std::size_t f = kFactorCount;  // the next combination: the last factor turns fastest
+    while (f > 0) {
+      --f;
+      if (point.level[f] == kNoLevel) continue;
+      if (++point.level[f] < factors[f].levels.size()) break;
+      point.level[f] = 0;
+      if (f == 0) return points;
+    }
+  }
+}
+
+std::string describe(const FactorialPlan &plan, const FactorialPoint &point) {
+  const std::vector<Factor> factors = factors_of(plan);
+  std::string text;
+  for (const Factor &factor : factors) {
+    const std::uint32_t level = point.of(factor.kind);
+    if (level == kNoLevel) continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", to_string(factor.kind), factor.levels[level]);
+  }
+  return text;
+}
+
+std::vector<PlanMistake> find_mistakes(const FactorialPlan &plan, const std::vector<std::string> &executors) {
+  return Checker(plan, executors).run();
+}
+
+}  // namespace redag::experiment

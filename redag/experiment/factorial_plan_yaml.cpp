@@ -1,0 +1,261 @@
+// The text form of a plan: docs/experiments.md.
+#include <array>
+#include <filesystem>
+#include <iterator>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "redag/experiment/factorial_plan.hpp"
+#include "redag/experiment/plan_yaml.hpp"
+#include "redag/model/workload_yaml.hpp"
+#include "redag/trace/output_file.hpp"
+
+namespace redag::experiment {
+namespace {
+
+using yaml::find;
+using yaml::Node;
+
+constexpr std::array kWorlds = {World::Simulator, World::Threads};
+
+const std::vector<std::string_view> kTopKeys = {
+    "experiment", "name",        "world",         "seed",           "repetitions", "duration",
+    "warm_up",    "overheads",   "paper_startup", "quantiles",      "workloads",   "policies",
+    "workers",    "utilization", "demand_scale",  "deadline_scale", "max_active",  "executors"};
+
+class Reader : private PlanReader {
+ public:
+  Reader(const Node &root, std::string file, const std::vector<std::string> &executors)
+      : PlanReader(std::move(file)), root_(root), executors_(executors) {}
+
+  Result<FactorialPlan> run() {
+    if (root_.kind == Node::Kind::Null) {
+      error(Node{}, "there is no plan in it", "see docs/experiments.md");
+    } else if (check_map(root_, "a plan", kTopKeys)) {
+      read();
+      if (diagnostics_.empty()) look_at_the_whole();
+    }
+    if (Diagnostics found = mistakes(); !found.empty()) return tl::unexpected<Diagnostics>(std::move(found));
+    return std::move(plan_);
+  }
+
+ private:
+  void read() {
+    const Node *kind = find(root_, "experiment");
+    if (kind == nullptr) {
+      error(root_, "experiment is missing", "say 'experiment: factorial'");
+    } else if (kind->text != "factorial") {
+      error(*kind, fmt::format("unknown experiment {}", describe(*kind)),
+            kind->text == "acceptance" ? "it is a plan of 'redag experiment acceptance'" : "known: factorial");
+    }
+    take_text(root_, "name", plan_.name);
+    take_enum(root_, "world", plan_.world, kWorlds);
+    take_seed(root_, plan_.seed);
+    take_count(root_, "repetitions", plan_.repetitions, 1);
+    take_duration(root_, "duration", plan_.duration);
+    take(root_, "warm_up", plan_.warm_up,
+         [this](const Node &node, std::string_view key) { return duration(node, key); });
+    take(root_, "paper_startup", plan_.paper_startup,
+         [this](const Node &node, std::string_view key) { return duration(node, key); });
+    take_flag(root_, "quantiles", plan_.quantiles);
+    read_overheads();
+    read_workloads();
+    take_list(root_, "policies", plan_.policies, [this](const Node &node, std::string_view key) {
+      return one_of(node, key, std::span<const PolicyKind>(kPolicies));
+    });
+    take_counts(root_, "workers", plan_.workers);
+    take_range(root_, "utilization", plan_.utilization);
+    take_range(root_, "demand_scale", plan_.demand_scale);
+    take_range(root_, "deadline_scale", plan_.deadline_scale);
+    read_max_active();
+    take_list(root_, "executors", plan_.executors,
+              [this](const Node &node, std::string_view key) { return text(node, key); });
+  }
+
+  void read_overheads() {
+    const Node *node = find(root_, "overheads");
+    if (node == nullptr || !check_map(*node, "overheads", {"release", "dispatch", "preempt"})) return;
+    const auto read = [&](const char *key, Duration &out) {
+      take(*node, key, out, [this](const Node &value, std::string_view name) { return duration(value, name); });
+    };
+    read("release", plan_.overheads.release);
+    read("dispatch", plan_.overheads.dispatch);
+    read("preempt", plan_.overheads.preempt);
+  }
+
+  void read_workloads() {
+    take_list(root_, "workloads", plan_.workloads,
+              [this](const Node &node, std::string_view /*key*/) -> std::optional<WorkloadSource> {
+                if (node.kind == Node::Kind::Scalar) return load(node, {});
+                if (!check_map(node, "a workload", {"name", "file", "text", "random"})) return std::nullopt;
+                std::string name;
+                take_text(node, "name", name);
+                if (const Node *file = find(node, "file")) return load(*file, std::move(name));
+                if (const Node *text = find(node, "text")) return parse(*text, std::move(name));
+                if (const Node *random = find(node, "random")) return read_random(*random, std::move(name));
+                error(node, "a workload is a file, a text, or random", "such as {name: cart, file: cart.yaml}");
+                return std::nullopt;
+              });
+  }
+
+  std::optional<WorkloadSource> load(const Node &node, std::string name) {
+    const std::optional<std::string> given = text(node, "file");
+    if (!given) return std::nullopt;
+    const std::filesystem::path path = std::filesystem::path(file_).parent_path() / *given;
+    Result<LoadedWorkload> loaded = load_workload(path);
+    if (!loaded) {
+      error(node, fmt::format("the workload '{}' cannot be used", *given), "its own mistakes are below");
+      // The reader's list is about one file: these name another one.
+      std::copy(loaded.error().begin(), loaded.error().end(), std::back_inserter(diagnostics_));
+      return std::nullopt;
+    }
+    if (name.empty()) name = path.stem().string();
+    return WorkloadSource{std::move(name), std::move(loaded->workload), std::nullopt};
+  }
+
+  std::optional<WorkloadSource> parse(const Node &node, std::string name) {
+    const std::optional<std::string> given = text(node, "text");
+    if (!given) return std::nullopt;
+    Result<LoadedWorkload> parsed = parse_workload(*given, fmt::format("{} (text of line {})", file_, node.line));
+    if (!parsed) {
+      std::copy(parsed.error().begin(), parsed.error().end(), std::back_inserter(diagnostics_));
+      return std::nullopt;
+    }
+    if (name.empty()) name = parsed->workload.name;
+    return WorkloadSource{std::move(name), std::move(parsed->workload), std::nullopt};
+  }
+
+  std::optional<WorkloadSource> read_random(const Node &node, std::string name) {
+    std::vector<std::string_view> keys = generation_keys();
+    keys.insert(keys.begin(), {"dags", "workers", "bcet"});
+    if (!check_map(node, "random", keys)) return std::nullopt;
+    WorkloadSource source{std::move(name), {}, GenerateOptions{}};
+    take_count(node, "dags", source.random->dags, 1);
+    take_count(node, "workers", source.random->workers, 1);
+    take_number(node, "bcet", source.random->bcet_min);
+    source.random->bcet_max = source.random->bcet_min;
+    take_generation(node, *source.random);
+    return source;
+  }
+
+  // unbounded, 3 (all DAGs), [2, 3] (by DAG), {from: 2, to: 5} (of two DAGs, all pairs).
+  void read_max_active() {
+    const Node *node = find(root_, "max_active");
+    if (node == nullptr) return;
+    if (node->kind != Node::Kind::Sequence) {
+      wrong_type(*node, "max_active", "a list: of unbounded, 3, [2, 3], or {from: 2, to: 5}");
+      return;
+    }
+    for (const Node &item : node->children) {
+      if (item.kind == Node::Kind::Map) {
+        read_pairs(item);
+      } else if (item.kind == Node::Kind::Sequence) {
+        std::vector<std::uint32_t> bounds;
+        for (const Node &part : item.children) {
+          if (const auto bound = integer<std::uint32_t>(part, "max_active", 0)) bounds.push_back(*bound);
+        }
+        plan_.max_active.push_back(std::move(bounds));
+      } else if (item.text == "unbounded") {
+        plan_.max_active.push_back({0});
+      } else if (const auto bound = integer<std::uint32_t>(item, "max_active", 1)) {
+        plan_.max_active.push_back({*bound});
+      }
+    }
+  }
+
+  void read_pairs(const Node &item) {
+    if (!check_map(item, "max_active", {"from", "to"})) return;
+    std::uint32_t from = 0;
+    std::uint32_t to = 0;
+    take_count(item, "from", from, 1);
+    take_count(item, "to", to, 1);
+    if (from == 0 || to < from || to - from > 100) {
+      error(item, "max_active: from and to are a range of at most 100 bounds", "such as {from: 2, to: 5}");
+      return;
+    }
+    for (std::uint32_t a = from; a <= to; ++a) {
+      for (std::uint32_t b = from; b <= to; ++b) plan_.max_active.push_back({a, b});
+    }
+  }
+
+  void look_at_the_whole() {
+    for (const PlanMistake &mistake : find_mistakes(plan_, executors_)) {
+      const Node *node = find(root_, mistake.key);
+      error(node != nullptr ? *node : root_, mistake.message, mistake.hint);
+    }
+  }
+
+  const Node &root_;
+  const std::vector<std::string> &executors_;
+  FactorialPlan plan_;
+};
+
+// A block scalar, which keeps the text as it is.
+std::string block(std::string_view text, std::string_view indentation) {
+  std::string indented;
+  while (!text.empty()) {
+    const std::size_t end = text.find('\n');
+    const std::string_view line = text.substr(0, end);
+    indented += fmt::format("{}{}\n", line.empty() ? "" : indentation, line);
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  }
+  return indented;
+}
+
+}  // namespace
+
+Result<FactorialPlan> parse_factorial_plan(std::string_view text, const std::string &file,
+                                           const std::vector<std::string> &executors) {
+  const Result<Node> root = yaml::parse(text, file);
+  if (!root) return tl::unexpected<Diagnostics>(root.error());
+  return Reader(*root, file, executors).run();
+}
+
+Result<FactorialPlan> load_factorial_plan(const std::string &path, const std::vector<std::string> &executors) {
+  const Result<std::string> text = trace::read_file(path);
+  if (!text) return tl::unexpected<Diagnostics>(text.error());
+  return parse_factorial_plan(*text, path, executors);
+}
+
+std::string to_yaml(const FactorialPlan &plan) {
+  std::string text = "experiment: factorial\n";
+  const auto line = [&text](std::string_view key, const std::string &value) {
+    text += fmt::format("{}: {}\n", key, value);
+  };
+  const auto number = [](auto value) { return fmt::format("{}", value); };
+  line("name", plan.name);
+  line("world", to_string(plan.world));
+  line("seed", number(plan.seed));
+  line("repetitions", number(plan.repetitions));
+  line("duration", format_duration(plan.duration));
+  line("warm_up", format_duration(plan.warm_up));
+  line("overheads", fmt::format("{{release: {}, dispatch: {}, preempt: {}}}", format_duration(plan.overheads.release),
+                                format_duration(plan.overheads.dispatch), format_duration(plan.overheads.preempt)));
+  line("paper_startup", format_duration(plan.paper_startup));
+  line("quantiles", plan.quantiles ? "true" : "false");
+  for (const Factor &factor : factors_of(plan)) {
+    if (factor.levels.empty() || factor.kind == FactorKind::Workload || factor.kind == FactorKind::MaxActive) continue;
+    const std::string key = factor.kind == FactorKind::Executor ? "executors"
+                            : factor.kind == FactorKind::Policy ? "policies"
+                                                                : to_string(factor.kind);
+    line(key, yaml_list(factor.levels, [](const std::string &level) { return level; }));
+  }
+  if (!plan.max_active.empty()) {
+    line("max_active", yaml_list(plan.max_active,
+                                 [&](const std::vector<std::uint32_t> &bounds) { return yaml_list(bounds, number); }));
+  }
+  text += "workloads:\n";
+  for (const WorkloadSource &source : plan.workloads) {
+    text += fmt::format("  - name: {}\n", source.name);
+    if (source.random) {
+      text += fmt::format("    random:\n      dags: {}\n      workers: {}\n      bcet: {}\n{}", source.random->dags,
+                          source.random->workers, source.random->bcet_min, generation_yaml(*source.random, "      "));
+    } else {
+      text += "    text: |\n" + block(redag::to_yaml(source.workload), "      ");
+    }
+  }
+  return text;
+}
+
+}  // namespace redag::experiment

@@ -1,0 +1,140 @@
+#include "redag/experiment/observation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "redag/metrics/distribution.hpp"
+#include "redag/metrics/jobs.hpp"
+#include "redag/metrics/paper_accounting.hpp"
+
+namespace redag::experiment {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using metrics::JobRecord;
+
+constexpr std::array<const char *, kMeasureCount> kNames = {
+    "released",          "finished",     "late",         "dropped",       "aborted",      "missed",
+    "deferred",          "preemptions",  "max_lateness", "response_mean", "response_p50", "response_p95",
+    "response_p99",      "response_max", "peak_active",  "paper_jobs",    "paper_late",   "paper_max_lateness",
+    "paper_startup_late"};
+
+std::vector<Duration> quantiles_of(const trace::RunInfo &info, const std::vector<JobRecord> &jobs,
+                                   const std::vector<TaskRef> &refs, std::optional<DagId> dag) {
+  std::vector<Duration> responses;
+  for (const JobRecord &job : jobs) {
+    if (job.outcome != metrics::JobOutcome::Finished || job.release < info.start + info.warm_up) continue;
+    if (!dag || refs[job.task.value].dag == *dag) responses.push_back(job.response());
+  }
+  std::vector<Duration> quantiles;
+  if (responses.empty()) return quantiles;
+  std::sort(responses.begin(), responses.end());
+  for (const double percent : kQuantiles) quantiles.push_back(metrics::percentile(responses, percent));
+  return quantiles;
+}
+
+}  // namespace
+
+const char *to_string(Measure measure) { return kNames[static_cast<std::size_t>(measure)]; }
+
+Observation observe(const FinishedRun &run, const ObserveOptions &options) {
+  const trace::RunInfo &info = run.trace.info;
+  const metrics::Summary &summary = run.summary;
+  const std::vector<JobRecord> jobs = metrics::fold_jobs(info.workload, run.trace.events);
+  const std::vector<TaskRef> refs = flatten(info.workload);
+
+  const auto describe = [&](const std::string &name, const metrics::JobStats &stats, std::uint32_t peak,
+                            std::optional<DagId> dag) {
+    DagObservation row;
+    row.dag = name;
+    const auto set = [&row](Measure measure, auto value) {
+      row.values[static_cast<std::size_t>(measure)] = static_cast<std::int64_t>(value);
+    };
+    set(Measure::Released, stats.released);
+    set(Measure::Finished, stats.finished);
+    set(Measure::Late, stats.late);
+    set(Measure::Dropped, stats.skipped);
+    set(Measure::Aborted, stats.aborted);
+    set(Measure::Missed, stats.late + stats.skipped + stats.aborted - stats.no_data());
+    set(Measure::Deferred, stats.deferred);
+    set(Measure::Preemptions, stats.preemptions);
+    set(Measure::MaxLateness, stats.max_lateness.value_or(0));
+    set(Measure::ResponseMean, std::llround(stats.response.mean));
+    set(Measure::ResponseP50, stats.response.p50);
+    set(Measure::ResponseP95, stats.response.p95);
+    set(Measure::ResponseP99, stats.response.p99);
+    set(Measure::ResponseMax, stats.response.max);
+    set(Measure::PeakActive, peak);
+    const metrics::PaperCount paper = metrics::paper_count(info.workload, jobs, info.start, dag);
+    set(Measure::PaperJobs, paper.jobs);
+    set(Measure::PaperLate, paper.late);
+    set(Measure::PaperMaxLateness, paper.max_lateness.value_or(0));
+    set(Measure::PaperStartupLate,
+        metrics::paper_count(info.workload, jobs, info.start - options.paper_startup, dag).late);
+    if (options.quantiles) row.quantiles = quantiles_of(info, jobs, refs, dag);
+    return row;
+  };
+
+  Observation seen;
+  seen.seed = info.seed;
+  seen.world = trace::to_string(info.driver);
+  seen.preemption = info.preemption;
+  seen.workers = info.config.workers;
+  seen.violations = run.check.violation_count;
+  seen.check_count =
+      std::accumulate(run.check.checks_by_rule.begin(), run.check.checks_by_rule.end(), std::uint64_t{0});
+  seen.enforced = summary.all_enforced;
+  std::uint32_t peak = 0;
+  for (std::size_t d = 0; d < summary.dags.size(); ++d) {
+    const metrics::DagSummary &dag = summary.dags[d];
+    seen.dags.push_back(describe(dag.name, dag.jobs, dag.peak_active, DagId(static_cast<std::uint32_t>(d))));
+    peak = std::max(peak, dag.peak_active);
+  }
+  seen.dags.push_back(describe("total", summary.total, peak, std::nullopt));
+  return seen;
+}
+
+std::string to_line(const Observation &observation) {
+  Json dags = Json::array();
+  for (const DagObservation &dag : observation.dags) dags.push_back(Json::array({dag.dag, dag.values, dag.quantiles}));
+  return Json::array({observation.seed, observation.world, observation.preemption, observation.workers,
+                      observation.violations, observation.enforced, observation.check_count, std::move(dags)})
+      .dump();
+}
+
+Result<Observation> parse_observation(std::string_view line) {
+  try {
+    const Json json = Json::parse(line);
+    Observation seen;
+    seen.seed = json.at(0).get<std::uint64_t>();
+    seen.world = json.at(1).get<std::string>();
+    seen.preemption = json.at(2).get<std::string>();
+    seen.workers = json.at(3).get<std::uint32_t>();
+    seen.violations = json.at(4).get<std::uint64_t>();
+    seen.enforced = json.at(5).get<bool>();
+    seen.check_count = json.at(6).get<std::uint64_t>();
+    for (const Json &dag : json.at(7)) {
+      DagObservation row;
+      row.dag = dag.at(0).get<std::string>();
+      if (dag.at(1).size() != kMeasureCount) return make_error("an observation has other measures");
+      row.values = dag.at(1).get<std::array<std::int64_t, kMeasureCount>>();
+      row.quantiles = dag.at(2).get<std::vector<Duration>>();
+      if (!row.quantiles.empty() && row.quantiles.size() != kQuantiles.size()) {
+        return make_error("an observation has other quantiles");
+      }
+      seen.dags.push_back(std::move(row));
+    }
+    if (seen.dags.empty()) return make_error("an observation has no DAGs");
+    return seen;
+  } catch (const nlohmann::json::exception &problem) {
+    return make_error(fmt::format("not an observation: {}", problem.what()));
+  }
+}
+
+}  // namespace redag::experiment
