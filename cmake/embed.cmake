@@ -32,7 +32,8 @@ namespace redag::report::assets {
 add_text(kTemplate ${PAGE}/page.html)
 add_text(kStyle ${PAGE}/page.css)
 add_text(kEcharts ${ECHARTS}/echarts.min.js)
-add_text(kScript ${PAGE}/format.js ${PAGE}/elements.js ${PAGE}/charts.js ${PAGE}/figures.js ${PAGE}/schedule.js
-  ${PAGE}/tables.js ${PAGE}/page.js)
+set(frame ${PAGE}/format.js ${PAGE}/elements.js ${PAGE}/charts.js ${PAGE}/frame.js)
+add_text(kScript ${frame} ${PAGE}/figures.js ${PAGE}/schedule.js ${PAGE}/tables.js ${PAGE}/page.js)
+add_text(kExperimentScript ${frame} ${PAGE}/experiment.js)
 file(APPEND ${OUTPUT}.new "}  // namespace redag::report::assets\n")
 file(RENAME ${OUTPUT}.new ${OUTPUT})

@@ -10,9 +10,11 @@
 #include "redag/cli/recorded_runs.hpp"
 #include "redag/cli/signals.hpp"
 #include "redag/report/document.hpp"
+#include "redag/report/experiment.hpp"
 #include "redag/report/page.hpp"
 #include "redag/report/verdict.hpp"
 #include "redag/trace/events_file.hpp"
+#include "redag/trace/output_file.hpp"
 
 namespace redag::cli {
 namespace {
@@ -130,15 +132,62 @@ class Reporting {
   std::vector<std::string> notes_;
 };
 
+// The folder of a factorial experiment, which is one page.
+int report_experiment(const Options &options, const fs::path &file, Console &console) {
+  if (options.places.size() > 1) {
+    console.error(fmt::format("{}: an experiment has a page of its own", file.string()), "name one folder");
+    return kExitBad;
+  }
+  const Result<std::string> text = trace::read_file(file.string());
+  if (!text) {
+    console.note(text.error());
+    return kExitBad;
+  }
+  const Result<report::ExperimentDocument> document = report::experiment_document(*text, file.string());
+  if (!document) {
+    console.note(document.error());
+    return kExitBad;
+  }
+  if (options.json) {
+    console.print(document->json + "\n");
+    if (options.output.empty()) return kExitOk;
+  }
+  const std::string path = options.output.empty() ? (file.parent_path() / "report.html").string() : options.output;
+  const std::string html = report::page(document->json, document->title, report::PageKind::Experiment);
+  if (const Result<void> written = write_text(path, html); !written) {
+    console.note(written.error());
+    return kExitBad;
+  }
+  const std::string words = fmt::format("{}\n{}: {:.1f} MB, opens in any browser, without a network\n",
+                                        document->summary, path, static_cast<double>(html.size()) / 1e6);
+  if (options.json) {
+    console.note(words);
+  } else {
+    console.print(words);
+  }
+  return kExitOk;
+}
+
+int make_report(const Options &options, Console &console) {
+  for (const std::string &place : options.places) {
+    std::error_code ignored;
+    const fs::path file = fs::path(place) / "factorial.json";
+    if (fs::exists(file, ignored)) return report_experiment(options, file, console);
+  }
+  return Reporting(options, console).run();
+}
+
 }  // namespace
 
 Action add_report(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option("DIR", options->places, "Folders that run, simulate or compare wrote with --out; also with such below")
+  app.add_option(
+         "DIR", options->places,
+         "Folders that run, simulate or compare wrote with --out, also with such below; or one of experiment factorial")
       ->required();
   app.add_option("-o,--output", options->output, "The page; default: report.html in the first DIR")->type_name("FILE");
   app.add_flag("--json", options->json, "Write the report's data to standard output; a page only with -o");
-  return [options](Console &console) { return Reporting(*options, console).run(); };
+  return [options](Console &console) { return make_report(*options, console); };
 }
 
 }  // namespace redag::cli

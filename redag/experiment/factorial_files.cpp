@@ -169,7 +169,7 @@ std::string to_json(const Factorial &factorial, const FactorialResults &results,
     document["effects"].push_back(effects_json(factorial, one));
   }
   for (const std::string &run : runs) document["runs"].push_back(Json::parse(run));
-  return document.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return document.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string to_svg(const Factorial &factorial, const FactorialResults &results) {

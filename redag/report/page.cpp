@@ -35,13 +35,14 @@ std::string html_escaped(std::string_view text) {
   return escaped;
 }
 
-std::string page(std::string_view document, std::string_view title) {
+std::string page(std::string_view document, std::string_view title, PageKind kind) {
   // In the order in which they stand in the template, so that nothing that was put in is looked at again.
   const std::string safe_title = html_escaped(title);
   const std::string safe_document = script_safe(document);
+  const std::string_view script = kind == PageKind::Runs ? assets::kScript : assets::kExperimentScript;
   const std::pair<std::string_view, std::string_view> parts[] = {
-      {"{{title}}", safe_title},         {"{{style}}", assets::kStyle},   {"{{document}}", safe_document},
-      {"{{echarts}}", assets::kEcharts}, {"{{script}}", assets::kScript},
+      {"{{title}}", safe_title},         {"{{style}}", assets::kStyle}, {"{{document}}", safe_document},
+      {"{{echarts}}", assets::kEcharts}, {"{{script}}", script},
   };
   std::string html;
   std::string_view rest = assets::kTemplate;

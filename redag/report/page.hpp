@@ -2,13 +2,17 @@
 // Opens without a network and lets none be used. Pure function.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
 namespace redag::report {
 
-/// `document`: of to_json(). `title` is plain text. Whatever names the document holds, no text of it becomes markup.
-[[nodiscard]] std::string page(std::string_view document, std::string_view title);
+enum class PageKind : std::uint8_t { Runs, Experiment };
+
+/// `document`: of to_json(), or of experiment_document(). `title` is plain text. Whatever names the document holds, no
+/// text of it becomes markup.
+[[nodiscard]] std::string page(std::string_view document, std::string_view title, PageKind kind = PageKind::Runs);
 
 /// A JSON text that can stand in a <script> element: "<" only as an escape. Requires JSON, where "<" is only in
 /// strings.

@@ -8,6 +8,7 @@ namespace redag::report::assets {
 extern const std::string_view kTemplate;
 extern const std::string_view kStyle;
 extern const std::string_view kEcharts;
-extern const std::string_view kScript;
+extern const std::string_view kScript;            // of recorded runs
+extern const std::string_view kExperimentScript;  // of a factorial experiment
 
 }  // namespace redag::report::assets

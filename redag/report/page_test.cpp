@@ -45,11 +45,18 @@ TEST(Page, HasAllItsPartsAndNoOther) {
   }
 }
 
+TEST(Page, EachKindHasItsScriptAndNoOther) {
+  const std::string runs = page("{}", "x");
+  const std::string experiment = page("{}", "x", PageKind::Experiment);
+  EXPECT_EQ(count_of(runs, assets::kScript) + count_of(experiment, assets::kExperimentScript), 2U);
+  EXPECT_EQ(count_of(runs, assets::kExperimentScript) + count_of(experiment, assets::kScript), 0U);
+}
+
 TEST(Page, AssetsAreWholeAndCannotEndTheirElements) {
   EXPECT_GT(assets::kEcharts.size(), 400'000U);
   EXPECT_LT(assets::kEcharts.size(), 900'000U);
   EXPECT_NE(assets::kEcharts.find("Apache License, Version 2.0"), std::string_view::npos) << "its notice travels along";
-  for (const std::string_view asset : {assets::kEcharts, assets::kScript, assets::kStyle}) {
+  for (const std::string_view asset : {assets::kEcharts, assets::kScript, assets::kExperimentScript, assets::kStyle}) {
     EXPECT_EQ(asset.find("</script"), std::string_view::npos);
     EXPECT_EQ(asset.find("<!--"), std::string_view::npos);
     EXPECT_EQ(asset.find("</style"), std::string_view::npos);

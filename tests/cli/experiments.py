@@ -110,6 +110,18 @@ class Factorial(unittest.TestCase):
                  .iter("{http://www.w3.org/2000/svg}text")]
         self.assertTrue({"workers", "deadline scale", "max active", "ideal", "ste"} <= set(names), names)
 
+    def test_report(self):
+        self.run_plan(self.plan(), "done")
+        result = self.expect(redag("report", self.folder / "done"), 0)
+        self.assertIn("small: 52 of 52 runs, 26 combinations, 0 violations of the model", result.stdout)
+        self.assertIn("<title>small - ReDAG-RT report</title>", (self.folder / "done" / "report.html").read_text())
+        document = json.loads(self.expect(redag("report", self.folder / "done", "--json"), 0).stdout)
+        self.assertEqual((document["kind"], len(document["points"])), ("factorial", 26))
+        self.expect(redag("report", self.folder / "done", self.folder / "done"), 2, "name one folder")
+        (self.folder / "done" / "factorial.json").write_text("{}")
+        self.expect(redag("report", self.folder / "done"), 2, "factorial.json: error: is no redag.experiment.factorial/1")
+        self.run_plan(self.folder / "done" / "plan.yaml", "done")  # a page in the folder is no stranger
+
     def test_plan_in_the_folder_is_whole(self):
         """A folder can be gone on with where the workload's file is not."""
         self.run_plan(self.plan(), "done")

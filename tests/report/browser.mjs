@@ -9,6 +9,7 @@ import {chromium} from 'playwright-core';
 const [executable, scratch] = process.argv.slice(2);
 const shot = (name) => path.join(scratch, 'screenshots', `${name}.png`);
 const FIGURES = {comparison: ['missed', 'p99', 'responses', 'lateness', 'timeline', 'schedule']};
+FIGURES.experiment = ['curves', 'distance', 'bounds', 'effects'];
 FIGURES.single = FIGURES.hostile = FIGURES.long = FIGURES.wide = FIGURES.comparison.slice(2);
 
 const browser = await chromium.launch({executablePath: executable, args: ['--no-sandbox', '--disable-gpu']});
@@ -144,6 +145,33 @@ await test('controls: each changes what it says', async () => {
   await changes(pixels, button('workers'), 'rows');
   await figureShot(page, 'schedule', 'workers');
   await assertAllDrawn(page, FIGURES.comparison);
+  none(problems);
+  await close();
+});
+
+await test('experiment: each choice changes its figures', async () => {
+  const {page, problems, close} = await open('experiment');
+  const markup = (name) => page.locator(`figure[data-figure=${name}] .chart`).innerHTML();
+  const changes = async (names, act) => {
+    const before = await Promise.all(names.map(markup));
+    await act();
+    const after = await Promise.all(names.map(markup));
+    names.forEach((name, i) => assert.notEqual(after[i], before[i], name));
+  };
+  const pick = (label, value) => () => page.getByLabel(label, {exact: true}).selectOption(value);
+  await changes(['curves', 'distance', 'bounds'], pick('demand scale', '5'));
+  await changes(['curves', 'bounds'], pick('deadline scale', '1.2'));
+  await changes(['curves', 'bounds'], pick('DAG', 'dag2'));
+  await changes(['curves', 'bounds'], pick('of', 'p99 response'));
+  await changes(['curves', 'distance'], pick('over', 'max active'));
+  await figureShot(page, 'curves', 'experiment-over-bounds');
+  await changes(['bounds'], pick('workers', '2'));
+  await changes(['bounds'], () => page.getByRole('button', {name: 'redag-none', exact: true}).click());
+  await figureShot(page, 'bounds', 'experiment-bounds');
+  await figureShot(page, 'effects', 'experiment-effects');
+  assert.match(await page.locator('ul.verdict').innerText(), /no violation of the model[^]*Every bound max_active was kept/);
+  const cell = await page.locator('.table tbody td.text').allInnerTexts();
+  assert.deepEqual([...new Set(cell)].sort(), ['ideal', 'mte', 'redag', 'redag-none']);
   none(problems);
   await close();
 });

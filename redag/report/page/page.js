@@ -5,23 +5,6 @@ const {groups} = report;
 const state = {executor: 0, task: null, tail: false, log: false, view: 0, rows: 'tasks', unfolded: false};
 const several = groups.length > 1;
 
-const MARKS = {good: '\u2713', bad: '\u2717', caution: '!', plain: '\u2022'};
-const verdictList = (sentences) => element('ul.verdict', {},
-  ...sentences.map(({tone, text}) => element(`li.${tone}`, {}, element('b', {'aria-hidden': 'true'}, MARKS[tone]), text)));
-
-/** A place whose content is made again by its `fill`. */
-function place(fill) {
-  const node = element('div');
-  node.refill = () => node.replaceChildren(...[].concat(fill()));
-  return node;
-}
-const places = [];
-function filled(fill) {
-  const node = place(fill);
-  places.push(node);
-  return node;
-}
-
 function header() {
   const run = groups[0].run;
   const seconds = (run.end_ns - run.start_ns) / 1e9;
@@ -32,13 +15,8 @@ function header() {
     DRIVERS[run.driver], `${runs > 1 ? `${runs} runs of ` : ''}${Number(seconds.toPrecision(3))} s`,
     `${formatCount(groups.reduce((sum, group) => sum + group.total.released, 0))} jobs`,
   ];
-  const names = ['auto', 'light', 'dark'];
-  const theme = choice(names, 0, (i) => {
-    forced = i === 0 ? null : names[i];
-    applyTheme();
-  });
   return [
-    element('div.head', {}, element('h1', {}, report.title), element('div.controls', {}, theme)),
+    element('div.head', {}, element('h1', {}, report.title), element('div.controls', {}, themeChoice())),
     element('p.facts', {}, facts.join(' \u00b7 ')),
   ];
 }
@@ -70,7 +48,7 @@ function taskChoice(refresh) {
     const names = ['all tasks, as a share of their deadlines', ...tasks.map((i) => taskName(group, i))];
     return dropdown('task', names, 1 + tasks.indexOf(state.task), (i) => {
       state.task = i === 0 ? null : tasks[i - 1];
-      places.forEach((node) => node.refill());
+      refill();
       refresh();
     });
   });
@@ -91,7 +69,7 @@ function detailSections() {
       const same = name === null ? -1 : groups[i].tasks.findIndex((task, k) => taskName(groups[i], k) === name);
       state.task = same < 0 ? null : same;
       state.view = 0;
-      places.forEach((node) => node.refill());
+      refill();
       redraw();
       timeline.draw();
       schedule.look();
@@ -109,7 +87,7 @@ function detailSections() {
     }),
     filled(() => taskTable(groups[state.executor], state.unfolded, () => {
       state.unfolded = true;
-      places.forEach((node) => node.refill());
+      refill();
     })),
     element('h2', {id: 'responses'}, 'Response times'),
     element('div.row.controls', {}, taskChoice(redraw),
@@ -148,14 +126,8 @@ function howItWasRun() {
   return [
     element('h2', {id: 'how'}, 'How it was run'), filled(facts), runTable(groups),
     ...(report.cuts.length === 0 ? [] : [element('h3', {}, 'What is not shown'), element('ul.soft', {}, ...report.cuts.map((cut) => element('li', {}, cut)))]),
-    element('footer', {}, `Made by redag ${report.version}. Figures: Apache ECharts ${echarts.version} (Apache License 2.0). `
-      + 'This file uses no network. Each figure can be saved as PNG or SVG with the buttons above it.'),
+    pageFooter(report.version),
   ];
 }
 
-document.documentElement.dataset.theme = themeName();
-themed.push(() => places.forEach((node) => node.refill()));
-const all = [...header(), verdictList(several ? report.comparison.words : groups[0].verdict), ...comparisonSection(), ...detailSections(), ...howItWasRun()];
-document.getElementById('report').append(...all.filter((node) => node !== null));
-applyTheme();
-document.documentElement.dataset.ready = 'true';
+startPage([...header(), verdictList(several ? report.comparison.words : groups[0].verdict), ...comparisonSection(), ...detailSections(), ...howItWasRun()]);

@@ -1,0 +1,265 @@
+// The page of a factorial experiment: executors over any factor, at chosen levels of the others; the bounds of two DAGs as
+// a map; what explains the differences.
+
+const report = JSON.parse(document.getElementById('data').textContent);
+const {factors, points} = report;
+const EXECUTOR = 'executor';
+const executors = factors.find(({name}) => name === EXECUTOR).levels;
+const varied = factors.filter(({name, levels}) => name !== EXECUTOR && levels.length > 1);
+const pairs = (factors.find(({name}) => name === 'max_active') || {levels: []}).levels.filter((level) => /^\d+\+\d+$/.test(level));
+
+const METRICS = {
+  miss_ratio: 'missed: late or dropped', drop_ratio: 'dropped', excess_miss_ratio: 'missed above the ideal', response_p50_ns: 'median response',
+  response_p95_ns: 'p95 response', response_p99_ns: 'p99 response', response_max_ns: 'longest response', max_lateness_ns: 'largest lateness',
+  deferred: 'deferred, of all jobs', preemptions: 'preemptions a job', paper_miss_ratio: 'missed as the paper counts',
+};
+const isTime = (metric) => metric.endsWith('_ns');
+const isShare = (metric) => metric.endsWith('_ratio') || metric === 'deferred';
+const show = (metric, value) => (isTime(metric) ? formatTime(value) : isShare(metric) ? formatPercent(value) : String(value));
+const words = (name) => name.replaceAll('_', ' ');
+
+// What is looked at: a level of each factor, the factor along the axis, a metric, a DAG, whose map it is.
+const state = {x: Math.max(0, varied.findIndex(({name}) => name !== 'workload')), metric: 'miss_ratio', dag: 'total', levels: {}, owner: 0};
+varied.forEach(({name, levels}) => { state.levels[name] = levels.includes('unbounded') ? 'unbounded' : levels[levels.length > 2 ? Math.floor(levels.length / 2) : 0]; });
+
+const byPlace = new Map(points.map((point) => [factors.map(({name}) => point.at[name] ?? '').join('\n'), point]));
+// Which factors an executor has a choice of: the others are not in the places of its points.
+const knows = new Map(executors.map((executor) => [executor, new Set(points.filter((point) => point.at.executor === executor)
+  .flatMap((point) => Object.keys(point.at)))]));
+
+/** [median, low, high] of an executor at the chosen levels, some of them replaced by `other`; null if it did not run. */
+function spreadAt(executor, metric, other = {}) {
+  const place = factors.map(({name, levels}) => {
+    if (name === EXECUTOR) return executor;
+    if (!knows.get(executor).has(name)) return '';
+    return other[name] ?? state.levels[name] ?? levels[0];
+  }).join('\n');
+  const point = byPlace.get(place);
+  const dag = point && (point.dags.find(({name}) => name === state.dag) || point.dags[point.dags.length - 1]);
+  return dag ? dag.values[report.metrics.indexOf(metric)] : null;
+}
+
+const where = (skip) => varied.filter(({name}) => !skip.includes(name)).map(({name}) => `${words(name)} ${state.levels[name]}`).join(', ');
+
+/** A metric over the chosen factor, a line for each executor. */
+function curvesFigure(name, metricOf, caption) {
+  return figure({
+    name, height: 340, label: 'A metric over a factor, by executor', caption,
+    build(t, width) {
+      const factor = varied[state.x];
+      if (factor === undefined) return 'Nothing was varied but the executor.';
+      const metric = metricOf();
+      // Numbers far apart have their true distance; few and close ones stand beside each other.
+      const numbers = factor.levels.map(Number);
+      const numeric = factor.numeric && factor.levels.length > 3 && numbers[0] <= numbers[numbers.length - 1] / 2;
+      const x = (i) => (numeric ? numbers[i] : i);
+      const lines = executors.map((executor, e) => ({executor, e, values: factor.levels.map((level, i) => {
+        const spread = spreadAt(executor, metric, {[factor.name]: level});
+        return spread && [x(i), ...spread];
+      }).filter((value) => value !== null)})).filter(({values}) => values.length > 0);
+      if (lines.length === 0) return 'There is nothing of this kind: the distance to the ideal needs the executor "ideal" on the same workers.';
+      const symbols = ['circle', 'rect', 'triangle', 'diamond', 'emptyCircle', 'emptyRect', 'emptyTriangle', 'emptyDiamond'];
+      const most = Math.max(...lines.flatMap(({values}) => values.map((value) => value[1])));
+      return {
+        grid: {left: 8, right: 24, top: 60, bottom: 26, containLabel: true},
+        legend: {},
+        tooltip: {
+          trigger: 'item',
+          formatter: ({seriesName, value}) => tip([seriesName, `${words(factor.name)} ${numeric ? value[0] : factor.levels[value[0]]}`, show(metric, value[1]),
+            value[2] === value[3] ? null : `${show(metric, value[2])} to ${show(metric, value[3])}`]),
+        },
+        xAxis: {
+          ...(numeric ? {type: 'value', min: 0, max: numbers[numbers.length - 1], splitNumber: width < 500 ? 4 : 8}
+            : {type: 'category', data: factor.levels}),
+          name: `${words(factor.name)}${factor.name === 'utilization' ? ' per worker' : ''}`, nameLocation: 'middle', nameGap: 32,
+        },
+        yAxis: {
+          type: 'value', name: METRICS[metric], nameTextStyle: {align: 'left'}, nameGap: 14, max: most === 0 ? 1 : undefined,
+          axisLabel: {formatter: (value) => (isTime(metric) ? formatAxisTime(value, Math.max(1, most / 10)) : isShare(metric) ? `${Number((100 * value).toPrecision(3))} %` : String(value))},
+        },
+        series: [
+          ...lines.map(({executor, e, values}) => ({
+            type: 'line', name: executor, symbol: symbols[e % symbols.length], symbolSize: 8, itemStyle: {color: colourOf(t, e)},
+            lineStyle: {width: 2, type: executor === 'ideal' || executor === 'unlimited' ? 'dashed' : 'solid'}, data: values,
+          })),
+          ...lines.map(({executor, e, values}) => ({
+            type: 'custom', name: executor, silent: true, data: values, encode: {x: 0, y: [2, 3]},
+            renderItem: (params, api) => {
+              const [left, top] = api.coord([api.value(0), api.value(3)]);
+              const bottom = api.coord([api.value(0), api.value(2)])[1];
+              if (bottom - top < 1) return null;
+              const bar = (x1, y1, x2, y2) => ({type: 'line', shape: {x1, y1, x2, y2}, style: {stroke: colourOf(t, e), lineWidth: 1}});
+              return {type: 'group', children: [bar(left, top, left, bottom), bar(left - 4, top, left + 4, top), bar(left - 4, bottom, left + 4, bottom)]};
+            },
+          })),
+        ],
+      };
+    },
+  });
+}
+
+/** The bounds of two DAGs: a metric for each pair. */
+function boundsFigure() {
+  const owners = executors.filter((executor) => knows.get(executor).has('max_active'));
+  const note = element('p.soft');
+  const self = figure({
+    name: 'bounds', height: 380, label: 'A metric for each pair of bounds',
+    caption: 'Across: max_active of the first DAG; up: of the second. The number is the median.',
+    build(t, width) {
+      const owner = owners[state.owner];
+      const cells = pairs.map((pair) => [...pair.split('+'), spreadAt(owner, state.metric, {max_active: pair})]).filter((cell) => cell[2] !== null);
+      if (cells.length === 0) return 'There is nothing of this kind.';
+      const axis = (i) => [...new Set(cells.map((cell) => cell[i]))].sort((a, b) => a - b);
+      const [across, up] = [axis(0), axis(1)];
+      const values = cells.map((cell) => cell[2][0]);
+      const free = spreadAt(owner, state.metric, {max_active: 'unbounded'});
+      const least = Math.min(...values);
+      const most = Math.max(...values);
+      const part = (value) => (most > least ? (value - least) / (most - least) : 0);
+      const mix = (from, to, share) => `rgb(${from.map((c, i) => Math.round(c + (to[i] - c) * share)).join(',')})`;
+      const shade = (value) => (t.dark ? mix([24, 44, 66], [214, 120, 48], part(value)) : mix([226, 238, 251], [196, 88, 8], part(value)));
+      note.textContent = `${owner}: ${METRICS[state.metric]}${free ? `; without bounds ${show(state.metric, free[0])}` : ''}`;
+      return {
+        grid: {left: 60, right: 16, top: 28, bottom: 52},
+        tooltip: {trigger: 'item', formatter: ({value}) => {
+          const [a, b, spread] = cells[value[3]];
+          return tip([`max_active ${a} and ${b}`, show(state.metric, spread[0]), `${show(state.metric, spread[1])} to ${show(state.metric, spread[2])}`]);
+        }},
+        xAxis: {type: 'category', data: across, name: 'max_active of the first DAG', nameLocation: 'middle', nameGap: 28},
+        yAxis: {type: 'category', data: up, name: 'of the second', nameLocation: 'middle', nameGap: 32},
+        series: [{
+          type: 'custom', data: cells.map(([a, b, spread], i) => [across.indexOf(a), up.indexOf(b), spread[0], i]), encode: {x: 0, y: 1},
+          renderItem: (params, api) => {
+            const [x, y] = api.coord([api.value(0), api.value(1)]);
+            const [w, h] = api.size([1, 1]);
+            const value = api.value(2);
+            return {type: 'group', children: [
+              {type: 'rect', shape: {x: x - w / 2 + 1, y: y - h / 2 + 1, width: w - 2, height: h - 2}, style: {fill: shade(value)}},
+              {type: 'text', style: {text: show(state.metric, value), x, y, textAlign: 'center', textVerticalAlign: 'middle', fontSize: width < 500 ? 10 : 13,
+                fill: t.dark || part(value) > 0.6 ? '#fff' : '#1b1f24'}},
+            ]};
+          },
+        }],
+      };
+    },
+  });
+  return {figure: self, owners, note};
+}
+
+/** What explains how much of the variation, one bar for each executor and workload. */
+function effectsFigure() {
+  const name = (term) => term.factors.map(words).join(' \u00d7 ');
+  const shown = report.effects.filter(({variance}) => variance > 0);
+  const terms = [...new Set(shown.flatMap(({shares}) => shares.map(name)))];
+  return figure({
+    name: 'effects', height: 140 + 34 * Math.max(1, shown.length), label: 'Shares of the variation that each factor explains',
+    caption: 'Of the variation of the miss ratio over all runs of an executor: the share that a factor explains alone, that pairs of factors explain '
+      + 'together (\u00d7), three and more, and chance.',
+    build(t) {
+      if (shown.length === 0) return report.complete ? 'The miss ratio is the same everywhere.' : 'Effects need all runs.';
+      const rows = shown.map(({workload, executor}) => (new Set(shown.map((one) => one.workload)).size > 1 ? `${executor}, ${workload}` : executor));
+      const value = (one, term) => (one.shares.find((share) => name(share) === term) || {share: 0}).share;
+      const stack = (label, data, i) => ({type: 'bar', stack: 'all', name: label, data, itemStyle: {color: colourOf(t, i), opacity: i >= 8 ? 0.55 : 1}, barMaxWidth: 22});
+      return {
+        grid: {left: 8, right: 16, top: 82, bottom: 8, containLabel: true},
+        legend: {type: 'plain', right: 90},
+        tooltip: {trigger: 'item', formatter: (item) => tip([item.name, item.seriesName, formatPercent(item.value)])},
+        xAxis: {type: 'value', min: 0, max: 1, axisLabel: {formatter: (share) => `${Math.round(100 * share)} %`}},
+        yAxis: {type: 'category', inverse: true, data: rows, axisLabel: {color: t.ink}},
+        series: [
+          ...terms.map((term, i) => stack(term, shown.map((one) => value(one, term)), i)),
+          stack('three and more', shown.map((one) => one.higher_interactions), terms.length),
+          stack('chance', shown.map((one) => one.noise), terms.length + 1),
+        ],
+      };
+    },
+  });
+}
+
+function verdict() {
+  const list = [];
+  const say = (tone, text) => list.push({tone, text});
+  if (report.violations > 0) say('bad', `The trace checker found ${formatCount(report.violations)} violations of the model.`);
+  else say('good', `${formatCount(report.done)} runs, ${formatCount(report.checks)} checks of their traces: no violation of the model.`);
+  if (report.runs_beyond_max_active > 0) say('bad', `max_active was exceeded in ${formatCount(report.runs_beyond_max_active)} runs.`);
+  else if (pairs.length > 0 || points.some(({at}) => at.max_active)) say('good', 'Every bound max_active was kept in every run.');
+  if (!report.complete) say('caution', `${formatCount(report.done)} of ${formatCount(report.units)} runs are done.`);
+  factors.find(({name}) => name === 'workload').levels.forEach((workload) => {
+    const parts = executors.map((executor) => {
+      const misses = points.filter(({at, dags}) => at.executor === executor && at.workload === workload && dags.length > 0)
+        .map(({dags}) => dags[dags.length - 1].values[0][0]);
+      if (misses.length === 0) return null;
+      const mean = misses.reduce((a, b) => a + b, 0) / misses.length;
+      return `${executor} ${formatPercent(mean)}${misses.length > 1 ? ` (${formatPercent(Math.min(...misses))} to ${formatPercent(Math.max(...misses))})` : ''}`;
+    }).filter((part) => part !== null);
+    say('plain', `${workload}: missed, mean over all combinations: ${parts.join(', ')}.`);
+  });
+  return verdictList(list);
+}
+
+function selectionTable() {
+  const factor = varied[state.x];
+  const levels = factor === undefined ? [''] : factor.levels;
+  const shownMetrics = ['miss_ratio', 'drop_ratio', 'excess_miss_ratio', 'paper_miss_ratio', 'response_p50_ns', 'response_p99_ns', 'max_lateness_ns'];
+  const columns = [{title: factor ? words(factor.name) : ''}, {title: 'executor', text: true}, ...shownMetrics.map((metric) => ({title: METRICS[metric]}))];
+  const rows = [];
+  levels.forEach((level) => {
+    let first = true;
+    executors.forEach((executor) => {
+      const spread = (metric) => spreadAt(executor, metric, factor ? {[factor.name]: level} : {});
+      if (spread('miss_ratio') === null) return;
+      rows.push({first, cells: [first ? level : '', executor, ...shownMetrics.map((metric) => {
+        const value = spread(metric);
+        return value === null ? '' : {text: show(metric, value[0]), title: `${show(metric, value[1])} to ${show(metric, value[2])}`, kind: metric === 'miss_ratio' && value[0] > 0 ? 'bad' : ''};
+      })]});
+      first = false;
+    });
+  });
+  return table(columns, rows);
+}
+
+function howItWasRun() {
+  const machines = [...new Set(report.runs.filter(({machine}) => machine).map(({machine, jobs, version}) =>
+    [machine.model, `${machine.cpus} processors`, machine.kernel, `redag ${version}`, `${jobs} at once`].filter(Boolean).join(', ')))];
+  return [
+    element('h2', {id: 'how'}, 'How it was run'),
+    element('dl', {}, ...[['World', DRIVERS[report.world]], ['Length of a run', formatTime(report.duration_ns)],
+      ['Runs of a combination', String(report.repetitions)], ['Combinations', formatCount(points.length)], ['Machine', machines.join('; ') || 'not recorded'],
+    ].flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])),
+    element('details', {}, element('summary', {}, 'The plan'), element('pre', {}, report.plan)),
+    pageFooter(report.version),
+  ];
+}
+
+const intervals = 'Lines across: a confidence interval for the median over the repetitions, whose level the tables of the experiment give.';
+const curves = curvesFigure('curves', () => state.metric, `Medians at the chosen levels. ${intervals}`);
+const distance = curvesFigure('distance', () => 'excess_miss_ratio', 'Missed deadlines above those of the ideal (preemptive, no overhead, no bounds, in virtual '
+  + `time) on the same jobs. Below 0: better than it, which is no contradiction, since a rate-monotonic order is not optimal. ${intervals}`);
+const map = boundsFigure();  // of width 0, so never drawn, where it is not shown
+const effects = varied.filter(({name}) => name !== 'workload').length > 1 ? effectsFigure() : null;  // one factor explains all
+
+function redraw() {
+  refill();
+  [curves, distance, map.figure].forEach((one) => one.draw());
+}
+const dagNames = [...new Set(points.flatMap(({dags}) => dags.map(({name}) => name)))].sort((a, b) => (b === 'total') - (a === 'total'));
+const controls = filled(() => element('div.row.controls', {},
+  varied.length > 1 ? dropdown('over', varied.map(({name}) => words(name)), state.x, (i) => { state.x = i; redraw(); }) : null,
+  dropdown('of', report.metrics.map((metric) => METRICS[metric]), report.metrics.indexOf(state.metric), (i) => { state.metric = report.metrics[i]; redraw(); }),
+  dropdown('DAG', dagNames, dagNames.indexOf(state.dag), (i) => { state.dag = dagNames[i]; redraw(); }),
+  ...varied.filter((factor, i) => i !== state.x).map(({name, levels}) => dropdown(words(name), levels, levels.indexOf(state.levels[name]),
+    (i) => { state.levels[name] = levels[i]; redraw(); }))));
+
+startPage([
+  element('div.head', {}, element('h1', {}, report.name), element('div.controls', {}, themeChoice())),
+  element('p.facts', {}, [`${executors.join(', ')}`, DRIVERS[report.world], `${formatCount(report.done)} runs of ${formatTime(report.duration_ns)}`].join(' \u00b7 ')),
+  verdict(),
+  element('h2', {id: 'curves'}, 'Over one factor'), controls, filled(() => element('p.soft', {}, varied[state.x] ? where([varied[state.x].name]) : '')), curves.box,
+  element('h3', {}, 'Distance to the ideal'), distance.box,
+  filled(selectionTable),
+  ...(pairs.length > 0 ? [element('h2', {id: 'bounds'}, 'Bounds on two DAGs'),
+    map.owners.length > 1 ? element('div.row.controls', {}, choice(map.owners, 0, (i) => { state.owner = i; map.figure.draw(); })) : null,
+    filled(() => element('p.soft', {}, where(['max_active']))), map.note, map.figure.box] : []),
+  ...(effects !== null ? [element('h2', {id: 'effects'}, 'What explains the differences'), effects.box] : []),
+  ...howItWasRun(),
+]);

@@ -1,0 +1,42 @@
+// What every page has: places that are made again, a verdict, the choice of a theme, a foot, and the start.
+
+const MARKS = {good: '\u2713', bad: '\u2717', caution: '!', plain: '\u2022'};
+const verdictList = (sentences) => element('ul.verdict', {},
+  ...sentences.map(({tone, text}) => element(`li.${tone}`, {}, element('b', {'aria-hidden': 'true'}, MARKS[tone]), text)));
+
+/** A place whose content is made again by its `fill`. */
+function place(fill) {
+  const node = element('div');
+  node.refill = () => node.replaceChildren(...[].concat(fill()));
+  return node;
+}
+const places = [];
+function filled(fill) {
+  const node = place(fill);
+  places.push(node);
+  return node;
+}
+const refill = () => places.forEach((node) => node.refill());
+
+/** Buttons: as the system has it, light, dark. */
+function themeChoice() {
+  const names = ['auto', 'light', 'dark'];
+  return choice(names, 0, (i) => {
+    forced = i === 0 ? null : names[i];
+    applyTheme();
+  });
+}
+
+function pageFooter(version) {
+  return element('footer', {}, `Made by redag ${version}. Figures: Apache ECharts ${echarts.version} (Apache License 2.0). `
+    + 'This file uses no network. Each figure can be saved as PNG or SVG with the buttons above it.');
+}
+
+/** Shows the page's nodes (null: nothing) and draws its figures. */
+function startPage(nodes) {
+  document.documentElement.dataset.theme = themeName();
+  themed.push(refill);
+  document.getElementById('report').append(...nodes.filter((node) => node !== null));
+  applyTheme();
+  document.documentElement.dataset.ready = 'true';
+}
