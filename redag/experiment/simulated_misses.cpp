@@ -9,6 +9,7 @@
 
 #include "redag/base/rng.hpp"
 #include "redag/experiment/seed.hpp"
+#include "redag/metrics/deadline_watch.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag/sim/simulator.hpp"
 #include "redag/trace/trace.hpp"
@@ -16,79 +17,23 @@
 namespace redag::experiment {
 namespace {
 
-/// Follows the jobs of one run until the first miss.
-class Watch {
- public:
-  Watch(const Workload &workload, const analysis::System &system)
-      : workload_(workload), system_(system), live_(system.tasks.size()) {}
-
-  /// False once there is a miss.
-  bool operator()(std::span<const JobEvent> events) {
-    for (const JobEvent &event : events) {
-      see(event);
-      if (!miss_.empty()) return false;
-    }
-    return true;
+// "b.t: job 3 answered after at least 12ms, its deadline is 10ms"
+std::string words_of(const metrics::JudgedJob &job, const Workload &workload, const analysis::System &system) {
+  const metrics::JobRecord &record = job.record;
+  const std::string name = fmt::format("{}: job {}", trace::task_name(workload, record.task), record.number);
+  const analysis::SystemTask &task = system.tasks[record.task.value];
+  switch (job.miss) {
+    case metrics::Miss::None: break;
+    case metrics::Miss::Lost: return fmt::format("{} was {}", name, to_string(record.outcome));
+    case metrics::Miss::Deadline:
+      return fmt::format("{} answered after at least {}, its deadline is {}", name, format_duration(*job.response),
+                         format_duration(task.deadline));
+    case metrics::Miss::EndToEnd:
+      return fmt::format("{} answered after at least {}, its DAG's end-to-end deadline is {}", name,
+                         format_duration(*job.end_to_end), format_duration(system.dags[task.dag.value].deadline));
   }
-
-  /// What has not ended by `end` has answered at least this late.
-  void finish(Time end) {
-    for (std::size_t t = 0; t < live_.size(); ++t) {
-      for (const Live &job : live_[t]) judge(TaskId(t), job, end);
-    }
-  }
-
-  [[nodiscard]] const std::string &miss() const { return miss_; }
-
- private:
-  struct Live {
-    std::uint32_t number = 0;
-    Time release = 0;
-    Time origin = kNever;
-  };
-
-  void see(const JobEvent &event) {
-    std::vector<Live> &jobs = live_[event.task.value];
-    if (event.kind == JobEventKind::Released) {
-      jobs.push_back(Live{event.job, event.value, kNever});
-      return;
-    }
-    const auto job = std::find_if(jobs.begin(), jobs.end(), [&](const Live &live) { return live.number == event.job; });
-    switch (event.kind) {
-      case JobEventKind::Ready: job->origin = event.value; break;
-      case JobEventKind::Finished:
-        judge(event.task, *job, event.value);
-        jobs.erase(job);
-        break;
-      case JobEventKind::Skipped:
-        miss_ = fmt::format("{}: job {} was skipped", trace::task_name(workload_, event.task), event.job);
-        break;
-      default: break;
-    }
-  }
-
-  void judge(TaskId id, const Live &job, Time until) {
-    const analysis::SystemTask &task = system_.tasks[id.value];
-    if (until - job.release > task.deadline) {
-      say(id, job, until - job.release, task.deadline, "deadline");
-    }
-    const Duration end_to_end = system_.dags[task.dag.value].deadline;
-    if (end_to_end > 0 && job.origin != kNever && until - job.origin > end_to_end) {
-      say(id, job, until - job.origin, end_to_end, "DAG's end-to-end deadline");
-    }
-  }
-
-  void say(TaskId id, const Live &job, Duration response, Duration deadline, const char *which) {
-    if (!miss_.empty()) return;
-    miss_ = fmt::format("{}: job {} answered after at least {}, its {} is {}", trace::task_name(workload_, id),
-                        job.number, format_duration(response), which, format_duration(deadline));
-  }
-
-  const Workload &workload_;
-  const analysis::System &system_;
-  std::vector<std::vector<Live>> live_;
-  std::string miss_;
-};
+  return {};
+}
 
 // What the runs have in common: every job takes its wcet, and none is released before time 0.
 Workload at_worst(const Workload &workload) {
@@ -135,13 +80,17 @@ std::optional<SeenMiss> find_miss(const Workload &workload, const analysis::Syst
     options.horizon = run.duration;
     options.seed = run.seed;
     sched::PriorityScheduler scheduler(run.workload, config);
-    Watch watch(run.workload, system);
-    const sim::Result result = sim::simulate(run.workload, scheduler, config.workers, options,
-                                             [&watch](std::span<const JobEvent> events) { return watch(events); });
-    if (watch.miss().empty()) watch.finish(result.end);
-    if (watch.miss().empty()) continue;
-    run.what = watch.miss();
-    return run;
+    metrics::DeadlineWatch watch(run.workload);
+    const auto see = [&](const metrics::JudgedJob &job) {
+      if (run.what.empty()) run.what = words_of(job, run.workload, system);
+    };
+    const sim::Result result =
+        sim::simulate(run.workload, scheduler, config.workers, options, [&](std::span<const JobEvent> events) {
+          watch.add(events, see);
+          return run.what.empty();
+        });
+    watch.finish(result.end, see);
+    if (!run.what.empty()) return run;
   }
   return std::nullopt;
 }

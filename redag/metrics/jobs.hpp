@@ -61,6 +61,13 @@ class JobFolder {
   /// Jobs that ended since the last call, in order of their end; moved out.
   [[nodiscard]] std::vector<JobRecord> take_ended();
 
+  /// The same, one by one to visit(const JobRecord &), without an allocation.
+  template <class Visit>
+  void drain_ended(Visit &&visit) {
+    for (const JobRecord &record : ended_) visit(record);
+    ended_.clear();
+  }
+
   /// Jobs that have not ended, in order of release.
   [[nodiscard]] std::vector<JobRecord> in_flight() const;
 

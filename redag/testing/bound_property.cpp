@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/metrics/deadline_watch.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag/sim/simulator.hpp"
 
@@ -75,65 +76,14 @@ struct Observed {
   std::vector<std::uint64_t> finished;
 };
 
-class Observer {
- public:
-  Observer(const analysis::System &system, Observed &observed) : system_(system), observed_(observed) {
-    live_.resize(system.tasks.size());
-  }
-
-  bool operator()(std::span<const JobEvent> events) {
-    for (const JobEvent &event : events) see(event);
-    return true;
-  }
-
-  // A job that has not ended by `end` has answered at least this late.
-  void finish(Time end) {
-    for (std::size_t t = 0; t < live_.size(); ++t) {
-      for (const Live &job : live_[t]) observe(TaskId(t), job, end);
-    }
-  }
-
- private:
-  struct Live {
-    std::uint32_t number = 0;
-    Time release = 0;
-    Time origin = kNever;
-  };
-
-  void see(const JobEvent &event) {
-    std::vector<Live> &jobs = live_[event.task.value];
-    if (event.kind == JobEventKind::Released) {
-      jobs.push_back(Live{event.job, event.value, kNever});
-      return;
-    }
-    const auto job = std::find_if(jobs.begin(), jobs.end(), [&](const Live &live) { return live.number == event.job; });
-    switch (event.kind) {
-      case JobEventKind::Ready: job->origin = event.value; break;
-      case JobEventKind::Finished:
-        ++observed_.finished[event.task.value];
-        observe(event.task, *job, event.value);
-        jobs.erase(job);
-        break;
-      case JobEventKind::Skipped:
-      case JobEventKind::Aborted:
-        ++observed_.lost[event.task.value];
-        jobs.erase(job);
-        break;
-      default: break;
-    }
-  }
-
-  void observe(TaskId task, const Live &job, Time until) {
-    Duration &response = observed_.tasks[task.value];
-    response = std::max(response, until - job.release);
-    Duration &dag = observed_.dags[system_.tasks[task.value].dag.value];
-    if (job.origin != kNever) dag = std::max(dag, until - job.origin);
-  }
-
-  const analysis::System &system_;
-  Observed &observed_;
-  std::vector<std::vector<Live>> live_;
-};
+void observe(const metrics::JudgedJob &job, const analysis::System &system, Observed &observed) {
+  const TaskId task = job.record.task;
+  if (job.miss == metrics::Miss::Lost) ++observed.lost[task.value];
+  if (job.record.outcome == metrics::JobOutcome::Finished) ++observed.finished[task.value];
+  if (job.response) observed.tasks[task.value] = std::max(observed.tasks[task.value], *job.response);
+  Duration &dag = observed.dags[system.tasks[task.value].dag.value];
+  if (job.end_to_end) dag = std::max(dag, *job.end_to_end);
+}
 
 void simulate_run(const BoundCase &bound_case, const analysis::System &system, const Run &run, std::uint32_t periods,
                   Observed &observed) {
@@ -188,10 +138,14 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
   config.levels = platform.levels;
   config.max_started = platform.max_started;
   sched::PriorityScheduler scheduler(workload, config);
-  Observer observer(system, observed);
-  const sim::Result result = sim::simulate(workload, scheduler, platform.workers, options,
-                                           [&observer](std::span<const JobEvent> events) { return observer(events); });
-  observer.finish(result.end);
+  metrics::DeadlineWatch watch(workload);
+  const auto see = [&](const metrics::JudgedJob &job) { observe(job, system, observed); };
+  const sim::Result result =
+      sim::simulate(workload, scheduler, platform.workers, options, [&](std::span<const JobEvent> events) {
+        watch.add(events, see);
+        return true;
+      });
+  watch.finish(result.end, see);
 }
 
 // One workload against one bound.
