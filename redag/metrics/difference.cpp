@@ -1,0 +1,144 @@
+#include "redag/metrics/difference.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include "redag/base/check.hpp"
+#include "redag/base/rng.hpp"
+
+namespace redag::metrics {
+namespace {
+
+constexpr Duration kMostBlocks = 30;
+
+Duration longest_period(const Workload &workload) {
+  Duration longest = 1;
+  for (const Dag &dag : workload.dags) {
+    for (const Task &task : dag.tasks) longest = std::max(longest, task.period);
+  }
+  return longest;
+}
+
+// Whole multiples of the longest period, so that every block sees the same releases: two of them or more, and 30 blocks
+// at most.
+Duration block_length(Duration run, Duration period) {
+  return period * std::max<Duration>(2, (run + kMostBlocks * period - 1) / (kMostBlocks * period));
+}
+
+bool is_row(const DifferenceSide::Row &a, const DifferenceSide::Row &b) { return a.dag == b.dag && a.task == b.task; }
+
+std::string name_of(const DifferenceSide::Row &row) { return row.task.empty() ? row.dag : row.dag + "." + row.task; }
+
+Verdict verdict_of(const FigureDifference &figure, double threshold) {
+  if (!figure.tested) return Verdict::NotTested;
+  if (figure.p() > threshold) return Verdict::Same;
+  return figure.p_more < figure.p_less ? Verdict::Worse : Verdict::Better;
+}
+
+}  // namespace
+
+const char *to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::Same: return "same";
+    case Verdict::Better: return "better";
+    case Verdict::Worse: return "worse";
+    case Verdict::NotTested: return "not tested";
+  }
+  return "?";
+}
+
+void DifferenceSide::make_rows(const Workload &workload) {
+  rows_.push_back({});
+  for (const Dag &dag : workload.dags) {
+    const std::size_t dag_row = rows_.size();
+    rows_.push_back({dag.name, {}, 0, 0, 0, 0, {}});
+    for (const Task &task : dag.tasks) {
+      places_.push_back(Places{dag_row, rows_.size()});
+      rows_.push_back({dag.name, task.name, 0, 0, 0, 0, {}});
+    }
+  }
+}
+
+void DifferenceSide::add(const trace::Trace &trace) {
+  const trace::RunInfo &run = trace.info;
+  if (runs_.empty()) make_rows(run.workload);
+  REDAG_CHECK(places_.size() == run.workload.task_count(), "runs of different tasks on one side");
+  runs_.push_back(run);
+
+  const Time begin = run.start + run.warm_up;
+  const Duration length = std::max<Duration>(1, run.end - begin);
+  const Duration block = block_length(length, longest_period(run.workload));
+  const auto blocks = static_cast<std::size_t>(std::max<Duration>(1, length / block));
+  for (Row &row : rows_) row.runs.emplace_back(blocks);
+  for (const JobRecord &job : fold_jobs(run.workload, trace.events)) {
+    if (job.release < begin) continue;
+    const std::size_t at = std::min(blocks - 1, static_cast<std::size_t>((job.release - begin) / block));
+    const bool late = job.is_late(run.end);
+    const bool lost =
+        (job.outcome == JobOutcome::Skipped || job.outcome == JobOutcome::Aborted) && job.reason != Reason::NoData;
+    const Places &places = places_[job.task.value];
+    for (const std::size_t index : {std::size_t{0}, places.dag, places.task}) {
+      Row &row = rows_[index];
+      ++row.released;
+      if (late) ++row.late;
+      if (lost) ++row.lost;
+      Block &here = row.runs.back()[at];
+      ++here.released;
+      if (late || lost) ++here.missed;
+      if (job.outcome != JobOutcome::Finished) continue;
+      row.max = std::max(row.max, job.response());
+      here.responses.push_back(job.response());
+    }
+  }
+}
+
+bool Difference::is_any(Verdict verdict) const {
+  return std::any_of(rows.begin(), rows.end(), [&](const DifferenceRow &row) { return row.is_any(verdict); });
+}
+
+Difference compare_sides(const DifferenceSide &a, const DifferenceSide &b, const BootstrapOptions &options) {
+  REDAG_CHECK(!a.runs().empty() && !b.runs().empty(), "a side without runs");
+  Difference difference;
+  for (const DifferenceSide::Row &row : a.rows()) {
+    const auto other =
+        std::find_if(b.rows().begin(), b.rows().end(), [&](const auto &candidate) { return is_row(row, candidate); });
+    if (other == b.rows().end()) {
+      difference.missing.push_back(name_of(row));
+    } else {
+      difference.rows.push_back(DifferenceRow{&row, &*other, {}});
+    }
+  }
+  for (const DifferenceSide::Row &row : b.rows()) {
+    const bool known =
+        std::any_of(a.rows().begin(), a.rows().end(), [&](const auto &other) { return is_row(row, other); });
+    if (!known) difference.missing.push_back(name_of(row));
+  }
+
+  std::vector<DifferenceRow> &rows = difference.rows;
+  tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t i) {
+    BootstrapOptions row_options = options;
+    row_options.seed = mix(options.seed ^ mix(i));
+    rows[i].figures = compare_blocks(rows[i].a->runs, rows[i].b->runs, row_options);
+  });
+
+  std::vector<double> p_values;
+  for (const DifferenceRow &row : rows) {
+    for (const FigureDifference *figure :
+         {&row.figures.miss_ratio, &row.figures.p50, &row.figures.p95, &row.figures.p99}) {
+      if (figure->tested) p_values.push_back(figure->p());
+    }
+  }
+  difference.tests = p_values.size();
+  difference.threshold = discovery_threshold(std::move(p_values));
+  for (DifferenceRow &row : rows) {
+    row.miss = verdict_of(row.figures.miss_ratio, difference.threshold);
+    row.p50 = verdict_of(row.figures.p50, difference.threshold);
+    row.p95 = verdict_of(row.figures.p95, difference.threshold);
+    row.p99 = verdict_of(row.figures.p99, difference.threshold);
+  }
+  return difference;
+}
+
+}  // namespace redag::metrics

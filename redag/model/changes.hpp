@@ -1,0 +1,31 @@
+// What two workloads differ in, value by value. Pure functions.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "redag/model/workload.hpp"
+
+namespace redag {
+
+struct Change {
+  enum class Kind : std::uint8_t {
+    Setting,  // how the work is scheduled: platform, policy, bounds, order, overload rules
+    Demand,   // what work comes: periods, deadlines, execution times, edges, DAGs and tasks that only one has
+  };
+  Kind kind = Kind::Setting;
+  std::string what;  // "max_active of nav", "priority of nav.plan", "wcet of nav.plan"
+  std::string before;
+  std::string after;
+
+  /// "max_active of nav: none -> 2"
+  [[nodiscard]] std::string text() const { return what + ": " + before + " -> " + after; }
+};
+
+/// DAGs and tasks are matched by name; names and order of the workloads themselves do not count.
+[[nodiscard]] std::vector<Change> changes_between(const Workload &before, const Workload &after);
+
+/// "none" for 0.
+[[nodiscard]] std::string bound_text(std::uint32_t bound);
+
+}  // namespace redag
