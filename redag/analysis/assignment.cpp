@@ -1,12 +1,9 @@
 #include "redag/analysis/assignment.hpp"
 
 #include <algorithm>
-#include <limits>
-#include <map>
-#include <tuple>
 
 #include "redag/analysis/arithmetic.hpp"
-#include "redag/base/rng.hpp"
+#include "redag/analysis/coordinate_search.hpp"
 #include "redag/sched/policy.hpp"
 
 namespace redag::analysis {
@@ -34,17 +31,6 @@ class Scorer {
   bool any_ = false;
 };
 
-Caps caps_of(const Workload &workload) {
-  Caps caps;
-  for (const Dag &dag : workload.dags) caps.push_back(dag.max_active);
-  return caps;
-}
-
-Workload with_caps(Workload workload, const Caps &caps) {
-  for (std::size_t d = 0; d < caps.size(); ++d) workload.dags[d].max_active = caps[d];
-  return workload;
-}
-
 // The policy itself; priorities that it would ignore go where the workload relied on them.
 Workload with_policy(Workload workload, PolicyKind policy) {
   if (workload.policy == PolicyKind::Fixed) {
@@ -60,15 +46,11 @@ class Search {
  public:
   Search(const Workload &workload, const AnalysisPlatform &platform, const AssignmentOptions &options)
       : workload_(workload), platform_(platform), options_(options) {
+    const Caps present = caps_of(workload);
     for (const Dag &dag : workload.dags) {
-      Caps values = {dag.max_active};
-      const auto most = static_cast<std::uint32_t>(std::min<std::size_t>(dag.tasks.size(), platform.workers + 1ULL));
-      for (std::uint32_t cap = 0; options.caps && dag.tasks.size() > 1 && cap < most; ++cap) {
-        if (cap != dag.max_active) values.push_back(cap);
-      }
-      std::sort(values.begin(), values.end());
-      values_.push_back(std::move(values));
+      space_.values.push_back(options.caps ? cap_choices(dag, platform.workers) : Caps{dag.max_active});
     }
+    space_.starts = cap_starts(present, space_.values);
   }
 
   Assignment run() {
@@ -139,108 +121,74 @@ class Search {
   // The best caps under one order. What only lowers the sum of bounds is no reason to change caps that somebody chose.
   void add_order(const std::string &name, const Workload &ordered) {
     if (stopped()) return;
-    trials_.clear();
-    const Candidate start = judged(name, ordered, caps_of(workload_));
-    Candidate best = start;
-    trials_[best.caps] = best.score;
-    if (combinations() <= options_.exhaustive) {
-      try_all(name, ordered, best);
-    } else {
-      result_.exhaustive = false;
-      search_locally(name, ordered, best);
-    }
+    Candidate start;
+    Candidate best;
+    const auto evaluate = [&](std::span<const Point> points) {
+      std::vector<Score> scores;
+      for (const Point &caps : points) {
+        if (!start.caps.empty() && stopped()) break;
+        Candidate candidate = judged(name, ordered, caps);
+        scores.push_back(candidate.score);
+        if (start.caps.empty()) start = best = candidate;
+        if (is_better_than(candidate.score, best.score)) best = std::move(candidate);
+      }
+      return scores;
+    };
+    CoordinateSearch<Score> search(evaluate, [this](const Score &a, const Score &b) { return is_better_than(a, b); });
+    const auto found = search.run(space_, {options_.exhaustive, options_.restarts, options_.seed});
+    result_.exhaustive = result_.exhaustive && found.exhaustive;
     if (!improves(best.score, start.score, options_.objective)) best = start;
     const bool is_best = improves(best.score, result_.best.score, options_.objective);
     if (is_best || result_.orders.empty()) {
       result_.trials.clear();
-      for (const auto &[caps, score] : trials_) result_.trials.push_back(Trial{caps, score});
+      for (const auto &[caps, score] : found.trials) result_.trials.push_back(Trial{caps, score});
     }
     if (is_best) result_.best = best;
     result_.orders.push_back(std::move(best));
   }
 
-  [[nodiscard]] std::uint64_t combinations() const {
-    std::uint64_t product = 1;
-    for (const Caps &values : values_) {
-      product *= values.size();
-      if (product > options_.exhaustive) break;
-    }
-    return product;
-  }
-
-  Score tried(const std::string &name, const Workload &ordered, const Caps &caps, Candidate &best) {
-    if (const auto known = trials_.find(caps); known != trials_.end()) return known->second;
-    Candidate candidate = judged(name, ordered, caps);
-    const Score score = candidate.score;
-    trials_[caps] = score;
-    if (is_better_than(score, best.score)) best = std::move(candidate);
-    return score;
-  }
-
-  void try_all(const std::string &name, const Workload &ordered, Candidate &best) {
-    std::vector<std::size_t> at(values_.size(), 0);
-    while (!stopped()) {
-      Caps caps;
-      for (std::size_t d = 0; d < at.size(); ++d) caps.push_back(values_[d][at[d]]);
-      (void)tried(name, ordered, caps, best);
-      std::size_t d = 0;
-      while (d < at.size() && ++at[d] == values_[d].size()) at[d++] = 0;
-      if (d == at.size()) return;
-    }
-  }
-
-  void search_locally(const std::string &name, const Workload &ordered, Candidate &best) {
-    std::vector<Caps> starts = {caps_of(workload_)};
-    for (const std::uint32_t cap : {0U, 1U}) {
-      Caps caps;
-      for (const Caps &values : values_) {
-        const bool has = std::find(values.begin(), values.end(), cap) != values.end();
-        caps.push_back(has ? cap : values.front());
-      }
-      starts.push_back(std::move(caps));
-    }
-    Rng rng(options_.seed);
-    for (std::uint32_t i = 0; i < options_.restarts; ++i) {
-      Caps caps;
-      for (const Caps &values : values_) {
-        caps.push_back(values[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(values.size()) - 1))]);
-      }
-      starts.push_back(std::move(caps));
-    }
-    for (Caps &start : starts) climb(name, ordered, std::move(start), best);
-  }
-
-  // One DAG at a time to its best value, until a whole round changes nothing.
-  void climb(const std::string &name, const Workload &ordered, Caps caps, Candidate &best) {
-    if (stopped()) return;
-    Score here = tried(name, ordered, caps, best);
-    bool changed = true;
-    while (changed) {
-      changed = false;
-      for (std::size_t d = 0; d < caps.size(); ++d) {
-        for (const std::uint32_t value : values_[d]) {
-          if (stopped()) return;
-          Caps next = caps;
-          next[d] = value;
-          const Score score = tried(name, ordered, next, best);
-          if (!is_better_than(score, here)) continue;
-          caps = std::move(next);
-          here = score;
-          changed = true;
-        }
-      }
-    }
-  }
-
   const Workload &workload_;
   const AnalysisPlatform &platform_;
   const AssignmentOptions &options_;
-  std::vector<Caps> values_;      // of each DAG
-  std::map<Caps, Score> trials_;  // under the order at hand
+  SearchSpace space_;  // of max_active, by DAG
   Assignment result_;
 };
 
 }  // namespace
+
+Caps caps_of(const Workload &workload) {
+  Caps caps;
+  for (const Dag &dag : workload.dags) caps.push_back(dag.max_active);
+  return caps;
+}
+
+Workload with_caps(Workload workload, const Caps &caps) {
+  for (std::size_t d = 0; d < caps.size(); ++d) workload.dags[d].max_active = caps[d];
+  return workload;
+}
+
+Caps cap_choices(const Dag &dag, std::uint32_t workers) {
+  Caps values = {dag.max_active};
+  const auto most = static_cast<std::uint32_t>(std::min<std::size_t>(dag.tasks.size(), workers + 1ULL));
+  for (std::uint32_t cap = 0; dag.tasks.size() > 1 && cap < most; ++cap) {
+    if (cap != dag.max_active) values.push_back(cap);
+  }
+  std::sort(values.begin(), values.end());
+  return values;
+}
+
+std::vector<Caps> cap_starts(const Caps &present, const std::vector<Caps> &choices) {
+  std::vector<Caps> starts = {present};
+  for (const std::uint32_t cap : {0U, 1U}) {
+    Caps caps;
+    for (const Caps &values : choices) {
+      const bool has = std::find(values.begin(), values.end(), cap) != values.end();
+      caps.push_back(has ? cap : values.front());
+    }
+    starts.push_back(std::move(caps));
+  }
+  return starts;
+}
 
 const char *to_string(Objective objective) { return objective == Objective::Lateness ? "lateness" : "slack"; }
 

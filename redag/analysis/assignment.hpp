@@ -41,6 +41,16 @@ struct Score {
 /// One max_active for each DAG, by DagId; 0: no bound.
 using Caps = std::vector<std::uint32_t>;
 
+[[nodiscard]] Caps caps_of(const Workload &workload);
+[[nodiscard]] Workload with_caps(Workload workload, const Caps &caps);
+
+/// What can make a difference on so many workers, and what there is now: none, and 1 to min(tasks - 1, workers); of a
+/// DAG with one task only what there is. Sorted.
+[[nodiscard]] Caps cap_choices(const Dag &dag, std::uint32_t workers);
+
+/// Where a local search begins: the present caps, none, all 1; as far as they are among the choices.
+[[nodiscard]] std::vector<Caps> cap_starts(const Caps &present, const std::vector<Caps> &choices);
+
 struct Candidate {
   std::string order;  // "present", "rate_monotonic", "deadline_monotonic", "dkc", "audsley"
   Workload workload;  // with the order and the caps

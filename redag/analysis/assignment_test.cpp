@@ -157,7 +157,7 @@ TEST(Assignment, LocalSearchIsDeterministicAndNoBetterThanAll) {
 TEST(Assignment, StopsWithTheBestSoFar) {
   AssignmentOptions options;
   int asked = 0;
-  options.stop = [&] { return ++asked > 2; };
+  options.stop = [&] { return ++asked > 1; };
   const Workload workload = workload_of({single("a", 3, 10, 10), single("b", 2, 20, 4)});
   const Assignment result = assigned(workload, options);
   EXPECT_TRUE(result.stopped);

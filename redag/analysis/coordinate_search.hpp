@@ -1,0 +1,155 @@
+// The search that `assign` and `tune` share: one of some values in each dimension. Small spaces are tried as a whole;
+// in larger ones one dimension at a time goes to its best value until nothing helps, from several places. What a point
+// is worth is asked in batches, so that it can be found in parallel; the answer does not depend on how. Pure, but for
+// what it calls.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "redag/base/rng.hpp"
+
+namespace redag::analysis {
+
+/// One value for each dimension.
+using Point = std::vector<std::uint32_t>;
+
+struct SearchSpace {
+  std::vector<std::vector<std::uint32_t>> values;  // of each dimension; not empty
+  std::vector<Point> starts;                       // of the local search; the first one is the present point
+
+  /// How many points there are; `limit` + 1 if they are more than `limit`.
+  [[nodiscard]] std::uint64_t size(std::uint64_t limit) const {
+    std::uint64_t product = 1;
+    for (const auto &choices : values) {
+      product *= choices.size();
+      if (product > limit) return limit + 1;
+    }
+    return product;
+  }
+};
+
+struct SearchEffort {
+  std::uint64_t exhaustive = 1024;  // points up to which all are tried
+  std::uint32_t restarts = 8;       // random places to start from, besides those of the space
+  std::uint64_t seed = 1;
+};
+
+template <class Score>
+class CoordinateSearch {
+ public:
+  /// Scores of points, in their order; fewer than were asked for: stop.
+  using Evaluate = std::function<std::vector<Score>(std::span<const Point>)>;
+  using Better = std::function<bool(const Score &, const Score &)>;  // a strict weak order
+
+  struct Found {
+    Point best;  // of equally good ones the first that was met
+    Score score{};
+    std::map<Point, Score> trials;
+    bool exhaustive = true;
+    bool stopped = false;
+  };
+
+  CoordinateSearch(Evaluate evaluate, Better better) : evaluate_(std::move(evaluate)), better_(std::move(better)) {}
+
+  /// Requires a start. If stopped before its score was known, there are no trials.
+  Found run(const SearchSpace &space, const SearchEffort &effort) {
+    found_ = {};
+    found_.best = space.starts.front();
+    try_points({space.starts.front()});
+    if (found_.stopped) return std::move(found_);
+    if (space.size(effort.exhaustive) <= effort.exhaustive) {
+      try_all(space);
+    } else {
+      found_.exhaustive = false;
+      for (Point &start : starts_of(space, effort)) climb(space, std::move(start));
+    }
+    return std::move(found_);
+  }
+
+ private:
+  static constexpr std::size_t kBatch = 64;
+
+  // Nothing is asked twice.
+  void try_points(const std::vector<Point> &points) {
+    std::vector<Point> unknown;
+    for (const Point &point : points) {
+      const bool listed = std::find(unknown.begin(), unknown.end(), point) != unknown.end();
+      if (!listed && found_.trials.find(point) == found_.trials.end()) unknown.push_back(point);
+    }
+    if (unknown.empty() || found_.stopped) return;
+    const std::vector<Score> scores = evaluate_(unknown);
+    for (std::size_t i = 0; i < scores.size(); ++i) {
+      if (found_.trials.empty() || better_(scores[i], found_.score)) {
+        found_.best = unknown[i];
+        found_.score = scores[i];
+      }
+      found_.trials.emplace(unknown[i], scores[i]);
+    }
+    found_.stopped = scores.size() < unknown.size();
+  }
+
+  void try_all(const SearchSpace &space) {
+    std::vector<std::size_t> at(space.values.size(), 0);
+    std::vector<Point> batch;
+    bool more = true;
+    while (more && !found_.stopped) {
+      Point point;
+      for (std::size_t d = 0; d < at.size(); ++d) point.push_back(space.values[d][at[d]]);
+      batch.push_back(std::move(point));
+      std::size_t d = 0;
+      while (d < at.size() && ++at[d] == space.values[d].size()) at[d++] = 0;
+      more = d < at.size();
+      if (more && batch.size() < kBatch) continue;
+      try_points(batch);
+      batch.clear();
+    }
+  }
+
+  static std::vector<Point> starts_of(const SearchSpace &space, const SearchEffort &effort) {
+    std::vector<Point> starts = space.starts;
+    Rng rng(effort.seed);
+    for (std::uint32_t i = 0; i < effort.restarts; ++i) {
+      Point point;
+      for (const auto &choices : space.values) {
+        point.push_back(
+            choices[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(choices.size()) - 1))]);
+      }
+      starts.push_back(std::move(point));
+    }
+    return starts;
+  }
+
+  void climb(const SearchSpace &space, Point here) {
+    try_points({here});
+    bool changed = true;
+    while (changed && !found_.stopped) {
+      changed = false;
+      for (std::size_t d = 0; d < space.values.size() && !found_.stopped; ++d) {
+        std::vector<Point> line;
+        for (const std::uint32_t value : space.values[d]) {
+          line.push_back(here);
+          line.back()[d] = value;
+        }
+        try_points(line);
+        if (found_.stopped) return;
+        for (const Point &point : line) {
+          if (!better_(found_.trials.at(point), found_.trials.at(here))) continue;
+          here = point;
+          changed = true;
+        }
+      }
+    }
+  }
+
+  Evaluate evaluate_;
+  Better better_;
+  Found found_;
+};
+
+}  // namespace redag::analysis
