@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "redag/cli/table.hpp"
+#include "redag/model/changes.hpp"
 
 namespace redag::cli {
 namespace {
@@ -40,14 +41,12 @@ std::string slack_text(const Score &score, const Workload &workload) {
   return has_numbers(score, workload) ? percent(score.least_slack) : "-";
 }
 
-std::string cap_text(std::uint32_t cap) { return cap == 0 ? "none" : fmt::format("{}", cap); }
-
 // Of the DAGs that have a choice: those with more than one task.
 std::string caps_text(const Workload &workload, const Caps &caps) {
   std::string text;
   for (std::size_t d = 0; d < caps.size(); ++d) {
     if (workload.dags[d].tasks.size() < 2 && caps[d] == 0) continue;
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", workload.dags[d].name, cap_text(caps[d]));
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", workload.dags[d].name, bound_text(caps[d]));
   }
   return text.empty() ? "-" : text;
 }
@@ -154,27 +153,9 @@ Json candidate_json(const Candidate &candidate) {
 }  // namespace
 
 std::vector<std::string> changes(const Assignment &assignment) {
-  const Workload &before = assignment.present.workload;
-  const Workload &after = assignment.best.workload;
   std::vector<std::string> list;
-  if (before.policy != after.policy) {
-    list.push_back(fmt::format("policy: {} -> {}", to_string(before.policy), to_string(after.policy)));
-  }
-  for (std::size_t d = 0; d < after.dags.size(); ++d) {
-    const Dag &dag = after.dags[d];
-    if (dag.max_active != before.dags[d].max_active) {
-      list.push_back(fmt::format("max_active of {}: {} -> {}", dag.name, cap_text(before.dags[d].max_active),
-                                 cap_text(dag.max_active)));
-    }
-    for (std::size_t t = 0; t < dag.tasks.size(); ++t) {
-      const std::optional<int> old = before.dags[d].tasks[t].priority;
-      const std::optional<int> now = dag.tasks[t].priority;
-      if (old == now) continue;
-      const auto text = [](std::optional<int> priority) {
-        return priority ? fmt::format("{}", *priority) : std::string("none");
-      };
-      list.push_back(fmt::format("priority of {}.{}: {} -> {}", dag.name, dag.tasks[t].name, text(old), text(now)));
-    }
+  for (const Change &change : changes_between(assignment.present.workload, assignment.best.workload)) {
+    list.push_back(change.text());
   }
   return list;
 }

@@ -41,6 +41,10 @@ constexpr std::array kCommands = {
           "  redag compare cart.yaml\n"
           "  redag compare cart.yaml --executors redag-none,redag-os,mte,mte-fifo --repeat 5 --out results/cmp\n"
           "  redag compare cart.yaml --simulate --duration 60s --json\n"},
+    Entry{"diff", "Two recorded results beside each other: what differs by more than chance", add_diff,
+          "  redag diff results/before results/after\n"
+          "  redag diff results/cmp/mte results/cmp/redag --tolerance 0.1\n"
+          "  redag diff results/main results/branch --check || echo 'the branch is worse'\n"},
     Entry{"analyze", "Bound every response time: which deadlines hold whatever happens, and why", add_analyze,
           "  redag analyze cart.yaml\n"
           "  redag analyze cart.yaml --preemption none --workers 2 --check\n"
@@ -56,6 +60,11 @@ constexpr std::array kCommands = {
           "  redag assign cart.yaml\n"
           "  redag assign cart.yaml --objective slack -o tuned.yaml\n"
           "  redag assign cart.yaml --keep priorities --workers 4 --json\n"},
+    Entry{"tune", "Find better max_active, workers and tie order by simulation, held to seeds not searched with",
+          add_tune,
+          "  redag tune cart.yaml\n"
+          "  redag tune cart.yaml --objective max_lateness --per-criticality -o tuned.yaml\n"
+          "  redag tune cart.yaml --vary max_active --caps 2-5 --simulator-only --all-trials\n"},
     Entry{"experiment", "Measure over many random workloads: seeded, parallel, resumable", add_experiment,
           "  redag experiment acceptance experiments/acceptance_tasks.yaml\n"
           "  redag experiment acceptance --help\n"

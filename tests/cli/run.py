@@ -23,7 +23,7 @@ import xml.etree.ElementTree
 PROGRAM = pathlib.Path()
 SOURCE = pathlib.Path()
 
-COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["compare"], ["analyze"], ["sensitivity"], ["assign"],
+COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["compare"], ["diff"], ["analyze"], ["sensitivity"], ["assign"], ["tune"],
             ["check-trace"], ["top"], ["report"], ["experiment"], ["experiment", "acceptance"],
             ["experiment", "factorial"], ["experiment", "merge"]]
 CART = """\
@@ -803,6 +803,55 @@ class Sensitivity(Case):
         self.assertTrue(json.loads(out)["stopped"])
 
 
+class Diff(Case):
+    def results(self, name, *arguments, file=None):
+        folder = self.folder / name
+        self.expect(redag("simulate", file or self.cart, "--duration", "20s", "--out", folder, *arguments), 0)
+        return folder
+
+    def test_better_and_worse(self):
+        none = self.results("none")
+        full = self.results("full", "--preemption", "os")
+        result = self.expect(redag("diff", none, full), 0)
+        self.assertIn("differs preemption: none -> os", result.stdout)
+        self.assertIn("better fast.sense: missed 10.0 % -> 0.0 %", result.stdout)
+        self.assertIn("worse slow.plan: p50 27ms -> 33ms", result.stdout)
+        self.assertNotIn("lasts longer than the blocks", result.stdout)
+        self.expect(redag("diff", none, full, "--check"), 1)
+        self.expect(redag("diff", none, none, "--check"), 0)
+        self.assertIn("no figure differs", redag("diff", none, none).stdout)
+        document = self.document(redag("diff", none, full, "--json"), "redag.difference/1")
+        self.assertEqual(document["changes"], [{"kind": "setting", "what": "preemption", "a": "none", "b": "os"}])
+        self.assertEqual([row["task"] for row in document["rows"]], [None, None, "sense", "act", None, "plan"])
+        self.assertTrue(document["worse"] and document["better"])
+        self.assertEqual(redag("diff", none, full, "--json").stdout, redag("diff", none, full, "--json").stdout)
+
+    def test_repetitions(self):
+        file = self.write("random.yaml", CART.replace("wcet: 1ms, period", "wcet: 1ms, bcet: 1us, period"))
+        folder = self.folder / "cmp"
+        self.expect(redag("compare", file, "--simulate", "--duration", "20s", "--repeat", "3", "--executors",
+                          "redag,mte", "--out", folder), 0)
+        result = redag("diff", folder / "mte", folder / "redag", "--json")
+        self.assertEqual(self.document(result, "redag.difference/1")["a"]["seeds"], [1, 2, 3])
+        self.expect(redag("diff", folder, folder / "mte"), 2, "holds runs of 2 kinds: redag, mte", "name one of them")
+
+    def test_other_workload(self):
+        one = self.results("one")
+        other = self.results("other", file=self.write("other.yaml", CART.replace("25ms", "20ms")))
+        self.expect(redag("diff", one, other), 2, "different workloads: wcet of slow.plan: 25ms -> 20ms", "--different")
+        result = self.expect(redag("diff", one, other, "--different"), 0)
+        self.assertIn("beware the two ran different workloads", result.stdout)
+
+    def test_bad_input(self):
+        one = self.results("one")
+        self.expect(redag("diff", one), 2, "B is required")
+        self.expect(redag("diff", one, self.folder / "nowhere"), 2, "nowhere")
+        (self.folder / "empty").mkdir()
+        self.expect(redag("diff", one, self.folder / "empty"), 2, "no events.jsonl")
+        self.expect(redag("diff", one, one, "--tolerance", "2"), 2, "not a share from 0 to 1")
+        self.expect(redag("diff", one, one, "--replicates", "1"), 2, "--replicates")
+
+
 class Assign(Case):
     def test_by_deadline(self):
         file = self.write("short.yaml", SHORT_DEADLINE)
@@ -875,6 +924,75 @@ dags:
             self.expect(redag("validate", tuned), 0)
         text = self.expect(redag("assign", SOURCE / "workloads" / "robot.yaml"), 0).stdout
         self.assertIn("nothing to compare: no method bounds any response time", text)
+
+
+class Tune(Case):
+    WIDE = """\
+name: wide
+platform: {workers: 2, preemption: none}
+dags:
+  - name: wide
+    tasks: [{name: s, wcet: 5ms, bcet: 1ms, period: 100ms}%s]
+  - name: quick
+    tasks: [{name: t, wcet: 1ms, bcet: 500us, period: 10ms}]
+""" % "".join(f", {{name: f{i}, wcet: 30ms, bcet: 20ms, activation: data, after: s}}" for i in range(2))
+
+    def test_max_active(self):
+        file = self.write("wide.yaml", self.WIDE)
+        tuned = self.folder / "tuned.yaml"
+        result = self.expect(redag("tune", file, "--simulator-only", "-o", tuned), 0, "wrote")
+        self.assertIn("change max_active of wide: none -> 1", result.stdout)
+        self.assertRegex(result.stdout, r"misses, on seeds that the search has not seen: [\d ]+ \([\d.]+ %\) -> none")
+        self.assertIn("seed by seed: 10 better, 0 equal, 0 worse", result.stdout)
+        self.expect(redag("validate", "--strict", tuned), 0)
+        self.assertIn("bcet: 20ms", tuned.read_text())
+        again = self.expect(redag("tune", tuned, "--simulator-only", "--check"), 0)
+        self.assertIn("nothing to change", again.stdout)
+        self.expect(redag("tune", file, "--simulator-only", "--vary", "workers", "--check"), 1)
+        before = self.folder / "before"
+        after = self.folder / "after"
+        for name, folder in (file, before), (tuned, after):
+            self.expect(redag("simulate", name, "--duration", "20s", "--seed", "77", "--out", folder), 0)
+        differs = self.expect(redag("diff", before, after), 0).stdout
+        self.assertIn("differs max_active of wide: none -> 1", differs)
+        self.assertIn("better quick: missed", differs)
+
+    def test_json_is_the_same_for_every_number_of_processors(self):
+        file = self.write("wide.yaml", self.WIDE)
+        one = redag("tune", file, "--jobs", "1", "--duration", "2s", "--json")
+        document = self.document(one, "redag.tuning/1")
+        self.assertEqual(one.stdout, redag("tune", file, "--jobs", "3", "--duration", "2s", "--json").stdout)
+        self.assertEqual(document["best"]["max_active"], {"wide": 1, "quick": 0})
+        self.assertEqual(len(document["best"]["held_out_runs"]), 10)
+
+    def test_pairs(self):
+        paper = SOURCE / "workloads" / "paper" / "harmonic_u08.yaml"
+        result = redag("tune", paper, "--vary", "max_active", "--caps", "2-5", "--simulator-only", "--duration", "2s",
+                       "--seeds", "1", "--held-out", "1", "--json")
+        trials = self.document(result, "redag.tuning/1")["trials"]
+        pairs = sorted((trial["max_active"]["dag1"], trial["max_active"]["dag2"]) for trial in trials)
+        self.assertEqual(pairs, [(a, b) for a in range(2, 6) for b in range(2, 6)])
+
+    def test_interrupted(self):
+        file = self.write("wide.yaml", self.WIDE)
+        process = subprocess.Popen([PROGRAM, "tune", file, "--duration", "100000s", "--held-out", "0", "--seeds", "1",
+                                    "--jobs", "1", "--simulator-only"],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=250)
+        self.assertIn("interrupted", err)
+        self.assertIn(process.returncode, (0, 2))  # 2: not even the workload as it is was judged
+        self.assertEqual(process.returncode == 0, "stopped after" in out)
+
+    def test_bad_input(self):
+        self.expect(redag("tune"), 2, "FILE is required")
+        self.expect(redag("tune", self.write("bad.yaml", MISTAKEN)), 2, "bad.yaml:6")
+        self.expect(redag("tune", self.cart, "--objective", "misess"), 2, "did you mean 'misses'?")
+        self.expect(redag("tune", self.cart, "--vary", "worker"), 2, "did you mean 'workers'?")
+        self.expect(redag("tune", self.cart, "--caps", "5-2"), 2, "write it as 2-5")
+        self.expect(redag("tune", self.cart, "--seeds", "0"), 2, "--seeds")
+        self.expect(redag("tune", self.cart, "-o", self.folder / "no" / "where.yaml"), 2)
 
 
 class Experiment(Case):

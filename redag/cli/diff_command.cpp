@@ -1,0 +1,168 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+
+#include "redag/cli/commands.hpp"
+#include "redag/cli/difference_report.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/cli/progress.hpp"
+#include "redag/cli/recorded_runs.hpp"
+#include "redag/cli/signals.hpp"
+#include "redag/trace/events_file.hpp"
+
+namespace redag::cli {
+namespace {
+
+constexpr std::uint32_t kFewestReplicates = 100;
+constexpr std::uint32_t kMostReplicates = 1'000'000;
+constexpr std::size_t kMostShown = 10;
+
+struct Options {
+  std::string a;
+  std::string b;
+  metrics::BootstrapOptions bootstrap;
+  bool different = false;
+  bool check = false;
+  bool json = false;
+  bool all_tasks = false;
+};
+
+// "a, b, c and 7 more"
+std::string some_of(const std::vector<std::string> &items) {
+  std::string text;
+  for (std::size_t i = 0; i < std::min(items.size(), kMostShown); ++i) text += (i == 0 ? "" : ", ") + items[i];
+  return items.size() > kMostShown ? fmt::format("{} and {} more", text, items.size() - kMostShown) : text;
+}
+
+class Diffing {
+ public:
+  Diffing(const Options &options, Console &console) : options_(options), console_(console), progress_(console) {}
+
+  int run() {
+    const InterruptGuard guard;
+    diffed_.options = options_.bootstrap;
+    if (!read(options_.a, diffed_.a) || !read(options_.b, diffed_.b)) return kExitBad;
+    if (!compare_workloads()) return kExitBad;
+    for (std::string &caveat : caveats(diffed_.a, diffed_.b)) diffed_.warnings.push_back(std::move(caveat));
+    progress_.draw(1, "comparing");
+    diffed_.difference = metrics::compare_sides(diffed_.a.jobs, diffed_.b.jobs, diffed_.options);
+    progress_.clear();
+    console_.print(options_.json ? to_text(to_json(diffed_))
+                                 : describe(diffed_, console_.out_traits(), options_.all_tasks));
+    return options_.check && diffed_.difference.is_any(metrics::Verdict::Worse) ? kExitNo : kExitOk;
+  }
+
+ private:
+  // False: an error was printed.
+  bool read(const std::string &place, DiffSide &side) {
+    const Result<RecordedPlaces> found = find_recorded_runs({place});
+    if (!found) {
+      console_.note(found.error());
+      return false;
+    }
+    if (found->runs.size() != 1) {
+      std::vector<std::string> labels;
+      for (const RecordedRuns &runs : found->runs) labels.push_back(runs.label);
+      console_.error(fmt::format("{}: holds runs of {} kinds: {}", place, labels.size(), some_of(labels)),
+                     fmt::format("name one of them, such as {}/{}", place, labels.front()));
+      return false;
+    }
+    side.name = place;
+    for (const std::string &note : found->notes) diffed_.warnings.push_back(place + ": " + note);
+    const std::vector<std::string> &traces = found->runs.front().traces;
+    for (std::size_t i = 0; i < traces.size(); ++i) {
+      if (InterruptGuard::interrupted()) {
+        progress_.clear();
+        console_.error("interrupted before both sides were read: there is nothing to compare");
+        return false;
+      }
+      progress_.draw(static_cast<double>(i) / static_cast<double>(traces.size()), traces[i]);
+      const Result<trace::Trace> trace = trace::read_trace(traces[i]);
+      if (!trace) {
+        progress_.clear();
+        console_.note(trace.error());
+        return false;
+      }
+      if (!add(traces[i], *trace, side)) return false;
+    }
+    progress_.clear();
+    return true;
+  }
+
+  bool add(const std::string &file, const trace::Trace &trace, DiffSide &side) {
+    if (!side.jobs.runs().empty()) {
+      const trace::RunInfo &first = side.jobs.runs().front();
+      const bool same_way = first.executor == trace.info.executor && first.preemption == trace.info.preemption &&
+                            first.driver == trace.info.driver && first.config.workers == trace.info.config.workers;
+      const std::vector<Change> changes = changes_between(first.workload, trace.info.workload);
+      if (!same_way || !changes.empty()) {
+        progress_.clear();
+        console_.error(
+            fmt::format("{}: is no repetition of the run beside it: {}", file,
+                        changes.empty() ? "its executor, mode, workers or driver differ" : changes.front().text()),
+            "keep runs of one kind in a folder");
+        return false;
+      }
+    }
+    side.jobs.add(trace);
+    return true;
+  }
+
+  // Only what asks for the same work can be compared: else a difference says nothing of how it was scheduled.
+  bool compare_workloads() {
+    diffed_.changes = changes_between(diffed_.a.jobs.runs().front().workload, diffed_.b.jobs.runs().front().workload);
+    std::vector<std::string> demand;
+    for (const Change &change : diffed_.changes) {
+      if (change.kind == Change::Kind::Demand) demand.push_back(change.text());
+    }
+    if (demand.empty()) return true;
+    const std::string what = fmt::format("the two ran different workloads: {}", some_of(demand));
+    if (!options_.different) {
+      console_.error(what, "--different compares the tasks that both have all the same");
+      return false;
+    }
+    diffed_.warnings.push_back(what);
+    return true;
+  }
+
+  const Options &options_;
+  Console &console_;
+  Progress progress_;
+  Diffed diffed_;
+};
+
+int diff(const Options &options, Console &console) {
+  const metrics::BootstrapOptions &bootstrap = options.bootstrap;
+  if (bootstrap.replicates < kFewestReplicates || bootstrap.replicates > kMostReplicates) {
+    console.error(
+        fmt::format("--replicates: {} is not from {} to {}", bootstrap.replicates, kFewestReplicates, kMostReplicates));
+    return kExitBad;
+  }
+  if (bootstrap.tolerance < 0 || bootstrap.tolerance >= 1) {
+    console.error(fmt::format("--tolerance: {:g} is not a share from 0 to 1", bootstrap.tolerance), "0.05 is 5 %");
+    return kExitBad;
+  }
+  return Diffing(options, console).run();
+}
+
+}  // namespace
+
+Action add_diff(CLI::App &app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("A", options->a, "Folder of a run, or of its repetitions (run, simulate, compare, ROS 2 run_workload)")
+      ->required();
+  app.add_option("B", options->b, "The same for what it is compared with")->required();
+  add_number(app, "--tolerance", options->bootstrap.tolerance,
+             "Share by which response percentiles may differ and count as equal");
+  app.add_flag("--different", options->different,
+               "Compare runs of different workloads too, as far as tasks are in both");
+  add_count(app, "--replicates", options->bootstrap.replicates, "Of the bootstrap");
+  add_count(app, "--seed", options->bootstrap.seed, "Of the bootstrap: the same seed gives the same answer");
+  app.add_flag("--all-tasks", options->all_tasks, "A row for every task, however many");
+  app.add_flag("--json", options->json, "Write one JSON document to standard output, and nothing else");
+  app.add_flag("--check", options->check, "Exit with 1 if B is worse in any figure by more than chance");
+  return [options](Console &console) { return diff(*options, console); };
+}
+
+}  // namespace redag::cli

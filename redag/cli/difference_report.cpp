@@ -1,0 +1,276 @@
+#include "redag/cli/difference_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "redag/base/text.hpp"
+#include "redag/cli/table.hpp"
+
+namespace redag::cli {
+namespace {
+
+using metrics::DifferenceRow;
+using metrics::DifferenceSide;
+using metrics::FigureDifference;
+using metrics::Verdict;
+
+constexpr std::size_t kMostTasks = 20;  // shown without a difference
+
+struct Figure {
+  const char *name;
+  FigureDifference metrics::RowDifference::*value;
+  Verdict DifferenceRow::*verdict;
+};
+constexpr std::array<Figure, 4> kFigures = {{{"missed", &metrics::RowDifference::miss_ratio, &DifferenceRow::miss},
+                                             {"p50", &metrics::RowDifference::p50, &DifferenceRow::p50},
+                                             {"p95", &metrics::RowDifference::p95, &DifferenceRow::p95},
+                                             {"p99", &metrics::RowDifference::p99, &DifferenceRow::p99}}};
+
+bool is_miss(const Figure &figure) { return figure.value == &metrics::RowDifference::miss_ratio; }
+
+std::string value_text(const Figure &figure, double value) {
+  return is_miss(figure) ? format_percent(value) : humanize_duration(static_cast<Duration>(value));
+}
+
+std::string row_name(const DifferenceRow &row) {
+  if (row.a->dag.empty()) return "all jobs";
+  return row.a->task.empty() ? row.a->dag : row.a->dag + "." + row.a->task;
+}
+
+Tint tint_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::Better: return Tint::Good;
+    case Verdict::Worse: return Tint::Bad;
+    case Verdict::Same: return Tint::Plain;
+    case Verdict::NotTested: return Tint::Faint;
+  }
+  return Tint::Plain;
+}
+
+std::string arrow(const std::string &a, const std::string &b) { return a == b ? a : a + " -> " + b; }
+
+Cell figure_cell(const DifferenceRow &row, const Figure &figure) {
+  const FigureDifference &value = row.figures.*figure.value;
+  const Verdict verdict = row.*figure.verdict;
+  const bool differs = verdict == Verdict::Better || verdict == Verdict::Worse;
+  return Cell{arrow(value_text(figure, value.a), value_text(figure, value.b)) + (differs ? " *" : ""),
+              tint_of(verdict)};
+}
+
+std::string signed_time(double value) {
+  return (value < 0 ? "-" : "+") + humanize_duration(static_cast<Duration>(std::abs(value)));
+}
+
+std::string change_text(const Figure &figure, const FigureDifference &value) {
+  if (is_miss(figure)) return fmt::format("{:+.2f} to {:+.2f} percentage points", 100 * value.low, 100 * value.high);
+  return fmt::format("{} to {}", signed_time(value.low), signed_time(value.high));
+}
+
+std::string run_words(const DiffSide &side) {
+  const std::vector<trace::RunInfo> &runs = side.jobs.runs();
+  const trace::RunInfo &first = runs.front();
+  return fmt::format("{}: {}, {}, {} worker{}, {}, {} run{} of {}", side.name, first.executor, first.preemption,
+                     first.config.workers, first.config.workers == 1 ? "" : "s", trace::to_string(first.driver),
+                     runs.size(), runs.size() == 1 ? "" : "s", humanize_duration(first.end - first.start));
+}
+
+std::string differences_table(const Diffed &diffed, const StreamTraits &terminal, bool all) {
+  Table table({{"", false, 9},
+               {"jobs", true, 1},
+               {"missed", true, 8},
+               {"dropped", true, 2},
+               {"p50", true, 3},
+               {"p95", true, 4},
+               {"p99", true, 6},
+               {"max", true, 5}});
+  const bool many = diffed.difference.rows.size() > kMostTasks && !all;
+  std::size_t left_out = 0;
+  for (const DifferenceRow &row : diffed.difference.rows) {
+    if (many && !row.a->task.empty() && !row.is_any(Verdict::Better) && !row.is_any(Verdict::Worse)) {
+      ++left_out;
+      continue;
+    }
+    const std::string indent = row.a->task.empty() ? "" : "  ";
+    table.add({{indent + (row.a->task.empty() ? row_name(row) : row.a->task),
+                row.a->dag.empty() ? Tint::Strong : Tint::Plain},
+               {arrow(format_count(row.a->released), format_count(row.b->released)), Tint::Faint},
+               figure_cell(row, kFigures[0]),
+               {arrow(format_count(row.a->lost), format_count(row.b->lost))},
+               figure_cell(row, kFigures[1]),
+               figure_cell(row, kFigures[2]),
+               figure_cell(row, kFigures[3]),
+               {arrow(humanize_duration(row.a->max), humanize_duration(row.b->max)), Tint::Faint}});
+  }
+  std::string text = table.render(terminal.width, terminal.colour);
+  if (left_out > 0) text += fmt::format("({} tasks without a difference; --all-tasks shows them)\n", left_out);
+  return text;
+}
+
+// Every figure that differs by more than chance, the worse ones first.
+std::string findings(const Diffed &diffed, const StreamTraits &terminal) {
+  std::string text;
+  for (const Verdict wanted : {Verdict::Worse, Verdict::Better}) {
+    for (const DifferenceRow &row : diffed.difference.rows) {
+      for (const Figure &figure : kFigures) {
+        if (row.*figure.verdict != wanted) continue;
+        const FigureDifference &value = row.figures.*figure.value;
+        text += fmt::format("{} {}: {} {} -> {} ({})\n", tinted(to_string(wanted), tint_of(wanted), terminal.colour),
+                            row_name(row), figure.name, value_text(figure, value.a), value_text(figure, value.b),
+                            change_text(figure, value));
+      }
+    }
+  }
+  return text;
+}
+
+std::vector<std::string> cautions(const Diffed &diffed) {
+  std::vector<std::string> list = diffed.warnings;
+  std::size_t untested = 0;
+  std::vector<std::string> correlated;
+  for (const DifferenceRow &row : diffed.difference.rows) {
+    if (row.is_any(Verdict::NotTested)) ++untested;
+    if (row.is_correlated()) correlated.push_back(row_name(row));
+  }
+  if (untested > 0) {
+    list.push_back(
+        fmt::format("{} of {} rows have figures that were not tested: too few jobs or too short runs; run for longer",
+                    untested, diffed.difference.rows.size()));
+  }
+  if (!correlated.empty()) {
+    list.push_back(fmt::format(
+        "{}{}: what happens lasts longer than the blocks of time that are compared, so the intervals "
+        "are too narrow; run for longer",
+        correlated.front(), correlated.size() > 1 ? fmt::format(" and {} more", correlated.size() - 1) : ""));
+  }
+  return list;
+}
+
+Json figure_json(const DifferenceRow &row, const Figure &figure) {
+  const FigureDifference &value = row.figures.*figure.value;
+  const bool tested = value.tested;
+  return Json{{"a", value.a},
+              {"b", value.b},
+              {"difference_low", tested ? Json(value.low) : Json()},
+              {"difference_high", tested ? Json(value.high) : Json()},
+              {"p", tested ? Json(value.p()) : Json()},
+              {"verdict", to_string(row.*figure.verdict)}};
+}
+
+Json counts_json(const DifferenceSide::Row &row) {
+  std::size_t blocks = 0;
+  for (const auto &run : row.runs) blocks += run.size();
+  return Json{
+      {"released", row.released}, {"late", row.late}, {"lost", row.lost}, {"max_ns", row.max}, {"blocks", blocks}};
+}
+
+Json side_json(const DiffSide &side) {
+  const trace::RunInfo &first = side.jobs.runs().front();
+  Json seeds = Json::array();
+  for (const trace::RunInfo &run : side.jobs.runs()) seeds.push_back(run.seed);
+  return Json{{"name", side.name},
+              {"executor", first.executor},
+              {"preemption", first.preemption},
+              {"workers", first.config.workers},
+              {"driver", trace::to_string(first.driver)},
+              {"runs", side.jobs.runs().size()},
+              {"duration_ns", first.end - first.start},
+              {"seeds", seeds}};
+}
+
+}  // namespace
+
+std::vector<std::string> caveats(const DiffSide &a, const DiffSide &b) {
+  std::vector<std::string> list;
+  const trace::RunInfo &x = a.jobs.runs().front();
+  const trace::RunInfo &y = b.jobs.runs().front();
+  if (x.driver != y.driver) {
+    list.push_back(
+        fmt::format("one side comes from '{}', the other from '{}': what the machine adds is part of the "
+                    "difference",
+                    trace::to_string(x.driver), trace::to_string(y.driver)));
+  } else if (x.driver != trace::Driver::Simulator && !(x.machine == y.machine)) {
+    list.push_back("the sides ran on different machines or kernels: that is part of the difference");
+  }
+  if (x.overheads != y.overheads) {
+    list.push_back(fmt::format("overheads differ: '{}' and '{}'", x.overheads, y.overheads));
+  }
+  const std::size_t fewest = std::min(a.jobs.runs().size(), b.jobs.runs().size());
+  if (fewest == 1 && (x.driver != trace::Driver::Simulator || y.driver != trace::Driver::Simulator)) {
+    list.push_back(
+        "a side has a single run: how runs differ from each other on this machine is not in the intervals; "
+        "repeat them ('redag compare --repeat')");
+  }
+  for (const DiffSide *side : {&a, &b}) {
+    const auto &runs = side->jobs.runs();
+    if (std::any_of(runs.begin(), runs.end(), [](const trace::RunInfo &run) { return run.lost_events > 0; })) {
+      list.push_back(side->name + " lost events: its jobs are not all there");
+    }
+  }
+  return list;
+}
+
+std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool all) {
+  std::string text = "A  " + run_words(diffed.a) + "\nB  " + run_words(diffed.b) + "\n";
+  for (const Change &change : diffed.changes)
+    text += tinted("differs ", Tint::Strong, terminal.colour) + change.text() + "\n";
+  text += "\n" + differences_table(diffed, terminal, all) + "\n";
+  const std::string found = findings(diffed, terminal);
+  text += found.empty() ? "no figure differs by more than chance" +
+                              (diffed.options.tolerance > 0 ? fmt::format(" and {:g} %", 100 * diffed.options.tolerance)
+                                                            : std::string()) +
+                              "\n"
+                        : found;
+  text += fmt::format(
+      "* more than chance{}; {} tests, false discovery rate 5 %; intervals 95 %, from blocks of time; max is not "
+      "tested\n",
+      diffed.options.tolerance > 0 ? fmt::format(", response times by more than {:g} %", 100 * diffed.options.tolerance)
+                                   : "",
+      diffed.difference.tests);
+  for (const std::string &caution : cautions(diffed)) {
+    text += tinted("beware ", Tint::Caution, terminal.colour) + caution + "\n";
+  }
+  return text;
+}
+
+Json to_json(const Diffed &diffed) {
+  Json changes = Json::array();
+  for (const Change &change : diffed.changes) {
+    changes.push_back(Json{{"kind", change.kind == Change::Kind::Demand ? "demand" : "setting"},
+                           {"what", change.what},
+                           {"a", change.before},
+                           {"b", change.after}});
+  }
+  Json rows = Json::array();
+  for (const DifferenceRow &row : diffed.difference.rows) {
+    Json figures = Json::object();
+    for (const Figure &figure : kFigures) {
+      figures[is_miss(figure) ? "miss_ratio_with_lost" : std::string(figure.name) + "_ns"] = figure_json(row, figure);
+    }
+    rows.push_back(Json{{"dag", row.a->dag.empty() ? Json() : Json(row.a->dag)},
+                        {"task", row.a->task.empty() ? Json() : Json(row.a->task)},
+                        {"a", counts_json(*row.a)},
+                        {"b", counts_json(*row.b)},
+                        {"figures", figures},
+                        {"block_correlation", row.figures.block_correlation},
+                        {"is_correlated", row.is_correlated()}});
+  }
+  return Json{{"format", "redag.difference/1"},
+              {"a", side_json(diffed.a)},
+              {"b", side_json(diffed.b)},
+              {"changes", changes},
+              {"worse", diffed.difference.is_any(Verdict::Worse)},
+              {"better", diffed.difference.is_any(Verdict::Better)},
+              {"tolerance", diffed.options.tolerance},
+              {"replicates", diffed.options.replicates},
+              {"tests", diffed.difference.tests},
+              {"p_threshold", diffed.difference.threshold},
+              {"rows", rows},
+              {"only_one_side", diffed.difference.missing},
+              {"cautions", cautions(diffed)}};
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,184 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <memory>
+
+#include "redag/base/text.hpp"
+#include "redag/cli/commands.hpp"
+#include "redag/cli/files.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/cli/progress.hpp"
+#include "redag/cli/run_arguments.hpp"
+#include "redag/cli/signals.hpp"
+#include "redag/cli/tuning_report.hpp"
+#include "redag/model/workload_yaml.hpp"
+
+namespace redag::cli {
+namespace {
+
+constexpr std::uint32_t kMostSeeds = 10'000;
+constexpr std::uint32_t kMostWorkers = 1024;
+
+struct Options {
+  RunArguments run;
+  tune::Options tune;
+  std::string output;
+  std::string vary = "workers,max_active,order";
+  std::string caps;
+  bool simulator_only = false;
+  bool all_trials = false;
+};
+
+// "workers,max_active": what may change. False: an error was printed.
+bool parse_vary(const std::string &list, tune::Freedom &freedom, Console &console) {
+  freedom.workers = freedom.caps = freedom.ties = false;
+  std::size_t begin = 0;
+  while (begin <= list.size()) {
+    const std::size_t end = std::min(list.find(',', begin), list.size());
+    const std::string name = list.substr(begin, end - begin);
+    if (name == "workers") {
+      freedom.workers = true;
+    } else if (name == "max_active") {
+      freedom.caps = true;
+    } else if (name == "order") {
+      freedom.ties = true;
+    } else {
+      console.error(fmt::format("--vary: '{}' is not a choice", name),
+                    suggestion(name, {"workers", "max_active", "order"}));
+      return false;
+    }
+    begin = end + 1;
+  }
+  return true;
+}
+
+// "2-5". False: an error was printed.
+bool parse_caps(const std::string &text, tune::Freedom &freedom, Console &console) {
+  if (text.empty()) return true;
+  std::uint32_t low = 0;
+  std::uint32_t high = 0;
+  const char *end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, low);
+  if (first.ec == std::errc() && first.ptr != end && *first.ptr == '-') {
+    const auto second = std::from_chars(first.ptr + 1, end, high);
+    if (second.ec == std::errc() && second.ptr == end && low >= 1 && low <= high && high <= kMostWorkers) {
+      freedom.cap_range = {low, high};
+      return true;
+    }
+  }
+  console.error(fmt::format("--caps: '{}' is not a range", text), "write it as 2-5");
+  return false;
+}
+
+bool is_fine(const Options &options, Console &console) {
+  const auto bad = [&](const char *name, std::uint64_t value, std::uint64_t least, std::uint64_t most) {
+    if (value >= least && value <= most) return false;
+    console.error(fmt::format("{}: {} is not from {} to {}", name, value, least, most));
+    return true;
+  };
+  return !bad("--seeds", options.tune.seeds, 1, kMostSeeds) &&
+         !bad("--held-out", options.tune.held_out, 0, kMostSeeds) &&
+         !bad("--most-workers", options.tune.freedom.most_workers, 0, kMostWorkers) &&
+         !bad("--jobs", options.tune.jobs, 0, kMostWorkers);
+}
+
+std::optional<tune::Tuned> search(const Workload &workload, tune::Options options, Console &console) {
+  Progress progress(console);
+  const tune::SettingSpace settings(workload, options.freedom);
+  const std::uint64_t size = settings.space().size(options.effort.exhaustive);
+  const Stopwatch watch;
+  options.stop = &InterruptGuard::flag();
+  options.progress = [&](std::uint64_t tried) {
+    if (!progress.due()) return;
+    if (size <= options.effort.exhaustive) {
+      progress.draw(static_cast<double>(tried) / static_cast<double>(size), pace(tried, size, watch.elapsed()));
+    } else {
+      progress.draw(0, fmt::format("{} settings", format_count(tried)));
+    }
+  };
+  return tune::tune(workload, options);
+}
+
+int write(const std::string &path, const tune::Tuned &tuned, Console &console) {
+  if (path.empty()) return kExitOk;
+  const Result<void> written = write_text(path, to_yaml(tuned.best.workload));
+  if (!written) {
+    console.note(written.error());
+    return kExitBad;
+  }
+  console.note(fmt::format("wrote {}{}\n", path, tuned.changed() ? "" : ": the workload as it was"));
+  return kExitOk;
+}
+
+int tune_file(const Options &options, Console &console) {
+  Tuning tuning;
+  tuning.options = options.tune;
+  tuning.options.bounds = !options.simulator_only;
+  tuning.options.effort.seed = options.run.seed;
+  tuning.options.seed = options.run.seed;
+  tuning.options.simulation.overheads = options.run.overheads;
+  if (!is_fine(options, console) || !parse_vary(options.vary, tuning.options.freedom, console) ||
+      !parse_caps(options.caps, tuning.options.freedom, console)) {
+    return kExitBad;
+  }
+  const std::optional<Workload> workload = load_configured(options.run, console);
+  if (!workload) return kExitBad;
+  tuning.options.simulation.duration = options.run.duration.value_or(sensible_duration(*workload));
+
+  const InterruptGuard guard;  // until the results are written
+  std::optional<tune::Tuned> tuned = search(*workload, tuning.options, console);
+  if (!tuned) {
+    console.error("interrupted before the workload as it is was judged: there is nothing to say");
+    return kExitBad;
+  }
+  tuning.tuned = *std::move(tuned);
+  if (tuning.tuned.stopped) console.warn("interrupted: this is the best so far");
+  console.print(options.run.json ? to_text(to_json(tuning))
+                                 : describe(tuning, console.out_traits(), options.all_trials));
+  if (const int status = write(options.output, tuning.tuned, console); status != kExitOk) return status;
+  const tune::Candidate &best = tuning.tuned.best;
+  const bool missed = best.score.all().missed + best.held_out.all().missed > 0;
+  return options.run.check && missed ? kExitNo : kExitOk;
+}
+
+}  // namespace
+
+Action add_tune(CLI::App &app) {
+  auto options = std::make_shared<Options>();
+  tune::Options &tune = options->tune;
+  app.add_option("FILE", options->run.file, "Workload (YAML); - is standard input")->required();
+  app.add_option("-o,--output", options->output, "File for the tuned workload; without comments")->type_name("FILE");
+  const auto objective = [](tune::Objective value) { return std::pair(std::string(to_string(value)), value); };
+  add_choice(app, "--objective", tune.goal.objective,
+             Choices<tune::Objective>{objective(tune::Objective::Misses), objective(tune::Objective::MaxLateness),
+                                      objective(tune::Objective::Slack)},
+             "Fewest jobs late or lost, smallest largest lateness, or largest least share of a deadline that is left")
+      ->default_str(to_string(tune.goal.objective));
+  app.add_flag("--per-criticality", tune.goal.per_criticality,
+               "What DAGs of higher criticality gain counts before all that others lose");
+  app.add_option("--vary", options->vary, "What may change: workers, max_active, order (of DAGs that share a priority)")
+      ->type_name("LIST")
+      ->capture_default_str();
+  app.add_option("--caps", options->caps,
+                 "Values of max_active to try for every DAG; default: none, 1, 2, ... as far as "
+                 "they can matter")
+      ->type_name("LOW-HIGH");
+  add_count(app, "--most-workers", tune.freedom.most_workers, "Try up to so many workers; 0: as many as there are");
+  add_duration(app, "--duration", options->run.duration, "Length of a simulation; default: some hyperperiods");
+  add_count(app, "--seeds", tune.seeds, "Simulations of each setting: seeds SEED, SEED+1, ...");
+  add_count(app, "--held-out", tune.held_out, "Seeds after these, on which the answer is judged");
+  add_count(app, "--seed", options->run.seed, "The first of them, and of the local search");
+  app.add_flag("--simulator-only", options->simulator_only, "Do not ask the bounds what is proven");
+  add_count(app, "--exhaustive", tune.effort.exhaustive, "Settings up to which all are tried");
+  add_count(app, "--restarts", tune.effort.restarts, "Random places from which the local search starts besides");
+  add_count(app, "--jobs", tune.jobs, "Processors to use; 0: all. The answer is the same");
+  app.add_flag("--all-trials", options->all_trials, "Show every setting that was tried");
+  app.add_flag("--json", options->run.json, "Write one JSON document to standard output, and nothing else");
+  app.add_flag("--check", options->run.check, "Exit with 1 if the best setting misses a deadline in the simulator");
+  add_platform_arguments(app, options->run);
+  add_overhead_arguments(app, options->run.overheads, "Platform");
+  return [options](Console &console) { return tune_file(*options, console); };
+}
+
+}  // namespace redag::cli
