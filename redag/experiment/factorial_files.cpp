@@ -1,7 +1,4 @@
-// The JSON document and the plot of factorial_results.hpp, and the files.
-#include <algorithm>
-#include <cmath>
-#include <map>
+// The JSON document of factorial_results.hpp, and the files.
 #include <set>
 #include <utility>
 
@@ -10,7 +7,6 @@
 
 #include "redag/experiment/factorial_results.hpp"
 #include "redag/experiment/folder.hpp"
-#include "redag/experiment/line_plot.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/version.hpp"
 
@@ -82,62 +78,6 @@ Json effects_json(const Factorial &factorial, const FactorialEffects &one) {
   return json;
 }
 
-// The next round number: an axis should not end at 0.0273.
-double round_up(double value) {
-  if (!(value > 0)) return 0.01;
-  const double decade = std::pow(10, std::floor(std::log10(value)));
-  for (const double step : {1.0, 2.0, 3.0, 5.0, 10.0}) {
-    if (value <= step * decade * 1.000001) return std::min(1.0, step * decade);
-  }
-  return 1;
-}
-
-// Mean of the medians at a level over all points that have it.
-LinePlot::Value mean_at(const std::vector<Median> &medians) {
-  LinePlot::Value value;
-  const auto n = static_cast<double>(medians.size());
-  for (const Median &median : medians) {
-    value.y += median.median / n;
-    value.low += median.low / n;
-    value.high += median.high / n;
-  }
-  return value;
-}
-
-LinePlot::Panel panel_of(const Factorial &factorial, const FactorialResults &results, const Factor &factor) {
-  const std::vector<std::string> &executors = factorial.plan().executors;
-  LinePlot::Panel panel;
-  panel.x_label = to_string(factor.kind);
-  std::replace(panel.x_label.begin(), panel.x_label.end(), '_', ' ');
-  if (factor.kind == FactorKind::Utilization) panel.x_label += " per worker";
-  panel.series.resize(executors.size());
-  // An axis from 0 is of use only for values that come near it.
-  const bool numeric = factor.numeric && std::stod(factor.levels.front()) <= std::stod(factor.levels.back()) / 2;
-  for (std::size_t level = 0; level < factor.levels.size(); ++level) {
-    const double x = numeric ? std::stod(factor.levels[level]) : static_cast<double>(level) + 0.5;
-    // As many labels as there is room for.
-    const std::size_t every = (factor.levels.size() + 9) / 10;
-    const bool last = level + 1 == factor.levels.size();
-    if (level % every == 0 || last) panel.ticks.emplace_back(x, factor.levels[level]);
-    for (std::size_t e = 0; e < executors.size(); ++e) {
-      std::vector<Median> medians;
-      for (const FactorialRow &row : results.rows) {
-        const FactorialPoint &point = factorial.points()[row.point];
-        const std::uint32_t here = point.of(factor.kind);
-        // Where the factor means nothing to the executor its line is flat.
-        if (point.of(FactorKind::Executor) != e || (here != level && here != kNoLevel) || row.runs.empty()) continue;
-        medians.push_back(*median_of(factorial, results, row, row.runs.front().dags.size() - 1, Metric::MissRatio));
-      }
-      if (medians.empty()) continue;
-      LinePlot::Value value = mean_at(medians);
-      value.x = x;
-      panel.series[e].push_back(value);
-    }
-  }
-  if (!numeric) panel.ticks.emplace_back(static_cast<double>(factor.levels.size()), "");
-  return panel;
-}
-
 }  // namespace
 
 std::string to_json(const Factorial &factorial, const FactorialResults &results, const std::vector<std::string> &runs) {
@@ -172,41 +112,16 @@ std::string to_json(const Factorial &factorial, const FactorialResults &results,
   return document.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-std::string to_svg(const Factorial &factorial, const FactorialResults &results) {
-  const FactorialPlan &plan = factorial.plan();
-  LinePlot plot;
-  plot.title = fmt::format("{}: deadlines missed", plan.name);
-  plot.subtitle = fmt::format("{}; {} run{} of {} a combination; each value is a mean over all other factors",
-                              to_string(plan.world), plan.repetitions, plan.repetitions == 1 ? "" : "s",
-                              format_duration(plan.duration));
-  if (!results.complete()) plot.subtitle = fmt::format("{} of {} runs done", results.done, results.units);
-  plot.y_label = "late or dropped, of all releases";
-  plot.lines = plan.executors;
-  for (const Factor &factor : factorial.factors()) {
-    if (factor.kind == FactorKind::Executor || factor.levels.size() < 2) continue;
-    plot.panels.push_back(panel_of(factorial, results, factor));
-  }
-  if (plot.panels.empty()) {
-    plot.panels.push_back(
-        panel_of(factorial, results, factorial.factors()[static_cast<std::size_t>(FactorKind::Workload)]));
-  }
-  double largest = 0;
-  for (const LinePlot::Panel &panel : plot.panels) {
-    for (const auto &series : panel.series) {
-      for (const LinePlot::Value &value : series) largest = std::max({largest, value.y, value.high});
-    }
-  }
-  plot.y_end = round_up(largest);
-  return experiment::to_svg(plot);
-}
-
 Result<void> write_results(const std::string &folder, const Factorial &factorial, const FactorialResults &results) {
   std::vector<std::pair<std::string, std::string>> files = {
       {"factorial.csv", to_csv(factorial, results)},
       {"observations.csv", observations_csv(factorial, results)},
       {"factorial.json", to_json(factorial, results, read_runs({folder}))},
       {"factorial.svg", to_svg(factorial, results)}};
-  if (factorial.plan().quantiles) files.emplace_back("response_quantiles.csv", quantiles_csv(factorial, results));
+  if (factorial.plan().quantiles) {
+    files.emplace_back("response_quantiles.csv", quantiles_csv(factorial, results));
+    files.emplace_back("responses.svg", responses_svg(factorial, results));
+  }
   for (const auto &[name, text] : files) {
     Result<trace::OutputFile> file = trace::OutputFile::create(folder + "/" + name);
     if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -66,17 +67,19 @@ TEST(FactorialPlan, CanonicalTextGivesThePlanBack) {
   const FactorialPlan plan =
       parsed(std::string("experiment: factorial\nworkers: [1, 2]\nutilization: [0.5]\n"
                          "max_active: [unbounded, [1, 2]]\nexecutors: [redag, ste]") +
-             kCart + "  - {name: drawn, random: {dags: 2, tasks: 3, shape: chain, bcet: 0.5}}\n");
+             kCart + "  - {name: drawn, random: {dags: 2, tasks: 3, shape: chain, bcet: 0.5, deadline: 0.6}}\n");
   const std::string text = to_yaml(plan);
   const FactorialPlan again = parsed(text);
   EXPECT_EQ(to_yaml(again), text);
   EXPECT_EQ(again.workloads.at(0).workload, plan.workloads.at(0).workload);
   EXPECT_EQ(again.workloads.at(1).random->shape, DagShape::Chain);
+  EXPECT_EQ(again.workloads.at(1).random->deadline_min, 0.6);
   EXPECT_EQ(points_of(again), points_of(plan));
 }
 
 TEST(FactorialPlan, WorkloadFilesLieBesideThePlan) {
-  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "factorial_plan_test";
+  const std::filesystem::path folder =
+      std::filesystem::path(::testing::TempDir()) / ("factorial_plan_test_" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "w.yaml") << "name: other\nplatform: {workers: 1}\ndags:\n  - name: d\n    tasks: [{name: t, "
                                       "wcet: 1ms, period: 10ms}]\n";

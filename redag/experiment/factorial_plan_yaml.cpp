@@ -128,13 +128,14 @@ class Reader : private PlanReader {
 
   std::optional<WorkloadSource> read_random(const Node &node, std::string name) {
     std::vector<std::string_view> keys = generation_keys();
-    keys.insert(keys.begin(), {"dags", "workers", "bcet"});
+    keys.insert(keys.begin(), {"dags", "workers", "bcet", "deadline"});
     if (!check_map(node, "random", keys)) return std::nullopt;
     WorkloadSource source{std::move(name), {}, GenerateOptions{}};
     take_count(node, "dags", source.random->dags, 1);
     take_count(node, "workers", source.random->workers, 1);
     take_number(node, "bcet", source.random->bcet_min);
     source.random->bcet_max = source.random->bcet_min;
+    take_number(node, "deadline", source.random->deadline_min);
     take_generation(node, *source.random);
     return source;
   }
@@ -249,8 +250,9 @@ std::string to_yaml(const FactorialPlan &plan) {
   for (const WorkloadSource &source : plan.workloads) {
     text += fmt::format("  - name: {}\n", source.name);
     if (source.random) {
-      text += fmt::format("    random:\n      dags: {}\n      workers: {}\n      bcet: {}\n{}", source.random->dags,
-                          source.random->workers, source.random->bcet_min, generation_yaml(*source.random, "      "));
+      text += fmt::format("    random:\n      dags: {}\n      workers: {}\n      bcet: {}\n      deadline: {}\n{}",
+                          source.random->dags, source.random->workers, source.random->bcet_min,
+                          source.random->deadline_min, generation_yaml(*source.random, "      "));
     } else {
       text += "    text: |\n" + block(redag::to_yaml(source.workload), "      ");
     }

@@ -94,8 +94,11 @@ class FactorialCounter {
                                   const std::vector<std::string> &runs);
 /// A panel for each factor that varies: the mean miss ratio at its levels, over all others, a line for each executor.
 [[nodiscard]] std::string to_svg(const Factorial &factorial, const FactorialResults &results);
+/// A panel for each DAG at each combination (the first dozen): the distribution of responses, a line for each executor.
+[[nodiscard]] std::string responses_svg(const Factorial &factorial, const FactorialResults &results);
 
-/// Writes factorial.csv, .json, .svg, observations.csv, and response_quantiles.csv where the plan asks for quantiles.
+/// Writes factorial.csv, .json, .svg, observations.csv, and, where the plan asks for quantiles, response_quantiles.csv
+/// and responses.svg.
 [[nodiscard]] Result<void> write_results(const std::string &folder, const Factorial &factorial,
                                          const FactorialResults &results);
 

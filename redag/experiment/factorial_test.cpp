@@ -177,6 +177,7 @@ TEST(Factorial, ResultsAreMediansWithTheirDistanceToTheIdeal) {
   EXPECT_THAT(json, HasSubstr("\"format\":\"redag.experiment.factorial/1\""));
   EXPECT_THAT(json, HasSubstr("\"complete\":true"));
   EXPECT_THAT(to_svg(factorial, results), HasSubstr("workers"));
+  EXPECT_THAT(responses_svg(factorial, results), HasSubstr(">cart, workers 2: slow<"));
 
   const std::vector<FactorialEffects> effects = effects_of(factorial, results);
   ASSERT_EQ(effects.size(), 2U);  // ideal and redag-none: to the others the number of workers means nothing

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <filesystem>
@@ -19,7 +20,8 @@ class JournalTest : public ::testing::Test {
  protected:
   void SetUp() override {
     file_ = std::filesystem::path(::testing::TempDir()) /
-            ("journal-" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + ".csv");
+            ("journal-" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + "-" +
+             std::to_string(::getpid()) + ".csv");
     std::filesystem::remove(file_);
   }
   void TearDown() override { std::filesystem::remove(file_); }

@@ -1,0 +1,164 @@
+// The plots of factorial_results.hpp.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "redag/experiment/factorial_results.hpp"
+#include "redag/experiment/line_plot.hpp"
+
+namespace redag::experiment {
+namespace {
+
+constexpr std::size_t kMostPanels = 12;
+
+// The next round number: an axis should not end at 0.0273.
+double round_up(double value) {
+  if (!(value > 0)) return 0.01;
+  const double decade = std::pow(10, std::floor(std::log10(value)));
+  for (const double step : {1.0, 2.0, 3.0, 5.0, 10.0}) {
+    if (value <= step * decade * 1.000001) return step * decade;
+  }
+  return 10 * decade;
+}
+
+// Mean of the medians at a level over all points that have it.
+LinePlot::Value mean_at(const std::vector<Median> &medians) {
+  LinePlot::Value value;
+  const auto n = static_cast<double>(medians.size());
+  for (const Median &median : medians) {
+    value.y += median.median / n;
+    value.low += median.low / n;
+    value.high += median.high / n;
+  }
+  return value;
+}
+
+LinePlot::Panel panel_of(const Factorial &factorial, const FactorialResults &results, const Factor &factor) {
+  const std::vector<std::string> &executors = factorial.plan().executors;
+  LinePlot::Panel panel;
+  panel.x_label = to_string(factor.kind);
+  std::replace(panel.x_label.begin(), panel.x_label.end(), '_', ' ');
+  if (factor.kind == FactorKind::Utilization) panel.x_label += " per worker";
+  panel.series.resize(executors.size());
+  // As many labels as there is room for.
+  constexpr std::size_t kRoom = 42;  // characters
+  std::size_t characters = 0;
+  for (const std::string &level : factor.levels) characters = std::max(characters, level.size() + 1);
+  const std::size_t every = (factor.levels.size() * characters + kRoom - 1) / kRoom;
+  // An axis from 0 is of use only for values that come near it.
+  const bool numeric = factor.numeric && std::stod(factor.levels.front()) <= std::stod(factor.levels.back()) / 2;
+  for (std::size_t level = 0; level < factor.levels.size(); ++level) {
+    const double x = numeric ? std::stod(factor.levels[level]) : static_cast<double>(level) + 0.5;
+    if (level % every == 0) panel.ticks.emplace_back(x, factor.levels[level]);
+    for (std::size_t e = 0; e < executors.size(); ++e) {
+      std::vector<Median> medians;
+      for (const FactorialRow &row : results.rows) {
+        const FactorialPoint &point = factorial.points()[row.point];
+        const std::uint32_t here = point.of(factor.kind);
+        // Where the factor means nothing to the executor its line is flat.
+        if (point.of(FactorKind::Executor) != e || (here != level && here != kNoLevel) || row.runs.empty()) continue;
+        medians.push_back(*median_of(factorial, results, row, row.runs.front().dags.size() - 1, Metric::MissRatio));
+      }
+      if (medians.empty()) continue;
+      LinePlot::Value value = mean_at(medians);
+      value.x = x;
+      panel.series[e].push_back(value);
+    }
+  }
+  if (!numeric) panel.ticks.emplace_back(static_cast<double>(factor.levels.size()), "");
+  if (numeric && (factor.levels.size() - 1) % every != 0) panel.ticks.emplace_back(std::stod(factor.levels.back()), "");
+  return panel;
+}
+
+// Share of the released jobs of a DAG that had answered by each time: what was dropped never does. Medians of the runs.
+std::vector<LinePlot::Value> answered(const FactorialRow &row, std::size_t dag) {
+  std::vector<LinePlot::Value> curve;
+  for (std::size_t q = 0; q < kQuantiles.size(); ++q) {
+    std::vector<double> times;
+    std::vector<double> shares;
+    for (const Observation &run : row.runs) {
+      const DagObservation &seen = run.dags[dag];
+      if (seen.quantiles.empty()) continue;
+      times.push_back(static_cast<double>(seen.quantiles[q]) / kMillisecond);
+      shares.push_back(kQuantiles[q] / 100 * static_cast<double>(seen.of(Measure::Finished)) /
+                       static_cast<double>(seen.of(Measure::Released)));
+    }
+    if (times.empty()) continue;
+    const double share = experiment::median_of(std::move(shares)).median;
+    curve.push_back({experiment::median_of(std::move(times)).median, share, share, share});
+  }
+  return curve;
+}
+
+}  // namespace
+
+std::string to_svg(const Factorial &factorial, const FactorialResults &results) {
+  const FactorialPlan &plan = factorial.plan();
+  LinePlot plot;
+  plot.title = fmt::format("{}: deadlines missed", plan.name);
+  plot.subtitle = fmt::format("{}; {} run{} of {} a combination; each value is a mean over all other factors",
+                              to_string(plan.world), plan.repetitions, plan.repetitions == 1 ? "" : "s",
+                              format_duration(plan.duration));
+  if (!results.complete()) plot.subtitle = fmt::format("{} of {} runs done", results.done, results.units);
+  plot.y_label = "late or dropped, of all releases";
+  plot.lines = plan.executors;
+  for (const Factor &factor : factorial.factors()) {
+    if (factor.kind == FactorKind::Executor || factor.levels.size() < 2) continue;
+    plot.panels.push_back(panel_of(factorial, results, factor));
+  }
+  if (plot.panels.empty()) {
+    plot.panels.push_back(
+        panel_of(factorial, results, factorial.factors()[static_cast<std::size_t>(FactorKind::Workload)]));
+  }
+  double largest = 0;
+  for (const LinePlot::Panel &panel : plot.panels) {
+    for (const auto &series : panel.series) {
+      for (const LinePlot::Value &value : series) largest = std::max({largest, value.y, value.high});
+    }
+  }
+  plot.y_end = std::min(1.0, round_up(largest));
+  return experiment::to_svg(plot);
+}
+
+std::string responses_svg(const Factorial &factorial, const FactorialResults &results) {
+  const FactorialPlan &plan = factorial.plan();
+  LinePlot plot;
+  plot.title = fmt::format("{}: response times", plan.name);
+  plot.subtitle = "median runs; the slowest percent is not shown; dropped jobs never answer";
+  plot.x_label = "response in ms";
+  plot.y_label = "answered, of all released jobs";
+  plot.lines = plan.executors;
+  for (const FactorialRow &row : results.rows) {
+    const FactorialPoint &point = factorial.points()[row.point];
+    if (row.runs.empty()) continue;
+    // A panel for each DAG of a combination of everything but the executors.
+    FactorialPoint place = point;
+    place.level.back() = kNoLevel;
+    for (std::size_t dag = 0; dag + 1 < row.runs.front().dags.size(); ++dag) {
+      const std::string title = fmt::format("{}: {}", describe(plan, place).substr(9), row.runs.front().dags[dag].dag);
+      auto panel = std::find_if(plot.panels.begin(), plot.panels.end(),
+                                [&](const LinePlot::Panel &other) { return other.title == title; });
+      if (panel == plot.panels.end()) {
+        if (plot.panels.size() == kMostPanels) continue;
+        panel = plot.panels.insert(panel, LinePlot::Panel{title, {}, {}, {}});
+        panel->series.resize(plan.executors.size());
+      }
+      panel->series[point.of(FactorKind::Executor)] = answered(row, dag);
+    }
+  }
+  for (LinePlot::Panel &panel : plot.panels) {
+    double end = 0;
+    for (auto &series : panel.series) {
+      if (series.size() == kQuantiles.size()) series.pop_back();  // the maximum would be most of the axis
+      for (const LinePlot::Value &value : series) end = std::max(end, value.x);
+    }
+    end = round_up(end);
+    for (int tick = 0; tick <= 4; ++tick)
+      panel.ticks.emplace_back(end * tick / 4, fmt::format("{:.3g}", end * tick / 4));
+  }
+  return experiment::to_svg(plot);
+}
+
+}  // namespace redag::experiment
