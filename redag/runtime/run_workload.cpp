@@ -76,7 +76,10 @@ class Run {
     auto scheduler = options_.scheduler ? options_.scheduler(workload_, engine.config)
                                         : sched::make_scheduler(options_.executor, workload_, engine.config);
     engine_ = std::make_unique<Engine>(std::move(scheduler), std::move(engine));
-    engine_->bind(workload_, synthetic_bodies(workload_, options_.seed, give_up_));
+    std::vector<Body> bodies = synthetic_bodies(workload_, options_.seed, give_up_);
+    if (options_.bodies)
+      bodies = options_.bodies(std::move(bodies), [engine_ptr = engine_.get()] { return engine_ptr->now(); });
+    engine_->bind(workload_, std::move(bodies));
     timer_ = std::make_unique<ReleaseTimer>([this](auto releases) { engine_->release(releases); }, options_.seed);
     TaskId first(0);
     for (const Dag &dag : workload_.dags) {

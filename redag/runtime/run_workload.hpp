@@ -1,5 +1,6 @@
-// Runs a whole workload on real threads with synthetic bodies, and returns its trace: the real-time counterpart of
-// sim::simulate(). Blocks the calling thread, which collects events meanwhile and does no real-time work.
+// Runs a whole workload on real threads, with synthetic bodies unless told otherwise, and returns its trace: the
+// real-time counterpart of sim::simulate(). Blocks the calling thread, which collects events meanwhile and does no
+// real-time work.
 #pragma once
 
 #include <atomic>
@@ -22,6 +23,9 @@ namespace redag::runtime {
 /// Makes the scheduler of a run: ours, or a model of another executor.
 using SchedulerFactory = std::function<std::unique_ptr<sched::Scheduler>(const Workload &, const sched::Config &)>;
 
+/// The time that the scheduler sees; 0 before the start.
+using Now = std::function<Time()>;
+
 struct RunOptions {
   Duration duration = 10 * kSecond;          // releases in [0, duration); the trace ends there
   Duration warm_up = 0;                      // of it: noted in the trace, for the metrics to leave out
@@ -35,7 +39,9 @@ struct RunOptions {
   std::vector<int> cpus;          // processors of the workers; empty: os takes m of the usable ones
   std::size_t trace_capacity = std::size_t{1} << 17;  // events between two collections
   Duration drain_timeout = 5 * kSecond;               // for started jobs to end after the horizon
-  bool live = false;                                  // `redag top` sees the run
+  /// What the jobs do besides, or instead: gets the synthetic bodies by TaskId and gives as many.
+  std::function<std::vector<Body>(std::vector<Body> synthetic, const Now &now)> bodies;
+  bool live = false;  // `redag top` sees the run
   /// For it: proven bounds on response times by task, 0 where there is none. Asked once, before the start.
   std::function<std::vector<Duration>(const sched::Config &)> bounds;
   const std::atomic<bool> *stop = nullptr;  // ends the run early when set (Ctrl-C)

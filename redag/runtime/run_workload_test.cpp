@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/runtime/mode.hpp"
@@ -150,6 +151,33 @@ TEST(RunWorkload, EveryExecutorRunsOnThreads) {
   RunOptions options;
   options.executor = "nobody's";
   EXPECT_FALSE(run_workload(two_rates(1, PreemptionMode::None), options));
+}
+
+TEST(RunWorkload, BodiesOfOnesOwn) {
+  const Workload workload = two_rates(1, PreemptionMode::Cooperative);
+  std::atomic<std::uint64_t> sensed{0};
+  std::atomic<Time> last{-1};
+  std::size_t offered = 0;
+  RunOptions options;
+  options.duration = 200 * kMillisecond;
+  options.bodies = [&](std::vector<Body> synthetic, const Now &now) {
+    offered = synthetic.size();
+    synthetic[0] = [&, now](const Job & /*job*/) {
+      ++sensed;
+      last = now();
+      return sched::Outcome::Finished;
+    };
+    return synthetic;
+  };
+  const RunResult result = run(workload, options);
+  EXPECT_EQ(offered, 3U);
+  const auto finished = std::count_if(result.trace.events.begin(), result.trace.events.end(), [](const JobEvent &e) {
+    return e.kind == JobEventKind::Finished && e.task == TaskId(0);
+  });
+  EXPECT_GT(finished, 0);
+  EXPECT_GE(sensed, static_cast<std::uint64_t>(finished));
+  EXPECT_GE(last, 0);  // from the origin of the run, not of the clock
+  EXPECT_LT(last, 10 * kSecond);
 }
 
 }  // namespace

@@ -1,0 +1,65 @@
+// One executor, one seed, all plants: in virtual time (exact, the same on every machine) or on threads (this machine).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "plants.hpp"
+#include "redag/metrics/summary.hpp"
+#include "redag/model/workload.hpp"
+
+namespace closed_loop {
+
+/// The five plants of robot.yaml.
+[[nodiscard]] std::vector<PlantSpec> plants();
+
+struct ExecutorChoice {
+  std::string name;      // as it is written on the command line
+  std::string executor;  // of redag/sched/executors.hpp
+  redag::PreemptionMode preemption = redag::PreemptionMode::Auto;
+  bool alone = false;             // the feedback without anything else: what no executor can beat
+  bool realtime_threads = false;  // on threads: SCHED_FIFO, as those of redag with preemption os
+};
+
+/// alone, redag, redag-cooperative, redag-none, mte, ste, mte-fifo, ste-fifo. Throws std::runtime_error for another
+/// name.
+[[nodiscard]] ExecutorChoice executor_choice(const std::string &name);
+
+struct Snapshot {
+  Time time = 0;
+  double position = 0;
+  double height = 0;
+  double angle = 0;
+  bool down = false;
+};
+
+struct PlantResult {
+  std::string plant;
+  double cost = 0;
+  std::uint32_t falls = 0;
+  std::uint64_t jobs = 0;    // of its DAG
+  std::uint64_t missed = 0;  // late or lost
+  Duration longest_gap = 0;  // between two actuations
+  std::vector<Snapshot> snapshots;
+};
+
+struct RunSetup {
+  Duration duration = 20 * redag::kSecond;
+  std::uint64_t seed = 1;
+  Duration snapshots_every = 0;  // 0: none
+};
+
+struct RunOutcome {
+  std::vector<PlantResult> plants;
+  std::string mode;  // preemption that ran
+  std::uint64_t other_jobs = 0;
+  std::uint64_t other_missed = 0;
+};
+
+[[nodiscard]] RunOutcome run_in_virtual_time(const redag::Workload &workload, const ExecutorChoice &choice,
+                                             const RunSetup &setup);
+/// Snapshots are taken by the sensors' jobs. Throws std::runtime_error with what the system refused.
+[[nodiscard]] RunOutcome run_on_threads(const redag::Workload &workload, const ExecutorChoice &choice,
+                                        const RunSetup &setup);
+
+}  // namespace closed_loop

@@ -1,0 +1,161 @@
+// Drawn by MuJoCo itself, in software: OSMesa needs neither screen nor graphics card.
+#include <stdexcept>
+
+#include "pictures.hpp"
+
+#ifdef CLOSED_LOOP_RENDERER
+#include <GL/osmesa.h>
+#include <fmt/format.h>
+#include <png.h>
+
+#include <algorithm>
+#include <cstring>
+#endif
+
+namespace closed_loop {
+
+#ifndef CLOSED_LOOP_RENDERER
+
+bool can_render() { return false; }
+
+void write_frames(const std::string& /*path*/, const std::vector<Recorded>& /*runs*/,
+                  const std::vector<Time>& /*times*/) {
+  throw std::runtime_error("built without a renderer: libosmesa6-dev and libpng-dev were missing");
+}
+
+#else
+
+namespace {
+
+constexpr int kWidth = 400;
+constexpr int kHeight = 300;
+constexpr int kGap = 4;
+constexpr std::size_t kBytes = 3;
+
+struct Image {
+  int width = 0;
+  int height = 0;
+  std::vector<unsigned char> pixels;
+
+  Image(int w, int h) : width(w), height(h), pixels(static_cast<std::size_t>(w * h) * kBytes, 255) {}
+
+  void paste(const Image &other, int x, int y) {
+    for (int row = 0; row < other.height; ++row) {
+      const auto from = static_cast<std::size_t>(row * other.width) * kBytes;
+      const auto to = static_cast<std::size_t>((y + row) * width + x) * kBytes;
+      std::memcpy(&pixels[to], &other.pixels[from], static_cast<std::size_t>(other.width) * kBytes);
+    }
+  }
+
+  void write(const std::string &path) const {
+    png_image image{};
+    image.version = PNG_IMAGE_VERSION;
+    image.width = static_cast<png_uint_32>(width);
+    image.height = static_cast<png_uint_32>(height);
+    image.format = PNG_FORMAT_RGB;
+    if (png_image_write_to_file(&image, path.c_str(), 0, pixels.data(), 0, nullptr) == 0) {
+      throw std::runtime_error(path + ": " + image.message);
+    }
+  }
+};
+
+class Renderer {
+ public:
+  explicit Renderer(const std::vector<PlantSpec> &plants)
+      : model_(compile(mjcf(plants))), data_(mj_makeData(model_.get())), buffer_(kWidth * kHeight * 4) {
+    gl_ = OSMesaCreateContextExt(OSMESA_RGBA, 24, 8, 0, nullptr);
+    if (gl_ == nullptr || OSMesaMakeCurrent(gl_, buffer_.data(), GL_UNSIGNED_BYTE, kWidth, kHeight) == 0) {
+      throw std::runtime_error("OSMesa gives no context to draw in");
+    }
+    mjv_defaultScene(&scene_);
+    mjv_makeScene(model_.get(), &scene_, 1000);
+    mjr_defaultContext(&context_);
+    mjr_makeContext(model_.get(), &context_, mjFONTSCALE_100);
+    mjr_setBuffer(mjFB_OFFSCREEN, &context_);
+    mjv_defaultOption(&option_);
+    mjv_defaultFreeCamera(model_.get(), &camera_);
+    camera_.lookat[0] = 0;
+    camera_.lookat[1] = 0.5;
+    camera_.lookat[2] = 0.34;
+    camera_.distance = 2.0;
+    camera_.azimuth = 72;
+    camera_.elevation = -17;
+  }
+  ~Renderer() {
+    mjr_freeContext(&context_);
+    mjv_freeScene(&scene_);
+    OSMesaDestroyContext(gl_);
+  }
+  Renderer(const Renderer &) = delete;
+  Renderer &operator=(const Renderer &) = delete;
+
+  Image draw(const std::vector<PlantSpec> &plants, const std::vector<Snapshot> &snapshots, const std::string &title,
+             const std::string &text) {
+    int q = 0;
+    for (std::size_t i = 0; i < plants.size(); ++i) {
+      data_->qpos[q++] = snapshots[i].position;
+      if (plants[i].kind == PlantSpec::Kind::Quadrotor) data_->qpos[q++] = snapshots[i].height;
+      data_->qpos[q++] = snapshots[i].angle;
+    }
+    mj_forward(model_.get(), data_.get());
+    const mjrRect view{0, 0, kWidth, kHeight};
+    mjv_updateScene(model_.get(), data_.get(), &option_, nullptr, &camera_, mjCAT_ALL, &scene_);
+    mjr_render(view, &scene_, &context_);
+    mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, view, title.c_str(), text.c_str(), &context_);
+    Image upside_down(kWidth, kHeight);
+    mjr_readPixels(upside_down.pixels.data(), nullptr, view, &context_);
+    Image image(kWidth, kHeight);
+    for (int row = 0; row < kHeight; ++row) {
+      const auto bytes = static_cast<std::size_t>(kWidth) * kBytes;
+      std::memcpy(&image.pixels[static_cast<std::size_t>(row) * bytes],
+                  &upside_down.pixels[static_cast<std::size_t>(kHeight - 1 - row) * bytes], bytes);
+    }
+    return image;
+  }
+
+ private:
+  Model model_;
+  Data data_;
+  std::vector<unsigned char> buffer_;
+  OSMesaContext gl_ = nullptr;
+  mjvScene scene_{};
+  mjrContext context_{};
+  mjvOption option_{};
+  mjvCamera camera_{};
+};
+
+Snapshot at(const std::vector<Snapshot> &snapshots, Time time) {
+  const auto next =
+      std::find_if(snapshots.begin(), snapshots.end(), [&](const Snapshot &snapshot) { return snapshot.time >= time; });
+  if (snapshots.empty()) throw std::runtime_error("a plant without snapshots cannot be drawn");
+  return next == snapshots.end() ? snapshots.back() : *next;
+}
+
+}  // namespace
+
+bool can_render() { return true; }
+
+void write_frames(const std::string &path, const std::vector<Recorded> &runs, const std::vector<Time> &times) {
+  const std::vector<PlantSpec> specs = plants();
+  Renderer renderer(specs);
+  const auto columns = static_cast<int>(times.size());
+  const auto rows = static_cast<int>(runs.size());
+  Image strip(columns * (kWidth + kGap) - kGap, rows * (kHeight + kGap) - kGap);
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      std::vector<Snapshot> snapshots;
+      for (const PlantResult &plant : runs[static_cast<std::size_t>(row)].plants) {
+        snapshots.push_back(at(plant.snapshots, times[static_cast<std::size_t>(column)]));
+      }
+      const Time time = times[static_cast<std::size_t>(column)];
+      strip.paste(renderer.draw(specs, snapshots, runs[static_cast<std::size_t>(row)].executor,
+                                fmt::format("{:.2f} s", static_cast<double>(time) / redag::kSecond)),
+                  column * (kWidth + kGap), row * (kHeight + kGap));
+    }
+  }
+  strip.write(path);
+}
+
+#endif
+
+}  // namespace closed_loop
