@@ -1,5 +1,9 @@
 #include "callback.hpp"
 
+#include <rcl/client.h>
+#include <rcl/service.h>
+#include <rcl/subscription.h>
+
 #include <algorithm>
 #include <mutex>
 #include <utility>
@@ -39,7 +43,6 @@ Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id,
 Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ServiceBase::SharedPtr &service)
     : Callback(std::move(intake), std::move(id)) {
   service_ = service;
-  by_wait_set_ = compat::needs_wait_set(std::string(service->get_service_name()));
 }
 
 Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ClientBase::SharedPtr &client)
@@ -77,16 +80,35 @@ bool Callback::attach(TaskId task) {
 }
 
 void Callback::hook() {
-  const auto tell = [self = shared_from_this()](std::size_t count) { self->arrived(count, Source::Middleware, 0); };
+  const std::weak_ptr<Hooked> self = weak_from_this();
   if (const auto subscription = subscription_.lock()) {
     if (const auto intra_process = intra_process_.lock()) {
       intra_process->set_on_ready_callback(
           [self = shared_from_this()](std::size_t count, int) { self->arrived(count, Source::IntraProcess, 0); });
     }
-    subscription->set_on_new_message_callback(tell);
+    hook_.set<rclcpp::SubscriptionBase>(
+        subscription,
+        [](rclcpp::SubscriptionBase &entity, rcl_event_callback_t call, const void *ticket) {
+          return rcl_subscription_set_on_new_message_callback(entity.get_subscription_handle().get(), call, ticket);
+        },
+        self);
   }
-  if (const auto service = service_.lock()) service->set_on_new_request_callback(tell);
-  if (const auto client = client_.lock()) client->set_on_new_response_callback(tell);
+  if (const auto service = service_.lock()) {
+    hook_.set<rclcpp::ServiceBase>(
+        service,
+        [](rclcpp::ServiceBase &entity, rcl_event_callback_t call, const void *ticket) {
+          return rcl_service_set_on_new_request_callback(entity.get_service_handle().get(), call, ticket);
+        },
+        self);
+  }
+  if (const auto client = client_.lock()) {
+    hook_.set<rclcpp::ClientBase>(
+        client,
+        [](rclcpp::ClientBase &entity, rcl_event_callback_t call, const void *ticket) {
+          return rcl_client_set_on_new_response_callback(entity.get_client_handle().get(), call, ticket);
+        },
+        self);
+  }
   if (const auto waitable = waitable_.lock()) {
     waitable->set_on_ready_callback(
         [self = shared_from_this()](std::size_t count, int part) { self->arrived(count, Source::Middleware, part); });
@@ -101,11 +123,9 @@ void Callback::unhook() {
       // It could not be set either.
     }
   };
+  hook_.clear();
   if (const auto timer = timer_.lock()) clear([&] { compat::clear_on_reset(*timer); });
-  if (const auto subscription = subscription_.lock()) clear([&] { subscription->clear_on_new_message_callback(); });
   if (const auto waitable = intra_process_.lock()) clear([&] { waitable->clear_on_ready_callback(); });
-  if (const auto service = service_.lock()) clear([&] { service->clear_on_new_request_callback(); });
-  if (const auto client = client_.lock()) clear([&] { client->clear_on_new_response_callback(); });
   if (const auto waitable = waitable_.lock()) clear([&] { waitable->clear_on_ready_callback(); });
 }
 

@@ -15,6 +15,7 @@
 #include <memory>
 #include <vector>
 
+#include "hook.hpp"
 #include "rclcpp/client.hpp"
 #include "rclcpp/service.hpp"
 #include "rclcpp/subscription_base.hpp"
@@ -49,7 +50,7 @@ class Intake {
   [[nodiscard]] virtual bool learning() const = 0;
 };
 
-class Callback final : public TimerQueue::Timer, public std::enable_shared_from_this<Callback> {
+class Callback final : public TimerQueue::Timer, public Hooked, public std::enable_shared_from_this<Callback> {
  public:
   Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::TimerBase::SharedPtr &timer);
   /// `intra_process`: the waitable through which the subscription gets messages of its own process; or null.
@@ -64,7 +65,7 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
   /// Connects the entity: what arrives from now on is released as jobs of `task`. True if part of it can only be
   /// watched by a wait set: see waited().
   bool attach(TaskId task);
-  /// Disconnects it: when this returns, no hook is under way that would release anything. Not with locks of ours held.
+  /// Disconnects it: from now on no hook releases anything. Not with locks of ours held.
   void detach();
 
   /// Runs one job.
@@ -95,6 +96,7 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
 
   Time expire(Time now, std::vector<redag::runtime::Release> &releases,
               std::vector<redag::runtime::Release> &missed) override;
+  void arrived_in_middleware(std::size_t count) noexcept override { arrived(count, Source::Middleware, 0); }
 
   /// Does the entity still exist?
   [[nodiscard]] bool alive() const;
@@ -157,6 +159,7 @@ class Callback final : public TimerQueue::Timer, public std::enable_shared_from_
   std::weak_ptr<rclcpp::ClientBase> client_;
   std::weak_ptr<rclcpp::Waitable> waitable_;
   std::size_t depth_ = 0;                 // arrivals that each source keeps; 0: all
+  Hook hook_;                             // of the middleware
   std::atomic<bool> by_wait_set_{false};  // the entity cannot be hooked
 
   // Held while a hook releases, so that detach() can wait for it, but not while a worker takes its token: a worker that

@@ -99,16 +99,4 @@ inline bool needs_wait_set(const rclcpp::Waitable &waitable) {
 #endif
 }
 
-/// Must the service be destroyed without a hook? Life-cycle nodes finalise the middleware's part of their services
-/// before the rclcpp::Service, whose destructor on Humble then clears the hook of what is no more. They share nothing
-/// to know them by but their names; for a service of a user's with such a name only the arrival time is less exact.
-inline bool needs_wait_set(const std::string &service_name) {
-  if (RCLCPP_VERSION_MAJOR >= 28) return false;
-  for (const char *name :
-       {"change_state", "get_state", "get_available_states", "get_available_transitions", "get_transition_graph"}) {
-    if (service_name.substr(service_name.rfind('/') + 1) == name) return true;
-  }
-  return false;
-}
-
 }  // namespace redag_rclcpp::compat

@@ -20,7 +20,6 @@
 
 #include "process_tasks.hpp"
 #include "rclcpp/rclcpp.hpp"
-#include "rclcpp/version.h"
 #include "redag/runtime/preemption_point.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "spinning.hpp"
@@ -74,7 +73,11 @@ struct Counts {
 /// The changes, at random.
 class Churn {
  public:
-  explicit Churn(Counts &counts) : counts_(counts) {}
+  explicit Churn(Counts &counts) : counts_(counts) {
+    for (std::uint64_t i = 0; i < kTopics; ++i) {
+      publishers_.push_back(here_->create_publisher<Strings>(topic(i), rclcpp::QoS(10)));
+    }
+  }
 
   std::shared_ptr<Patch> make_patch(std::uint64_t seed) {
     auto patch = std::make_shared<Patch>();
@@ -107,7 +110,7 @@ class Churn {
       case 0:
       case 1: return add_timer(patch);
       case 2: return add_subscription(patch);
-      case 3: patch->publishers.push_back(patch->node->create_publisher<Strings>(topic(*patch), depth(*patch))); return;
+      case 3: return add_publisher(*patch);
       case 4: return add_service(*patch);
       default: patch->clients.push_back(patch->node->create_client<EmptyService>("~/work"));
     }
@@ -129,10 +132,9 @@ class Churn {
       auto &timer = *patch.timers[below(patch.random, patch.timers.size())];
       below(patch.random, 2) == 0 ? timer.cancel() : timer.reset();
     }
-    if (!patch.publishers.empty()) {
-      auto &publisher = *patch.publishers[below(patch.random, patch.publishers.size())];
-      for (int i = 0; i < 3; ++i) publisher.publish(std::make_unique<Strings>());
-    }
+    const auto &publishers = patch.publishers.empty() || below(patch.random, 2) == 0 ? publishers_ : patch.publishers;
+    auto &publisher = *publishers[below(patch.random, publishers.size())];
+    for (int i = 0; i < 3; ++i) publisher.publish(std::make_unique<Strings>());
     if (!patch.clients.empty()) {
       auto &client = *patch.clients[below(patch.random, patch.clients.size())];
       client.async_send_request(std::make_shared<EmptyService::Request>(),
@@ -147,7 +149,10 @@ class Churn {
   }
 
  private:
-  static std::string topic(Patch &patch) { return "/churn" + std::to_string(below(patch.random, 3)); }
+  static constexpr std::uint64_t kTopics = 3;
+
+  static std::string topic(std::uint64_t index) { return "/churn" + std::to_string(index); }
+  static std::string topic(Patch &patch) { return topic(below(patch.random, kTopics)); }
   static rclcpp::QoS depth(Patch &patch) { return rclcpp::QoS(1 + below(patch.random, 10)); }
 
   template <class Entities>
@@ -185,11 +190,19 @@ class Churn {
         [this, weak = std::weak_ptr<Patch>(patch)](Strings::ConstSharedPtr) { run(weak, 100us); }, options));
   }
 
+  // Not within the process: rclcpp, up to Rolling at least, locks itself up when a publisher goes while some
+  // subscription gets a message from elsewhere (IntraProcessManager::matches_any_publishers is then the last to hold
+  // it, and its destructor wants the lock that is held there). Those within the process stay: publishers_.
+  void add_publisher(Patch &patch) {
+    rclcpp::PublisherOptions options;
+    options.use_intra_process_comm = rclcpp::IntraProcessSetting::Disable;
+    patch.publishers.push_back(patch.node->create_publisher<Strings>(topic(patch), depth(patch), options));
+  }
+
   void add_service(Patch &patch) {
-    // Names of life-cycle nodes' services: these are watched by a wait set.
-    const std::string name = below(patch.random, 3) == 0 ? "~/get_state" : "~/work";
     patch.services.push_back(patch.node->create_service<EmptyService>(
-        name, [this](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) { ++counts_.callbacks; }));
+        "~/work",
+        [this](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) { ++counts_.callbacks; }));
   }
 
   /// Nothing ever calls these. Were a task's id used for another's arrivals, they would be given jobs.
@@ -217,6 +230,9 @@ class Churn {
   }
 
   Counts &counts_;
+  const rclcpp::Node::SharedPtr here_ = std::make_shared<rclcpp::Node>(
+      "here", rclcpp::NodeOptions().use_intra_process_comms(true).start_parameter_services(false));
+  std::vector<rclcpp::Publisher<Strings>::SharedPtr> publishers_;
   std::atomic<std::uint64_t> next_{0};
   std::mutex lock_;
   std::vector<std::weak_ptr<rclcpp::Node>> nodes_;
@@ -501,12 +517,6 @@ class ChurnTest : public ::testing::TestWithParam<Parameters> {
 };
 
 TEST_P(ChurnTest, WhatStaysGoesOnAndWhatGoesIsLetGoOf) {
-#if RCLCPP_VERSION_MAJOR >= 28
-  if (std::getenv("REDAG_CHURN") == nullptr) {
-    GTEST_SKIP() << "KNOWN DEFECT, not mended: on Jazzy a message hook is called for a subscription that is being "
-                    "destroyed, and this test crashes. REDAG_CHURN=1 runs it all the same";
-  }
-#endif
   // The middleware starts threads as it needs them: a first round has it start them all.
   {
     const auto executor = make_executor();

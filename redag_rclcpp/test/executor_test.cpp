@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <mutex>
 #include <optional>
@@ -319,6 +320,27 @@ TEST_P(ExecutorTest, WhatOneExecutorLeavesTheNextOneTakes) {
     second.spin_all(kLimit);
     EXPECT_EQ(count, 4);
   }
+}
+
+// What is left of it, here the handle, still gets messages. (What the test is about AddressSanitizer sees.)
+TEST_P(ExecutorTest, AMessageForADestroyedSubscriptionIsNoCallOfWhatIsGone) {
+  ReDAGExecutor executor(options);
+  auto ours = std::make_shared<rclcpp::Node>("through_the_middleware");
+  auto subscription = ours->create_subscription<Empty>("/gone", rclcpp::QoS(10), [](Empty::ConstSharedPtr) {});
+  auto publisher = ours->create_publisher<Empty>("/gone", rclcpp::QoS(10));
+  executor.add_node(ours);
+  publisher->publish(Empty());
+  executor.spin_all(100ms);
+
+  const auto handle = subscription->get_subscription_handle();
+  subscription.reset();
+  for (int round = 0; round < 2; ++round) {
+    publisher->publish(Empty());  // the hook is still set
+    executor.spin_all(100ms);
+    ours->create_wall_timer(1h, [] {});  // second round: what is gone was noticed
+  }
+  const auto stats = executor.stats();
+  EXPECT_TRUE(std::none_of(stats.begin(), stats.end(), [](const auto &s) { return s.id.name == "/gone"; }));
 }
 
 TEST_P(ExecutorTest, WhatIsCreatedInAnEmptyGroupIsServed) {

@@ -1,4 +1,4 @@
-// The executor's parts that need no ROS: timer queue, token queue.
+// The executor's parts that need no nodes: timer queue, token queue, hooks.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,6 +6,7 @@
 #include <map>
 #include <random>
 
+#include "hook.hpp"
 #include "timer_queue.hpp"
 #include "token_queue.hpp"
 
@@ -120,6 +121,84 @@ TEST(TokenQueue, IsAFifoThatGrowsAndDropsFromTheMiddle) {
     ASSERT_EQ(queue.size(), expected.size());
     for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_EQ(queue.at(i), expected[i]);
   }
+}
+
+// ---- hooks ----
+
+/// A middleware's part: calls who is set, also after it was told not to, as one that is being destroyed may.
+struct FakeEntity {
+  rcl_event_callback_t callback = nullptr;
+  const void *ticket = nullptr;
+  rcl_event_callback_t last_callback = nullptr;
+  const void *last_ticket = nullptr;
+  rcl_ret_t answer = RCL_RET_OK;
+
+  static rcl_ret_t set_hook(FakeEntity &self, rcl_event_callback_t callback, const void *ticket) {
+    self.callback = callback;
+    self.ticket = ticket;
+    if (callback != nullptr) {
+      self.last_callback = callback;
+      self.last_ticket = ticket;
+    }
+    return self.answer;
+  }
+  void call_late() const { last_callback(last_ticket, 1); }
+};
+
+struct FakeHooked final : Hooked {
+  void arrived_in_middleware(std::size_t count) noexcept override { arrived += count; }
+  std::size_t arrived = 0;
+};
+
+struct Hooks : ::testing::Test {
+  std::shared_ptr<FakeEntity> entity = std::make_shared<FakeEntity>();
+  std::shared_ptr<FakeHooked> hooked = std::make_shared<FakeHooked>();
+  Hook hook;
+};
+
+TEST_F(Hooks, TellUntilTheyAreCleared) {
+  hook.set(entity, FakeEntity::set_hook, hooked);
+  entity->callback(entity->ticket, 3);
+  EXPECT_EQ(hooked->arrived, 3u);
+  hook.clear();
+  EXPECT_EQ(entity->callback, nullptr);
+  entity->call_late();
+  EXPECT_EQ(hooked->arrived, 3u);
+}
+
+TEST_F(Hooks, ALateCallFindsNobodyAlsoWhereAnotherTookThePlace) {
+  hook.set(entity, FakeEntity::set_hook, hooked);
+  hook.clear();
+  const auto next_entity = std::make_shared<FakeEntity>();
+  const auto next = std::make_shared<FakeHooked>();
+  Hook next_hook;
+  next_hook.set(next_entity, FakeEntity::set_hook, next);
+  const auto place = [](const FakeEntity &e) {
+    return static_cast<std::uint32_t>(reinterpret_cast<std::uintptr_t>(e.last_ticket));
+  };
+  ASSERT_EQ(place(*entity), place(*next_entity));
+  entity->call_late();
+  EXPECT_EQ(next->arrived, 0u);
+  next_entity->callback(next_entity->ticket, 1);
+  EXPECT_EQ(next->arrived, 1u);
+}
+
+TEST_F(Hooks, OutliveTheirEntityAndWhoIsTold) {
+  hook.set(entity, FakeEntity::set_hook, hooked);
+  const auto late = *entity;
+  hooked = nullptr;
+  late.call_late();
+  entity = nullptr;
+  EXPECT_NO_THROW(hook.clear());
+  late.call_late();
+}
+
+TEST_F(Hooks, OneThatTheMiddlewareRefusesThrowsAndTellsNobody) {
+  entity->answer = RCL_RET_UNSUPPORTED;
+  EXPECT_ANY_THROW(hook.set(entity, FakeEntity::set_hook, hooked));
+  hook.clear();
+  entity->call_late();
+  EXPECT_EQ(hooked->arrived, 0u);
 }
 
 }  // namespace

@@ -1,0 +1,88 @@
+#include "hook.hpp"
+
+#include <rcl/error_handling.h>
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/pi_mutex.hpp"
+
+namespace redag_rclcpp {
+
+namespace {
+
+/// Who has which ticket. A ticket is a place and how often the place was given away before: an old one finds nobody.
+class Tickets {
+ public:
+  static Tickets &all() {
+    static auto *const tickets = new Tickets;  // never destroyed: the middleware's threads may outlive static objects
+    return *tickets;
+  }
+
+  const void *issue(std::weak_ptr<Hooked> hooked) {
+    const redag::LockGuard guard(lock_);
+    if (free_.empty()) {
+      free_.push_back(static_cast<std::uint32_t>(places_.size()));
+      places_.emplace_back();
+    }
+    const std::uint32_t index = free_.back();
+    free_.pop_back();
+    places_[index].hooked = std::move(hooked);
+    return reinterpret_cast<const void *>(std::uintptr_t{places_[index].uses} << 32 | index);
+  }
+
+  void give_back(const void *ticket) {
+    const redag::LockGuard guard(lock_);
+    places_[index_of(ticket)].hooked.reset();
+    ++places_[index_of(ticket)].uses;
+    free_.push_back(index_of(ticket));
+  }
+
+  std::shared_ptr<Hooked> find(const void *ticket) {
+    const redag::LockGuard guard(lock_);
+    const Place &place = places_[index_of(ticket)];
+    return place.uses == reinterpret_cast<std::uintptr_t>(ticket) >> 32 ? place.hooked.lock() : nullptr;
+  }
+
+ private:
+  static_assert(sizeof(std::uintptr_t) == 8, "two 32-bit numbers are kept in a pointer");
+
+  struct Place {
+    std::uint32_t uses = 0;
+    std::weak_ptr<Hooked> hooked;
+  };
+
+  static std::uint32_t index_of(const void *ticket) {
+    return static_cast<std::uint32_t>(reinterpret_cast<std::uintptr_t>(ticket));
+  }
+
+  redag::PiMutex lock_;
+  std::vector<Place> places_ REDAG_GUARDED_BY(lock_);
+  std::vector<std::uint32_t> free_ REDAG_GUARDED_BY(lock_);
+};
+
+void call(const void *ticket, std::size_t count) {
+  if (const auto hooked = Tickets::all().find(ticket)) hooked->arrived_in_middleware(count);
+}
+
+}  // namespace
+
+void Hook::set(const std::weak_ptr<Hooked> &hooked, Setter setter) {
+  clear();
+  ticket_ = Tickets::all().issue(hooked);
+  setter_ = std::move(setter);
+  if (const rcl_ret_t result = setter_(call, ticket_); result != RCL_RET_OK) {
+    rclcpp::exceptions::throw_from_rcl_error(result, "cannot set a hook");
+  }
+}
+
+void Hook::clear() {
+  if (!setter_) return;
+  if (setter_(nullptr, nullptr) != RCL_RET_OK) rcl_reset_error();  // it could not be set either, or is being destroyed
+  Tickets::all().give_back(ticket_);
+  setter_ = nullptr;
+}
+
+}  // namespace redag_rclcpp
