@@ -246,6 +246,7 @@ void Engine::miss(TaskId task, Time nominal, Reason reason) {
   if (halted_at_ != kNever) return;
   scheduler_->miss(task, nominal, at, reason);
   decide(locked, at, nullptr, JobSlot());
+  locked.tell_nobody();
 }
 
 // ---- pauses ----
@@ -325,12 +326,13 @@ AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
   return added;
 }
 
-TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body body) {
+TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body body,
+                        std::shared_ptr<SkipListener> listener) {
   const Time at = now();
   Locked locked(*this);
   withdraw_if_halting();
   const TaskId id = scheduler_->add_task(dag, rank, task, at);
-  register_task(id, task, body);
+  register_task(id, task, body, std::move(listener));
   decide(locked, at, nullptr, JobSlot());
   return id;
 }
@@ -367,7 +369,7 @@ void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
 }
 
 // An id that is used again begins anew; the body of before went when its last job ended.
-void Engine::register_task(TaskId id, const Task &task, Body &body) {
+void Engine::register_task(TaskId id, const Task &task, Body &body, std::shared_ptr<SkipListener> listener) {
   REDAG_CHECK(id.value <= tasks_.size(), "the scheduler numbers tasks differently");
   if (id.value == tasks_.size()) tasks_.emplace_back();
   TaskEntry &entry = tasks_[id.value];
@@ -376,6 +378,8 @@ void Engine::register_task(TaskId id, const Task &task, Body &body) {
   most_started_ -= entry.concurrency;
   entry = TaskEntry{};
   entry.body.swap(body);
+  has_listeners_ = has_listeners_ || listener != nullptr;
+  entry.listener = std::move(listener);
   entry.wcet = task.wcet;
   entry.wcet_low = task.wcet_low;
   entry.budget = task.budget;
@@ -389,6 +393,7 @@ void Engine::register_task(TaskId id, const Task &task, Body &body) {
 void Engine::remove_entry(TaskId id, std::vector<Body> &doomed) {
   TaskEntry &entry = tasks_[id.value];
   entry.removed = true;
+  entry.listener.reset();
   if (entry.busy == 0) doomed.emplace_back().swap(entry.body);
 }
 

@@ -46,6 +46,14 @@ using Body = std::function<sched::Outcome(const Job &)>;
 /// Told of every exception that left a body, on the worker's thread, before the job counts as ended. Must not throw.
 using ExceptionHandler = std::function<void(const Job &, std::exception_ptr)>;
 
+/// Told of each release of a task whose job was skipped before it started, also in the midst of release(); not of
+/// miss(). On the thread that had the scheduler decide, without the engine's lock.
+class SkipListener {
+ public:
+  virtual ~SkipListener() = default;
+  virtual void skipped(Reason reason) noexcept = 0;
+};
+
 struct Release {
   TaskId task;
   Time nominal = 0;
@@ -118,7 +126,9 @@ class Engine {
   AddedDag add_dag(const Dag &dag, std::vector<Body> bodies);
   /// Jobs that have not started are skipped. A body is destroyed as soon as its last job has ended.
   void remove_dag(DagId dag);
-  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Body body);
+  /// `listener`: something that the body owns, too, or null.
+  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Body body,
+                  std::shared_ptr<SkipListener> listener = nullptr);
   /// As remove_dag(). With reuse_ids nobody may use the id from here on.
   void remove_task(TaskId task);
   void set_timing(TaskId task, Duration period, Duration deadline);
@@ -188,7 +198,8 @@ class Engine {
   void hand(Locked &locked, Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
   void set_level(Thread &thread, std::uint32_t level) REDAG_REQUIRES(lock_);
   void refresh_outranked() REDAG_REQUIRES(lock_);
-  void register_task(TaskId id, const Task &task, Body &body) REDAG_REQUIRES(lock_);
+  void register_task(TaskId id, const Task &task, Body &body, std::shared_ptr<SkipListener> listener = nullptr)
+      REDAG_REQUIRES(lock_);
   void remove_entry(TaskId id, std::vector<Body> &doomed) REDAG_REQUIRES(lock_);
   void withdraw_if_halting() REDAG_REQUIRES(lock_);
   void wake_pause_waiters() REDAG_REQUIRES(lock_);
@@ -207,6 +218,7 @@ class Engine {
   std::size_t most_started_ REDAG_GUARDED_BY(lock_) = 0;  // jobs that all tasks together can have in progress
   std::uint32_t unfinished_ REDAG_GUARDED_BY(lock_) = 0;  // jobs dispatched and not ended
   bool running_ REDAG_GUARDED_BY(lock_) = false;          // the threads are there
+  bool has_listeners_ REDAG_GUARDED_BY(lock_) = false;    // some task has or had one
   bool paused_ REDAG_GUARDED_BY(lock_);
   std::uint32_t pause_waiters_ REDAG_GUARDED_BY(lock_) = 0;
   FutexWord pause_changes_{0};  // counts what wait_paused() waits for; written under the lock

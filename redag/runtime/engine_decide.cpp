@@ -22,6 +22,12 @@ Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot belo
       if (event.kind == JobEventKind::Preempted) ++tasks_[event.task.value].preemptions;
     }
   }
+  if (has_listeners_) {
+    for (const JobEvent &event : step.events) {
+      const auto &listener = tasks_[event.task.value].listener;
+      if (event.kind == JobEventKind::Skipped && listener) locked.tell(listener, event.reason);
+    }
+  }
   const Next next = os() ? place_on_pool(locked, step, self) : place_on_workers(locked, step, self, below);
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
   return next;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <utility>
 
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/threads.hpp"
@@ -26,6 +27,7 @@ struct Engine::TaskEntry {
   }
 
   Body body;
+  std::shared_ptr<SkipListener> listener;  // or null
   Duration wcet = 0;
   Duration wcet_low = 0;
   Duration budget = 0;
@@ -73,18 +75,23 @@ struct alignas(64) Engine::Thread {
   ThreadHandle handle;
 };
 
-/// Holds the engine's lock, and wakes after it. Real-time threads are woken under the lock instead: one that were
-/// preempted between its decision and the wake-up would leave an urgent job asleep, and only as the lock's owner is it
-/// raised when the next decision is due.
+/// Holds the engine's lock; wakes threads and tells of skips after it. Real-time threads are woken under the lock
+/// instead: one that were preempted between its decision and the wake-up would leave an urgent job asleep, and only as
+/// the lock's owner is it raised when the next decision is due.
 class REDAG_SCOPED_CAPABILITY Engine::Locked {
  public:
   explicit Locked(Engine &engine) REDAG_ACQUIRE(engine.lock_) : engine_(engine) { engine_.lock_.lock(); }
   ~Locked() REDAG_RELEASE() {
     engine_.lock_.unlock();
     for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
+    for (const auto &[listener, reason] : skips_) listener->skipped(reason);
   }
   Locked(const Locked &) = delete;
   Locked &operator=(const Locked &) = delete;
+
+  void tell(std::shared_ptr<SkipListener> listener, Reason reason) { skips_.emplace_back(std::move(listener), reason); }
+  /// What was skipped is what the caller itself called missed.
+  void tell_nobody() { skips_.clear(); }
 
   void wake(Thread &thread) {
     if (engine_.realtime() || count_ == late_.size()) {
@@ -96,6 +103,7 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
 
  private:
   Engine &engine_;
+  std::vector<std::pair<std::shared_ptr<SkipListener>, Reason>> skips_;
   std::array<Thread *, 32> late_;
   std::size_t count_ = 0;
 };

@@ -502,6 +502,42 @@ TEST(Engine, ABudgetThatWasUsedIsToldAtTheEndAtTheLatest) {
             2);
 }
 
+struct SkipLog final : SkipListener {
+  explicit SkipLog(Engine &its_engine) : engine(its_engine) {}
+  void skipped(Reason reason) noexcept override {
+    reasons.push_back(reason);
+    (void)engine.usage(TaskId(0));  // takes the engine's lock
+  }
+  Engine &engine;
+  std::vector<Reason> reasons;
+};
+
+TEST(Engine, AListenerIsToldOfSkippedJobsAndNotOfMissedReleases) {
+  Bench bench(ladder(1), PreemptionMode::None, 1);
+  bench.bind();
+  bench.engine->pause();
+  Task task;
+  task.period = task.deadline = kSecond;
+  task.wcet = task.budget = kMicrosecond;
+  task.on_budget = OnBudget::SkipNext;
+  const auto log = std::make_shared<SkipLog>(*bench.engine);
+  const auto body = [log](const Job &) {
+    use_processor(kMillisecond, false);
+    return Outcome::Finished;
+  };
+  const TaskId added = bench.engine->add_task(DagId(0), 1, task, body, log);
+  bench.engine->release(added, 1);
+  EXPECT_TRUE(log->reasons.empty());
+  bench.engine->release(added, 2);
+  EXPECT_EQ(log->reasons, std::vector{Reason::Overrun});
+  bench.engine->miss(added, 3, Reason::QueueFull);
+  EXPECT_EQ(log->reasons.size(), 1U);
+  EXPECT_TRUE(bench.engine->run_one());
+  bench.engine->release(added, 4);
+  EXPECT_EQ(log->reasons, (std::vector{Reason::Overrun, Reason::Budget}));
+  EXPECT_EQ(bench.engine->accounting(added).skipped, 3U);
+}
+
 TEST(Engine, HighModeIsOnWhileTheJobThatBeganItRuns) {
   Workload workload = ladder(1);
   workload.dags.push_back(workload.dags[0]);

@@ -16,6 +16,8 @@ using redag::kNever;
 
 namespace {
 
+constexpr Duration kAskAgain = 10 * redag::kMillisecond;  // between two releases of what is not dropped when skipped
+
 std::size_t depth_of(const rclcpp::QoS &qos) {
   return qos.history() == rclcpp::HistoryPolicy::KeepLast ? qos.depth() : 0;
 }
@@ -136,7 +138,7 @@ void Callback::detach() {
     const std::lock_guard guard(lock_);
     intake.swap(intake_);
     tokens_.clear();
-    if (intake && is_timer()) intake->timers().schedule(*this, kNever);
+    if (intake) intake->timers().schedule(*this, kNever);
   }
   unhook();
 }
@@ -153,7 +155,7 @@ void Callback::arrived(std::size_t count, Source source, int part, bool seen_onl
   {
     const std::lock_guard release_guard(release_lock_);
     Time now = 0;
-    bool release = false;
+    bool begins = false;
     Time arrival = 0;
     std::size_t overwritten = 0;
     {
@@ -163,43 +165,77 @@ void Callback::arrived(std::size_t count, Source source, int part, bool seen_onl
       if (intake_->learning()) learn_from_arrival(now, count);
       const bool direct = intake_->direct();
       if (depth_ > 0) count = std::min(count, depth_);
+      bool replaces = false;
       for (std::size_t i = 0; i < count; ++i) {
         // The job that waits for a dropped token is now the next one's: its release takes the place of the old one.
         if (depth_ > 0 && kept_[index_of(source)] >= depth_) {
-          if (drop_oldest(source) && direct) {
-            release = true;
-          } else {
-            ++overwritten;
+          if (drop_oldest(source, overwritten) && direct && !replaces) {
+            replaces = true;
+            --overwritten;
           }
         }
         tokens_.push(Token{now, source, part, seen_only});
         ++kept_[index_of(source)];
       }
-      arrival = tokens_.front().arrival;
-      if (direct) {
-        release = release || !released_;
-        released_ = true;
-      } else if (!released_ && !noted_) {
-        noted_ = true;
-        intake_->note(shared_from_this());
-        to_wake = intake_;
+      if (replaces) {
+        arrival = tokens_.front().arrival;
+        ++released_;
+        ++releasers_;
+        begins = true;
+      } else {
+        const bool noted = noted_;
+        begins = begin_release(arrival);
+        if (noted_ && !noted) to_wake = intake_;
       }
     }
     for (; overwritten > 0; --overwritten) engine_.miss(task_, now, redag::Reason::QueueFull);
-    if (release) engine_.release(task_, arrival);
+    if (begins) release(arrival);
   }
   if (to_wake) to_wake->wake();
 }
 
-// True if the dropped token was that of the released job.
-bool Callback::drop_oldest(Source source) {
+// The middleware overwrote its oldest message, one more of those that were. True if that was the released job's.
+bool Callback::drop_oldest(Source source, std::size_t &overwritten) {
+  if (dropped_[index_of(source)] > 0) {  // was skipped, and counted, before
+    --dropped_[index_of(source)];
+    --kept_[index_of(source)];
+    return false;
+  }
+  ++overwritten;
   for (std::size_t i = 0; i < tokens_.size(); ++i) {
     if (tokens_.at(i).source != source) continue;
     tokens_.erase(i);
     --kept_[index_of(source)];
-    return i == 0 && released_;
+    return i == 0 && released_ > 0;
   }
   return false;
+}
+
+// With lock_. True: the first token is to be released, by release() without the lock.
+bool Callback::begin_release(Time &arrival) {
+  if (released_ > 0 || !intake_ || tokens_.empty()) return false;
+  if (!intake_->direct()) {
+    if (!noted_) {
+      noted_ = true;
+      intake_->note(shared_from_this());
+    }
+    return false;
+  }
+  ++released_;
+  ++releasers_;
+  arrival = tokens_.front().arrival;
+  return true;
+}
+
+// With release_lock_, or by a job: an id is not used again while a job of it runs. Where the job is skipped at once,
+// the next token's turn has come.
+void Callback::release(Time arrival) {
+  for (bool again = true; again;) {
+    engine_.release(task_, arrival);
+    const std::lock_guard guard(lock_);
+    --releasers_;
+    again = begin_release(arrival);
+  }
 }
 
 void Callback::admit() {
@@ -208,32 +244,59 @@ void Callback::admit() {
   {
     const std::lock_guard guard(lock_);
     noted_ = false;
-    if (!intake_ || released_ || tokens_.empty()) return;
-    released_ = true;
+    if (!intake_ || released_ > 0 || tokens_.empty()) return;
+    ++released_;
+    ++releasers_;
     arrival = tokens_.front().arrival;
   }
-  engine_.release(task_, arrival);
+  release(arrival);
 }
 
-bool Callback::take_token(Token &token) {
-  Time next = kNever;
+void Callback::skipped(redag::Reason reason) noexcept {
+  if (is_timer()) {
+    if (reason != redag::Reason::Overrun) drop_expiry();
+    return;
+  }
   {
     const std::lock_guard guard(lock_);
-    released_ = false;
+    if (!intake_) return;
+    // A job that was replaced by the next one's is all that `overrun` means here: the token is that one's now.
+    if (released_ == 1 && reason != redag::Reason::Overrun && !tokens_.empty()) {
+      const Token &token = tokens_.front();
+      if (token.seen_only || subscription_.expired()) {
+        // Still released: by the timer queue.
+        if (intake_->timers().schedule(*this, engine_.now() + kAskAgain)) intake_->timers_changed();
+        return;
+      }
+      ++dropped_[index_of(token.source)];
+      tokens_.pop();
+    }
+    --released_;
+    if (releasers_ > 0) return;  // whoever that is looks again
+  }
+  const std::lock_guard release_guard(release_lock_);
+  Time arrival = kNever;
+  bool begins = false;
+  {
+    const std::lock_guard guard(lock_);
+    begins = begin_release(arrival);
+  }
+  if (begins) release(arrival);
+}
+
+bool Callback::take_token(Token &token, std::size_t &dropped) {
+  Time next = kNever;
+  bool begins = false;
+  {
+    const std::lock_guard guard(lock_);
+    if (released_ > 0) --released_;
     if (tokens_.empty()) return false;
     token = tokens_.pop();
-    --kept_[index_of(token.source)];
-    if (tokens_.empty() || !intake_) return true;
-    if (intake_->direct()) {
-      released_ = true;
-      next = tokens_.front().arrival;
-    } else if (!noted_) {
-      noted_ = true;
-      intake_->note(shared_from_this());
-    }
+    dropped = std::exchange(dropped_[index_of(token.source)], 0);
+    kept_[index_of(token.source)] -= dropped + 1;
+    begins = begin_release(next);
   }
-  // The task is still ours: an id is not used again while a job of it runs.
-  if (next != kNever) engine_.release(task_, next);
+  if (begins) release(next);
   return true;
 }
 

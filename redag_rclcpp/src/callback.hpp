@@ -3,7 +3,8 @@
 //
 // An arrival (a message, request, ...) becomes a token. Of the tokens one at a time is a released job that waits in the
 // scheduler; the others wait here, so that a long queue costs the scheduler nothing. When the job starts, the next
-// token is released.
+// token is released. Where the scheduler skips the job, its message is dropped, unread; but requests, responses and
+// what waitables wait for are not data that the next ones replace: they are released again until they are taken.
 //
 // Threads: hooks are called by the middleware's and by publishing threads, with locks of theirs held; execute() by
 // workers. Lock order: theirs, release_lock_, lock_, the timer queue's, the engine's. Nothing of rclcpp that takes
@@ -50,7 +51,10 @@ class Intake {
   [[nodiscard]] virtual bool learning() const = 0;
 };
 
-class Callback final : public TimerQueue::Timer, public Hooked, public std::enable_shared_from_this<Callback> {
+class Callback final : public TimerQueue::Timer,
+                       public Hooked,
+                       public redag::runtime::SkipListener,
+                       public std::enable_shared_from_this<Callback> {
  public:
   Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::TimerBase::SharedPtr &timer);
   /// `intra_process`: the waitable through which the subscription gets messages of its own process; or null.
@@ -97,6 +101,7 @@ class Callback final : public TimerQueue::Timer, public Hooked, public std::enab
   Time expire(Time now, std::vector<redag::runtime::Release> &releases,
               std::vector<redag::runtime::Release> &missed) override;
   void arrived_in_middleware(std::size_t count) noexcept override { arrived(count, Source::Middleware, 0); }
+  void skipped(redag::Reason reason) noexcept override;
 
   /// Does the entity still exist?
   [[nodiscard]] bool alive() const;
@@ -130,9 +135,12 @@ class Callback final : public TimerQueue::Timer, public Hooked, public std::enab
   void hook();
   void unhook();
   void arrived(std::size_t count, Source source, int part, bool seen_only = false);
-  [[nodiscard]] bool drop_oldest(Source source);
+  [[nodiscard]] bool drop_oldest(Source source, std::size_t &overwritten);
   void learn_from_arrival(Time now, std::size_t count);
-  [[nodiscard]] bool take_token(Token &token);
+  [[nodiscard]] bool take_token(Token &token, std::size_t &dropped);
+  [[nodiscard]] bool begin_release(Time &arrival);
+  void release(Time arrival);
+  void drop_expiry();
 
   /// Does only the timer's guard condition tell of resets, or of jumps of time?
   [[nodiscard]] bool has_waited_timer() const;
@@ -146,6 +154,7 @@ class Callback final : public TimerQueue::Timer, public Hooked, public std::enab
   [[nodiscard]] bool execute_service();
   [[nodiscard]] bool execute_client();
   [[nodiscard]] bool execute_waitable(rclcpp::Waitable &waitable, const Token &token);
+  void drop_messages(Source source, std::size_t count);
 
   const redag::CallbackId id_;
   redag::runtime::Engine &engine_;  // not after detach(), except by a job
@@ -170,8 +179,10 @@ class Callback final : public TimerQueue::Timer, public Hooked, public std::enab
   std::shared_ptr<Intake> intake_;      // lock; null once detached
   TokenQueue<Token> tokens_;            // lock; the first one is that of the released job, if there is one
   std::size_t kept_[2] = {0, 0};        // lock: tokens by source
+  std::size_t dropped_[2] = {0, 0};     // lock: of the kept, those whose jobs were skipped; they have no token
   bool leftovers_[2] = {false, false};  // lock: by source, there may be more than tokens
-  bool released_ = false;               // lock: a job waits in the scheduler
+  std::uint32_t released_ = 0;          // lock: jobs that wait in the scheduler, or whose skip is still to be told
+  std::uint32_t releasers_ = 0;         // lock: threads in release()
   bool noted_ = false;                  // lock: note()d, and not admitted since
   bool seen_ = false;                   // lock: by the wait set, and not dealt with
   std::vector<TaskId> publishers_;      // lock

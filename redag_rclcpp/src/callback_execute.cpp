@@ -35,7 +35,14 @@ bool take_and_handle(const char *what, const char *name, Take take, Handle handl
 
 Outcome Callback::execute(const redag::runtime::Job &job) {
   Token token;
-  const bool executed = is_timer() ? execute_timer() : take_token(token) && execute_token(token);
+  std::size_t dropped = 0;
+  bool executed = false;
+  if (is_timer()) {
+    executed = execute_timer();
+  } else if (take_token(token, dropped)) {
+    drop_messages(token.source, dropped);
+    executed = execute_token(token);
+  }
   if (!executed) return Outcome::NoData;
   const Duration response = engine_.now() - job.release;
   response_.add(response);
@@ -89,6 +96,29 @@ bool Callback::execute_waitable(rclcpp::Waitable &waitable, const Token &token) 
       token.seen_only ? waitable.take_data() : waitable.take_data_by_entity_id(static_cast<std::size_t>(token.part));
   compat::execute(waitable, data);
   return true;
+}
+
+// Jobs of theirs were skipped.
+void Callback::drop_messages(Source source, std::size_t count) {
+  const auto subscription = subscription_.lock();
+  const auto intra_process = intra_process_.lock();
+  rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
+  rclcpp::MessageInfo info;
+  for (bool more = count > 0 && subscription; more && count > 0; --count) {
+    if (source == Source::IntraProcess) {
+      more = intra_process && compat::is_ready(*intra_process, unused) && intra_process->take_data();
+      continue;
+    }
+    more = take_and_handle(
+        "a message of topic", subscription->get_topic_name(),
+        [&] {
+          if (subscription->is_serialized())
+            return subscription->take_serialized(*subscription->create_serialized_message(), info);
+          const std::shared_ptr<void> message = subscription->create_message();
+          return subscription->take_type_erased(message.get(), info);
+        },
+        [] {});
+  }
 }
 
 bool Callback::execute_subscription() {

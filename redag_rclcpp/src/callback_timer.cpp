@@ -76,6 +76,10 @@ void Callback::reschedule() {
 }
 
 Time Callback::expire(Time now, std::vector<Release> &releases, std::vector<Release> &missed) {
+  if (!is_timer()) {  // skipped before
+    releases.push_back(Release{task_, now});
+    return kNever;
+  }
   const bool simulated = is_simulated(*timer_handle_);
   const TimerReading reading = read_timer(*timer_handle_, engine_);
   if (reading.cancelled) return kNever;
@@ -103,6 +107,16 @@ Time Callback::expire(Time now, std::vector<Release> &releases, std::vector<Rele
     releases.push_back(Release{task_, nominal});
   }
   return nominal + period;
+}
+
+// The expiry whose job was skipped will have no other: it is consumed. Where there is a grid the next point's job
+// does that.
+void Callback::drop_expiry() {
+  const auto timer = timer_.lock();
+  if (!timer || (!is_simulated(*timer_handle_) && period_of(*timer_handle_) != 0)) return;
+  const compat::TimerCall call(*timer);
+  uncalled_ = false;
+  reschedule();
 }
 
 bool Callback::execute_timer() {

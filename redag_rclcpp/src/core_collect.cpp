@@ -199,9 +199,9 @@ void ReDAGExecutor::Core::add(const Found &found) {
   entry.callback = callback;
   callback->set_deadline(entry.task.deadline);
 
-  const redag::TaskId task =
-      engine_->add_task(dag_ids_[entry.dag], entry.rank, entry.task,
-                        [callback](const redag::runtime::Job &job) { return callback->execute(job); });
+  const redag::TaskId task = engine_->add_task(
+      dag_ids_[entry.dag], entry.rank, entry.task,
+      [callback](const redag::runtime::Job &job) { return callback->execute(job); }, callback);
   tasks_.set(task, std::move(entry));
   callbacks_[found.key] = callback;
   if (callback->attach(task)) bridge_.add(callback);

@@ -53,8 +53,10 @@ TaskTable::TaskTable(redag::Platform platform, redag::PolicyKind policy, const W
     : platform_(platform), policy_(policy), configured_(configured) {
   if (configured != nullptr) dags_ = configured->dags;
   for (redag::Dag &dag : dags_) dag.tasks.clear();
-  // All that the workload does not name: no bound, and last among equals.
+  // All that the workload does not name: no bound, and last among equals. In HI mode not more often than its period,
+  // after everything else.
   dags_.emplace_back().name = "ros";
+  dags_.back().degrade = redag::Degrade{.kind = redag::Degrade::Kind::Stretch, .skip = 1, .stretch = 1};
 }
 
 void TaskTable::set(TaskId task, Entry entry) {
