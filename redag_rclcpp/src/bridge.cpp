@@ -36,7 +36,11 @@ void Bridge::add(std::shared_ptr<Callback> callback) {
   wake();
 }
 
+// What is removed may be attached again at once. With Cyclone DDS, setting the hook of a subscription can lock up with
+// a wait that is just beginning for a QoS event of it: the one has the middleware's lock and wants the reader's, the
+// other has the reader's and waits for a listener, which wants the middleware's.
 void Bridge::remove(const Callback &callback) {
+  std::uint64_t begun = 0;
   {
     const std::lock_guard guard(lock_);
     const auto found =
@@ -44,8 +48,12 @@ void Bridge::remove(const Callback &callback) {
     if (found == callbacks_.end()) return;
     *found = std::move(callbacks_.back());
     callbacks_.pop_back();
+    begun = waits_;
   }
   wake();
+  std::unique_lock guard(lock_);
+  left_.wait(guard,
+             [&] { return waiter_ == std::thread::id() || waiter_ == std::this_thread::get_id() || waits_ != begun; });
 }
 
 bool Bridge::empty() const {
@@ -66,9 +74,22 @@ void Bridge::wait(std::chrono::nanoseconds timeout) {
   {
     const std::lock_guard guard(lock_);
     for (const auto &callback : callbacks_) entries.push_back(Entry{callback, callback->waited()});
+    waiter_ = std::this_thread::get_id();
+    ++waits_;
   }
-  fill(set_, conditions_, entries);
-  const rcl_ret_t result = rcl_wait(&set_, timeout.count() < 0 ? -1 : timeout.count());
+  rcl_ret_t result = RCL_RET_ERROR;
+  {
+    const struct Leave {
+      ~Leave() {
+        const std::lock_guard guard(bridge.lock_);
+        bridge.waiter_ = {};
+        bridge.left_.notify_all();
+      }
+      Bridge &bridge;
+    } leave{*this};
+    fill(set_, conditions_, entries);
+    result = rcl_wait(&set_, timeout.count() < 0 ? -1 : timeout.count());
+  }
   if (result == RCL_RET_TIMEOUT) return;
   check(result, "waiting failed");
 

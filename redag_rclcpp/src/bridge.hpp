@@ -3,8 +3,11 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
+#include <cstdint>
 #include <memory>
 #include <mutex>
+#include <thread>
 #include <vector>
 
 #include "callback.hpp"
@@ -24,6 +27,7 @@ class Bridge {
   void watch(const rclcpp::GuardCondition &condition) { conditions_.push_back(&condition); }
 
   void add(std::shared_ptr<Callback> callback);
+  /// When this returns no other thread waits for it. Not with locks of ours held but Core's for collecting.
   void remove(const Callback &callback);
   [[nodiscard]] bool empty() const;
 
@@ -49,8 +53,11 @@ class Bridge {
   std::vector<const rclcpp::GuardCondition *> conditions_;
   rcl_wait_set_t set_;
 
-  mutable std::mutex lock_;
+  mutable std::mutex lock_;  // the rest
   std::vector<std::shared_ptr<Callback>> callbacks_;
+  std::thread::id waiter_;   // of the thread in rcl_wait(), if there is one
+  std::uint64_t waits_ = 0;  // begun
+  std::condition_variable left_;
 };
 
 /// What arrived before these callbacks were attached and was not executed by who had them before: hooks do not tell of

@@ -393,7 +393,8 @@ struct Steady {
       inner->publish(std::make_unique<Strings>());
       outer->publish(Strings());
       ++sent;
-      if (ticks % 4 == 0) {
+      if (ticks % 4 == 0 && client->service_is_ready()) {
+        ++asked;
         client->async_send_request(std::make_shared<EmptyService::Request>(),
                                    [this](rclcpp::Client<EmptyService>::SharedFuture) { ++answered; });
       }
@@ -408,7 +409,7 @@ struct Steady {
   }
 
   rclcpp::Node::SharedPtr node = std::make_shared<rclcpp::Node>("steady");
-  std::atomic<std::uint64_t> ticks{0}, sent{0}, inner_received{0}, outer_received{0}, answered{0};
+  std::atomic<std::uint64_t> ticks{0}, sent{0}, inner_received{0}, outer_received{0}, asked{0}, answered{0};
   rclcpp::Publisher<Strings>::SharedPtr inner, outer;
   rclcpp::SubscriptionBase::SharedPtr inner_subscription, outer_subscription;
   rclcpp::ServiceBase::SharedPtr service;
@@ -490,6 +491,8 @@ class ChurnTest : public ::testing::TestWithParam<Parameters> {
       return steady->inner_received >= steady->sent && steady->outer_received >= steady->sent;
     })) << steady->sent
         << " sent, " << steady->inner_received << " and " << steady->outer_received << " received";
+    EXPECT_TRUE(eventually([&] { return steady->answered >= steady->asked; }))
+        << steady->asked << " asked, " << steady->answered << " answered";
     // What was dropped is forgotten with the next change.
     EXPECT_TRUE(eventually([&] {
       steady->node->create_wall_timer(1h, [] {});
