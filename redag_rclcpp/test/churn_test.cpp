@@ -393,7 +393,8 @@ struct Steady {
       inner->publish(std::make_unique<Strings>());
       outer->publish(Strings());
       ++sent;
-      if (ticks % 4 == 0 && client->service_is_ready()) {
+      // One at a time: a service keeps ten requests, and at full load more would be overwritten.
+      if (ticks % 4 == 0 && asked == answered && client->service_is_ready()) {
         ++asked;
         client->async_send_request(std::make_shared<EmptyService::Request>(),
                                    [this](rclcpp::Client<EmptyService>::SharedFuture) { ++answered; });
