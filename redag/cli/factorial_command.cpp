@@ -9,6 +9,7 @@
 #include "redag/cli/experiment_run.hpp"
 #include "redag/cli/experiment_studies.hpp"
 #include "redag/cli/factorial_report.hpp"
+#include "redag/cli/ros2_run.hpp"
 #include "redag/cli/session.hpp"
 #include "redag/cli/signals.hpp"
 #include "redag/cli/variant.hpp"
@@ -22,7 +23,9 @@ using experiment::FinishedRun;
 using experiment::PlannedRun;
 using experiment::World;
 
-Result<FinishedRun> drive(const PlannedRun &planned) {
+/// Every world's drivers; `program` is that of ROS 2.
+Result<FinishedRun> drive(const PlannedRun &planned, const std::string &program) {
+  if (planned.world == World::Ros2) return run_in_ros2(planned, program, InterruptGuard::flag());
   const Result<Variant> variant = parse_variant(planned.executor);
   REDAG_CHECK(variant.has_value(), "the plan was checked");
   SessionOptions options;
@@ -42,15 +45,19 @@ Result<FinishedRun> drive(const PlannedRun &planned) {
   return FinishedRun{std::move(session->trace), std::move(session->summary), std::move(session->check)};
 }
 
+std::vector<std::string> executors_of(World world) { return world == World::Ros2 ? ros2_executors() : variant_names(); }
+
 class FactorialStudy final : public Study {
  public:
-  explicit FactorialStudy(FactorialPlan plan) : factorial_(std::move(plan), drive), counter_(factorial_) {}
+  explicit FactorialStudy(FactorialPlan plan, const std::string &ros2_program = {})
+      : factorial_(std::move(plan), [ros2_program](const PlannedRun &run) { return drive(run, ros2_program); }),
+        counter_(factorial_) {}
 
   [[nodiscard]] const char *command() const override { return "factorial"; }
   [[nodiscard]] const char *units_are() const override { return "runs"; }
   [[nodiscard]] std::string plan() const override { return to_yaml(factorial_.plan()); }
   [[nodiscard]] std::uint64_t unit_count() const override { return factorial_.unit_count(); }
-  [[nodiscard]] bool takes_turns() const override { return factorial_.plan().world == World::Threads; }
+  [[nodiscard]] bool takes_turns() const override { return factorial_.plan().world != World::Simulator; }
 
   /// On a real machine no executor always comes first, when the machine is coldest or quietest.
   void arrange(std::vector<std::uint64_t> &units) const override {
@@ -105,31 +112,35 @@ Action add_factorial(CLI::App &app) {
   const auto file = std::make_shared<std::string>();
   const auto settings = std::make_shared<StudySettings>();
   app.add_option("PLAN", *file, "Plan (YAML, docs/experiments.md)")->type_name("FILE")->required();
+  const auto program = std::make_shared<std::string>();
+  app.add_option("--run-workload", *program,
+                 "world: ros2: the program run_workload of redag_rclcpp; default: 'ros2 run redag_rclcpp run_workload'")
+      ->type_name("PROGRAM");
   add_study_settings(app, *settings);
   app.footer(
       "Examples:\n"
       "  redag experiment factorial experiments/paper/factorial.yaml --out results/factorial\n"
       "  redag experiment factorial experiments/paper/utilization.yaml --shard 1/2 --out results/utilization-1\n");
-  return [file, settings](Console &console) {
-    Result<FactorialPlan> plan = experiment::load_factorial_plan(*file, variant_names());
+  return [file, program, settings](Console &console) {
+    Result<FactorialPlan> plan = experiment::load_factorial_plan(*file, executors_of);
     if (!plan) {
       console.note(plan.error());
       return kExitBad;
     }
-    if (plan->world == World::Threads) {
+    if (plan->world != World::Simulator) {
       if (settings->shard.count > 1) {
-        console.error("--shard: runs on threads belong to one machine", "give each machine a plan and a folder");
+        console.error("--shard: real runs belong to one machine", "give each machine a plan and a folder");
         return kExitBad;
       }
       if (const auto busy = busy_machine_warning()) console.warn(*busy);
     }
-    FactorialStudy study(std::move(*plan));
+    FactorialStudy study(std::move(*plan), *program);
     return run_study(study, *settings, console);
   };
 }
 
 std::unique_ptr<Study> make_factorial(const std::string &plan, const std::string &file, Console &console) {
-  Result<FactorialPlan> read = experiment::parse_factorial_plan(plan, file, variant_names());
+  Result<FactorialPlan> read = experiment::parse_factorial_plan(plan, file, executors_of);
   if (read) return std::make_unique<FactorialStudy>(std::move(*read));
   console.note(read.error());
   return nullptr;

@@ -35,7 +35,8 @@ bool is_redag(std::string_view executor) { return executor.substr(0, executor.fi
 
 // Does this factor change anything for this executor?
 bool applies(const FactorialPlan &plan, FactorKind kind, std::string_view executor) {
-  const bool has_workers = executor != kUnlimited && executor.substr(0, executor.find('-')) != "ste";
+  const std::string_view family = executor.substr(0, executor.find('-'));
+  const bool has_workers = family != kUnlimited && family != "ste" && family != "static" && family != "events";
   switch (kind) {
     case FactorKind::Policy:
     case FactorKind::MaxActive: return is_redag(executor);
@@ -47,7 +48,7 @@ bool applies(const FactorialPlan &plan, FactorKind kind, std::string_view execut
 
 class Checker {
  public:
-  Checker(const FactorialPlan &plan, const std::vector<std::string> &executors) : plan_(plan), executors_(executors) {}
+  Checker(const FactorialPlan &plan, const ExecutorNames &executors) : plan_(plan), executors_(executors(plan.world)) {}
 
   std::vector<PlanMistake> run() {
     if (!is_plan_name(plan_.name)) say("name", "a name has letters, digits, - and _, and at least one of them");
@@ -122,13 +123,20 @@ class Checker {
   }
 
   const FactorialPlan &plan_;
-  const std::vector<std::string> &executors_;
+  const std::vector<std::string> executors_;
   std::vector<PlanMistake> mistakes_;
 };
 
 }  // namespace
 
-const char *to_string(World world) { return world == World::Simulator ? "simulator" : "threads"; }
+const char *to_string(World world) {
+  switch (world) {
+    case World::Simulator: return "simulator";
+    case World::Threads: return "threads";
+    case World::Ros2: return "ros2";
+  }
+  return "?";
+}
 
 const char *to_string(FactorKind kind) {
   switch (kind) {
@@ -198,7 +206,7 @@ std::string describe(const FactorialPlan &plan, const FactorialPoint &point) {
   return text;
 }
 
-std::vector<PlanMistake> find_mistakes(const FactorialPlan &plan, const std::vector<std::string> &executors) {
+std::vector<PlanMistake> find_mistakes(const FactorialPlan &plan, const ExecutorNames &executors) {
   return Checker(plan, executors).run();
 }
 

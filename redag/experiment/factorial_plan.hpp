@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -18,7 +19,14 @@
 namespace redag::experiment {
 
 /// Where the runs happen.
-enum class World : std::uint8_t { Simulator, Threads };
+enum class World : std::uint8_t {
+  Simulator,
+  Threads,
+  Ros2,  // nodes on rclcpp's executors or ours: run_workload of redag_rclcpp
+};
+
+/// The executors that a world has.
+using ExecutorNames = std::function<std::vector<std::string>(World)>;
 
 /// Executors beside those of the drivers, always simulated and without overheads. `ideal`: ReDAG-RT, fully preemptive,
 /// no max_active. `unlimited`: the same with a worker for every job, so that nobody ever waits.
@@ -94,18 +102,15 @@ struct FactorialPoint {
 /// "workers 4, executor mte": for messages.
 [[nodiscard]] std::string describe(const FactorialPlan &plan, const FactorialPoint &point);
 
-/// `executors`: names of those that the drivers have.
-[[nodiscard]] std::vector<PlanMistake> find_mistakes(const FactorialPlan &plan,
-                                                     const std::vector<std::string> &executors);
+[[nodiscard]] std::vector<PlanMistake> find_mistakes(const FactorialPlan &plan, const ExecutorNames &executors);
 
 /// Canonical text, which holds the workloads themselves: equal plans have equal texts, and parsing gives the plan back.
 [[nodiscard]] std::string to_yaml(const FactorialPlan &plan);
 /// Workloads that are named by files are read; relative names are relative to the folder of `file`. Errors: every
 /// mistake with its place.
 [[nodiscard]] Result<FactorialPlan> parse_factorial_plan(std::string_view text, const std::string &file,
-                                                         const std::vector<std::string> &executors);
-[[nodiscard]] Result<FactorialPlan> load_factorial_plan(const std::string &path,
-                                                        const std::vector<std::string> &executors);
+                                                         const ExecutorNames &executors);
+[[nodiscard]] Result<FactorialPlan> load_factorial_plan(const std::string &path, const ExecutorNames &executors);
 
 [[nodiscard]] const char *to_string(World world);
 

@@ -14,7 +14,10 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-const std::vector<std::string> kExecutors = {"redag", "redag-none", "mte", "ste", "mte-fifo"};
+std::vector<std::string> executors_of(World world) {
+  if (world == World::Ros2) return {"redag", "mte", "events"};
+  return {"redag", "redag-none", "mte", "ste", "mte-fifo"};
+}
 
 constexpr const char *kCart = R"(
 workloads:
@@ -30,13 +33,13 @@ workloads:
 )";
 
 FactorialPlan parsed(const std::string &text) {
-  const Result<FactorialPlan> plan = parse_factorial_plan(text, "plan.yaml", kExecutors);
+  const Result<FactorialPlan> plan = parse_factorial_plan(text, "plan.yaml", executors_of);
   EXPECT_TRUE(plan) << (plan ? "" : to_string(plan.error()));
   return plan.value_or(FactorialPlan{});
 }
 
 std::string errors_of(const std::string &text) {
-  const Result<FactorialPlan> plan = parse_factorial_plan(text, "plan.yaml", kExecutors);
+  const Result<FactorialPlan> plan = parse_factorial_plan(text, "plan.yaml", executors_of);
   EXPECT_FALSE(plan);
   return plan ? "" : to_string(plan.error());
 }
@@ -84,7 +87,7 @@ TEST(FactorialPlan, WorkloadFilesLieBesideThePlan) {
   std::ofstream(folder / "w.yaml") << "name: other\nplatform: {workers: 1}\ndags:\n  - name: d\n    tasks: [{name: t, "
                                       "wcet: 1ms, period: 10ms}]\n";
   std::ofstream(folder / "plan.yaml") << "experiment: factorial\nworkloads: w.yaml\nexecutors: redag\n";
-  const Result<FactorialPlan> plan = load_factorial_plan((folder / "plan.yaml").string(), kExecutors);
+  const Result<FactorialPlan> plan = load_factorial_plan((folder / "plan.yaml").string(), executors_of);
   ASSERT_TRUE(plan) << to_string(plan.error());
   EXPECT_EQ(plan->workloads.at(0).name, "w");
   EXPECT_EQ(plan->workloads.at(0).workload.name, "other");
@@ -111,6 +114,14 @@ TEST(FactorialPlan, WorkersMatterToAllWhereTheyMakeTheDemand) {
   const FactorialPlan plan =
       parsed(std::string("experiment: factorial\nworkers: [1, 2]\nutilization: [0.5, 1]\nexecutors: [ste]") + kCart);
   EXPECT_EQ(points_of(plan).size(), 4U);
+}
+
+TEST(FactorialPlan, WorldsHaveTheirExecutors) {
+  const FactorialPlan plan =
+      parsed(std::string("experiment: factorial\nworld: ros2\nworkers: [1, 2]\nexecutors: [mte, events]") + kCart);
+  EXPECT_EQ(points_of(plan).size(), 3U);  // events has one thread
+  EXPECT_THAT(errors_of(std::string("experiment: factorial\nexecutors: [events]") + kCart),
+              HasSubstr("there is no executor 'events'"));
 }
 
 TEST(FactorialPlan, MistakesHaveTheirPlaceAndAHint) {

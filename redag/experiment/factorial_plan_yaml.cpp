@@ -17,7 +17,7 @@ namespace {
 using yaml::find;
 using yaml::Node;
 
-constexpr std::array kWorlds = {World::Simulator, World::Threads};
+constexpr std::array kWorlds = {World::Simulator, World::Threads, World::Ros2};
 
 const std::vector<std::string_view> kTopKeys = {
     "experiment", "name",        "world",         "seed",           "repetitions", "duration",
@@ -26,7 +26,7 @@ const std::vector<std::string_view> kTopKeys = {
 
 class Reader : private PlanReader {
  public:
-  Reader(const Node &root, std::string file, const std::vector<std::string> &executors)
+  Reader(const Node &root, std::string file, const ExecutorNames &executors)
       : PlanReader(std::move(file)), root_(root), executors_(executors) {}
 
   Result<FactorialPlan> run() {
@@ -188,7 +188,7 @@ class Reader : private PlanReader {
   }
 
   const Node &root_;
-  const std::vector<std::string> &executors_;
+  const ExecutorNames &executors_;
   FactorialPlan plan_;
 };
 
@@ -207,13 +207,13 @@ std::string block(std::string_view text, std::string_view indentation) {
 }  // namespace
 
 Result<FactorialPlan> parse_factorial_plan(std::string_view text, const std::string &file,
-                                           const std::vector<std::string> &executors) {
+                                           const ExecutorNames &executors) {
   const Result<Node> root = yaml::parse(text, file);
   if (!root) return tl::unexpected<Diagnostics>(root.error());
   return Reader(*root, file, executors).run();
 }
 
-Result<FactorialPlan> load_factorial_plan(const std::string &path, const std::vector<std::string> &executors) {
+Result<FactorialPlan> load_factorial_plan(const std::string &path, const ExecutorNames &executors) {
   const Result<std::string> text = trace::read_file(path);
   if (!text) return tl::unexpected<Diagnostics>(text.error());
   return parse_factorial_plan(*text, path, executors);

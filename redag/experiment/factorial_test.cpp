@@ -13,7 +13,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const std::vector<std::string> kExecutors = {"redag", "redag-none", "mte", "ste"};
+std::vector<std::string> executors_of(World /*world*/) { return {"redag", "redag-none", "mte", "ste"}; }
 
 FactorialPlan plan_of(const std::string &text) {
   const Result<FactorialPlan> plan = parse_factorial_plan("experiment: factorial\n" + text +
@@ -29,7 +29,7 @@ workloads:
             {name: act, wcet: 2ms, bcet: 1ms, activation: data, after: sense}]}
         - {name: slow, tasks: [{name: plan, wcet: 30ms, bcet: 30ms, period: 100ms}]}
 )",
-                                                          "plan.yaml", kExecutors);
+                                                          "plan.yaml", executors_of);
   EXPECT_TRUE(plan) << (plan ? "" : to_string(plan.error()));
   return plan.value_or(FactorialPlan{});
 }

@@ -71,12 +71,11 @@ Observation observe(const FinishedRun &run, const ObserveOptions &options) {
     set(Measure::ResponseP99, stats.response.p99);
     set(Measure::ResponseMax, stats.response.max);
     set(Measure::PeakActive, peak);
-    const metrics::PaperCount paper = metrics::paper_count(info.workload, jobs, info.start, dag);
+    const metrics::PaperCount paper = metrics::paper_count(info.workload, jobs, 0, dag);
     set(Measure::PaperJobs, paper.jobs);
     set(Measure::PaperLate, paper.late);
     set(Measure::PaperMaxLateness, paper.max_lateness.value_or(0));
-    set(Measure::PaperStartupLate,
-        metrics::paper_count(info.workload, jobs, info.start - options.paper_startup, dag).late);
+    set(Measure::PaperStartupLate, metrics::paper_count(info.workload, jobs, options.paper_startup, dag).late);
     if (options.quantiles) row.quantiles = quantiles_of(info, jobs, refs, dag);
     return row;
   };

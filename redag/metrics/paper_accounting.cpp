@@ -5,16 +5,19 @@
 
 namespace redag::metrics {
 
-PaperCount paper_count(const Workload &workload, std::span<const JobRecord> records, Time epoch,
+PaperCount paper_count(const Workload &workload, std::span<const JobRecord> records, Duration startup,
                        std::optional<DagId> dag) {
   const std::vector<TaskRef> refs = flatten(workload);
   std::vector<std::int64_t> ran(refs.size(), 0);
+  std::vector<Time> epoch(refs.size(), kNever);
   PaperCount count;
   for (const JobRecord &job : records) {
     const TaskRef &ref = refs[job.task.value];
+    Time &first = epoch[job.task.value];
+    if (first == kNever) first = job.release - startup;
     if (ref.task->activation != Activation::Timer || job.outcome != JobOutcome::Finished) continue;
     if (dag && ref.dag != *dag) continue;
-    const Time nominal = epoch + ref.task->offset + ran[job.task.value]++ * ref.task->period;
+    const Time nominal = first + ran[job.task.value]++ * ref.task->period;
     const Duration lateness = job.finish - (nominal + ref.task->deadline);
     ++count.jobs;
     if (lateness > 0) ++count.late;

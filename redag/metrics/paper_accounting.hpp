@@ -21,9 +21,9 @@ struct PaperCount {
   std::optional<Duration> max_lateness;
 };
 
-/// `records` in order of release (fold_jobs()); those of `dag` only, if given. `epoch`: what the program took for the
-/// start of the release grid.
-[[nodiscard]] PaperCount paper_count(const Workload &workload, std::span<const JobRecord> records, Time epoch,
+/// `records` in order of release (fold_jobs()), from the start of the run; those of `dag` only, if given. A timer's
+/// epoch is `startup` before its first release.
+[[nodiscard]] PaperCount paper_count(const Workload &workload, std::span<const JobRecord> records, Duration startup,
                                      std::optional<DagId> dag = std::nullopt);
 
 }  // namespace redag::metrics

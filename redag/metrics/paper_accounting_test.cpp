@@ -42,8 +42,16 @@ TEST(PaperAccounting, ItsClockFallsBehindWithEveryDroppedRelease) {
 TEST(PaperAccounting, AnEpochBeforeStartUpMakesJobsLate) {
   const std::vector<JobRecord> jobs = {job(0, JobOutcome::Finished, 6), job(1, JobOutcome::Finished, 14)};
   EXPECT_EQ(paper_count(one_timer(), jobs, 0).late, 0U);
-  EXPECT_EQ(paper_count(one_timer(), jobs, -5).late, 1U);
-  EXPECT_EQ(paper_count(one_timer(), jobs, -7).late, 2U);
+  EXPECT_EQ(paper_count(one_timer(), jobs, 5).late, 1U);
+  EXPECT_EQ(paper_count(one_timer(), jobs, 7).late, 2U);
+}
+
+// Timers of ROS 2 begin when their nodes are made.
+TEST(PaperAccounting, TheGridBeginsWithTheFirstRelease) {
+  std::vector<JobRecord> jobs = {job(0, JobOutcome::Finished, 1005), job(1, JobOutcome::Finished, 1015)};
+  for (JobRecord &one : jobs) one.release += 1000;
+  EXPECT_EQ(paper_count(one_timer(), jobs, 0).late, 0U);
+  EXPECT_EQ(paper_count(one_timer(), jobs, 0).max_lateness, -5);
 }
 
 TEST(PaperAccounting, OnlyTimersOfTheDagThatFinished) {
