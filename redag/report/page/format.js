@@ -31,7 +31,7 @@ function formatPercent(ratio) {
 
 const DRIVERS = {
   simulator: 'in virtual time', threads: 'on threads of this machine', ros: 'under ROS 2, as the executor saw it',
-  ros_nodes: 'under ROS 2, as the nodes saw it',
+  ros_nodes: 'under ROS 2, as the nodes saw it', ros2: 'under ROS 2',
 };
 const OUTCOMES = ['in progress', 'finished', 'skipped', 'aborted'];
 const REASONS = [
