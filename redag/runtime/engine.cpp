@@ -19,6 +19,7 @@ using sched::Outcome;
 Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options)
     : options_(std::move(options)),
       scheduler_(std::move(scheduler)),
+      priorities_(os() ? options_.config.max_started : 0, options_.band.top_job),
       paused_(options_.start_paused),
       decisions_(options_.trace_capacity) {
   const sched::Config &config = options_.config;
@@ -46,16 +47,16 @@ Time Engine::now() const noexcept {
 
 Result<void> Engine::start() {
   std::vector<int> cpus = options_.cpus;
+  const std::vector<int> usable = usable_cpus();
   if (os() && cpus.empty()) {
     // The kernel runs the m most urgent threads only if it has exactly m processors to choose for; the last ones,
     // because the first ones serve most interrupts.
-    const std::vector<int> usable = usable_cpus();
     const std::size_t workers = options_.config.workers;
     if (workers <= usable.size()) cpus.assign(usable.end() - static_cast<std::ptrdiff_t>(workers), usable.end());
   }
   for (auto &thread : threads_) {
-    thread->priority = realtime() ? options_.band.top_job : 0;
-    const ThreadSetup setup{options_.name + "-" + std::to_string(thread->index), thread->priority, cpus};
+    const ThreadSetup setup{options_.name + "-" + std::to_string(thread->index),
+                            realtime() ? options_.band.top_job : 0, cpus};
     Result<ThreadHandle> started = start_thread(setup, [this, &self = *thread] { main(self); });
     if (!started) {
       halt();
@@ -67,6 +68,7 @@ Result<void> Engine::start() {
   const Time at = now();
   Locked locked(*this);
   withdraw_if_halting();
+  priorities_.set_processors(std::min(cpus.empty() ? usable.size() : cpus.size(), usable.size()));
   if (os()) {
     for (auto thread = threads_.rbegin(); thread != threads_.rend(); ++thread) idle_.push_back(thread->get());
   }
@@ -84,8 +86,9 @@ void Engine::main(Thread &self) noexcept {
       self.has_mail.store(false, std::memory_order_relaxed);
       // A job that was dispatched to this very thread when the last one ended needs no wake-up.
       Next next{Next::Kind::Start, first};
-      Duration cpu = thread_cpu_now();
-      while (next.kind == Next::Kind::Start) next = run(self, next.assignment, JobSlot(), cpu);
+      self.meter.pass();
+      Time at = now();
+      while (next.kind == Next::Kind::Start) next = run(self, next.assignment, JobSlot(), at);
       continue;
     }
     if (exiting) return;
@@ -116,24 +119,48 @@ std::optional<TaskId> Engine::current_task() const noexcept {
 
 // ---- jobs, on their threads ----
 
-// Runs a job to its end, on top of `below` if that is one. `cpu`: the thread's processor time when it begins, and then
-// when it ends; reading that clock is a system call, so that a job which follows another on its thread is charged for
-// the decision between the two. Returns what this thread is to do next.
-Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot below, Duration &cpu) noexcept {
+// Runs a job to its end, on top of `below` if that is one. `at`: when it begins, and then when it ends: a job which
+// follows another on its thread is charged for the decision between the two, which saves reading clocks. Returns what
+// this thread is to do next.
+Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept {
   const Job &job = assignment.job;
   if (options_.trace_capacity > 0) {
     const Time begun = now();
     self.events.push(
         JobEvent{begun, begun, job.task, job.number, job.worker.value, JobEventKind::Started, Reason::None, 0});
   }
-  RunningJob running{this, self.index, &self.outranked, job.task, job.slot, kNever, cpu, 0, RunningJob::current()};
+  RunningJob running;
+  running.engine = this;
+  running.thread = self.index;
+  running.outranked = &self.outranked;
+  running.task = job.task;
+  running.slot = job.slot;
   running.limit = assignment.entry->next_limit(running);
+  running.begun = at;
+  running.start = self.meter.begin(at, !assignment.expected_short);
+  running.below = RunningJob::current();
   RunningJob::set_current(&running);
   const Outcome outcome = call(assignment);
   RunningJob::set_current(running.below);
+  at = now();
+  const Duration used = charge(self, *assignment.entry, running, at);
+  return finish(self, assignment, running, outcome, at, used, below);
+}
+
+// What a job that ended at `at` has used.
+Duration Engine::charge(Thread &self, const TaskEntry &entry, const RunningJob &running, Time at) noexcept {
+  const Duration took = at - running.begun;
+  if (running.total < 0 && took <= CpuMeter::kShort && !entry.limits_short_jobs()) {
+    self.meter.pass();
+    return took;
+  }
   const Duration used = running.total >= 0 ? running.total : running.cpu_time();
-  cpu += running.cpu_on_top + used;
-  return finish(self, assignment, running, outcome, used, below);
+  if (running.start.exact) {
+    self.meter.set(running.start.cpu + used, at);
+  } else {
+    self.meter.pass();
+  }
+  return used;
 }
 
 Outcome Engine::call(const Assignment &assignment) {
@@ -148,20 +175,20 @@ Outcome Engine::call(const Assignment &assignment) {
 }
 
 Engine::Next Engine::finish(Thread &self, const Assignment &assignment, RunningJob &running, Outcome outcome,
-                            Duration used, JobSlot below) {
+                            Time at, Duration used, JobSlot below) {
   Body doomed;  // of a removed task; destroyed without the lock
-  const Time at = now();
   TaskEntry &entry = *assignment.entry;
   const bool measured = entry.response && outcome == Outcome::Finished;
   const Duration response = at - assignment.job.release;
   if (measured) entry.response->add(response);
   Locked locked(*this);
   withdraw_if_halting();
-  entry.count(used);
+  entry.count(used, at - running.begun);
   if (measured && response > entry.deadline) ++entry.late;
   --entry.busy;
   if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
   self.stack.pop_back();
+  if (os() && &self != caller_.get()) priorities_.end(self.index);
   --unfinished_;
   if (used > running.limit) {
     running.used_budget = running.used_budget || outcome == Outcome::BudgetExceeded;
@@ -172,6 +199,11 @@ Engine::Next Engine::finish(Thread &self, const Assignment &assignment, RunningJ
   if (unfinished_ == 0 && halted_at_ != kNever) idle_event_.set();
   if (unfinished_ == 0 && pause_waiters_ > 0) wake_pause_waiters();
   return next;
+}
+
+Duration RunningJob::cpu_time() const noexcept {
+  const Duration used = thread_cpu_now() - start.cpu;
+  return start.exact ? used : std::min(used, engine->now() - begun);
 }
 
 void RunningJob::reach_preemption_point() { engine->preemption_point(*this); }
@@ -207,8 +239,8 @@ void Engine::report_limits(RunningJob &job, Duration used, Time now) {
 void Engine::preemption_point(RunningJob &job) {
   Thread &self = *threads_[job.thread];
   Next next;
+  Time at = now();
   {
-    const Time at = now();
     Locked locked(*this);
     withdraw_if_halting();
     if (!scheduler_->outranked(job.slot)) return;
@@ -216,11 +248,11 @@ void Engine::preemption_point(RunningJob &job) {
     next = decide(locked, at, &self, job.slot);
   }
   if (next.kind != Next::Kind::Start) return;
-  const Duration before = thread_cpu_now();
-  Duration cpu = before;
-  while (next.kind == Next::Kind::Start) next = run(self, next.assignment, job.slot, cpu);
+  const Duration used = job.cpu_time();
+  self.meter.pass();
+  while (next.kind == Next::Kind::Start) next = run(self, next.assignment, job.slot, at);
   REDAG_CHECK(next.kind == Next::Kind::Resume, "a suspended job was not resumed");
-  job.cpu_on_top += cpu - before;
+  job.start = CpuMeter::Start{thread_cpu_now() - used, true};
 }
 
 // ---- events from outside ----
@@ -299,8 +331,9 @@ bool Engine::run_one() {
     next = decide(locked, at, caller_.get(), JobSlot());
   }
   if (next.kind != Next::Kind::Start) return false;
-  Duration cpu = thread_cpu_now();
-  run(*caller_, next.assignment, JobSlot(), cpu);
+  caller_->meter.forget();
+  Time at = now();
+  run(*caller_, next.assignment, JobSlot(), at);
   return true;
 }
 

@@ -26,6 +26,7 @@
 #include "redag/runtime/mode.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/running_job.hpp"
+#include "redag/runtime/thread_priorities.hpp"
 #include "redag/sched/scheduler.hpp"
 #include "redag/trace/ring.hpp"
 
@@ -183,10 +184,11 @@ class Engine {
   class Locked;
 
   void main(Thread &self) noexcept;
-  Next run(Thread &self, const Assignment &assignment, JobSlot below, Duration &cpu) noexcept;
+  Next run(Thread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;
   sched::Outcome call(const Assignment &assignment);
-  Next finish(Thread &self, const Assignment &assignment, RunningJob &running, sched::Outcome outcome, Duration used,
-              JobSlot below);
+  Duration charge(Thread &self, const TaskEntry &entry, const RunningJob &running, Time at) noexcept;
+  Next finish(Thread &self, const Assignment &assignment, RunningJob &running, sched::Outcome outcome, Time at,
+              Duration used, JobSlot below);
   void preemption_point(RunningJob &job);
   void reach_limit(RunningJob &job, Duration used);
 
@@ -196,7 +198,7 @@ class Engine {
   Next place_on_pool(Locked &locked, const sched::Step &step, Thread *self) REDAG_REQUIRES(lock_);
   Assignment assign(Thread &thread, const sched::Dispatch &dispatch) REDAG_REQUIRES(lock_);
   void hand(Locked &locked, Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
-  void set_level(Thread &thread, std::uint32_t level) REDAG_REQUIRES(lock_);
+  void set_priority(std::size_t thread, int priority) REDAG_REQUIRES(lock_);
   void refresh_outranked() REDAG_REQUIRES(lock_);
   void register_task(TaskId id, const Task &task, Body &body, std::shared_ptr<SkipListener> listener = nullptr)
       REDAG_REQUIRES(lock_);
@@ -217,6 +219,7 @@ class Engine {
   std::deque<TaskEntry> tasks_ REDAG_GUARDED_BY(lock_);   // by TaskId; entries stay where they are
   std::size_t most_started_ REDAG_GUARDED_BY(lock_) = 0;  // jobs that all tasks together can have in progress
   std::uint32_t unfinished_ REDAG_GUARDED_BY(lock_) = 0;  // jobs dispatched and not ended
+  ThreadPriorities priorities_ REDAG_GUARDED_BY(lock_);   // os
   bool running_ REDAG_GUARDED_BY(lock_) = false;          // the threads are there
   bool has_listeners_ REDAG_GUARDED_BY(lock_) = false;    // some task has or had one
   bool paused_ REDAG_GUARDED_BY(lock_);

@@ -63,10 +63,14 @@ Engine::Next Engine::place_on_pool(Locked &locked, const sched::Step &step, Thre
       if (!dispatch.resume && (own == nullptr || dispatch.level < own->level)) own = &dispatch;
     }
   }
+  const PriorityBand &band = options_.band;
+  const auto apply = [this](std::size_t thread, int priority) REDAG_REQUIRES(lock_) { set_priority(thread, priority); };
   Next next;
   if (own != nullptr) {
-    if (self != caller_.get()) set_level(*self, own->level);
     next = Next{Next::Kind::Start, assign(*self, *own)};
+    if (self != caller_.get()) {
+      priorities_.start(self->index, band.of_level(own->level), next.assignment.expected_short, apply);
+    }
   } else if (self != nullptr && self != caller_.get()) {
     idle_.push_back(self);
   }
@@ -77,14 +81,15 @@ Engine::Next Engine::place_on_pool(Locked &locked, const sched::Step &step, Thre
       if (runs_it(caller_)) continue;  // at its own priority
       const auto thread = std::find_if(threads_.begin(), threads_.end(), runs_it);
       REDAG_CHECK(thread != threads_.end(), "a job goes on that no thread has");
-      set_level(**thread, dispatch.level);
+      priorities_.change((*thread)->index, band.of_level(dispatch.level), apply);
       continue;
     }
     REDAG_CHECK(!idle_.empty(), "more jobs started than there are threads");
     Thread &thread = *idle_.back();
     idle_.pop_back();
-    set_level(thread, dispatch.level);
-    hand(locked, thread, assign(thread, dispatch));
+    const Assignment assignment = assign(thread, dispatch);
+    priorities_.start(thread.index, band.of_level(dispatch.level), assignment.expected_short, apply);
+    hand(locked, thread, assignment);
   }
   return next;
 }
@@ -96,7 +101,7 @@ Engine::Assignment Engine::assign(Thread &thread, const Dispatch &dispatch) {
   ++unfinished_;
   const Job job{dispatch.task, dispatch.number, dispatch.release, dispatch.job, dispatch.worker};
   thread.stack.push_back(job);
-  return Assignment{job, &entry};
+  return Assignment{job, &entry, entry.expected_short()};
 }
 
 void Engine::hand(Locked &locked, Thread &thread, const Assignment &assignment) {
@@ -106,11 +111,8 @@ void Engine::hand(Locked &locked, Thread &thread, const Assignment &assignment) 
   locked.wake(thread);
 }
 
-void Engine::set_level(Thread &thread, std::uint32_t level) {
-  const int priority = options_.band.of_level(level);
-  if (thread.priority == priority) return;
-  thread.priority = priority;
-  if (!set_fifo_priority(thread.handle.native_handle(), priority)) {
+void Engine::set_priority(std::size_t thread, int priority) {
+  if (!set_fifo_priority(threads_[thread]->handle.native_handle(), priority)) {
     refused_priorities_.fetch_add(1, std::memory_order_relaxed);
   }
 }

@@ -4,13 +4,16 @@
 #include <array>
 #include <utility>
 
+#include "redag/runtime/cpu_meter.hpp"
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/threads.hpp"
 
 namespace redag::runtime {
 
 struct Engine::TaskEntry {
-  void count(Duration used) {
+  /// A job that used that much and took that long ended.
+  void count(Duration used, Duration took) {
+    short_jobs = took <= CpuMeter::kShort ? std::min(short_jobs + 1, kStreak) : 0;
     ++usage.jobs;
     usage.total += used;
     usage.longest = std::max(usage.longest, used);
@@ -26,6 +29,15 @@ struct Engine::TaskEntry {
     return next;
   }
 
+  /// Is a limit so short, or does it act at once, that processor time has to be known to the system call?
+  [[nodiscard]] bool limits_short_jobs() const {
+    return wcet_low > 0 || budget > 0 || (wcet > 0 && wcet < CpuMeter::kShort);
+  }
+  /// Its last jobs were short: the next one is taken to be, too, until it proves otherwise.
+  [[nodiscard]] bool expected_short() const { return short_jobs == kStreak && !limits_short_jobs(); }
+
+  static constexpr std::uint32_t kStreak = 8;
+
   Body body;
   std::shared_ptr<SkipListener> listener;  // or null
   Duration wcet = 0;
@@ -40,12 +52,14 @@ struct Engine::TaskEntry {
   std::uint64_t withdrawn = 0;    // jobs taken away at the end
   std::uint32_t concurrency = 0;  // jobs that can be in progress
   std::uint32_t busy = 0;         // jobs that have started and not ended
+  std::uint32_t short_jobs = 0;   // in a row, until now; at most kStreak
   bool removed = false;
 };
 
 struct Engine::Assignment {
   Job job;
   TaskEntry *entry = nullptr;  // stays where it is; its body is not touched while `busy`
+  bool expected_short = false;
 };
 
 /// What a thread does after a decision.
@@ -69,8 +83,8 @@ struct alignas(64) Engine::Thread {
   Atomic<bool> has_mail{false};
   Atomic<bool> outranked{false};  // written under the lock
   std::vector<Job> stack;         // lock: the jobs started here, the running one last
-  int priority = 0;               // lock: SCHED_FIFO priority it has now; 0: not real-time
   trace::Ring events;             // Started; written by the thread
+  CpuMeter meter;                 // of the thread
 
   ThreadHandle handle;
 };

@@ -1,6 +1,5 @@
 #include "redag/runtime/preemption_point.hpp"
 
-#include "redag/runtime/clock.hpp"
 #include "redag/runtime/running_job.hpp"
 
 namespace redag {
@@ -13,8 +12,6 @@ constinit thread_local RunningJob *current_job = nullptr;
 
 RunningJob *RunningJob::current() noexcept { return current_job; }
 void RunningJob::set_current(RunningJob *job) noexcept { current_job = job; }
-
-Duration RunningJob::cpu_time() const noexcept { return thread_cpu_now() - cpu_start - cpu_on_top; }
 
 }  // namespace runtime
 

@@ -6,6 +6,7 @@
 #include "redag/base/atomic.hpp"
 #include "redag/base/ids.hpp"
 #include "redag/base/time.hpp"
+#include "redag/runtime/cpu_meter.hpp"
 
 namespace redag::runtime {
 
@@ -18,8 +19,8 @@ struct RunningJob {
   TaskId task;
   JobSlot slot;
   Duration limit = kNever;  // processor time of the next of its limits that is to be looked at; kNever: none
-  Duration cpu_start = 0;   // of the thread, when the body began
-  Duration cpu_on_top = 0;  // used by jobs that ran on top of this one
+  Time begun = 0;           // on the engine's clock
+  CpuMeter::Start start;    // without what jobs that ran on top used
   RunningJob *below = nullptr;
   Duration total = -1;         // the whole job's, once that is known
   bool used_wcet_low = false;  // and the scheduler was told; written under the engine's lock
@@ -27,6 +28,7 @@ struct RunningJob {
 
   void reach_preemption_point();
   void reach_limit(Duration used);
+  /// Processor time until now. Never too little; if its start is not exact, not more than the job took on the clock.
   [[nodiscard]] Duration cpu_time() const noexcept;
   /// For a body that is about to return and wants to know: the engine then need not read the clock again.
   Duration close() noexcept { return total = cpu_time(); }

@@ -1,0 +1,212 @@
+// What a node of a DAG costs when its body is empty: chains, fan-outs and random graphs of 64 nodes, started anew by
+// their last node. Beside it the flow graph of oneTBB and, where its headers are found, Taskflow: both start nodes in no
+// order of priority and time none of them. cpu_ns/node counts all threads.
+#include <benchmark/benchmark.h>
+#include <oneapi/tbb/flow_graph.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/task_arena.h>
+#include <pthread.h>
+#if __has_include(<taskflow/taskflow.hpp>)
+#include <taskflow/taskflow.hpp>
+#define REDAG_HAS_TASKFLOW 1
+#endif
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "redag/base/rng.hpp"
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/engine.hpp"
+#include "redag/runtime/threads.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+
+namespace {
+
+using namespace redag;
+using namespace redag::runtime;
+
+constexpr std::uint32_t kNodes = 64;
+constexpr std::uint32_t kRounds = 1000;
+
+enum class Shape : std::uint8_t { Chain, FanOut, Random };
+constexpr std::array kShapes = {"chain", "fan_out", "random"};
+
+// Node 0 is the only source and the last one the only sink.
+std::vector<std::vector<std::uint32_t>> predecessors_of(Shape shape) {
+  std::vector<std::vector<std::uint32_t>> predecessors(kNodes);
+  Rng rng(7);
+  std::vector<bool> has_successor(kNodes, false);
+  for (std::uint32_t v = 1; v + 1 < kNodes; ++v) {
+    switch (shape) {
+      case Shape::Chain: predecessors[v] = {v - 1}; break;
+      case Shape::FanOut: predecessors[v] = {0}; break;
+      case Shape::Random:
+        for (std::uint32_t u = v < 8 ? 0 : v - 8; u < v; ++u) {
+          if (rng.uniform(0, 3) == 0) predecessors[v].push_back(u);
+        }
+        if (predecessors[v].empty()) predecessors[v] = {v - 1};
+        break;
+    }
+    for (const std::uint32_t u : predecessors[v]) has_successor[u] = true;
+  }
+  for (std::uint32_t u = 0; u + 1 < kNodes; ++u) {
+    if (!has_successor[u]) predecessors[kNodes - 1].push_back(u);
+  }
+  return predecessors;
+}
+
+class Cost {
+ public:
+  explicit Cost(benchmark::State &state) : state_(state) {}
+  ~Cost() {
+    const double nodes = static_cast<double>(state_.iterations()) * kRounds * kNodes;
+    state_.counters["ns/node"] = static_cast<double>(wall_) / nodes;
+    state_.counters["cpu_ns/node"] = static_cast<double>(cpu_) / nodes;
+  }
+  Cost(const Cost &) = delete;
+  Cost &operator=(const Cost &) = delete;
+
+  template <class F>
+  void of(F &&rounds) {
+    const Duration cpu = process_cpu_now();
+    const Time begin = monotonic_now();
+    rounds();
+    const Duration took = monotonic_now() - begin;
+    wall_ += took;
+    cpu_ += process_cpu_now() - cpu;
+    state_.SetIterationTime(static_cast<double>(took) / kSecond);
+  }
+
+ private:
+  static Duration process_cpu_now() {
+    timespec time{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return time.tv_sec * kSecond + time.tv_nsec;
+  }
+
+  benchmark::State &state_;
+  Duration wall_ = 0;
+  Duration cpu_ = 0;
+};
+
+void redag_engine(benchmark::State &state, Shape shape, PreemptionMode mode) {
+  const auto workers = static_cast<std::uint32_t>(state.range(0));
+  Result<Setup> setup = set_up(mode, PolicyKind::Fixed, workers, 0, {});
+  if (!setup) return state.SkipWithError("this mode cannot be had here");
+  Workload workload;
+  workload.dags.emplace_back();
+  for (const auto &predecessors : predecessors_of(shape)) {
+    Task task;
+    task.priority = static_cast<int>(workload.dags[0].tasks.size());  // the sink does not preempt itself
+    task.period = task.deadline = kSecond;
+    task.wcet = kMillisecond;
+    task.activation = predecessors.empty() ? Activation::Timer : Activation::Data;
+    task.predecessors = predecessors;
+    workload.dags[0].tasks.push_back(task);
+  }
+  EngineOptions options;
+  options.config = setup->config;
+  options.band = setup->band;
+  Engine engine(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+  FutexWord done{0};
+  std::uint32_t left = 0;
+  std::vector<std::atomic<std::uint32_t>> runs(kNodes);
+  std::vector<Body> bodies(kNodes, [&](const runtime::Job &job) {
+    runs[job.task.value].fetch_add(1, std::memory_order_relaxed);
+    return sched::Outcome::Finished;
+  });
+  bodies.back() = [&](const runtime::Job &) {
+    if (--left > 0) {
+      engine.release(TaskId(0), 0);
+    } else {
+      done.store(1);
+      futex_wake(done, 1);
+    }
+    return sched::Outcome::Finished;
+  };
+  engine.bind(workload, std::move(bodies));
+  engine.set_origin(monotonic_now());
+  if (!engine.start()) return state.SkipWithError("threads cannot be started");
+  Cost cost(state);
+  for (auto _ : state) {
+    left = kRounds;
+    done.store(0);
+    cost.of([&] {
+      engine.release(TaskId(0), 0);
+      while (done.load() == 0) futex_wait(done, 0);
+    });
+  }
+}
+
+void tbb_flow_graph(benchmark::State &state, Shape shape) {
+  const auto workers = static_cast<std::size_t>(state.range(0));
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, workers);
+  tbb::task_arena arena(static_cast<int>(workers));
+  Cost cost(state);
+  arena.execute([&] {
+    using Node = tbb::flow::continue_node<tbb::flow::continue_msg>;
+    tbb::flow::graph graph;
+    std::uint32_t left = 0;
+    std::vector<std::atomic<std::uint32_t>> runs(kNodes);
+    std::vector<std::unique_ptr<Node>> nodes;
+    const auto predecessors = predecessors_of(shape);
+    for (std::uint32_t v = 0; v < kNodes; ++v) {
+      nodes.push_back(std::make_unique<Node>(graph, [&, v](const tbb::flow::continue_msg &) {
+        runs[v].fetch_add(1, std::memory_order_relaxed);
+        if (v + 1 == kNodes && --left > 0) nodes[0]->try_put(tbb::flow::continue_msg());
+      }));
+      for (const std::uint32_t u : predecessors[v]) tbb::flow::make_edge(*nodes[u], *nodes[v]);
+    }
+    for (auto _ : state) {
+      left = kRounds;
+      cost.of([&] {
+        nodes[0]->try_put(tbb::flow::continue_msg());
+        graph.wait_for_all();
+      });
+    }
+  });
+}
+
+#ifdef REDAG_HAS_TASKFLOW
+void taskflow(benchmark::State &state, Shape shape) {
+  tf::Executor executor(static_cast<std::size_t>(state.range(0)));
+  tf::Taskflow flow;
+  std::vector<std::atomic<std::uint32_t>> runs(kNodes);
+  std::vector<tf::Task> nodes;
+  const auto predecessors = predecessors_of(shape);
+  for (std::uint32_t v = 0; v < kNodes; ++v) {
+    nodes.push_back(flow.emplace([&runs, v] { runs[v].fetch_add(1, std::memory_order_relaxed); }));
+    for (const std::uint32_t u : predecessors[v]) nodes[u].precede(nodes[v]);
+  }
+  Cost cost(state);
+  for (auto _ : state) {
+    cost.of([&] { executor.run_n(flow, kRounds).wait(); });
+  }
+}
+#endif
+
+[[maybe_unused]] const bool registered = [] {
+  const auto add = [](const std::string &name, auto function) {
+    benchmark::RegisterBenchmark(name.c_str(), function)
+        ->ArgName("workers")
+        ->Arg(1)
+        ->Arg(2)
+        ->UseManualTime()
+        ->Unit(benchmark::kMillisecond);
+  };
+  for (const Shape shape : {Shape::Chain, Shape::FanOut, Shape::Random}) {
+    const std::string name = kShapes[static_cast<std::size_t>(shape)];
+    add(name + "/redag_none", [=](benchmark::State &state) { redag_engine(state, shape, PreemptionMode::None); });
+    add(name + "/redag_os", [=](benchmark::State &state) { redag_engine(state, shape, PreemptionMode::Os); });
+    add(name + "/tbb_flow_graph", [=](benchmark::State &state) { tbb_flow_graph(state, shape); });
+#ifdef REDAG_HAS_TASKFLOW
+    add(name + "/taskflow", [=](benchmark::State &state) { taskflow(state, shape); });
+#endif
+  }
+  return true;
+}();
+
+}  // namespace

@@ -1,0 +1,168 @@
+// What the engine spares jobs that are over within CpuMeter::kShort, and that nobody notices it.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/cpu_meter.hpp"
+#include "redag/runtime/engine.hpp"
+#include "redag/runtime/preemption_point.hpp"
+#include "redag/runtime/threads.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+
+namespace redag::runtime {
+namespace {
+
+using sched::Outcome;
+
+constexpr int kEnoughToBeExpectedShort = 200;  // eight in a row will do; a loaded machine interrupts some
+
+// Independent tasks on one worker; the first one is the most urgent.
+class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
+ protected:
+  void SetUp() override {
+    band = probe_priority_band();
+    if (GetParam() == PreemptionMode::Os && band.top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+  }
+
+  void start(std::vector<Body> bodies) {
+    Workload workload;
+    workload.policy = PolicyKind::Fixed;
+    workload.dags.emplace_back();
+    for (std::size_t t = 0; t < bodies.size(); ++t) {
+      Task task;
+      task.period = task.deadline = task.wcet = kSecond;
+      task.priority = -static_cast<int>(t);
+      workload.dags[0].tasks.push_back(task);
+    }
+    EngineOptions options;
+    options.config = make_config(Mode{GetParam(), {}}, 1, workload.policy, band, 4);
+    options.band = band;
+    engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+    engine->bind(workload, std::move(bodies));
+    ASSERT_TRUE(engine->start());
+    engine->set_origin(monotonic_now());
+  }
+
+  void run(std::size_t task, int times = 1) {
+    for (int i = 0; i < times; ++i) {
+      const std::uint64_t before = finished(task);
+      engine->release(TaskId(task), engine->now());
+      while (finished(task) == before) std::this_thread::yield();
+    }
+  }
+
+  std::uint64_t finished(std::size_t task) const { return engine->accounting(TaskId(task)).finished; }
+
+  PriorityBand band;
+  std::unique_ptr<Engine> engine;
+};
+INSTANTIATE_TEST_SUITE_P(Modes, ShortJobs,
+                         ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os),
+                         [](const auto &instance) { return std::string(to_string(instance.param)); });
+
+TEST_P(ShortJobs, OneThatSleepsAllTheSameIsNotChargedForIt) {
+  std::atomic<bool> sleeps{false};
+  start({[&](const Job &) {
+    if (sleeps) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    return Outcome::Finished;
+  }});
+  run(0, kEnoughToBeExpectedShort);
+  sleeps = true;
+  run(0, 3);
+  EXPECT_LT(engine->usage(TaskId(0)).longest, 25 * kMillisecond);
+}
+
+TEST_P(ShortJobs, OneThatComputesAllTheSameIsChargedForIt) {
+  std::atomic<Duration> demand{0};
+  start({[&](const Job &) {
+    const Duration begun = thread_cpu_now();
+    while (thread_cpu_now() - begun < demand) {
+    }
+    if (demand > 0) {
+      EXPECT_GE(job_cpu_time(), demand);
+    }
+    return Outcome::Finished;
+  }});
+  run(0, kEnoughToBeExpectedShort);
+  EXPECT_GT(engine->usage(TaskId(0)).total, 0);
+  demand = 2 * kMillisecond;
+  run(0);
+  EXPECT_GE(engine->usage(TaskId(0)).longest, demand);
+  EXPECT_LT(engine->usage(TaskId(0)).longest, 100 * demand);
+}
+
+TEST_P(ShortJobs, AJobIsNotChargedForTheOneBefore) {
+  const auto use = [](Duration demand) {
+    const Duration begun = thread_cpu_now();
+    while (thread_cpu_now() - begun < demand) {
+    }
+    return Outcome::Finished;
+  };
+  start({[&](const Job &) { return use(20 * kMillisecond); }, [&](const Job &) { return use(100 * kMicrosecond); }});
+  const Release both[] = {{TaskId(0), engine->now()}, {TaskId(1), engine->now()}};
+  engine->release(both);
+  while (finished(1) == 0) std::this_thread::yield();
+  EXPECT_GE(engine->usage(TaskId(0)).longest, 20 * kMillisecond);
+  EXPECT_GE(engine->usage(TaskId(1)).longest, 100 * kMicrosecond);
+  EXPECT_LT(engine->usage(TaskId(1)).longest, 10 * kMillisecond);
+}
+
+// Between the jobs of 2 and 0 there is one of 1: it must not wait for 2, whose thread has the priority of 0 before it.
+TEST_P(ShortJobs, AThreadThatKeptItsPriorityLosesItToAJobInBetween) {
+  if (GetParam() != PreemptionMode::Os) GTEST_SKIP() << "the other modes do not change priorities";
+  std::atomic<bool> waits{false};
+  std::atomic<bool> seen{false};
+  start({[](const Job &) { return Outcome::Finished; },
+         [&](const Job &) {
+           seen = true;
+           return Outcome::Finished;
+         },
+         [&](const Job &) {
+           if (!waits) return Outcome::Finished;
+           engine->release(TaskId(1), engine->now());
+           const Time give_up = monotonic_now() + 5 * kSecond;
+           while (!seen && monotonic_now() < give_up) {
+           }
+           EXPECT_TRUE(seen);
+           EXPECT_EQ(fifo_priority(pthread_self()), band.of_level(2));
+           return Outcome::Finished;
+         }});
+  run(2, kEnoughToBeExpectedShort);
+  waits = true;
+  run(0);
+  run(2);
+}
+
+// The thread is asked for its priority from within: what is short keeps the one before, what is not has its own.
+TEST_P(ShortJobs, OnlyOneThatIsExpectedToBeShortKeepsAHigherPriority) {
+  if (GetParam() != PreemptionMode::Os) GTEST_SKIP() << "the other modes do not change priorities";
+  std::atomic<int> last{0};
+  std::atomic<bool> is_long{true};
+  start({[](const Job &) { return Outcome::Finished; },
+         [&](const Job &) {
+           last = fifo_priority(pthread_self());
+           const Time end = monotonic_now() + (is_long ? 2 * CpuMeter::kShort : 0);
+           while (monotonic_now() < end) {
+           }
+           return Outcome::Finished;
+         }});
+  run(1);
+  run(0);
+  run(1);
+  EXPECT_EQ(last, band.of_level(1));
+  is_long = false;
+  for (int i = 0; i < 100 && last == band.of_level(1); ++i) {
+    run(1, 10);
+    run(0);
+    run(1);
+  }
+  EXPECT_EQ(last, band.of_level(0));
+}
+
+}  // namespace
+}  // namespace redag::runtime

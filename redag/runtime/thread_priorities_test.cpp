@@ -1,0 +1,131 @@
+#include "redag/runtime/thread_priorities.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+namespace redag::runtime {
+namespace {
+
+constexpr int kFirst = 80;
+
+// What the kernel has, beside the jobs that the threads have.
+struct Kernel {
+  explicit Kernel(std::size_t count, std::size_t cpus)
+      : processors(cpus), priorities(count, kFirst), threads(count, kFirst), jobs(count) {
+    threads.set_processors(cpus);
+  }
+
+  void start(std::size_t thread, int priority, bool is_short) {
+    jobs[thread] = priority;
+    threads.start(thread, priority, is_short, [this](std::size_t t, int p) { apply(t, p); });
+    if (!is_short) {
+      EXPECT_EQ(priorities[thread], priority);
+    }
+  }
+  void change(std::size_t thread, int priority) {
+    jobs[thread] = priority;
+    threads.change(thread, priority, [this](std::size_t t, int p) { apply(t, p); });
+    EXPECT_EQ(priorities[thread], priority);
+  }
+  void end(std::size_t thread) {
+    jobs[thread].reset();
+    threads.end(thread);
+  }
+  void apply(std::size_t thread, int priority) {
+    EXPECT_NE(priorities[thread], priority) << "a change that is none";
+    priorities[thread] = priority;
+    ++changes;
+  }
+
+  [[nodiscard]] bool all_run() const {
+    return static_cast<std::size_t>(std::count_if(jobs.begin(), jobs.end(), [](auto &j) { return j.has_value(); })) <=
+           processors;
+  }
+  // The threads are in the order of their jobs, and above what these ask for at most.
+  [[nodiscard]] bool ordered() const {
+    for (std::size_t a = 0; a < jobs.size(); ++a) {
+      for (std::size_t b = 0; b < jobs.size(); ++b) {
+        if (!jobs[a] || !jobs[b]) continue;
+        if ((*jobs[a] < *jobs[b]) != (priorities[a] < priorities[b])) return false;
+      }
+    }
+    return true;
+  }
+  [[nodiscard]] bool none_below() const {
+    for (std::size_t t = 0; t < jobs.size(); ++t) {
+      if (jobs[t] && priorities[t] < *jobs[t]) return false;
+      if (priorities[t] != threads.priority(t)) return false;
+    }
+    return true;
+  }
+
+  std::size_t processors;
+  std::vector<int> priorities;
+  ThreadPriorities threads;
+  std::vector<std::optional<int>> jobs;
+  int changes = 0;
+};
+
+TEST(ThreadPriorities, ShortJobsOneAfterAnotherCostNothing) {
+  Kernel kernel(3, 2);
+  for (int i = 0; i < 10; ++i) {
+    kernel.start(0, 70 - i, true);
+    kernel.start(1, 60 + i, true);
+    kernel.end(0);
+    kernel.end(1);
+  }
+  EXPECT_EQ(kernel.changes, 0);
+}
+
+TEST(ThreadPriorities, ALongJobHasItsOwn) {
+  Kernel kernel(1, 1);
+  kernel.start(0, 10, false);
+  EXPECT_EQ(kernel.priorities[0], 10);
+}
+
+TEST(ThreadPriorities, AJobMoreThanProcessorsPutsAllInOrder) {
+  Kernel kernel(3, 2);
+  kernel.start(0, 20, true);
+  kernel.start(1, 10, true);
+  EXPECT_EQ(kernel.changes, 0);
+  kernel.start(2, 15, true);
+  EXPECT_TRUE(kernel.ordered());
+}
+
+TEST(ThreadPriorities, AShortJobAboveAPreemptedOneKeepsWhatItHas) {
+  Kernel kernel(2, 1);
+  kernel.start(0, 10, false);
+  kernel.start(1, 50, true);
+  const int changes = kernel.changes;
+  kernel.end(1);
+  kernel.start(1, 40, true);
+  EXPECT_EQ(kernel.changes, changes);
+  EXPECT_TRUE(kernel.ordered());
+  kernel.change(0, 60);  // it inherits
+  EXPECT_TRUE(kernel.ordered());
+}
+
+RC_GTEST_PROP(ThreadPriorities, MoreJobsThanProcessorsAreAlwaysInOrder, ()) {
+  const auto count = *rc::gen::inRange<std::size_t>(1, 6);
+  Kernel kernel(count, *rc::gen::inRange<std::size_t>(1, 4));
+  for (int steps = *rc::gen::inRange(1, 60); steps > 0; --steps) {
+    const auto thread = *rc::gen::inRange<std::size_t>(0, count);
+    const int priority = *rc::gen::inRange(1, *rc::gen::element(5, kFirst));
+    if (!kernel.jobs[thread]) {
+      kernel.start(thread, priority, *rc::gen::arbitrary<bool>());
+    } else if (*rc::gen::inRange(0, 4) == 0) {
+      kernel.change(thread, priority);
+    } else {
+      kernel.end(thread);
+    }
+    RC_ASSERT(kernel.none_below());
+    RC_ASSERT(kernel.all_run() || kernel.ordered());
+  }
+}
+
+}  // namespace
+}  // namespace redag::runtime
