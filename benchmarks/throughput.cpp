@@ -42,7 +42,7 @@ void BM_Engine(benchmark::State &state) {
   for (std::uint32_t t = 0; t < kTasks; ++t) {
     Task task;
     task.period = task.deadline = (t + 1) * kMillisecond;
-    task.wcet = kMicrosecond;
+    task.wcet = kMillisecond;
     workload.dags[0].tasks.push_back(task);
   }
   std::uint64_t jobs = 0;

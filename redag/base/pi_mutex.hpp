@@ -14,10 +14,13 @@ namespace redag {
 
 class REDAG_CAPABILITY("mutex") PiMutex {
  public:
-  PiMutex() {
+  /// `inherits` false: for when all threads that take it are alike. It then goes to whoever comes first instead of to
+  /// the one that waits, which is faster by far with more threads than processors.
+  explicit PiMutex(bool inherits = true) {
     pthread_mutexattr_t attributes;
     REDAG_CHECK(pthread_mutexattr_init(&attributes) == 0, "no mutex attributes");
-    REDAG_CHECK(pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT) == 0, "no priority inheritance");
+    const int protocol = inherits ? PTHREAD_PRIO_INHERIT : PTHREAD_PRIO_NONE;
+    REDAG_CHECK(pthread_mutexattr_setprotocol(&attributes, protocol) == 0, "no priority inheritance");
     REDAG_CHECK(pthread_mutex_init(&mutex_, &attributes) == 0, "the kernel has no priority-inheriting futexes");
     pthread_mutexattr_destroy(&attributes);
   }

@@ -18,6 +18,7 @@ using sched::Outcome;
 
 Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options)
     : options_(std::move(options)),
+      lock_(realtime()),
       scheduler_(std::move(scheduler)),
       priorities_(os() ? options_.config.max_started : 0, options_.band.top_job),
       paused_(options_.start_paused),
@@ -55,8 +56,8 @@ Result<void> Engine::start() {
     if (workers <= usable.size()) cpus.assign(usable.end() - static_cast<std::ptrdiff_t>(workers), usable.end());
   }
   for (auto &thread : threads_) {
-    const ThreadSetup setup{options_.name + "-" + std::to_string(thread->index),
-                            realtime() ? options_.band.top_job : 0, cpus};
+    const ThreadSetup setup{options_.name + "-" + std::to_string(thread->index), realtime() ? options_.band.top_job : 0,
+                            cpus};
     Result<ThreadHandle> started = start_thread(setup, [this, &self = *thread] { main(self); });
     if (!started) {
       halt();
@@ -174,8 +175,8 @@ Outcome Engine::call(const Assignment &assignment) {
   }
 }
 
-Engine::Next Engine::finish(Thread &self, const Assignment &assignment, RunningJob &running, Outcome outcome,
-                            Time at, Duration used, JobSlot below) {
+Engine::Next Engine::finish(Thread &self, const Assignment &assignment, RunningJob &running, Outcome outcome, Time at,
+                            Duration used, JobSlot below) {
   Body doomed;  // of a removed task; destroyed without the lock
   TaskEntry &entry = *assignment.entry;
   const bool measured = entry.response && outcome == Outcome::Finished;

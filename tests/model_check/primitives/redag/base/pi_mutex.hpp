@@ -8,7 +8,7 @@ namespace redag {
 
 class REDAG_CAPABILITY("mutex") PiMutex {
  public:
-  PiMutex() = default;
+  explicit PiMutex(bool = true) {}
   PiMutex(const PiMutex &) = delete;
   PiMutex &operator=(const PiMutex &) = delete;
 
