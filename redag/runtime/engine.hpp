@@ -198,7 +198,7 @@ class Engine {
   Next place_on_pool(Locked &locked, const sched::Step &step, Thread *self) REDAG_REQUIRES(lock_);
   Assignment assign(Thread &thread, const sched::Dispatch &dispatch) REDAG_REQUIRES(lock_);
   void hand(Locked &locked, Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
-  void set_priority(std::size_t thread, int priority) REDAG_REQUIRES(lock_);
+  void apply(std::span<const ThreadPriorities::Change> changes) REDAG_REQUIRES(lock_);
   void refresh_outranked() REDAG_REQUIRES(lock_);
   void register_task(TaskId id, const Task &task, Body &body, std::shared_ptr<SkipListener> listener = nullptr)
       REDAG_REQUIRES(lock_);

@@ -64,12 +64,11 @@ Engine::Next Engine::place_on_pool(Locked &locked, const sched::Step &step, Thre
     }
   }
   const PriorityBand &band = options_.band;
-  const auto apply = [this](std::size_t thread, int priority) REDAG_REQUIRES(lock_) { set_priority(thread, priority); };
   Next next;
   if (own != nullptr) {
     next = Next{Next::Kind::Start, assign(*self, *own)};
     if (self != caller_.get()) {
-      priorities_.start(self->index, band.of_level(own->level), next.assignment.expected_short, apply);
+      apply(priorities_.start(self->index, band.of_level(own->level), next.assignment.expected_short));
     }
   } else if (self != nullptr && self != caller_.get()) {
     idle_.push_back(self);
@@ -81,14 +80,14 @@ Engine::Next Engine::place_on_pool(Locked &locked, const sched::Step &step, Thre
       if (runs_it(caller_)) continue;  // at its own priority
       const auto thread = std::find_if(threads_.begin(), threads_.end(), runs_it);
       REDAG_CHECK(thread != threads_.end(), "a job goes on that no thread has");
-      priorities_.change((*thread)->index, band.of_level(dispatch.level), apply);
+      apply(priorities_.change((*thread)->index, band.of_level(dispatch.level)));
       continue;
     }
     REDAG_CHECK(!idle_.empty(), "more jobs started than there are threads");
     Thread &thread = *idle_.back();
     idle_.pop_back();
     const Assignment assignment = assign(thread, dispatch);
-    priorities_.start(thread.index, band.of_level(dispatch.level), assignment.expected_short, apply);
+    apply(priorities_.start(thread.index, band.of_level(dispatch.level), assignment.expected_short));
     hand(locked, thread, assignment);
   }
   return next;
@@ -111,9 +110,11 @@ void Engine::hand(Locked &locked, Thread &thread, const Assignment &assignment) 
   locked.wake(thread);
 }
 
-void Engine::set_priority(std::size_t thread, int priority) {
-  if (!set_fifo_priority(threads_[thread]->handle.native_handle(), priority)) {
-    refused_priorities_.fetch_add(1, std::memory_order_relaxed);
+void Engine::apply(std::span<const ThreadPriorities::Change> changes) {
+  for (const ThreadPriorities::Change &change : changes) {
+    if (!set_fifo_priority(threads_[change.thread]->handle.native_handle(), change.priority)) {
+      refused_priorities_.fetch_add(1, std::memory_order_relaxed);
+    }
   }
 }
 

@@ -1,0 +1,65 @@
+#include "redag/runtime/thread_priorities.hpp"
+
+#include <algorithm>
+
+#include "redag/base/check.hpp"
+
+namespace redag::runtime {
+
+ThreadPriorities::ThreadPriorities(std::size_t threads, int priority) : threads_(threads, Thread{priority, 0, false}) {
+  changes_.reserve(threads);
+}
+
+std::span<const ThreadPriorities::Change> ThreadPriorities::start(std::size_t thread, int priority, bool is_short) {
+  REDAG_CHECK(!threads_[thread].started, "a thread has two jobs");
+  threads_[thread].started = true;
+  ++started_;
+  return place(threads_[thread], priority, is_short);
+}
+
+std::span<const ThreadPriorities::Change> ThreadPriorities::change(std::size_t thread, int priority) {
+  return place(threads_[thread], priority, false);
+}
+
+void ThreadPriorities::end(std::size_t thread) {
+  threads_[thread].started = false;
+  --started_;
+}
+
+std::span<const ThreadPriorities::Change> ThreadPriorities::place(Thread &self, int priority, bool is_short) {
+  changes_.clear();
+  self.of_job = priority;
+  const bool all_run = started_ <= processors_;
+  if (unordered_ && !all_run) {
+    for (Thread &thread : threads_) {
+      if (thread.started) set(thread);
+    }
+    unordered_ = false;
+    return changes_;
+  }
+  // Threads whose order with this one is not that of their jobs, or not for every job that may come in between.
+  const auto overlaps = [&self](const Thread &other) {
+    return &other != &self && other.started && other.of_job <= self.priority && self.of_job <= other.priority;
+  };
+  if (is_short && self.priority > self.of_job) {
+    const bool ordered = std::none_of(threads_.begin(), threads_.end(), overlaps);
+    if (ordered) return changes_;
+    if (all_run) {
+      unordered_ = true;
+      return changes_;
+    }
+  }
+  set(self);
+  for (Thread &thread : threads_) {
+    if (overlaps(thread)) set(thread);
+  }
+  return changes_;
+}
+
+void ThreadPriorities::set(Thread &thread) {
+  if (thread.priority == thread.of_job) return;
+  thread.priority = thread.of_job;
+  changes_.push_back(Change{static_cast<std::size_t>(&thread - threads_.data()), thread.priority});
+}
+
+}  // namespace redag::runtime
