@@ -25,9 +25,9 @@ constexpr int kEnoughToBeExpectedShort = 200;  // eight in a row will do; a load
 class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
  protected:
   void SetUp() override {
-    band = probe_priority_band();
-    if (GetParam() == PreemptionMode::Os && band.top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+    if (mode() == PreemptionMode::Os && band.top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
   }
+  static PreemptionMode mode() { return GetParam(); }
 
   void start(std::vector<Body> bodies) {
     Workload workload;
@@ -40,7 +40,7 @@ class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
       workload.dags[0].tasks.push_back(task);
     }
     EngineOptions options;
-    options.config = make_config(Mode{GetParam(), {}}, 1, workload.policy, band, 4);
+    options.config = make_config(Mode{mode(), {}}, 1, workload.policy, band, 4);
     options.band = band;
     engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
     engine->bind(workload, std::move(bodies));
@@ -58,7 +58,7 @@ class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
 
   std::uint64_t finished(std::size_t task) const { return engine->accounting(TaskId(task)).finished; }
 
-  PriorityBand band;
+  const PriorityBand band = probe_priority_band();
   std::unique_ptr<Engine> engine;
 };
 INSTANTIATE_TEST_SUITE_P(Modes, ShortJobs,
@@ -112,9 +112,13 @@ TEST_P(ShortJobs, AJobIsNotChargedForTheOneBefore) {
   EXPECT_LT(engine->usage(TaskId(1)).longest, 10 * kMillisecond);
 }
 
+// The other modes do not change priorities.
+class ShortJobsWithPriorities : public ShortJobs {};
+INSTANTIATE_TEST_SUITE_P(Modes, ShortJobsWithPriorities, ::testing::Values(PreemptionMode::Os),
+                         [](const auto &instance) { return std::string(to_string(instance.param)); });
+
 // Between the jobs of 2 and 0 there is one of 1: it must not wait for 2, whose thread has the priority of 0 before it.
-TEST_P(ShortJobs, AThreadThatKeptItsPriorityLosesItToAJobInBetween) {
-  if (GetParam() != PreemptionMode::Os) GTEST_SKIP() << "the other modes do not change priorities";
+TEST_P(ShortJobsWithPriorities, AThreadThatKeptItsPriorityLosesItToAJobInBetween) {
   std::atomic<bool> waits{false};
   std::atomic<bool> seen{false};
   start({[](const Job &) { return Outcome::Finished; },
@@ -139,8 +143,7 @@ TEST_P(ShortJobs, AThreadThatKeptItsPriorityLosesItToAJobInBetween) {
 }
 
 // The thread is asked for its priority from within: what is short keeps the one before, what is not has its own.
-TEST_P(ShortJobs, OnlyOneThatIsExpectedToBeShortKeepsAHigherPriority) {
-  if (GetParam() != PreemptionMode::Os) GTEST_SKIP() << "the other modes do not change priorities";
+TEST_P(ShortJobsWithPriorities, OnlyOneThatIsExpectedToBeShortKeepsAHigherPriority) {
   std::atomic<int> last{0};
   std::atomic<bool> is_long{true};
   start({[](const Job &) { return Outcome::Finished; },

@@ -115,7 +115,7 @@ TEST(RunWorkload, JobsThatDoNotEndAreNamed) {
   Workload workload = two_rates(1, PreemptionMode::None);
   workload.dags[1].tasks[0].wcet = workload.dags[1].tasks[0].bcet = 3600 * kSecond;
   RunOptions options;
-  options.duration = 20 * kMillisecond;
+  options.duration = 200 * kMillisecond;
   options.drain_timeout = kMillisecond;
   const RunResult result = run(workload, options);
   EXPECT_EQ(result.unfinished, std::vector<std::string>{"slow.slow0 #0"});
