@@ -61,16 +61,14 @@ class Diffing {
       console_.note(found.error());
       return false;
     }
-    if (found->runs.size() != 1) {
-      std::vector<std::string> labels;
-      for (const RecordedRuns &runs : found->runs) labels.push_back(runs.label);
-      console_.error(fmt::format("{}: holds runs of {} kinds: {}", place, labels.size(), some_of(labels)),
-                     fmt::format("name one of them, such as {}/{}", place, labels.front()));
-      return false;
-    }
     side.name = place;
-    for (const std::string &note : found->notes) diffed_.warnings.push_back(place + ": " + note);
-    const std::vector<std::string> &traces = found->runs.front().traces;
+    for (const std::string &note : found->notes) diffed_.warnings.push_back(fmt::format("{}: {}", place, note));
+    std::vector<std::string> traces;
+    std::vector<std::string> labels;
+    for (const RecordedRuns &runs : found->runs) {
+      traces.insert(traces.end(), runs.traces.begin(), runs.traces.end());
+      labels.push_back(runs.label);
+    }
     for (std::size_t i = 0; i < traces.size(); ++i) {
       if (InterruptGuard::interrupted()) {
         progress_.clear();
@@ -84,29 +82,34 @@ class Diffing {
         console_.note(trace.error());
         return false;
       }
-      if (!add(traces[i], *trace, side)) return false;
+      if (const std::string other = add(*trace, side); !other.empty()) {
+        progress_.clear();
+        if (labels.size() > 1) {
+          console_.error(fmt::format("{}: holds runs of several kinds: {}", place, some_of(labels)),
+                         fmt::format("name one of them, such as {}/{}", place, labels.front()));
+        } else {
+          console_.error(fmt::format("{}: is no repetition of the run beside it: {}", traces[i], other),
+                         "keep runs of one kind in a folder");
+        }
+        return false;
+      }
     }
     progress_.clear();
     return true;
   }
 
-  bool add(const std::string &file, const trace::Trace &trace, DiffSide &side) {
+  // Why it is no repetition of the runs before, or empty.
+  static std::string add(const trace::Trace &trace, DiffSide &side) {
     if (!side.jobs.runs().empty()) {
       const trace::RunInfo &first = side.jobs.runs().front();
       const bool same_way = first.executor == trace.info.executor && first.preemption == trace.info.preemption &&
                             first.driver == trace.info.driver && first.config.workers == trace.info.config.workers;
+      if (!same_way) return "its executor, mode, workers or driver differ";
       const std::vector<Change> changes = changes_between(first.workload, trace.info.workload);
-      if (!same_way || !changes.empty()) {
-        progress_.clear();
-        console_.error(
-            fmt::format("{}: is no repetition of the run beside it: {}", file,
-                        changes.empty() ? "its executor, mode, workers or driver differ" : changes.front().text()),
-            "keep runs of one kind in a folder");
-        return false;
-      }
+      if (!changes.empty()) return changes.front().text();
     }
     side.jobs.add(trace);
-    return true;
+    return {};
   }
 
   // Only what asks for the same work can be compared: else a difference says nothing of how it was scheduled.

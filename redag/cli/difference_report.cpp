@@ -193,14 +193,14 @@ std::vector<std::string> caveats(const DiffSide &a, const DiffSide &b) {
                     "difference",
                     trace::to_string(x.driver), trace::to_string(y.driver)));
   } else if (x.driver != trace::Driver::Simulator && !(x.machine == y.machine)) {
-    list.push_back("the sides ran on different machines or kernels: that is part of the difference");
+    list.emplace_back("the sides ran on different machines or kernels: that is part of the difference");
   }
   if (x.overheads != y.overheads) {
     list.push_back(fmt::format("overheads differ: '{}' and '{}'", x.overheads, y.overheads));
   }
   const std::size_t fewest = std::min(a.jobs.runs().size(), b.jobs.runs().size());
   if (fewest == 1 && (x.driver != trace::Driver::Simulator || y.driver != trace::Driver::Simulator)) {
-    list.push_back(
+    list.emplace_back(
         "a side has a single run: how runs differ from each other on this machine is not in the intervals; "
         "repeat them ('redag compare --repeat')");
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "redag/base/rng.hpp"
 #include "redag/metrics/distribution.hpp"
@@ -49,12 +50,13 @@ std::vector<Duration> grid_of(std::vector<Duration> values) {
   return grid;
 }
 
-// One side, counted once so that a replicate only adds.
+// One side, counted once so that a replicate only adds: and no more than a binary search looks at.
 class Side {
  public:
-  Side(const BlockedRuns &runs, const std::vector<Duration> &grid) : grid_(grid), sum_(grid.size()) {
+  Side(const BlockedRuns &runs, const std::vector<Duration> &grid) : grid_(grid) {
     for (const std::vector<Block> &run : runs) {
       std::vector<Counted> counted;
+      counted.reserve(run.size());
       for (const Block &block : run) counted.push_back(count(block));
       if (!counted.empty()) runs_.push_back(std::move(counted));
     }
@@ -66,7 +68,7 @@ class Side {
   };
 
   Drawn draw(Rng &rng) {
-    std::fill(sum_.begin(), sum_.end(), 0);
+    drawn_.clear();
     std::uint64_t released = 0;
     std::uint64_t missed = 0;
     std::uint64_t finished = 0;
@@ -81,7 +83,7 @@ class Side {
         released += block.released;
         missed += block.missed;
         finished += block.finished;
-        for (std::size_t g = 0; g < sum_.size(); ++g) sum_[g] += block.cells[g];
+        drawn_.push_back(&block);
       }
     }
     Drawn drawn;
@@ -95,30 +97,41 @@ class Side {
     std::uint64_t released = 0;
     std::uint64_t missed = 0;
     std::uint64_t finished = 0;
-    std::vector<std::uint32_t> cells;  // responses in (grid[i - 1], grid[i]]
+    std::vector<std::uint32_t> up_to;  // responses of at most grid[i]
   };
 
   Counted count(const Block &block) const {
     Counted counted{block.released, block.missed, block.responses.size(), std::vector<std::uint32_t>(grid_.size())};
     for (const Duration response : block.responses) {
-      ++counted.cells[static_cast<std::size_t>(std::lower_bound(grid_.begin(), grid_.end(), response) - grid_.begin())];
+      ++counted.up_to[static_cast<std::size_t>(std::lower_bound(grid_.begin(), grid_.end(), response) - grid_.begin())];
     }
+    std::partial_sum(counted.up_to.begin(), counted.up_to.end(), counted.up_to.begin());
     return counted;
   }
 
   void read_percentiles(std::uint64_t finished, std::array<double, 3> &percentiles) const {
-    std::uint64_t below = 0;
-    std::size_t g = 0;
+    if (finished == 0) return;
     for (std::size_t p = 0; p < kPercents.size(); ++p) {
       const double rank = std::max(1.0, std::ceil(kPercents[p] / 100 * static_cast<double>(finished)));
-      while (g < sum_.size() && static_cast<double>(below + sum_[g]) < rank) below += sum_[g++];
-      percentiles[p] = g < sum_.size() ? static_cast<double>(grid_[g]) : 0;
+      std::size_t low = 0;
+      std::size_t high = grid_.size() - 1;  // every response is at most the last value
+      while (low < high) {
+        const std::size_t middle = (low + high) / 2;
+        std::uint64_t count = 0;
+        for (const Counted *block : drawn_) count += block->up_to[middle];
+        if (static_cast<double>(count) >= rank) {
+          high = middle;
+        } else {
+          low = middle + 1;
+        }
+      }
+      percentiles[p] = static_cast<double>(grid_[low]);
     }
   }
 
   const std::vector<Duration> &grid_;
   std::vector<std::vector<Counted>> runs_;
-  std::vector<std::uint64_t> sum_;
+  std::vector<const Counted *> drawn_;
 };
 
 // Collects the replicates of one figure.

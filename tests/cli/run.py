@@ -833,7 +833,13 @@ class Diff(Case):
                           "redag,mte", "--out", folder), 0)
         result = redag("diff", folder / "mte", folder / "redag", "--json")
         self.assertEqual(self.document(result, "redag.difference/1")["a"]["seeds"], [1, 2, 3])
-        self.expect(redag("diff", folder, folder / "mte"), 2, "holds runs of 2 kinds: redag, mte", "name one of them")
+        self.expect(redag("diff", folder, folder / "mte"), 2, "holds runs of several kinds: redag, mte", "name one of them")
+        # Repetitions by any other name, as run_workload of redag_rclcpp has them.
+        for n in 1, 2, 3:
+            (folder / "redag" / f"repetition-{n}").rename(folder / "redag" / str(n))
+        again = self.document(redag("diff", folder / "mte", folder / "redag", "--json"), "redag.difference/1")
+        self.assertEqual(again["b"]["seeds"], [1, 2, 3])
+        self.assertEqual(again["rows"], json.loads(result.stdout)["rows"])
 
     def test_other_workload(self):
         one = self.results("one")
