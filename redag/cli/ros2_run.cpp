@@ -50,6 +50,7 @@ class Scratch {
 // Starts `words` with its output in `log`, and waits. The wait status, or an errno, negative.
 int run_program(std::vector<std::string> words, const std::string &log, const std::atomic<bool> &stop) {
   std::vector<char *> argv;
+  argv.reserve(words.size() + 1);
   for (std::string &word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   posix_spawn_file_actions_t actions;

@@ -42,7 +42,7 @@ Effects effects_of(const std::vector<std::uint32_t> &counts, const std::vector<E
 
   Effects effects;
   effects.mean = mean_of(means);
-  const double all = static_cast<double>(cells.size());
+  const auto all = static_cast<double>(cells.size());
   double total = 0;  // sums of squares, of each run
   double noise = 0;
   double between = 0;

@@ -80,7 +80,8 @@ function curvesFigure(name, metricOf, caption) {
         series: [
           ...lines.map(({executor, e, values}) => ({
             type: 'line', name: executor, symbol: symbols[e % symbols.length], symbolSize: 8, itemStyle: {color: colourOf(t, e)},
-            lineStyle: {width: 2, type: executor === 'ideal' || executor === 'unlimited' ? 'dashed' : 'solid'}, data: values,
+            // Between levels that are no numbers there is nothing: the line only leads the eye.
+            lineStyle: {width: 2, opacity: factor.numeric ? 1 : 0.35, type: executor === 'ideal' || executor === 'unlimited' ? 'dashed' : 'solid'}, data: values,
           })),
           ...lines.map(({executor, e, values}) => ({
             type: 'custom', name: executor, silent: true, data: values, encode: {x: 0, y: [2, 3]},
