@@ -123,7 +123,7 @@ Result<void> write_results(const std::string &folder, const Factorial &factorial
     files.emplace_back("responses.svg", responses_svg(factorial, results));
   }
   for (const auto &[name, text] : files) {
-    Result<trace::OutputFile> file = trace::OutputFile::create(folder + "/" + name);
+    Result<trace::OutputFile> file = trace::OutputFile::create(fmt::format("{}/{}", folder, name));
     if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));
     file->write(text);
     if (Result<void> done = file->commit(); !done) return done;

@@ -18,6 +18,7 @@ constexpr std::uint64_t kMostUnits = 10'000'000;
 template <class Values, class Text>
 std::vector<std::string> texts(const Values &values, Text text) {
   std::vector<std::string> result;
+  result.reserve(values.size());
   for (const auto &value : values) result.emplace_back(text(value));
   return result;
 }

@@ -46,7 +46,7 @@ LinePlot::Panel panel_of(const Factorial &factorial, const FactorialResults &res
   constexpr std::size_t kRoom = 42;  // characters
   std::size_t characters = 0;
   for (const std::string &level : factor.levels) characters = std::max(characters, level.size() + 1);
-  const std::size_t every = (factor.levels.size() * characters + kRoom - 1) / kRoom;
+  const std::size_t every = std::max<std::size_t>(1, (factor.levels.size() * characters + kRoom - 1) / kRoom);
   // An axis from 0 is of use only for values that come near it.
   const bool numeric = factor.numeric && std::stod(factor.levels.front()) <= std::stod(factor.levels.back()) / 2;
   for (std::size_t level = 0; level < factor.levels.size(); ++level) {

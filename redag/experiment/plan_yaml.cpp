@@ -12,7 +12,6 @@ namespace redag::experiment {
 namespace {
 
 using yaml::find;
-using yaml::Node;
 
 constexpr double kMillionth = 1e6;
 
