@@ -284,6 +284,8 @@ TYPED_TEST(Conformance, ActionsGiveFeedbackAndResults) {
   using Fibonacci = test_msgs::action::Fibonacci;
   using Handle = rclcpp_action::ServerGoalHandle<Fibonacci>;
   std::vector<std::thread> threads;
+  std::atomic<int> feedback{0};
+  std::atomic<int> results{0};
   auto server = rclcpp_action::create_server<Fibonacci>(
       this->node, "fibonacci",
       [](const rclcpp_action::GoalUUID &, std::shared_ptr<const Fibonacci::Goal>) {
@@ -291,9 +293,13 @@ TYPED_TEST(Conformance, ActionsGiveFeedbackAndResults) {
       },
       [](std::shared_ptr<Handle>) { return rclcpp_action::CancelResponse::ACCEPT; },
       [&](std::shared_ptr<Handle> handle) {
-        threads.emplace_back([handle] {
-          handle->publish_feedback(std::make_shared<Fibonacci::Feedback>());
-          std::this_thread::sleep_for(5ms);
+        threads.emplace_back([&feedback, handle] {
+          // A client ignores what comes before it has seen that its goal was accepted.
+          eventually([&] { return feedback > 0; },
+                     [&] {
+                       handle->publish_feedback(std::make_shared<Fibonacci::Feedback>());
+                       std::this_thread::sleep_for(5ms);
+                     });
           handle->succeed(std::make_shared<Fibonacci::Result>());
         });
       });
@@ -301,8 +307,6 @@ TYPED_TEST(Conformance, ActionsGiveFeedbackAndResults) {
   this->executor->add_node(this->node);
   Spinner spinner(*this->executor);
   ASSERT_TRUE(client->wait_for_action_server(kLimit));
-  std::atomic<int> feedback{0};
-  std::atomic<int> results{0};
   typename rclcpp_action::Client<Fibonacci>::SendGoalOptions options;
   options.feedback_callback = [&](auto, auto) { ++feedback; };
   options.result_callback = [&](auto) { ++results; };
@@ -312,7 +316,7 @@ TYPED_TEST(Conformance, ActionsGiveFeedbackAndResults) {
     ASSERT_NE(goal.get(), nullptr);
   }
   EXPECT_TRUE(eventually([&] { return results == 5; }));
-  EXPECT_TRUE(eventually([&] { return feedback > 0; }));  // another thread can be at it still
+  EXPECT_GT(feedback, 0);
   spinner.stop();
   for (auto &thread : threads) thread.join();
 }
