@@ -65,8 +65,7 @@ TEST(Plant, TheShorterThePoleTheLessDelayItBears) {
   const std::vector<PlantSpec> all = plants();
   const auto bears = [](const PlantSpec &spec) {
     for (Duration hold = spec.period;; hold += kMillisecond) {
-      PlantSpec slow = spec;
-      Plant plant(slow, 3);
+      Plant plant(spec, 3);
       for (Time t = 0; t < 10 * kSecond; t += hold) {
         plant.advance(t);
         plant.actuate(plant.feedback(plant.state()));

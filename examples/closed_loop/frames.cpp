@@ -62,7 +62,7 @@ struct Image {
 class Renderer {
  public:
   explicit Renderer(const std::vector<PlantSpec> &plants)
-      : model_(compile(mjcf(plants))), data_(mj_makeData(model_.get())), buffer_(kWidth * kHeight * 4) {
+      : model_(compile(mjcf(plants))), data_(mj_makeData(model_.get())), buffer_(std::size_t{4} * kWidth * kHeight) {
     gl_ = OSMesaCreateContextExt(OSMESA_RGBA, 24, 8, 0, nullptr);
     if (gl_ == nullptr || OSMesaMakeCurrent(gl_, buffer_.data(), GL_UNSIGNED_BYTE, kWidth, kHeight) == 0) {
       throw std::runtime_error("OSMesa gives no context to draw in");

@@ -61,7 +61,7 @@ Matrix lqr(const Matrix &a, const Matrix &b, const std::vector<double> &q, const
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
     Matrix weight = product(bt, product(p, b));
     for (std::size_t i = 0; i < weight.rows; ++i) weight.at(i, i) += r[i];
-    const Matrix gain = solved(std::move(weight), product(bt, product(p, a)));
+    Matrix gain = solved(std::move(weight), product(bt, product(p, a)));
     // P+ = Q + K'RK + (A - BK)'P(A - BK): this form keeps P symmetric in spite of rounding, the shorter one does not.
     Matrix closed = product(b, gain);
     for (std::size_t i = 0; i < closed.values.size(); ++i) closed.values[i] = a.values[i] - closed.values[i];

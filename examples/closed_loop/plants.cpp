@@ -115,14 +115,14 @@ Model compile(const std::string &text) {
   std::string error(1024, '\0');
   Model model(mj_loadXML(name.c_str(), files.get(), error.data(), static_cast<int>(error.size())));
   mj_deleteVFS(files.get());
-  if (!model) throw std::runtime_error("MuJoCo: " + std::string(error.c_str()));
+  if (!model) throw std::runtime_error(std::string("MuJoCo: ") + error.data());
   return model;
 }
 
 Plant::Plant(const PlantSpec &spec, std::uint64_t seed)
     : spec_(spec), seed_(seed), model_(compile(mjcf({spec}))), data_(mj_makeData(model_.get())) {
   const auto inputs = static_cast<std::size_t>(model_->nu);
-  const auto states = static_cast<std::size_t>(2 * model_->nv);
+  const auto states = 2 * static_cast<std::size_t>(model_->nv);
   if (spec.kind == PlantSpec::Kind::CartPole) {
     weights_ = {1, 10, 0.1, 0.1};  // x, angle, their velocities
     control_weight_ = 0.001;
