@@ -33,8 +33,8 @@ class REDAG_CAPABILITY("mutex") PiMutex {
   /// inherits priority is handed to the first who sleeps: once one does, whoever comes before it has woken up sleeps
   /// too.
   void lock() noexcept REDAG_ACQUIRE() {
-    static const int spins = std::thread::hardware_concurrency() > 1 ? kSpins : 0;
-    for (int i = 0; i < spins; ++i) {
+    static const int kTries = std::thread::hardware_concurrency() > 1 ? kSpins : 0;
+    for (int i = 0; i < kTries; ++i) {
       if (pthread_mutex_trylock(&mutex_) == 0) return;
       relax();
     }

@@ -25,7 +25,7 @@ constexpr int kEnoughToBeExpectedShort = 200;  // eight in a row will do; a load
 class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
  protected:
   void SetUp() override {
-    if (mode() == PreemptionMode::Os && band.top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+    if (mode() == PreemptionMode::Os && band_.top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
   }
   static PreemptionMode mode() { return GetParam(); }
 
@@ -40,26 +40,26 @@ class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
       workload.dags[0].tasks.push_back(task);
     }
     EngineOptions options;
-    options.config = make_config(Mode{mode(), {}}, 1, workload.policy, band, 4);
-    options.band = band;
-    engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
-    engine->bind(workload, std::move(bodies));
-    ASSERT_TRUE(engine->start());
-    engine->set_origin(monotonic_now());
+    options.config = make_config(Mode{mode(), {}}, 1, workload.policy, band_, 4);
+    options.band = band_;
+    engine_ = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+    engine_->bind(workload, std::move(bodies));
+    ASSERT_TRUE(engine_->start());
+    engine_->set_origin(monotonic_now());
   }
 
   void run(std::size_t task, int times = 1) {
     for (int i = 0; i < times; ++i) {
       const std::uint64_t before = finished(task);
-      engine->release(TaskId(task), engine->now());
+      engine_->release(TaskId(task), engine_->now());
       while (finished(task) == before) std::this_thread::yield();
     }
   }
 
-  std::uint64_t finished(std::size_t task) const { return engine->accounting(TaskId(task)).finished; }
+  std::uint64_t finished(std::size_t task) const { return engine_->accounting(TaskId(task)).finished; }
 
-  const PriorityBand band = probe_priority_band();
-  std::unique_ptr<Engine> engine;
+  const PriorityBand band_ = probe_priority_band();
+  std::unique_ptr<Engine> engine_;
 };
 INSTANTIATE_TEST_SUITE_P(Modes, ShortJobs,
                          ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os),
@@ -74,7 +74,7 @@ TEST_P(ShortJobs, OneThatSleepsAllTheSameIsNotChargedForIt) {
   run(0, kEnoughToBeExpectedShort);
   sleeps = true;
   run(0, 3);
-  EXPECT_LT(engine->usage(TaskId(0)).longest, 25 * kMillisecond);
+  EXPECT_LT(engine_->usage(TaskId(0)).longest, 25 * kMillisecond);
 }
 
 TEST_P(ShortJobs, OneThatComputesAllTheSameIsChargedForIt) {
@@ -89,11 +89,11 @@ TEST_P(ShortJobs, OneThatComputesAllTheSameIsChargedForIt) {
     return Outcome::Finished;
   }});
   run(0, kEnoughToBeExpectedShort);
-  EXPECT_GT(engine->usage(TaskId(0)).total, 0);
+  EXPECT_GT(engine_->usage(TaskId(0)).total, 0);
   demand = 2 * kMillisecond;
   run(0);
-  EXPECT_GE(engine->usage(TaskId(0)).longest, demand);
-  EXPECT_LT(engine->usage(TaskId(0)).longest, 100 * demand);
+  EXPECT_GE(engine_->usage(TaskId(0)).longest, demand);
+  EXPECT_LT(engine_->usage(TaskId(0)).longest, 100 * demand);
 }
 
 TEST_P(ShortJobs, AJobIsNotChargedForTheOneBefore) {
@@ -104,12 +104,12 @@ TEST_P(ShortJobs, AJobIsNotChargedForTheOneBefore) {
     return Outcome::Finished;
   };
   start({[&](const Job &) { return use(20 * kMillisecond); }, [&](const Job &) { return use(100 * kMicrosecond); }});
-  const Release both[] = {{TaskId(0), engine->now()}, {TaskId(1), engine->now()}};
-  engine->release(both);
+  const Release both[] = {{TaskId(0), engine_->now()}, {TaskId(1), engine_->now()}};
+  engine_->release(both);
   while (finished(1) == 0) std::this_thread::yield();
-  EXPECT_GE(engine->usage(TaskId(0)).longest, 20 * kMillisecond);
-  EXPECT_GE(engine->usage(TaskId(1)).longest, 100 * kMicrosecond);
-  EXPECT_LT(engine->usage(TaskId(1)).longest, 10 * kMillisecond);
+  EXPECT_GE(engine_->usage(TaskId(0)).longest, 20 * kMillisecond);
+  EXPECT_GE(engine_->usage(TaskId(1)).longest, 100 * kMicrosecond);
+  EXPECT_LT(engine_->usage(TaskId(1)).longest, 10 * kMillisecond);
 }
 
 // The other modes do not change priorities.
@@ -128,12 +128,12 @@ TEST_P(ShortJobsWithPriorities, AThreadThatKeptItsPriorityLosesItToAJobInBetween
          },
          [&](const Job &) {
            if (!waits) return Outcome::Finished;
-           engine->release(TaskId(1), engine->now());
+           engine_->release(TaskId(1), engine_->now());
            const Time give_up = monotonic_now() + 5 * kSecond;
            while (!seen && monotonic_now() < give_up) {
            }
            EXPECT_TRUE(seen);
-           EXPECT_EQ(fifo_priority(pthread_self()), band.of_level(2));
+           EXPECT_EQ(fifo_priority(pthread_self()), band_.of_level(2));
            return Outcome::Finished;
          }});
   run(2, kEnoughToBeExpectedShort);
@@ -157,14 +157,14 @@ TEST_P(ShortJobsWithPriorities, OnlyOneThatIsExpectedToBeShortKeepsAHigherPriori
   run(1);
   run(0);
   run(1);
-  EXPECT_EQ(last, band.of_level(1));
+  EXPECT_EQ(last, band_.of_level(1));
   is_long = false;
-  for (int i = 0; i < 100 && last == band.of_level(1); ++i) {
+  for (int i = 0; i < 100 && last == band_.of_level(1); ++i) {
     run(1, 10);
     run(0);
     run(1);
   }
-  EXPECT_EQ(last, band.of_level(0));
+  EXPECT_EQ(last, band_.of_level(0));
 }
 
 }  // namespace

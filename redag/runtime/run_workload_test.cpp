@@ -41,7 +41,7 @@ Workload two_rates(std::uint32_t workers, PreemptionMode mode) {
   return workload;
 }
 
-RunResult run(const Workload &workload, RunOptions options) {
+RunResult run(const Workload &workload, const RunOptions &options) {
   Result<RunResult> result = run_workload(workload, options);
   if (!result) {
     ADD_FAILURE() << to_string(result.error());
