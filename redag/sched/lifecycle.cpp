@@ -76,14 +76,15 @@ void Lifecycle::complete(JobSlot job_slot, Time now, Outcome outcome) {
   free_slot(slot);
   if (outcome != Outcome::Finished || !takes_releases(task)) return;
 
-  precedence_.on_complete(job.task, job.release, job.origin, [&](TaskId successor) {
+  precedence_.on_complete(job.task, job.release, job.origin, now, [&](TaskId successor) {
     const TaskState &next = tasks_[successor.value];
     if (next.life != TaskLife::Live) return;
     if (!next.timer) {
-      const Time origin = precedence_.consume(successor);
-      restricted_ ? admit_or_refuse(successor, now, origin) : admit(successor, now, origin);
+      const Precedence::Data data = precedence_.consume(successor);
+      restricted_ ? admit_or_refuse(successor, data.complete, data.origin)
+                  : admit(successor, data.complete, data.origin);
     } else if (next.waiting != kNil) {
-      make_ready(next.waiting, precedence_.consume(successor));
+      make_ready(next.waiting, precedence_.consume(successor).origin);
     }
   });
 }
@@ -526,7 +527,7 @@ void Lifecycle::admit(TaskId id, Time nominal, Time origin) {
   jobs_[slot] = fresh;
   ++dag.pending;
   if (complete_set) {
-    make_ready(slot, task.timer && precedence_.has_predecessors(id) ? precedence_.consume(id) : origin);
+    make_ready(slot, task.timer && precedence_.has_predecessors(id) ? precedence_.consume(id).origin : origin);
   } else {
     jobs_[slot].state = JobState::Waiting;
     task.waiting = slot;

@@ -29,7 +29,7 @@ void Precedence::add_dag(const Dag &dag, std::span<const TaskId> ids) {
     node.first_edge = static_cast<std::uint32_t>(edges_.size());
     for (const std::uint32_t p : dag.tasks[i].predecessors) {
       outgoing[p].push_back(static_cast<std::uint32_t>(edges_.size()));
-      edges_.push_back(Edge{ids[i], is_aligned(nodes_[ids[p].value], node), false, 0, 0});
+      edges_.push_back(Edge{ids[i], is_aligned(nodes_[ids[p].value], node), false, 0, 0, 0});
     }
     node.last_edge = static_cast<std::uint32_t>(edges_.size());
   }
@@ -95,15 +95,16 @@ bool Precedence::on_release(TaskId task, Time release) {
   return node.fresh == node.last_edge - node.first_edge;
 }
 
-Time Precedence::consume(TaskId task) {
+Precedence::Data Precedence::consume(TaskId task) {
   Node &node = nodes_[task.value];
-  Time origin = kNever;
+  Data data{kNever, std::numeric_limits<Time>::min()};
   for (std::uint32_t i = node.first_edge; i < node.last_edge; ++i) {
     edges_[i].fresh = false;
-    origin = std::min(origin, edges_[i].origin);
+    data.origin = std::min(data.origin, edges_[i].origin);
+    data.complete = std::max(data.complete, edges_[i].finish);
   }
   node.fresh = 0;
-  return origin;
+  return data;
 }
 
 void Precedence::discard(TaskId task) {

@@ -26,9 +26,12 @@ class Precedence {
   /// Returns whether all its predecessors have fresh data.
   bool on_release(TaskId task, Time release);
 
-  /// The waiting or newly released job of `task` takes its predecessors' data. Returns the earliest origin among them.
-  /// Requires at least one predecessor.
-  Time consume(TaskId task);
+  struct Data {
+    Time origin = 0;    // the earliest
+    Time complete = 0;  // when the last of it was there; threads can report the end of an earlier job later
+  };
+  /// The waiting or newly released job of `task` takes its predecessors' data. Requires at least one predecessor.
+  Data consume(TaskId task);
 
   /// The job that consumed last was skipped before it started: its data is fresh again.
   void give_back(TaskId task);
@@ -36,10 +39,10 @@ class Precedence {
   /// Data that `task` has not consumed is forgotten.
   void discard(TaskId task);
 
-  /// A job of `task`, released at `release` with data from `origin`, completed. Calls on_fresh(successor) for each
-  /// successor all of whose predecessors now have fresh data.
+  /// A job of `task`, released at `release` with data from `origin`, completed at `finish`. Calls on_fresh(successor)
+  /// for each successor all of whose predecessors now have fresh data.
   template <class OnFresh>
-  void on_complete(TaskId task, Time release, Time origin, OnFresh on_fresh) {
+  void on_complete(TaskId task, Time release, Time origin, Time finish, OnFresh on_fresh) {
     const Node node = nodes_[task.value];
     for (std::uint32_t i = node.first_successor; i < node.last_successor; ++i) {
       Edge &edge = edges_[successors_[i]];
@@ -49,6 +52,7 @@ class Precedence {
       edge.fresh = true;
       edge.release = release;
       edge.origin = origin;
+      edge.finish = finish;
       if (successor.fresh == successor.last_edge - successor.first_edge) on_fresh(edge.to);
     }
   }
@@ -64,6 +68,7 @@ class Precedence {
     bool fresh = false;    // completed since `to` last consumed
     Time release = 0;      // of the predecessor's job that completed last
     Time origin = 0;
+    Time finish = 0;
   };
   struct Node {
     std::uint32_t first_edge = 0;  // edges into the task: [first_edge, last_edge)

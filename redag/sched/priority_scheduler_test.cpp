@@ -171,6 +171,25 @@ TEST(PriorityScheduler, DataOfAJobThatNeverStartedIsFreshAgain) {
   EXPECT_EQ(workers.accounting("sink").skipped, 1U);
 }
 
+// Threads stamp the end of a job before they get to report it.
+TEST(PriorityScheduler, ADataJobIsReleasedWhenTheLastOfItsDataIsThere) {
+  Workload workload = make_workload({make_dag("a", {{"p", 10}, {"q", 10}, {"both", 10}})}, 2);
+  workload.dags[0].tasks[2].activation = Activation::Data;
+  workload.dags[0].tasks[2].predecessors = {0, 1};
+  PriorityScheduler scheduler(workload, {.workers = 2});
+  scheduler.release(TaskId(0), 0, 0);
+  scheduler.release(TaskId(1), 0, 0);
+  std::vector<JobSlot> jobs;
+  for (const Dispatch &dispatch : scheduler.dispatch(0).dispatches) jobs.push_back(dispatch.job);
+  ASSERT_EQ(jobs.size(), 2U);
+  scheduler.complete(jobs[0], 7, Outcome::Finished);
+  (void)scheduler.dispatch(7);
+  scheduler.complete(jobs[1], 5, Outcome::Finished);
+  const Step step = scheduler.dispatch(8);
+  ASSERT_EQ(step.dispatches.size(), 1U);
+  EXPECT_EQ(step.dispatches[0].release, 7) << "the end of what completed last, whoever reported last";
+}
+
 TEST(PriorityScheduler, AnAbortedJobReleasesNoSuccessor) {
   const Workload workload = make_workload({make_dag("a", {{"source", 40}, {"sink", 0, 1, {0}}})}, 1);
   ManualWorkers workers = drive(workload, Preemption::None);
