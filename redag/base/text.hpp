@@ -1,8 +1,11 @@
-// Numbers as text for people, the same in tables, verdicts and pages. Pure functions.
+// Numbers as text for people, the same in tables, verdicts and pages; and what is asked of texts from outside before
+// they are parsed. Pure functions.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace redag {
 
@@ -11,5 +14,12 @@ namespace redag {
 
 /// 1234567 -> "1 234 567".
 [[nodiscard]] std::string format_count(std::uint64_t count);
+
+/// No JSON that this project writes is nested as deep.
+inline constexpr std::size_t kMaxJsonDepth = 32;
+
+/// Are there more than `levels` arrays and objects inside one another? What copies or prints a tree of JSON calls
+/// itself once a level: ask before parsing what others wrote. Of a text that is not JSON, any answer.
+[[nodiscard]] bool json_nests_deeper(std::string_view json, std::size_t levels = kMaxJsonDepth);
 
 }  // namespace redag

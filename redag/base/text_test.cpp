@@ -22,5 +22,15 @@ TEST(Text, AMissNeverReadsAsNone) {
   EXPECT_EQ(format_percent(std::numeric_limits<double>::quiet_NaN()), "-");
 }
 
+TEST(Text, TheDepthOfJson) {
+  EXPECT_FALSE(json_nests_deeper("", 0));
+  EXPECT_FALSE(json_nests_deeper("[1, 2], [3]", 1));
+  EXPECT_TRUE(json_nests_deeper(R"({"a": [1]})", 1));
+  EXPECT_FALSE(json_nests_deeper(R"({"a": [1]})", 2));
+  EXPECT_FALSE(json_nests_deeper(R"(["[[[\"[[", "\\"])", 1)) << "brackets in texts are text";
+  EXPECT_TRUE(json_nests_deeper(std::string(1'000'000, '[')));
+  EXPECT_FALSE(json_nests_deeper("]]]]"));
+}
+
 }  // namespace
 }  // namespace redag

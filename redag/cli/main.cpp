@@ -7,7 +7,9 @@
 
 int main(int argc, char **argv) {
   // A reader that goes away (`| head`) must not end a run before its files are written: writing says so instead.
+  // The same for a file that may not grow any more (ulimit -f).
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   redag::cli::Console console;
   return redag::cli::run_program(std::vector<std::string>(argv + (argc > 0 ? 1 : 0), argv + argc), console);
 }

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <exception>
 #include <new>
 
 #include "redag/cli/commands.hpp"
@@ -187,6 +188,8 @@ int run_program(const std::vector<std::string> &arguments, Console &console) {
     status = parse_and_run(arguments, console);
   } catch (const std::bad_alloc &) {
     console.error("out of memory");
+  } catch (const std::exception &error) {  // of the libraries: a folder that vanished, say
+    console.error(error.what());
   }
   if (!console.flush()) return kExitBad;
   return status;

@@ -5,6 +5,7 @@
 #include <set>
 #include <system_error>
 
+#include "redag/base/text.hpp"
 #include "redag/cli/files.hpp"
 #include "redag/cli/json.hpp"
 #include "redag/trace/output_file.hpp"
@@ -52,9 +53,10 @@ Result<void> read_comparison(const fs::path &file, std::vector<std::string> &ord
   if (!fs::exists(file, error)) return {};
   const Result<std::string> text = trace::read_file(file.string());
   if (!text) return tl::unexpected<Diagnostics>(text.error());
-  const Json json = Json::parse(*text, nullptr, false);
   const auto bad = [&] { return trace::file_error(file.string(), 1, "not a comparison of 'redag compare'"); };
-  if (!json.is_object() || json.value("format", "") != "redag.comparison/1") return bad();
+  if (json_nests_deeper(*text)) return bad();
+  const Json json = Json::parse(*text, nullptr, false);
+  if (!json.is_object() || json.value("format", Json()) != "redag.comparison/1") return bad();
   for (const Json &executor : json.value("executors", Json::array())) {
     if (!executor.is_object() || !executor.contains("name") || !executor["name"].is_string()) return bad();
     order.push_back(executor["name"]);

@@ -52,7 +52,7 @@ std::string describe(const AcceptancePoint &point) {
 
 std::uint64_t unit_count(const AcceptancePlan &plan) { return points_of(plan).size() * plan.sets; }
 
-Result<Workload> draw_workload(const AcceptancePlan &plan, const AcceptancePoint &point, std::uint64_t repetition) {
+GenerateOptions generate_options(const AcceptancePlan &plan, const AcceptancePoint &point) {
   GenerateOptions options = plan.workload;
   options.dags = point.dags;
   options.workers = point.workers;
@@ -60,7 +60,11 @@ Result<Workload> draw_workload(const AcceptancePlan &plan, const AcceptancePoint
   options.utilization = static_cast<double>(point.utilization) * point.workers / kMillion;
   options.deadline_min = point.deadlines == DeadlineKind::Implicit ? 1.0 : 0.5;
   options.deadline_max = 1.0;
-  Result<Workload> workload = generate(options, workload_seed(plan, point, repetition));
+  return options;
+}
+
+Result<Workload> draw_workload(const AcceptancePlan &plan, const AcceptancePoint &point, std::uint64_t repetition) {
+  Result<Workload> workload = generate(generate_options(plan, point), workload_seed(plan, point, repetition));
   if (workload) make_deadlines_end_to_end(*workload);
   return workload;
 }

@@ -23,6 +23,9 @@ inline constexpr char kAcceptedUnsound = 'u';  // the paper's equations say yes 
 /// Units are numbered repetition by repetition, so that what an interrupted run has done covers all points.
 [[nodiscard]] std::uint64_t unit_count(const AcceptancePlan &plan);
 
+/// What the generator is asked for at a point.
+[[nodiscard]] GenerateOptions generate_options(const AcceptancePlan &plan, const AcceptancePoint &point);
+
 /// Workload `repetition` of a point. Points that differ in preemption alone have the same workloads. In a DAG of
 /// several tasks the deadline is end to end. Errors: those of generate().
 [[nodiscard]] Result<Workload> draw_workload(const AcceptancePlan &plan, const AcceptancePoint &point,

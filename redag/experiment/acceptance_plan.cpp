@@ -14,6 +14,8 @@ namespace redag::experiment {
 namespace {
 
 constexpr std::uint64_t kMostUnits = 100'000'000;
+constexpr std::uint64_t kMostPoints = 100'000;
+constexpr std::uint64_t kMostTasks = 100'000;  // of one workload
 
 template <class Value>
 bool has_twice(std::vector<Value> values) {
@@ -77,18 +79,45 @@ class Checker {
     }
   }
 
-  // The generator knows what it can make.
+  // How many points there are, without making them; no more than kMostPoints + 1.
+  [[nodiscard]] std::uint64_t count_points() const {
+    std::uint64_t points = 1;
+    for (const std::size_t choices : {plan_.dags.size(), plan_.workers.size(), plan_.deadlines.size(),
+                                      plan_.preemption.size(), plan_.utilization.size()}) {
+      if (choices > kMostPoints / points) return kMostPoints + 1;
+      points *= choices;
+    }
+    return points;
+  }
+
+  // The generator knows what it can make: it is asked at every point, and draws as long as that takes no time.
   void check_points() {
-    const std::vector<AcceptancePoint> points = points_of(plan_);
-    if (points.size() > kMostUnits / plan_.sets) {
-      say("sets", fmt::format("{} points of {} sets are more than {}", points.size(), plan_.sets, kMostUnits));
+    const std::uint64_t count = count_points();
+    if (count > kMostPoints) {
+      say("experiment", fmt::format("the plan has more than {} points", kMostPoints),
+          "every combination of its lists is one: shorten them, or make several plans of it");
       return;
     }
-    for (const AcceptancePoint &point : points) {
-      const Result<Workload> workload = draw_workload(plan_, point, 0);
-      if (workload) continue;
-      say("workload", fmt::format("{}: {}", describe(point), workload.error().front().message),
-          workload.error().front().hint);
+    if (count > kMostUnits / plan_.sets) {
+      say("sets", fmt::format("{} points of {} sets are more than {}", count, plan_.sets, kMostUnits));
+      return;
+    }
+    std::uint64_t to_draw = 1'000'000;  // tasks
+    for (const AcceptancePoint &point : points_of(plan_)) {
+      const GenerateOptions options = generate_options(plan_, point);
+      Diagnostics mistakes = redag::find_mistakes(options);
+      const std::uint64_t tasks = std::uint64_t{options.dags} * options.max_tasks;
+      if (mistakes.empty() && tasks > kMostTasks) {
+        say("dags", fmt::format("{}: up to {} tasks a workload, more than {}", describe(point), tasks, kMostTasks));
+        return;
+      }
+      if (mistakes.empty() && tasks <= to_draw) {
+        to_draw -= tasks;
+        const Result<Workload> workload = draw_workload(plan_, point, 0);
+        if (!workload) mistakes = workload.error();
+      }
+      if (mistakes.empty()) continue;
+      say("workload", fmt::format("{}: {}", describe(point), mistakes.front().message), mistakes.front().hint);
       return;
     }
   }

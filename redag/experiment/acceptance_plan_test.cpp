@@ -91,6 +91,16 @@ TEST(AcceptancePlan, WhatMakesNoSense) {
   EXPECT_THAT(errors_of(""), HasSubstr("there is no plan in it"));
 }
 
+// Counted before they are made, and drawn only where that takes no time.
+TEST(AcceptancePlan, WhatWouldNeverEndIsRefusedAtOnce) {
+  std::string numbers = "1";
+  for (int i = 2; i <= 10'000; ++i) numbers += "," + std::to_string(i);
+  EXPECT_THAT(errors_of("experiment: acceptance\nutilization: 0.0001:1:0.0001\ndags: [" + numbers + "]\nworkers: [" +
+                        numbers + "]\n"),
+              HasSubstr("more than 100000 points"));
+  EXPECT_THAT(errors_of("experiment: acceptance\ndags: 9000000\n"), HasSubstr("plan.yaml:2:7: error: 9000000 DAGs"));
+}
+
 TEST(AcceptancePlan, Utilizations) {
   EXPECT_THAT(*parse_utilization("0.05:0.2:0.05"), ElementsAre(50'000, 100'000, 150'000, 200'000));
   EXPECT_THAT(*parse_utilization("0.5"), ElementsAre(500'000));

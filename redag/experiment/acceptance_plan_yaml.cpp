@@ -6,6 +6,7 @@
 
 #include "redag/experiment/acceptance_plan.hpp"
 #include "redag/experiment/plan_yaml.hpp"
+#include "redag/model/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
 
 namespace redag::experiment {
@@ -33,7 +34,7 @@ class Reader : private PlanReader {
       read();
       if (diagnostics_.empty()) look_at_the_whole();
     }
-    if (Diagnostics found = mistakes(); !found.empty()) return tl::unexpected<Diagnostics>(std::move(found));
+    if (Diagnostics found = take_diagnostics(); !found.empty()) return tl::unexpected<Diagnostics>(std::move(found));
     return std::move(plan_);
   }
 
@@ -94,7 +95,7 @@ Result<AcceptancePlan> parse_acceptance_plan(std::string_view text, const std::s
 }
 
 Result<AcceptancePlan> load_acceptance_plan(const std::string &path) {
-  const Result<std::string> text = trace::read_file(path);
+  const Result<std::string> text = trace::read_file(path, kMaxWorkloadBytes);
   if (!text) return tl::unexpected<Diagnostics>(text.error());
   return parse_acceptance_plan(*text, path);
 }

@@ -36,7 +36,7 @@ class Reader : private PlanReader {
       read();
       if (diagnostics_.empty()) look_at_the_whole();
     }
-    if (Diagnostics found = mistakes(); !found.empty()) return tl::unexpected<Diagnostics>(std::move(found));
+    if (Diagnostics found = take_diagnostics(); !found.empty()) return tl::unexpected<Diagnostics>(std::move(found));
     return std::move(plan_);
   }
 

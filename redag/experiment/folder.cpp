@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "redag/base/text.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag/version.hpp"
@@ -143,7 +144,8 @@ std::vector<std::string> read_runs(const std::vector<std::string> &folders) {
     for (std::string_view rest = *text; !rest.empty();) {
       const std::size_t end = rest.find('\n');
       if (end == std::string_view::npos) break;  // killed while it was written
-      if (Json::accept(rest.substr(0, end))) lines.emplace_back(rest.substr(0, end));
+      const std::string_view line = rest.substr(0, end);
+      if (!json_nests_deeper(line) && Json::accept(line)) lines.emplace_back(line);
       rest.remove_prefix(end + 1);
     }
   }

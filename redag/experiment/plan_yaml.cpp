@@ -46,13 +46,6 @@ std::optional<std::vector<std::uint32_t>> split(std::string_view text, char sepa
 
 }  // namespace
 
-Diagnostics PlanReader::mistakes() {
-  std::stable_sort(diagnostics_.begin(), diagnostics_.end(), [](const Diagnostic &a, const Diagnostic &b) {
-    return std::tie(a.line, a.column) < std::tie(b.line, b.column);
-  });
-  return std::move(diagnostics_);
-}
-
 void PlanReader::take_text(const Node &map, const char *key, std::string &out) {
   take(map, key, out, [this](const Node &node, std::string_view name) { return text(node, name); });
 }

@@ -25,9 +25,6 @@ class PlanReader : protected yaml::ValueReader {
   using yaml::ValueReader::ValueReader;
   using Node = yaml::Node;
 
-  /// All mistakes, by line.
-  [[nodiscard]] Diagnostics mistakes();
-
   template <class T, class Read>
   void take(const Node &map, const char *key, T &out, Read read) {
     const Node *node = yaml::find(map, key);

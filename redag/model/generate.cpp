@@ -55,46 +55,6 @@ std::uint32_t uniform(std::uint32_t low, std::uint32_t high, Rng &rng) {
   return static_cast<std::uint32_t>(rng.uniform(low, high));
 }
 
-Diagnostics check(const GenerateOptions &o) {
-  Diagnostics mistakes;
-  const auto require = [&](bool kept, std::string message) {
-    if (!kept) mistakes.push_back(Diagnostic{Severity::Error, {}, 0, 0, std::move(message), {}});
-  };
-  const auto require_share = [&](const char *name, double value) {
-    require(value >= 0 && value <= 1, fmt::format("{} must be from 0 to 1, not {}", name, value));
-  };
-  constexpr std::uint32_t kMostTasks = 10'000'000;
-  require(o.dags >= 1, "dags must be at least 1");
-  require(o.min_tasks >= 1 && o.min_tasks <= o.max_tasks, "tasks per DAG must be a range from at least 1");
-  require(std::uint64_t{o.dags} * o.max_tasks <= kMostTasks, fmt::format("more than {} tasks", kMostTasks));
-  require(o.workers >= 1 && o.workers <= kMaxWorkers, fmt::format("workers must be from 1 to {}", kMaxWorkers));
-  require(o.preemption != PreemptionMode::Os || (o.policy != PolicyKind::Edf && o.policy != PolicyKind::Fifo),
-          "preemption 'os' needs a static policy");
-  require(o.utilization > 0 && std::isfinite(o.utilization), "utilization must be greater than zero");
-  require(o.max_task_utilization > 0 && o.max_task_utilization <= 1, "max_task_utilization must be in (0, 1]");
-  require(o.utilization <= o.max_task_utilization * o.dags * o.min_tasks,
-          fmt::format("{} DAGs of {} tasks of at most {} do not reach utilization {}", o.dags, o.min_tasks,
-                      o.max_task_utilization, o.utilization));
-  require(o.period_granularity >= 1 && o.period_min >= o.period_granularity, "period_min is below the granularity");
-  require(o.period_min <= o.period_max && o.period_max <= kMaxDuration / 4, "period_min to period_max is not a range");
-  require(o.deadline_min > 0 && o.deadline_min <= o.deadline_max && o.deadline_max <= 4,
-          "deadline_min to deadline_max must be a range in (0, 4]");
-  require(o.bcet_min >= 0 && o.bcet_min <= o.bcet_max && o.bcet_max <= 1,
-          "bcet_min to bcet_max must be a range in [0, 1]");
-  require(o.max_active_min <= o.max_active_max, "max_active_min to max_active_max is not a range");
-  require(o.group_share == 0 || o.groups > 0, "group_share needs groups");
-  require(o.queue_depth >= 1 && o.queue_depth <= kMaxQueueDepth, "queue_depth is out of range");
-  require_share("edge_probability", o.edge_probability);
-  require_share("data_share", o.data_share);
-  require_share("jitter", o.jitter);
-  require_share("group_share", o.group_share);
-  require_share("queue_share", o.queue_share);
-  require_share("high_share", o.high_share);
-  require_share("low_share", o.low_share);
-  require(o.high_share + o.low_share <= 1 + 1e-9, "high_share and low_share exceed 1 together");
-  return mistakes;
-}
-
 /// Builds one workload; what each part draws comes from a stream of its own, so that changing one option (jitter, say)
 /// leaves everything else as it was.
 class Generator {
@@ -311,8 +271,48 @@ std::optional<Enum> from_string(std::string_view name, const std::array<Enum, N>
 
 }  // namespace
 
+Diagnostics find_mistakes(const GenerateOptions &o) {
+  Diagnostics mistakes;
+  const auto require = [&](bool kept, std::string message) {
+    if (!kept) mistakes.push_back(Diagnostic{Severity::Error, {}, 0, 0, std::move(message), {}});
+  };
+  const auto require_share = [&](const char *name, double value) {
+    require(value >= 0 && value <= 1, fmt::format("{} must be from 0 to 1, not {}", name, value));
+  };
+  constexpr std::uint32_t kMostTasks = 10'000'000;
+  require(o.dags >= 1, "dags must be at least 1");
+  require(o.min_tasks >= 1 && o.min_tasks <= o.max_tasks, "tasks per DAG must be a range from at least 1");
+  require(std::uint64_t{o.dags} * o.max_tasks <= kMostTasks, fmt::format("more than {} tasks", kMostTasks));
+  require(o.workers >= 1 && o.workers <= kMaxWorkers, fmt::format("workers must be from 1 to {}", kMaxWorkers));
+  require(o.preemption != PreemptionMode::Os || (o.policy != PolicyKind::Edf && o.policy != PolicyKind::Fifo),
+          "preemption 'os' needs a static policy");
+  require(o.utilization > 0 && std::isfinite(o.utilization), "utilization must be greater than zero");
+  require(o.max_task_utilization > 0 && o.max_task_utilization <= 1, "max_task_utilization must be in (0, 1]");
+  require(o.utilization <= o.max_task_utilization * o.dags * o.min_tasks,
+          fmt::format("{} DAGs of {} tasks of at most {} do not reach utilization {}", o.dags, o.min_tasks,
+                      o.max_task_utilization, o.utilization));
+  require(o.period_granularity >= 1 && o.period_min >= o.period_granularity, "period_min is below the granularity");
+  require(o.period_min <= o.period_max && o.period_max <= kMaxDuration / 4, "period_min to period_max is not a range");
+  require(o.deadline_min > 0 && o.deadline_min <= o.deadline_max && o.deadline_max <= 4,
+          "deadline_min to deadline_max must be a range in (0, 4]");
+  require(o.bcet_min >= 0 && o.bcet_min <= o.bcet_max && o.bcet_max <= 1,
+          "bcet_min to bcet_max must be a range in [0, 1]");
+  require(o.max_active_min <= o.max_active_max, "max_active_min to max_active_max is not a range");
+  require(o.group_share == 0 || o.groups > 0, "group_share needs groups");
+  require(o.queue_depth >= 1 && o.queue_depth <= kMaxQueueDepth, "queue_depth is out of range");
+  require_share("edge_probability", o.edge_probability);
+  require_share("data_share", o.data_share);
+  require_share("jitter", o.jitter);
+  require_share("group_share", o.group_share);
+  require_share("queue_share", o.queue_share);
+  require_share("high_share", o.high_share);
+  require_share("low_share", o.low_share);
+  require(o.high_share + o.low_share <= 1 + 1e-9, "high_share and low_share exceed 1 together");
+  return mistakes;
+}
+
 Result<Workload> generate(const GenerateOptions &options, std::uint64_t seed) {
-  Diagnostics mistakes = check(options);
+  Diagnostics mistakes = find_mistakes(options);
   if (!mistakes.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes));
   return Generator(options, seed).run();
 }

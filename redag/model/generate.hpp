@@ -76,6 +76,9 @@ struct GenerateOptions {
   double low_share = 0.0;   // of the DAGs: criticality low
 };
 
+/// What is wrong with the options, each with a message; cheap, where generate() with large options is not.
+[[nodiscard]] Diagnostics find_mistakes(const GenerateOptions &options);
+
 /// Errors: options out of range, each with a message; UUniFastDiscard that found no vector. The workload passes
 /// validate() without errors; its utilization is the target within rounding (each wcet to a nanosecond, at least 1).
 [[nodiscard]] Result<Workload> generate(const GenerateOptions &options, std::uint64_t seed);

@@ -8,7 +8,6 @@
 #include <limits>
 #include <optional>
 #include <span>
-#include <tuple>
 #include <unordered_map>
 #include <utility>
 
@@ -77,11 +76,9 @@ class Reader : private yaml::ValueReader {
       inherit();
       report(find_mistakes(workload_, options_));
     }
-    std::stable_sort(diagnostics_.begin(), diagnostics_.end(), [](const Diagnostic &a, const Diagnostic &b) {
-      return std::tie(a.line, a.column) < std::tie(b.line, b.column);
-    });
-    if (has_errors(diagnostics_)) return tl::unexpected<Diagnostics>(std::move(diagnostics_));
-    return LoadedWorkload{std::move(workload_), std::move(diagnostics_)};
+    Diagnostics found = take_diagnostics();
+    if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
+    return LoadedWorkload{std::move(workload_), std::move(found)};
   }
 
  private:

@@ -20,8 +20,8 @@ struct LoadedWorkload {
 /// What a file has to say: LoadOptions{.wcet_optional = true} is for what runs callbacks and measures them.
 using LoadOptions = ValidateOptions;
 
-/// Longest text that is read, in bytes.
-inline constexpr std::size_t kMaxWorkloadBytes = std::size_t{256} << 20U;
+/// Longest text that is read, in bytes: yaml-cpp can take 400 times as much memory.
+inline constexpr std::size_t kMaxWorkloadBytes = std::size_t{16} << 20U;
 
 /// Reads and validates a file. Errors: all mistakes, by line (with the warnings among them), or why the file cannot be
 /// read.

@@ -536,7 +536,17 @@ TEST(LoadWorkload, RefusesHugeFilesBeforeParsingThem) {
   std::filesystem::resize_file(file.path(), kMaxWorkloadBytes + 1);  // sparse
   const auto loaded = load_workload(file.path());
   ASSERT_FALSE(loaded);
-  EXPECT_NE(to_string(loaded.error()).find("larger than 256 MiB"), std::string::npos);
+  EXPECT_NE(to_string(loaded.error()).find("larger than 16 MiB"), std::string::npos);
+}
+
+TEST(LoadWorkload, OfVeryManyMistakesTheFirstAreSaid) {
+  std::string text = "name: x\ndags:\n";
+  for (int i = 0; i < 5000; ++i) text += "  - 1\n";
+  const auto loaded = parse_workload(text, "w.yaml");
+  ASSERT_FALSE(loaded);
+  EXPECT_LT(loaded.error().size(), 1100U);
+  EXPECT_NE(loaded.error().back().message.find("more mistakes from here on"), std::string::npos);
+  EXPECT_TRUE(has_errors({loaded.error().back()}));
 }
 
 TEST(SaveWorkload, RoundTripsThroughAFile) {

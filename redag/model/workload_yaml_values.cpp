@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -53,6 +55,23 @@ bool ValueReader::check_map(const Node &node, std::string_view what, const std::
     }
   }
   return true;
+}
+
+Diagnostics ValueReader::take_diagnostics() {
+  constexpr std::size_t kMostReported = 1000;
+  std::stable_sort(diagnostics_.begin(), diagnostics_.end(), [](const Diagnostic &a, const Diagnostic &b) {
+    return std::tie(a.line, a.column) < std::tie(b.line, b.column);
+  });
+  if (diagnostics_.size() > kMostReported) {
+    const auto rest = diagnostics_.begin() + kMostReported;
+    const bool errors =
+        std::any_of(rest, diagnostics_.end(), [](const Diagnostic &each) { return each.severity == Severity::Error; });
+    Diagnostic more{errors ? Severity::Error : Severity::Warning, file_, rest->line, rest->column, {}, {}};
+    more.message = fmt::format("{} more mistakes from here on", diagnostics_.size() - kMostReported);
+    diagnostics_.erase(rest, diagnostics_.end());
+    diagnostics_.push_back(std::move(more));
+  }
+  return std::move(diagnostics_);
 }
 
 std::optional<Duration> ValueReader::duration(const Node &node, std::string_view key) {

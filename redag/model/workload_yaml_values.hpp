@@ -38,6 +38,9 @@ class ValueReader {
   /// False if the node is not a map. Reports unknown, repeated and odd keys.
   bool check_map(const Node &node, std::string_view what, const std::vector<std::string_view> &keys);
 
+  /// What was found, in the order of the file; of very many the first ones, and how many more there are.
+  [[nodiscard]] Diagnostics take_diagnostics();
+
   std::optional<Duration> duration(const Node &node, std::string_view key);
   std::optional<Duration> positive_duration(const Node &node, std::string_view key);
   std::optional<std::string> text(const Node &node, std::string_view key);

@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "redag/base/text.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/trace/run_info_json.hpp"
 
@@ -71,7 +72,12 @@ bool read_event(std::string_view line, JobEvent &event) {
   return true;
 }
 
-bool is_a_time(std::int64_t value) { return value >= -kMaxDuration && value <= kMaxDuration; }
+bool is_a_time(std::int64_t time) { return time >= -kMaxTraceTime && time <= kMaxTraceTime; }
+
+// A deadline lies behind the end of the longest run at most by the longest deadline there is.
+bool is_a_value(std::int64_t value) {
+  return value >= -kMaxTraceTime - kMaxDuration && value <= kMaxTraceTime + kMaxDuration;
+}
 
 struct Footer {
   std::uint64_t events = 0;
@@ -80,6 +86,7 @@ struct Footer {
 };
 
 std::optional<Footer> read_footer(std::string_view line) {
+  if (json_nests_deeper(line)) return std::nullopt;
   const nlohmann::json json = nlohmann::json::parse(line, nullptr, false);
   if (!json.is_object()) return std::nullopt;
   const auto events = json.find("events");
@@ -93,6 +100,7 @@ std::optional<Footer> read_footer(std::string_view line) {
 }
 
 Result<RunInfo> read_header(std::string_view line, const std::string &file) {
+  if (json_nests_deeper(line)) return file_error(file, 1, "not an event trace: nested too deep");
   const nlohmann::ordered_json json = nlohmann::ordered_json::parse(line, nullptr, false);
   const auto format = json.is_object() ? json.find("format") : json.end();
   if (!json.is_object() || format == json.end() || *format != kFormat || !json.contains("run")) {
@@ -166,7 +174,7 @@ Result<Trace> parse_trace(std::string_view text, const std::string &file) {
     if (!line.empty() && line.front() == '{') {
       footer = read_footer(line);
       if (!footer) return file_error(file, number, "the last line must have events, end_ns and lost_events");
-    } else if (!read_event(line, event) || !is_a_time(event.time) || !is_a_time(event.value)) {
+    } else if (!read_event(line, event) || !is_a_time(event.time) || !is_a_value(event.value)) {
       return file_error(file, number, "not an event", "an event is [time,\"kind\",task,job,worker,value,\"reason\"]");
     } else if (event.task.value >= task_count) {
       return file_error(file, number, "task " + std::to_string(event.task.value) + " is not in the workload");
@@ -181,6 +189,7 @@ Result<Trace> parse_trace(std::string_view text, const std::string &file) {
                       "the file has " + std::to_string(trace.events.size()) + " events, but " +
                           std::to_string(footer->events) + " were written");
   }
+  if (footer->end < trace.info.start) return file_error(file, number, "the run ends before it begins");
   trace.info.end = footer->end;
   trace.info.lost_events = footer->lost_events;
   return trace;

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -78,15 +79,21 @@ Result<void> OutputFile::commit() {
   return file_error(path_, 0, std::string("cannot write: ") + std::strerror(error_));
 }
 
-Result<std::string> read_file(const std::string &path) {
+Result<std::string> read_file(const std::string &path, std::size_t most) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return file_error(path, 0, std::string("cannot open: ") + std::strerror(errno));
   std::string text;
   struct stat status {};
-  if (::fstat(descriptor, &status) == 0 && status.st_size > 0) text.reserve(static_cast<std::size_t>(status.st_size));
+  if (::fstat(descriptor, &status) == 0 && status.st_size > 0) {
+    text.reserve(std::min(static_cast<std::size_t>(status.st_size), most));
+  }
   std::string block(kBufferSize, '\0');
   ssize_t count = 0;
   while ((count = ::read(descriptor, block.data(), block.size())) != 0) {
+    if (count > 0 && static_cast<std::size_t>(count) > most - text.size()) {
+      ::close(descriptor);
+      return file_error(path, 0, "longer than " + std::to_string(most >> 20U) + " MiB");
+    }
     if (count > 0) {
       text.append(block, 0, static_cast<std::size_t>(count));
     } else if (errno != EINTR) {

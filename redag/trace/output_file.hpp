@@ -2,6 +2,7 @@
 // Every error (unwritable directory, full disk) is kept and reported by commit(). Not thread-safe.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -39,8 +40,11 @@ class OutputFile {
   std::string buffer_;
 };
 
+/// The largest file that is read: what has no end (a device, a pipe) must not take all memory.
+inline constexpr std::size_t kMaxFileBytes = std::size_t{8} << 30U;
+
 /// The whole of a file, for readers of our formats. Errors name the file.
-[[nodiscard]] Result<std::string> read_file(const std::string &path);
+[[nodiscard]] Result<std::string> read_file(const std::string &path, std::size_t most = kMaxFileBytes);
 
 /// One error at a line of a file.
 [[nodiscard]] tl::unexpected<Diagnostics> file_error(const std::string &file, int line, std::string message,

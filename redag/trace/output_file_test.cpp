@@ -92,6 +92,13 @@ TEST(OutputFile, FullDiskIsReported) {
   fs::remove_all(directory);
 }
 
+// Whatever it says its size is.
+TEST(ReadFile, WhatHasNoEndIsAnError) {
+  const auto text = read_file("/dev/zero", std::size_t{3} << 20U);
+  ASSERT_FALSE(text);
+  EXPECT_EQ(text.error().front().message, "longer than 3 MiB");
+}
+
 TEST(ReadFile, MissingFileIsAnError) {
   const auto text = read_file("/nonexistent/events.jsonl");
   ASSERT_FALSE(text);

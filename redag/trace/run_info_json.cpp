@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "redag/base/text.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
@@ -97,9 +98,9 @@ RunInfo info_from(const Json &json) {
   info.driver = one_of(
       kDrivers, [](Driver d) { return to_string(d); }, text_of(json, "driver"), "driver");
   info.seed = unsigned_of(json, "seed");
-  info.start = integer_of(json, "start_ns", -kMaxDuration, kMaxDuration);
-  info.end = integer_of(json, "end_ns", -kMaxDuration, kMaxDuration);
-  info.warm_up = integer_of(json, "warm_up_ns", 0, kMaxDuration);
+  info.start = integer_of(json, "start_ns", -kMaxTraceTime, kMaxTraceTime);
+  info.end = integer_of(json, "end_ns", -kMaxTraceTime, kMaxTraceTime);
+  info.warm_up = integer_of(json, "warm_up_ns", 0, kMaxTraceTime);
   info.stepped = json.value("stepped", false);
   info.lost_events = unsigned_of(json, "lost_events");
   info.overheads = text_of(json, "overheads");
@@ -136,6 +137,7 @@ std::string run_info_to_json(const RunInfo &info) {
 }
 
 Result<RunInfo> run_info_from_json(std::string_view text, const std::string &file, int line) {
+  if (json_nests_deeper(text)) return file_error(file, line, "the description of the run is nested too deep");
   try {
     const Json json = Json::parse(text);
     if (!json.is_object()) return file_error(file, line, "the description of the run must be an object");

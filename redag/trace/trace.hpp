@@ -31,6 +31,10 @@ struct Machine {
   friend bool operator==(const Machine &, const Machine &) = default;
 };
 
+/// Times of a trace are at most this far from 0 (73 years), so that no difference of two overflows, nor one with the
+/// latest deadline.
+inline constexpr Time kMaxTraceTime = kMaxDuration / 2;
+
 struct RunInfo {
   Workload workload;           // task ids of the events index this
   std::string executor;        // "redag", "mte", "ste", ...
