@@ -14,6 +14,7 @@ namespace redag::experiment {
 namespace {
 
 constexpr std::uint64_t kMostUnits = 10'000'000;
+constexpr std::uint64_t kMostCombinations = 1'000'000;
 
 template <class Values, class Text>
 std::vector<std::string> texts(const Values &values, Text text) {
@@ -64,6 +65,10 @@ class Checker {
       say(key_of(factor.kind), fmt::format("{} names a value twice", key_of(factor.kind)));
     }
     check_workloads();
+    if (mistakes_.empty() && has_too_many_combinations()) {
+      say("executors", fmt::format("the plan has more than {} combinations", kMostCombinations),
+          "shorten its lists, or make several plans of it");
+    }
     if (mistakes_.empty() && points_of(plan_).size() > kMostUnits / plan_.repetitions) {
       say("repetitions", fmt::format("{} combinations {} times are more than {} runs", points_of(plan_).size(),
                                      plan_.repetitions, kMostUnits));
@@ -72,6 +77,17 @@ class Checker {
   }
 
  private:
+  // Counted before they are made: lists that a file can hold have more combinations than memory.
+  [[nodiscard]] bool has_too_many_combinations() const {
+    std::uint64_t combinations = 1;
+    for (const Factor &factor : factors_of(plan_)) {
+      const std::uint64_t levels = std::max<std::size_t>(1, factor.levels.size());
+      if (levels > kMostCombinations / combinations) return true;
+      combinations *= levels;
+    }
+    return false;
+  }
+
   void say(std::string key, std::string message, std::string hint = {}) {
     mistakes_.push_back(PlanMistake{std::move(key), std::move(message), std::move(hint)});
   }

@@ -214,7 +214,7 @@ Result<FactorialPlan> parse_factorial_plan(std::string_view text, const std::str
 }
 
 Result<FactorialPlan> load_factorial_plan(const std::string &path, const ExecutorNames &executors) {
-  const Result<std::string> text = trace::read_file(path);
+  const Result<std::string> text = trace::read_file(path, kMaxWorkloadBytes);
   if (!text) return tl::unexpected<Diagnostics>(text.error());
   return parse_factorial_plan(*text, path, executors);
 }

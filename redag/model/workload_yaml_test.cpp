@@ -539,16 +539,6 @@ TEST(LoadWorkload, RefusesHugeFilesBeforeParsingThem) {
   EXPECT_NE(to_string(loaded.error()).find("larger than 16 MiB"), std::string::npos);
 }
 
-TEST(LoadWorkload, OfVeryManyMistakesTheFirstAreSaid) {
-  std::string text = "name: x\ndags:\n";
-  for (int i = 0; i < 5000; ++i) text += "  - 1\n";
-  const auto loaded = parse_workload(text, "w.yaml");
-  ASSERT_FALSE(loaded);
-  EXPECT_LT(loaded.error().size(), 1100U);
-  EXPECT_NE(loaded.error().back().message.find("more mistakes from here on"), std::string::npos);
-  EXPECT_TRUE(has_errors({loaded.error().back()}));
-}
-
 TEST(SaveWorkload, RoundTripsThroughAFile) {
   const Workload workload = generate(GenerateOptions{}, 1).value();
   const TemporaryFile file("redag_saved.yaml");
@@ -693,14 +683,17 @@ TEST(ParseWorkload, ReadsAHundredThousandTasksInOneDag) {
   EXPECT_EQ(workload.dags.at(0).tasks.back().period, kSecond);
 }
 
-TEST(ParseWorkload, ReportsTwentyThousandMistakes) {
+TEST(ParseWorkload, CountsTwentyThousandMistakesAndSaysAThousand) {
   std::string text = "dags:\n- name: d\n  tasks:\n";
   constexpr std::size_t kCount = 10'000;
   for (std::size_t i = 0; i < kCount; ++i)
     text += fmt::format("  - {{name: t{}, wcet: 1, activation: data, after: u{}}}\n", i, i);
   const auto loaded = parse_workload(text, "bad.yaml");
   ASSERT_FALSE(loaded);
-  EXPECT_EQ(loaded.error().size(), 2 * kCount);
+  EXPECT_EQ(loaded.error().size(), 1001U);
+  EXPECT_EQ(loaded.error().back().message, "19000 more mistakes from here on");
+  EXPECT_EQ(loaded.error().back().line, 504);
+  EXPECT_TRUE(has_errors({loaded.error().back()}));
 }
 
 // --- what the repository ships ---

@@ -92,12 +92,21 @@ TEST_F(EventsFile, EndAndLossesAreKnownAtTheEnd) {
   ASSERT_TRUE(writer);
   for (const JobEvent &event : trace.events) writer->add(std::span(&event, 1));
   EXPECT_FALSE(fs::exists(path_));
-  ASSERT_TRUE(writer->commit(77, 5));
+  const Time end = trace.info.start + 77;
+  ASSERT_TRUE(writer->commit(end, 5));
   const Result<Trace> read = read_trace(path_);
-  ASSERT_TRUE(read);
-  EXPECT_EQ(read->info.end, 77);
+  ASSERT_TRUE(read) << to_string(read.error());
+  EXPECT_EQ(read->info.end, end);
   EXPECT_EQ(read->info.lost_events, 5U);
   EXPECT_EQ(read->events, trace.events);
+}
+
+TEST_F(EventsFile, ARunThatEndsBeforeItBeginsIsRefused) {
+  const Trace trace = example();
+  auto writer = EventsWriter::create(path_, trace.info);
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE(writer->commit(trace.info.start - 1, 0));
+  EXPECT_FALSE(read_trace(path_));
 }
 
 TEST_F(EventsFile, AnInvalidWorkloadIsNotWritten) {
