@@ -1,7 +1,7 @@
 # The front door: each target does one everyday thing from a fresh clone on. What it runs is plain CMake and the scripts
 # of tools/; nothing is built here that `cmake --preset` could not build.
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench lint format asan tsan coverage mutate ros install clean
+.PHONY: help demo test bench lint format asan tsan coverage mutate fuzz chaos ros install clean
 PREFIX ?= /usr/local
 
 # ThreadSanitizer of older compilers cannot start where a kernel randomises much of the address space
@@ -73,6 +73,23 @@ mutate: ## break redag/ on purpose, as tests/mutations.yaml says, and see whethe
 	@tools/bootstrap test
 	tools/mutate
 
+FUZZ_SECONDS ?= 600
+fuzz: ## look for input that breaks a reader: FUZZ_SECONDS (600) of processor time for each target of tests/fuzz
+	@tools/bootstrap fuzz
+	cmake --preset fuzz
+	cmake --build --preset fuzz
+	tools/fuzz $(FUZZ_SECONDS)
+
+CHAOS_RUNS ?= 2000
+chaos: ## faults by the thousand: CHAOS_RUNS (2000) runs of executor and simulator, a hundredth of it of each fault from outside
+	@tools/bootstrap test
+	cmake --preset dev
+	cmake --build --preset dev --target redag_chaos redag_cli redag_allocation_failures
+	build/dev/tests/chaos/redag_chaos simulator $(CHAOS_RUNS)
+	build/dev/tests/chaos/redag_chaos executor $(CHAOS_RUNS)
+	build/dev/tests/chaos/redag_allocation_failures workloads
+	tests/chaos/process.py build/dev/bin/redag . --runs $$(($(CHAOS_RUNS) / 100))
+
 ros: ## build redag_rclcpp with colcon and run its tests, for each ROS 2 under /opt/ros
 	@tools/bootstrap test
 	tools/test_rclcpp
@@ -84,5 +101,5 @@ install: ## install library, headers and program to PREFIX (default /usr/local)
 	cmake --install build/release --prefix $(PREFIX)
 
 clean: ## remove what the targets above built; results/ stays
-	rm -rf build/dev build/release build/bench build/asan-ubsan build/tsan build/coverage build/mutate build/colcon
+	rm -rf build/dev build/release build/bench build/asan-ubsan build/tsan build/coverage build/mutate build/fuzz build/colcon
 	git worktree prune

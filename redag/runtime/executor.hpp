@@ -95,6 +95,9 @@ class Executor {
 
   /// Appends the events since the last call; times count from the start. One thread at a time.
   void drain(std::vector<JobEvent> &events);
+  /// When the scheduler stopped deciding, on the clock of the events; kNever before. A trace ends there: what happens
+  /// to started jobs afterwards follows no rules.
+  [[nodiscard]] Time stopped_at() const { return engine_->halted_at(); }
   [[nodiscard]] std::uint64_t lost_events() const { return engine_->lost_events(); }
   [[nodiscard]] std::vector<TaskStats> stats(DagId dag) const;
   /// "control.ekf"

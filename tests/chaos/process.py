@@ -1,0 +1,353 @@
+#!/usr/bin/env python3
+"""Faults from outside, at random moments: signals, limits, full and read-only folders, lost rights, fewer processors.
+
+Usage: process.py PROGRAM SOURCE_DIR [--runs N] [--seed S] [--fault NAME]...
+
+Each fault is tried N times, each time from a seed that is printed when something breaks: `--runs 1 --seed S --fault NAME`
+does it again. Whatever happens, the program ends in time, by itself or by the signal, never by a crash; it says why when it
+fails; what it leaves behind is whole; what it says it did is lawful. Standard library only.
+"""
+import argparse
+import ctypes
+import json
+import os
+import pathlib
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+NOBODY = 65534
+GOOD = {0, 1, 2}
+TIMEOUT = 600
+PROGRAM = pathlib.Path()
+SOURCE = pathlib.Path()
+
+
+class Broken(Exception):
+    pass
+
+
+class Skipped(Exception):
+    pass
+
+
+def expect(condition, what):
+    if not condition:
+        raise Broken(what)
+
+
+class Child:
+    """The program with faults around it."""
+
+    def __init__(self, *arguments, prepare=None, **options):
+        self.arguments = [str(a) for a in arguments]
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL} | options
+        self.process = subprocess.Popen([PROGRAM, *self.arguments], preexec_fn=prepare, **options)
+
+    def send(self, number):
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+
+    def end(self, allowed=frozenset(GOOD)):
+        try:
+            out, err = self.process.communicate(timeout=TIMEOUT)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.communicate()
+            raise Broken(f"does not end: {' '.join(self.arguments)}") from None
+        self.out, self.err = (text.decode(errors="replace") if text else "" for text in (out, err))
+        self.status = self.process.returncode
+        expect(self.status in allowed, f"ended with {self.status}: {' '.join(self.arguments)}\n{self.err}{self.out[-1500:]}")
+        if self.status == 2 and self.process.stderr:
+            expect("error" in self.err, f"failed without a word: {' '.join(self.arguments)}\n{self.err}{self.out[-1500:]}")
+        return self
+
+
+def check_results(folder, tidy=True):
+    """Every file is whole, every trace lawful; nothing temporary is left."""
+    for path in pathlib.Path(folder).rglob("*"):
+        if not path.is_file():
+            continue
+        if ".tmp." in path.name:
+            expect(not tidy, f"{path.name} was left behind")
+        elif path.name == "events.jsonl":
+            Child("check-trace", path).end({0})
+        elif path.suffix == ".json":
+            json.loads(path.read_text())
+        elif path.suffix in (".csv", ".html", ".svg") and path.name != "units.csv":  # that one may be cut anywhere
+            expect(path.read_bytes()[-1:] in (b"\n", b""), f"{path.name} ends in the middle of a line")
+
+
+def workload(rng, folder, tasks=4, busy=True):
+    """A random one of a few short periods, so that a second of it is a lot."""
+    path = folder / "random.yaml"
+    Child("generate", "--dags", tasks, "--utilization", 0.9 if busy else 0.3, "--workers", 2, "--seed",
+          rng.randrange(2**32), "-o", path).end({0})
+    return path
+
+
+def some_command(rng, folder):
+    """Something that takes a while."""
+    file = workload(rng, folder)
+    out = ["--out", folder / "out"]
+    return rng.choice([
+        ["run", file, "--duration", "20s", *out],
+        ["run", file, "--duration", "20s", "--preemption", rng.choice(["none", "cooperative"]), *out],
+        ["simulate", file, "--duration", "20000s", *out],
+        ["compare", file, "--duration", "1s", "--executors", "redag-none,mte", "--repeat", "20", *out],
+        ["experiment", "acceptance", SOURCE / "experiments" / "acceptance_dags.yaml", *out],
+        ["sensitivity", SOURCE / "workloads" / "robot.yaml", "--simulate"],
+        ["analyze", file, "--preemption", "none", "--explore=100000000"],
+    ])
+
+
+def interrupted(rng, folder):
+    """Ctrl-C at any moment, and perhaps once more."""
+    child = Child(*some_command(rng, folder))
+    time.sleep(rng.uniform(0, 0.6))
+    number = rng.choice([signal.SIGINT, signal.SIGTERM])
+    child.send(number)
+    twice = rng.random() < 0.5
+    if twice:
+        time.sleep(rng.uniform(0, 0.5))
+        child.send(number)
+    child.end(GOOD | {-number, 128 + number})
+    check_results(folder, tidy=child.status in GOOD)
+
+
+def stopped(rng, folder):
+    """SIGSTOP and SIGCONT: time jumps for everybody."""
+    file = workload(rng, folder, busy=False)
+    child = Child("run", file, "--duration", "1s", "--preemption", rng.choice(["none", "cooperative", "auto"]), "--out",
+                  folder / "out")
+    for _ in range(rng.randint(1, 4)):
+        time.sleep(rng.uniform(0, 0.4))
+        child.send(signal.SIGSTOP)
+        time.sleep(rng.uniform(0, 0.3))
+        child.send(signal.SIGCONT)
+    child.end({0})
+    check_results(folder)
+
+
+def fewer_processors(rng, folder):
+    """The affinity of every thread shrinks to one processor, and grows again, while jobs run."""
+    usable = sorted(os.sched_getaffinity(0))
+    file = workload(rng, folder, busy=False)
+    child = Child("run", file, "--duration", "1s", "--preemption", rng.choice(["none", "cooperative", "auto"]), "--out",
+                  folder / "out")
+    for cpus in ([rng.choice(usable)], usable, [rng.choice(usable)]):
+        time.sleep(rng.uniform(0, 0.3))
+        try:
+            for thread in os.listdir(f"/proc/{child.process.pid}/task"):
+                os.sched_setaffinity(int(thread), cpus)
+        except OSError:  # that thread has ended
+            pass
+    child.end({0})
+    check_results(folder)
+
+
+def drop_realtime():
+    """No CAP_SYS_NICE from here on, whoever runs it; needs the capability to drop it."""
+    resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
+    libc = ctypes.CDLL(None)
+    libc.prctl(24, 23, 0, 0, 0)  # PR_CAPBSET_DROP, CAP_SYS_NICE
+
+
+def without_realtime(rng, folder):
+    """`auto` goes on without; `os` is an error that says what to do."""
+    file = workload(rng, folder, busy=False)
+    child = Child("run", file, "--duration", "200ms", "--preemption", "auto", "--out", folder / "out",
+                  prepare=drop_realtime).end({0})
+    summary = json.loads((folder / "out" / "summary.json").read_text())
+    expect(summary["run"]["preemption"] == "cooperative", f"auto became {summary['run']['preemption']}")
+    child = Child("run", file, "--preemption", "os", prepare=drop_realtime).end({2})
+    expect("cap_sys_nice" in child.err.lower(), child.err)
+    check_results(folder)
+
+
+def as_nobody(limit=None):
+    def prepare():
+        if limit:
+            resource.setrlimit(*limit)
+        os.setgid(NOBODY)
+        os.setuid(NOBODY)
+
+    if os.geteuid() != 0:
+        raise Skipped("only root can become somebody whom limits hold for")
+    return prepare
+
+
+def for_everybody(folder, rng):
+    """The program and a workload where `nobody` may read them."""
+    program = folder / "redag"
+    shutil.copy(PROGRAM, program)
+    program.chmod(0o755)
+    folder.chmod(0o755)
+    return program, workload(rng, folder)
+
+
+def no_threads(rng, folder):
+    """RLIMIT_NPROC: some of the threads, or none, can be made."""
+    program, file = for_everybody(folder, rng)
+    limit = (resource.RLIMIT_NPROC, (rng.randint(1, 6),) * 2)
+    arguments = ["run", file, "--duration", "100ms", "--workers", rng.randint(1, 64), "--preemption", "none"]
+    if rng.random() < 0.3:
+        arguments = ["experiment", "acceptance", "--utilization", "0.5", "--sets", "20", "--out", "/dev/shm/none"]
+    child = Child(*arguments, executable=program, prepare=as_nobody(limit)).end()
+    check_results(folder)
+
+
+def read_only(rng, folder):
+    """A folder of somebody else."""
+    program, file = for_everybody(folder, rng)
+    (folder / "out").mkdir(mode=0o755)
+    command = rng.choice([["run", file, "--duration", "100ms"], ["simulate", file], ["compare", file, "--simulate"],
+                          ["generate", "--count", "2"], ["experiment", "acceptance", "--sets", "2"]])
+    target = folder / "out" if rng.random() < 0.5 else folder / "out" / "deeper"
+    child = Child(*command, "--out", target, executable=program, prepare=as_nobody()).end({2})
+    expect("Permission denied" in child.err, child.err)
+    expect(not list((folder / "out").iterdir()), "something was written")
+
+
+def writing_command(rng, folder, out):
+    file = workload(rng, folder)
+    return rng.choice([
+        ["simulate", file, "--duration", "2s", "--out", out],
+        ["compare", file, "--simulate", "--duration", "1s", "--out", out],
+        ["run", file, "--duration", "200ms", "--preemption", "none", "--out", out],
+        ["generate", "--count", "40", "--out", out],
+        ["experiment", "acceptance", "--utilization", "0.3,0.6", "--sets", "50", "--out", out],
+    ])
+
+
+def small_files(rng, folder):
+    """RLIMIT_FSIZE: every file ends somewhere."""
+    size = rng.choice([0, rng.randrange(1000), rng.randrange(100_000)])
+    arguments = writing_command(rng, folder, folder / "out")
+    Child(*arguments, prepare=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))).end()
+    check_results(folder)
+
+
+class Tmpfs:
+    def __init__(self, folder, size):
+        self.folder = folder
+        folder.mkdir()
+        if subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "none", folder], capture_output=True,
+                          check=False).returncode != 0:
+            raise Skipped("a small file system cannot be mounted here")
+
+    def __enter__(self):
+        return self.folder
+
+    def __exit__(self, *_):
+        subprocess.run(["umount", self.folder], check=True)
+
+
+def full_disk(rng, folder):
+    """A small disk; an experiment goes on once there is room."""
+    with Tmpfs(folder / "disk", rng.choice([4096, 16384, 65536, 300_000])) as disk:
+        arguments = writing_command(rng, folder, disk / "out")
+        child = Child(*arguments).end()
+        check_results(disk)
+        if "experiment" not in arguments or child.status == 0:
+            return
+        subprocess.run(["mount", "-o", "remount,size=50M", disk], check=True)
+        Child(*arguments).end({0})
+        Child(*arguments[:-1], folder / "elsewhere").end({0})
+        for name in ("acceptance.csv", "acceptance.svg"):
+            same = (disk / "out" / name).read_bytes() == (folder / "elsewhere" / name).read_bytes()
+            expect(same, f"{name} differs from that of an experiment that was not interrupted")
+
+
+def killed(rng, folder):
+    """kill -9 in the middle of an experiment, several times: nothing is lost, nothing counts twice."""
+    arguments = ["experiment", "acceptance", "--utilization", "0.2,0.5,0.8", "--sets", "60", "--seed",
+                 rng.randrange(1000), "--jobs", rng.randint(1, 3), "--out"]
+    for _ in range(rng.randint(1, 4)):
+        child = Child(*arguments, folder / "out")
+        time.sleep(rng.uniform(0, 0.5))
+        child.send(signal.SIGKILL)
+        child.end({0, -signal.SIGKILL})
+    Child(*arguments, folder / "out").end({0})
+    Child(*arguments, folder / "whole").end({0})
+    for name in ("acceptance.csv", "acceptance.svg"):
+        expect((folder / "out" / name).read_bytes() == (folder / "whole" / name).read_bytes(), f"{name} differs")
+
+
+def little_memory(rng, folder):
+    """RLIMIT_AS: an allocation fails somewhere."""
+    file = workload(rng, folder, tasks=rng.choice([4, 40, 400]))
+    limit = rng.randint(8, 160) << 20
+    command = rng.choice([["validate", file], ["simulate", file, "--duration", "5s", "--out", folder / "out"],
+                          ["analyze", file], ["run", file, "--duration", "100ms", "--preemption", "none"],
+                          ["generate", "--dags", "20000"], ["assign", SOURCE / "workloads" / "robot.yaml"],
+                          ["experiment", "acceptance", "--sets", "5", "--utilization", "0.5", "--out", folder / "out"]])
+    # 127: the loader itself had no room for the program's libraries.
+    child = Child(*command, prepare=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit))).end(GOOD | {127})
+    check_results(folder)
+
+
+def few_files(rng, folder):
+    """RLIMIT_NOFILE, and standard streams that are closed."""
+    limit = rng.randint(4, 12)
+    closed = [descriptor for descriptor in (0, 1, 2) if rng.random() < 0.3]
+
+    def prepare():
+        for descriptor in closed:
+            os.close(descriptor)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (limit, limit))
+
+    arguments = writing_command(rng, folder, folder / "out")
+    child = Child(*arguments, prepare=prepare)
+    if 2 in closed:
+        child.process.stderr = None
+    child.end(GOOD | {127})
+    check_results(folder)
+
+
+FAULTS = [interrupted, stopped, fewer_processors, without_realtime, no_threads, read_only, small_files, full_disk, killed,
+          little_memory, few_files]
+
+
+def try_one(fault, seed):
+    with tempfile.TemporaryDirectory(prefix="redag_chaos_") as name:
+        fault(random.Random(f"{fault.__name__} {seed}"), pathlib.Path(name))
+
+
+def main():
+    global PROGRAM, SOURCE
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program", type=pathlib.Path)
+    parser.add_argument("source", type=pathlib.Path)
+    parser.add_argument("--runs", type=int, default=1, help="of each fault")
+    parser.add_argument("--seed", type=int, default=1, help="of the first run; the others follow")
+    parser.add_argument("--fault", action="append", choices=[fault.__name__ for fault in FAULTS])
+    options = parser.parse_args()
+    PROGRAM, SOURCE = options.program.resolve(), options.source.resolve()
+    failed = 0
+    for fault in FAULTS:
+        if options.fault and fault.__name__ not in options.fault:
+            continue
+        survived = 0
+        why = ""
+        for seed in range(options.seed, options.seed + options.runs):
+            try:
+                try_one(fault, seed)
+                survived += 1
+            except Skipped as skip:
+                why = f" (skipped: {skip})"
+                break
+            except Broken as broken:
+                failed += 1
+                print(f"{fault.__name__}, seed {seed}: {broken}", file=sys.stderr, flush=True)
+        print(f"{fault.__name__:18} {survived:6} survived{why}", flush=True)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

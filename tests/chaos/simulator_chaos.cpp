@@ -1,0 +1,99 @@
+#include <algorithm>
+#include <array>
+
+#include "redag/base/rng.hpp"
+#include "redag/metrics/jobs.hpp"
+#include "redag/metrics/trace_checker.hpp"
+#include "redag/model/validate.hpp"
+#include "redag/sched/executors.hpp"
+#include "redag/sim/simulator.hpp"
+#include "redag/testing/random_workloads.hpp"
+#include "tests/chaos/chaos.hpp"
+
+namespace redag::chaos {
+namespace {
+
+// Times of a random workload are microseconds: in their place years, so that releases, deadlines and the end come near
+// the largest time there is.
+void stretch(Workload &workload, Duration factor) {
+  const auto scale = [factor](Duration &time) { time *= factor; };
+  for (Dag &dag : workload.dags) {
+    scale(dag.deadline);
+    for (Task &task : dag.tasks) {
+      for (Duration *time : {&task.wcet, &task.wcet_low, &task.bcet, &task.period, &task.deadline, &task.offset,
+                             &task.jitter, &task.region, &task.budget, &task.execution.mean, &task.execution.stddev}) {
+        scale(*time);
+      }
+      for (Duration &sample : task.execution.samples) scale(sample);
+    }
+  }
+}
+
+Duration longest_time(const Workload &workload) {
+  Duration longest = 1;
+  for (const TaskRef &ref : flatten(workload)) {
+    longest = std::max({longest, ref.task->period, ref.task->deadline, ref.task->offset, ref.task->wcet});
+  }
+  return longest;
+}
+
+}  // namespace
+
+std::string simulator_run(std::uint64_t seed, Survived &survived) {
+  Rng rng(seed);
+  constexpr std::array kModes = {sched::Preemption::None, sched::Preemption::Cooperative, sched::Preemption::Full};
+  Workload workload = testing::random_workload(rng);
+  workload.policy = static_cast<PolicyKind>(rng.uniform(0, 5));
+  const Duration longest = longest_time(workload);
+  const Duration horizon = 20 * longest;
+  const bool far = rng.uniform01() < 0.3;
+  const Duration factor = far ? trace::kMaxTraceTime / horizon : 1;
+  stretch(workload, factor);
+  if (has_errors(validate(workload))) return "the random workload is not valid: " + to_string(validate(workload));
+
+  const auto executors = sched::executors();
+  const sched::ExecutorKind &kind =
+      rng.uniform01() < 0.6 ? executors.front()
+                            : executors[static_cast<std::size_t>(rng.uniform(0, std::ssize(executors) - 1))];
+  const auto preemption = kModes[static_cast<std::size_t>(rng.uniform(0, 2))];
+  trace::Trace trace;
+  trace.info.config =
+      sched::effective_config(kind, testing::random_config(rng, workload.policy, preemption, workload.task_count()));
+  trace.info.workload = workload;
+  trace.info.executor = kind.name;
+  trace.info.driver = trace::Driver::Simulator;
+  trace.info.seed = seed;
+
+  sim::Options options;
+  options.horizon = std::min(horizon * factor, trace::kMaxTraceTime);
+  options.seed = seed;
+  const double overruns = rng.uniform01() < 0.5 ? 0 : rng.uniform01();
+  std::uint64_t overrun = 0;
+  const std::uint64_t demands = rng();
+  options.demand = [&](const Task &task, TaskId id, std::uint32_t number) {
+    Rng dice = Rng::stream(demands, id.value, number);
+    if (dice.uniform01() >= overruns) return task.wcet;
+    ++overrun;
+    return std::min(task.wcet * dice.uniform(2, 100), kMaxDuration);
+  };
+  const std::uint64_t most = rng.uniform01() < 0.3 ? static_cast<std::uint64_t>(rng.uniform(1, 60)) : 20'000;
+  const auto scheduler = sched::make_scheduler(kind.name, workload, trace.info.config);
+  const sim::Result result =
+      sim::simulate(workload, *scheduler, trace.info.config.workers, options, [&](std::span<const JobEvent> events) {
+        trace.events.insert(trace.events.end(), events.begin(), events.end());
+        return trace.events.size() < most;
+      });
+  trace.info.end = result.end;
+  // How long jobs execute is not what the workload says here.
+  const metrics::CheckReport report =
+      metrics::check_trace(trace, metrics::rules_for(trace.info).without(metrics::Rule::Execution));
+  if (!report.ok()) return report.to_string() + testing::describe(workload, trace.info.config);
+  survived["jobs"] += result.released;
+  survived["jobs that overran their wcet up to 100 times"] += overrun;
+  survived["runs near the largest time"] += far ? 1 : 0;
+  survived["runs broken off"] += result.end < options.horizon ? 1 : 0;
+  survived["runs of " + std::string(kind.name)] += 1;
+  return {};
+}
+
+}  // namespace redag::chaos

@@ -1,0 +1,57 @@
+#include <fcntl.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "redag/base/check.hpp"
+#include "redag/base/time.hpp"
+#include "redag/cli/program.hpp"
+#include "redag/model/workload_yaml.hpp"
+#include "tests/fuzz/scratch_file.hpp"
+#include "tests/fuzz/targets.hpp"
+
+namespace redag::fuzz {
+namespace {
+
+// 0: yes, 1: the answer is no. Anything else is not an answer.
+bool answers(const std::vector<std::string> &arguments) {
+  static const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+  cli::Console console(nowhere, {}, nowhere, {});
+  const int status = cli::run_program(arguments, console);
+  return status == 0 || status == 1;
+}
+
+// What is asked for grows with the number of releases: some of the fastest task's.
+Duration some_releases(const Workload &workload) {
+  constexpr Duration kReleases = 30;
+  Duration fastest = kSecond;
+  for (const TaskRef &ref : flatten(workload)) fastest = std::min(fastest, ref.task->period);
+  return std::max(fastest * kReleases, Duration{1});
+}
+
+}  // namespace
+
+void commands_target(std::string_view input) {
+  const Result<LoadedWorkload> loaded = parse_workload(input, "fuzz.yaml");
+  if (!loaded) return;
+  const std::string file = scratch_file("workload.yaml", input);
+  const std::string results = scratch_folder() + "/results";
+  const std::string duration = format_duration(some_releases(loaded->workload));
+  REDAG_CHECK(answers({"validate", file, "--json"}), "validate");
+  REDAG_CHECK(answers({"validate", file}), "validate, in words");
+  for (const char *executor : {"redag-none", "redag-cooperative", "mte", "ste"}) {
+    REDAG_CHECK(answers({"simulate", file, "--executor", executor, "--duration", duration, "--json"}), executor);
+  }
+  REDAG_CHECK(answers({"simulate", file, "--duration", duration, "--out", results, "--force"}), "simulate");
+  REDAG_CHECK(answers({"check-trace", results}), "check-trace: what was simulated is lawful");
+  REDAG_CHECK(answers({"report", results}), "report");
+  REDAG_CHECK(answers({"analyze", file, "--json"}), "analyze");
+  REDAG_CHECK(answers({"analyze", file, "--preemption", "none", "--explore=1000"}), "analyze --explore");
+  constexpr std::size_t kMostTasks = 4;  // of what analyses again and again
+  if (loaded->workload.task_count() > kMostTasks) return;
+  REDAG_CHECK(answers({"sensitivity", file, "--json"}), "sensitivity");
+  REDAG_CHECK(answers({"assign", file, "--json"}), "assign");
+}
+
+}  // namespace redag::fuzz

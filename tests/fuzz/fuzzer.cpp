@@ -1,0 +1,12 @@
+// libFuzzer's entry for one target, which the build names.
+#include <cstddef>
+#include <cstdint>
+
+#include "tests/fuzz/targets.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size);
+
+int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size) {
+  redag::fuzz::REDAG_FUZZ_TARGET({reinterpret_cast<const char *>(data), size});
+  return 0;
+}

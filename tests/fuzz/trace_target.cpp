@@ -1,0 +1,44 @@
+#include <vector>
+
+#include "redag/base/check.hpp"
+#include "redag/metrics/jobs.hpp"
+#include "redag/metrics/jobs_csv.hpp"
+#include "redag/metrics/perfetto.hpp"
+#include "redag/metrics/summary.hpp"
+#include "redag/metrics/summary_json.hpp"
+#include "redag/metrics/trace_checker.hpp"
+#include "redag/report/document.hpp"
+#include "redag/report/page.hpp"
+#include "redag/report/verdict.hpp"
+#include "redag/trace/events_file.hpp"
+#include "tests/fuzz/scratch_file.hpp"
+#include "tests/fuzz/targets.hpp"
+
+namespace redag::fuzz {
+
+void trace_target(std::string_view input) {
+  const Result<trace::Trace> trace = trace::parse_trace(input, "events.jsonl");
+  if (!trace) {
+    REDAG_CHECK(!trace.error().empty(), "a refusal says why");
+    return;
+  }
+  (void)metrics::check_trace(*trace, metrics::rules_for(trace->info));
+  (void)metrics::check_trace(*trace);
+  (void)metrics::summary_to_json(metrics::summarize(*trace), trace->info);
+  const std::string &folder = scratch_folder();
+  const auto jobs = metrics::fold_jobs(trace->info.workload, trace->events);
+  REDAG_CHECK(metrics::write_jobs_csv(folder + "/jobs.csv", trace->info.workload, jobs).has_value(), "jobs.csv");
+  REDAG_CHECK(metrics::write_perfetto(folder + "/trace.json", *trace).has_value(), "trace.json");
+  std::vector<report::Group> groups;
+  groups.emplace_back("fuzz", report::digest_options(1));
+  groups.back().add(folder, *trace);
+  if (groups.back().fits(trace->info)) groups.back().add(folder, *trace);
+  groups.back().finish();
+  (void)report::page(report::to_json(groups), report::title_of(groups));
+  (void)report::verdict_of(groups.front());
+  REDAG_CHECK(trace::write_trace(folder + "/events.jsonl", *trace).has_value(), "events.jsonl");
+  const Result<trace::Trace> again = trace::read_trace(folder + "/events.jsonl");
+  REDAG_CHECK(again.has_value() && again->events.size() == trace->events.size(), "what was written can be read");
+}
+
+}  // namespace redag::fuzz

@@ -1,0 +1,25 @@
+#include <string>
+
+#include "redag/base/check.hpp"
+#include "redag/base/time.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/experiment/acceptance_plan.hpp"
+#include "redag/model/callback_match.hpp"
+#include "tests/fuzz/targets.hpp"
+
+namespace redag::fuzz {
+
+void values_target(std::string_view input) {
+  if (const Result<Duration> duration = parse_duration(input)) {
+    const Result<Duration> again = parse_duration(format_duration(*duration));
+    REDAG_CHECK(again && *again == *duration, "a duration is read as it was written");
+    (void)humanize_duration(*duration);
+  }
+  (void)cli::parse_cpu_list(input);
+  (void)experiment::parse_utilization(input);
+  (void)ros_name_mistake(input);
+  const std::size_t half = input.size() / 2;
+  (void)glob_match(input.substr(0, half), input.substr(half));
+}
+
+}  // namespace redag::fuzz

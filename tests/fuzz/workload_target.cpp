@@ -1,0 +1,46 @@
+#include <string>
+
+#include "redag/base/check.hpp"
+#include "redag/model/callback_match.hpp"
+#include "redag/model/workload_yaml.hpp"
+#include "tests/fuzz/targets.hpp"
+
+namespace redag::fuzz {
+namespace {
+
+// What the loader accepts is without mistakes, and writing it loses nothing.
+void load(std::string_view input, LoadOptions options) {
+  const Result<LoadedWorkload> loaded = parse_workload(input, "fuzz.yaml", options);
+  if (!loaded) {
+    REDAG_CHECK(!loaded.error().empty(), "a refusal says why");
+    for (const Diagnostic &diagnostic : loaded.error()) {
+      REDAG_CHECK(!diagnostic.message.empty(), "a diagnostic says something");
+      (void)diagnostic.to_string();
+    }
+    return;
+  }
+  const Workload &workload = loaded->workload;
+  REDAG_CHECK(!has_errors(validate(workload, options)), "what is accepted has no mistakes");
+  const std::string text = to_yaml(workload);
+  const Result<LoadedWorkload> again = parse_workload(text, "again.yaml", options);
+  REDAG_CHECK(again.has_value(), "what was written can be read");
+  REDAG_CHECK(again->workload == workload, "what was written is read as it was");
+  CallbackMatcher matcher(workload);
+  for (const TaskRef &ref : flatten(workload)) {
+    if (!ref.task->callback) continue;
+    const Callback &callback = *ref.task->callback;
+    (void)matcher.find(CallbackId{callback.kind, callback.node, callback.name, callback.period, 0});
+    (void)matcher.find(CallbackId{callback.kind, callback.node + "x", "/other", callback.period, 1});
+  }
+  (void)matcher.unmatched();
+  (void)matcher.unconfigured();
+}
+
+}  // namespace
+
+void workload_target(std::string_view input) {
+  load(input, {});
+  load(input, {.wcet_optional = true});
+}
+
+}  // namespace redag::fuzz
