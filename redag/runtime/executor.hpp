@@ -92,6 +92,8 @@ class Executor {
   /// Which preemption mode this is, and why.
   [[nodiscard]] const Mode &mode() const { return setup_.mode; }
   [[nodiscard]] const std::vector<std::string> &warnings() const { return setup_.warnings; }
+  /// What the scheduler was told: with the events, all that a trace needs.
+  [[nodiscard]] const sched::Config &config() const { return engine_->options().config; }
 
   /// Appends the events since the last call; times count from the start. One thread at a time.
   void drain(std::vector<JobEvent> &events);

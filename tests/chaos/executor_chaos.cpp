@@ -103,8 +103,6 @@ class Run {
     options.trace_capacity = 1U << 16U;
     options.threads = options.workers + static_cast<std::uint32_t>(rng_.uniform(0, 6));
     options.stop_timeout = 60s;
-    if (rng_.uniform01() < 0.5) options.watchdog = runtime::WatchdogOptions{{3 * kMillisecond, 2}, kMillisecond};
-    options.on_overdue = [this](const runtime::OverdueInfo &) { ++overdue_; };
     options.on_exception = [this](const runtime::ExceptionInfo &) {
       ++exceptions_;
       return runtime::OnException::Continue;
@@ -149,7 +147,6 @@ class Run {
     if (alive_.use_count() != 1) return "bodies are left over\n" + verdict;
     for (std::size_t fault = 0; fault < kFaultNames.size(); ++fault) survived[kFaultNames[fault]] += faults_[fault];
     survived["exceptions told"] += exceptions_;
-    survived["bodies named by the watchdog"] += overdue_;
     survived["DAGs added while running"] += dags_.size();
     survived["runs with processors taken away"] += moved ? 1 : 0;
     survived[fmt::format("runs, preemption {}", to_string(trace_preemption_))] += 1;
@@ -323,7 +320,6 @@ class Run {
   std::atomic<std::uint32_t> jobs_{0};
   std::array<std::atomic<std::uint64_t>, kFaultNames.size()> faults_{};
   std::atomic<std::uint64_t> exceptions_{0};
-  std::atomic<std::uint64_t> overdue_{0};
   std::atomic<std::uint64_t> mistakes_{0};
   std::unique_ptr<Executor> executor_;  // last: its bodies use the rest
 };
