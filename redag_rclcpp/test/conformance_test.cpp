@@ -70,6 +70,9 @@ TYPED_TEST(Conformance, TimersRunUntilCancelled) {
 }
 
 TYPED_TEST(Conformance, SpinsAgainAfterCancel) {
+  // Cancelled between taking a callback and running it, it returns without giving the callback's group back
+  // (execute_any_executable() returns early, run() then resets any_exec.callback_group): the timer never runs again.
+  if (kParallel<TypeParam> && !kOurs<TypeParam>) GTEST_SKIP() << "rclcpp's MultiThreadedExecutor can lose a group here";
   std::atomic<int> count{0};
   auto timer = this->node->create_wall_timer(1ms, [&] { ++count; });
   this->executor->add_node(this->node);
@@ -160,10 +163,13 @@ TYPED_TEST(Conformance, SimulatedTimeMovesTimers) {
     });
   };
   ASSERT_TRUE(now_is(100'000'000'000));
-  std::this_thread::sleep_for(50ms);
-  const int before = count;  // activation of simulated time may count as an expiry
-  std::this_thread::sleep_for(300ms);
-  EXPECT_EQ(count, before) << "time stands still";
+  // The activation of simulated time may count as an expiry, sooner or later.
+  int before = 0;
+  EXPECT_TRUE(eventually([&] {
+    before = count;
+    std::this_thread::sleep_for(300ms);
+    return count == before;
+  })) << "time stands still";
   for (int step = 1; step <= 5; ++step) {
     message.clock.nanosec += 100'000'000;
     const int last = count;
