@@ -151,7 +151,7 @@ Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot bel
 // What a job that ended at `at` has used.
 Duration Engine::charge(Thread &self, const TaskEntry &entry, const RunningJob &running, Time at) noexcept {
   const Duration took = at - running.begun;
-  if (running.total < 0 && took <= CpuMeter::kShort && !entry.limits_short_jobs()) {
+  if (running.total < 0 && took <= CpuMeter::kShort && !entry.always_measured()) {
     self.meter.pass();
     return took;
   }

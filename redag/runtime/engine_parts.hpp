@@ -29,12 +29,12 @@ struct Engine::TaskEntry {
     return next;
   }
 
-  /// Is a limit so short, or does it act at once, that processor time has to be known to the system call?
-  [[nodiscard]] bool limits_short_jobs() const {
+  /// Its limits act at once, or lie below what is taken on trust: its processor time is always measured.
+  [[nodiscard]] bool always_measured() const {
     return wcet_low > 0 || budget > 0 || (wcet > 0 && wcet < CpuMeter::kShort);
   }
   /// Its last jobs were short: the next one is taken to be, too, until it proves otherwise.
-  [[nodiscard]] bool expected_short() const { return short_jobs == kStreak && !limits_short_jobs(); }
+  [[nodiscard]] bool expected_short() const { return short_jobs == kStreak && !always_measured(); }
 
   static constexpr std::uint32_t kStreak = 8;
 

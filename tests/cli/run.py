@@ -13,28 +13,15 @@ import re
 import signal
 import struct
 import subprocess
-import sys
-import tempfile
 import termios
 import time
 import unittest
-import xml.etree.ElementTree
 
-PROGRAM = pathlib.Path()
-SOURCE = pathlib.Path()
+from program import CART, PROGRAM, SOURCE, Case, in_terminal, main, redag
 
 COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["compare"], ["diff"], ["analyze"], ["sensitivity"], ["assign"], ["tune"],
             ["check-trace"], ["top"], ["report"], ["experiment"], ["experiment", "acceptance"],
             ["experiment", "factorial"], ["experiment", "merge"]]
-CART = """\
-name: cart
-platform: {workers: 1, preemption: none}
-dags:
-  - name: fast
-    tasks: [{name: sense, wcet: 1ms, period: 10ms}, {name: act, wcet: 1ms, activation: data, after: sense}]
-  - name: slow
-    tasks: [{name: plan, wcet: 25ms, period: 100ms}]
-"""
 MISTAKEN = """\
 name: cart
 platform: {workers: 1}
@@ -44,63 +31,6 @@ dags:
       - {name: sense, wect: 1ms, period: 10ms}
       - {name: act, wcet: 1, activation: data, after: sense}
 """
-
-
-def redag(*arguments, text=None, **options):
-    return subprocess.run([PROGRAM, *map(str, arguments)], input=text, capture_output=True, text=True, timeout=250,
-                          check=False, **options)
-
-
-def in_terminal(*arguments, columns=80, **environment):
-    """Runs on a pseudo-terminal; returns exit status and everything written."""
-    try:
-        pid, terminal = pty.fork()
-    except OSError as error:  # a chroot without /dev/pts
-        raise unittest.SkipTest(f"no pseudo-terminal to be had here: {error}") from error
-    if pid == 0:
-        os.environ.update(TERM="xterm", **environment)
-        try:
-            os.execv(PROGRAM, [str(PROGRAM), *map(str, arguments)])
-        finally:
-            os._exit(127)
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
-    text = b""
-    while True:
-        try:
-            block = os.read(terminal, 65536)
-        except OSError:  # Linux says EIO once the other end is closed
-            break
-        if not block:
-            break
-        text += block
-    os.close(terminal)
-    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), text.decode()
-
-
-class Case(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-        self.cart = self.write("cart.yaml", CART)
-
-    def write(self, name, text):
-        path = self.folder / name
-        path.write_text(text)
-        return path
-
-    def expect(self, result, status, *errors):
-        self.assertEqual(result.returncode, status, result.stderr + result.stdout)
-        for error in errors:
-            self.assertIn(error, result.stderr)
-        return result
-
-    def document(self, result, form, status=0):
-        """Standard output is one JSON document and nothing else."""
-        self.expect(result, status)
-        document = json.loads(result.stdout)
-        self.assertEqual(document["format"], form)
-        return document
 
 
 class Usage(Case):
@@ -1001,159 +931,6 @@ dags:
         self.expect(redag("tune", self.cart, "-o", self.folder / "no" / "where.yaml"), 2)
 
 
-class Experiment(Case):
-    """`redag experiment`: the same results however it was run."""
-    PLAN = ["--dags", "6", "--workers", "2", "--utilization", "0.2:0.8:0.2", "--methods", "any,simulation,melani"]
-
-    def acceptance(self, name, *arguments, status=0):
-        return self.expect(redag("experiment", "acceptance", *self.PLAN, "--out", self.folder / name, *arguments), status)
-
-    def results(self, name):
-        return [(self.folder / name / file).read_text() for file in ("acceptance.csv", "units.csv", "acceptance.svg")]
-
-    def start(self, name, *arguments):
-        """A run that takes some seconds, once it has units on file."""
-        process = subprocess.Popen([PROGRAM, "experiment", "acceptance", *self.PLAN, "--out", self.folder / name,
-                                    *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        units = self.folder / name / "units.csv"
-        lines = units.read_text().count("\n") if units.exists() else 2
-        deadline = time.monotonic() + 60
-        while not units.exists() or units.read_text().count("\n") <= lines:
-            self.assertIsNone(process.poll(), "it ended before it could be disturbed")
-            self.assertLess(time.monotonic(), deadline)
-            time.sleep(0.01)
-        return process
-
-    def test_same_results_for_any_number_of_jobs_and_shards(self):
-        self.acceptance("one", "--sets", "20", "-j1")
-        self.acceptance("two", "--sets", "20", "-j2")
-        self.assertEqual(self.results("one"), self.results("two"))
-        for shard in ("1", "2", "3"):
-            self.acceptance(f"shard{shard}", "--sets", "20", "--shard", f"{shard}/3")
-        folders = [self.folder / f"shard{shard}" for shard in (3, 1, 2)]
-        self.expect(redag("experiment", "merge", *folders, "-o", self.folder / "merged"), 0)
-        self.assertEqual(self.results("one"), self.results("merged"))
-        runs = json.loads((self.folder / "merged" / "acceptance.json").read_text())["runs"]
-        self.assertEqual([run["shard"] for run in runs if run["event"] == "begin"], ["3/3", "1/3", "2/3"])
-        self.assertTrue(runs[0]["machine"]["kernel"])
-
-        rows = list(csv.DictReader(self.results("one")[0].splitlines()))
-        self.assertEqual(len(rows), 2 * 4 * 3)
-        self.assertTrue(all(row["sets"] == "20" for row in rows))
-        self.acceptance("other", "--sets", "20", "--seed", "6")
-        self.assertNotEqual(self.results("one")[1], self.results("other")[1])
-
-    def test_merging_what_is_not_all_there(self):
-        self.acceptance("first", "--sets", "4", "--shard", "1/2")
-        result = redag("experiment", "merge", self.folder / "first", self.folder / "first", "-o", self.folder / "merged")
-        self.expect(result, 0, "16 of 32 workloads are in none of the folders")
-        self.assertIn("16 of 32 workloads are done", result.stdout)
-        plan = self.folder / "merged" / "plan.yaml"
-        self.expect(redag("experiment", "acceptance", plan, "--out", self.folder / "merged"), 0)
-        self.acceptance("whole", "--sets", "4")
-        self.assertEqual(self.results("whole")[0], self.results("merged")[0])
-        again = redag("experiment", "merge", self.folder / "first", "-o", self.folder / "merged")
-        self.expect(again, 2, "holds results already")
-
-        self.acceptance("other", "--sets", "5")
-        result = redag("experiment", "merge", self.folder / "first", self.folder / "other", "-o", self.folder / "x")
-        self.expect(result, 2, "another plan: 'sets: 5' there, 'sets: 4' now")
-
-    def test_killed_and_gone_on(self):
-        size = ["--sets", "120", "--simulation-periods", "40", "-j1"]
-        for _ in range(2):
-            process = self.start("killed", *size)
-            process.kill()
-            process.communicate()
-        with open(self.folder / "killed" / "units.csv", "a") as units:
-            units.write("959,0")  # the kill came in the middle of a line
-        result = self.acceptance("killed", *size)
-        self.assertRegex(result.stderr, r"\d+ of 960 workloads are done already")
-        self.acceptance("whole", *size[:-1], "-j2")
-        self.assertEqual(self.results("killed"), self.results("whole"))
-        document = json.loads((self.folder / "killed" / "acceptance.json").read_text())
-        self.assertEqual([run["event"] for run in document["runs"]], ["begin", "begin", "begin", "end"])
-        self.assertTrue(document["complete"])
-
-    def test_ctrl_c_keeps_what_is_done(self):
-        size = ["--sets", "2000", "--simulation-periods", "40"]
-        process = self.start("stopped", *size)
-        second = redag("experiment", "acceptance", *self.PLAN, *size, "--out", self.folder / "stopped")
-        self.expect(second, 2, "another process is writing to it")
-        process.send_signal(signal.SIGINT)
-        out, error = process.communicate(timeout=60)
-        self.assertEqual(process.returncode, 0, error)
-        self.assertIn("interrupted", error)
-        self.assertIn("workloads are done", out)
-        document = json.loads((self.folder / "stopped" / "acceptance.json").read_text())
-        self.assertFalse(document["complete"])
-        self.assertEqual(document["done"], self.results("stopped")[1].count("\n") - 2)
-        self.assertTrue(document["runs"][-1]["interrupted"])
-
-    def test_another_plan_is_refused(self):
-        self.acceptance("done", "--sets", "2")
-        before = self.results("done")
-        result = self.acceptance("done", "--sets", "3", status=2)
-        self.assertIn("plan.yaml:4:1: error: the folder holds results of another plan: 'sets: 2' there, 'sets: 3' now",
-                      result.stderr)
-        self.assertIn("choose another folder", result.stderr)
-        self.assertEqual(before, self.results("done"))
-
-    def test_plan_file_and_options(self):
-        plan = self.write("plan.yaml", "experiment: acceptance\nname: mine\ndags: 3\nworkers: 2\nsets: 2\n"
-                          "utilization: [0.1, 0.5]\nworkload: {tasks: {min: 2, max: 4}}\n")
-        document = self.document(redag("experiment", "acceptance", plan, "--sets", "3", "--json"),
-                                 "redag.experiment.acceptance/1")
-        self.assertEqual((document["name"], document["done"], document["complete"]), ("mine", 12, True))
-        self.assertIn("sets: 3\n", document["plan"])
-        self.assertEqual(document["violations"], [])
-        self.expect(redag("experiment", "acceptance", plan, "--out", self.folder / "out"), 0)
-        picture = xml.etree.ElementTree.parse(self.folder / "out" / "acceptance.svg").getroot()
-        texts = [text.text for text in picture.iter("{http://www.w3.org/2000/svg}text")]
-        self.assertIn("mine: schedulable workloads", texts)
-        self.assertIn("3 DAGs, 2 workers, full preemption", texts)
-
-    def test_violation_is_an_error_with_a_replay(self):
-        """A workload that misses is made to look as if a bound had accepted it."""
-        self.acceptance("forged", "--sets", "2")
-        units = self.folder / "forged" / "units.csv"
-        lines = units.read_text().splitlines()
-        forged = next(i for i, line in enumerate(lines) if i > 1 and line.split(",")[1][:2] == "00")
-        lines[forged] = lines[forged].replace(",00", ",10")
-        units.write_text("\n".join(lines) + "\n")
-        number = lines[forged].split(",")[0]
-        result = self.acceptance("forged", "--sets", "2", status=1)
-        self.assertIn(f"error: unit {number} (6 DAGs, 2 workers, ", result.stderr)
-        self.assertIn("misses a deadline in the simulation, but is accepted by any", result.stderr)
-        replay = self.folder / "forged" / f"violation-{number}.yaml"
-        options = re.search(r"^# redag simulate THIS_FILE (.*)$", replay.read_text(), re.M)[1].split()
-        self.expect(redag("simulate", replay, *options, "--check"), 1)
-
-    def test_bad_input(self):
-        bad = self.write("bad.yaml", "experiment: acceptance\nworkers: two\nmethods: [gaun]\n")
-        self.expect(redag("experiment", "acceptance", bad), 2, "bad.yaml:2:10: error: workers must be a whole number")
-        for arguments, words in [(["--methods", "gaun"], "did you mean 'guan'?"), (["--shard", "3/2"], "--shard: '3/2'"),
-                                 (["--utilization", "1:0:1"], "--utilization: '1:0:1'"), (["--sets", "0"], "at least 1"),
-                                 (["--workers", "0"], "--workers: '0'"), (["--dags", "2"], "2 DAGs, 4 workers"),
-                                 (["--preemption", "auto"], "choose none or os"), (["--set", "1"], "--sets"),
-                                 (["/no/such.yaml"], "/no/such.yaml")]:
-            self.expect(redag("experiment", "acceptance", *arguments), 2, words)
-        self.expect(redag("experiment"), 2, "redag experiment --help")
-        self.expect(redag("experiment", "merge", self.folder, "-o", self.folder / "x"), 2, "plan.yaml")
-        self.expect(redag("experiment", "acceptance", *self.PLAN, "--out", self.folder), 2, "is not a result of redag")
-        damaged = self.folder / "damaged"
-        self.acceptance("damaged", "--sets", "1")
-        with open(damaged / "units.csv", "a") as units:
-            units.write("x,110\n")
-        self.assertIn("units.csv:11:1: error: not a finished unit", self.acceptance("damaged", "--sets", "1",
-                                                                                   status=2).stderr)
-
-    def test_progress_on_a_terminal(self):
-        status, text = in_terminal("experiment", "acceptance", *self.PLAN, "--sets", "300", columns=100)
-        self.assertEqual(status, 0, text)
-        self.assertRegex(text, r"\d+ %  [\d ]+ of 2 400, \d+/s, \S+ left")
-
-
 class CheckTrace(Case):
     def trace(self):
         out = self.folder / "out"
@@ -1251,6 +1028,4 @@ class Report(Case):
 
 
 if __name__ == "__main__":
-    PROGRAM = pathlib.Path(sys.argv[1]).resolve()
-    SOURCE = pathlib.Path(sys.argv[2]).resolve()
-    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
+    main()

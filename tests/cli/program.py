@@ -1,0 +1,90 @@
+"""What the tests of the program share: how it is called, and a folder for each test.
+
+The first two arguments of whoever imports this are the program and the source tree.
+"""
+import fcntl
+import json
+import os
+import pathlib
+import pty
+import struct
+import subprocess
+import sys
+import tempfile
+import termios
+import unittest
+
+if len(sys.argv) < 3:
+    sys.exit(f"usage: {sys.argv[0]} PROGRAM SOURCE_DIR [unittest arguments]")
+PROGRAM, SOURCE = (pathlib.Path(argument).resolve() for argument in sys.argv[1:3])
+
+CART = """\
+name: cart
+platform: {workers: 1, preemption: none}
+dags:
+  - name: fast
+    tasks: [{name: sense, wcet: 1ms, period: 10ms}, {name: act, wcet: 1ms, activation: data, after: sense}]
+  - name: slow
+    tasks: [{name: plan, wcet: 25ms, period: 100ms}]
+"""
+
+
+def redag(*arguments, text=None, **options):
+    return subprocess.run([PROGRAM, *map(str, arguments)], input=text, capture_output=True, text=True, timeout=250,
+                          check=False, **options)
+
+
+def in_terminal(*arguments, columns=80, **environment):
+    """Runs on a pseudo-terminal; returns exit status and everything written."""
+    try:
+        pid, terminal = pty.fork()
+    except OSError as error:  # a chroot without /dev/pts
+        raise unittest.SkipTest(f"no pseudo-terminal to be had here: {error}") from error
+    if pid == 0:
+        os.environ.update(TERM="xterm", **environment)
+        try:
+            os.execv(PROGRAM, [str(PROGRAM), *map(str, arguments)])
+        finally:
+            os._exit(127)
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    text = b""
+    while True:
+        try:
+            block = os.read(terminal, 65536)
+        except OSError:  # Linux says EIO once the other end is closed
+            break
+        if not block:
+            break
+        text += block
+    os.close(terminal)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), text.decode()
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.cart = self.write("cart.yaml", CART)
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.write_text(text)
+        return path
+
+    def expect(self, result, status, *errors):
+        self.assertEqual(result.returncode, status, result.stderr + result.stdout)
+        for error in errors:
+            self.assertIn(error, result.stderr)
+        return result
+
+    def document(self, result, form, status=0):
+        """Standard output is one JSON document and nothing else."""
+        self.expect(result, status)
+        document = json.loads(result.stdout)
+        self.assertEqual(document["format"], form)
+        return document
+
+
+def main():
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
