@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "redag/base/int128.hpp"
+#include "redag/sched/executors.hpp"
 
 namespace redag::metrics {
 namespace {
@@ -21,12 +23,18 @@ std::string expected_and_got(const char *what, std::int64_t expected, std::int64
 
 ReleaseRules::ReleaseRules(CheckContext &context) : context_(context) {
   const Workload &workload = context.info.workload;
+  const sched::ExecutorKind *kind = sched::find_executor(context.info.executor);
+  const bool keeps_timers = kind != nullptr && kind->keeps_releases;
   tasks_.resize(workload.task_count());
   removed_.resize(workload.dags.size(), false);
   std::size_t first = 0;
   for (const Dag &dag : workload.dags) {
     for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
-      tasks_[first + i].timer = dag.tasks[i].activation == Activation::Timer;
+      TaskState &task = tasks_[first + i];
+      task.timer = dag.tasks[i].activation == Activation::Timer;
+      const bool keeps = task.timer && keeps_timers;
+      task.overrun = keeps ? Overrun::Queue : dag.tasks[i].overrun;
+      task.queue_depth = keeps ? std::numeric_limits<std::uint32_t>::max() : dag.tasks[i].queue_depth;
       for (const std::uint32_t p : dag.tasks[i].predecessors) {
         const auto edge = static_cast<std::uint32_t>(edges_.size());
         tasks_[first + i].in.push_back(edge);
@@ -110,7 +118,7 @@ void ReleaseRules::expect_skips(const JobEvent &event) {
     expected_skips_.push_back(ExpectedSkip{event.task, event.job, reason});
     return;
   }
-  const Task &task = context_.replay.task(event.task);
+  const TaskState &task = tasks_[event.task.value];
   const DagId dag_id = context_.replay.dag_of(event.task);
   const Dag &dag = context_.info.workload.dags[dag_id.value];
   std::uint32_t pending = context_.replay.pending(dag_id);
@@ -146,19 +154,35 @@ Reason ReleaseRules::refusal(const JobEvent &event) {
   const Degrade &degrade = context_.info.workload.dags[replay.dag_of(event.task).value].degrade;
   if (degrade.kind == Degrade::Kind::Stop) return Reason::Degraded;
   if (!task.timer) return Reason::None;  // its predecessors are held back
-  if (degrade.kind == Degrade::Kind::Skip) {
-    if (refusals.to_skip > 0) {
-      --refusals.to_skip;
-      return Reason::Degraded;
-    }
-    refusals.to_skip = degrade.skip;
-    return Reason::None;
-  }
-  if (event.value < refusals.not_before) return Reason::Degraded;
-  const double distance = std::ceil(degrade.stretch * static_cast<double>(replay.task(event.task).period));
-  refusals.not_before =
-      distance >= static_cast<double>(kNever - event.value) ? kNever : event.value + static_cast<Duration>(distance);
+  if (!is_let_through(event)) return Reason::Degraded;
+  refusals.let_through = event.value;
   return Reason::None;
+}
+
+// Tasks that edges join decide together, where their releases are on one grid; the others each by itself.
+bool ReleaseRules::is_let_through(const JobEvent &event) const {
+  const Replay &replay = context_.replay;
+  const Task &task = replay.task(event.task);
+  const auto has_edges = [this](const TaskState &state) { return !state.in.empty() || !state.out.empty(); };
+  Time newest = tasks_[event.task.value].refusals.let_through;
+  for (std::size_t t = 0; t < tasks_.size(); ++t) {
+    const Task &other = replay.task(TaskId(t));
+    if (replay.dag_of(TaskId(t)) != replay.dag_of(event.task) || !tasks_[t].timer) continue;
+    if (other.period != task.period || other.offset != task.offset) continue;
+    if (!has_edges(tasks_[t]) || !has_edges(tasks_[event.task.value])) continue;
+    newest = std::max(newest, tasks_[t].refusals.let_through);
+  }
+  if (newest == std::numeric_limits<Time>::min()) return true;
+  const Degrade &degrade = context_.info.workload.dags[replay.dag_of(event.task).value].degrade;
+  const bool skips = degrade.kind == Degrade::Kind::Skip;
+  const Int128 period = task.period;
+  const Int128 passed = Int128{event.value} - newest;
+  if (passed <= 0) {
+    const Int128 every = skips ? Int128{degrade.skip} + 1 : static_cast<Int128>(std::ceil(degrade.stretch));
+    return -passed % (every * period) == 0;
+  }
+  if (skips) return 2 * passed > (2 * Int128{degrade.skip} + 1) * period;
+  return passed >= static_cast<Int128>(std::ceil(degrade.stretch * static_cast<double>(task.period)));
 }
 
 void ReleaseRules::exceeded(const JobEvent &event) {
@@ -171,8 +195,7 @@ void ReleaseRules::mode_begins() {
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     const TaskId id(t);
     if (!context_.replay.is_degradable(id)) continue;
-    tasks_[t].refusals.to_skip = 0;
-    tasks_[t].refusals.not_before = std::numeric_limits<Time>::min();
+    tasks_[t].refusals.let_through = std::numeric_limits<Time>::min();
     for (const LiveJob &job : context_.replay.jobs_of(id)) {
       if (!job.started()) expected_skips_.push_back(ExpectedSkip{id, job.number, Reason::Degraded});
     }
@@ -254,8 +277,10 @@ void ReleaseRules::finished(const JobEvent &event, const LiveJob &job) {
   for (const std::uint32_t index : tasks_[event.task.value].out) {
     Edge &edge = edges_[index];
     edge.fresh = true;
-    edge.release = job.release;
-    edge.origin = job.origin;
+    if (job.release >= edge.release) {  // an older job that ends late does not replace newer data
+      edge.release = job.release;
+      edge.origin = job.origin;
+    }
     edge.finish = event.value;
     edge.finish_decided = event.time;
     touch(edge.to);

@@ -23,21 +23,22 @@ class ReleaseRules {
   struct Edge {
     TaskId from;
     TaskId to;
-    bool aligned = false;  // timer to timer, same period and offset: only data of the same period or later counts
+    bool aligned = false;  // timer to timer, same period and offset: only data of the same period counts
     bool fresh = false;    // completed since `to` last consumed
-    Time release = 0;      // of the job that completed last
-    Time origin = 0;
-    Time finish = 0;          // as measured
-    Time finish_decided = 0;  // when the scheduler heard of it
+    Time release = std::numeric_limits<Time>::min();  // of the newest job that completed: its data
+    Time origin = 0;                                  // of that data
+    Time finish = 0;                                  // of the job that completed last, as measured
+    Time finish_decided = 0;                          // when the scheduler heard of it
   };
   // Releases of the task that are not taken (docs/model.md, "Budgets" and "Criticality").
   struct Refusals {
     bool skips_next = false;
-    std::uint32_t to_skip = 0;
-    Time not_before = std::numeric_limits<Time>::min();
+    Time let_through = std::numeric_limits<Time>::min();  // HI mode: its newest release that was taken; min(): none
   };
   struct TaskState {
     bool timer = true;
+    Overrun overrun = Overrun::Skip;
+    std::uint32_t queue_depth = 0;
     std::vector<std::uint32_t> in;   // edges
     std::vector<std::uint32_t> out;  // edges
     std::uint32_t next_number = 0;
@@ -56,6 +57,7 @@ class ReleaseRules {
   void check_data_release(const JobEvent &event);
   void expect_skips(const JobEvent &event);
   [[nodiscard]] Reason refusal(const JobEvent &event);
+  [[nodiscard]] bool is_let_through(const JobEvent &event) const;
   void exceeded(const JobEvent &event);
   void mode_begins();
   void mode_ends();
@@ -67,7 +69,7 @@ class ReleaseRules {
   void touch(TaskId id);
 
   [[nodiscard]] bool is_fresh(const Edge &edge, Time release) const {
-    return edge.fresh && (!edge.aligned || edge.release >= release);
+    return edge.fresh && (!edge.aligned || edge.release == release);
   }
   /// The first predecessor without fresh data for a job released at `release`; none() if there is no such.
   [[nodiscard]] TaskId missing(const TaskState &task, Time release) const;

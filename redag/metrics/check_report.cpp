@@ -29,7 +29,7 @@ const char *to_string(Rule rule) {
 
 RuleSet RuleSet::all() { return {}; }
 
-RuleSet RuleSet::wait_set() {
+RuleSet RuleSet::rclcpp() {
   return all()
       .without(Rule::Priority)
       .without(Rule::WorkConservation)

@@ -42,9 +42,9 @@ class RuleSet {
  public:
   /// Everything: ReDAG-RT's own executors.
   [[nodiscard]] static RuleSet all();
-  /// Models of rclcpp's wait-set executors: without Priority, WorkConservation, Deferral, Preemption, MaxActive and
+  /// rclcpp's executors and their models: without Priority, WorkConservation, Deferral, Preemption, MaxActive and
   /// Budget, which those do not have.
-  [[nodiscard]] static RuleSet wait_set();
+  [[nodiscard]] static RuleSet rclcpp();
 
   [[nodiscard]] RuleSet without(Rule rule) const;
   [[nodiscard]] bool contains(Rule rule) const { return ((bits_ >> static_cast<unsigned>(rule)) & 1U) != 0; }

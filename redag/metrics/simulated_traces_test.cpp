@@ -9,7 +9,7 @@
 #include "redag/metrics/summary.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/model/generate.hpp"
-#include "redag/sched/priority_scheduler.hpp"
+#include "redag/sched/executors.hpp"
 #include "redag/sim/simulator.hpp"
 
 namespace redag::metrics {
@@ -80,7 +80,7 @@ trace::RunInfo drawn(std::uint64_t seed) {
 
 trace::Trace simulated(trace::RunInfo info, Duration horizon) {
   trace::Trace trace{std::move(info), {}};
-  sched::PriorityScheduler scheduler(trace.info.workload, trace.info.config);
+  const auto scheduler = sched::make_scheduler(trace.info.executor, trace.info.workload, trace.info.config);
   sim::Options options;
   options.horizon = horizon;
   options.seed = trace.info.seed;
@@ -88,7 +88,7 @@ trace::Trace simulated(trace::RunInfo info, Duration horizon) {
     trace.events.insert(trace.events.end(), events.begin(), events.end());
     return true;
   };
-  trace.info.end = sim::simulate(trace.info.workload, scheduler, trace.info.config.workers, options, keep).end;
+  trace.info.end = sim::simulate(trace.info.workload, *scheduler, trace.info.config.workers, options, keep).end;
   return trace;
 }
 
@@ -98,6 +98,44 @@ RC_GTEST_PROP(SimulatedTraces, KeepEveryRule, ()) {
   const CheckReport report = check_trace(trace);
   RC_LOG() << report.to_string();
   RC_ASSERT(report.ok());
+}
+
+trace::RunInfo on_peer(trace::RunInfo info, const sched::ExecutorKind &peer) {
+  info.executor = peer.name;
+  info.config = sched::effective_config(peer, info.config);
+  return info;
+}
+
+RC_GTEST_PROP(SimulatedTraces, OfPeersKeepTheRulesThatPeersHave, ()) {
+  const auto seed = *rc::gen::arbitrary<std::uint64_t>();
+  for (const sched::ExecutorKind &kind : sched::executors()) {
+    if (kind.ours) continue;
+    const trace::Trace trace = simulated(on_peer(drawn(seed), kind), 100 * kMillisecond);
+    const CheckReport report = check_trace(trace, rules_for(trace.info));
+    RC_LOG() << kind.name << ": " << report.to_string();
+    RC_ASSERT(report.ok());
+  }
+}
+
+// Only the events executor keeps every release of a timer, and the checker knows.
+TEST(SimulatedTraces, AnExecutorThatLosesPeriodsIsNotTheEventsExecutor) {
+  Task task;
+  task.name = "often";
+  task.wcet = task.period = task.deadline = kMillisecond;
+  Task heavy = task;
+  heavy.name = "heavy";
+  heavy.wcet = 5 * kMillisecond;
+  trace::RunInfo info;
+  info.workload.dags.resize(2);
+  info.workload.dags[0].tasks = {task};
+  info.workload.dags[1].tasks = {heavy};
+  info.driver = trace::Driver::Simulator;
+  for (const char *executor : {"ste", "events"}) {
+    trace::Trace trace = simulated(on_peer(info, *sched::find_executor(executor)), 100 * kMillisecond);
+    EXPECT_TRUE(check_trace(trace, rules_for(trace.info)).ok()) << executor;
+    trace.info.executor = trace.info.executor == "ste" ? "events" : "ste";
+    EXPECT_GT(check_trace(trace, rules_for(trace.info)).violated(Rule::Admission), 0U) << executor;
+  }
 }
 
 RC_GTEST_PROP(SimulatedTraces, SummaryAgreesWithTheEvents, ()) {

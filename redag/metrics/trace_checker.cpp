@@ -7,6 +7,7 @@
 #include "redag/metrics/check_overload.hpp"
 #include "redag/metrics/check_release.hpp"
 #include "redag/metrics/replay.hpp"
+#include "redag/sched/executors.hpp"
 
 namespace redag::metrics {
 namespace {
@@ -98,16 +99,20 @@ class Checker {
   Time time_ = std::numeric_limits<Time>::min();
 };
 
+bool is_peer(const std::string &executor) {
+  const sched::ExecutorKind *kind = sched::find_executor(executor);
+  return kind != nullptr && !kind->ours;
+}
+
 }  // namespace
 
 RuleSet rules_for(const trace::RunInfo &info) {
   switch (info.driver) {
     case trace::Driver::Simulator:
-    case trace::Driver::Threads:
-      return info.executor == "mte" || info.executor == "ste" ? RuleSet::wait_set() : RuleSet::all();
+    case trace::Driver::Threads: return is_peer(info.executor) ? RuleSet::rclcpp() : RuleSet::all();
     case trace::Driver::Ros: return RuleSet::all().without(Rule::Grid);
     case trace::Driver::RosNodes:
-      return RuleSet::wait_set().without(Rule::Precedence).without(Rule::Admission).without(Rule::Worker);
+      return RuleSet::rclcpp().without(Rule::Precedence).without(Rule::Admission).without(Rule::Worker);
   }
   return RuleSet::all();
 }

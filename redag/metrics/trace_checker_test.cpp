@@ -173,6 +173,50 @@ TEST(CheckTrace, PrecedenceResolvesWithFreshData) {
   expect_broken(stale.ready("aligned", 1, 0).dispatched("src", 1, 0, 20).until(11), Rule::Precedence);
 }
 
+// src#0 ends after src#1: join#1 has the data of src#1, and waits for other#1.
+TEST(CheckTrace, PrecedenceKeepsTheNewestData) {
+  Workload w = make_workload({make_dag("d", {{"src", 10}, {"other", 10}, {"join", 10, 1, {0, 1}}})}, 3);
+  w.dags[0].tasks[0].concurrency = 2;
+  w.dags[0].tasks[2].jitter = 5 * kMillisecond;
+  TraceBuilder t(w);
+  t.at(0).arrives("src", 0).arrives("other", 0).released("join", 0);
+  t.dispatched("src", 0, 0, 10).dispatched("other", 0, 1, 10);
+  t.at(10).arrives("src", 1).arrives("other", 1).dispatched("src", 1, 2, 20);
+  t.at(11).finished("src", 1, 2).at(12).finished("src", 0, 0);
+  t.at(13).released_for("join", 1, 10).skipped("join", 0, Reason::Precedence);
+  t.at(14).finished("other", 0, 1).dispatched("other", 1, 0, 20).at(16).finished("other", 1, 0);
+  const auto check = [](const TraceBuilder &built) {
+    const trace::Trace trace = built.until(17);
+    return check_trace(trace, rules_for(trace.info).without(Rule::Execution));
+  };
+  EXPECT_GT(check(t).violated(Rule::Precedence), 0U) << "join#1 is not ready";
+  TraceBuilder older = t;
+  older.ready("join", 1, 0).dispatched("join", 1, 0, 20);
+  EXPECT_GT(check(older).violated(Rule::Precedence), 0U);
+  t.ready("join", 1, 10).dispatched("join", 1, 0, 20);
+  EXPECT_TRUE(check(t).ok()) << check(t).to_string();
+}
+
+// src#0 throws: aligned#0 waits for it in vain, and not for src#1.
+TEST(CheckTrace, PrecedenceIsOfTheSamePeriod) {
+  Workload w = make_workload({make_dag("d", {{"src", 10}, {"aligned", 10, 1, {0}}})}, 1);
+  w.dags[0].tasks[1].jitter = 5 * kMillisecond;
+  TraceBuilder t(w);
+  t.at(0)
+      .arrives("src", 0)
+      .released("aligned", 0)
+      .dispatched("src", 0, 0, 10)
+      .at(1)
+      .aborted("src", 0, 0, Reason::Exception);
+  t.at(10).arrives("src", 1).dispatched("src", 1, 0, 20).at(11).finished("src", 1, 0);
+  TraceBuilder other_period = t;
+  other_period.ready("aligned", 0, 10).dispatched("aligned", 0, 0, 10);
+  expect_broken(other_period.until(12), Rule::Precedence);
+  t.at(13).released_for("aligned", 1, 10).skipped("aligned", 0, Reason::Precedence);
+  t.ready("aligned", 1, 10).dispatched("aligned", 1, 0, 20).at(14).finished("aligned", 1, 0);
+  expect_kept(t.until(15), Rule::Precedence);
+}
+
 TEST(CheckTrace, PrecedenceOwesReadiness) {
   TraceBuilder t = diamond_start();
   t.ready("aligned", 0, 0).released("data", 0).ready("data", 0, 0).dispatched("aligned", 0, 0, 10);
@@ -429,7 +473,7 @@ TEST(CheckTrace, PriorityOfTheChosen) {
   TraceBuilder t(two_tasks());
   t.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("lo", 0, 0, 20);
   expect_broken(t.until(1), Rule::Priority);
-  EXPECT_TRUE(check_trace(t.until(1), RuleSet::wait_set()).ok());
+  EXPECT_TRUE(check_trace(t.until(1), RuleSet::rclcpp()).ok());
 }
 
 TEST(CheckTrace, PriorityFollowsThePolicy) {
@@ -469,7 +513,7 @@ TEST(CheckTrace, PriorityIsInherited) {
 TEST(CheckTrace, WorkIsConserved) {
   TraceBuilder t(two_tasks());
   expect_broken(t.at(0).arrives("hi", 0).arrives("lo", 0).until(1), Rule::WorkConservation);
-  EXPECT_TRUE(check_trace(t.until(1), RuleSet::wait_set()).ok());
+  EXPECT_TRUE(check_trace(t.until(1), RuleSet::rclcpp()).ok());
 }
 
 TEST(CheckTrace, ExecutionIsWhatTheJobNeeds) {

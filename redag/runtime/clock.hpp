@@ -21,4 +21,7 @@ inline Time read_clock(clockid_t clock) noexcept {
 /// Processor time of the calling thread: stands still while it sleeps or is preempted. A system call.
 [[nodiscard]] inline Duration thread_cpu_now() noexcept { return detail::read_clock(CLOCK_THREAD_CPUTIME_ID); }
 
+/// The same of any thread: cpu_clock_of() of redag/runtime/threads.hpp. Once that has ended, anything.
+[[nodiscard]] inline Duration cpu_now(clockid_t clock) noexcept { return detail::read_clock(clock); }
+
 }  // namespace redag::runtime

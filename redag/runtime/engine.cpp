@@ -27,6 +27,7 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
   REDAG_CHECK(!os() || config.max_started >= config.workers, "os: a thread for every processor, at least");
   const std::uint32_t count = os() ? config.max_started : config.workers;
   idle_.reserve(count);
+  handed_.reserve(count);
   for (std::uint32_t i = 0; i < count; ++i) {
     threads_.push_back(std::make_unique<Thread>(i, options_.trace_capacity));
   }
@@ -65,14 +66,13 @@ Result<void> Engine::start() {
       return tl::unexpected(started.error());
     }
     thread->handle = *std::move(started);
+    thread->cpu_clock = cpu_clock_of(thread->handle);
   }
   const Time at = now();
   Locked locked(*this);
   withdraw_if_halting();
   priorities_.set_processors(std::min(cpus.empty() ? usable.size() : cpus.size(), usable.size()));
-  if (os()) {
-    for (auto thread = threads_.rbegin(); thread != threads_.rend(); ++thread) idle_.push_back(thread->get());
-  }
+  for (auto thread = threads_.rbegin(); thread != threads_.rend(); ++thread) idle_.push_back(thread->get());
   running_ = true;
   decide(locked, at, nullptr, JobSlot());
   return {};
@@ -82,9 +82,8 @@ void Engine::main(Thread &self) noexcept {
   for (;;) {
     // Read before the mail: all that was handed out was so before this was set.
     const bool exiting = exit_.load(std::memory_order_acquire);
-    if (self.has_mail.load(std::memory_order_acquire)) {
+    if (self.claim_mail()) {
       const Assignment first = self.mail;
-      self.has_mail.store(false, std::memory_order_relaxed);
       // A job that was dispatched to this very thread when the last one ended needs no wake-up.
       Next next{Next::Kind::Start, first};
       self.meter.pass();
@@ -136,12 +135,15 @@ Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot bel
   running.outranked = &self.outranked;
   running.task = job.task;
   running.slot = job.slot;
+  running.top = &self.top;
   running.limit = assignment.entry->next_limit(running);
   running.begun = at;
   running.start = self.meter.begin(at, !assignment.expected_short);
   running.below = RunningJob::current();
   RunningJob::set_current(&running);
+  running.enter();
   const Outcome outcome = call(assignment);
+  running.leave();
   RunningJob::set_current(running.below);
   at = now();
   const Duration used = charge(self, *assignment.entry, running, at);
@@ -225,16 +227,54 @@ void Engine::reach_limit(RunningJob &job, Duration used) {
 }
 
 void Engine::report_limits(RunningJob &job, Duration used, Time now) {
+  tell_limits(job, used, now, false);
+  job.limit = tasks_[job.task.value].next_limit(job);
+}
+
+// From outside, a job that is to be cut off is left alone until its own preemption point, or its end.
+bool Engine::tell_limits(RunningJob &job, Duration used, Time now, bool from_outside) {
   const TaskEntry &entry = tasks_[job.task.value];
+  bool told = false;
   if (entry.wcet_low > 0 && used > entry.wcet_low && !job.used_wcet_low) {
-    job.used_wcet_low = true;
+    job.used_wcet_low = told = true;
     scheduler_->exceed(job.slot, sched::Limit::WcetLow, now);
   }
-  if (entry.budget > 0 && used > entry.budget && !job.used_budget) {
-    job.used_budget = true;
+  if (entry.budget > 0 && used > entry.budget && !job.used_budget && !(from_outside && entry.cuts_off)) {
+    job.used_budget = told = true;
     scheduler_->exceed(job.slot, sched::Limit::Budget, now);
   }
-  job.limit = entry.next_limit(job);
+  return told;
+}
+
+// `RunningJob::limit` belongs to the job's thread, which looks at it without the lock: from here it is left as it is,
+// and the next preemption point finds nothing more to tell.
+void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob> &out) {
+  // What a job that has just ended can be seen to have used besides.
+  constexpr Duration kSlack = 10 * kMicrosecond;
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  bool told = false;
+  for (auto &thread : threads_) {
+    RunningJob *running = thread->stack.empty() ? nullptr : thread->top.load(std::memory_order_acquire);
+    if (running == nullptr || running->slot != thread->stack.back().slot) continue;
+    const Job &job = thread->stack.back();
+    TaskEntry &entry = tasks_[job.task.value];
+    const Duration elapsed = as_of - running->begun;
+    const bool overdue = !running->named && entry.is_overdue(elapsed, limits);
+    // A job has not used more than the time that has passed.
+    const Duration limit = entry.next_limit(*running);
+    if (!overdue && (limit == kNever || elapsed <= limit)) continue;
+    // Of a task with limits the start is exact; of others `used` is only told to people.
+    const Duration used = cpu_now(thread->cpu_clock) - running->start.cpu;
+    if (thread->top.load(std::memory_order_acquire) != running) continue;  // it has ended, and waits for the lock
+    if (used - kSlack > limit) told = tell_limits(*running, used - kSlack, at, true) || told;
+    if (!overdue) continue;
+    running->named = true;
+    ++entry.usage.overdue;
+    out.push_back(OverdueJob{job, elapsed, used});
+  }
+  if (told) decide(locked, at, nullptr, JobSlot());
 }
 
 void Engine::preemption_point(RunningJob &job) {
@@ -254,6 +294,7 @@ void Engine::preemption_point(RunningJob &job) {
   while (next.kind == Next::Kind::Start) next = run(self, next.assignment, job.slot, at);
   REDAG_CHECK(next.kind == Next::Kind::Resume, "a suspended job was not resumed");
   job.start = CpuMeter::Start{thread_cpu_now() - used, true};
+  job.enter();
 }
 
 // ---- events from outside ----

@@ -38,7 +38,7 @@ struct Job {
   std::uint32_t number = 0;  // within its task, from 0
   Time release = 0;          // nominal
   JobSlot slot;
-  WorkerId worker;  // with `os`: the processor it was given first
+  WorkerId worker;  // the scheduler's: threads are not tied to workers; with `os` the first one it was given
 };
 
 /// Runs one job. What it throws becomes Outcome::Threw, or BudgetExceeded if it is redag::BudgetExceeded.
@@ -79,6 +79,20 @@ struct Usage {
   Duration longest = 0;
   std::uint64_t over_wcet = 0;
   std::uint64_t over_budget = 0;
+  std::uint64_t overdue = 0;  // that watch() named
+};
+
+/// How long a job may be in progress before watch() names it: the shorter of those that are given.
+struct WatchLimits {
+  Duration longest = 0;  // 0: not given
+  double deadlines = 0;  // so many of its own relative deadline; 0: not given
+};
+
+/// A job that has not ended although it should have.
+struct OverdueJob {
+  Job job;
+  Duration elapsed = 0;  // since its body began
+  Duration used = 0;     // processor time: little where it blocks, or where more urgent jobs leave it none
 };
 
 /// What a live view shows of a task.
@@ -163,6 +177,11 @@ class Engine {
   void drain(std::vector<JobEvent> &out, bool last = false);
   [[nodiscard]] std::uint64_t lost_events() const;
 
+  /// For a watchdog, now and then, between start() and join(). Tells the scheduler of running jobs that have used a
+  /// limit and have not come to a preemption point since: `on_budget` and HI mode then need not wait for one (being cut
+  /// off does). Appends jobs that are in progress for too long at `as_of` (the origin's clock), each once.
+  void watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob> &out);
+
   [[nodiscard]] sched::Accounting accounting(TaskId task) const;
   [[nodiscard]] Usage usage(TaskId task) const;
   [[nodiscard]] TaskFigures figures(TaskId task) const;
@@ -193,9 +212,14 @@ class Engine {
   void reach_limit(RunningJob &job, Duration used);
 
   void report_limits(RunningJob &job, Duration used, Time now) REDAG_REQUIRES(lock_);
+  bool tell_limits(RunningJob &job, Duration used, Time now, bool from_outside) REDAG_REQUIRES(lock_);
   Next decide(Locked &locked, Time now, Thread *self, JobSlot below) REDAG_REQUIRES(lock_);
-  Next place_on_workers(Locked &locked, const sched::Step &step, Thread *self, JobSlot below) REDAG_REQUIRES(lock_);
-  Next place_on_pool(Locked &locked, const sched::Step &step, Thread *self) REDAG_REQUIRES(lock_);
+  Next place(Locked &locked, const sched::Step &step, Thread *self, JobSlot below) REDAG_REQUIRES(lock_);
+  static const sched::Dispatch *choose_own(const sched::Step &step, JobSlot below);
+  Thread *rob(std::uint32_t level) REDAG_REQUIRES(lock_);
+  Assignment move_job(Thread &from, Thread &to) REDAG_REQUIRES(lock_);
+  void set_priority_for_job(Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
+  void change_level(const sched::Dispatch &dispatch) REDAG_REQUIRES(lock_);
   Assignment assign(Thread &thread, const sched::Dispatch &dispatch) REDAG_REQUIRES(lock_);
   void hand(Locked &locked, Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
   void apply(std::span<const ThreadPriorities::Change> changes) REDAG_REQUIRES(lock_);
@@ -215,7 +239,8 @@ class Engine {
   std::unique_ptr<sched::Scheduler> scheduler_ REDAG_PT_GUARDED_BY(lock_);
   std::vector<std::unique_ptr<Thread>> threads_;
   std::unique_ptr<Thread> caller_;                        // whoever is in run_one()
-  std::vector<Thread *> idle_ REDAG_GUARDED_BY(lock_);    // os: threads without a job
+  std::vector<Thread *> idle_ REDAG_GUARDED_BY(lock_);    // threads without a job, the last one first
+  std::vector<Thread *> handed_ REDAG_GUARDED_BY(lock_);  // threads that may have mail; each once
   std::deque<TaskEntry> tasks_ REDAG_GUARDED_BY(lock_);   // by TaskId; entries stay where they are
   std::size_t most_started_ REDAG_GUARDED_BY(lock_) = 0;  // jobs that all tasks together can have in progress
   std::uint32_t unfinished_ REDAG_GUARDED_BY(lock_) = 0;  // jobs dispatched and not ended

@@ -28,69 +28,103 @@ Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot belo
       if (event.kind == JobEventKind::Skipped && listener) locked.tell(listener, event.reason);
     }
   }
-  const Next next = os() ? place_on_pool(locked, step, self) : place_on_workers(locked, step, self, below);
+  const Next next = place(locked, step, self, below);
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
   return next;
 }
 
-// none, cooperative: thread w is worker w, save that the caller of run_one() does the work of whichever it was given.
-Engine::Next Engine::place_on_workers(Locked &locked, const sched::Step &step, Thread *self, JobSlot below) {
+// Threads are alike: whichever is idle gets the job, and a job that is suspended under others is on its thread. `os`:
+// the kernel decides what really runs, by priority; nothing is done to a job that is preempted, since whoever outranks
+// it has a higher priority. Of the jobs to start the calling thread takes the most urgent one, so that none of those it
+// then wakes preempts it under the lock.
+Engine::Next Engine::place(Locked &locked, const sched::Step &step, Thread *self, JobSlot below) {
+  const bool is_caller = self == caller_.get();
+  const Dispatch *own = self == nullptr ? nullptr : choose_own(step, below);
   Next next;
-  for (const Dispatch &dispatch : step.dispatches) {
-    Thread &thread = self == caller_.get() ? *self : *threads_[dispatch.worker.value];
-    if (dispatch.resume) {
-      // Other than that of the job below, these are changes of level: nothing to do without levels.
-      if (&thread == self && dispatch.job == below) next.kind = Next::Kind::Resume;
-      continue;
-    }
-    const Assignment assignment = assign(thread, dispatch);
-    if (&thread == self) {
-      next = Next{Next::Kind::Start, assignment};
-    } else {
-      hand(locked, thread, assignment);
+  if (self != nullptr && !below.valid() && !is_caller) {
+    // `os`: only so as not to be idle; two threads that exchange jobs have to exchange priorities.
+    const std::uint32_t above = own == nullptr ? sched::kNoLimit : (os() ? 0 : own->level);
+    if (Thread *other = rob(above)) {
+      next = Next{Next::Kind::Start, move_job(*other, *self)};
+      own = nullptr;
+    } else if (own == nullptr) {
+      idle_.push_back(self);
     }
   }
-  return next;
-}
-
-// os: any idle thread will do; the kernel decides what really runs, by priority. Of the jobs to start the calling
-// thread takes the most urgent one, so that none of those it then wakes preempts it under the lock. Nothing is done to
-// a job that is preempted: whoever outranks it has a higher priority.
-Engine::Next Engine::place_on_pool(Locked &locked, const sched::Step &step, Thread *self) {
-  const Dispatch *own = nullptr;
-  if (self != nullptr) {
-    for (const Dispatch &dispatch : step.dispatches) {
-      if (!dispatch.resume && (own == nullptr || dispatch.level < own->level)) own = &dispatch;
-    }
-  }
-  const PriorityBand &band = options_.band;
-  Next next;
   if (own != nullptr) {
     next = Next{Next::Kind::Start, assign(*self, *own)};
-    if (self != caller_.get()) {
-      apply(priorities_.start(self->index, band.of_level(own->level), next.assignment.expected_short));
-    }
-  } else if (self != nullptr && self != caller_.get()) {
-    idle_.push_back(self);
+    if (!is_caller) set_priority_for_job(*self, next.assignment);
   }
   for (const Dispatch &dispatch : step.dispatches) {
     if (&dispatch == own) continue;
     if (dispatch.resume) {
-      const auto runs_it = [&](const auto &t) { return !t->stack.empty() && t->stack.back().slot == dispatch.job; };
-      if (runs_it(caller_)) continue;  // at its own priority
-      const auto thread = std::find_if(threads_.begin(), threads_.end(), runs_it);
-      REDAG_CHECK(thread != threads_.end(), "a job goes on that no thread has");
-      apply(priorities_.change((*thread)->index, band.of_level(dispatch.level)));
+      if (dispatch.job == below) next.kind = Next::Kind::Resume;
+      if (os()) change_level(dispatch);
       continue;
     }
     REDAG_CHECK(!idle_.empty(), "more jobs started than there are threads");
     Thread &thread = *idle_.back();
     idle_.pop_back();
     const Assignment assignment = assign(thread, dispatch);
-    apply(priorities_.start(thread.index, band.of_level(dispatch.level), assignment.expected_short));
+    set_priority_for_job(thread, assignment);
     hand(locked, thread, assignment);
   }
   return next;
+}
+
+// What the calling thread is to start: on top of the job below, or the most urgent of all.
+const Dispatch *Engine::choose_own(const sched::Step &step, JobSlot below) {
+  const Dispatch *own = nullptr;
+  for (const Dispatch &dispatch : step.dispatches) {
+    if (dispatch.resume || (below.valid() && dispatch.over != below)) continue;
+    if (own == nullptr || dispatch.level < own->level) own = &dispatch;
+  }
+  return own;
+}
+
+// A thread that was given a job above `level` and has not begun it, since it is not awake yet; it does not begin it any
+// more. Its wake-up takes longer than most jobs: it is not waited for by a thread that could begin at once.
+Engine::Thread *Engine::rob(std::uint32_t level) {
+  Thread *victim = nullptr;
+  for (std::size_t i = 0; i < handed_.size();) {
+    Thread &thread = *handed_[i];
+    if (!thread.has_mail.load(std::memory_order_relaxed)) {
+      thread.is_handed = false;
+      handed_[i] = handed_.back();
+      handed_.pop_back();
+      continue;
+    }
+    if (thread.level < level) {
+      victim = &thread;
+      level = thread.level;
+    }
+    ++i;
+  }
+  return victim != nullptr && victim->claim_mail() ? victim : nullptr;
+}
+
+Engine::Assignment Engine::move_job(Thread &from, Thread &to) {
+  const Assignment assignment = from.mail;
+  to.stack.push_back(from.stack.back());
+  from.stack.pop_back();
+  to.level = from.level;
+  if (os()) priorities_.end(from.index);
+  set_priority_for_job(to, assignment);
+  idle_.push_back(&from);
+  return assignment;
+}
+
+void Engine::set_priority_for_job(Thread &thread, const Assignment &assignment) {
+  if (os()) apply(priorities_.start(thread.index, options_.band.of_level(thread.level), assignment.expected_short));
+}
+
+void Engine::change_level(const Dispatch &dispatch) {
+  const auto runs_it = [&](const auto &t) { return !t->stack.empty() && t->stack.back().slot == dispatch.job; };
+  if (runs_it(caller_)) return;  // at its own priority
+  const auto thread = std::find_if(threads_.begin(), threads_.end(), runs_it);
+  REDAG_CHECK(thread != threads_.end(), "a job goes on that no thread has");
+  (*thread)->level = dispatch.level;
+  apply(priorities_.change((*thread)->index, options_.band.of_level(dispatch.level)));
 }
 
 Engine::Assignment Engine::assign(Thread &thread, const Dispatch &dispatch) {
@@ -100,6 +134,7 @@ Engine::Assignment Engine::assign(Thread &thread, const Dispatch &dispatch) {
   ++unfinished_;
   const Job job{dispatch.task, dispatch.number, dispatch.release, dispatch.job, dispatch.worker};
   thread.stack.push_back(job);
+  thread.level = dispatch.level;
   return Assignment{job, &entry, entry.expected_short()};
 }
 
@@ -107,6 +142,8 @@ void Engine::hand(Locked &locked, Thread &thread, const Assignment &assignment) 
   REDAG_CHECK(!thread.has_mail.load(std::memory_order_relaxed), "a worker was given two jobs");
   thread.mail = assignment;
   thread.has_mail.store(true, std::memory_order_release);
+  if (!thread.is_handed) handed_.push_back(&thread);
+  thread.is_handed = true;
   locked.wake(thread);
 }
 

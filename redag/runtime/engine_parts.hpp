@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <utility>
 
 #include "redag/runtime/cpu_meter.hpp"
@@ -11,6 +12,8 @@
 namespace redag::runtime {
 
 struct Engine::TaskEntry {
+  static constexpr std::uint32_t kStreak = 8;
+
   /// A job that used that much and took that long ended.
   void count(Duration used, Duration took) {
     short_jobs = took <= CpuMeter::kShort ? std::min(short_jobs + 1, kStreak) : 0;
@@ -36,7 +39,12 @@ struct Engine::TaskEntry {
   /// Its last jobs were short: the next one is taken to be, too, until it proves otherwise.
   [[nodiscard]] bool expected_short() const { return short_jobs == kStreak && !always_measured(); }
 
-  static constexpr std::uint32_t kStreak = 8;
+  /// Is a job that has been in progress for `elapsed` overdue?
+  [[nodiscard]] bool is_overdue(Duration elapsed, const WatchLimits &limits) const {
+    return (limits.longest > 0 && elapsed > limits.longest) ||
+           (limits.deadlines > 0 && deadline > 0 &&
+            static_cast<double>(elapsed) > limits.deadlines * static_cast<double>(deadline));
+  }
 
   Body body;
   std::shared_ptr<SkipListener> listener;  // or null
@@ -76,17 +84,29 @@ struct Engine::Next {
 struct alignas(64) Engine::Thread {
   Thread(std::uint32_t its_index, std::size_t trace_capacity) : index(its_index), events(trace_capacity) {}
 
-  std::uint32_t index;  // none, cooperative: the worker's number
+  /// Whoever gets true has the mail, and nobody else does.
+  bool claim_mail() noexcept {
+    return has_mail.load(std::memory_order_relaxed) && has_mail.exchange(false, std::memory_order_acquire);
+  }
+
+  std::uint32_t index;
   Parker parker;
-  // Written under the lock by whoever dispatches, while the thread has no job; read by the thread without it.
+  // Written under the lock by whoever dispatches, while the thread has no job; read by whoever claims it: the thread,
+  // without the lock, or another one that is free before this one is awake, under it.
   Assignment mail;
   Atomic<bool> has_mail{false};
+  bool is_handed = false;         // lock: is among Engine::handed_
+  std::uint32_t level = 0;        // lock: of the job it was given last; inherited only with `os`
   Atomic<bool> outranked{false};  // written under the lock
   std::vector<Job> stack;         // lock: the jobs started here, the running one last
   trace::Ring events;             // Started; written by the thread
   CpuMeter meter;                 // of the thread
+  // The job whose body the thread is in, the topmost one; null from when it has returned. Written by the thread. Under
+  // the lock what it points to stays: a job's end needs the lock after this is cleared.
+  Atomic<RunningJob *> top{nullptr};
 
   ThreadHandle handle;
+  clockid_t cpu_clock = 0;  // of `handle`; set before the engine runs
 };
 
 /// Holds the engine's lock; wakes threads and tells of skips after it. Real-time threads are woken under the lock
@@ -98,14 +118,29 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   ~Locked() REDAG_RELEASE() {
     engine_.lock_.unlock();
     for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
-    for (const auto &[listener, reason] : skips_) listener->skipped(reason);
+    for (std::size_t i = 0; i < skip_count_; ++i) {
+      few_skips[i].listener->skipped(few_skips[i].reason);
+      std::destroy_at(&few_skips[i]);
+    }
+    for (const Skip &skip : more_skips_) skip.listener->skipped(skip.reason);
   }
   Locked(const Locked &) = delete;
   Locked &operator=(const Locked &) = delete;
 
-  void tell(std::shared_ptr<SkipListener> listener, Reason reason) { skips_.emplace_back(std::move(listener), reason); }
+  /// Allocates only where one decision skips more than kFewSkips jobs (HI mode begins).
+  void tell(std::shared_ptr<SkipListener> listener, Reason reason) {
+    if (skip_count_ < kFewSkips) {
+      std::construct_at(&few_skips[skip_count_++], Skip{std::move(listener), reason});
+    } else {
+      more_skips_.push_back(Skip{std::move(listener), reason});
+    }
+  }
   /// What was skipped is what the caller itself called missed.
-  void tell_nobody() { skips_.clear(); }
+  void tell_nobody() {
+    std::destroy_n(few_skips, skip_count_);
+    skip_count_ = 0;
+    more_skips_.clear();
+  }
 
   void wake(Thread &thread) {
     if (engine_.realtime() || count_ == late_.size()) {
@@ -117,7 +152,16 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
 
  private:
   Engine &engine_;
-  std::vector<std::pair<std::shared_ptr<SkipListener>, Reason>> skips_;
+  struct Skip {
+    std::shared_ptr<SkipListener> listener;
+    Reason reason = Reason::None;
+  };
+  static constexpr std::size_t kFewSkips = 8;
+  union {
+    Skip few_skips[kFewSkips];  // the first skip_count_ are there: the others cost nothing
+  };
+  std::size_t skip_count_ = 0;
+  std::vector<Skip> more_skips_;
   std::array<Thread *, 32> late_;
   std::size_t count_ = 0;
 };

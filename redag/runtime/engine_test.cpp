@@ -277,6 +277,58 @@ TEST_P(EngineInEveryMode, TheHotPathDoesNotAllocate) {
   EXPECT_EQ(after, before);
 }
 
+class CountsSkips : public SkipListener {
+ public:
+  void skipped(Reason reason) noexcept override { overruns += reason == Reason::Overrun ? 1 : 0; }
+  std::atomic<std::uint32_t> overruns{0};
+};
+
+// Each job releases two of its task, the first of which is skipped.
+TEST_P(EngineInEveryMode, ToTellOfASkipDoesNotAllocate) {
+  Bench bench(ladder(1), GetParam(), 1);
+  bench.start();
+  Event done;
+  std::uint64_t before = 0;
+  std::uint64_t after = 0;
+  constexpr std::uint32_t kJobs = 100;
+  const auto listener = std::make_shared<CountsSkips>();
+  Task task = ladder(1).dags[0].tasks[0];
+  task.name = "skipped";
+  // Numbers of jobs: 0, 2, 4, ...
+  const auto body = [&](const Job &job) {
+    if (job.number == 20) before = testing::allocation_count();
+    if (job.number == 2 * kJobs) {
+      after = testing::allocation_count();
+      done.set();
+    } else {
+      bench.engine->release(job.task, bench.engine->now());
+      bench.engine->release(job.task, bench.engine->now());
+    }
+    return Outcome::Finished;
+  };
+  const TaskId id = bench.engine->add_task(DagId(0), 1, task, body, listener);
+  bench.engine->release(id, bench.engine->now());
+  done.wait();
+  bench.engine->join();
+  EXPECT_EQ(listener->overruns, kJobs);
+  EXPECT_EQ(after, before);
+}
+
+// More at once than there is room for.
+TEST_P(EngineInEveryMode, EverySkipIsTold) {
+  Bench bench(ladder(1), GetParam(), 1);
+  bench.start();
+  const auto listener = std::make_shared<CountsSkips>();
+  Task task = ladder(1).dags[0].tasks[0];
+  task.name = "skipped";
+  const TaskId id = bench.engine->add_task(
+      DagId(0), 1, task, [](const Job &) { return Outcome::Finished; }, listener);
+  constexpr std::uint32_t kReleases = 50;
+  bench.engine->release(std::vector<Release>(kReleases, Release{id, 0}));
+  EXPECT_EQ(listener->overruns, kReleases - 1);
+  bench.engine->join();
+}
+
 TEST_P(EngineInEveryMode, PausedItStartsNothingAndKeepsWhatIsReleased) {
   Bench bench(ladder(3), GetParam(), 1);
   Event begun;
@@ -313,7 +365,7 @@ TEST_P(EngineInEveryMode, PausedItStartsNothingAndKeepsWhatIsReleased) {
 
 // Without a thread of its own: jobs run one by one, the most urgent first, on the thread that asks.
 TEST_P(EngineInEveryMode, RunOneNeedsNoThreads) {
-  Bench bench(ladder(3), GetParam(), 1);
+  Bench bench(ladder(3), GetParam(), 2);
   const std::thread::id here = std::this_thread::get_id();
   for (std::size_t t = 0; t < 3; ++t) {
     bench.bodies[t] = [&, t](const Job &) -> Outcome {

@@ -21,8 +21,9 @@ void EventMerge::merge(std::vector<JobEvent> &out, bool last) {
     for (; next != started_.end() && next->time < decision.time; ++next) append(out, *next);
     // Of equal times a decision comes first, except that a job begins before it ends.
     if (ends(decision)) {
-      const auto begun = std::find_if(next, started_.end(), [&](const JobEvent &e) { return same_job(e, decision); });
-      if (begun != started_.end()) {
+      const auto begun = std::find_if(
+          next, started_.end(), [&](const JobEvent &e) { return e.time > decision.time || same_job(e, decision); });
+      if (begun != started_.end() && same_job(*begun, decision)) {
         std::rotate(next, begun, begun + 1);
         append(out, *next++);
       }

@@ -39,19 +39,19 @@ TEST(EventMerge, StartedComesByTime) {
 
 TEST(EventMerge, AtEqualTimesAJobIsDispatchedThenBeginsThenEnds) {
   EventMerge merge;
-  merge.decisions() = {event(4, Kind::Dispatched, 0), event(4, Kind::Finished, 1), event(4, Kind::Finished, 0)};
+  merge.decisions() = {event(4, Kind::Dispatched, 2), event(4, Kind::Finished, 1), event(4, Kind::Finished, 2)};
   merge.started() = {event(4, Kind::Started, 2), event(4, Kind::Started, 0)};
   std::vector<JobEvent> out;
   merge.merge(out, false);
-  ASSERT_EQ(out.size(), 4U);  // job 2's dispatch may still come
+  ASSERT_EQ(out.size(), 4U);  // job 0's dispatch may still come
   EXPECT_EQ(out[0].kind, Kind::Dispatched);
   EXPECT_EQ(out[1].kind, Kind::Finished);
   EXPECT_EQ(out[2].kind, Kind::Started);
-  EXPECT_EQ(out[2].task, TaskId(0));
+  EXPECT_EQ(out[2].task, TaskId(2));
   EXPECT_EQ(out[3].kind, Kind::Finished);
   merge.merge(out, true);
   ASSERT_EQ(out.size(), 5U);
-  EXPECT_EQ(out[4].task, TaskId(2));
+  EXPECT_EQ(out[4].task, TaskId(0));
 }
 
 TEST(EventMerge, ALateStartedKeepsItsExactTimeInValue) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <stdexcept>
 #include <utility>
 
@@ -66,6 +67,9 @@ Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
 Executor::~Executor() {
   request_stop();
   timer_->join();
+  // As long as a body runs, it is watched.
+  if (watchdog_) (void)engine_->wait_idle(kNever);
+  watchdog_.reset();
   engine_->join();
 }
 
@@ -87,11 +91,26 @@ DagId Executor::add(DagBuilder builder) {
     });
   }
   const LockGuard guard(lock_);
+  if (options_.admission) admit(dag);
   const AddedDag ids = engine_->add_dag(dag, std::move(bodies));
   const TaskId first = ids.tasks.empty() ? TaskId(0) : ids.tasks.front();  // the others follow: ids are not reused
-  dags_.push_back(Added{dag.name, dag.tasks, dag.max_active, first});
+  dags_.push_back(Added{dag.name, dag.tasks, dag.max_active, first, false, options_.admission ? dag : Dag{}});
   timer_->add(dag, first, running_ ? std::max<Time>(0, engine_->now()) : 0);
   return ids.dag;
+}
+
+void Executor::admit(const Dag &dag) const {
+  Workload workload;
+  workload.name = options_.name;
+  workload.platform = Platform{options_.workers, setup_.mode.mode};
+  workload.policy = options_.policy;
+  for (const Added &other : dags_) {
+    if (!other.removed) workload.dags.push_back(other.dag);
+  }
+  workload.dags.push_back(dag);
+  if (const Result<void> admitted = options_.admission(workload, engine_->options().config); !admitted) {
+    throw AdmissionRefused(fmt::format("DAG '{}' is not admitted: {}", dag.name, to_string(admitted.error())));
+  }
 }
 
 void Executor::remove(DagId dag) {
@@ -119,8 +138,13 @@ void Executor::run_for(nanoseconds duration) {
 }
 
 void Executor::start() {
+  const LockGuard starting(finishing_);  // a stop() meanwhile waits for what it is going to end
   if (started_.exchange(true)) throw std::logic_error("an Executor runs once");
   if (const Result<void> ready = engine_->start(); !ready) throw std::runtime_error(to_string(ready.error()));
+  if (const Result<void> watching = start_watchdog(); !watching) {
+    request_stop();
+    throw std::runtime_error(to_string(watching.error()));
+  }
   const LockGuard guard(lock_);
   const Time origin = monotonic_now() + kStartMargin;
   engine_->set_origin(origin);
@@ -129,6 +153,23 @@ void Executor::start() {
   if (const Result<void> ready = timer_->start(origin, kNever, setup); !ready) {
     request_stop();
     throw std::runtime_error(to_string(ready.error()));
+  }
+}
+
+Result<void> Executor::start_watchdog() {
+  if (!options_.watchdog) return {};
+  watchdog_ =
+      std::make_unique<Watchdog>(*engine_, *options_.watchdog, [this](const OverdueJob &job) { on_overdue(job); });
+  return watchdog_->start({options_.name + "-watch", setup_.timer_priority(), {}});
+}
+
+void Executor::on_overdue(const OverdueJob &job) {
+  OverdueInfo info{task_name(job.job.task), job.job.number, job.elapsed, job.used, {}};
+  info.text = fmt::format("{} #{} is overdue: {}", info.task, info.job, describe(job));
+  if (options_.on_overdue) {
+    options_.on_overdue(info);
+  } else {
+    std::fprintf(stderr, "%s: %s\n", options_.name.c_str(), info.text.c_str());
   }
 }
 
@@ -166,6 +207,7 @@ void Executor::finish() {
     throw std::runtime_error(fmt::format("still running {} after the stop: {}",
                                          format_duration(options_.stop_timeout.count()), fmt::join(names, ", ")));
   }
+  watchdog_.reset();
   engine_->join();
   live_.reset();
   finished_ = true;

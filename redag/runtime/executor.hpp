@@ -9,6 +9,8 @@
 #include <exception>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -21,6 +23,7 @@
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/mode.hpp"
 #include "redag/runtime/release_timer.hpp"
+#include "redag/runtime/watchdog.hpp"
 
 namespace redag::runtime {
 
@@ -30,6 +33,19 @@ struct ExceptionInfo {
   std::uint32_t job = 0;
   std::exception_ptr exception;
 };
+
+/// A body that has not returned although it should have.
+struct OverdueInfo {
+  std::string task;  // "control.ekf"
+  std::uint32_t job = 0;
+  Duration elapsed = 0;  // since it was started
+  Duration used = 0;     // of that, processor time
+  std::string text;      // all of it, for a log
+};
+
+/// Is there time for these DAGs? The one that is to be added is the last of the workload; the others are there. An
+/// error says why not.
+using AdmissionTest = std::function<Result<void>(const Workload &, const sched::Config &)>;
 
 enum class OnException : std::uint8_t {
   Stop,      // as request_stop(); run(), run_for() or wait() throws the first such exception
@@ -46,9 +62,19 @@ struct ExecutorOptions {
   bool lock_memory = false;        // if it cannot be had, warnings() says so
   std::size_t trace_capacity = 0;  // events kept between two drain(); 0: none are recorded
   bool live = false;               // `redag top` sees it: a page of shared memory, and a thread that updates it
+  /// A thread that looks for bodies that do not return, also while the executor stops; and `on_budget` then needs no
+  /// preemption points. None: no such thread.
+  std::optional<WatchdogOptions> watchdog{};
+  // Called on the watchdog's thread, once for each such job; must not throw. Empty: a line on standard error.
+  std::function<void(const OverdueInfo &)> on_overdue{};
+  AdmissionTest admission{};  // asked by add(); empty: everything is admitted. See analysis::admit_by_bounds()
   nanoseconds stop_timeout = std::chrono::seconds(10);  // how long stopping waits for bodies to return
   // Called on the worker's thread; must not throw. Empty: Stop.
   std::function<OnException(const ExceptionInfo &)> on_exception{};
+};
+
+struct AdmissionRefused : std::runtime_error {
+  using std::runtime_error::runtime_error;
 };
 
 struct TaskStats {
@@ -67,7 +93,8 @@ class Executor {
   Executor &operator=(const Executor &) = delete;
 
   /// Adds a DAG, before or while running; its release grid begins at the start, or now. Throws std::invalid_argument
-  /// with all mistakes if it is not valid.
+  /// with all mistakes if it is not valid, AdmissionRefused with the reason if `admission` says no; nothing is changed
+  /// then.
   DagId add(DagBuilder dag);
   /// What has not started is skipped, what has started ends as usual; a body is destroyed once it no longer runs.
   void remove(DagId dag);
@@ -112,8 +139,12 @@ class Executor {
     std::uint32_t max_active = 0;
     TaskId first;
     bool removed = false;
+    Dag dag;  // for `admission` only
   };
   void finish();
+  void admit(const Dag &dag) const REDAG_REQUIRES(lock_);
+  void on_overdue(const OverdueJob &job);
+  [[nodiscard]] Result<void> start_watchdog();
   void sample(live::Sample &sample) const;
   void on_exception(const Job &job, std::exception_ptr exception);
   /// Throws std::out_of_range.
@@ -123,11 +154,12 @@ class Executor {
   Setup setup_;
   std::unique_ptr<Engine> engine_;
   std::unique_ptr<ReleaseTimer> timer_;
+  std::unique_ptr<Watchdog> watchdog_;  // from start() until no body is left
   mutable PiMutex lock_;
   std::vector<Added> dags_ REDAG_GUARDED_BY(lock_);
   std::exception_ptr failure_ REDAG_GUARDED_BY(lock_);  // the first that stopped us
   bool running_ REDAG_GUARDED_BY(lock_) = false;
-  Mutex finishing_;  // one thread at a time ends the run
+  Mutex finishing_;  // one thread at a time begins or ends the run
   Atomic<bool> started_{false};
   Atomic<bool> finished_{false};
   Event stop_;

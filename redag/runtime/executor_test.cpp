@@ -264,5 +264,35 @@ TEST(Executor, IsDestroyedCleanlyInEveryState) {
   }
 }
 
+// Refused, nothing has changed; what was removed makes room.
+TEST(Executor, AsksWhetherADagIsAdmitted) {
+  ExecutorOptions options = one_worker();
+  std::vector<std::size_t> asked;
+  options.admission = [&](const Workload &workload, const sched::Config &config) -> Result<void> {
+    EXPECT_EQ(config.workers, 1U);
+    asked.push_back(workload.dags.size());
+    if (workload.utilization() <= 1) return {};
+    return make_error("no time is left");
+  };
+  Executor executor(options);
+  const auto dag = [](const std::string &name) {
+    DagBuilder builder(name);
+    builder.timer("t", 10ms, [] {}, {.wcet = 6ms});
+    return builder;
+  };
+  const DagId first = executor.add(dag("first"));
+  try {
+    executor.add(dag("second"));
+    FAIL() << "more than there is time for was admitted";
+  } catch (const AdmissionRefused &refused) {
+    EXPECT_NE(std::string(refused.what()).find("'second' is not admitted"), std::string::npos) << refused.what();
+    EXPECT_NE(std::string(refused.what()).find("no time is left"), std::string::npos) << refused.what();
+  }
+  executor.remove(first);
+  const DagId third = executor.add(dag("third"));
+  EXPECT_EQ(executor.stats(third)[0].task, "third.t");
+  EXPECT_EQ(asked, (std::vector<std::size_t>{1, 2, 1}));
+}
+
 }  // namespace
 }  // namespace redag::runtime

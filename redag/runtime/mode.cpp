@@ -64,6 +64,11 @@ sched::Config make_config(const Mode &mode, std::uint32_t workers, PolicyKind po
   return config;
 }
 
+int Setup::timer_priority() const {
+  if (mode.mode == PreemptionMode::Os) return band.timer;
+  return fifo_priority_above_this_thread();
+}
+
 Result<Setup> set_up(PreemptionMode wanted, PolicyKind policy, std::uint32_t workers, std::uint32_t threads,
                      const std::vector<int> &cpus) {
   Setup setup;

@@ -46,8 +46,9 @@ struct Setup {
   sched::Config config;
   std::vector<std::string> warnings;
 
-  /// SCHED_FIFO priority of what must not wait for jobs, the release timer first of all; 0: none.
-  [[nodiscard]] int timer_priority() const { return mode.mode == PreemptionMode::Os ? band.timer : 0; }
+  /// SCHED_FIFO priority of what must not wait for jobs, the release timer first of all; 0: none. Without `os`, one
+  /// above that of the calling thread, which workers that it starts inherit (`chrt -f 10 program`).
+  [[nodiscard]] int timer_priority() const;
 };
 
 /// `workers` 0: one for each of `cpus` (empty: of the processors that the process may use). `threads` (jobs that can be

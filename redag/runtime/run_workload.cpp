@@ -6,6 +6,8 @@
 #include <thread>
 #include <utility>
 
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/mutex.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/release_timer.hpp"
@@ -45,7 +47,7 @@ class Run {
     if (kind == nullptr && !options_.scheduler) {
       return make_error(fmt::format("there is no executor '{}'", options_.executor));
     }
-    const bool preemptive = kind == nullptr || kind->preemptive;
+    const bool preemptive = kind == nullptr || kind->ours;
     const auto wanted = options_.preemption.value_or(workload_.platform.preemption);
     Result<Setup> setup = set_up(preemptive ? wanted : PreemptionMode::None, workload_.policy,
                                  workload_.platform.workers, pool_size(workload_, options_), options_.cpus);
@@ -124,8 +126,42 @@ class Run {
     origin_ = monotonic_now() + kStartMargin;
     engine_->set_origin(origin_);
     const bool realtime = options_.realtime_threads || result_.mode.mode == PreemptionMode::Os;
-    const ThreadSetup setup{"redag-timer", realtime ? engine_->options().band.timer : 0, {}};
-    return timer_->start(origin_, options_.duration, setup);
+    const int priority = realtime ? engine_->options().band.timer : 0;
+    if (options_.watchdog) {
+      watchdog_ =
+          std::make_unique<Watchdog>(*engine_, *options_.watchdog, [this](const OverdueJob &job) { note(job); });
+      if (Result<void> started = watchdog_->start({"redag-watch", priority, {}}); !started) return started;
+    }
+    return timer_->start(origin_, options_.duration, {"redag-timer", priority, {}});
+  }
+
+  void note(const OverdueJob &job) {
+    std::string text = fmt::format("{} #{} is overdue: {}", trace::task_name(workload_, job.job.task), job.job.number,
+                                   runtime::describe(job));
+    const LockGuard guard(notes_lock_);
+    notes_.push_back(std::move(text));
+  }
+
+  void report_overdue() {
+    std::vector<std::string> notes;
+    {
+      const LockGuard guard(notes_lock_);
+      notes.swap(notes_);
+    }
+    for (std::string &text : notes) {
+      if (options_.on_overdue) options_.on_overdue(text);
+      result_.overdue.push_back(std::move(text));
+    }
+  }
+
+  // False: there are started jobs left after drain_timeout.
+  bool wait_idle() {
+    const Time give_up = monotonic_now() + options_.drain_timeout;
+    for (Time now = monotonic_now();; now = monotonic_now()) {
+      const bool idle = engine_->wait_idle(std::min(now + kCollectEvery, give_up));
+      report_overdue();
+      if (idle || now >= give_up) return idle;
+    }
   }
 
   void collect_until_horizon() {
@@ -138,6 +174,7 @@ class Run {
       }
       never.wait_until(std::min(now + kCollectEvery, end));
       engine_->drain(result_.trace.events);
+      report_overdue();
       if (options_.progress) options_.progress(engine_->now(), result_.trace.events);
     }
   }
@@ -147,13 +184,16 @@ class Run {
     timer_->stop();  // reports what was due until now
     timer_->join();
     engine_->halt();
-    if (!engine_->wait_idle(monotonic_now() + options_.drain_timeout)) {
+    if (!wait_idle()) {
       for (const Job &job : engine_->started()) {
         result_.unfinished.push_back(fmt::format("{} #{}", trace::task_name(workload_, job.task), job.number));
       }
       give_up_.store(true);
     }
+    (void)engine_->wait_idle(kNever);
+    watchdog_.reset();
     engine_->join();
+    report_overdue();
     live_.reset();
     describe();
     cut();
@@ -199,9 +239,12 @@ class Run {
   const Workload &workload_;
   const RunOptions &options_;
   RunResult result_;
+  Mutex notes_lock_;
+  std::vector<std::string> notes_ REDAG_GUARDED_BY(notes_lock_);  // of the watchdog, not yet reported
   std::atomic<bool> give_up_{false};
   std::unique_ptr<Engine> engine_;
   std::unique_ptr<ReleaseTimer> timer_;    // after the engine: it ends first
+  std::unique_ptr<Watchdog> watchdog_;     // the same
   std::unique_ptr<live::Publisher> live_;  // after the engine: it asks for figures until it is gone
   Time origin_ = 0;
   Time end_ = 0;

@@ -15,6 +15,7 @@
 #include "redag/base/result.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/runtime/engine.hpp"
+#include "redag/runtime/watchdog.hpp"
 #include "redag/sched/scheduler.hpp"
 #include "redag/trace/trace.hpp"
 
@@ -41,6 +42,10 @@ struct RunOptions {
   Duration drain_timeout = 5 * kSecond;               // for started jobs to end after the horizon
   /// What the jobs do besides, or instead: gets the synthetic bodies by TaskId and gives as many.
   std::function<std::vector<Body>(std::vector<Body> synthetic, const Now &now)> bodies;
+  /// Names jobs that are in progress for too long, while they are: to on_overdue, on the calling thread, and in the
+  /// result's `overdue`.
+  std::optional<WatchdogOptions> watchdog;
+  std::function<void(const std::string &text)> on_overdue;
   bool live = false;  // `redag top` sees the run
   /// For it: proven bounds on response times by task, 0 where there is none. Asked once, before the start.
   std::function<std::vector<Duration>(const sched::Config &)> bounds;
@@ -54,6 +59,7 @@ struct RunResult {
   Mode mode;
   std::vector<Usage> usage;             // by task
   std::vector<std::string> unfinished;  // jobs that were told to give up after drain_timeout
+  std::vector<std::string> overdue;     // what the watchdog said
   std::vector<std::string> warnings;    // what a reader of the figures should know
   bool stopped = false;                 // by `stop`
 };

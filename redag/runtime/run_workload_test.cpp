@@ -122,6 +122,25 @@ TEST(RunWorkload, JobsThatDoNotEndAreNamed) {
   expect_lawful(result);
 }
 
+TEST(RunWorkload, TheWatchdogNamesAJobWhileItRuns) {
+  Workload workload = two_rates(1, PreemptionMode::None);
+  workload.dags[1].tasks[0].wcet = workload.dags[1].tasks[0].bcet = 3600 * kSecond;
+  std::atomic<bool> stop{false};
+  RunOptions options;
+  options.duration = 3600 * kSecond;
+  options.drain_timeout = kMillisecond;
+  options.stop = &stop;
+  options.watchdog = WatchdogOptions{{20 * kMillisecond, 0}, 5 * kMillisecond};
+  // Nothing else ends the run.
+  options.on_overdue = [&](const std::string &text) {
+    EXPECT_NE(text.find("slow.slow0 #0 is overdue"), std::string::npos) << text;
+    stop = true;
+  };
+  const RunResult result = run(workload, options);
+  EXPECT_EQ(result.overdue.size(), 1U);
+  EXPECT_EQ(result.usage[2].overdue, 1U);
+}
+
 TEST(RunWorkload, ABudgetCutsAJobOff) {
   Workload workload = two_rates(1, PreemptionMode::Cooperative);
   workload.dags[1].tasks[0].budget = 2 * kMillisecond;
@@ -143,7 +162,7 @@ TEST(RunWorkload, EveryExecutorRunsOnThreads) {
     options.executor = kind.name;
     options.realtime_threads = probe_priority_band().top_job > 0;
     const RunResult result = run(two_rates(2, PreemptionMode::Auto), options);
-    EXPECT_EQ(result.mode.mode == PreemptionMode::None, !kind.preemptive) << kind.name;
+    EXPECT_EQ(result.mode.mode == PreemptionMode::None, !kind.ours) << kind.name;
     EXPECT_EQ(result.trace.info.config.workers, kind.single_worker ? 1U : 2U);
     EXPECT_GT(result.usage[0].jobs + result.usage[2].jobs, 0U) << kind.name;
     if (kind.name == "redag") expect_lawful(result);

@@ -22,16 +22,25 @@ struct RunningJob {
   Time begun = 0;           // on the engine's clock
   CpuMeter::Start start;    // without what jobs that ran on top used
   RunningJob *below = nullptr;
-  Duration total = -1;         // the whole job's, once that is known
-  bool used_wcet_low = false;  // and the scheduler was told; written under the engine's lock
+  Atomic<RunningJob *> *top = nullptr;  // the thread's: this, while the body runs
+  Duration total = -1;                  // the whole job's, once that is known
+  bool used_wcet_low = false;           // and the scheduler was told; written under the engine's lock
   bool used_budget = false;
+  bool named = false;  // as overdue; written under the engine's lock
 
   void reach_preemption_point();
   void reach_limit(Duration used);
   /// Processor time until now. Never too little; if its start is not exact, not more than the job took on the clock.
   [[nodiscard]] Duration cpu_time() const noexcept;
   /// For a body that is about to return and wants to know: the engine then need not read the clock again.
-  Duration close() noexcept { return total = cpu_time(); }
+  Duration close() noexcept {
+    leave();
+    return total = cpu_time();
+  }
+
+  /// From here on, and no longer, watch() may look at what the job has used.
+  void enter() noexcept { top->store(this, std::memory_order_release); }
+  void leave() noexcept { top->store(nullptr, std::memory_order_release); }
 
   static RunningJob *current() noexcept;
   static void set_current(RunningJob *job) noexcept;

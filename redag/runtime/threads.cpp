@@ -14,6 +14,7 @@
 #include <thread>
 #include <utility>
 
+#include "redag/base/check.hpp"
 #include "redag/runtime/parker.hpp"
 
 namespace redag::runtime {
@@ -56,11 +57,29 @@ Result<void> set_up_this_thread(const ThreadSetup &setup) {
   return {};
 }
 
+clockid_t cpu_clock_of(ThreadHandle &thread) noexcept {
+  clockid_t clock = CLOCK_MONOTONIC;
+  const int error = ::pthread_getcpuclockid(thread.native_handle(), &clock);
+  REDAG_CHECK(error == 0, "a thread that runs has a clock");
+  return clock;
+}
+
 bool set_fifo_priority(pthread_t thread, int priority) noexcept {
   sched_param parameters{};
   parameters.sched_priority = priority;
   return pthread_setschedparam(thread, SCHED_FIFO, &parameters) == 0;
 }
+
+namespace {
+
+// What a thread does after its work, such as destroying what is its own, is urgent to nobody; and under ThreadSanitizer
+// threads that end at several priorities wait for each other for ever, since its spin locks do not inherit them.
+void leave_fifo() noexcept {
+  const sched_param ordinary{};
+  if (fifo_priority(pthread_self()) > 0) pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
+}
+
+}  // namespace
 
 Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()> main) {
   Result<void> result;
@@ -72,6 +91,7 @@ Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()
       const bool usable = result.has_value();
       ready.set();
       if (usable) main();
+      leave_fifo();
     });
   } catch (const std::system_error &error) {
     return make_error(fmt::format("thread '{}' cannot be created: {}", setup.name, error.what()),
@@ -114,6 +134,13 @@ int available_fifo_priority(int wanted) {
     if (set_fifo_priority(pthread_self(), allowed)) found = allowed;
   }).join();
   return found;
+}
+
+int fifo_priority_above_this_thread() {
+  const int inherited = fifo_priority(pthread_self());
+  if (inherited == 0) return 0;
+  const int above = available_fifo_priority(inherited + 1);
+  return above > inherited ? above : 0;
 }
 
 const char *realtime_hint() {

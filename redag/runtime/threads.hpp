@@ -5,6 +5,7 @@
 #include <pthread.h>
 
 #include <cstdint>
+#include <ctime>
 #include <functional>
 #include <optional>
 #include <string>
@@ -32,11 +33,17 @@ struct ThreadSetup {
 /// `main` does not run.
 [[nodiscard]] Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()> main);
 
+/// The clock of a running thread's processor time.
+[[nodiscard]] clockid_t cpu_clock_of(ThreadHandle &thread) noexcept;
+
 /// False if the system refused.
 [[nodiscard]] bool set_fifo_priority(pthread_t thread, int priority) noexcept;
 
 /// SCHED_FIFO priority of a thread; 0 if it is scheduled otherwise.
 [[nodiscard]] int fifo_priority(pthread_t thread) noexcept;
+
+/// One above that of the calling thread; 0: that has none, or the process may not have more.
+[[nodiscard]] int fifo_priority_above_this_thread();
 
 /// Processors that the calling thread may run on, ascending.
 [[nodiscard]] std::vector<int> usable_cpus();

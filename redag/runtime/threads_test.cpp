@@ -45,6 +45,24 @@ TEST(Threads, FifoPriorityIsSetWhereItIsAvailable) {
 
 constexpr PriorityBand kBand{80, 90};
 
+TEST(Threads, AThreadIsNoLongerUrgentWhenItsWorkIsDone) {
+  if (available_fifo_priority(7) == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+  static int at_work = -1;
+  static int at_its_end = -1;
+  struct AtItsEnd {
+    ~AtItsEnd() { at_its_end = fifo_priority(pthread_self()); }
+  };
+  Result<ThreadHandle> thread = start_thread(ThreadSetup{"t", 7, {}}, [] {
+    thread_local const AtItsEnd kOwned;
+    (void)kOwned;
+    at_work = fifo_priority(pthread_self());
+  });
+  ASSERT_TRUE(thread) << to_string(thread.error());
+  thread->join();
+  EXPECT_EQ(at_work, 7);
+  EXPECT_EQ(at_its_end, 0);
+}
+
 TEST(ResolveMode, AutoTakesOsWhereItCanAndSaysWhy) {
   const auto with_rights = resolve_mode(PreemptionMode::Auto, PolicyKind::RateMonotonic, kBand);
   ASSERT_TRUE(with_rights);
@@ -80,6 +98,19 @@ TEST(ResolveMode, TheMostUrgentLevelHasTheTopPriorityAndTheLastOneIsValid) {
   EXPECT_EQ(kBand.of_level(kBand.levels()), 1) << "of demoted jobs";
   const PriorityBand band = probe_priority_band();
   EXPECT_TRUE(band.top_job == 0 || band.timer > band.top_job);
+}
+
+TEST(Setup, TheTimerOutranksWorkersThatInheritAPriority) {
+  if (available_fifo_priority(8) < 8) GTEST_SKIP() << "this process may not use SCHED_FIFO 8";
+  for (const PreemptionMode mode : {PreemptionMode::None, PreemptionMode::Cooperative}) {
+    const auto setup = set_up(mode, PolicyKind::RateMonotonic, 1, 0, {});
+    ASSERT_TRUE(setup);
+    EXPECT_EQ(setup->timer_priority(), 0);
+    std::thread([&] {
+      ASSERT_TRUE(set_fifo_priority(pthread_self(), 7));
+      EXPECT_EQ(setup->timer_priority(), 8);
+    }).join();
+  }
 }
 
 TEST(ModeWarnings, TellOfTooFewProcessors) {

@@ -1,0 +1,44 @@
+#include "redag/runtime/watchdog.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "redag/runtime/clock.hpp"
+
+namespace redag::runtime {
+
+Watchdog::Watchdog(Engine &engine, WatchdogOptions options, Report report)
+    : engine_(engine), options_(options), report_(std::move(report)) {
+  options_.interval = std::max(options_.interval, kMillisecond);
+  overdue_.reserve(engine.thread_count());  // what is found is appended under the engine's lock
+}
+
+Watchdog::~Watchdog() {
+  stop_.set();
+  if (thread_.joinable()) thread_.join();
+}
+
+Result<void> Watchdog::start(const ThreadSetup &setup) {
+  return start_thread(setup, [this] { main(); }).map([this](ThreadHandle &&thread) { thread_ = std::move(thread); });
+}
+
+void Watchdog::look(Time as_of) {
+  overdue_.clear();
+  engine_.watch(options_.limits, as_of, overdue_);
+  for (const OverdueJob &job : overdue_) report_(job);
+}
+
+void Watchdog::main() noexcept {
+  while (!stop_.wait_until(monotonic_now() + options_.interval)) look(engine_.now());
+}
+
+std::string describe(const OverdueJob &job) {
+  const bool mostly_off = job.used < job.elapsed / 2;
+  return fmt::format("in progress for {}, {} of processor time{}", humanize_duration(job.elapsed),
+                     humanize_duration(job.used),
+                     mostly_off ? ": it waits, or more urgent jobs leave it no processor" : "");
+}
+
+}  // namespace redag::runtime
