@@ -15,13 +15,23 @@ using one_worker::View;
 
 constexpr std::string_view kOnlyInLowMode = "HI mode degrades it: bounded in LO mode only";
 
+// HI mode can end between the releases of one instance, of which the first were skipped: jobs that wait for these are
+// then late, or skipped, in LO mode.
+bool can_be_torn(const System &system) {
+  return std::any_of(system.units.begin(), system.units.end(), [&](const Unit &unit) {
+    return unit.tasks.size() > 1 && unit.jitter > 0 && !system.dags[unit.dag.value].high;
+  });
+}
+
 std::optional<std::string> why_not(const System &system) {
   if (!system.has_modes) return "no task has a wcet_low below its wcet: there is no HI mode";
   if (auto reason = one_worker::why_not(system)) return reason;
   if (system.mode != sched::Preemption::Full) {
     return "for full preemption; here jobs of lower criticality keep the worker in HI mode";
   }
-  if (system.has_edges() || system.has_rate_edges()) return "tasks have predecessors";
+  if (system.has_rate_edges()) return "edges between rates";
+  if (can_be_torn(system))
+    return "jitter in a DAG of lower criticality: HI mode can end between the releases of one instance";
   if (system.threads_suffice_if_bounded) return "fewer threads than tasks: a demoted job may hold the last one";
   if (!system.groups.empty()) return "groups: a job of lower criticality that holds one runs on in HI mode";
   if (system.platform.preempt_overhead > 0) return "an overhead of preemption: the change of mode preempts, too";
@@ -142,7 +152,7 @@ Method amc_rtb() {
       "S. Baruah, A. Burns, R. Davis, Response-time analysis for mixed criticality systems, RTSS 2011 (AMC-rtb)";
   method.assumptions =
       "one worker, full preemption, static priorities, some wcet_low below its wcet, no groups, R <= T; any degrade; "
-      "independent tasks, jitter, shared levels";
+      "DAGs of one rate as in dag_one_worker_preemptive, without jitter if of lower criticality; shared levels";
   method.complexity = "pseudo-polynomial; O(n) a step";
   method.knows_modes = true;
   method.apply = apply;

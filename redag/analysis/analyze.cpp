@@ -1,6 +1,7 @@
 #include "redag/analysis/analyze.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace redag::analysis {
 namespace {
@@ -32,9 +33,8 @@ Bound combine(const std::vector<Tightest> &tasks, const std::vector<Tightest> &d
   return bound;
 }
 
-}  // namespace
-
-Report analyze(const System &system, const std::vector<Method> &methods) {
+// The report points into `methods`.
+Report report_of(const System &system, const std::vector<Method> &methods) {
   Report report;
   report.tasks.resize(system.tasks.size());
   report.dags.resize(system.dags.size());
@@ -58,7 +58,16 @@ Report analyze(const System &system, const std::vector<Method> &methods) {
   return report;
 }
 
-Report analyze(const System &system) { return analyze(system, methods()); }
+}  // namespace
+
+Report analyze(const System &system) { return report_of(system, methods()); }
+
+Report analyze(const System &system, std::vector<Method> methods) {
+  const auto owned = std::make_shared<const std::vector<Method>>(std::move(methods));
+  Report report = report_of(system, *owned);
+  report.owned = owned;
+  return report;
+}
 
 bool is_shown_schedulable(const System &system) {
   if (!system.not_analysable.empty()) return false;

@@ -2,6 +2,7 @@
 // with the method that gave it. A pure function.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -32,11 +33,14 @@ struct Report {
   Verdict verdict = Verdict::NotShown;
   /// Who says so: methods that accept all, or those that gave the tightest bounds. Empty when NotShown.
   std::vector<const Method *> by;
+  /// What the pointers to methods above point into, unless that is methods(): good as long as a copy of the report is.
+  std::shared_ptr<const std::vector<Method>> owned;
 };
 
 /// Runs methods(). Its cost is that of its dearest method; each states its own.
 [[nodiscard]] Report analyze(const System &system);
-[[nodiscard]] Report analyze(const System &system, const std::vector<Method> &methods);
+/// These methods alone; the report keeps them.
+[[nodiscard]] Report analyze(const System &system, std::vector<Method> methods);
 
 /// Is analyze(system).verdict Schedulable? Stops at the first method that says so: for those who ask it often.
 [[nodiscard]] bool is_shown_schedulable(const System &system);

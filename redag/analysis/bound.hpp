@@ -107,7 +107,7 @@ enum class Verdict : std::uint8_t { Schedulable, NotShown };
 
 /// Every method known, in the order in which a report shows them. Adding one: a file pair and a line in methods.cpp.
 [[nodiscard]] const std::vector<Method> &methods();
-/// Null for an unknown name.
+/// Of methods(); null for an unknown name.
 [[nodiscard]] const Method *find_method(std::string_view name);
 
 }  // namespace redag::analysis

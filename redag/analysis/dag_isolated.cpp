@@ -14,8 +14,9 @@ namespace {
 
 using global::GlobalUnit;
 
-// Length of the longest path over what is left of each task's wcet, which is taken away.
-Duration take_longest_path(const System &system, const Unit &unit, std::map<std::uint32_t, Duration> &left) {
+// The tasks of the heaviest path over what is left of the tasks' weights, which is taken away.
+std::vector<std::uint32_t> take_heaviest_path(const System &system, const Unit &unit,
+                                              std::map<std::uint32_t, Duration> &left) {
   struct Step {
     Duration length = 0;
     std::uint32_t before = TaskId::kNoneValue;
@@ -31,9 +32,12 @@ Duration take_longest_path(const System &system, const Unit &unit, std::map<std:
     paths[t] = step;
     if (step.length > paths[last].length) last = t;
   }
-  const Duration length = paths[last].length;
-  for (std::uint32_t t = last; t != TaskId::kNoneValue; t = paths[t].before) left[t] = 0;
-  return length;
+  std::vector<std::uint32_t> taken;
+  for (std::uint32_t t = last; t != TaskId::kNoneValue; t = paths[t].before) {
+    if (left[t] > 0) taken.push_back(t);
+    left[t] = 0;
+  }
+  return taken;
 }
 
 Duration graham_response(const Unit &unit, std::uint32_t workers) {
@@ -143,13 +147,23 @@ Outcome apply_isolated(const System &system) {
 
 }  // namespace
 
-Duration long_paths_response(const System &system, const Unit &unit, std::uint32_t workers) {
+std::vector<Duration> disjoint_paths(const System &system, const Unit &unit, std::size_t count, Heaviest heaviest) {
   std::map<std::uint32_t, Duration> left;
-  for (const std::uint32_t t : unit.tasks) left[t] = system.tasks[t].wcet;
-  Duration covered = take_longest_path(system, unit, left);
+  for (const std::uint32_t t : unit.tasks) left[t] = heaviest == Heaviest::MostTasks ? 1 : system.tasks[t].wcet;
+  std::vector<Duration> paths;
+  for (Duration covered = 0; paths.size() < count && covered < unit.volume; covered += paths.back()) {
+    paths.push_back(0);
+    for (const std::uint32_t t : take_heaviest_path(system, unit, left)) paths.back() += system.tasks[t].wcet;
+  }
+  return paths;
+}
+
+Duration long_paths_response(const System &system, const Unit &unit, std::uint32_t workers) {
+  const std::vector<Duration> paths = disjoint_paths(system, unit, workers, Heaviest::Longest);
   Duration best = graham_response(unit, workers);
-  for (std::uint32_t j = 1; j < workers && covered < unit.volume; ++j) {
-    covered += take_longest_path(system, unit, left);
+  Duration covered = unit.length;
+  for (std::uint32_t j = 1; j < paths.size(); ++j) {
+    covered += paths[j];
     best = std::min(best, unit.length + (unit.volume - covered) / (workers - j));
   }
   return best;

@@ -10,6 +10,14 @@
 
 namespace redag::analysis {
 
+/// Which path disjoint_paths() takes next. That with the most tasks does not change with execution times.
+enum class Heaviest : std::uint8_t { Longest, MostTasks };
+
+/// Lengths of at most `count` paths that share no task: the heaviest, then the heaviest in what is left, and so on; a
+/// path leads through tasks of earlier ones without counting them. O(count (tasks + edges)).
+[[nodiscard]] std::vector<Duration> disjoint_paths(const System &system, const Unit &unit, std::size_t count,
+                                                   Heaviest heaviest);
+
 /// A DAG on `workers` of its own: min over j of len(l_0) + floor((vol - sum_{i <= j} len(l_i)) / (workers - j)), l_0
 /// the longest path and l_i the longest in what is left without l_0 .. l_{i-1}. Q. He, N. Guan, M. Lv, X. Jiang, W.
 /// Chang, RTSS 2022, theorem 1; j = 0 is R. Graham's of 1969. O(workers (tasks + edges)).

@@ -1,5 +1,7 @@
 #include "redag/analysis/global_dag.hpp"
 
+#include <utility>
+
 #include "redag/analysis/arithmetic.hpp"
 #include "redag/analysis/rate_edges.hpp"
 
@@ -209,6 +211,84 @@ Outcome apply_bounded(const System &system, sched::Preemption mode) {
       [&](std::size_t k, SharedTerms &terms) { explain_bounded(units, k, view.workers, blocking, waiting, terms); });
 }
 
+// Units[k] below all others: what it is bounded by if nothing is known of their order.
+class AgainstAll {
+ public:
+  AgainstAll(const System &system, std::vector<GlobalUnit> &units, std::uint32_t workers)
+      : system_(system), units_(units), workers_(workers) {
+    waiting_.works.resize(units.size());
+    for (GlobalUnit &unit : units) {
+      // Not above any response that is found, and enough for dag_work().
+      const Duration more = unit.bound > 0         ? (unit.volume - unit.length) / unit.bound
+                            : unit.tasks > workers ? (unit.volume - unit.length) / static_cast<Duration>(workers)
+                                                   : 0;
+      unit.response = unit.length + more + unit.jitter;
+    }
+  }
+
+  // The least responses that agree with each other, or why there are none.
+  std::string_view solve() {
+    constexpr int kMaxRounds = 1000;
+    bool changed = true;
+    for (int round = 0; changed; ++round) {
+      if (round == kMaxRounds) return "gave up: the responses did not agree in a thousand rounds";
+      changed = false;
+      for (std::size_t k = 0; k < units_.size(); ++k) {
+        const Duration before = units_[k].response;
+        std::swap(units_[k], units_.back());
+        const bool found = respond();
+        std::swap(units_[k], units_.back());
+        if (!found) return "some DAG's response can exceed its limit, which all others rely on";
+        changed = changed || units_[k].response != before;
+      }
+    }
+    return {};
+  }
+
+  // Once solved.
+  ResponseBound explain(std::size_t k) {
+    std::swap(units_[k], units_.back());
+    (void)respond();
+    const GlobalUnit &own = units_.back();
+    ResponseBound bound;
+    bound.response = own.response;
+    SharedTerms terms(system_, own);
+    terms.add_path();
+    explain_bounded(units_, units_.size() - 1, workers_, 0, waiting_, terms);
+    terms.add_jitter();
+    bound.terms = terms.take();
+    std::swap(units_[k], units_.back());
+    return bound;
+  }
+
+ private:
+  bool respond() { return global::bounded_response(units_, units_.size() - 1, workers_, 0, waiting_); }
+
+  const System &system_;
+  std::vector<GlobalUnit> &units_;
+  std::uint32_t workers_;
+  global::Waiting waiting_;
+};
+
+Outcome apply_any(const System &system) {
+  // A critical path waits only while all workers execute, or as many of its own tasks as max_active lets.
+  const auto mode = system.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
+  global::Units view = global::units_of(system, {.mode = mode, .bounds = true, .any_policy = true});
+  if (view.reason) return NotApplicable{*view.reason};
+  AgainstAll all(system, view.units, view.workers);
+  const std::string_view absent = all.solve();
+  std::vector<ResponseBound> responses(system.units.size());
+  for (std::size_t k = 0; k < view.units.size(); ++k) {
+    ResponseBound &response = responses[view.units[k].unit];
+    if (absent.empty()) {
+      response = all.explain(k);
+    } else {
+      response.absent = absent;
+    }
+  }
+  return from_units(system, std::move(responses));
+}
+
 Outcome apply_preemptive(const System &system) { return apply_bounded(system, sched::Preemption::Full); }
 Outcome apply_nonpreemptive(const System &system) { return apply_bounded(system, sched::Preemption::None); }
 
@@ -240,6 +320,21 @@ Method dag_bounded() {
       "max_active of DAGs in one part; no shared groups or levels";
   method.complexity = "pseudo-polynomial; O(DAGs) a step";
   method.apply = [](const System &system) { return across_rates(system, apply_preemptive); };
+  return method;
+}
+
+Method dag_any() {
+  Method method;
+  method.name = "dag_any";
+  method.subject = Subject::Dag;
+  method.cite =
+      "docs/analysis.md, \"Several workers\"; after A. Melani et al., ECRTS 2015 (global EDF), and M. Bertogna, M. "
+      "Cirinei, RTSS 2007";
+  method.assumptions =
+      "m workers, full preemption or none, any work-conserving order (EDF, FIFO, interleaved priorities), one rate a "
+      "DAG, R <= T for all; release jitter, shared levels, max_active of DAGs in one part; no shared groups";
+  method.complexity = "pseudo-polynomial; O(DAGs^2) a step, at most 1000 rounds";
+  method.apply = apply_any;
   return method;
 }
 

@@ -57,4 +57,8 @@ struct Waiting {
 /// of M. Serrano, A. Melani, M. Bertogna, E. Quinones, DATE 2016. Proof: ibid.
 [[nodiscard]] Method dag_nonpreemptive();
 
+/// dag_bounded() over all other DAGs, for any work-conserving order, with preemption or without. Responses rely on each
+/// other: all are bounded or none is. Proof: ibid.
+[[nodiscard]] Method dag_any();
+
 }  // namespace redag::analysis

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "redag/analysis/response_time.hpp"
 #include "redag/testing/bound_property.hpp"
 
@@ -54,6 +56,43 @@ TEST(BoundProperty, DagNonpreemptive) {
 
 TEST(BoundProperty, DagNonpreemptiveWithMaxActive) {
   expect_bound_holds(dag_nonpreemptive(), cases(with_max_active(graphs(sched::Preemption::None))), {.workloads = 2000});
+}
+
+// The least responses that agree with each other do not depend on where the rounds begin.
+TEST(DagAny, KnowsNoOrderOfDags) {
+  std::uint64_t compared = 0;
+  BoundCaseLimits limits = graphs(sched::Preemption::Full);
+  limits.policies = {PolicyKind::Fifo};
+  for (std::uint64_t seed = 0; seed < 1000; ++seed) {
+    Rng rng(seed);
+    const testing::BoundCase drawn = testing::random_bound_case(rng, limits);
+    Workload reversed = drawn.workload;
+    std::reverse(reversed.dags.begin(), reversed.dags.end());
+    const Outcome outcome = dag_any().apply(compile(drawn.workload, drawn.platform).value());
+    const Outcome other = dag_any().apply(compile(reversed, drawn.platform).value());
+    const auto *bound = std::get_if<Bound>(&outcome);
+    if (bound == nullptr) continue;
+    const std::size_t last = bound->dags.size() - 1;
+    for (std::size_t d = 0; d <= last; ++d) {
+      ASSERT_EQ(bound->dags[d].response, std::get<Bound>(other).dags[last - d].response) << "seed " << seed;
+      compared += bound->dags[d].response ? 1U : 0U;
+    }
+  }
+  EXPECT_GT(compared, 300U);
+}
+
+// Every policy, shared levels, priorities of DAGs that are interleaved; with max_active too.
+TEST(BoundProperty, DagAnyOrder) {
+  for (const auto mode : {sched::Preemption::Full, sched::Preemption::None}) {
+    BoundCaseLimits limits = graphs(mode);
+    limits.max_utilization = 0.5;
+    limits.policies = {PolicyKind::Edf, PolicyKind::Fifo};
+    expect_bound_holds(dag_any(), cases(limits), {.workloads = 700});
+    expect_bound_holds(dag_any(), cases(with_max_active(limits)), {.workloads = 700});
+    limits.policies = {PolicyKind::Fixed, PolicyKind::RateMonotonic};
+    limits.levels = mode == sched::Preemption::Full;
+    expect_bound_holds(dag_any(), cases(with_max_active(limits)), {.workloads = 700});
+  }
 }
 
 Task make_task(std::string name, Duration wcet, Duration period, std::vector<std::uint32_t> after) {
@@ -227,30 +266,55 @@ TEST(GlobalDag, OnOneWorkerItIsNotBelowTheExactResponse) {
 }
 
 TEST(GlobalDag, MoreExecutionNeverShrinksABound) {
-  const auto compared = compare_all(
-      with_max_active(graphs(sched::Preemption::Full)), 1000,
-      [](const testing::BoundCase &bound_case, const System &system) {
-        const Outcome before = dag_bounded().apply(system);
-        if (!std::holds_alternative<Bound>(before)) return false;
-        Workload more = bound_case.workload;
-        Task &grown = more.dags[more.dags.size() / 2].tasks.back();
-        ++grown.wcet;
-        const auto larger = compile(more, bound_case.platform);
-        if (!larger) return false;  // above its deadline
-        const Outcome after = dag_bounded().apply(*larger);
-        for (std::size_t t = 0; t < system.tasks.size(); ++t) {
-          const Duration grown_response = std::get<Bound>(after).tasks[t].response.value_or(kNever);
-          EXPECT_LE(std::get<Bound>(before).tasks[t].response.value_or(kNever), grown_response) << describe(bound_case);
-        }
-        return true;
-      });
+  const auto compared =
+      compare_all(with_max_active(graphs(sched::Preemption::Full)), 1000,
+                  [](const testing::BoundCase &bound_case, const System &system) {
+                    Workload more = bound_case.workload;
+                    Task &grown = more.dags[more.dags.size() / 2].tasks.back();
+                    ++grown.wcet;
+                    const auto larger = compile(more, bound_case.platform);
+                    if (!larger) return false;  // above its deadline
+                    for (const Method &method : {dag_bounded(), dag_any()}) {
+                      const Outcome before = method.apply(system);
+                      if (!std::holds_alternative<Bound>(before)) return false;
+                      const Outcome after = method.apply(*larger);
+                      for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+                        const Duration grown_response = std::get<Bound>(after).tasks[t].response.value_or(kNever);
+                        EXPECT_LE(std::get<Bound>(before).tasks[t].response.value_or(kNever), grown_response)
+                            << method.name << describe(bound_case);
+                      }
+                    }
+                    return true;
+                  });
   EXPECT_GT(compared, 300U);
+}
+
+// What is known of the order helps where jobs are preempted.
+TEST(GlobalDag, AnyOrderIsNeverBelowBounded) {
+  std::uint64_t larger = 0;
+  const auto compared =
+      compare_all(with_max_active(graphs(sched::Preemption::Full)), 1500,
+                  [&](const testing::BoundCase &bound_case, const System &system) {
+                    const Outcome any = dag_any().apply(system);
+                    const Outcome bounded = dag_bounded().apply(system);
+                    if (!std::holds_alternative<Bound>(any) || !std::holds_alternative<Bound>(bounded)) return false;
+                    for (std::size_t d = 0; d < system.dags.size(); ++d) {
+                      const auto worse = std::get<Bound>(any).dags[d].response;
+                      if (!worse) continue;
+                      const auto better = std::get<Bound>(bounded).dags[d].response;
+                      EXPECT_LE(better.value(), *worse) << describe(bound_case);
+                      if (*better < *worse) ++larger;
+                    }
+                    return true;
+                  });
+  EXPECT_GT(compared, 300U);
+  EXPECT_GT(larger, 100U);
 }
 
 TEST(GlobalDag, TermsAddUp) {
   for (const auto mode : {sched::Preemption::Full, sched::Preemption::None}) {
     compare_all(with_max_active(graphs(mode)), 700, [](const testing::BoundCase &bound_case, const System &system) {
-      for (const Method &method : {melani(), dag_bounded(), dag_nonpreemptive()}) {
+      for (const Method &method : {melani(), dag_bounded(), dag_nonpreemptive(), dag_any()}) {
         const Outcome outcome = method.apply(system);
         if (!std::holds_alternative<Bound>(outcome)) continue;
         for (const ResponseBound &bound : std::get<Bound>(outcome).dags) {

@@ -1,68 +1,14 @@
 #include "redag/analysis/global_sequential.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "redag/analysis/arithmetic.hpp"
 #include "redag/analysis/rate_edges.hpp"
+#include "redag/analysis/waiting_window.hpp"
 
 namespace redag::analysis {
 namespace global {
 namespace {
-
-// The `kept` largest of the values offered, with what they belong to; a few workers need a few.
-class Largest {
- public:
-  explicit Largest(std::size_t kept) : kept_(std::min(kept, kMost)) {}
-
-  void offer(Duration value, std::size_t whose = 0) {
-    if (kept_ == 0 || value <= entries_[kept_ - 1].value) return;
-    std::size_t i = kept_ - 1;
-    for (; i > 0 && entries_[i - 1].value < value; --i) entries_[i] = entries_[i - 1];
-    entries_[i] = {value, whose};
-  }
-
-  struct Entry {
-    Duration value = 0;
-    std::size_t whose = 0;
-  };
-  [[nodiscard]] std::span<const Entry> entries() const { return std::span(entries_).first(kept_); }
-
-  static constexpr std::size_t kMost = 64;
-
- private:
-  std::size_t kept_;
-  std::array<Entry, kMost> entries_{};
-};
-
-// Least d with sum_i min(w_i, d) + rest < m d, where `all` is the sum of the w_i and rest, and `largest` holds the m -
-// 1 largest w_i. The j largest count for d each: d = floor((all - their sum) / (m - j)) + 1 for the j that makes it
-// least. (With fewer than m - 1 values kept d can be larger than the least one; it keeps the inequality.)
-Duration least_window(Duration all, std::span<const Largest::Entry> largest, std::uint32_t workers) {
-  auto share = static_cast<Duration>(workers);
-  Duration least = all / share + 1;
-  for (const Largest::Entry &entry : largest) {
-    if (entry.value < least) break;
-    all -= entry.value;
-    --share;
-    least = std::min(least, all / share + 1);
-  }
-  return least;
-}
-
-// The least d, from the given one on, with sum_i min(W_i(d), d) + rest < m d, by steps of least_window(): work grows
-// with the window, so no d that one of them skips can do. That a job waits in d instants would take m d of work, so it
-// waits in less. Plain iteration instead creeps, a nanosecond a step, while m tasks interfere in every instant. False
-// above `stop`.
-template <class Window>
-bool least_fixed_point(Duration stop, Duration &d, Window next) {
-  for (int steps = 0; d <= stop && steps < kMaxSteps; ++steps) {
-    const Duration grown = next(d);
-    if (grown <= d) return true;
-    d = grown;
-  }
-  return false;
-}
 
 // A task's work in a window that starts when an instant with an idle worker ends: without a job from before, and with
 // one. A job from before has executed for at least a tick, unless jitter can hide its release.
@@ -137,11 +83,20 @@ Duration carrying_window(std::span<GlobalUnit> others, std::size_t skip, Duratio
 
 constexpr std::size_t kNobody = SIZE_MAX;
 
+// Each other executes for min(C, d) at least in a window of d and more.
+Duration first_window(std::span<const GlobalUnit> others, std::size_t skip, Duration rest, std::uint32_t workers) {
+  FirstWindow first(workers, rest);
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    if (i != skip) first.add(others[i].volume);
+  }
+  return first.length();
+}
+
 }  // namespace
 
 bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
   GlobalUnit &own = units[k];
-  Duration d = 1;
+  Duration d = first_window(units.first(k), kNobody, 0, workers);
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
     return carrying_window(units.first(k), kNobody, waiting + own.volume - 1, waiting, 0, workers);
   });
@@ -153,7 +108,7 @@ bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t wor
   GlobalUnit &own = units[k];
   const Duration stop = own.limit - own.jitter - own.volume + 1;
   const auto window = [&](Duration d) { return d + own.volume - 1; };
-  Duration d = 1;
+  Duration d = first_window(units.first(k), kNobody, 0, workers);
   const bool found =
       least_fixed_point(stop, d, [&](Duration w) { return fresh_window(units.first(k), window(w), w, workers); }) &&
       least_fixed_point(stop, d, [&](Duration w) { return guan_window(units.first(k), window(w), w, workers); });
@@ -165,7 +120,7 @@ bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t 
                                        Duration remaining) {
   GlobalUnit &own = units[k];
   if (remaining >= kUnbounded / 4) return false;
-  Duration d = 1;
+  Duration d = first_window(units.first(k), kNobody, remaining, workers);
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
     return carrying_window(units.first(k), kNobody, waiting, waiting, remaining, workers);
   });
@@ -175,7 +130,7 @@ bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t 
 
 bool any_order_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
   GlobalUnit &own = units[k];
-  Duration d = 1;
+  Duration d = first_window(units, k, 0, workers);
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
     return carrying_window(units, k, waiting + own.volume - 1, waiting, 0, workers);
   });

@@ -2,9 +2,11 @@
 #include "redag/analysis/amc.hpp"
 #include "redag/analysis/bound.hpp"
 #include "redag/analysis/dag_isolated.hpp"
+#include "redag/analysis/dag_shapes.hpp"
 #include "redag/analysis/edf_demand.hpp"
 #include "redag/analysis/exact_points.hpp"
 #include "redag/analysis/global_dag.hpp"
+#include "redag/analysis/global_edf.hpp"
 #include "redag/analysis/global_groups.hpp"
 #include "redag/analysis/global_sequential.hpp"
 #include "redag/analysis/linear_bound.hpp"
@@ -34,12 +36,17 @@ const std::vector<Method> &methods() {
       bertogna_cirinei_any(),
       sequential_nonpreemptive(),
       melani(),
+      dag_shapes(),
       dag_bounded(),
       dag_nonpreemptive(),
       graham(),
       long_paths(),
       isolated(),
       dag_groups(),
+      dag_any(),
+      // Several workers, edf
+      edf_global_response(),
+      edf_global_density(),
       // Utilization
       liu_layland(),
       hyperbolic(),

@@ -63,7 +63,7 @@ ResponseBound itemise(const System &system, std::uint32_t t, std::optional<Durat
                       const std::vector<std::uint32_t> &others, const std::vector<one_worker::Blocker> &blockers) {
   ResponseBound bound;
   const SystemTask &task = system.tasks[t];
-  if (!response || *response > task.limit) {
+  if (!response || *response >= kUnbounded || *response > task.limit) {
     bound.absent = one_worker::kExceedsLimit;
     return bound;
   }
@@ -77,7 +77,7 @@ ResponseBound itemise(const System &system, std::uint32_t t, std::optional<Durat
   for (const std::uint32_t j : others) {
     const SystemTask &other = system.tasks[j];
     const std::int64_t jobs = once ? 1 : ceil_div(*response, other.period);
-    bound.terms.push_back(Term{Term::Kind::Interference, TaskId(j), other.dag, jobs * other.wcet, jobs});
+    bound.terms.push_back(Term{Term::Kind::Interference, TaskId(j), other.dag, multiply(jobs, other.wcet), jobs});
   }
   return bound;
 }

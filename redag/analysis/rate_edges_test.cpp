@@ -229,8 +229,8 @@ TEST(RateEdges, WhatCannotBindIsNoObstacle) {
 TEST(RateEdges, OtherMethodsRefuseThem) {
   const Workload workload =
       make_workload({make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 10, .after = {0}}})}, 1);
-  constexpr std::string_view kKnow[] = {"rta_preemptive", "dag_one_worker_preemptive", "melani", "dag_bounded",
-                                        "guan",           "bertogna_cirinei"};
+  constexpr std::string_view kKnow[] = {"rta_preemptive", "dag_one_worker_preemptive", "melani",    "dag_bounded",
+                                        "guan",           "bertogna_cirinei",          "dag_shapes"};
   for (const std::uint32_t workers : {1U, 2U}) {
     for (const MethodReport &report : analyze(compiled(workload, workers)).methods) {
       if (std::find(std::begin(kKnow), std::end(kKnow), report.method->name) != std::end(kKnow)) continue;

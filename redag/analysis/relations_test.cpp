@@ -241,6 +241,24 @@ TEST(Report, TrustsNoUnsoundEquationAndNamesWhoSpoke) {
   EXPECT_GT(by_response, 1000U);
 }
 
+// A report outlives the methods it was asked with, and so does a copy of it.
+TEST(Report, KeepsTheMethodsItWasGiven) {
+  std::size_t named = 0;
+  for_cases(BoundCaseLimits{}, [&](const BoundCase &, const System &system, Rng &) {
+    std::optional<Report> report = analyze(system, {linear_bound(), rta_preemptive()});
+    const Report copy = *report;
+    report.reset();
+    ASSERT_EQ(copy.methods.size(), 2U);
+    EXPECT_EQ(copy.methods[1].method->name, "rta_preemptive");
+    for (const Tightest &best : copy.tasks) {
+      if (best.method == nullptr) continue;
+      EXPECT_TRUE(best.method == copy.methods[0].method || best.method == copy.methods[1].method);
+      ++named;
+    }
+  });
+  EXPECT_GT(named, 1000U);
+}
+
 TEST(Registry, NamesAreUniqueAndEveryMethodIsDescribed) {
   for (const Method &method : methods()) {
     EXPECT_EQ(find_method(method.name), &method) << method.name;

@@ -3,100 +3,47 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
-#include <map>
 
-#include <fmt/format.h>
-
-#include "redag/sched/executors.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag/analysis/executors.hpp"
+#include "redag/analysis/wait_set_rates.hpp"
 #include "redag/testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {
 
-// Largest f - origin of each DAG's jobs under the model of rclcpp's executor.
-std::vector<Duration> observed(const System &system, const testing::BoundCase &bound_case, int run, Rng &rng) {
-  Workload workload = bound_case.workload;
-  std::vector<Duration> offsets;
-  for (const Unit &unit : system.units) offsets.push_back(run == 0 ? 0 : rng.uniform(0, unit.period));
-  std::uint32_t id = 0;
-  Duration longest = 0;
-  for (Dag &dag : workload.dags) {
-    for (Task &task : dag.tasks) {
-      const std::uint32_t unit = system.tasks[id++].unit;
-      if (task.activation == Activation::Timer) task.offset = offsets[unit];
-      longest = std::max(longest, task.period);
-    }
-  }
-  const std::uint64_t seed = rng();
-  sim::Options options;
-  options.horizon = 12 * longest;
-  options.seed = seed;
-  options.demand = [seed, run](const Task &task, TaskId task_id, std::uint32_t number) {
-    return run % 2 == 0 ? task.wcet : Rng::stream(seed, task_id.value, number).uniform(1, task.wcet);
-  };
-  sched::Config config;
-  config.workers = bound_case.platform.workers;
-  config.policy = workload.policy;
-  const auto scheduler = sched::make_scheduler(config.workers == 1 ? "ste" : "mte", workload, config);
-  std::vector<Duration> responses(system.dags.size(), 0);
-  std::map<std::pair<std::uint32_t, std::uint32_t>, Time> origins;
-  sim::simulate(workload, *scheduler, config.workers, options, [&](std::span<const JobEvent> events) {
-    for (const JobEvent &event : events) {
-      const std::pair job(event.task.value, event.job);
-      if (event.kind == JobEventKind::Ready) origins[job] = event.value;
-      if (event.kind != JobEventKind::Finished) continue;
-      Duration &response = responses[system.tasks[event.task.value].dag.value];
-      response = std::max(response, event.value - origins.at(job));
-    }
-    return true;
-  });
-  return responses;
-}
-
-TEST(WaitSetBound, HoldsUnderTheModelOfRclcpp) {
-  std::uint64_t wanted = 1500;
-  if (const char *many = std::getenv("REDAG_BOUND_WORKLOADS")) wanted = std::strtoull(many, nullptr, 10);
+testing::BoundGenerator callbacks(std::uint32_t workers, double utilization, bool edges) {
   testing::BoundCaseLimits limits;
   limits.preemption = sched::Preemption::None;
   limits.policies = {PolicyKind::RateMonotonic};
-  limits.max_workers = 4;
+  limits.max_workers = workers;
+  limits.edges = edges;
   limits.max_dags = 4;
-  limits.jitter = limits.caps = true;
+  limits.jitter = limits.caps = limits.overheads = true;
   limits.min_utilization = 0.02;
-  limits.max_utilization = 0.3;
+  limits.max_utilization = utilization;
   limits.min_period = 20;
   limits.max_period = 300;
-  std::uint64_t bounds = 0;
-  std::uint64_t violations = 0;
-  double ratios = 0;
-  for (std::uint64_t i = 0; i < wanted; ++i) {
-    Rng rng(mix(i));
-    limits.edges = i % 2 == 0;
-    const testing::BoundCase bound_case = random_bound_case(rng, limits);
-    const System system = compile(bound_case.workload, bound_case.platform).value();
-    const Outcome outcome = wait_set().apply(system);
-    if (!system.not_analysable.empty() || !std::holds_alternative<Bound>(outcome)) continue;
-    std::vector<Duration> worst(system.dags.size(), 0);
-    for (int run = 0; run < 5; ++run) {
-      const std::vector<Duration> responses = observed(system, bound_case, run, rng);
-      for (std::size_t d = 0; d < worst.size(); ++d) worst[d] = std::max(worst[d], responses[d]);
-    }
-    for (std::size_t d = 0; d < worst.size(); ++d) {
-      const auto response = std::get<Bound>(outcome).dags[d].response;
-      if (!response) continue;
-      ++bounds;
-      ratios += static_cast<double>(worst[d]) / static_cast<double>(*response);
-      if (worst[d] <= *response) continue;
-      if (violations++ == 0) ADD_FAILURE() << worst[d] << " above " << *response << "\n" << describe(bound_case);
-    }
-  }
-  fmt::print("[ figures  ] wait_set: {} workloads, {} bounds, {} violations; mean observed/bound {:.3f}\n", wanted,
-             bounds, violations, ratios / static_cast<double>(bounds));
-  EXPECT_EQ(violations, 0U);
-  EXPECT_GT(bounds, wanted / 2);
+  return [limits](Rng &rng) { return random_bound_case(rng, limits); };
 }
+
+// Under the model of the executor of so many threads.
+void expect_holds(const Method &method, std::uint32_t workers, double utilization) {
+  for (const bool edges : {true, false}) {
+    const testing::BoundPropertyOptions options{.workloads = 700, .executor = workers == 1 ? "ste" : "mte"};
+    testing::expect_bound_holds(method, callbacks(workers, utilization, edges), options);
+  }
+}
+
+TEST(BoundProperty, WaitSet) {
+  expect_holds(wait_set(), 1, 0.3);
+  expect_holds(wait_set(), 4, 0.3);
+}
+TEST(BoundProperty, WaitSetRates) {
+  expect_holds(wait_set_rates(), 1, 0.5);
+  expect_holds(wait_set_rates(), 4, 0.4);
+}
+TEST(BoundProperty, WaitSetCasini) { expect_holds(casini(), 1, 0.6); }
+TEST(BoundProperty, WaitSetBlass) { expect_holds(blass(), 1, 0.5); }
 
 Workload three_timers(std::uint32_t workers) {
   Workload workload;
@@ -127,7 +74,140 @@ TEST(WaitSetBound, EveryOtherCallbackOnceAndThoseBeforeTwice) {
   }
 }
 
-TEST(WaitSetBound, IsNotAmongTheMethodsForOurScheduler) { EXPECT_EQ(find_method("wait_set"), nullptr); }
+// Rates: the long one comes once while the short one waits, not again before it.
+TEST(WaitSetBound, ACallbackThatSeldomComesCountsOnce) {
+  Workload workload = three_timers(1);
+  const System system = compile(workload, platform_of(workload)).value();
+  // Registered 3, 5, 7: by windows 3 + 5 + 7, 5 + 2 * 3 + 7, 7 + 2 * (3 + 5); within 100 each comes only once.
+  for (const Method &method : {casini(), blass(), wait_set_rates()}) {
+    const Outcome outcome = method.apply(system);
+    for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) EXPECT_EQ(bound.response, 15) << method.name;
+  }
+  // Every 15 the first comes twice in a busy window, but can only delay the last one twice by its window.
+  workload.dags[0].tasks[0].period = workload.dags[0].tasks[0].deadline = 15;
+  const System faster = compile(workload, platform_of(workload)).value();
+  const auto last = [&](const Method &method) {
+    const Outcome outcome = method.apply(faster);
+    return std::get<Bound>(outcome).tasks[2].response;
+  };
+  EXPECT_EQ(last(casini()), 7 + 5 + 3);
+  EXPECT_EQ(last(wait_set()), 7 + 2 * (3 + 5));
+  EXPECT_EQ(last(wait_set_rates()), 7 + 5 + 2 * 3);
+}
+
+template <class Check>
+void for_cases(std::uint32_t workers, Check check) {
+  for (std::uint64_t seed = 0; seed < 2000; ++seed) {
+    Rng rng(mix(seed));
+    const testing::BoundCase bound_case = callbacks(workers, 0.5, seed % 2 == 0)(rng);
+    const System system = compile(bound_case.workload, bound_case.platform).value();
+    SCOPED_TRACE(describe(bound_case));
+    if (system.not_analysable.empty()) check(bound_case, system, rng);
+    if (::testing::Test::HasFailure()) return;
+  }
+}
+
+// Where `loose` bounds a DAG, `tight` does too, and not above it.
+void expect_never_above(const Method &tight, const Method &loose, std::uint32_t workers) {
+  std::uint64_t smaller = 0;
+  for_cases(workers, [&](const testing::BoundCase &, const System &system, Rng &) {
+    const Outcome better = tight.apply(system);
+    const Outcome worse = loose.apply(system);
+    if (!std::holds_alternative<Bound>(worse)) return;
+    const std::vector<ResponseBound> &dags = std::get<Bound>(worse).dags;
+    const auto is_bounded = [](const ResponseBound &bound) { return bound.response.has_value(); };
+    if (!std::all_of(dags.begin(), dags.end(), is_bounded)) return;  // rates need bounds of all
+    for (std::size_t d = 0; d < dags.size(); ++d) {
+      const auto response = std::get<Bound>(better).dags[d].response;
+      ASSERT_TRUE(response) << tight.name;
+      ASSERT_LE(*response, *dags[d].response) << tight.name << " above " << loose.name;
+      smaller += *response < *dags[d].response ? 1U : 0U;
+    }
+  });
+  EXPECT_GT(smaller, 100U) << tight.name << " never below " << loose.name;
+}
+
+// With jitter 6 and a response of 14 the first job of the other can end as late as 20 after its nominal release: the
+// next one, 20 after that, follows on it.
+TEST(WaitSetBound, WorkComesCloserWithJitter) {
+  const auto second = [](Duration jitter) {
+    Workload workload = three_timers(1);
+    workload.dags.pop_back();
+    Task &often = workload.dags[0].tasks[0];
+    often.wcet = often.bcet = 4;
+    often.period = often.deadline = 20;
+    often.jitter = jitter;
+    Task &seldom = workload.dags[1].tasks[0];
+    seldom.wcet = seldom.bcet = 10;
+    const Outcome outcome = wait_set_rates().apply(compile(workload, platform_of(workload)).value());
+    return std::get<Bound>(outcome).tasks[1].response;
+  };
+  EXPECT_EQ(second(0), 10 + 4);
+  EXPECT_EQ(second(6), 10 + 2 * 4);
+}
+
+TEST(WaitSetBound, RatesAreNeverAboveWindows) {
+  expect_never_above(wait_set_rates(), wait_set(), 4);
+  expect_never_above(wait_set_rates(), wait_set(), 1);
+  expect_never_above(wait_set_rates(), blass(), 1);
+}
+
+TEST(WaitSetBound, MoreExecutionNeverShrinksABoundAndTermsAddUp) {
+  std::uint64_t compared = 0;
+  for (const std::uint32_t workers : {1U, 4U}) {
+    for_cases(workers, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
+      Workload more = bound_case.workload;
+      Dag &dag = more.dags[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(more.dags.size()) - 1))];
+      ++dag.tasks[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(dag.tasks.size()) - 1))].wcet;
+      const auto larger = compile(more, bound_case.platform);
+      for (const Method &method : executor_methods()) {
+        const Outcome before = method.apply(system);
+        if (!std::holds_alternative<Bound>(before)) continue;
+        for (const ResponseBound &bound : std::get<Bound>(before).dags) {
+          Duration sum = 0;
+          for (const Term &term : bound.terms) sum += term.amount;
+          ASSERT_EQ(sum, bound.response.value_or(0)) << method.name;
+          ASSERT_EQ(bound.absent.empty(), bound.response.has_value());
+        }
+        if (!larger) continue;
+        const Outcome after = method.apply(*larger);
+        for (std::size_t d = 0; d < system.dags.size(); ++d) {
+          const Duration grown = std::get<Bound>(after).dags[d].response.value_or(kNever);
+          ASSERT_LE(std::get<Bound>(before).dags[d].response.value_or(kNever), grown) << method.name;
+          ++compared;
+        }
+      }
+    });
+  }
+  EXPECT_GT(compared, 1000U);
+}
+
+TEST(WaitSetBound, OverloadIsNotBounded) {
+  Workload workload = three_timers(1);
+  for (Dag &dag : workload.dags) dag.tasks[0].period = dag.tasks[0].deadline = 15;
+  const Outcome outcome = casini().apply(compile(workload, platform_of(workload)).value());
+  for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) EXPECT_FALSE(bound.response);
+}
+
+TEST(WaitSetBound, TimesNearTheLargestDoNotWrap) {
+  for (const std::uint32_t workers : {1U, 4U}) {
+    Workload workload = three_timers(workers);
+    for (Dag &dag : workload.dags) {
+      Task &task = dag.tasks[0];
+      task.wcet = task.bcet = kMaxDuration / 8;
+      task.period = task.deadline = kMaxDuration / 2;
+    }
+    const System system = compile(workload, platform_of(workload)).value();
+    for (const Method &method : executor_methods()) {
+      const Outcome outcome = method.apply(system);
+      if (!std::holds_alternative<Bound>(outcome)) continue;
+      for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) {
+        const Duration least = kMaxDuration / 8 + kMaxDuration / 4 / workers - 1;
+        EXPECT_GE(bound.response.value_or(least), least) << method.name;
+      }
+    }
+  }
+}
 
 }  // namespace
 }  // namespace redag::analysis

@@ -1,0 +1,204 @@
+#include "redag/analysis/dag_shapes.hpp"
+
+#include <algorithm>
+#include <map>
+#include <span>
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/dag_isolated.hpp"
+#include "redag/analysis/rate_edges.hpp"
+
+namespace redag::analysis {
+namespace global {
+
+Shape::Shape(const System &system, const Unit &unit, std::uint32_t workers) {
+  // All tasks as early as they can be, with workers without number: each from `start` to `end`.
+  std::map<std::uint32_t, Duration> end;
+  std::map<Duration, Duration> steps;  // before the end of the DAG: change of how many tasks execute, going back
+  for (const std::uint32_t t : unit.tasks) {
+    Duration start = 0;
+    for (const std::uint32_t p : system.tasks[t].predecessors) {
+      if (const auto found = end.find(p); found != end.end()) start = std::max(start, found->second);
+    }
+    end[t] = start + system.tasks[t].wcet;
+    ++steps[unit.length - end[t]];
+    --steps[unit.length - start];
+  }
+  Points left = {{0, 0}};
+  Duration width = 0;
+  for (const auto &[time, change] : steps) {
+    const auto [before, work] = left.back();
+    if (time > before) left.emplace_back(time, work + (time - before) * width);
+    width += change;
+  }
+  left_ = limited(left, workers);
+
+  // Paths that do not depend on execution times, so that more execution is never less work.
+  std::vector<Duration> paths = disjoint_paths(system, unit, unit.tasks.size(), Heaviest::MostTasks);
+  std::sort(paths.begin(), paths.end());
+  Points done = {{0, 0}};
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    const auto [before, work] = done.back();
+    const auto going_on = static_cast<Duration>(paths.size() - i);
+    if (paths[i] > before) done.emplace_back(paths[i], work + (paths[i] - before) * going_on);
+  }
+  done_ = limited(done, workers);
+}
+
+Duration Shape::at(const Points &points, Duration time) {
+  const auto after = std::upper_bound(points.begin(), points.end(), time,
+                                      [](Duration value, const auto &point) { return value < point.first; });
+  if (after == points.begin()) return 0;
+  const auto &[before, work] = *(after - 1);
+  if (after == points.end()) return work;
+  return work + (time - before) * ((after->second - work) / (after->first - before));
+}
+
+// No more than `workers` an instant: the smaller of the points and workers * time, with the instants beside a crossing.
+Shape::Points Shape::limited(const Points &points, std::uint32_t workers) {
+  const auto m = static_cast<Duration>(workers);
+  const auto smaller = [&](Duration time) { return std::min(m * time, at(points, time)); };
+  Points result = {{0, 0}};
+  const auto add_point = [&](Duration time) {
+    if (time > result.back().first) result.emplace_back(time, smaller(time));
+  };
+  for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+    const auto &[begin, work] = points[i];
+    const auto &[end, more] = points[i + 1];
+    const Duration slope = (more - work) / (end - begin);
+    const Duration ahead = work - m * begin;  // of workers * time
+    if (slope != m && (ahead < 0) != (more - m * end < 0)) {
+      const Duration crossing = begin + std::max<Duration>(0, ahead / (m - slope));
+      add_point(std::min(crossing, end));
+      add_point(std::min(crossing + 1, end));
+    }
+    add_point(end);
+  }
+  // Past the points only the workers are a limit, until the volume is done.
+  const Duration volume = points.back().second;
+  add_point(volume / m);
+  add_point(ceil_div(volume, m));
+  return result;
+}
+
+// Least time with at least so much work. Requires 0 <= work <= the volume.
+Duration Shape::reach(const Points &points, Duration work) {
+  const auto after = std::lower_bound(points.begin(), points.end(), work,
+                                      [](const auto &point, Duration value) { return point.second < value; });
+  if (after == points.begin()) return 0;
+  const auto &[before, done] = *(after - 1);
+  return before + ceil_div(work - done, (after->second - done) / (after->first - before));
+}
+
+Duration Shape::work(Duration x, Duration response, Duration period) const {
+  // The first job's response ends `first` after the window begins, in [1, period]; each later one comes a period after
+  // the one before, and all but the last of them can be done.
+  const Duration volume = left_.back().second;
+  const Duration within = done(x);  // of one job
+  const auto placed = [&](Duration first) {
+    const Duration rest = x + response - first - period;  // of the window, when the second job comes
+    const Duration later = rest > 0 ? rest / period * volume + done(rest % period) : 0;
+    return std::min(left(first), within) + later;
+  };
+  // Between the places where a slope changes the sum is straight. Once the first job does all it can, later is worse.
+  const Duration last = std::clamp<Duration>(reach(left_, within), 1, period);
+  Duration most = std::max({placed(1), placed(std::max<Duration>(1, last - 1)), placed(last)});
+  for (const auto &[time, work] : left_) {
+    if (time > 0 && time < last) most = std::max(most, placed(time));
+  }
+  for (const auto &[time, work] : done_) {
+    const Duration after = x + response - time;
+    const Duration first = after > 0 ? (after - 1) % period + 1 : period;
+    if (first < last) most = std::max(most, placed(first));
+  }
+  return most;
+}
+
+}  // namespace global
+
+namespace {
+
+using global::GlobalUnit;
+using global::SharedTerms;
+
+// Fills in `response` of units[k] given those of units[0 .. k), and `work` of these. False: above its limit, or too
+// many steps.
+bool respond(std::span<GlobalUnit> units, std::span<const global::Shape> shapes, std::size_t k, std::uint32_t workers) {
+  GlobalUnit &own = units[k];
+  if (own.volume > multiply(own.limit, workers) || own.length > own.limit) return false;
+  const auto m = static_cast<Duration>(workers);
+  Duration window = own.length + (own.volume - own.length) / m;
+  for (int step = 0; window <= own.limit - own.jitter && step < global::kMaxSteps; ++step) {
+    Duration sum = own.volume - own.length;
+    for (std::size_t i = 0; i < k; ++i) {
+      GlobalUnit &other = units[i];
+      other.work = shapes[i].work(window, other.response, other.period);
+      sum += other.work;
+    }
+    const Duration grown = own.length + sum / m;
+    if (grown <= window) {
+      own.response = window + own.jitter;
+      return true;
+    }
+    window = grown;
+  }
+  return false;
+}
+
+ResponseBound explain(const System &system, std::span<const GlobalUnit> units, std::size_t k, std::uint32_t workers) {
+  const GlobalUnit &own = units[k];
+  ResponseBound bound;
+  bound.response = own.response;
+  SharedTerms terms(system, own);
+  terms.add_path();
+  terms.add_share(Term::Kind::Own, own, own.volume - own.length, workers);
+  for (std::size_t i = 0; i < k; ++i) terms.add_share(Term::Kind::Interference, units[i], units[i].work, workers);
+  terms.add_jitter();
+  bound.terms = terms.take();
+  return bound;
+}
+
+Outcome apply_shapes(const System &system) {
+  // Without edges no DAG has a shape, and bertogna_cirinei() is never above this, and quicker.
+  if (!system.has_edges()) return NotApplicable{"no task has predecessors: see the bounds for independent tasks"};
+  global::Units view = global::units_of(system, {});
+  if (view.reason) return NotApplicable{*view.reason};
+  std::vector<global::Shape> shapes;
+  shapes.reserve(view.units.size());
+  for (const GlobalUnit &unit : view.units) shapes.emplace_back(system, system.units[unit.unit], view.workers);
+  std::vector<ResponseBound> responses(system.units.size());
+  bool known = true;
+  for (std::size_t k = 0; k < view.units.size(); ++k) {
+    ResponseBound &response = responses[view.units[k].unit];
+    if (!known) {
+      response.absent = global::kMoreUrgent;
+    } else if (respond(view.units, shapes, k, view.workers)) {
+      response = explain(system, view.units, k, view.workers);
+    } else {
+      known = false;
+      response.absent = global::kNoFixedPoint;
+    }
+  }
+  return from_units(system, std::move(responses));
+}
+
+}  // namespace
+
+Method dag_shapes() {
+  Method method;
+  method.name = "dag_shapes";
+  method.subject = Subject::Dag;
+  method.cite =
+      "docs/analysis.md, \"Shapes of DAGs\"; after J. Fonseca, G. Nelissen, V. Nelis, Improved response time analysis "
+      "of "
+      "sporadic DAG tasks for global FP scheduling, RTNS 2017; Schedulability analysis of DAG tasks with arbitrary "
+      "deadlines under global fixed-priority scheduling, Real-Time Systems 55, 2019";
+  method.assumptions =
+      "m workers, full preemption, static priorities that keep DAGs together, some edges, R <= T; release jitter; "
+      "no max_active, shared groups or levels";
+  method.complexity = "pseudo-polynomial; O(tasks log tasks) a step";
+  method.apply = [](const System &system) { return across_rates(system, apply_shapes); };
+  return method;
+}
+
+}  // namespace redag::analysis

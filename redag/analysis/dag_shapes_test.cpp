@@ -1,0 +1,221 @@
+#include "redag/analysis/dag_shapes.hpp"
+
+#include <gtest/gtest.h>
+
+#include "redag/analysis/global_dag.hpp"
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using global::Shape;
+using testing::BoundCaseLimits;
+using testing::expect_bound_holds;
+
+BoundCaseLimits graphs() {
+  BoundCaseLimits limits;
+  limits.max_workers = 4;
+  limits.edges = true;
+  limits.max_dags = 4;
+  limits.max_tasks = 8;
+  limits.jitter = limits.overheads = true;
+  limits.max_deadline = 1.5;
+  limits.min_utilization = 0.1;
+  limits.max_utilization = 0.7;
+  limits.min_period = 10;
+  limits.max_period = 120;
+  return limits;
+}
+
+testing::BoundGenerator cases(const BoundCaseLimits &limits) {
+  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
+}
+
+TEST(BoundProperty, DagShapes) { expect_bound_holds(dag_shapes(), cases(graphs()), {.workloads = 2000}); }
+
+// Short periods and two workers, from many offsets: a job that is carried in or cut off matters.
+TEST(BoundProperty, DagShapesAtTheEndsOfWindows) {
+  BoundCaseLimits limits = graphs();
+  limits.min_workers = limits.max_workers = 2;
+  limits.max_dags = 3;
+  limits.jitter = limits.overheads = false;
+  limits.min_utilization = 0.4;
+  limits.max_utilization = 0.9;
+  limits.min_period = 6;
+  limits.max_period = 30;
+  expect_bound_holds(dag_shapes(), cases(limits), {.workloads = 1000, .runs = 20, .periods = 20});
+}
+
+TEST(BoundProperty, RatesDagShapes) {
+  BoundCaseLimits limits = graphs();
+  limits.rates = true;
+  limits.max_dags = 3;
+  limits.max_tasks = 5;
+  limits.max_utilization = 0.5;
+  expect_bound_holds(dag_shapes(), cases(limits), {.workloads = 300, .runs = 6});
+}
+
+Task make_task(std::string name, Duration wcet, std::vector<std::uint32_t> after) {
+  Task task;
+  task.name = std::move(name);
+  task.wcet = task.bcet = wcet;
+  task.period = task.deadline = 20;
+  task.predecessors = std::move(after);
+  if (!task.predecessors.empty()) task.activation = Activation::Data;
+  return task;
+}
+
+// 1, then 4 and 2 in parallel, then 1.
+Workload fork_and_join(std::uint32_t workers) {
+  Workload workload;
+  workload.name = "w";
+  workload.platform.workers = workers;
+  Dag dag;
+  dag.name = "upper";
+  dag.tasks = {make_task("begin", 1, {}), make_task("left", 4, {0}), make_task("right", 2, {0}),
+               make_task("end", 1, {1, 2})};
+  workload.dags.push_back(dag);
+  return workload;
+}
+
+TEST(Shape, IsThatOfTheDag) {
+  const Workload workload = fork_and_join(2);
+  const System system = compile(workload, platform_of(workload)).value();
+  const Shape shape(system, system.units[0], 2);
+  // Going back from the end: the join, left alone for two, both for two, the fork.
+  const Duration left[] = {0, 1, 2, 3, 5, 7, 8, 8, 8};
+  // Paths of 6 and of 2.
+  const Duration done[] = {0, 2, 4, 5, 6, 7, 8, 8, 8};
+  for (Duration time = 0; time < 9; ++time) {
+    EXPECT_EQ(shape.left(time), left[time]) << time;
+    EXPECT_EQ(shape.done(time), done[time]) << time;
+  }
+}
+
+TEST(Shape, OneWorkerDoesOneThingAtATime) {
+  const Workload workload = fork_and_join(1);
+  const System system = compile(workload, platform_of(workload)).value();
+  const Shape shape(system, system.units[0], 1);
+  for (Duration time = 0; time < 12; ++time) {
+    EXPECT_EQ(shape.left(time), std::min<Duration>(time, 8));
+    EXPECT_EQ(shape.done(time), std::min<Duration>(time, 8));
+  }
+}
+
+template <class Check>
+void for_cases(const BoundCaseLimits &limits, int count, Check check) {
+  for (int i = 0; i < count; ++i) {
+    Rng rng(mix(static_cast<std::uint64_t>(i)));
+    const testing::BoundCase bound_case = random_bound_case(rng, limits);
+    const System system = compile(bound_case.workload, bound_case.platform).value();
+    SCOPED_TRACE(describe(bound_case));
+    if (system.not_analysable.empty()) check(bound_case, system, rng);
+    if (::testing::Test::HasFailure()) return;
+  }
+}
+
+// Where slopes change is enough to look at: the same as all placements of the first job.
+TEST(Shape, WorkIsTheMostOverAllPlacements) {
+  std::uint64_t checked = 0;
+  std::uint64_t single = 0;
+  for_cases(graphs(), 400, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
+    for (const Unit &unit : system.units) {
+      single += unit.tasks.size() == 1 ? 1U : 0U;
+      const std::uint32_t m = bound_case.platform.workers;
+      const Shape shape(system, unit, m);
+      const Duration least = unit.length + (unit.volume - unit.length) / m;
+      if (least > unit.period) continue;
+      const Duration response = rng.uniform(least, unit.period);
+      for (const Duration x : {rng.uniform(1, unit.period), rng.uniform(1, 4 * unit.period)}) {
+        Duration most = 0;
+        for (Duration first = 1; first <= unit.period; ++first) {
+          Duration sum = std::min(shape.left(first), shape.done(x));
+          for (Duration rest = x + response - first - unit.period; rest > 0; rest -= unit.period) {
+            sum += shape.done(rest);
+          }
+          most = std::max(most, sum);
+        }
+        ASSERT_EQ(shape.work(x, response, unit.period), most) << x << " " << response;
+        ++checked;
+      }
+    }
+  });
+  EXPECT_GT(checked, 500U);
+  EXPECT_GT(single, 50U);
+}
+
+TEST(DagShapes, AreNeverAboveMelani) {
+  std::uint64_t smaller = 0;
+  std::uint64_t bounds = 0;
+  for_cases(graphs(), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
+    const Outcome melanis = melani().apply(system);
+    const Outcome shapes = dag_shapes().apply(system);
+    ASSERT_EQ(std::holds_alternative<Bound>(shapes), std::holds_alternative<Bound>(melanis) && system.has_edges());
+    if (!std::holds_alternative<Bound>(shapes)) return;
+    for (std::size_t d = 0; d < system.dags.size(); ++d) {
+      const auto worse = std::get<Bound>(melanis).dags[d].response;
+      const auto better = std::get<Bound>(shapes).dags[d].response;
+      if (!worse) continue;
+      ASSERT_TRUE(better);
+      ASSERT_LE(*better, *worse);
+      ++bounds;
+      if (*better < *worse) ++smaller;
+    }
+  });
+  EXPECT_GT(bounds, 1000U);
+  EXPECT_GT(smaller, 100U);
+}
+
+// Neither is always the smaller: dag_bounded() cuts each DAG's work at its width while a path waits.
+TEST(DagShapes, AndWidthsAreIncomparable) {
+  std::uint64_t smaller = 0;
+  std::uint64_t larger = 0;
+  for_cases(graphs(), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
+    const Outcome bounded = dag_bounded().apply(system);
+    const Outcome shapes = dag_shapes().apply(system);
+    if (!std::holds_alternative<Bound>(shapes)) return;
+    for (std::size_t d = 0; d < system.dags.size(); ++d) {
+      const Duration one = std::get<Bound>(shapes).dags[d].response.value_or(kNever);
+      const Duration other = std::get<Bound>(bounded).dags[d].response.value_or(kNever);
+      smaller += one < other ? 1U : 0U;
+      larger += one > other ? 1U : 0U;
+    }
+  });
+  EXPECT_GT(smaller, 0U);
+  EXPECT_GT(larger, 0U);
+}
+
+TEST(DagShapes, MoreExecutionNeverShrinksABound) {
+  std::uint64_t compared = 0;
+  for_cases(graphs(), 1500, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
+    const Outcome before = dag_shapes().apply(system);
+    if (!std::holds_alternative<Bound>(before)) return;
+    Workload more = bound_case.workload;
+    Dag &dag = more.dags[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(more.dags.size()) - 1))];
+    ++dag.tasks[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(dag.tasks.size()) - 1))].wcet;
+    const auto larger = compile(more, bound_case.platform);
+    if (!larger) return;  // above its deadline
+    const Outcome after = dag_shapes().apply(*larger);
+    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+      const Duration grown = std::get<Bound>(after).tasks[t].response.value_or(kNever);
+      ASSERT_LE(std::get<Bound>(before).tasks[t].response.value_or(kNever), grown);
+    }
+    ++compared;
+  });
+  EXPECT_GT(compared, 500U);
+}
+
+TEST(DagShapes, TermsAddUp) {
+  for_cases(graphs(), 1000, [](const testing::BoundCase &, const System &system, Rng &) {
+    const Outcome outcome = dag_shapes().apply(system);
+    if (!std::holds_alternative<Bound>(outcome)) return;
+    for (const ResponseBound &bound : std::get<Bound>(outcome).dags) {
+      Duration sum = 0;
+      for (const Term &term : bound.terms) sum += term.amount;
+      ASSERT_EQ(sum, bound.response.value_or(0));
+    }
+  });
+}
+
+}  // namespace
+}  // namespace redag::analysis

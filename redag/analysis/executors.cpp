@@ -1,0 +1,51 @@
+#include "redag/analysis/executors.hpp"
+
+#include "redag/analysis/dag_isolated.hpp"
+#include "redag/analysis/global_dag.hpp"
+#include "redag/analysis/global_sequential.hpp"
+#include "redag/analysis/wait_set.hpp"
+#include "redag/analysis/wait_set_rates.hpp"
+
+namespace redag::analysis {
+
+const std::vector<Method> &executor_methods() {
+  static const std::vector<Method> kAll = {wait_set_rates(), wait_set(), casini(), blass()};
+  return kAll;
+}
+
+const std::vector<Method> &methods_of(const sched::ExecutorKind &executor) {
+  static const std::vector<Method> kAnyOrder = {bertogna_cirinei_any(), graham(), long_paths(), dag_any()};
+  static const std::vector<Method> kWaitSet = [] {
+    std::vector<Method> all = executor_methods();
+    all.insert(all.end(), kAnyOrder.begin(), kAnyOrder.end());
+    return all;
+  }();
+  if (executor.ours) return methods();
+  // The static executor has windows too, but walks through them in another order than these bounds count on.
+  return executor.name == "ste" || executor.name == "mte" ? kWaitSet : kAnyOrder;
+}
+
+AnalysisPlatform effective_platform(const sched::ExecutorKind &executor, AnalysisPlatform platform) {
+  sched::Config config;
+  config.workers = platform.workers;
+  config.preemption = platform.preemption;
+  config.levels = platform.levels;
+  config.max_started = platform.max_started;
+  config = sched::effective_config(executor, config);
+  platform.workers = config.workers;
+  platform.preemption = config.preemption;
+  platform.levels = config.levels;
+  platform.max_started = config.max_started;
+  return platform;
+}
+
+Result<System> compile_for(const sched::ExecutorKind &executor, const Workload &workload,
+                           const AnalysisPlatform &platform) {
+  const AnalysisPlatform effective = effective_platform(executor, platform);
+  if (executor.ours) return compile(workload, effective);
+  Workload seen = workload;
+  for (Dag &dag : seen.dags) dag.max_active = 0;
+  return compile(seen, effective);
+}
+
+}  // namespace redag::analysis

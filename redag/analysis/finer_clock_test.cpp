@@ -1,0 +1,95 @@
+// Bounds are computed in nanoseconds. The other tests draw times of a few ticks, where an iteration that goes a tick a
+// step ends soon: here the same workloads with a tick of 100 ns, and of a millisecond.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "redag/analysis/executors.hpp"
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+testing::BoundCase with_tick(testing::BoundCase bound_case, Duration tick) {
+  for (Dag &dag : bound_case.workload.dags) {
+    dag.deadline *= tick;
+    for (Task &task : dag.tasks) {
+      for (Duration *time : {&task.period, &task.deadline, &task.wcet, &task.wcet_low, &task.bcet, &task.offset,
+                             &task.jitter, &task.region}) {
+        *time *= tick;
+      }
+    }
+  }
+  for (Duration *time : {&bound_case.platform.release_overhead, &bound_case.platform.dispatch_overhead,
+                         &bound_case.platform.preempt_overhead}) {
+    *time *= tick;
+  }
+  return bound_case;
+}
+
+struct Count {
+  std::uint64_t coarse = 0;  // bounds
+  std::uint64_t fine = 0;
+};
+
+std::uint64_t bounded(const Method &method, const System &system) {
+  const Outcome outcome = system.not_analysable.empty() ? method.apply(system) : Outcome(NotApplicable{});
+  const auto *bound = std::get_if<Bound>(&outcome);
+  if (bound == nullptr) return 0;
+  return static_cast<std::uint64_t>(std::count_if(bound->tasks.begin(), bound->tasks.end(),
+                                                  [](const ResponseBound &task) { return task.response.has_value(); }));
+}
+
+void count(const testing::BoundCaseLimits &limits, std::map<std::string, Count> &counts) {
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    Rng rng(seed);
+    const testing::BoundCase drawn = random_bound_case(rng, limits);
+    const testing::BoundCase coarse = with_tick(drawn, 100);
+    const testing::BoundCase fine = with_tick(drawn, kMillisecond);
+    for (const char *name : {"redag", "ste", "mte"}) {
+      const sched::ExecutorKind &executor = *sched::find_executor(name);
+      const auto before = compile_for(executor, coarse.workload, coarse.platform);
+      const auto after = compile_for(executor, fine.workload, fine.platform);
+      ASSERT_TRUE(before && after);
+      for (const Method &method : methods_of(executor)) {
+        Count &of = counts[std::string(method.name)];
+        of.coarse += bounded(method, *before);
+        of.fine += bounded(method, *after);
+      }
+    }
+  }
+}
+
+// Few tasks and workers: as many others as workers is where steps are shortest.
+TEST(FinerClock, LosesFewBounds) {
+  std::map<std::string, Count> counts;
+  for (const auto preemption : {sched::Preemption::Full, sched::Preemption::None}) {
+    for (const PolicyKind policy : {PolicyKind::RateMonotonic, PolicyKind::Edf}) {
+      for (const bool edges : {false, true}) {
+        testing::BoundCaseLimits limits;
+        limits.max_workers = 3;
+        limits.preemption = preemption;
+        limits.policies = {policy};
+        limits.edges = edges;
+        limits.max_dags = 4;
+        limits.max_utilization = 0.6;
+        limits.min_utilization = 0.1;
+        limits.max_period = 120;
+        count(limits, counts);
+      }
+    }
+  }
+  std::size_t compared = 0;
+  for (const auto &[name, of] : counts) {
+    if (of.coarse < 20) continue;
+    ++compared;
+    // Not none: responses that rely on each other can grow so slowly that the rounds allowed do not reach their end.
+    EXPECT_GE(of.fine * 100, of.coarse * 85) << name << ": " << of.fine << " of " << of.coarse;
+  }
+  EXPECT_GE(compared, 15U);
+}
+
+}  // namespace
+}  // namespace redag::analysis

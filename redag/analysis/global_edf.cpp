@@ -1,0 +1,228 @@
+#include "redag/analysis/global_edf.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/global_sequential.hpp"
+#include "redag/analysis/waiting_window.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using global::Division;
+using global::GlobalUnit;
+using global::Largest;
+
+// Rounds of all tasks; each raises some response, and ordinary systems need about ten.
+constexpr int kMaxRounds = 1000;
+
+Duration deadline_of(const System &system, const GlobalUnit &unit) {
+  return system.tasks[system.units[unit.unit].tasks.front()].deadline;
+}
+
+// Work after the release of a job, by jobs of `task` whose deadlines are `later` or more before its own: the last one
+// has just that deadline and all are as late as they can be.
+Duration due_work(const GlobalUnit &task, Duration later) {
+  const Division jobs = global::divide(std::max<Duration>(0, later + task.response), task);
+  return jobs.quotient * task.volume + std::min(task.volume, jobs.remainder);
+}
+
+// The tasks and what is assumed of them, one job at a time.
+class Edf {
+ public:
+  Edf(const System &system, std::vector<GlobalUnit> &units) : system_(system), units_(units) {
+    for (const GlobalUnit &unit : units_) deadlines_.push_back(deadline_of(system, unit));
+    for (GlobalUnit &unit : units_) unit.response = unit.volume + unit.jitter;
+  }
+
+  // The least responses that agree with each other, or why there are none.
+  std::string_view solve() {
+    bool changed = true;
+    for (int round = 0; changed; ++round) {
+      if (round == kMaxRounds) return "gave up: the responses did not agree in a thousand rounds";
+      changed = false;
+      for (std::size_t k = 0; k < units_.size(); ++k) {
+        const Duration before = units_[k].response;
+        if (!respond(k)) return "some task's response can exceed its limit, which all others rely on";
+        changed = changed || units_[k].response != before;
+      }
+    }
+    return {};
+  }
+
+  // Once solved.
+  ResponseBound explain(std::size_t k) {
+    (void)respond(k);
+    const GlobalUnit &own = units_[k];
+    const Duration waiting = own.response - own.jitter - own.volume + 1;
+    ResponseBound bound;
+    bound.response = own.response;
+    global::SharedTerms terms(system_, own);
+    terms.add_path();
+    terms.add_jitter();
+    for (std::size_t i = 0; i < units_.size(); ++i) {
+      if (i == k) continue;
+      const auto kind = units_[i].work > units_[i].carried ? Term::Kind::Blocking : Term::Kind::Interference;
+      terms.add_share(kind, units_[i], std::min(units_[i].work, waiting), system_.platform.workers);
+    }
+    bound.terms = terms.take();
+    // With very many workers the fixed point need not be the least one.
+    Duration sum = 0;
+    for (const Term &term : bound.terms) sum += term.amount;
+    if (sum < own.response) {
+      bound.terms.push_back(Term{Term::Kind::Interference, TaskId(), DagId(), own.response - sum, 0});
+    }
+    return bound;
+  }
+
+ private:
+  bool respond(std::size_t k) {
+    GlobalUnit &own = units_[k];
+    global::FirstWindow first(system_.platform.workers, 0);
+    for (std::size_t i = 0; i < units_.size(); ++i) {
+      if (i != k) first.add(std::min(units_[i].volume, due_work(units_[i], later(k, i))));
+    }
+    Duration d = first.length();
+    const bool found = global::least_fixed_point(own.limit - own.jitter - own.volume + 1, d,
+                                                 [&](Duration waiting) { return window(k, waiting); });
+    own.response = d - 1 + own.volume + own.jitter;
+    return found;
+  }
+
+  // How much later the deadline of units_[k] is. From its own period on that makes no difference: the window is not
+  // longer.
+  [[nodiscard]] Duration later(std::size_t k, std::size_t i) const {
+    return std::min(deadlines_[k] - deadlines_[i], units_[k].period);
+  }
+
+  // least_window() of all others; leaves each one's work in `work`, and in `carried` what of it has a deadline in time.
+  Duration window(std::size_t k, Duration d) {
+    const bool preempts = system_.mode == sched::Preemption::Full;
+    const GlobalUnit &own = units_[k];
+    const std::uint32_t workers = system_.platform.workers;
+    // A job that can be preempted waits in d instants before it has executed for C - 1; another one before it starts.
+    const Duration length = preempts ? d + own.volume - 1 : d;
+    Largest blockers(preempts ? 0 : workers);
+    for (std::size_t i = 0; i < units_.size(); ++i) {
+      GlobalUnit &other = units_[i];
+      if (i == k) continue;
+      const Duration any = global::sequential_work(other, length);
+      other.work = other.carried = std::min(any, due_work(other, later(k, i)));
+      if (deadlines_[i] <= deadlines_[k] - own.jitter) continue;
+      blockers.offer(std::min({any, other.volume - 1, d}) - std::min(other.carried, d), i);
+    }
+    for (const Largest::Entry &entry : blockers.entries()) {
+      if (entry.value > 0) units_[entry.whose].work = units_[entry.whose].volume - 1;
+    }
+    Largest largest(workers - 1);
+    Duration sum = 0;
+    for (std::size_t i = 0; i < units_.size(); ++i) {
+      if (i == k) continue;
+      sum += units_[i].work;
+      if (units_[i].work >= d) largest.offer(units_[i].work);
+    }
+    return global::least_window(sum, largest.entries(), workers);
+  }
+
+  const System &system_;
+  std::vector<GlobalUnit> &units_;
+  std::vector<Duration> deadlines_;
+};
+
+global::Units edf_units(const System &system, sched::Preemption mode) {
+  global::Units view = global::units_of(system, {.mode = mode, .edges = false, .any_policy = true});
+  if (system.policy != PolicyKind::Edf) {
+    view.reason = std::string("for edf; the policy is ") + to_string(system.policy);
+  } else if (!view.reason && mode == sched::Preemption::None && view.workers > Largest::kMost) {
+    view.reason = "for at most " + std::to_string(Largest::kMost) + " workers where jobs run to completion";
+  }
+  return view;
+}
+
+Outcome apply_response(const System &system) {
+  const auto mode = system.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
+  global::Units view = edf_units(system, mode);
+  if (view.reason) return NotApplicable{*view.reason};
+  Edf edf(system, view.units);
+  const std::string_view absent = edf.solve();
+  std::vector<ResponseBound> responses(system.units.size());
+  for (std::size_t k = 0; k < view.units.size(); ++k) {
+    ResponseBound &response = responses[view.units[k].unit];
+    if (absent.empty()) {
+      response = edf.explain(k);
+    } else {
+      response.absent = absent;
+    }
+  }
+  return from_units(system, std::move(responses));
+}
+
+// Densities in units of 2^-40, rounded up.
+constexpr Int128 kOne = Int128{1} << 40;
+
+double as_double(Int128 value) { return static_cast<double>(value) / static_cast<double>(kOne); }
+
+Outcome apply_density(const System &system) {
+  const global::Units view = edf_units(system, sched::Preemption::Full);
+  if (view.reason) return NotApplicable{*view.reason};
+  Int128 sum = 0;
+  Int128 largest = 0;
+  for (const GlobalUnit &unit : view.units) {
+    const SystemTask &task = system.tasks[system.units[unit.unit].tasks.front()];
+    if (task.deadline > unit.limit) return NotApplicable{"task '" + task.name + "': its deadline is above its period"};
+    if (task.deadline <= task.jitter) {
+      return NotApplicable{"task '" + task.name + "': its jitter is as large as its deadline"};
+    }
+    const Duration end_to_end = system.dags[task.dag.value].deadline;
+    if (end_to_end > 0 && end_to_end < task.deadline) {
+      return NotApplicable{"DAG '" + system.dags[task.dag.value].name + "': its deadline is below those of its tasks"};
+    }
+    const Duration until = task.deadline - task.jitter;
+    const Int128 density = (unit.volume * kOne + until - 1) / until;
+    sum += density;
+    largest = std::max(largest, density);
+  }
+  const Int128 m = view.workers;
+  const Int128 limit = m * kOne - (m - 1) * largest;
+  Bound bound;
+  bound.accepts = largest <= kOne && sum <= limit;
+  char text[96];
+  std::snprintf(text, sizeof text, "density = %.4f, limit %.4f", as_double(sum), as_double(limit));
+  bound.figures = text;
+  return bound;
+}
+
+}  // namespace
+
+Method edf_global_density() {
+  Method method;
+  method.name = "edf_global_density";
+  method.subject = Subject::System;
+  method.cite =
+      "J. Goossens, S. Funk, S. Baruah, Priority-driven scheduling of periodic task systems on multiprocessors, "
+      "Real-Time Systems 25, 2003; M. Bertogna, M. Cirinei, G. Lipari, Improved schedulability analysis of EDF on "
+      "multiprocessor platforms, ECRTS 2005";
+  method.assumptions =
+      "m workers, full preemption, edf, no edges, D <= T and no jobs skipped before it, jitter below the deadline; no "
+      "shared groups, no max_active";
+  method.complexity = "O(n)";
+  method.apply = apply_density;
+  return method;
+}
+
+Method edf_global_response() {
+  Method method;
+  method.name = "edf_global_response";
+  method.cite =
+      "M. Bertogna, M. Cirinei, Response-time analysis for globally scheduled symmetric multiprocessor platforms, RTSS "
+      "2007; without preemption: docs/analysis.md, \"EDF on several workers\"";
+  method.assumptions =
+      "m workers, full preemption or none, edf, no edges, R <= T for all tasks; release jitter; no shared groups, no "
+      "max_active";
+  method.complexity = "pseudo-polynomial; O(n^2) a step, at most 1000 rounds";
+  method.apply = apply_response;
+  return method;
+}
+
+}  // namespace redag::analysis

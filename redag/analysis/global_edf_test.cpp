@@ -1,0 +1,223 @@
+#include "redag/analysis/global_edf.hpp"
+
+#include <gtest/gtest.h>
+
+#include <initializer_list>
+
+#include "redag/analysis/edf_demand.hpp"
+#include "redag/analysis/global_sequential.hpp"
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using testing::BoundCaseLimits;
+using testing::expect_bound_holds;
+
+BoundCaseLimits several_workers(sched::Preemption preemption) {
+  BoundCaseLimits limits;
+  limits.preemption = preemption;
+  limits.policies = {PolicyKind::Edf};
+  limits.max_workers = 4;
+  limits.max_dags = 9;
+  limits.jitter = limits.queues = limits.overheads = true;
+  limits.max_deadline = 1.5;
+  limits.max_utilization = 0.7;
+  return limits;
+}
+
+testing::BoundGenerator cases(const BoundCaseLimits &limits) {
+  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
+}
+
+TEST(BoundProperty, EdfGlobalDensity) {
+  BoundCaseLimits limits = several_workers(sched::Preemption::Full);
+  limits.max_deadline = 1.0;
+  limits.max_utilization = 0.6;
+  expect_bound_holds(edf_global_density(), cases(limits), {.workloads = 1500});
+}
+
+TEST(BoundProperty, EdfGlobalResponse) {
+  expect_bound_holds(edf_global_response(), cases(several_workers(sched::Preemption::Full)), {.workloads = 1500});
+}
+
+TEST(BoundProperty, EdfGlobalResponseNonpreemptive) {
+  BoundCaseLimits limits = several_workers(sched::Preemption::None);
+  limits.min_utilization = 0.1;
+  limits.max_utilization = 0.5;
+  expect_bound_holds(edf_global_response(), cases(limits), {.workloads = 1500});
+}
+
+// Few long tasks on two workers, looked at from many offsets.
+TEST(BoundProperty, EdfGlobalResponseOfFewTasks) {
+  for (const auto mode : {sched::Preemption::Full, sched::Preemption::None}) {
+    BoundCaseLimits limits;
+    limits.preemption = mode;
+    limits.policies = {PolicyKind::Edf};
+    limits.min_workers = limits.max_workers = 2;
+    limits.max_dags = 5;
+    limits.min_utilization = mode == sched::Preemption::Full ? 0.4 : 0.2;
+    limits.max_utilization = mode == sched::Preemption::Full ? 0.9 : 0.7;
+    limits.min_deadline = 0.3;
+    limits.max_deadline = 1.2;
+    limits.min_period = 3;
+    limits.max_period = 14;
+    limits.queues = true;
+    expect_bound_holds(edf_global_response(), cases(limits), {.workloads = 1000, .runs = 20, .periods = 30});
+  }
+}
+
+struct Numbers {
+  Duration wcet;
+  Duration period;
+};
+
+System edf_system(std::uint32_t workers, std::initializer_list<Numbers> tasks, sched::Preemption preemption) {
+  Workload workload;
+  workload.name = "w";
+  workload.policy = PolicyKind::Edf;
+  for (const Numbers &numbers : tasks) {
+    Task task;
+    task.name = "t";
+    task.wcet = task.bcet = numbers.wcet;
+    task.period = task.deadline = numbers.period;
+    Dag dag;
+    dag.name = "d" + std::to_string(workload.dags.size());
+    dag.tasks.push_back(task);
+    workload.dags.push_back(dag);
+  }
+  AnalysisPlatform platform;
+  platform.workers = workers;
+  platform.preemption = preemption;
+  return compile(workload, platform).value();
+}
+
+std::vector<std::optional<Duration>> responses(const Method &method, const System &system) {
+  std::vector<std::optional<Duration>> result;
+  const Outcome outcome = method.apply(system);
+  for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) result.push_back(bound.response);
+  return result;
+}
+
+using Responses = std::vector<std::optional<Duration>>;
+
+// Exactly on the limit, and above it.
+TEST(EdfGlobalDensity, LeavesRoomForTheLargest) {
+  const auto full = sched::Preemption::Full;
+  const Outcome three = edf_global_density().apply(edf_system(2, {{2, 4}, {2, 4}, {2, 4}}, full));
+  EXPECT_EQ(std::get<Bound>(three).accepts, true) << "1.5 <= 2 - 0.5";
+  const Outcome four = edf_global_density().apply(edf_system(2, {{2, 4}, {2, 4}, {2, 4}, {1, 100}}, full));
+  EXPECT_EQ(std::get<Bound>(four).accepts, false);
+  // S. Dhall, C. Liu, Operations Research 26(1), 1978: little work, and one task that needs nearly all of a worker.
+  const Outcome dhall = edf_global_density().apply(edf_system(2, {{1, 9}, {1, 9}, {10, 10}}, full));
+  EXPECT_EQ(std::get<Bound>(dhall).accepts, false);
+}
+
+// A job that is due later does not count: the other's next one, which a bound for any order has to count.
+TEST(EdfGlobalResponse, CountsWhatIsDueInTime) {
+  const System system = edf_system(1, {{2, 5}, {2, 5}}, sched::Preemption::Full);
+  EXPECT_EQ(responses(edf_global_response(), system), (Responses{4, 4}));
+  EXPECT_EQ(responses(bertogna_cirinei_any(), system), (Responses{std::nullopt, std::nullopt}));
+}
+
+// The short one waits for 19 of the long one, which waits for one job of the short one.
+TEST(EdfGlobalResponse, BlockingWithoutPreemption) {
+  EXPECT_EQ(responses(edf_global_response(), edf_system(1, {{1, 100}, {20, 200}}, sched::Preemption::None)),
+            (Responses{20, 21}));
+  EXPECT_EQ(responses(edf_global_response(), edf_system(2, {{1, 100}, {20, 200}}, sched::Preemption::None)),
+            (Responses{1, 20}));
+}
+
+template <class Check>
+void for_cases(const BoundCaseLimits &limits, int count, Check check) {
+  for (int i = 0; i < count; ++i) {
+    Rng rng(mix(static_cast<std::uint64_t>(i)));
+    const testing::BoundCase bound_case = random_bound_case(rng, limits);
+    const System system = compile(bound_case.workload, bound_case.platform).value();
+    SCOPED_TRACE(describe(bound_case));
+    if (system.not_analysable.empty()) check(bound_case, system, rng);
+    if (::testing::Test::HasFailure()) return;
+  }
+}
+
+TEST(EdfGlobalResponse, IsNeverAboveThatForAnyOrder) {
+  std::uint64_t smaller = 0;
+  std::uint64_t compared = 0;
+  for (const auto mode : {sched::Preemption::Full, sched::Preemption::None}) {
+    BoundCaseLimits limits = several_workers(mode);
+    limits.min_utilization = 0.1;
+    limits.max_utilization = 0.6;
+    for_cases(limits, 2000, [&](const testing::BoundCase &, const System &system, Rng &) {
+      const Outcome any = bertogna_cirinei_any().apply(system);
+      const Outcome edf = edf_global_response().apply(system);
+      if (!std::holds_alternative<Bound>(any)) return;
+      for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+        const auto worse = std::get<Bound>(any).tasks[t].response;
+        const auto better = std::get<Bound>(edf).tasks[t].response;
+        if (!worse) continue;
+        ASSERT_TRUE(better);
+        // Without preemption the other one lets a job wait to its last tick.
+        ASSERT_LE(*better, *worse);
+        ++compared;
+        if (*better < *worse) ++smaller;
+      }
+    });
+  }
+  EXPECT_GT(compared, 1000U);
+  EXPECT_GT(smaller, 100U);
+}
+
+// On one worker the demand bound is exact for sporadic tasks: nobody accepts more.
+TEST(EdfGlobal, AcceptsNothingThatTheDemandOfOneWorkerRefuses) {
+  BoundCaseLimits limits = several_workers(sched::Preemption::Full);
+  limits.max_workers = 1;
+  limits.max_deadline = 1.0;
+  limits.jitter = false;
+  std::uint64_t accepted = 0;
+  for_cases(limits, 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
+    const Outcome demand = edf_demand().apply(system);
+    if (!std::holds_alternative<Bound>(demand)) return;
+    for (const Method &method : {edf_global_density(), edf_global_response()}) {
+      const Outcome outcome = method.apply(system);
+      if (!std::holds_alternative<Bound>(outcome)) continue;
+      if (verdict(system, std::get<Bound>(outcome)) != Verdict::Schedulable) continue;
+      ASSERT_EQ(std::get<Bound>(demand).accepts, true) << method.name;
+      ++accepted;
+    }
+  });
+  EXPECT_GT(accepted, 300U);
+}
+
+TEST(EdfGlobalResponse, MoreExecutionNeverShrinksABoundAndTermsAddUp) {
+  std::uint64_t compared = 0;
+  for (const auto mode : {sched::Preemption::Full, sched::Preemption::None}) {
+    BoundCaseLimits limits = several_workers(mode);
+    limits.min_utilization = 0.1;
+    limits.max_utilization = 0.6;
+    for_cases(limits, 1500, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
+      const Outcome before = edf_global_response().apply(system);
+      if (!std::holds_alternative<Bound>(before)) return;
+      for (const ResponseBound &bound : std::get<Bound>(before).tasks) {
+        Duration sum = 0;
+        for (const Term &term : bound.terms) sum += term.amount;
+        ASSERT_EQ(sum, bound.response.value_or(0));
+        ASSERT_EQ(bound.absent.empty(), bound.response.has_value());
+      }
+      Workload more = bound_case.workload;
+      Dag &dag = more.dags[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(more.dags.size()) - 1))];
+      ++dag.tasks.back().wcet;
+      const auto larger = compile(more, bound_case.platform);
+      if (!larger) return;
+      const Outcome after = edf_global_response().apply(*larger);
+      for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+        const Duration grown = std::get<Bound>(after).tasks[t].response.value_or(kNever);
+        ASSERT_LE(std::get<Bound>(before).tasks[t].response.value_or(kNever), grown);
+      }
+      ++compared;
+    });
+  }
+  EXPECT_GT(compared, 500U);
+}
+
+}  // namespace
+}  // namespace redag::analysis

@@ -1,0 +1,355 @@
+#include "redag/analysis/wait_set_rates.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/global.hpp"
+#include "redag/analysis/rate_edges.hpp"
+#include "redag/analysis/waiting_window.hpp"
+
+namespace redag::analysis {
+namespace {
+
+constexpr int kMaxRounds = 1000;
+constexpr std::string_view kOverloaded = "the executor's busy window was not found to end: it is overloaded, or nearly";
+
+// From a task's arrival to its finish: C + the shares of others + what its own earlier jobs add (or take away).
+struct FromReady {
+  Duration response = 0;
+  Duration earlier = 0;
+  std::vector<Duration> shares;  // of the response, by TaskId
+};
+
+struct Callback {
+  Duration wcet = 0;
+  Duration period = 0;
+  Duration ready = 0;     // J: latest arrival after the unit's release
+  Duration response = 0;  // R, from arrival to finish
+  std::size_t place = 0;  // in the order of registration
+};
+
+Duration arrivals(const Callback &callback, Duration length) {
+  return length <= 0 ? 0 : ceil_div(add(length, callback.ready), callback.period);
+}
+
+// All callbacks of an executor, with what is known of them so far. Responses only ever grow.
+class Executor {
+ public:
+  /// Of one callback, given `callbacks`; nothing: more than `limit`, or no end was found.
+  using Respond =
+      std::function<std::optional<FromReady>(const std::vector<Callback> &callbacks, std::size_t i, Duration limit)>;
+
+  Executor(const System &system, Respond respond) : system_(system), respond_(std::move(respond)) {
+    callbacks_.resize(system.tasks.size());
+    std::size_t place = 0;
+    for (const bool data : {false, true}) {  // timers before subscriptions, each in the order of TaskIds
+      for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+        const SystemTask &task = system.tasks[t];
+        if (task.data == data) callbacks_[t] = {task.wcet, system.units[task.unit].period, 0, task.wcet, place++};
+      }
+    }
+  }
+
+  Outcome run() {
+    const std::string_view absent = solve();
+    std::vector<ResponseBound> responses(system_.units.size());
+    for (std::size_t u = 0; u < responses.size(); ++u) {
+      if (absent.empty()) {
+        responses[u] = explain(system_.units[u]);
+      } else {
+        responses[u].absent = absent;
+      }
+    }
+    return from_units(system_, std::move(responses));
+  }
+
+ private:
+  std::string_view solve() {
+    bool changed = true;
+    for (int round = 0; changed; ++round) {
+      if (round == kMaxRounds) return "gave up: arrivals and responses did not agree in a thousand rounds";
+      changed = false;
+      for (const Unit &unit : system_.units) {
+        for (const std::uint32_t t : unit.tasks) {
+          Callback &callback = callbacks_[t];
+          const Duration ready = latest_arrival(t);
+          changed = changed || ready != callback.ready;
+          callback.ready = ready;
+          const Duration limit = std::min(unit.limit, unit.period) - ready;
+          if (limit < callback.wcet) return kExceeds;
+          const auto found = respond_(callbacks_, t, limit);
+          if (!found || found->response > limit) return kExceeds;
+          changed = changed || found->response != callback.response;
+          callback.response = found->response;
+        }
+      }
+    }
+    return {};
+  }
+
+  [[nodiscard]] Duration latest_arrival(std::uint32_t t) const {
+    const SystemTask &task = system_.tasks[t];
+    Duration latest = task.data ? 0 : task.jitter;
+    for (const std::uint32_t p : task.predecessors) {
+      latest = std::max(latest, add(callbacks_[p].ready, callbacks_[p].response));
+    }
+    return latest;
+  }
+
+  // Back from the task that ends last to the one that it waited for, and so on: sum of all they take.
+  [[nodiscard]] ResponseBound explain(const Unit &unit) const {
+    const auto end = [&](std::uint32_t t) { return callbacks_[t].ready + callbacks_[t].response; };
+    std::uint32_t at = *std::max_element(unit.tasks.begin(), unit.tasks.end(),
+                                         [&](std::uint32_t a, std::uint32_t b) { return end(a) < end(b); });
+    ResponseBound bound;
+    bound.response = end(at);
+    std::map<std::size_t, Duration> shares;
+    Duration own = 0;
+    Duration earlier = 0;
+    Duration jitter = 0;
+    for (bool more = true; more;) {
+      const auto found = respond_(callbacks_, at, std::min(unit.limit, unit.period) - callbacks_[at].ready);
+      own += callbacks_[at].wcet;
+      earlier += found->earlier;
+      for (std::size_t j = 0; j < found->shares.size(); ++j) {
+        if (found->shares[j] != 0) shares[j] += found->shares[j];
+      }
+      jitter = callbacks_[at].ready;
+      more = false;
+      for (const std::uint32_t p : system_.tasks[at].predecessors) {
+        if (end(p) != jitter) continue;
+        at = p;
+        jitter = 0;
+        more = true;
+        break;
+      }
+    }
+    bound.terms.push_back(Term{Term::Kind::Own, TaskId(), unit.dag, own, 1});
+    if (earlier != 0) bound.terms.push_back(Term{Term::Kind::Earlier, TaskId(), unit.dag, earlier, 0});
+    for (const auto &[j, amount] : shares) {
+      bound.terms.push_back(Term{Term::Kind::Interference, TaskId(j), system_.tasks[j].dag, amount, 0});
+    }
+    if (jitter > 0) bound.terms.push_back(Term{Term::Kind::Jitter, TaskId(), unit.dag, jitter, 0});
+    return bound;
+  }
+
+  static constexpr std::string_view kExceeds =
+      "some callback's response can exceed its limit, which all others rely on";
+
+  const System &system_;
+  Respond respond_;
+  std::vector<Callback> callbacks_;  // by TaskId
+};
+
+std::optional<std::string> why_not(const System &system) {
+  if (auto reason = why_not_directly(system)) return reason;
+  if (system.mode != sched::Preemption::None) return "rclcpp's executors do not preempt";
+  if (!system.groups.empty()) return "exclusive groups: a busy group's callbacks can miss every window";
+  return std::nullopt;
+}
+
+std::optional<std::string> why_not_one_thread(const System &system) {
+  if (system.platform.workers != 1) {
+    return "for one thread; the platform has " + std::to_string(system.platform.workers) + " workers";
+  }
+  return why_not(system);
+}
+
+// Least fixed point of a monotone `next` from `value` on; false above `stop`.
+template <class Next>
+bool grow(Duration &value, Duration stop, Next next) {
+  for (int step = 0; value <= stop && step < global::kMaxSteps; ++step) {
+    const Duration grown = next(value);
+    if (grown <= value) return true;
+    value = grown;
+  }
+  return false;
+}
+
+Duration arrived_work(const std::vector<Callback> &callbacks, std::size_t skip, Duration length) {
+  Duration sum = 0;
+  for (std::size_t j = 0; j < callbacks.size(); ++j) {
+    if (j != skip) sum = add(sum, multiply(arrivals(callbacks[j], length), callbacks[j].wcet));
+  }
+  return sum;
+}
+
+std::optional<FromReady> casini_response(const std::vector<Callback> &callbacks, std::size_t i, Duration limit) {
+  const Callback &own = callbacks[i];
+  Duration window = 1;
+  constexpr std::size_t kNobody = SIZE_MAX;
+  if (!grow(window, kUnbounded - 1, [&](Duration length) { return arrived_work(callbacks, kNobody, length); })) {
+    return std::nullopt;
+  }
+  // The arrivals of its own at which another job has come: the n-th no sooner than A.
+  std::optional<FromReady> worst;
+  for (Duration n = 1; n < global::kMaxSteps; ++n) {
+    const Duration arrival = std::max<Duration>(0, multiply(n - 1, own.period) - own.ready);
+    if (arrival >= window) return worst;
+    Duration start = multiply(n - 1, own.wcet);
+    const bool found = grow(start, add(arrival, limit), [&](Duration begin) {
+      return add(multiply(n - 1, own.wcet), arrived_work(callbacks, i, begin + 1));
+    });
+    // It waits for nothing that comes after its own arrival if it can start at once.
+    const Duration response = start - arrival + own.wcet;
+    if (!found || response > limit) return std::nullopt;
+    if (worst && response <= worst->response) continue;
+    worst = FromReady{response, (n - 1) * own.wcet - arrival, {}};
+    for (std::size_t j = 0; j < callbacks.size(); ++j) {
+      worst->shares.push_back(j == i ? 0 : arrivals(callbacks[j], start + 1) * callbacks[j].wcet);
+    }
+  }
+  return std::nullopt;
+}
+
+// 1 where j is registered before i.
+Duration before(const std::vector<Callback> &callbacks, std::size_t j, std::size_t i) {
+  return callbacks[j].place < callbacks[i].place ? 1 : 0;
+}
+
+std::optional<FromReady> blass_response(const std::vector<Callback> &callbacks, std::size_t i, Duration limit) {
+  const Callback &own = callbacks[i];
+  const Duration polls = arrivals(own, own.response);
+  FromReady found;
+  found.shares.resize(callbacks.size());
+  Duration window = 1;
+  const bool ends = grow(window, limit, [&](Duration length) {
+    found.earlier = (arrivals(own, length + own.response - 1) - 1) * own.wcet;
+    Duration sum = found.earlier;
+    for (std::size_t j = 0; j < callbacks.size(); ++j) {
+      if (j == i) continue;
+      const Duration jobs =
+          std::min(arrivals(callbacks[j], length + callbacks[j].response - 1), polls + before(callbacks, j, i));
+      found.shares[j] = multiply(jobs, callbacks[j].wcet);
+      sum = add(sum, found.shares[j]);
+    }
+    return add(sum, 1);
+  });
+  if (!ends) return std::nullopt;
+  found.response = window - 1 + own.wcet;
+  return found;
+}
+
+// In any window of length x, by jobs that execute one after the other, within J + R of their releases.
+Duration work_of(const Callback &callback, Duration x) {
+  const Duration until = add(x, callback.ready + callback.response - callback.wcet);
+  return until / callback.period * callback.wcet + std::min(callback.wcet, until % callback.period);
+}
+
+std::optional<FromReady> rates_response(const std::vector<Callback> &callbacks, std::size_t i, Duration limit,
+                                        std::uint32_t threads) {
+  const Callback &own = callbacks[i];
+  std::vector<Duration> works(callbacks.size(), 0);
+  global::FirstWindow first(threads, 0);
+  for (std::size_t j = 0; j < callbacks.size(); ++j) {
+    if (j != i) first.add(callbacks[j].wcet);
+  }
+  Duration d = first.length();
+  const bool found = global::least_fixed_point(limit - own.wcet + 1, d, [&](Duration waiting) {
+    global::Largest largest(threads - 1);
+    Duration sum = 0;
+    for (std::size_t j = 0; j < callbacks.size(); ++j) {
+      if (j == i) continue;
+      works[j] = std::min(work_of(callbacks[j], waiting), multiply(1 + before(callbacks, j, i), callbacks[j].wcet));
+      sum = add(sum, works[j]);
+      if (works[j] >= waiting) largest.offer(works[j]);
+    }
+    return global::least_window(sum, largest.entries(), threads);
+  });
+  if (!found) return std::nullopt;
+  FromReady result{d - 1 + own.wcet, 0, std::vector<Duration>(callbacks.size(), 0)};
+  // Shares of a sum that is divided once: they add up to d - 1, what very many threads leave open at the last one.
+  const auto m = static_cast<Duration>(threads);
+  Duration sum = 0;
+  for (std::size_t j = 0; j < callbacks.size(); ++j) {
+    const Duration more = sum + std::min(works[j], d);
+    result.shares[j] = more / m - sum / m;
+    sum = more;
+  }
+  if (const std::size_t last = i == callbacks.size() - 1 ? 0 : callbacks.size() - 1; last != i) {
+    result.shares[last] += d - 1 - sum / m;
+  }
+  return result;
+}
+
+Outcome apply_casini(const System &system) {
+  if (auto reason = why_not_one_thread(system)) return NotApplicable{*reason};
+  Int128 share = 0;  // of the processor, in units of 2^-40, rounded up
+  for (const SystemTask &task : system.tasks) {
+    const Duration period = system.units[task.unit].period;
+    share += ((Int128{task.wcet} << 40U) + period - 1) / period;
+  }
+  // Above one, windows would not end; just below it, they would take too long to.
+  if (share >= Int128{1} << 40U) {
+    ResponseBound none;
+    none.absent = kOverloaded;
+    return from_units(system, std::vector<ResponseBound>(system.units.size(), none));
+  }
+  return Executor(system, casini_response).run();
+}
+
+Outcome apply_blass(const System &system) {
+  if (auto reason = why_not_one_thread(system)) return NotApplicable{*reason};
+  return Executor(system, blass_response).run();
+}
+
+Outcome apply_rates(const System &system) {
+  if (auto reason = why_not(system)) return NotApplicable{*reason};
+  const std::uint32_t threads = system.platform.workers;
+  const Duration longest = kUnbounded / 4 / threads / static_cast<Duration>(system.tasks.size() + 2);
+  for (const Unit &unit : system.units) {
+    if (unit.period > longest) return NotApplicable{"periods too long for exact sums"};
+  }
+  return Executor(system, [threads](const std::vector<Callback> &callbacks, std::size_t i,
+                                    Duration limit) { return rates_response(callbacks, i, limit, threads); })
+      .run();
+}
+
+constexpr std::string_view kOneThread =
+    "rclcpp's SingleThreadedExecutor of Humble with a processor of its own, timers polled like subscriptions; one rate "
+    "a "
+    "DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups";
+
+Method make(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
+            Outcome (*apply)(const System &)) {
+  Method method;
+  method.name = name;
+  method.subject = Subject::Dag;
+  method.cite = cite;
+  method.assumptions = assumptions;
+  method.complexity = complexity;
+  method.apply = apply;
+  return method;
+}
+
+}  // namespace
+
+Method casini() {
+  return make("casini",
+              "D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, Response-time analysis of ROS 2 processing chains "
+              "under reservation-based scheduling, ECRTS 2019",
+              kOneThread, "pseudo-polynomial; O(tasks^2) a step, at most 1000 rounds", apply_casini);
+}
+
+Method blass() {
+  return make("blass",
+              "T. Blass, D. Casini, S. Bozhko, B. Brandenburg, A ROS 2 response-time analysis exploiting starvation "
+              "freedom and execution-time variance, RTSS 2021 (theorem 2, without execution-time curves)",
+              kOneThread, "pseudo-polynomial; O(tasks^2) a step, at most 1000 rounds", apply_blass);
+}
+
+Method wait_set_rates() {
+  return make(
+      "wait_set_rates",
+      "docs/analysis.md, \"rclcpp's executors\"; after T. Blass et al., RTSS 2021; in place of X. Jiang et al., "
+      "RTSS 2022, and H. Sobhani, H. Choi, H. Kim, RTAS 2023",
+      "rclcpp's single- or multi-threaded executor of Humble, m threads with processors of their own; one rate "
+      "a DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups",
+      "pseudo-polynomial; O(tasks^2) a step, at most 1000 rounds", apply_rates);
+}
+
+}  // namespace redag::analysis
