@@ -9,6 +9,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/threads.hpp"
@@ -24,6 +25,7 @@ TEST(PiMutex, ExcludesOthers) {
   EXPECT_FALSE(taken);
 }
 
+// More threads than processors: some are preempted as owners, and others queue.
 TEST(PiMutex, CountsRightUnderContention) {
   PiMutex mutex;
   int count = 0;
@@ -33,10 +35,10 @@ TEST(PiMutex, CountsRightUnderContention) {
       ++count;
     }
   };
-  std::thread other(add);
-  add();
-  other.join();
-  EXPECT_EQ(count, 20'000);
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 8; ++i) threads.emplace_back(add);
+  for (std::thread &thread : threads) thread.join();
+  EXPECT_EQ(count, 80'000);
 }
 
 // Field 18 of /proc/<pid>/stat: for real-time threads minus (priority + 1), inherited priority included.
@@ -49,8 +51,9 @@ int kernel_priority(long thread) {
   return -std::stoi(text) - 1;
 }
 
-TEST(PiMutex, TheOwnerRunsAtTheWaitersPriority) {
-  if (runtime::available_fifo_priority(20) < 20) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+// The first waiter sleeps for the mutex, the second behind it.
+TEST(PiMutex, TheOwnerRunsAtThePriorityOfWhoeverWaits) {
+  if (runtime::available_fifo_priority(30) < 30) GTEST_SKIP() << "this process may not use SCHED_FIFO";
   PiMutex mutex;
   std::atomic<long> owner{0};
   runtime::Event let_go;
@@ -62,13 +65,16 @@ TEST(PiMutex, TheOwnerRunsAtTheWaitersPriority) {
   });
   while (owner == 0) std::this_thread::yield();
   EXPECT_EQ(kernel_priority(owner), 10);
-  std::thread high([&] {
-    ASSERT_TRUE(runtime::set_fifo_priority(pthread_self(), 20));
-    const std::lock_guard guard(mutex);
-  });
-  while (kernel_priority(owner) != 20) std::this_thread::yield();
+  std::vector<std::thread> waiters;
+  for (const int priority : {20, 30}) {
+    waiters.emplace_back([&mutex, priority] {
+      ASSERT_TRUE(runtime::set_fifo_priority(pthread_self(), priority));
+      const std::lock_guard guard(mutex);
+    });
+    while (kernel_priority(owner) != priority) std::this_thread::yield();
+  }
   let_go.set();
-  high.join();
+  for (std::thread &waiter : waiters) waiter.join();
   low.join();
 }
 

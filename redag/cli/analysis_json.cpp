@@ -91,6 +91,7 @@ Json to_json(const Analysed &analysed) {
   Json document = {
       {"format", "redag.analysis/1"},
       {"workload", analysed.workload.name},
+      {"executor", std::string(analysed.executor->name)},
       {"policy", to_string(analysed.workload.policy)},
       {"workers", platform.workers},
       {"preemption", mode_name(analysed)},

@@ -175,9 +175,11 @@ std::string plural(std::size_t count, const char *noun) {
 std::string headline(const Analysed &analysed) {
   const analysis::AnalysisPlatform &platform = analysed.system.platform;
   const std::string reason = mode_reason(analysed);
-  std::string text =
-      fmt::format("{}: {}, {}, utilization {:.3f}\n", analysed.workload.name, to_string(analysed.workload.policy),
-                  plural(platform.workers, "worker"), analysed.system.utilization);
+  // What orders the jobs: the policy, or somebody else's executor, which knows none.
+  const std::string order =
+      analysed.executor->ours ? to_string(analysed.workload.policy) : std::string(analysed.executor->description);
+  std::string text = fmt::format("{}: {}, {}, utilization {:.3f}\n", analysed.workload.name, order,
+                                 plural(platform.workers, "worker"), analysed.system.utilization);
   text += fmt::format("preemption: {}{}\n", mode_name(analysed), reason.empty() ? "" : " (" + reason + ")");
   if (platform.levels > 0) text += fmt::format("priority levels: {}\n", platform.levels);
   if (platform.release_overhead > 0 || platform.dispatch_overhead > 0 || platform.preempt_overhead > 0) {
@@ -212,22 +214,24 @@ const char *to_string(Standing standing) {
 }
 
 Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                         const analysis::ExplorationOptions *explore) {
-  Result<analysis::System> system = analysis::compile(workload, platform);
+                         const analysis::ExplorationOptions *explore, const std::string &executor) {
+  const sched::ExecutorKind *kind = sched::find_executor(executor);
+  if (kind == nullptr) return make_error("there is no analysis of the executor '" + executor + "'");
+  Result<analysis::System> system = analysis::compile_for(*kind, workload, platform);
   if (!system) return tl::unexpected<Diagnostics>(system.error());
-  auto methods = std::make_shared<std::vector<Method>>(analysis::methods());
+  std::vector<Method> methods = analysis::methods_of(*kind);
   std::shared_ptr<const analysis::Exploration> exploration;
-  if (explore != nullptr) {
+  if (explore != nullptr && kind->ours) {
     std::optional<std::string> reason = analysis::why_not_explore(*system);
     if (!reason) exploration = std::make_shared<analysis::Exploration>(analysis::explore(*system, *explore));
-    methods->push_back(analysis::exploration());
-    methods->back().apply = [exploration, reason](const analysis::System &asked) -> analysis::Outcome {
+    methods.push_back(analysis::exploration());
+    methods.back().apply = [exploration, reason](const analysis::System &asked) -> analysis::Outcome {
       if (reason) return NotApplicable{*reason};
       return to_bound(asked, *exploration);
     };
   }
-  analysis::Report report = analysis::analyze(*system, *methods);
-  return Analysed{workload, *std::move(system), std::move(report), std::move(methods), std::move(exploration)};
+  analysis::Report report = analysis::analyze(*system, std::move(methods));
+  return Analysed{workload, kind, *std::move(system), std::move(report), std::move(exploration)};
 }
 
 std::string task_name(const Analysed &analysed, TaskId task) {
@@ -279,6 +283,7 @@ std::string mode_reason(const Analysed &analysed) {
   if (system.platform.preemption == sched::Preemption::Cooperative && system.mode == sched::Preemption::None) {
     return "no task has a region: the same as none";
   }
+  if (!analysed.executor->ours) return "rclcpp's executors do not preempt";
   if (analysed.workload.platform.preemption != PreemptionMode::Auto) return {};
   const bool is_static = system.policy != PolicyKind::Edf && system.policy != PolicyKind::Fifo;
   return is_static
@@ -354,14 +359,15 @@ std::string describe(const Analysed &analysed, const StreamTraits &terminal, boo
 
 std::string describe_methods() {
   std::string text;
-  std::vector<Method> all = analysis::methods();
-  all.push_back(analysis::exploration());
-  for (const Method &method : all) {
-    text +=
-        fmt::format("{} ({}{})\n  assumes: {}\n  cite: {}\n  complexity: {}\n", method.name, to_string(method.subject),
-                    method.is_paper() ? ", paper" : "", method.assumptions, method.cite, method.complexity);
+  const auto describe = [&text](const Method &method, std::string_view remark) {
+    text += fmt::format("{} ({}{})\n  assumes: {}\n  cite: {}\n  complexity: {}\n", method.name,
+                        to_string(method.subject), remark, method.assumptions, method.cite, method.complexity);
     if (method.is_paper()) text += fmt::format("  sound only if: {}\n", method.sound_only_if);
-  }
+  };
+  for (const Method &method : analysis::methods()) describe(method, method.is_paper() ? ", paper" : "");
+  describe(analysis::exploration(), "; with --explore");
+  text += "\nFor rclcpp's own executors, with --executor ste or mte:\n";
+  for (const Method &method : analysis::executor_methods()) describe(method, "");
   return text;
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "redag/analysis/analyze.hpp"
+#include "redag/analysis/executors.hpp"
 #include "redag/analysis/exploration.hpp"
 #include "redag/cli/console.hpp"
 #include "redag/cli/json.hpp"
@@ -17,18 +18,20 @@
 
 namespace redag::cli {
 
-/// A workload, the platform on which it was looked at, and what the methods say.
+/// A workload, the executor and the platform on which it was looked at, and what the methods say.
 struct Analysed {
   Workload workload;
+  const sched::ExecutorKind *executor = nullptr;
   analysis::System system;
   analysis::Report report;
-  std::shared_ptr<const std::vector<analysis::Method>> methods;  // what the report points into
-  std::shared_ptr<const analysis::Exploration> exploration;      // null: not asked for, or nothing to explore
+  std::shared_ptr<const analysis::Exploration> exploration;  // null: not asked for, or nothing to explore
 };
 
-/// With `explore`, exploration() is one of the methods. Error: analysis::compile().
+/// With `explore`, exploration() is one of the methods, of our executor only. Error: analysis::compile(), an executor
+/// that sched::executors() does not list.
 [[nodiscard]] Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                                       const analysis::ExplorationOptions *explore = nullptr);
+                                       const analysis::ExplorationOptions *explore = nullptr,
+                                       const std::string &executor = "redag");
 
 enum class Standing : std::uint8_t {
   Ok,          // a sound method shows that the deadline is met

@@ -54,6 +54,21 @@ TEST(AnalysisReport, KnownResponsesOnOneWorker) {
   EXPECT_EQ(verdict_in_words(analysed).find("schedulable: every deadline is met, by "), 0U);
 }
 
+TEST(AnalysisReport, AnotherExecutorIsItsOwnHeadlineAndMethods) {
+  Workload workload = two_tasks(PreemptionMode::Os);
+  workload.dags[0].tasks[0].period = workload.dags[0].tasks[0].deadline = 20 * kMillisecond;
+  const Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload), nullptr, "ste");
+  ASSERT_TRUE(analysed);
+  EXPECT_EQ(task_rows(*analysed)[0].tightest.response, 10 * kMillisecond) << "3 after 7";
+  const std::string text = describe(*analysed, StreamTraits{}, false);
+  EXPECT_NE(text.find("SingleThreadedExecutor"), std::string::npos) << text;
+  EXPECT_NE(text.find("wait_set_rates"), std::string::npos) << text;
+  EXPECT_EQ(text.find("rta_nonpreemptive"), std::string::npos) << text;
+  EXPECT_EQ(to_json(*analysed)["executor"], "ste");
+  EXPECT_EQ(to_json(*analysed)["preemption"], "none");
+  EXPECT_FALSE(analyse(workload, analysis::platform_of(workload), nullptr, "SingleThreadedExecutor"));
+}
+
 // Run to completion, with the offsets as they are: b never comes while a runs, nor a while b does.
 TEST(AnalysisReport, AnExplorationIsAMethodAmongOthers) {
   Workload workload = two_tasks(PreemptionMode::None);
@@ -106,6 +121,8 @@ TEST(AnalysisReport, DeadlinesOfDagsCount) {
 TEST(AnalysisReport, ATestWithoutNumbersStillAnswers) {
   Workload workload = two_tasks(PreemptionMode::Auto);
   workload.policy = PolicyKind::Edf;
+  workload.dags[0].tasks[0].wcet = 5 * kMillisecond;  // a full worker: more than the bounds on responses can show
+  workload.dags[1].tasks[0].wcet = 10 * kMillisecond;
   const Analysed analysed = look_at(workload);
   const Row row = row_of(analysed, "fast.a");
   EXPECT_EQ(row.standing, Standing::Ok);

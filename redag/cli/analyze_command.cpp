@@ -9,6 +9,7 @@
 #include "redag/cli/analysis_explanation.hpp"
 #include "redag/cli/analysis_report.hpp"
 #include "redag/cli/commands.hpp"
+#include "redag/cli/options.hpp"
 #include "redag/cli/progress.hpp"
 #include "redag/cli/signals.hpp"
 #include "redag/cli/table.hpp"
@@ -18,10 +19,20 @@ namespace {
 
 struct Options {
   AnalysisArguments analysis;
+  std::string executor = "redag";
   std::string explain;
   bool methods = false;
   std::uint64_t explore = 0;  // states; 0: not asked for
 };
+
+const Choices<std::string> &executor_choices() {
+  static const Choices<std::string> kAll = [] {
+    Choices<std::string> all;
+    for (const sched::ExecutorKind &kind : sched::executors()) all.emplace_back(kind.name, kind.name);
+    return all;
+  }();
+  return kAll;
+}
 
 constexpr std::uint64_t kUsualStates = 1'000'000;
 
@@ -61,7 +72,7 @@ std::string is_positive_count(const std::string &text) {
 // With --explore and Ctrl-C, what the other methods say remains.
 Result<Analysed> analyse_configured(const Workload &workload, const Options &options, Console &console) {
   const analysis::AnalysisPlatform platform = platform_for(workload, options.analysis);
-  if (options.explore == 0) return analyse(workload, platform);
+  if (options.explore == 0) return analyse(workload, platform, nullptr, options.executor);
   const InterruptGuard guard;
   Progress progress(console);
   progress.set_label("explore");
@@ -89,6 +100,10 @@ int analyze_file(const Options &options, Console &console) {
     console.error("FILE is required", "only --methods does without, and not with --json");
     return kExitBad;
   }
+  if (options.explore > 0 && options.executor != "redag") {
+    console.error("--explore follows our executor alone, not '" + options.executor + "'", "leave one of the two out");
+    return kExitBad;
+  }
   const std::optional<Workload> workload = load_configured(options.analysis.run, console);
   if (!workload) return kExitBad;
   const Result<Analysed> analysed = analyse_configured(*workload, options, console);
@@ -106,6 +121,9 @@ int analyze_file(const Options &options, Console &console) {
 Action add_analyze(CLI::App &app) {
   auto options = std::make_shared<Options>();
   app.add_option("FILE", options->analysis.run.file, "Workload (YAML); - is standard input");
+  add_choice(app, "--executor", options->executor, executor_choices(),
+             "Under our executor, or the model of another one: what is known of its order")
+      ->default_str(options->executor);
   app.add_option("--explain", options->explain, "Where the bound of one task (dag.task) or DAG comes from")
       ->type_name("TASK");
   app.add_flag("--methods", options->methods,

@@ -16,7 +16,7 @@ BoundCheck check_bounds(const Session &session) {
   const trace::RunInfo &info = session.info;
   Workload workload = info.workload;
   workload.policy = info.config.policy;
-  const Result<Analysed> analysed = analyse(workload, analysis::platform_of(info.config));
+  const Result<Analysed> analysed = analyse(workload, analysis::platform_of(info.config), nullptr, info.executor);
   if (!analysed) {
     check.absent = to_string(analysed.error());
     return check;

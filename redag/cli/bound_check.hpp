@@ -30,8 +30,8 @@ struct BoundCheck {
   std::string absent;       // why some task, or all, have no bound; empty: all have one
 };
 
-/// Analyses the workload as it ran, without overheads. Responses are those of the whole trace, warm-up included.
-/// Requires a session of our own executor.
+/// Analyses the workload as it ran, under the executor that ran it, without overheads. Responses are those of the whole
+/// trace, warm-up included.
 [[nodiscard]] BoundCheck check_bounds(const Session &session);
 
 [[nodiscard]] std::string describe(const BoundCheck &check, std::size_t tasks, const StreamTraits &terminal);

@@ -14,10 +14,10 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 // 100 ms of it, in virtual time.
-Session simulated(const Workload &workload) {
+Session simulated(const Workload &workload, const std::string &executor = "redag") {
   SessionOptions options;
   options.duration = 100 * kMillisecond;
-  return run_session(workload, *parse_variant("redag"), options).value();
+  return run_session(workload, *parse_variant(executor), options).value();
 }
 
 Workload fast_and_slow() {
@@ -37,6 +37,18 @@ TEST(BoundCheck, ARunWithinItsBounds) {
   EXPECT_FALSE(check.rows[0].is_broken() || check.rows[1].is_broken());
   EXPECT_THAT(describe(check, 2, StreamTraits{}),
               HasSubstr("2 of 2 tasks have one; no response was above its bound, no execution above its wcet"));
+}
+
+// Against what is known of the executor that ran: 20 + 2 ms for both, and nothing that our priorities would promise.
+TEST(BoundCheck, ARunOfAnotherExecutor) {
+  Workload workload = fast_and_slow();
+  workload.dags[0].tasks[0].period = workload.dags[0].tasks[0].deadline = 50 * kMillisecond;
+  for (const char *executor : {"ste", "events"}) {
+    const BoundCheck check = check_bounds(simulated(workload, executor));
+    EXPECT_EQ(check.bounded, 2U) << executor << ": " << check.absent;
+    EXPECT_EQ(check.rows.at(0).bound, 22 * kMillisecond) << executor;
+    EXPECT_FALSE(check.rows.at(0).is_broken() || check.rows.at(1).is_broken()) << executor;
+  }
 }
 
 // Jobs executed for longer than what the bounds are told: both tasks answer too late, the second because of the first.

@@ -208,8 +208,10 @@ int compare(const Options &options, Console &console) {
 Action add_compare(CLI::App &app) {
   auto options = std::make_shared<Options>();
   add_workload_arguments(app, options->run);
-  app.add_option("--executors", options->executors,
-                 "What to compare: redag, redag-none, redag-cooperative, redag-os, mte, ste, mte-fifo, ste-fifo")
+  app.add_option(
+         "--executors", options->executors,
+         "What to compare: redag, redag-none, redag-cooperative, redag-os, mte, ste, static, events, cbg; mte-fifo, "
+         "ste-fifo, ...: on real-time threads")
       ->type_name("LIST")
       ->capture_default_str();
   add_count(

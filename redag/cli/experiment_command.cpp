@@ -1,10 +1,17 @@
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "redag/cli/commands.hpp"
 #include "redag/cli/experiment_run.hpp"
 #include "redag/cli/experiment_studies.hpp"
+#include "redag/cli/files.hpp"
+#include "redag/cli/json.hpp"
+#include "redag/experiment/factorial_recorded.hpp"
+#include "redag/trace/events_file.hpp"
+#include "redag/version.hpp"
 
 namespace redag::cli {
 namespace {
@@ -20,16 +27,72 @@ std::unique_ptr<Study> make_study(const std::string &plan, const std::string &fi
   return make_acceptance(plan, file, console);
 }
 
+// With recorded runs: the results of the experiment that they belong to, and they.
+Result<MergedUnits> add_recorded(MergedUnits merged, const std::vector<std::string> &places) {
+  Result<experiment::FactorialPlan> plan =
+      experiment::parse_factorial_plan(merged.plan, merged.plan_file, executors_of);
+  if (!plan) return tl::unexpected<Diagnostics>(std::move(plan.error()));
+  std::vector<experiment::RecordedRun> runs;
+  for (const std::string &place : places) {
+    const Result<std::vector<std::string>> traces = find_traces(place);
+    if (!traces) return tl::unexpected<Diagnostics>(traces.error());
+    for (const std::string &file : *traces) {
+      const Result<trace::Trace> trace = trace::read_trace(file);
+      if (!trace) return tl::unexpected<Diagnostics>(trace.error());
+      if (trace->info.driver == trace::Driver::Ros) continue;  // the scheduler's own, beside the nodes'
+      runs.push_back(experiment::record(file, *trace, *plan));
+    }
+  }
+  Result<experiment::FactorialUnits> all = experiment::with_recorded({std::move(*plan), std::move(merged.units)}, runs);
+  if (!all) return tl::unexpected<Diagnostics>(std::move(all.error()));
+  merged.plan = to_yaml(all->plan);
+  merged.units = std::move(all->units);
+  for (const experiment::RecordedRun &run : runs) {
+    const trace::Machine &machine = run.info.machine;
+    merged.runs.push_back(Json{
+        {"event", "recorded"},
+        {"file", run.file},
+        {"machine", {{"cpus", machine.cpus}, {"kernel", machine.kernel}, {"model", machine.model}}},
+        {"version", kVersion},
+        {"jobs", 1}}.dump(-1, ' ', false, Json::error_handler_t::replace));
+  }
+  return merged;
+}
+
+// Folders without a plan hold recorded runs.
+int merge(const MergeSettings &settings, Console &console) {
+  std::vector<std::string> experiments;
+  std::vector<std::string> recorded;
+  for (const std::string &folder : settings.folders) {
+    const bool has_plan = std::filesystem::exists(folder + "/plan.yaml");
+    const bool has_runs = !has_plan && find_traces(folder).has_value();
+    (has_runs ? recorded : experiments).push_back(folder);
+  }
+  if (experiments.empty()) {
+    console.error("recorded runs alone are no experiment", "name the folder of the one that they belong to, too");
+    return kExitBad;
+  }
+  Result<MergedUnits> merged = read_merged(experiments);
+  if (merged && !recorded.empty()) merged = add_recorded(std::move(*merged), recorded);
+  if (!merged) {
+    console.note(merged.error());
+    return kExitBad;
+  }
+  return merge_studies(*merged, settings.output, make_study, console);
+}
+
 Action add_merge(CLI::App &app) {
   const auto settings = std::make_shared<MergeSettings>();
-  app.add_option("DIR", settings->folders, "Folders of the shards (--out); the same plan in all")
+  app.add_option("DIR", settings->folders,
+                 "Folders of the shards (--out), the same plan in all; folders of run_workload, whose runs are added")
       ->type_name("DIR")
       ->required();
-  add_study_output(app, settings->output, "-o,--out", "Folder for the whole");
-  app.get_option("--out")->required();
-  app.footer("Examples:\n  redag experiment merge results/dags-1 results/dags-2 results/dags-3 --out results/dags\n");
-  return
-      [settings](Console &console) { return merge_studies(settings->folders, settings->output, make_study, console); };
+  add_study_output(app, settings->output, "-o,--out", "Folder for the whole")->required();
+  app.footer(
+      "Examples:\n"
+      "  redag experiment merge results/dags-1 results/dags-2 results/dags-3 --out results/dags\n"
+      "  redag experiment merge results/simulated results/recorded_with_ros --out results/both\n");
+  return [settings](Console &console) { return merge(*settings, console); };
 }
 
 }  // namespace

@@ -150,10 +150,11 @@ class StudyRun {
 
 }  // namespace
 
-void add_study_output(CLI::App &app, StudyOutput &output, const std::string &names, const std::string &help) {
-  app.add_option(names, output.folder, help)->type_name("DIR");
+CLI::Option *add_study_output(CLI::App &app, StudyOutput &output, const std::string &names, const std::string &help) {
+  CLI::Option *folder = app.add_option(names, output.folder, help)->type_name("DIR");
   app.add_flag("--force", output.force, "Write into a folder that holds other files");
   app.add_flag("--json", output.json, "Write one JSON document to standard output, and nothing else");
+  return folder;
 }
 
 void add_study_settings(CLI::App &app, StudySettings &settings) {
@@ -172,31 +173,35 @@ int run_study(Study &study, const StudySettings &settings, Console &console) {
   return StudyRun(study, settings, console).run();
 }
 
-int merge_studies(const std::vector<std::string> &folders, const StudyOutput &output, const StudyMaker &make,
-                  Console &console) {
+Result<MergedUnits> read_merged(const std::vector<std::string> &folders) {
+  Result<std::string> text = experiment::read_plan(folders.front());
+  if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
+  Result<std::vector<FinishedUnit>> units = experiment::read_folders(folders, *text);
+  if (!units) return tl::unexpected<Diagnostics>(std::move(units.error()));
+  return MergedUnits{std::move(*text), folders.front() + "/plan.yaml", std::move(*units),
+                     experiment::read_runs(folders)};
+}
+
+int merge_studies(const MergedUnits &merged, const StudyOutput &output, const StudyMaker &make, Console &console) {
   const std::string &folder = output.folder;
-  const Result<std::string> text = experiment::read_plan(folders.front());
-  if (!ok(text, console)) return kExitBad;
-  const std::unique_ptr<Study> study = make(*text, folders.front() + "/plan.yaml", console);
+  const std::unique_ptr<Study> study = make(merged.plan, merged.plan_file, console);
   if (study == nullptr) return kExitBad;
-  const Result<std::vector<FinishedUnit>> units = experiment::read_folders(folders, *text);
-  if (!ok(units, console)) return kExitBad;
-  for (const FinishedUnit &unit : *units) {
+  for (const FinishedUnit &unit : merged.units) {
     if (!ok(study->add(unit.unit, unit.result), console)) return kExitBad;
   }
   if (!ok(prepare_folder(folder, output.force), console)) return kExitBad;
-  Result<Journal> journal = experiment::open_folder(folder, *text);
+  Result<Journal> journal = experiment::open_folder(folder, merged.plan);
   if (!ok(journal, console)) return kExitBad;
   if (!journal->found().empty()) {
     console.error(fmt::format("{} holds results already", folder),
                   "merge into a new folder, or name it as a source too");
     return kExitBad;
   }
-  for (const FinishedUnit &unit : *units) {
+  for (const FinishedUnit &unit : merged.units) {
     if (!ok(journal->append(unit.unit, unit.result), console)) return kExitBad;
   }
   if (!ok(journal->sync(), console)) return kExitBad;
-  if (!ok(experiment::add_runs(folder, experiment::read_runs(folders)), console)) return kExitBad;
+  if (!ok(experiment::add_runs(folder, merged.runs), console)) return kExitBad;
   if (study->done() < study->unit_count()) {
     console.warn(fmt::format("{} of {} {} are in none of the folders", study->unit_count() - study->done(),
                              study->unit_count(), study->units_are()),

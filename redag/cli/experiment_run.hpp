@@ -10,6 +10,7 @@
 
 #include "redag/cli/console.hpp"
 #include "redag/cli/experiment_study.hpp"
+#include "redag/experiment/journal.hpp"
 #include "redag/experiment/shard.hpp"
 
 namespace redag::cli {
@@ -19,7 +20,8 @@ struct StudyOutput {
   bool force = false;
   bool json = false;
 };
-void add_study_output(CLI::App &app, StudyOutput &output, const std::string &names, const std::string &help);
+/// Returns the option of the folder.
+CLI::Option *add_study_output(CLI::App &app, StudyOutput &output, const std::string &names, const std::string &help);
 
 struct StudySettings {
   std::uint32_t jobs = 0;  // 0: one a processor
@@ -36,8 +38,18 @@ void add_study_settings(CLI::App &app, StudySettings &settings);
 using StudyMaker =
     std::function<std::unique_ptr<Study>(const std::string &plan, const std::string &file, Console &console)>;
 
-/// Puts the units of several folders into a new one. Returns the exit status.
-[[nodiscard]] int merge_studies(const std::vector<std::string> &folders, const StudyOutput &output,
-                                const StudyMaker &make, Console &console);
+/// Finished units of several folders, to become those of a new one.
+struct MergedUnits {
+  std::string plan;
+  std::string plan_file;  // what messages call it
+  std::vector<experiment::FinishedUnit> units;
+  std::vector<std::string> runs;  // lines of runs.jsonl
+};
+/// Of folders with one plan.
+[[nodiscard]] Result<MergedUnits> read_merged(const std::vector<std::string> &folders);
+
+/// Writes them into the folder of `output`. Returns the exit status.
+[[nodiscard]] int merge_studies(const MergedUnits &merged, const StudyOutput &output, const StudyMaker &make,
+                                Console &console);
 
 }  // namespace redag::cli

@@ -4,9 +4,11 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "redag/cli/commands.hpp"
 #include "redag/cli/experiment_study.hpp"
+#include "redag/experiment/factorial_plan.hpp"
 
 namespace redag::cli {
 
@@ -15,6 +17,8 @@ namespace redag::cli {
                                                      Console &console);
 
 [[nodiscard]] Action add_factorial(CLI::App &app);
+/// What plans can name (experiment::ExecutorNames).
+[[nodiscard]] std::vector<std::string> executors_of(experiment::World world);
 [[nodiscard]] std::unique_ptr<Study> make_factorial(const std::string &plan, const std::string &file, Console &console);
 
 }  // namespace redag::cli

@@ -45,8 +45,6 @@ Result<FinishedRun> drive(const PlannedRun &planned, const std::string &program)
   return FinishedRun{std::move(session->trace), std::move(session->summary), std::move(session->check)};
 }
 
-std::vector<std::string> executors_of(World world) { return world == World::Ros2 ? ros2_executors() : variant_names(); }
-
 class FactorialStudy final : public Study {
  public:
   explicit FactorialStudy(FactorialPlan plan, const std::string &ros2_program = {})
@@ -57,7 +55,7 @@ class FactorialStudy final : public Study {
   [[nodiscard]] const char *units_are() const override { return "runs"; }
   [[nodiscard]] std::string plan() const override { return to_yaml(factorial_.plan()); }
   [[nodiscard]] std::uint64_t unit_count() const override { return factorial_.unit_count(); }
-  [[nodiscard]] bool takes_turns() const override { return factorial_.plan().world != World::Simulator; }
+  [[nodiscard]] bool takes_turns() const override { return needs_machine(factorial_.plan()); }
 
   /// On a real machine no executor always comes first, when the machine is coldest or quietest.
   void arrange(std::vector<std::uint64_t> &units) const override {
@@ -127,7 +125,7 @@ Action add_factorial(CLI::App &app) {
       console.note(plan.error());
       return kExitBad;
     }
-    if (plan->world != World::Simulator) {
+    if (needs_machine(*plan)) {
       if (settings->shard.count > 1) {
         console.error("--shard: real runs belong to one machine", "give each machine a plan and a folder");
         return kExitBad;
@@ -138,6 +136,8 @@ Action add_factorial(CLI::App &app) {
     return run_study(study, *settings, console);
   };
 }
+
+std::vector<std::string> executors_of(World world) { return world == World::Ros2 ? ros2_executors() : variant_names(); }
 
 std::unique_ptr<Study> make_factorial(const std::string &plan, const std::string &file, Console &console) {
   Result<FactorialPlan> read = experiment::parse_factorial_plan(plan, file, executors_of);

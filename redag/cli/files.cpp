@@ -91,14 +91,14 @@ bool is_result_name(std::string_view name) {
   if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
     name = name.substr(0, at);
   }
-  constexpr std::array<std::string_view, 22> kNames = {"jobs.csv",       "summary.json",     "trace.json",
+  constexpr std::array<std::string_view, 23> kNames = {"jobs.csv",       "summary.json",     "trace.json",
                                                        "events.jsonl",   "workload.yaml",    "comparison.json",
                                                        "comparison.csv", "comparison.html",  "report.html",
                                                        "check.json",     "plan.yaml",        "units.csv",
                                                        "runs.jsonl",     "acceptance.csv",   "acceptance.json",
                                                        "acceptance.svg", "factorial.csv",    "factorial.json",
                                                        "factorial.svg",  "observations.csv", "response_quantiles.csv",
-                                                       "responses.svg"};
+                                                       "responses.svg",  "distance.svg"};
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
   // Folders of a comparison: one an executor, in it one a repetition; and what `generate` writes.
   const std::vector<std::string> &executors = variant_names();

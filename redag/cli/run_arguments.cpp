@@ -6,6 +6,7 @@
 #include "redag/cli/options.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag/trace/trace.hpp"
 
 namespace redag::cli {
 namespace {
@@ -30,7 +31,8 @@ void add_overhead_arguments(CLI::App &app, sim::Overheads &overheads, const std:
 void add_workload_arguments(CLI::App &app, RunArguments &arguments) {
   app.add_option("FILE", arguments.file, "Workload (YAML); - is standard input")->required();
   add_duration(app, "--duration", arguments.duration, "Releases happen in this time; jobs may still be running then");
-  add_duration(app, "--warmup", arguments.warm_up, "Jobs released in this time at the start are not counted", true);
+  add_duration(app, "--warm-up", arguments.warm_up, "Jobs released in this time at the start are not counted", true);
+  add_duration(app, "--warmup", arguments.warm_up, "As it was called", true)->group("");  // not in --help
   add_count(app, "--seed", arguments.seed, "Of execution times and jitter: every executor gets the same jobs");
   add_platform_arguments(app, arguments);
 }
@@ -59,6 +61,8 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments) {
       ->group(group);
   app.add_flag("--mlockall", arguments.lock_memory, "Lock the memory: no page faults during the run")->group(group);
   app.add_flag("--realtime", arguments.realtime_threads, "SCHED_FIFO threads, also for executors that do not preempt")
+      ->group(group);
+  add_duration(app, "--watchdog", arguments.watchdog, "Say which jobs are in progress for longer, while they are")
       ->group(group);
 }
 
@@ -95,6 +99,12 @@ std::optional<SessionOptions> session_options(const RunArguments &arguments, tra
   options.lock_memory = arguments.lock_memory;
   options.realtime_threads = arguments.realtime_threads;
   options.live = arguments.live;
+  options.watchdog = arguments.watchdog.value_or(0);
+  if (options.duration > trace::kMaxTraceTime) {
+    console.error(fmt::format("a run of {} is longer than a trace can be", format_duration(options.duration)),
+                  "the longest is " + format_duration(trace::kMaxTraceTime));
+    return std::nullopt;
+  }
   if (options.warm_up >= options.duration) {
     console.error(fmt::format("the warm-up of {} leaves nothing of a run of {}", format_duration(options.warm_up),
                               format_duration(options.duration)));

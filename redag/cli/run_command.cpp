@@ -10,7 +10,7 @@ Action add_run(CLI::App &app) {
   auto arguments = std::make_shared<RunArguments>();
   auto executor = std::make_shared<std::string>("redag");
   add_workload_arguments(app, *arguments);
-  app.add_option("--executor", *executor, "As in simulate, also mte-fifo and ste-fifo: those on real-time threads")
+  app.add_option("--executor", *executor, "As in simulate, also mte-fifo, ste-fifo, ...: those on real-time threads")
       ->type_name("NAME")
       ->capture_default_str();
   add_result_arguments(app, *arguments);

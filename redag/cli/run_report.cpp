@@ -114,10 +114,8 @@ std::string dag_table(const Session &session, const StreamTraits &terminal) {
   return table.render(terminal.width, terminal.colour);
 }
 
-// Bounds are for our own scheduler; its simulation is held to them by the property tests.
-bool has_bounds(const Session &session) {
-  return session.info.driver == trace::Driver::Threads && session.info.executor == "redag";
-}
+// A simulation is held to them by the property tests.
+bool has_bounds(const Session &session) { return session.info.driver == trace::Driver::Threads; }
 
 std::string headline(const Session &session) {
   const trace::RunInfo &info = session.info;

@@ -98,10 +98,10 @@ bool Screen::draw(const std::vector<std::string> &lines) {
   const std::size_t room = std::min(lines.size(), size().lines);
   std::string text = "\033[H";
   for (std::size_t i = 0; i < room; ++i) {
-    text += lines[i] + "\033[K";
-    if (i + 1 < room) text += "\r\n";
+    // Erased first: after a line as wide as the terminal the cursor is still on its last character.
+    const bool last = i + 1 == room;
+    text += (last ? "\033[J" : "\033[K") + lines[i] + (last ? "" : "\r\n");
   }
-  text += "\033[J";
   return write_all(text);
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "redag/analysis/analyze.hpp"
+#include "redag/analysis/executors.hpp"
 #include "redag/base/check.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/runtime/run_workload.hpp"
@@ -109,17 +110,13 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, const
 std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant, const sched::Config &config) {
   constexpr std::size_t kMostTasks = 100;
   std::vector<Duration> bounds(workload.task_count(), 0);
-  if (variant.executor != "redag" || bounds.size() > kMostTasks) return bounds;
+  if (bounds.size() > kMostTasks) return bounds;
   Workload configured = workload;
   for (Dag &dag : configured.dags) inherit_periods(dag);
-  analysis::AnalysisPlatform platform;
-  platform.workers = config.workers;
-  platform.preemption = config.preemption;
-  platform.levels = config.levels;
-  platform.max_started = config.max_started;
-  const Result<analysis::System> system = analysis::compile(configured, platform);
+  const sched::ExecutorKind &executor = *sched::find_executor(variant.executor);
+  const Result<analysis::System> system = analysis::compile_for(executor, configured, analysis::platform_of(config));
   if (!system || !system->not_analysable.empty()) return bounds;
-  const analysis::Report report = analysis::analyze(*system);
+  const analysis::Report report = analysis::analyze(*system, analysis::methods_of(executor));
   for (std::size_t t = 0; t < bounds.size(); ++t) bounds[t] = report.tasks[t].response.value_or(0);
   return bounds;
 }
@@ -137,6 +134,8 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   run.cpus = options.cpus;
   run.stop = options.stop;
   run.live = options.live;
+  if (options.watchdog > 0) run.watchdog = runtime::WatchdogOptions{{options.watchdog, 0}, 10 * kMillisecond};
+  run.on_overdue = options.on_overdue;
   run.bounds = [&](const sched::Config &config) { return bounds_of(workload, variant, config); };
   run.scheduler = [&](const Workload &w, const sched::Config &config) {
     return sched::make_scheduler(variant.executor, w, config);
@@ -161,6 +160,11 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   session.stopped = result->stopped;
   session.realtime_threads = run.realtime_threads || result->mode.mode == PreemptionMode::Os;
   session.warnings = std::move(result->warnings);
+  if (!result->overdue.empty()) {
+    session.warnings.push_back(fmt::format("{} job{} in progress for more than {}", result->overdue.size(),
+                                           result->overdue.size() == 1 ? " was" : "s were",
+                                           format_duration(options.watchdog)));
+  }
   return session;
 }
 

@@ -33,7 +33,9 @@ struct SessionOptions {
   std::vector<int> cpus;                    // threads, as the two below
   bool lock_memory = false;
   bool realtime_threads = false;
-  bool live = false;  // `redag top` sees the run
+  bool live = false;      // `redag top` sees the run
+  Duration watchdog = 0;  // jobs in progress for longer are named, at once to `on_overdue`; 0: none
+  std::function<void(const std::string &text)> on_overdue;
 };
 
 /// Deadline misses while a run goes on, by DAG: jobs that finished late, were skipped or aborted. An estimate for the

@@ -10,7 +10,8 @@ Action add_simulate(CLI::App &app) {
   auto arguments = std::make_shared<RunArguments>();
   auto executor = std::make_shared<std::string>("redag");
   add_workload_arguments(app, *arguments);
-  app.add_option("--executor", *executor, "redag, redag-none, redag-cooperative, redag-os, mte or ste")
+  app.add_option("--executor", *executor,
+                 "redag, redag-none, redag-cooperative, redag-os, mte, ste, static, events or cbg")
       ->type_name("NAME")
       ->capture_default_str();
   add_result_arguments(app, *arguments);

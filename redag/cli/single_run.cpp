@@ -16,6 +16,10 @@ Result<Session> run_interruptibly(const Workload &workload, const Variant &varia
   options.stop = &InterruptGuard::flag();
   Progress progress(console);
   progress.set_label(variant.name);
+  options.on_overdue = [&](const std::string &text) {
+    progress.clear();
+    console.warn(text);
+  };
   return run_session(workload, variant, options, progress_hook(progress, workload, options.duration));
 }
 

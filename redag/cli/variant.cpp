@@ -3,12 +3,20 @@
 #include <algorithm>
 
 #include "redag/cli/options.hpp"
+#include "redag/sched/executors.hpp"
 
 namespace redag::cli {
 
 const std::vector<std::string> &variant_names() {
-  static const std::vector<std::string> kNames = {"redag", "redag-none", "redag-cooperative", "redag-os",
-                                                  "mte",   "ste",        "mte-fifo",          "ste-fifo"};
+  static const std::vector<std::string> kNames = [] {
+    std::vector<std::string> names = {"redag", "redag-none", "redag-cooperative", "redag-os"};
+    for (const char *threads : {"", "-fifo"}) {
+      for (const sched::ExecutorKind &kind : sched::executors()) {
+        if (!kind.ours) names.push_back(std::string(kind.name) + threads);
+      }
+    }
+    return names;
+  }();
   return kNames;
 }
 

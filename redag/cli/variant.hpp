@@ -1,6 +1,6 @@
 // An executor as the command line names it: which scheduler, which preemption, which threads. "redag", "redag-none",
-// "redag-cooperative", "redag-os"; "mte" and "ste" (rclcpp's multi- and single-threaded executors), and "mte-fifo" and
-// "ste-fifo", the same on real-time threads. Pure.
+// "redag-cooperative", "redag-os"; the models of other executors, "mte", "ste", ..., and "mte-fifo", "ste-fifo", ...,
+// the same on real-time threads. Pure.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ namespace redag::cli {
 
 struct Variant {
   std::string name;                          // as it was written
-  std::string executor;                      // "redag", "mte", "ste"
+  std::string executor;                      // of sched::executors()
   std::optional<PreemptionMode> preemption;  // instead of the workload's; peers: none
   bool realtime_threads = false;
 

@@ -88,6 +88,8 @@ TEST(AcceptancePlan, WhatMakesNoSense) {
   EXPECT_THAT(errors_of(head + "dags: 2\nworkload: {tasks: 1}\n"), HasSubstr("plan.yaml:3:11: error: 2 DAGs"));
   EXPECT_THAT(errors_of("name: x\n"), HasSubstr("experiment is missing"));
   EXPECT_THAT(errors_of("experiment: figure\n"), HasSubstr("unknown experiment 'figure'"));
+  EXPECT_THAT(errors_of("experiment: factorial\n"), HasSubstr("it is a plan of 'redag experiment factorial'"));
+  EXPECT_THAT(errors_of("sets: 1\n"), HasSubstr("say 'experiment: acceptance'"));
   EXPECT_THAT(errors_of(""), HasSubstr("there is no plan in it"));
 }
 

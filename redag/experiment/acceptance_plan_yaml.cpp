@@ -28,25 +28,12 @@ class Reader : private PlanReader {
   Reader(const Node &root, std::string file) : PlanReader(std::move(file)), root_(root) {}
 
   Result<AcceptancePlan> run() {
-    if (root_.kind == Node::Kind::Null) {
-      error(Node{}, "there is no plan in it", "the smallest is 'experiment: acceptance': see docs/experiments.md");
-    } else if (check_map(root_, "a plan", kTopKeys)) {
-      read();
-      if (diagnostics_.empty()) look_at_the_whole();
-    }
-    if (Diagnostics found = take_diagnostics(); !found.empty()) return tl::unexpected<Diagnostics>(std::move(found));
-    return std::move(plan_);
+    return read_plan(
+        root_, "acceptance", kTopKeys, plan_, [this] { read(); }, [this] { return find_mistakes(plan_); });
   }
 
  private:
   void read() {
-    const Node *kind = find(root_, "experiment");
-    if (kind == nullptr) {
-      error(root_, "experiment is missing", "say 'experiment: acceptance'");
-    } else if (kind->text != "acceptance") {
-      error(*kind, fmt::format("unknown experiment {}", describe(*kind)),
-            kind->text == "factorial" ? "it is a plan of 'redag experiment factorial'" : "known: acceptance");
-    }
     take_text(root_, "name", plan_.name);
     take_seed(root_, plan_.seed);
     take_count(root_, "sets", plan_.sets, 1);
@@ -73,13 +60,6 @@ class Reader : private PlanReader {
     if (node == nullptr || !check_map(*node, "simulation", {"offsets", "periods"})) return;
     take_count(*node, "offsets", plan_.simulation.offsets, 0);
     take_count(*node, "periods", plan_.simulation.periods, 1);
-  }
-
-  void look_at_the_whole() {
-    for (const PlanMistake &mistake : find_mistakes(plan_)) {
-      const Node *node = find(root_, mistake.key);
-      error(node != nullptr ? *node : root_, mistake.message, mistake.hint);
-    }
   }
 
   const Node &root_;

@@ -143,8 +143,9 @@ Result<PlannedRun> Factorial::planned_run(std::uint64_t unit) const {
   }
   PlannedRun run;
   run.workload = std::move(*workload);
-  run.executor = plan_.executors[point.of(FactorKind::Executor)];
-  run.world = plan_.world;
+  ExecutorPlace place = place_of(plan_, plan_.executors[point.of(FactorKind::Executor)]);
+  run.executor = std::move(place.name);
+  run.world = place.world;
   run.seed = derive_seed(plan_.seed, {point.of(FactorKind::Workload), repetition_of(unit)});
   run.duration = plan_.duration;
   run.warm_up = plan_.warm_up;

@@ -122,6 +122,9 @@ Result<void> write_results(const std::string &folder, const Factorial &factorial
     files.emplace_back("response_quantiles.csv", quantiles_csv(factorial, results));
     files.emplace_back("responses.svg", responses_svg(factorial, results));
   }
+  if (std::optional<std::string> distance = distance_svg(factorial, results)) {
+    files.emplace_back("distance.svg", std::move(*distance));
+  }
   for (const auto &[name, text] : files) {
     Result<trace::OutputFile> file = trace::OutputFile::create(fmt::format("{}/{}", folder, name));
     if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));

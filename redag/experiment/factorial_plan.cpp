@@ -1,6 +1,7 @@
 #include "redag/experiment/factorial_plan.hpp"
 
 #include <algorithm>
+#include <array>
 #include <set>
 #include <string>
 #include <utility>
@@ -9,6 +10,7 @@
 
 #include "redag/experiment/plan_yaml.hpp"
 #include "redag/model/workload_yaml_nearest.hpp"
+#include "redag/sched/executors.hpp"
 
 namespace redag::experiment {
 namespace {
@@ -33,12 +35,21 @@ std::string bounds_text(const std::vector<std::uint32_t> &bounds) {
   return text;
 }
 
-bool is_redag(std::string_view executor) { return executor.substr(0, executor.find('-')) == "redag"; }
+constexpr std::array kWorlds = {World::Simulator, World::Threads, World::Ros2};
+
+// "redag" of "ros2/redag-none".
+std::string_view family_of(std::string_view executor) {
+  executor.remove_prefix(executor.find('/') + 1);  // npos + 1 is 0
+  return executor.substr(0, executor.find('-'));
+}
+
+bool is_redag(std::string_view executor) { return family_of(executor) == "redag"; }
 
 // Does this factor change anything for this executor?
 bool applies(const FactorialPlan &plan, FactorKind kind, std::string_view executor) {
-  const std::string_view family = executor.substr(0, executor.find('-'));
-  const bool has_workers = family != kUnlimited && family != "ste" && family != "static" && family != "events";
+  const std::string_view family = family_of(executor);
+  const sched::ExecutorKind *kind_of = sched::find_executor(family);
+  const bool has_workers = family != kUnlimited && (kind_of == nullptr || !kind_of->single_worker);
   switch (kind) {
     case FactorKind::Policy:
     case FactorKind::MaxActive: return is_redag(executor);
@@ -50,7 +61,7 @@ bool applies(const FactorialPlan &plan, FactorKind kind, std::string_view execut
 
 class Checker {
  public:
-  Checker(const FactorialPlan &plan, const ExecutorNames &executors) : plan_(plan), executors_(executors(plan.world)) {}
+  Checker(const FactorialPlan &plan, const ExecutorNames &executors) : plan_(plan), executors_(executors) {}
 
   std::vector<PlanMistake> run() {
     if (!is_plan_name(plan_.name)) say("name", "a name has letters, digits, - and _, and at least one of them");
@@ -102,23 +113,27 @@ class Checker {
   }
 
   void check_executors() {
-    std::vector<std::string_view> known = {kIdeal, kUnlimited};
-    known.insert(known.end(), executors_.begin(), executors_.end());
-    for (const std::string &name : plan_.executors) {
-      if (std::find(known.begin(), known.end(), name) == known.end()) {
-        const std::string_view near = yaml::nearest(name, known);
-        say("executors", fmt::format("there is no executor '{}'", name),
-            near.empty() ? fmt::format("known: {}", fmt::join(known, ", ")) : fmt::format("did you mean '{}'?", near));
-      } else if (plan_.world == World::Simulator && name.ends_with("-fifo")) {
-        say("executors",
-            fmt::format("the simulator has no threads: '{}' is '{}' there", name, name.substr(0, name.find('-'))));
-      }
-    }
+    for (const std::string &written : plan_.executors) check_executor(written);
     const bool any_bounded = std::any_of(plan_.executors.begin(), plan_.executors.end(),
                                          [](const std::string &name) { return is_redag(name); });
     for (const auto &[key, given] : {std::pair<const char *, bool>{"policies", !plan_.policies.empty()},
                                      {"max_active", !plan_.max_active.empty()}}) {
       if (given && !any_bounded) say(key, fmt::format("{} mean nothing to the executors of this plan", key));
+    }
+  }
+
+  void check_executor(const std::string &written) {
+    const auto [world, name] = place_of(plan_, written);
+    const std::vector<std::string> of_world = executors_(world);
+    std::vector<std::string_view> known(of_world.begin(), of_world.end());
+    if (name == written) known.insert(known.begin(), {kIdeal, kUnlimited});
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      const std::string_view near = yaml::nearest(name, known);
+      say("executors", fmt::format("there is no executor '{}'", written),
+          near.empty() ? fmt::format("known: {}", fmt::join(known, ", ")) : fmt::format("did you mean '{}'?", near));
+    } else if (world == World::Simulator && name.ends_with("-fifo")) {
+      say("executors",
+          fmt::format("the simulator has no threads: '{}' is '{}' there", name, name.substr(0, name.find('-'))));
     }
   }
 
@@ -140,7 +155,7 @@ class Checker {
   }
 
   const FactorialPlan &plan_;
-  const std::vector<std::string> executors_;
+  const ExecutorNames &executors_;
   std::vector<PlanMistake> mistakes_;
 };
 
@@ -153,6 +168,23 @@ const char *to_string(World world) {
     case World::Ros2: return "ros2";
   }
   return "?";
+}
+
+ExecutorPlace place_of(const FactorialPlan &plan, const std::string &executor) {
+  const std::size_t slash = executor.find('/');
+  for (const World world : kWorlds) {
+    if (slash != std::string::npos && executor.substr(0, slash) == to_string(world)) {
+      return {world, executor.substr(slash + 1)};
+    }
+  }
+  return {plan.world, executor};
+}
+
+bool needs_machine(const FactorialPlan &plan) {
+  return std::any_of(plan.executors.begin(), plan.executors.end(), [&](const std::string &executor) {
+    const auto [world, name] = place_of(plan, executor);
+    return world != World::Simulator && name != kIdeal && name != kUnlimited;
+  });
 }
 
 const char *to_string(FactorKind kind) {

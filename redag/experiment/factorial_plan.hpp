@@ -63,6 +63,15 @@ struct FactorialPlan {
   std::vector<std::vector<std::uint32_t>> max_active;
 };
 
+/// An executor as plans write it: "mte", in the plan's world, or "ros2/mte", in that one.
+struct ExecutorPlace {
+  World world = World::Simulator;
+  std::string name;
+};
+[[nodiscard]] ExecutorPlace place_of(const FactorialPlan &plan, const std::string &executor);
+/// Does any of the plan's executors really run, so that only one can at a time?
+[[nodiscard]] bool needs_machine(const FactorialPlan &plan);
+
 enum class FactorKind : std::uint8_t {
   Workload,
   Policy,

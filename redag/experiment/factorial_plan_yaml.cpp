@@ -30,25 +30,12 @@ class Reader : private PlanReader {
       : PlanReader(std::move(file)), root_(root), executors_(executors) {}
 
   Result<FactorialPlan> run() {
-    if (root_.kind == Node::Kind::Null) {
-      error(Node{}, "there is no plan in it", "see docs/experiments.md");
-    } else if (check_map(root_, "a plan", kTopKeys)) {
-      read();
-      if (diagnostics_.empty()) look_at_the_whole();
-    }
-    if (Diagnostics found = take_diagnostics(); !found.empty()) return tl::unexpected<Diagnostics>(std::move(found));
-    return std::move(plan_);
+    return read_plan(
+        root_, "factorial", kTopKeys, plan_, [this] { read(); }, [this] { return find_mistakes(plan_, executors_); });
   }
 
  private:
   void read() {
-    const Node *kind = find(root_, "experiment");
-    if (kind == nullptr) {
-      error(root_, "experiment is missing", "say 'experiment: factorial'");
-    } else if (kind->text != "factorial") {
-      error(*kind, fmt::format("unknown experiment {}", describe(*kind)),
-            kind->text == "acceptance" ? "it is a plan of 'redag experiment acceptance'" : "known: factorial");
-    }
     take_text(root_, "name", plan_.name);
     take_enum(root_, "world", plan_.world, kWorlds);
     take_seed(root_, plan_.seed);
@@ -177,13 +164,6 @@ class Reader : private PlanReader {
     }
     for (std::uint32_t a = from; a <= to; ++a) {
       for (std::uint32_t b = from; b <= to; ++b) plan_.max_active.push_back({a, b});
-    }
-  }
-
-  void look_at_the_whole() {
-    for (const PlanMistake &mistake : find_mistakes(plan_, executors_)) {
-      const Node *node = find(root_, mistake.key);
-      error(node != nullptr ? *node : root_, mistake.message, mistake.hint);
     }
   }
 

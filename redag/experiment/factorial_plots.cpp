@@ -1,6 +1,9 @@
 // The plots of factorial_results.hpp.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -72,6 +75,17 @@ LinePlot::Panel panel_of(const Factorial &factorial, const FactorialResults &res
   return panel;
 }
 
+// The panel of that name, a new one at the end if there is none; nothing where there are too many.
+LinePlot::Panel *panel_named(LinePlot &plot, const std::string &title) {
+  const auto known = std::find_if(plot.panels.begin(), plot.panels.end(),
+                                  [&](const LinePlot::Panel &panel) { return panel.title == title; });
+  if (known != plot.panels.end()) return &*known;
+  if (plot.panels.size() == kMostPanels) return nullptr;
+  plot.panels.push_back(LinePlot::Panel{title, {}, {}, {}});
+  plot.panels.back().series.resize(plot.lines.size());
+  return &plot.panels.back();
+}
+
 // Share of the released jobs of a DAG that had answered by each time: what was dropped never does. Medians of the runs.
 std::vector<LinePlot::Value> answered(const FactorialRow &row, std::size_t dag) {
   std::vector<LinePlot::Value> curve;
@@ -122,6 +136,48 @@ std::string to_svg(const Factorial &factorial, const FactorialResults &results) 
   return experiment::to_svg(plot);
 }
 
+std::optional<std::string> distance_svg(const Factorial &factorial, const FactorialResults &results) {
+  const Factor &load = factorial.factors()[static_cast<std::size_t>(FactorKind::Utilization)];
+  if (load.levels.size() < 2) return std::nullopt;
+  const FactorialPlan &plan = factorial.plan();
+  LinePlot plot;
+  plot.title = fmt::format("{}: distance to the ideal", plan.name);
+  plot.subtitle = fmt::format(
+      "medians of {} runs of {}, each against the ideal on the same jobs; fewer misses than its are drawn as 0",
+      plan.repetitions, format_duration(plan.duration));
+  if (!results.complete()) plot.subtitle = fmt::format("{} of {} runs done", results.done, results.units);
+  plot.x_label = "utilization per worker";
+  plot.y_label = "missed above the ideal, of all releases";
+  // Of what the rest is measured against nothing is to be seen.
+  std::copy_if(plan.executors.begin(), plan.executors.end(), std::back_inserter(plot.lines),
+               [](const std::string &executor) { return executor != kIdeal && executor != kUnlimited; });
+  double largest = 0;
+  for (const FactorialRow &row : results.rows) {
+    if (row.runs.empty()) continue;
+    const std::size_t total = row.runs.front().dags.size() - 1;
+    const std::optional<Median> distance = median_of(factorial, results, row, total, Metric::ExcessMissRatio);
+    if (!distance) continue;
+    const FactorialPoint &point = factorial.points()[row.point];
+    const auto line = std::find(plot.lines.begin(), plot.lines.end(), plan.executors[point.of(FactorKind::Executor)]);
+    if (line == plot.lines.end()) continue;
+    FactorialPoint place = point;
+    place.level[static_cast<std::size_t>(FactorKind::Utilization)] = kNoLevel;
+    place.level.back() = kNoLevel;
+    LinePlot::Panel *panel = panel_named(plot, describe(plan, place).substr(9));
+    if (panel == nullptr) continue;
+    LinePlot::Value value{std::stod(load.levels[point.of(FactorKind::Utilization)]), std::max(0.0, distance->median),
+                          std::max(0.0, distance->low), std::max(0.0, distance->high)};
+    largest = std::max(largest, value.high);
+    panel->series[static_cast<std::size_t>(line - plot.lines.begin())].push_back(value);
+  }
+  if (plot.panels.empty()) return std::nullopt;
+  for (LinePlot::Panel &panel : plot.panels) {
+    for (const std::string &level : load.levels) panel.ticks.emplace_back(std::stod(level), level);
+  }
+  plot.y_end = std::min(1.0, round_up(largest));
+  return experiment::to_svg(plot);
+}
+
 std::string responses_svg(const Factorial &factorial, const FactorialResults &results) {
   const FactorialPlan &plan = factorial.plan();
   LinePlot plot;
@@ -138,14 +194,9 @@ std::string responses_svg(const Factorial &factorial, const FactorialResults &re
     place.level.back() = kNoLevel;
     for (std::size_t dag = 0; dag + 1 < row.runs.front().dags.size(); ++dag) {
       const std::string title = fmt::format("{}: {}", describe(plan, place).substr(9), row.runs.front().dags[dag].dag);
-      auto panel = std::find_if(plot.panels.begin(), plot.panels.end(),
-                                [&](const LinePlot::Panel &other) { return other.title == title; });
-      if (panel == plot.panels.end()) {
-        if (plot.panels.size() == kMostPanels) continue;
-        panel = plot.panels.insert(panel, LinePlot::Panel{title, {}, {}, {}});
-        panel->series.resize(plan.executors.size());
+      if (LinePlot::Panel *panel = panel_named(plot, title); panel != nullptr) {
+        panel->series[point.of(FactorKind::Executor)] = answered(row, dag);
       }
-      panel->series[point.of(FactorKind::Executor)] = answered(row, dag);
     }
   }
   for (LinePlot::Panel &panel : plot.panels) {

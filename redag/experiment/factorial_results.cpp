@@ -17,13 +17,13 @@ constexpr std::array<const char *, kMetricCount> kNames = {
     "max_lateness",      "paper_max_lateness", "response_mean",
     "response_p50",      "response_p95",       "response_p99",
     "response_max",      "deferred",           "preemptions",
-    "peak_active"};
+    "peak_active",       "finished_per_s",     "work"};
 
 double ratio(std::int64_t part, std::int64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-double value_of(const DagObservation &seen, Metric metric) {
+double value_of(const DagObservation &seen, Metric metric, Duration counted) {
   const auto per_release = [&](Measure measure) { return ratio(seen.of(measure), seen.of(Measure::Released)); };
   const auto plain = [&](Measure measure) { return static_cast<double>(seen.of(measure)); };
   switch (metric) {
@@ -43,9 +43,13 @@ double value_of(const DagObservation &seen, Metric metric) {
     case Metric::Deferred: return per_release(Measure::Deferred);
     case Metric::Preemptions: return per_release(Measure::Preemptions);
     case Metric::PeakActive: return plain(Measure::PeakActive);
+    case Metric::FinishedPerSecond: return plain(Measure::Finished) * kSecond / static_cast<double>(counted);
+    case Metric::Work: return plain(Measure::Work) / static_cast<double>(counted);
   }
   return 0;
 }
+
+Duration counted_of(const Factorial &factorial) { return factorial.plan().duration - factorial.plan().warm_up; }
 
 // The run of that repetition, if it is finished. Runs come in order of their repetition.
 const Observation *run_of(const FactorialRow &row, std::uint64_t repetition) {
@@ -101,12 +105,13 @@ std::optional<Median> median_of(const Factorial &factorial, const FactorialResul
   const std::optional<std::size_t> ideal =
       metric == Metric::ExcessMissRatio ? factorial.ideal_of(row.point) : std::nullopt;
   if (metric == Metric::ExcessMissRatio && !ideal) return std::nullopt;
+  const Duration counted = counted_of(factorial);
   for (std::size_t r = 0; r < row.runs.size(); ++r) {
-    double value = value_of(row.runs[r].dags[dag], metric);
+    double value = value_of(row.runs[r].dags[dag], metric, counted);
     if (ideal) {
       const Observation *best = run_of(results.rows[*ideal], row.repetition[r]);
-      if (best == nullptr) continue;
-      value -= value_of(best->dags[dag], metric);
+      if (best == nullptr || best->seed != row.runs[r].seed) continue;  // recorded runs can have other jobs
+      value -= value_of(best->dags[dag], metric, counted);
     }
     values.push_back(value);
   }
@@ -143,7 +148,8 @@ std::vector<FactorialEffects> effects_of(const Factorial &factorial, const Facto
       for (const FactorialRow *row : rows) {
         EffectCell cell;
         for (const FactorKind kind : one.factors) cell.level.push_back(factorial.points()[row->point].of(kind));
-        for (const Observation &run : row->runs) cell.results.push_back(value_of(run.dags.back(), Metric::MissRatio));
+        for (const Observation &run : row->runs)
+          cell.results.push_back(value_of(run.dags.back(), Metric::MissRatio, counted_of(factorial)));
         cells.push_back(std::move(cell));
       }
       one.effects = experiment::effects_of(counts, cells);

@@ -33,8 +33,10 @@ enum class Metric : std::uint8_t {
   Deferred,  // jobs, of all releases
   Preemptions,
   PeakActive,
+  FinishedPerSecond,  // jobs, of the time that counts
+  Work,               // time that jobs had a worker, by that time: processors in use
 };
-inline constexpr std::size_t kMetricCount = 16;
+inline constexpr std::size_t kMetricCount = 18;
 [[nodiscard]] const char *to_string(Metric metric);
 /// Durations are in ns.
 [[nodiscard]] bool is_duration(Metric metric);
@@ -96,9 +98,12 @@ class FactorialCounter {
 [[nodiscard]] std::string to_svg(const Factorial &factorial, const FactorialResults &results);
 /// A panel for each DAG at each combination (the first dozen): the distribution of responses, a line for each executor.
 [[nodiscard]] std::string responses_svg(const Factorial &factorial, const FactorialResults &results);
+/// Misses above the ideal's over utilization, a panel for each combination of the rest (the first dozen), a line for
+/// each executor. Nothing where no ideal ran, or utilization does not vary.
+[[nodiscard]] std::optional<std::string> distance_svg(const Factorial &factorial, const FactorialResults &results);
 
-/// Writes factorial.csv, .json, .svg, observations.csv, and, where the plan asks for quantiles, response_quantiles.csv
-/// and responses.svg.
+/// Writes factorial.csv, .json, .svg, observations.csv, where there is a distance to the ideal over utilization
+/// distance.svg, and where the plan asks for quantiles response_quantiles.csv and responses.svg.
 [[nodiscard]] Result<void> write_results(const std::string &folder, const Factorial &factorial,
                                          const FactorialResults &results);
 

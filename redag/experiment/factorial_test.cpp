@@ -11,7 +11,9 @@
 namespace redag::experiment {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 std::vector<std::string> executors_of(World /*world*/) { return {"redag", "redag-none", "mte", "ste"}; }
 
@@ -122,6 +124,15 @@ TEST(Factorial, IdealHasNoBoundsAndNoOverheads) {
   EXPECT_EQ(none.workload.dags[0].max_active, 1U);
 }
 
+// "plan" of the DAG "slow" takes 30 ms, ten times a second.
+TEST(Factorial, ThroughputIsOfTheTimeThatCounts) {
+  const Factorial factorial(plan_of("duration: 2s\nrepetitions: 1\nexecutors: [redag]"), simulate_run);
+  const FactorialResults results = run_all(factorial);
+  const auto of_slow = [&](Metric metric) { return median_of(factorial, results, results.rows[0], 1, metric)->median; };
+  EXPECT_DOUBLE_EQ(of_slow(Metric::FinishedPerSecond), 10);
+  EXPECT_DOUBLE_EQ(of_slow(Metric::Work), 0.3);
+}
+
 TEST(Factorial, RepetitionsHaveTheirOwnJobsTheSameForEveryExecutor) {
   const Factorial factorial(plan_of("repetitions: 2\nexecutors: [redag, mte]\nutilization: [0.5]\n"), simulate_run);
   EXPECT_EQ(planned(factorial, 0).seed, planned(factorial, 1).seed);
@@ -182,6 +193,20 @@ TEST(Factorial, ResultsAreMediansWithTheirDistanceToTheIdeal) {
   const std::vector<FactorialEffects> effects = effects_of(factorial, results);
   ASSERT_EQ(effects.size(), 2U);  // ideal and redag-none: to the others the number of workers means nothing
   EXPECT_GT(effects[1].effects.terms[0].share, 0.9);
+}
+
+TEST(Factorial, TheDistanceToTheIdealHasAPanelForEachNumberOfWorkers) {
+  const auto plot = [](const std::string &keys) {
+    const Factorial factorial(plan_of("duration: 1s\n" + keys), simulate_run);
+    return distance_svg(factorial, run_all(factorial));
+  };
+  const std::optional<std::string> svg =
+      plot("utilization: [0.5, 1.5]\nworkers: [1, 2]\nexecutors: [ideal, redag-none, ste]");
+  ASSERT_TRUE(svg);
+  EXPECT_THAT(*svg, AllOf(HasSubstr(">cart, workers 1<"), HasSubstr(">cart, workers 2<"), HasSubstr(">ste<")));
+  EXPECT_THAT(*svg, Not(HasSubstr(">ideal<")));
+  EXPECT_EQ(plot("utilization: [0.5, 1.5]\nexecutors: [redag, ste]"), std::nullopt) << "there is no ideal";
+  EXPECT_EQ(plot("executors: [ideal, ste]"), std::nullopt) << "nothing for the axis";
 }
 
 TEST(Factorial, UnfinishedResultsSayWhatTheyCan) {

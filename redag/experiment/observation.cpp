@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -20,10 +21,10 @@ using Json = nlohmann::ordered_json;
 using metrics::JobRecord;
 
 constexpr std::array<const char *, kMeasureCount> kNames = {
-    "released",          "finished",     "late",         "dropped",       "aborted",      "missed",
-    "deferred",          "preemptions",  "max_lateness", "response_mean", "response_p50", "response_p95",
-    "response_p99",      "response_max", "peak_active",  "paper_jobs",    "paper_late",   "paper_max_lateness",
-    "paper_startup_late"};
+    "released",           "finished",     "late",         "dropped",       "aborted",      "missed",
+    "deferred",           "preemptions",  "max_lateness", "response_mean", "response_p50", "response_p95",
+    "response_p99",       "response_max", "peak_active",  "paper_jobs",    "paper_late",   "paper_max_lateness",
+    "paper_startup_late", "work"};
 
 std::vector<Duration> quantiles_of(const trace::RunInfo &info, const std::vector<JobRecord> &jobs,
                                    const std::vector<TaskRef> &refs, std::optional<DagId> dag) {
@@ -39,6 +40,36 @@ std::vector<Duration> quantiles_of(const trace::RunInfo &info, const std::vector
   return quantiles;
 }
 
+// By task: the time that its jobs had a worker while the run counts. Also of jobs that were still running at its end:
+// of long jobs there, finished ones alone would show too little.
+std::vector<Duration> work_of(const trace::Trace &trace, std::size_t tasks) {
+  const Time begin = trace.info.start + trace.info.warm_up;
+  std::vector<Duration> work(tasks, 0);
+  std::map<std::pair<std::uint32_t, std::uint32_t>, Time> running;  // since when, by task and number
+  const auto stop = [&](std::uint32_t task, Time since, Time now) {
+    work[task] += std::max<Duration>(0, std::min(now, trace.info.end) - std::max(since, begin));
+  };
+  for (const JobEvent &event : trace.events) {
+    if (event.task.value >= tasks) continue;
+    const std::pair job(event.task.value, event.job);
+    switch (event.kind) {
+      case JobEventKind::Dispatched:
+      case JobEventKind::Resumed: running[job] = event.time; break;
+      case JobEventKind::Preempted:
+      case JobEventKind::Finished:
+      case JobEventKind::Aborted:
+        if (const auto at = running.find(job); at != running.end()) {
+          stop(job.first, at->second, event.kind == JobEventKind::Preempted ? event.time : event.value);
+          running.erase(at);
+        }
+        break;
+      default: break;
+    }
+  }
+  for (const auto &[job, since] : running) stop(job.first, since, trace.info.end);
+  return work;
+}
+
 }  // namespace
 
 const char *to_string(Measure measure) { return kNames[static_cast<std::size_t>(measure)]; }
@@ -48,6 +79,7 @@ Observation observe(const FinishedRun &run, const ObserveOptions &options) {
   const metrics::Summary &summary = run.summary;
   const std::vector<JobRecord> jobs = metrics::fold_jobs(info.workload, run.trace.events);
   const std::vector<TaskRef> refs = flatten(info.workload);
+  const std::vector<Duration> work = work_of(run.trace, refs.size());
 
   const auto describe = [&](const std::string &name, const metrics::JobStats &stats, std::uint32_t peak,
                             std::optional<DagId> dag) {
@@ -76,6 +108,9 @@ Observation observe(const FinishedRun &run, const ObserveOptions &options) {
     set(Measure::PaperLate, paper.late);
     set(Measure::PaperMaxLateness, paper.max_lateness.value_or(0));
     set(Measure::PaperStartupLate, metrics::paper_count(info.workload, jobs, options.paper_startup, dag).late);
+    Duration had_workers = 0;
+    for (const TaskRef &ref : refs) had_workers += !dag || ref.dag == *dag ? work[ref.id.value] : 0;
+    set(Measure::Work, had_workers);
     if (options.quantiles) row.quantiles = quantiles_of(info, jobs, refs, dag);
     return row;
   };

@@ -37,8 +37,9 @@ enum class Measure : std::uint8_t {
   PaperLate,
   PaperMaxLateness,
   PaperStartupLate,
+  Work,  // time that jobs had a worker, from the end of the warm-up to that of the run
 };
-inline constexpr std::size_t kMeasureCount = 19;
+inline constexpr std::size_t kMeasureCount = 20;
 [[nodiscard]] const char *to_string(Measure measure);
 
 /// Of the response times, where the plan asks for it.

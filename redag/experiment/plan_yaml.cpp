@@ -14,6 +14,7 @@ namespace {
 using yaml::find;
 
 constexpr double kMillionth = 1e6;
+constexpr std::array<std::string_view, 2> kExperiments = {"acceptance", "factorial"};
 
 constexpr std::array kShapes = {DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain,
                                 DagShape::Independent};
@@ -45,6 +46,24 @@ std::optional<std::vector<std::uint32_t>> split(std::string_view text, char sepa
 }
 
 }  // namespace
+
+bool PlanReader::is_plan(const Node &root, std::string_view kind, const std::vector<std::string_view> &keys) {
+  if (root.kind == Node::Kind::Null) {
+    error(Node{}, "there is no plan in it", fmt::format("begin with 'experiment: {}': see docs/experiments.md", kind));
+    return false;
+  }
+  if (!check_map(root, "a plan", keys)) return false;
+  const Node *named = find(root, "experiment");
+  if (named == nullptr) {
+    error(root, "experiment is missing", fmt::format("say 'experiment: {}'", kind));
+  } else if (named->text != kind) {
+    const bool is_other = std::find(kExperiments.begin(), kExperiments.end(), named->text) != kExperiments.end();
+    error(
+        *named, fmt::format("unknown experiment {}", describe(*named)),
+        is_other ? fmt::format("it is a plan of 'redag experiment {}'", named->text) : fmt::format("known: {}", kind));
+  }
+  return true;
+}
 
 void PlanReader::take_text(const Node &map, const char *key, std::string &out) {
   take(map, key, out, [this](const Node &node, std::string_view name) { return text(node, name); });

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "redag/model/generate.hpp"
@@ -61,12 +62,32 @@ class PlanReader : protected yaml::ValueReader {
   /// Millionths: {from: 0.05, to: 1, step: 0.05}, a list, or as on the command line (parse_range()).
   void take_range(const Node &map, const char *key, std::vector<std::uint32_t> &out);
 
+  /// The frame of every plan: a map of `keys`, `experiment` being `kind`. Calls read(), and, where all can be read,
+  /// find_mistakes(), whose mistakes are of keys.
+  template <class Plan, class Read, class FindMistakes>
+  Result<Plan> read_plan(const Node &root, std::string_view kind, const std::vector<std::string_view> &keys, Plan &plan,
+                         Read read, FindMistakes find_mistakes) {
+    if (is_plan(root, kind, keys)) {
+      read();
+      if (diagnostics_.empty()) {
+        for (const auto &mistake : find_mistakes()) {
+          const Node *node = yaml::find(root, mistake.key);
+          error(node != nullptr ? *node : root, mistake.message, mistake.hint);
+        }
+      }
+    }
+    if (Diagnostics found = take_diagnostics(); !found.empty()) return tl::unexpected<Diagnostics>(std::move(found));
+    return std::move(plan);
+  }
+
   /// The keys of take_generation().
   [[nodiscard]] static const std::vector<std::string_view> &generation_keys();
   /// How random workloads are drawn, but for what an experiment varies.
   void take_generation(const Node &map, GenerateOptions &out);
 
  private:
+  /// Can it be read? Whether it is of this kind is reported, but does not matter for that.
+  bool is_plan(const Node &root, std::string_view kind, const std::vector<std::string_view> &keys);
   void take_tasks(const Node &map, GenerateOptions &out);
 };
 

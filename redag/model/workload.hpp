@@ -95,8 +95,8 @@ struct Task {
 struct Degrade {
   enum class Kind : std::uint8_t {
     Stop,     // no releases
-    Skip,     // after each release of a timer task that is let through, `skip` ones are skipped
-    Stretch,  // releases of a timer task are let through when `stretch` periods have passed since the last such
+    Skip,     // after each period that is let through, `skip` ones are skipped
+    Stretch,  // a release of a timer task is let through when `stretch` periods have passed since the last such
   };
   Kind kind = Kind::Stop;
   std::uint32_t skip = 1;

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "redag/analysis/analyze.hpp"
-#include "redag/analysis/wait_set.hpp"
+#include "redag/analysis/executors.hpp"
 
 namespace redag::report {
 namespace {
@@ -58,24 +58,19 @@ std::vector<BoundOf> by_id(const std::vector<analysis::Tightest> &all) {
 }  // namespace
 
 RunBounds bounds_of(const trace::RunInfo &run) {
-  const bool wait_set = run.executor == "mte" || run.executor == "ste";
-  if (!wait_set && run.executor != "redag") return none("there is no analysis of the executor '" + run.executor + "'");
+  const sched::ExecutorKind *executor = sched::find_executor(run.executor);
+  if (executor == nullptr) return none("there is no analysis of the executor '" + run.executor + "'");
   if (run.workload.task_count() > kMostTasks) {
     return none(fmt::format("more than {} tasks: 'redag analyze' takes its time for them", kMostTasks));
   }
-  analysis::AnalysisPlatform platform;
-  platform.workers = run.config.workers;
-  platform.preemption = run.config.preemption;
-  platform.levels = run.config.levels;
-  platform.max_started = run.config.max_started;
+  analysis::AnalysisPlatform platform = analysis::platform_of(run.config);
   if (!read_overheads(run.overheads, platform)) return none("the run's overheads are not understood: " + run.overheads);
   Workload workload = run.workload;
   workload.policy = run.config.policy;
-  const Result<analysis::System> system = analysis::compile(workload, platform);
+  const Result<analysis::System> system = analysis::compile_for(*executor, workload, platform);
   if (!system) return none(system.error().front().message);
 
-  static const std::vector<analysis::Method> kWaitSet = {analysis::wait_set()};  // the report points into it
-  const analysis::Report report = wait_set ? analysis::analyze(*system, kWaitSet) : analysis::analyze(*system);
+  const analysis::Report report = analysis::analyze(*system, analysis::methods_of(*executor));
   RunBounds bounds;
   bounds.assumes = describe(platform, run.overheads);
   bounds.tasks = by_id(report.tasks);

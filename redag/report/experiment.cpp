@@ -14,9 +14,19 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char *kFormat = "redag.experiment.factorial/1";
 // What the page draws, in this order.
-constexpr std::array kMetrics = {"miss_ratio",      "drop_ratio",      "excess_miss_ratio", "response_p50_ns",
-                                 "response_p95_ns", "response_p99_ns", "response_max_ns",   "max_lateness_ns",
-                                 "deferred",        "preemptions",     "paper_miss_ratio"};
+constexpr std::array kMetrics = {"miss_ratio",
+                                 "drop_ratio",
+                                 "excess_miss_ratio",
+                                 "response_p50_ns",
+                                 "response_p95_ns",
+                                 "response_p99_ns",
+                                 "response_max_ns",
+                                 "max_lateness_ns",
+                                 "deferred",
+                                 "preemptions",
+                                 "paper_miss_ratio",
+                                 "finished_per_s",
+                                 "work"};
 
 // Four digits are more than anybody sees, and a tenth of the file.
 double rounded(double value) {
@@ -47,7 +57,10 @@ Json dag_json(const Json &dag) {
 Json point_json(const Json &point) {
   Json dags = Json::array();
   for (const Json &dag : point.value("dags", Json::array())) dags.push_back(dag_json(dag));
-  return Json{{"at", point.at("factors")}, {"repetitions", point.at("repetitions")}, {"dags", std::move(dags)}};
+  return Json{{"at", point.at("factors")},
+              {"worlds", point.value("world", Json::array())},  // none yet where no run is finished
+              {"repetitions", point.at("repetitions")},
+              {"dags", std::move(dags)}};
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ nlohmann::json small_document() {
           {"runs_beyond_max_active", 0},
           {"factors", {{{"name", "executor"}, {"numeric", false}, {"levels", {"redag", "mte"}}}}},
           {"points",
-           {{{"factors", {{"executor", "redag"}}}, {"repetitions", 6}, {"dags", {dag}}},
+           {{{"factors", {{"executor", "redag"}}}, {"world", {"ros_nodes"}}, {"repetitions", 6}, {"dags", {dag}}},
             {{"factors", {{"executor", "mte"}}}, {"repetitions", 0}}}},
           {"effects", nlohmann::json::array()},
           {"runs", nlohmann::json::array()}};
@@ -55,6 +55,8 @@ TEST(ExperimentDocument, HoldsWhatThePageDraws) {
   EXPECT_EQ(at("max_lateness_ns"), nlohmann::json({-1235000, -2, 0}));
   EXPECT_TRUE(at("excess_miss_ratio").is_null()) << "there was no ideal";
   EXPECT_TRUE(json.at("points").at(1).at("dags").empty()) << "no run is finished";
+  EXPECT_EQ(json.at("points").at(0).at("worlds"), nlohmann::json({"ros_nodes"})) << "of the runs, not the plan's";
+  EXPECT_TRUE(json.at("points").at(1).at("worlds").empty());
 }
 
 TEST(ExperimentDocument, OtherFilesAreRefused) {

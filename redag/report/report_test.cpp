@@ -76,9 +76,17 @@ TEST(Bounds, ChargeTheRecordedOverheads) {
 }
 
 TEST(Bounds, OtherExecutorsHaveTheirOwnOrNone) {
-  const trace::Trace ste = simulated(hi_and_lo(PreemptionMode::None), kSecond, "ste");
+  const Workload workload = testing::make_workload(
+      {testing::make_dag("hi", {{"h", 100, 2}}), testing::make_dag("lo", {{"l", 120, 20}})}, 1, PreemptionMode::None);
+  const trace::Trace ste = simulated(workload, kSecond, "ste");
   const RunBounds bounds = bounds_of(ste.info);
-  for (const BoundOf &bound : bounds.tasks) EXPECT_TRUE(!bound.response || bound.method == "wait_set") << bound.method;
+  ASSERT_EQ(bounds.tasks.size(), 2U) << bounds.absent;
+  EXPECT_EQ(bounds.tasks[1].response, 22 * kMillisecond) << "h comes once while l waits; wait_set counts it twice";
+  EXPECT_EQ(bounds.tasks[1].method, "wait_set_rates");
+  const RunBounds events = bounds_of(simulated(workload, kSecond, "events").info);
+  ASSERT_EQ(events.tasks.size(), 2U) << events.absent;
+  EXPECT_EQ(events.tasks[1].response, 22 * kMillisecond);
+  EXPECT_EQ(events.tasks[1].method, "bertogna_cirinei_any") << "nothing that counts on windows";
   trace::RunInfo unknown = ste.info;
   unknown.executor = "SingleThreadedExecutor";
   EXPECT_FALSE(bounds_of(unknown).absent.empty());

@@ -4,16 +4,20 @@
 #include <array>
 
 #include "redag/base/check.hpp"
+#include "redag/sched/models/events.hpp"
 #include "redag/sched/models/wait_set.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
 namespace redag::sched {
 namespace {
 
-constexpr std::array<ExecutorKind, 3> kExecutors{{
-    {"redag", "ReDAG-RT: one priority order over all DAGs, per-DAG bounds, preemption", true, true, false},
+constexpr std::array<ExecutorKind, 6> kExecutors{{
+    {"redag", "ReDAG-RT: one priority order over all DAGs, per-DAG bounds, preemption", true, false, false},
     {"mte", "model of rclcpp's MultiThreadedExecutor (Humble)", false, false, false},
-    {"ste", "model of rclcpp's SingleThreadedExecutor (Humble); one worker", false, false, true},
+    {"ste", "model of rclcpp's SingleThreadedExecutor (Humble); one worker", false, true, false},
+    {"static", "model of rclcpp's StaticSingleThreadedExecutor (Humble); one worker", false, true, false},
+    {"events", "model of rclcpp's experimental EventsExecutor (Jazzy); one worker", false, true, true},
+    {"cbg", "model of EventsCBGExecutor (cm_executors)", false, false, false},
 }};
 
 }  // namespace
@@ -27,7 +31,7 @@ const ExecutorKind *find_executor(std::string_view name) {
 }
 
 Config effective_config(const ExecutorKind &kind, Config config) {
-  if (!kind.preemptive) {
+  if (!kind.ours) {
     config.preemption = Preemption::None;
     config.levels = 0;
     config.max_started = 0;
@@ -41,7 +45,15 @@ std::unique_ptr<Scheduler> make_scheduler(std::string_view name, const Workload 
   REDAG_CHECK(kind != nullptr, "an executor of that name does not exist");
   const Config effective = effective_config(*kind, config);
   if (name == "redag") return std::make_unique<PriorityScheduler>(workload, effective);
-  return std::make_unique<WaitSetScheduler>(workload, effective);
+  if (name == "events") {
+    return std::make_unique<EventsScheduler>(workload, effective, EventsScheduler::Kind::Events);
+  }
+  if (name == "cbg") {
+    return std::make_unique<EventsScheduler>(workload, effective, EventsScheduler::Kind::CallbackGroups);
+  }
+  using Order = WaitSetScheduler::Order;
+  return std::make_unique<WaitSetScheduler>(workload, effective,
+                                            name == "static" ? Order::SubscriptionsFirst : Order::TimersFirst);
 }
 
 }  // namespace redag::sched

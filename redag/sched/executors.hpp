@@ -12,9 +12,9 @@ namespace redag::sched {
 struct ExecutorKind {
   std::string_view name;         // what a user writes
   std::string_view description;  // one line
-  bool preemptive = false;       // knows the modes other than Preemption::None
-  bool bounds = false;           // keeps a DAG's max_active
+  bool ours = false;             // priorities, preemption, max_active, budgets: what peers do not know
   bool single_worker = false;    // uses one worker, whatever the platform has
+  bool keeps_releases = false;   // a timer's release is never skipped for an earlier one that has not run
 };
 
 /// All of them, ours first.
@@ -24,7 +24,7 @@ struct ExecutorKind {
 [[nodiscard]] const ExecutorKind *find_executor(std::string_view name);
 
 /// The configuration that the executor makes of `config`: a model of another executor has no preemption, levels or
-/// bound on threads, and "ste" has one worker.
+/// bound on threads, and some have one worker.
 [[nodiscard]] Config effective_config(const ExecutorKind &kind, Config config);
 
 /// A scheduler for effective_config(). Requires a known name and what PriorityScheduler requires.

@@ -1,7 +1,6 @@
 #include "redag/sched/lifecycle.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <tuple>
 
 #include "redag/base/check.hpp"
@@ -74,7 +73,7 @@ void Lifecycle::complete(JobSlot job_slot, Time now, Outcome outcome) {
   std::erase_if(dispatches_, [&](const Dispatch &change) { return change.job == job_slot; });
   on_end(slot);
   free_slot(slot);
-  if (outcome != Outcome::Finished || !takes_releases(task)) return;
+  if (outcome != Outcome::Finished || !task.joined || !takes_releases(task)) return;
 
   precedence_.on_complete(job.task, job.release, job.origin, now, [&](TaskId successor) {
     const TaskState &next = tasks_[successor.value];
@@ -87,133 +86,6 @@ void Lifecycle::complete(JobSlot job_slot, Time now, Outcome outcome) {
       make_ready(next.waiting, precedence_.consume(successor).origin);
     }
   });
-}
-
-// ---- budgets and criticality ----
-
-void Lifecycle::exceed(JobSlot job_slot, Limit limit, Time now) {
-  REDAG_CHECK(job_slot.value < jobs_.size() && jobs_[job_slot.value].started(), "a job that does not run uses nothing");
-  begin(now);
-  const Job &job = jobs_[job_slot.value];
-  if (limit == Limit::WcetLow) return enter_high_mode(job);
-  emit(job, JobEventKind::Exceeded, 0);
-  TaskState &task = tasks_[job.task.value];
-  switch (task.on_budget) {
-    case OnBudget::Abort:  // the driver cuts it off as soon as it can
-    case OnBudget::Log: break;
-    case OnBudget::Demote: demote(job_slot.value); break;
-    case OnBudget::SkipNext:
-      if (task.skips_next || !takes_releases(task)) break;
-      task.skips_next = true;
-      ++owed_skips_;
-      refresh_restricted();
-      break;
-  }
-}
-
-void Lifecycle::forget_skip(TaskState &task) {
-  if (!task.skips_next) return;
-  task.skips_next = false;
-  --owed_skips_;
-  refresh_restricted();
-}
-
-// Why a release of a live task is not taken; None: it is.
-Reason Lifecycle::refusal(TaskState &task, Time nominal) {
-  if (task.skips_next) {
-    forget_skip(task);
-    return Reason::Budget;
-  }
-  const bool taken = !task.degraded || is_let_through(task, dag_states_[task.dag.value].degrade, nominal);
-  return taken ? Reason::None : Reason::Degraded;
-}
-
-bool Lifecycle::is_let_through(TaskState &task, const Degrade &degrade, Time nominal) {
-  switch (degrade.kind) {
-    case Degrade::Kind::Stop: return false;
-    case Degrade::Kind::Skip:
-      if (!task.timer) return true;
-      if (task.to_skip > 0) {
-        --task.to_skip;
-        return false;
-      }
-      task.to_skip = degrade.skip;
-      return true;
-    case Degrade::Kind::Stretch: {
-      if (!task.timer) return true;
-      if (nominal < task.not_before) return false;
-      const double distance = std::ceil(degrade.stretch * static_cast<double>(task.period));
-      const bool is_endless = distance >= static_cast<double>(kNever - nominal);
-      task.not_before = is_endless ? kNever : nominal + static_cast<Duration>(distance);
-      return true;
-    }
-  }
-  return false;
-}
-
-// AMC (Baruah, Burns, Davis, RTSS 2011): from this instant no job of a DAG of lower criticality is in the way of
-// others.
-void Lifecycle::enter_high_mode(const Job &cause) {
-  if (high_mode_ || closed_ || degrades(dag_states_[tasks_[cause.task.value].dag.value])) return;
-  high_mode_ = true;
-  refresh_restricted();
-  has_chores_ = true;
-  mode_cause_ = cause;
-  mode_cause_.worker = WorkerId();
-  high_since_ = now_;
-  emit(cause, JobEventKind::HighMode, 0);
-  for (TaskState &task : tasks_) {
-    if (task.life == TaskLife::Gone || !degrades(dag_states_[task.dag.value])) continue;
-    task.degraded = true;
-    task.to_skip = 0;
-    task.not_before = std::numeric_limits<Time>::min();
-    task.key = demoted_key();
-  }
-  for (std::uint32_t slot = 0; slot < jobs_.size(); ++slot) {
-    const Job &job = jobs_[slot];
-    if (job.state == JobState::Free) continue;
-    if (job.started()) {
-      // What it inherited from a job that is skipped now goes, too.
-      if (tasks_[job.task.value].degraded && !job.demoted) {
-        demote(slot);
-      } else if (tasks_[job.priority_of.value].degraded) {
-        on_lowered(slot);
-      }
-      continue;
-    }
-    if (!tasks_[job.task.value].degraded) continue;
-    const bool unused_data = job.state == JobState::Ready && tasks_[job.task.value].timer;
-    const TaskId task = job.task;
-    skip(slot, Reason::Degraded);
-    if (unused_data) precedence_.give_back(task);
-  }
-}
-
-// Nothing is in progress: the degraded DAGs begin afresh, without data of before and without jobs that wait for some.
-void Lifecycle::restore() {
-  emit(mode_cause_, JobEventKind::LowMode, high_since_);
-  skip_all(Reason::Degraded, [this](const Job &job) { return tasks_[job.task.value].degraded; });
-  for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
-    TaskState &task = tasks_[t];
-    if (!task.degraded) continue;
-    task.degraded = false;
-    task.key = task.priority.rank;
-    if (task.life == TaskLife::Live) precedence_.discard(TaskId(t));
-  }
-  high_mode_ = false;
-  refresh_restricted();
-}
-
-void Lifecycle::demote(std::uint32_t slot) {
-  if (jobs_[slot].demoted) return;
-  jobs_[slot].demoted = true;
-  on_lowered(slot);
-}
-
-std::int64_t Lifecycle::own_key(const Job &job) const {
-  const TaskState &task = tasks_[job.task.value];
-  if (job.demoted || task.degraded) return demoted_key();
-  return is_static(config_.policy) ? task.priority.rank : job.deadline;
 }
 
 // ---- reconfiguration ----
@@ -287,14 +159,6 @@ void Lifecycle::close(Time now) {
   skip_all(Reason::Removed, [](const Job &) { return true; });
 }
 
-template <class Predicate>
-void Lifecycle::skip_all(Reason reason, Predicate which) {
-  for (std::uint32_t slot = 0; slot < jobs_.size(); ++slot) {
-    const JobState state = jobs_[slot].state;
-    if ((state == JobState::Waiting || state == JobState::Ready) && which(jobs_[slot])) skip(slot, reason);
-  }
-}
-
 DagId Lifecycle::append_dag(const Dag &dag) {
   DagId id(dag_states_.size());
   if (free_dags_.empty()) {
@@ -306,7 +170,12 @@ DagId Lifecycle::append_dag(const Dag &dag) {
   dag_states_[id.value] = DagState{dag.max_active, dag.max_pending, 0, dag.criticality, false, false, {}, dag.degrade};
   const std::vector<std::uint32_t> topological = topological_ranks(dag);
   for (std::size_t i = 0; i < dag.tasks.size(); ++i) append_task(id, topological[i], dag.tasks[i]);
-  precedence_.add_dag(dag, dag_states_[id.value].tasks);
+  const std::vector<TaskId> &ids = dag_states_[id.value].tasks;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    for (const std::uint32_t p : dag.tasks[i].predecessors)
+      tasks_[ids[i].value].joined = tasks_[ids[p].value].joined = true;
+  }
+  precedence_.add_dag(dag, ids);
   reserve_step();
   return id;
 }
@@ -323,6 +192,7 @@ TaskId Lifecycle::append_task(DagId dag, std::uint32_t rank, const Task &task) {
   }
   TaskState state;
   state.period = task.period;
+  state.offset = task.offset;
   state.deadline = task.deadline;
   state.dag = dag;
   if (!task.group.empty()) state.group = join_group(task.group);
@@ -331,10 +201,12 @@ TaskId Lifecycle::append_task(DagId dag, std::uint32_t rank, const Task &task) {
   state.topological_rank = rank;
   state.fixed_priority = task.priority.value_or(0);
   state.timer = task.activation == Activation::Timer;
+  if (state.timer && kept_ == TimerReleases::AllKept) state.queue_depth = kUnboundedQueue;
   state.on_budget = task.on_budget;
   state.degraded = high_mode_ && degrades(dag_states_[dag.value]);
   // The jobs that have started, the ready ones, and one that waits for its predecessors.
-  const std::uint32_t slot_count = state.concurrency + std::max(1U, state.queue_depth) + 1;
+  const std::uint32_t queued = state.queue_depth == kUnboundedQueue ? 1 : std::max(1U, state.queue_depth);
+  const std::uint32_t slot_count = state.concurrency + queued + 1;
   for (std::uint32_t i = 0; i < slot_count; ++i) {
     const std::uint32_t slot = new_slot();
     jobs_[slot].next = state.free_slot;
@@ -512,9 +384,10 @@ void Lifecycle::admit(TaskId id, Time nominal, Time origin) {
   if (task.waiting != kNil) skip(task.waiting, Reason::Precedence);
   if (task.queue_depth == 0 && task.ready_count > 0) {
     skip(task.latest_ready, Reason::Overrun);
-    if (task.timer) precedence_.give_back(id);
+    if (task.timer && task.joined) precedence_.give_back(id);
   }
-  const bool complete_set = !task.timer || precedence_.on_release(id, nominal);
+  const bool has_data = task.timer && task.joined && precedence_.has_predecessors(id);
+  const bool complete_set = !has_data || precedence_.on_release(id, nominal);
   const bool queue_is_full = task.queue_depth > 0 && task.ready_count >= task.queue_depth;
   const bool dag_is_full = dag.max_pending > 0 && dag.pending >= dag.max_pending;
   if (queue_is_full || dag_is_full) {
@@ -527,7 +400,7 @@ void Lifecycle::admit(TaskId id, Time nominal, Time origin) {
   jobs_[slot] = fresh;
   ++dag.pending;
   if (complete_set) {
-    make_ready(slot, task.timer && precedence_.has_predecessors(id) ? precedence_.consume(id).origin : origin);
+    make_ready(slot, has_data ? precedence_.consume(id).origin : origin);
   } else {
     jobs_[slot].state = JobState::Waiting;
     task.waiting = slot;
@@ -580,6 +453,7 @@ std::uint32_t Lifecycle::new_slot() {
 }
 
 std::uint32_t Lifecycle::take_slot(TaskState &task) {
+  if (task.free_slot == kNil && task.queue_depth == kUnboundedQueue) return new_slot();
   const std::uint32_t slot = task.free_slot;
   REDAG_CHECK(slot != kNil, "a task has more jobs than its overrun rule allows");
   task.free_slot = jobs_[slot].next;

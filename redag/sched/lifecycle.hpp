@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "redag/sched/degradation.hpp"
 #include "redag/sched/job.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag/sched/precedence.hpp"
@@ -46,31 +47,33 @@ class Lifecycle : public Scheduler {
   // Live -> Removed -> Gone (no job of it is left, and none has its priority) -> with reuse_ids another Live task.
   enum class TaskLife : std::uint8_t { Live, Removed, Gone };
 
-  struct TaskState {
-    Duration period = 0;
+  // What each job needs is in the first 64 bytes, then what is counted.
+  struct alignas(64) TaskState {
     Duration deadline = 0;
+    std::int64_t key = 0;  // static policies: of its jobs that have inherited nothing
+    Priority priority;     // not of one that is gone
     DagId dag;
-    std::uint32_t group = kNil;     // position among the groups
-    std::uint32_t queue_depth = 0;  // 0: overrun by skipping
-    std::uint32_t concurrency = 1;
-    std::uint32_t topological_rank = 0;
-    int fixed_priority = 0;
-    bool timer = true;
-    TaskLife life = TaskLife::Live;
-    OnBudget on_budget = OnBudget::Abort;
-    bool skips_next = false;  // a job used its budget, and the next release is not taken
-    bool degraded = false;    // its jobs are demoted from the start: HI mode, and its DAG is of lower criticality
-    Priority priority;        // not of one that is gone
-    std::int64_t key = 0;     // static policies: of its jobs that have inherited nothing
-
+    std::uint32_t queue_depth = 0;      // 0: overrun by skipping; kUnboundedQueue
     std::uint32_t free_slot = kNil;     // list through Job::next
     std::uint32_t waiting = kNil;       // the job whose predecessors are incomplete
     std::uint32_t latest_ready = kNil;  // the job that became ready last; not started if ready_count > 0
     std::uint32_t ready_count = 0;      // ready and not started
     std::uint32_t next_number = 0;
-    std::uint32_t to_skip = 0;  // degraded, Degrade::Skip: releases until the next that is taken
-    Time not_before = 0;        // degraded, Degrade::Stretch: a release before it is skipped
+    bool timer = true;
+    bool joined = false;  // it has predecessors or successors
+    TaskLife life = TaskLife::Live;
+    OnBudget on_budget = OnBudget::Abort;
+    bool skips_next = false;  // a job used its budget, and the next release is not taken
+    bool degraded = false;    // its jobs are demoted from the start: HI mode, and its DAG is of lower criticality
     Accounting accounting;
+
+    Duration period = 0;
+    Duration offset = 0;
+    Time let_through = kNoRelease;  // degraded: its newest release that was taken
+    std::uint32_t group = kNil;     // position among the groups
+    std::uint32_t concurrency = 1;
+    std::uint32_t topological_rank = 0;
+    int fixed_priority = 0;
   };
   struct DagState {
     std::uint32_t max_active = 0;
@@ -83,7 +86,10 @@ class Lifecycle : public Scheduler {
     Degrade degrade;
   };
 
-  explicit Lifecycle(const Config &config) : config_(config) {}
+  enum class TimerReleases : std::uint8_t { AsTheTaskSays, AllKept };  // AllKept: no overrun, any number can wait
+
+  explicit Lifecycle(const Config &config, TimerReleases kept = TimerReleases::AsTheTaskSays)
+      : config_(config), kept_(kept) {}
 
   /// Adds the workload's DAGs; for the subclass's constructor.
   void load(const Workload &workload);
@@ -131,13 +137,15 @@ class Lifecycle : public Scheduler {
       false;  // a dispatch has more to do than to decide: HI mode may end, or what the subclass sets it for
 
  private:
+  static constexpr std::uint32_t kUnboundedQueue = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::int64_t kDemotedKey = std::numeric_limits<std::int64_t>::max();
 
   void admit(TaskId id, Time nominal, Time origin);
   void admit_or_refuse(TaskId id, Time nominal, Time origin);
   void refuse(TaskId id, Time nominal, Reason reason);
   [[nodiscard]] Reason refusal(TaskState &task, Time nominal);
-  [[nodiscard]] static bool is_let_through(TaskState &task, const Degrade &degrade, Time nominal);
+  [[nodiscard]] bool is_let_through(TaskState &task, Time nominal);
+  [[nodiscard]] static bool shares_grid(const TaskState &a, const TaskState &b);
   void enter_high_mode(const Job &cause);
   void demote(std::uint32_t slot);
   void forget_skip(TaskState &task);
@@ -167,6 +175,7 @@ class Lifecycle : public Scheduler {
     std::uint32_t tasks = 0;  // 0: the position is free
   };
 
+  TimerReleases kept_;
   Precedence precedence_;
   std::map<std::string, std::uint32_t> group_positions_;
   std::vector<Group> groups_;
@@ -187,5 +196,13 @@ class Lifecycle : public Scheduler {
   std::uint64_t next_sequence_ = 0;
   bool step_was_read_ = false;
 };
+
+template <class Predicate>
+void Lifecycle::skip_all(Reason reason, Predicate which) {
+  for (std::uint32_t slot = 0; slot < jobs_.size(); ++slot) {
+    const JobState state = jobs_[slot].state;
+    if ((state == JobState::Waiting || state == JobState::Ready) && which(jobs_[slot])) skip(slot, reason);
+  }
+}
 
 }  // namespace redag::sched

@@ -29,7 +29,7 @@ void Precedence::add_dag(const Dag &dag, std::span<const TaskId> ids) {
     node.first_edge = static_cast<std::uint32_t>(edges_.size());
     for (const std::uint32_t p : dag.tasks[i].predecessors) {
       outgoing[p].push_back(static_cast<std::uint32_t>(edges_.size()));
-      edges_.push_back(Edge{ids[i], is_aligned(nodes_[ids[p].value], node), false, 0, 0, 0});
+      edges_.push_back(Edge{ids[i], is_aligned(nodes_[ids[p].value], node)});
     }
     node.last_edge = static_cast<std::uint32_t>(edges_.size());
   }
@@ -80,19 +80,20 @@ void Precedence::set_period(TaskId task, Duration period) {
       edge.aligned = is_aligned(from, nodes_[edge.to.value]);
     }
   }
+  for (Node &node : nodes_) static_cast<void>(count_fresh(node));
+}
+
+// Whether all are.
+bool Precedence::count_fresh(Node &node) {
+  node.fresh = 0;
+  for (std::uint32_t i = node.first_edge; i < node.last_edge; ++i) node.fresh += serves(edges_[i], node) ? 1U : 0U;
+  return node.fresh == node.last_edge - node.first_edge;
 }
 
 bool Precedence::on_release(TaskId task, Time release) {
   Node &node = nodes_[task.value];
   node.last_release = release;
-  for (std::uint32_t i = node.first_edge; i < node.last_edge; ++i) {
-    Edge &edge = edges_[i];
-    if (edge.aligned && edge.fresh && edge.release < release) {
-      edge.fresh = false;
-      --node.fresh;
-    }
-  }
-  return node.fresh == node.last_edge - node.first_edge;
+  return count_fresh(node);
 }
 
 Precedence::Data Precedence::consume(TaskId task) {
@@ -116,7 +117,7 @@ void Precedence::discard(TaskId task) {
 void Precedence::give_back(TaskId task) {
   Node &node = nodes_[task.value];
   for (std::uint32_t i = node.first_edge; i < node.last_edge; ++i) edges_[i].fresh = true;
-  node.fresh = node.last_edge - node.first_edge;
+  static_cast<void>(count_fresh(node));
 }
 
 }  // namespace redag::sched

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -22,7 +23,7 @@ class Precedence {
   /// edges.
   void set_period(TaskId task, Duration period);
 
-  /// `task` has a new job, released at `release`. Data too old for it is discarded.
+  /// `task` has a new job, released at `release`.
   /// Returns whether all its predecessors have fresh data.
   bool on_release(TaskId task, Time release);
 
@@ -47,12 +48,14 @@ class Precedence {
     for (std::uint32_t i = node.first_successor; i < node.last_successor; ++i) {
       Edge &edge = edges_[successors_[i]];
       Node &successor = nodes_[edge.to.value];
-      if (edge.aligned && release < successor.last_release) continue;  // late data of an earlier period
-      if (!edge.fresh) ++successor.fresh;
-      edge.fresh = true;
-      edge.release = release;
-      edge.origin = origin;
+      if (serves(edge, successor)) --successor.fresh;
       edge.finish = finish;
+      if (release >= edge.release) {  // an older job that ends late does not replace newer data
+        edge.release = release;
+        edge.origin = origin;
+      }
+      edge.fresh = true;
+      if (serves(edge, successor)) ++successor.fresh;
       if (successor.fresh == successor.last_edge - successor.first_edge) on_fresh(edge.to);
     }
   }
@@ -63,25 +66,30 @@ class Precedence {
 
  private:
   struct Edge {
-    TaskId to;             // none: forgotten
-    bool aligned = false;  // timer to timer, same period and offset: job k waits for job k
-    bool fresh = false;    // completed since `to` last consumed
-    Time release = 0;      // of the predecessor's job that completed last
-    Time origin = 0;
-    Time finish = 0;
+    TaskId to;                                        // none: forgotten
+    bool aligned = false;                             // timer to timer, same period and offset: job k waits for job k
+    bool fresh = false;                               // completed since `to` last consumed
+    Time release = std::numeric_limits<Time>::min();  // of the newest job of the predecessor that completed: its data
+    Time origin = 0;                                  // of that data
+    Time finish = 0;                                  // of the job that completed last
   };
   struct Node {
     std::uint32_t first_edge = 0;  // edges into the task: [first_edge, last_edge)
     std::uint32_t last_edge = 0;
     std::uint32_t first_successor = 0;  // edges out of it: successors_[first_successor .. last_successor)
     std::uint32_t last_successor = 0;
-    std::uint32_t fresh = 0;  // edges into the task with fresh data
-    Time last_release = 0;
+    std::uint32_t fresh = 0;  // edges into the task with fresh data for its last job
+    Time last_release = 0;    // of that job
     Duration period = 0;
     Duration offset = 0;
     bool timer = true;
   };
 
+  /// Is there data for the successor's last job?
+  [[nodiscard]] static bool serves(const Edge &edge, const Node &successor) {
+    return edge.fresh && (!edge.aligned || edge.release == successor.last_release);
+  }
+  [[nodiscard]] bool count_fresh(Node &node);
   Node &add_node(const Task &task, TaskId id);
   [[nodiscard]] static bool is_aligned(const Node &from, const Node &to);
 

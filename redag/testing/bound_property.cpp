@@ -11,8 +11,8 @@
 
 #include <fmt/format.h>
 
+#include "redag/analysis/executors.hpp"
 #include "redag/metrics/deadline_watch.hpp"
-#include "redag/sched/priority_scheduler.hpp"
 #include "redag/sim/simulator.hpp"
 
 namespace redag::testing {
@@ -85,8 +85,8 @@ void observe(const metrics::JudgedJob &job, const analysis::System &system, Obse
   if (job.end_to_end) dag = std::max(dag, *job.end_to_end);
 }
 
-void simulate_run(const BoundCase &bound_case, const analysis::System &system, const Run &run, std::uint32_t periods,
-                  Observed &observed) {
+void simulate_run(const BoundCase &bound_case, const analysis::System &system, const Run &run,
+                  const BoundPropertyOptions &property, Observed &observed) {
   Workload workload = bound_case.workload;
   std::vector<std::uint32_t> unit_of;
   std::vector<bool> can_pause;  // by TaskId
@@ -110,7 +110,7 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
 
   sim::Options options;
   const analysis::AnalysisPlatform &platform = bound_case.platform;
-  options.horizon = (periods + 1) * longest + 1;
+  options.horizon = (property.periods + 1) * longest + 1;
   options.overheads = {platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead};
   options.demand = [&](const Task &task, TaskId id, std::uint32_t number) {
     Rng rng = Rng::stream(run.seed, id.value, number);
@@ -137,11 +137,11 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
   config.policy = workload.policy;
   config.levels = platform.levels;
   config.max_started = platform.max_started;
-  sched::PriorityScheduler scheduler(workload, config);
+  const auto scheduler = sched::make_scheduler(property.executor, workload, config);
   metrics::DeadlineWatch watch(workload);
   const auto see = [&](const metrics::JudgedJob &job) { observe(job, system, observed); };
   const sim::Result result =
-      sim::simulate(workload, scheduler, platform.workers, options, [&](std::span<const JobEvent> events) {
+      sim::simulate(workload, *scheduler, platform.workers, options, [&](std::span<const JobEvent> events) {
         watch.add(events, see);
         return true;
       });
@@ -218,7 +218,8 @@ void check_one(const analysis::Method &method, const BoundGenerator &generator, 
                std::uint64_t seed, BoundPropertyResult &result, std::vector<double> &ratios) {
   Rng rng(seed);
   const BoundCase bound_case = generator(rng);
-  const auto system = analysis::compile(bound_case.workload, bound_case.platform);
+  const sched::ExecutorKind &executor = *sched::find_executor(options.executor);
+  const auto system = analysis::compile_for(executor, bound_case.workload, bound_case.platform);
   ASSERT_TRUE(system) << to_string(system.error()) << describe(bound_case);
   if (!system->not_analysable.empty()) {
     ++result.not_applicable;
@@ -239,7 +240,7 @@ void check_one(const analysis::Method &method, const BoundGenerator &generator, 
   observed.dags.resize(system->dags.size());
   if (bound->accepts != false) {
     for (std::uint32_t r = 0; r < options.runs; ++r) {
-      simulate_run(bound_case, *system, draw_run(*system, r, rng), options.periods, observed);
+      simulate_run(bound_case, *system, draw_run(*system, r, rng), options, observed);
     }
   }
   const std::string broken = Judge(*system, *bound, result, ratios).judge(observed);

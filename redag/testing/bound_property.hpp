@@ -55,6 +55,7 @@ struct BoundPropertyOptions {
   std::uint32_t workloads = 1000;  // to which the method applies; environment: REDAG_BOUND_WORKLOADS
   std::uint32_t runs = 5;          // simulations of each
   std::uint32_t periods = 10;      // length of a simulation, in largest periods
+  std::string executor = "redag";  // sched::executors(): under which the bound is to hold
   /// Look at bounds that a method itself calls unsound, too (to show that they are).
   bool include_unsound = false;
 };

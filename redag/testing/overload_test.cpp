@@ -2,6 +2,7 @@
 // owed however large the rest of the load is.
 #include <algorithm>
 #include <cstdlib>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -144,17 +145,12 @@ void offset_at_random(Workload &workload, const analysis::System &system, bool a
   }
 }
 
-// Tasks of high criticality execute for wcet_low or for anything up to wcet, the others try more than their budget.
-std::vector<JobEvent> simulate_overruns(const BoundCase &drawn, Duration horizon, double overruns, std::uint64_t seed) {
+std::vector<JobEvent> simulate(const BoundCase &drawn, Duration horizon, std::uint64_t seed,
+                               std::function<Duration(const Task &, TaskId, std::uint32_t)> demand) {
   sim::Options options;
   options.horizon = horizon;
   options.seed = seed;
-  options.demand = [&](const Task &task, TaskId task_id, std::uint32_t number) {
-    Rng dice = Rng::stream(seed, task_id.value, number);
-    if (task.budget > 0) return dice.uniform01() < overruns ? 3 * task.wcet : task.wcet;
-    const Duration expected = task.wcet_low > 0 ? task.wcet_low : task.wcet;
-    return dice.uniform01() < overruns ? dice.uniform(1, task.wcet) : expected;
-  };
+  options.demand = std::move(demand);
   sched::Config config;
   config.policy = drawn.workload.policy;
   config.preemption = sched::Preemption::Full;
@@ -166,6 +162,22 @@ std::vector<JobEvent> simulate_overruns(const BoundCase &drawn, Duration horizon
     return true;
   });
   return events;
+}
+
+// Tasks of high criticality execute for wcet_low or for anything up to wcet, the others try more than their budget.
+std::vector<JobEvent> simulate_overruns(const BoundCase &drawn, Duration horizon, double overruns, std::uint64_t seed) {
+  return simulate(drawn, horizon, seed, [&](const Task &task, TaskId task_id, std::uint32_t number) {
+    Rng dice = Rng::stream(seed, task_id.value, number);
+    if (task.budget > 0) return dice.uniform01() < overruns ? 3 * task.wcet : task.wcet;
+    const Duration expected = task.wcet_low > 0 ? task.wcet_low : task.wcet;
+    return dice.uniform01() < overruns ? dice.uniform(1, task.wcet) : expected;
+  });
+}
+
+// REDAG_BOUND_WORKLOADS=<n>: how many workloads, for a long run.
+std::uint64_t wanted_workloads(std::uint64_t otherwise) {
+  const char *text = std::getenv("REDAG_BOUND_WORKLOADS");
+  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
 }
 
 // No job of high criticality answers later than its bound, and no job that ends in LO mode later than its bound there.
@@ -204,15 +216,63 @@ void check_amc(std::uint64_t seed, std::uint64_t &judged, std::uint64_t &changes
   }
 }
 
-// REDAG_BOUND_WORKLOADS=<n>: how many workloads, for a long run.
 TEST(HighMode, AmcBoundsHoldUnderRandomOverruns) {
-  const char *text = std::getenv("REDAG_BOUND_WORKLOADS");
-  const std::uint64_t wanted = text == nullptr ? 1500 : std::strtoull(text, nullptr, 10);
+  const std::uint64_t wanted = wanted_workloads(1500);
   std::uint64_t judged = 0;
   std::uint64_t changes = 0;
   for (std::uint64_t seed = 1; judged < wanted && !::testing::Test::HasFatalFailure(); ++seed) {
     check_amc(seed, judged, changes);
   }
+  EXPECT_GT(changes, wanted) << "HI mode was hardly ever on";
+}
+
+// Every job of lower criticality asks for ten times the platform, whatever its period; a budget of its wcet is what it
+// gets in LO mode. Those of high criticality that amc_rtb shows met in every mode miss nothing.
+void check_overload(std::uint64_t seed, std::uint64_t &judged, std::uint64_t &cut_off, std::uint64_t &changes) {
+  Rng rng(seed);
+  BoundCase drawn = random_criticalities(rng);
+  for (Dag &dag : drawn.workload.dags) {
+    if (dag.criticality == Criticality::High) continue;
+    for (Task &task : dag.tasks) task.budget = task.wcet;
+  }
+  const auto system = analysis::compile(drawn.workload, drawn.platform);
+  ASSERT_TRUE(system) << to_string(system.error());
+  const auto outcome = analysis::amc_rtb().apply(*system);
+  const auto *bound = std::get_if<analysis::Bound>(&outcome);
+  if (bound == nullptr || bound->figures.find("criticality are met in every mode") == std::string::npos) return;
+  ++judged;
+  constexpr Duration kHorizon = 1500;
+  for (int run = 0; run < 2; ++run) {
+    offset_at_random(drawn.workload, *system, run == 0, rng);
+    const double overruns = rng.uniform01();
+    const std::uint64_t demands = rng();
+    const auto demand = [&](const Task &task, TaskId id, std::uint32_t number) {
+      if (task.budget > 0) return 10 * task.period;
+      Rng dice = Rng::stream(demands, id.value, number);
+      return dice.uniform01() < overruns ? dice.uniform(1, task.wcet) : task.wcet_low;
+    };
+    const std::vector<JobEvent> events = simulate(drawn, kHorizon, demands, demand);
+    changes += count(events, JobEventKind::HighMode);
+    cut_off += count(events, JobEventKind::Aborted);
+    for (const metrics::JobRecord &job : metrics::fold_jobs(drawn.workload, events)) {
+      if (!system->dags[system->tasks[job.task.value].dag.value].high) continue;
+      const bool missed = job.outcome == metrics::JobOutcome::Skipped || job.is_late(kHorizon);
+      ASSERT_FALSE(missed) << "seed " << seed << " run " << run << " task " << job.task.value << " job " << job.number
+                           << "\n"
+                           << describe(drawn);
+    }
+  }
+}
+
+TEST(Overload, WithinAmcRtbHighCriticalityMissesNothingBesideTenTimesTheCapacity) {
+  const std::uint64_t wanted = wanted_workloads(2000);
+  std::uint64_t judged = 0;
+  std::uint64_t cut_off = 0;
+  std::uint64_t changes = 0;
+  for (std::uint64_t seed = 1; judged < wanted && !::testing::Test::HasFatalFailure(); ++seed) {
+    check_overload(seed, judged, cut_off, changes);
+  }
+  EXPECT_GT(cut_off, 10 * wanted) << "the load was no overload";
   EXPECT_GT(changes, wanted) << "HI mode was hardly ever on";
 }
 

@@ -34,8 +34,11 @@ void ReferenceScheduler::add_tasks(const Dag &dag) {
     state.dag = dags_.size() - 1;
     state.topological = topological[i];
     for (const std::uint32_t p : dag.tasks[i].predecessors) state.predecessors.push_back(first + p);
+    for (const Task &other : dag.tasks) {
+      const auto &of = other.predecessors;
+      if (!state.predecessors.empty() || std::find(of.begin(), of.end(), i) != of.end()) state.has_edges = true;
+    }
     state.inputs.resize(state.predecessors.size());
-    state.last_release = std::numeric_limits<Time>::min();
     dags_.back().tasks.emplace_back(tasks_.size());
     tasks_.push_back(state);
   }
@@ -163,7 +166,6 @@ void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, co
   if (state.task.overrun == Overrun::Skip) {
     for (const std::size_t other : jobs_of(task, State::Ready)) skip(other, now, Reason::Overrun);
   }
-  if (state.task.activation == Activation::Timer) discard_old_data(state, release);
   if (state.task.overrun == Overrun::Queue && jobs_of(task, State::Ready).size() >= state.task.queue_depth) {
     skip(job, now, Reason::QueueFull);
     return;
@@ -181,21 +183,17 @@ void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, co
   resolve(job, now);
 }
 
-// "Job k waits for job k": data of the same period or a later one.
-void ReferenceScheduler::discard_old_data(TaskState &state, Time release) const {
-  state.last_release = release;
-  for (std::size_t i = 0; i < state.inputs.size(); ++i) {
-    Data &input = state.inputs[i];
-    if (same_phase(tasks_[state.predecessors[i]], state) && input.release < release) input.fresh = false;
-  }
-}
-
 // "Readiness": makes a waiting job ready if it can be.
 void ReferenceScheduler::resolve(std::size_t job, Time now) {
   Job &j = jobs_[job];
   TaskState &state = tasks_[j.task];
   if (state.task.activation == Activation::Timer) {
-    if (!std::all_of(state.inputs.begin(), state.inputs.end(), [](const Data &d) { return d.fresh; })) return;
+    for (std::size_t i = 0; i < state.inputs.size(); ++i) {
+      const Data &input = state.inputs[i];
+      // "Job k waits for job k."
+      const bool other_period = same_phase(tasks_[state.predecessors[i]], state) && input.release != j.release;
+      if (!input.fresh || other_period) return;
+    }
     j.consumed = state.inputs;
     for (Data &input : state.inputs) input.fresh = false;
   }
@@ -210,10 +208,8 @@ void ReferenceScheduler::skip(std::size_t job, Time now, Reason reason) {
   Job &j = jobs_[job];
   TaskState &state = tasks_[j.task];
   if (j.state == State::Ready && state.task.activation == Activation::Timer) {
-    // Nobody used its data: fresh again, unless newer data has come.
-    for (std::size_t i = 0; i < j.consumed.size(); ++i) {
-      if (!state.inputs[i].fresh) state.inputs[i] = j.consumed[i];
-    }
+    // Nobody used its data: that, or what has come since, is fresh again.
+    for (Data &input : state.inputs) input.fresh = true;
   }
   j.state = State::Done;
   ++state.count.skipped;
@@ -248,8 +244,12 @@ void ReferenceScheduler::deliver(std::size_t job, Time now) {
     TaskState &state = tasks_[s];
     const auto input = std::find(state.predecessors.begin(), state.predecessors.end(), producer);
     if (input == state.predecessors.end()) continue;
-    if (same_phase(tasks_[producer], state) && data.release < state.last_release) continue;  // of an earlier period
-    state.inputs[static_cast<std::size_t>(input - state.predecessors.begin())] = data;
+    Data &newest = state.inputs[static_cast<std::size_t>(input - state.predecessors.begin())];
+    if (data.release < newest.release) {
+      newest.fresh = true;  // it completed, but what it says is known better
+    } else {
+      newest = data;
+    }
     if (state.removed) continue;
     if (state.task.activation == Activation::Timer) {
       for (const std::size_t waiting : jobs_of(s, State::Waiting)) resolve(waiting, now);
@@ -291,18 +291,29 @@ Reason ReferenceScheduler::refusal(std::size_t task, Time release) {
   const Degrade &degrade = dags_[state.dag].dag.degrade;
   if (degrade.kind == Degrade::Kind::Stop) return Reason::Degraded;
   if (state.task.activation == Activation::Data) return Reason::None;
-  const bool too_soon = degrade.kind == Degrade::Kind::Skip ? state.to_skip > 0 : release < state.not_before;
-  if (too_soon) {
-    if (state.to_skip > 0) --state.to_skip;
-    return Reason::Degraded;
-  }
-  if (degrade.kind == Degrade::Kind::Skip) {
-    state.to_skip = degrade.skip;
-  } else {
-    state.not_before =
-        release + static_cast<Duration>(std::ceil(degrade.stretch * static_cast<double>(state.task.period)));
-  }
+  if (!is_taken(state, release)) return Reason::Degraded;
+  state.let_through.push_back(release);
   return Reason::None;
+}
+
+// All that was let through of the tasks that count together, its own if it counts alone.
+bool ReferenceScheduler::is_taken(const TaskState &state, Time release) const {
+  std::vector<Time> taken = state.let_through;
+  for (const TaskState &other : tasks_) {
+    const bool together = state.has_edges && other.has_edges && other.dag == state.dag && !other.removed &&
+                          other.task.activation == Activation::Timer && other.task.period == state.task.period &&
+                          other.task.offset == state.task.offset;
+    if (together) taken.insert(taken.end(), other.let_through.begin(), other.let_through.end());
+  }
+  if (taken.empty()) return true;
+  const Time newest = *std::max_element(taken.begin(), taken.end());
+  const Degrade &degrade = dags_[state.dag].dag.degrade;
+  const bool skips = degrade.kind == Degrade::Kind::Skip;
+  const auto period = static_cast<double>(state.task.period);
+  const Duration every = skips ? degrade.skip + 1 : static_cast<Duration>(std::ceil(degrade.stretch));
+  if (release <= newest) return (newest - release) % (every * state.task.period) == 0;
+  const auto passed = static_cast<double>(release - newest);
+  return skips ? passed / period > degrade.skip + 0.5 : passed >= degrade.stretch * period;
 }
 
 void ReferenceScheduler::begin_high_mode(std::size_t cause, Time now) {
@@ -318,8 +329,7 @@ void ReferenceScheduler::begin_high_mode(std::size_t cause, Time now) {
     started(jobs_[job]) ? demote(job) : skip(job, now, Reason::Degraded);
   }
   for (TaskState &state : tasks_) {
-    state.to_skip = 0;
-    state.not_before = std::numeric_limits<Time>::min();
+    state.let_through.clear();
   }
 }
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -42,7 +43,7 @@ class ReferenceScheduler final : public sched::Scheduler {
   /// What a completed job left for one successor.
   struct Data {
     bool fresh = false;
-    Time release = 0;  // r of the job that wrote it
+    Time release = std::numeric_limits<Time>::min();  // r of the job that wrote it: of those that ended, the newest
     Time origin = 0;
   };
 
@@ -54,13 +55,12 @@ class ReferenceScheduler final : public sched::Scheduler {
     std::vector<Data> inputs;  // one for each predecessor
     bool removed = false;
     bool gone = false;  // removed, and no job has its priority: not in the order any more
-    Time last_release = 0;
     std::uint32_t next_number = 0;
     std::uint32_t rank = 0;
     std::uint32_t level = 0;
     bool skips_next = false;
-    std::uint32_t to_skip = 0;  // HI mode: releases
-    Time not_before = 0;
+    bool has_edges = false;
+    std::vector<Time> let_through;  // HI mode
     sched::Accounting count;
   };
 
@@ -103,7 +103,6 @@ class ReferenceScheduler final : public sched::Scheduler {
 
   std::size_t new_job(std::size_t task, Time release, Time now);
   void skip_all(std::size_t task, Time now);
-  void discard_old_data(TaskState &state, Time release) const;
   void create_job(std::size_t task, Time release, Time now, const std::vector<Data> &consumed);
   void resolve(std::size_t job, Time now);
   void deliver(std::size_t job, Time now);
@@ -111,6 +110,7 @@ class ReferenceScheduler final : public sched::Scheduler {
 
   [[nodiscard]] bool is_degradable(std::size_t task) const;
   [[nodiscard]] Reason refusal(std::size_t task, Time release);
+  [[nodiscard]] bool is_taken(const TaskState &state, Time release) const;
   void begin_high_mode(std::size_t cause, Time now);
   void end_high_mode(Time now);
   void demote(std::size_t job);

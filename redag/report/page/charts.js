@@ -7,6 +7,7 @@ const PALETTE = {
 };
 const charts = [];
 const themed = [];   // what else to make again when the theme changes
+let beforePrint = null;  // what it was before the printer came
 let forced = null;  // 'light' or 'dark' where the reader or the printer said so
 
 const systemDark = window.matchMedia('(prefers-color-scheme: dark)');
@@ -29,7 +30,7 @@ function applyTheme() {
 }
 
 // Text, axes and tooltips as the page has them, under what a figure says itself.
-function withTheme(option, t) {
+function withTheme(option, t, width) {
   const axis = (own) => ({
     ...own,
     axisLine: {show: true, lineStyle: {color: t.line}, ...own.axisLine},
@@ -41,13 +42,15 @@ function withTheme(option, t) {
   const axes = (own) => (Array.isArray(own) ? own.map(axis) : axis(own));
   return {
     animation: false,
-    textStyle: {fontFamily: 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif'},
+    // In a saved SVG ECharts puts it between double quotes as it is.
+    textStyle: {fontFamily: "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif"},
     color: t.palette,
     ...option,
     xAxis: axes(option.xAxis),
     yAxis: axes(option.yAxis),
     legend: option.legend && {
-      type: 'scroll', top: 0, left: 0, right: 84, icon: 'roundRect', itemWidth: 14, itemHeight: 10,
+      // Beside the buttons, which paper does not have. (Of left, right and width ECharts takes one and the last.)
+      type: 'scroll', top: 0, left: 0, width: Math.max(120, width - (beforePrint === null ? 92 : 8)), icon: 'roundRect', itemWidth: 14, itemHeight: 10,
       formatter: (name) => (name.length > 42 ? `${name.slice(0, 41)}\u2026` : name), textStyle: {color: t.ink},
       pageTextStyle: {color: t.soft}, pageIconColor: t.ink, inactiveColor: t.line, ...option.legend,
     },
@@ -133,7 +136,7 @@ function figure({name, height, build, caption, canvas = false, label, onready}) 
         return;
       }
       chart = echarts.init(place, null, {renderer: canvas ? 'canvas' : 'svg', devicePixelRatio: Math.max(2, window.devicePixelRatio)});
-      drawn = withTheme(option, t);
+      drawn = withTheme(option, t, width);
       chart.setOption(drawn);
       if (onready) onready(chart);
     },
@@ -150,15 +153,15 @@ window.addEventListener('resize', () => {
 });
 systemDark.addEventListener('change', applyTheme);
 // Paper is white, and narrower than most windows.
-let beforePrint = null;
 window.addEventListener('beforeprint', () => {
-  beforePrint = forced;
+  beforePrint = {forced};
   forced = 'light';
   document.getElementById('report').style.width = '700px';
   applyTheme();
 });
 window.addEventListener('afterprint', () => {
-  forced = beforePrint;
+  ({forced} = beforePrint);
+  beforePrint = null;
   document.getElementById('report').style.width = '';
   applyTheme();
 });

@@ -4,7 +4,17 @@
 const report = JSON.parse(document.getElementById('data').textContent);
 const {factors, points} = report;
 const EXECUTOR = 'executor';
-const executors = factors.find(({name}) => name === EXECUTOR).levels;
+// Where an executor ran. Runs of several worlds can stand in one experiment, as executors "mte", "threads/mte", "ros2/mte".
+const worldOf = new Map(factors.find(({name}) => name === EXECUTOR).levels.map((executor) => [executor,
+  (points.find(({at, worlds}) => at.executor === executor && worlds.length > 0) || {worlds: [report.world]}).worlds[0]]));
+const worlds = Object.keys(WORLDS).filter((world) => [...worldOf.values()].includes(world));
+const plainName = (executor) => executor.slice(executor.indexOf('/') + 1);
+const label = (executor) => (worlds.length > 1 ? `${plainName(executor)}, ${WORLDS[worldOf.get(executor)]}` : executor);
+// The same executor in its worlds is side by side.
+const plainNames = [...new Set([...worldOf.keys()].map(plainName))];
+const executors = [...worldOf.keys()].sort((a, b) => plainNames.indexOf(plainName(a)) - plainNames.indexOf(plainName(b))
+  || worlds.indexOf(worldOf.get(a)) - worlds.indexOf(worldOf.get(b)));
+const byWorld = (list) => worlds.map((world) => ({world, names: list.filter((executor) => worldOf.get(executor) === world)}));
 const varied = factors.filter(({name, levels}) => name !== EXECUTOR && levels.length > 1);
 const pairs = (factors.find(({name}) => name === 'max_active') || {levels: []}).levels.filter((level) => /^\d+\+\d+$/.test(level));
 
@@ -12,6 +22,7 @@ const METRICS = {
   miss_ratio: 'missed: late or dropped', drop_ratio: 'dropped', excess_miss_ratio: 'missed above the ideal', response_p50_ns: 'median response',
   response_p95_ns: 'p95 response', response_p99_ns: 'p99 response', response_max_ns: 'longest response', max_lateness_ns: 'largest lateness',
   deferred: 'deferred, of all jobs', preemptions: 'preemptions a job', paper_miss_ratio: 'missed as the paper counts',
+  finished_per_s: 'finished jobs a second', work: 'processors in use',
 };
 const isTime = (metric) => metric.endsWith('_ns');
 const isShare = (metric) => metric.endsWith('_ratio') || metric === 'deferred';
@@ -44,10 +55,9 @@ const where = (skip) => varied.filter(({name}) => !skip.includes(name)).map(({na
 /** A metric over the chosen factor, a line for each executor. */
 function curvesFigure(name, metricOf, caption) {
   return figure({
-    name, height: 340, label: 'A metric over a factor, by executor', caption,
+    name, height: 348, label: 'A metric over a factor, by executor', caption,
     build(t, width) {
       const factor = varied[state.x];
-      if (factor === undefined) return 'Nothing was varied but the executor.';
       const metric = metricOf();
       // Numbers far apart have their true distance; few and close ones stand beside each other.
       const numbers = factor.levels.map(Number);
@@ -61,7 +71,7 @@ function curvesFigure(name, metricOf, caption) {
       const symbols = ['circle', 'rect', 'triangle', 'diamond', 'emptyCircle', 'emptyRect', 'emptyTriangle', 'emptyDiamond'];
       const most = Math.max(...lines.flatMap(({values}) => values.map((value) => value[1])));
       return {
-        grid: {left: 8, right: 24, top: 60, bottom: 26, containLabel: true},
+        grid: {left: 8, right: 24, top: 60, bottom: 34, containLabel: true},
         legend: {},
         tooltip: {
           trigger: 'item',
@@ -79,18 +89,79 @@ function curvesFigure(name, metricOf, caption) {
         },
         series: [
           ...lines.map(({executor, e, values}) => ({
-            type: 'line', name: executor, symbol: symbols[e % symbols.length], symbolSize: 8, itemStyle: {color: colourOf(t, e)},
+            type: 'line', name: label(executor), symbol: symbols[e % symbols.length], symbolSize: 8, itemStyle: {color: colourOf(t, e)},
             // Between levels that are no numbers there is nothing: the line only leads the eye.
             lineStyle: {width: 2, opacity: factor.numeric ? 1 : 0.35, type: executor === 'ideal' || executor === 'unlimited' ? 'dashed' : 'solid'}, data: values,
           })),
           ...lines.map(({executor, e, values}) => ({
-            type: 'custom', name: executor, silent: true, data: values, encode: {x: 0, y: [2, 3]},
+            type: 'custom', name: label(executor), silent: true, data: values, encode: {x: 0, y: [2, 3]},
             renderItem: (params, api) => {
               const [left, top] = api.coord([api.value(0), api.value(3)]);
               const bottom = api.coord([api.value(0), api.value(2)])[1];
               if (bottom - top < 1) return null;
               const bar = (x1, y1, x2, y2) => ({type: 'line', shape: {x1, y1, x2, y2}, style: {stroke: colourOf(t, e), lineWidth: 1}});
               return {type: 'group', children: [bar(left, top, left, bottom), bar(left - 4, top, left + 4, top), bar(left - 4, bottom, left + 4, bottom)]};
+            },
+          })),
+        ],
+      };
+    },
+  });
+}
+
+/** A metric at the chosen levels: a group of bars for each executor, a bar for each world that it ran in. */
+function worldsFigure() {
+  return figure({
+    name: 'worlds', height: 340, label: 'A metric of each executor, in each world',
+    caption: `Medians at the chosen levels, of ${worlds.length > 1 ? 'the same executor in each world that it ran in' : 'each executor'}. ${intervals}`,
+    build(t, width) {
+      const {metric} = state;
+      const inWorld = (name, world) => executors.find((executor) => plainName(executor) === name && worldOf.get(executor) === world);
+      const spread = (name, world) => (inWorld(name, world) ? spreadAt(inWorld(name, world), metric) : null);
+      const names = plainNames.filter((name) => worlds.some((world) => spread(name, world) !== null));
+      if (names.length === 0) return 'There is nothing of this kind: the distance to the ideal needs the executor "ideal" on the same workers and jobs.';
+      const all = names.flatMap((name) => worlds.map((world) => spread(name, world))).filter((one) => one !== null);
+      const most = Math.max(...all.map((one) => one[0]));
+      // Times are far apart; a logarithmic axis has no place for early ones (negative lateness).
+      const log = isTime(metric) && all.every((one) => one[0] > 0);
+      const floor = log ? 10 ** Math.floor(Math.log10(Math.min(...all.map((one) => one[0])) / 2)) : 0;
+      const bars = {barGap: '12%', barMaxWidth: 46};
+      return {
+        grid: {left: 8, right: 16, top: 60, bottom: 8, containLabel: true},
+        legend: worlds.length > 1 ? {} : undefined,
+        tooltip: {
+          trigger: 'item',
+          formatter: ({dataIndex, seriesIndex}) => {
+            const one = spread(names[dataIndex], worlds[seriesIndex]);
+            return tip([`${names[dataIndex]}, ${WORLDS[worlds[seriesIndex]]}`, show(metric, one[0]),
+              one[1] === one[2] ? null : `${show(metric, one[1])} to ${show(metric, one[2])}`]);
+          },
+        },
+        xAxis: {type: 'category', data: names, axisTick: {show: false}, axisLabel: {color: t.ink, interval: 0, rotate: names.length * 62 > width ? 35 : 0}},
+        yAxis: {
+          type: log ? 'log' : 'value', min: log ? floor : undefined, max: most === 0 ? 1 : undefined, name: METRICS[metric],
+          nameTextStyle: {align: 'left'}, nameGap: 14,
+          axisLabel: {formatter: (value) => (isTime(metric) ? formatAxisTime(value, log ? value : Math.max(1, Math.abs(most) / 10))
+            : isShare(metric) ? `${Number((100 * value).toPrecision(3))} %` : String(value))},
+        },
+        series: [
+          ...worlds.map((world, w) => ({
+            type: 'bar', name: WORLDS[world], ...bars, itemStyle: {color: colourOf(t, w), borderRadius: [3, 3, 0, 0]},
+            data: names.map((name) => { const one = spread(name, world); return one === null ? null : one[0]; }),
+            label: {show: names.length * worlds.length * 78 <= width, position: 'top', color: t.soft, fontSize: 11, distance: 6,
+              formatter: ({value}) => show(metric, value)},
+          })),
+          ...worlds.map((world, w) => ({
+            type: 'custom', name: WORLDS[world], silent: true, z: 5,
+            data: names.map((name, i) => [i, ...(spread(name, world) || [0, 0, 0]).slice(1)]),
+            renderItem: (params, api) => {
+              if (api.value(1) === api.value(2)) return null;
+              const layout = api.barLayout({count: worlds.length, ...bars})[w];
+              const [left, top] = api.coord([api.value(0), api.value(2)]);
+              const bottom = api.coord([api.value(0), Math.max(api.value(1), log ? floor : api.value(1))])[1];
+              const x = left + layout.offsetCenter;
+              const line = (x1, y1, x2, y2) => ({type: 'line', shape: {x1, y1, x2, y2}, style: {stroke: t.ink, lineWidth: 1.2}});
+              return {type: 'group', children: [line(x, top, x, bottom), line(x - 4, top, x + 4, top), line(x - 4, bottom, x + 4, bottom)]};
             },
           })),
         ],
@@ -119,7 +190,7 @@ function boundsFigure() {
       const part = (value) => (most > least ? (value - least) / (most - least) : 0);
       const mix = (from, to, share) => `rgb(${from.map((c, i) => Math.round(c + (to[i] - c) * share)).join(',')})`;
       const shade = (value) => (t.dark ? mix([24, 44, 66], [214, 120, 48], part(value)) : mix([226, 238, 251], [196, 88, 8], part(value)));
-      note.textContent = `${owner}: ${METRICS[state.metric]}${free ? `; without bounds ${show(state.metric, free[0])}` : ''}`;
+      note.textContent = `${label(owner)}: ${METRICS[state.metric]}${free ? `; without bounds ${show(state.metric, free[0])}` : ''}`;
       return {
         grid: {left: 60, right: 16, top: 28, bottom: 52},
         tooltip: {trigger: 'item', formatter: ({value}) => {
@@ -158,7 +229,7 @@ function effectsFigure() {
       + 'together (\u00d7), three and more, and chance.',
     build(t) {
       if (shown.length === 0) return report.complete ? 'The miss ratio is the same everywhere.' : 'Effects need all runs.';
-      const rows = shown.map(({workload, executor}) => (new Set(shown.map((one) => one.workload)).size > 1 ? `${executor}, ${workload}` : executor));
+      const rows = shown.map(({workload, executor}) => (new Set(shown.map((one) => one.workload)).size > 1 ? `${label(executor)}, ${workload}` : label(executor)));
       const value = (one, term) => (one.shares.find((share) => name(share) === term) || {share: 0}).share;
       const stack = (label, data, i) => ({type: 'bar', stack: 'all', name: label, data, itemStyle: {color: colourOf(t, i), opacity: i >= 8 ? 0.55 : 1}, barMaxWidth: 22});
       return {
@@ -186,14 +257,18 @@ function verdict() {
   else if (pairs.length > 0 || points.some(({at}) => at.max_active)) say('good', 'Every bound max_active was kept in every run.');
   if (!report.complete) say('caution', `${formatCount(report.done)} of ${formatCount(report.units)} runs are done.`);
   factors.find(({name}) => name === 'workload').levels.forEach((workload) => {
-    const parts = executors.map((executor) => {
+    const missed = (executor) => {
       const misses = points.filter(({at, dags}) => at.executor === executor && at.workload === workload && dags.length > 0)
         .map(({dags}) => dags[dags.length - 1].values[0][0]);
       if (misses.length === 0) return null;
       const mean = misses.reduce((a, b) => a + b, 0) / misses.length;
-      return `${executor} ${formatPercent(mean)}${misses.length > 1 ? ` (${formatPercent(Math.min(...misses))} to ${formatPercent(Math.max(...misses))})` : ''}`;
+      return `${plainName(executor)} ${formatPercent(mean)}${misses.length > 1 ? ` (${formatPercent(Math.min(...misses))} to ${formatPercent(Math.max(...misses))})` : ''}`;
+    };
+    const parts = byWorld(executors).map(({world, names}) => {
+      const list = names.map(missed).filter((part) => part !== null).join(', ');
+      return list === '' ? null : `${worlds.length > 1 ? `${DRIVERS[world]} ` : ''}${list}`;
     }).filter((part) => part !== null);
-    say('plain', `${workload}: missed, mean over all combinations: ${parts.join(', ')}.`);
+    say('plain', `${workload}: missed${varied.length > 1 ? ', mean over all combinations' : ''}: ${parts.join('; ')}.`);
   });
   return verdictList(list);
 }
@@ -202,14 +277,15 @@ function selectionTable() {
   const factor = varied[state.x];
   const levels = factor === undefined ? [''] : factor.levels;
   const shownMetrics = ['miss_ratio', 'drop_ratio', 'excess_miss_ratio', 'paper_miss_ratio', 'response_p50_ns', 'response_p99_ns', 'max_lateness_ns'];
-  const columns = [{title: factor ? words(factor.name) : ''}, {title: 'executor', text: true}, ...shownMetrics.map((metric) => ({title: METRICS[metric]}))];
+  const columns = [{title: factor ? words(factor.name) : ''}, {title: 'executor', text: true}, ...(worlds.length > 1 ? [{title: 'world', text: true}] : []),
+    ...shownMetrics.map((metric) => ({title: METRICS[metric]}))];
   const rows = [];
   levels.forEach((level) => {
     let first = true;
     executors.forEach((executor) => {
       const spread = (metric) => spreadAt(executor, metric, factor ? {[factor.name]: level} : {});
       if (spread('miss_ratio') === null) return;
-      rows.push({first, cells: [first ? level : '', executor, ...shownMetrics.map((metric) => {
+      rows.push({first, cells: [first ? level : '', plainName(executor), ...(worlds.length > 1 ? [WORLDS[worldOf.get(executor)]] : []), ...shownMetrics.map((metric) => {
         const value = spread(metric);
         return value === null ? '' : {text: show(metric, value[0]), title: `${show(metric, value[1])} to ${show(metric, value[2])}`, kind: metric === 'miss_ratio' && value[0] > 0 ? 'bad' : ''};
       })]});
@@ -222,9 +298,11 @@ function selectionTable() {
 function howItWasRun() {
   const machines = [...new Set(report.runs.filter(({machine}) => machine).map(({machine, jobs, version}) =>
     [machine.model, `${machine.cpus} processors`, machine.kernel, `redag ${version}`, `${jobs} at once`].filter(Boolean).join(', ')))];
+  const worldRows = worlds.length > 1 ? byWorld(executors).map(({world, names}) => [WORLDS[world], `${names.map(plainName).join(', ')} ${DRIVERS[world]}`])
+    : [['World', DRIVERS[worlds[0]]]];
   return [
     element('h2', {id: 'how'}, 'How it was run'),
-    element('dl', {}, ...[['World', DRIVERS[report.world]], ['Length of a run', formatTime(report.duration_ns)],
+    element('dl', {}, ...[...worldRows, ['Length of a run', formatTime(report.duration_ns)],
       ['Runs of a combination', String(report.repetitions)], ['Combinations', formatCount(points.length)], ['Machine', machines.join('; ') || 'not recorded'],
     ].flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])),
     element('details', {}, element('summary', {}, 'The plan'), element('pre', {}, report.plan)),
@@ -233,6 +311,7 @@ function howItWasRun() {
 }
 
 const intervals = 'Lines across: a confidence interval for the median over the repetitions, whose level the tables of the experiment give.';
+const bars = worlds.length > 1 || varied.length === 0 ? worldsFigure() : null;
 const curves = curvesFigure('curves', () => state.metric, `Medians at the chosen levels. ${intervals}`);
 const distance = curvesFigure('distance', () => 'excess_miss_ratio', 'Missed deadlines above those of the ideal (preemptive, no overhead, no bounds, in virtual '
   + `time) on the same jobs. Below 0: better than it, which is no contradiction, since a rate-monotonic order is not optimal. ${intervals}`);
@@ -241,25 +320,30 @@ const effects = varied.filter(({name}) => name !== 'workload').length > 1 ? effe
 
 function redraw() {
   refill();
-  [curves, distance, map.figure].forEach((one) => one.draw());
+  [bars, curves, distance, map.figure].forEach((one) => { if (one !== null) one.draw(); });
 }
 const dagNames = [...new Set(points.flatMap(({dags}) => dags.map(({name}) => name)))].sort((a, b) => (b === 'total') - (a === 'total'));
+const levelChoice = ({name, levels}) => dropdown(words(name), levels, levels.indexOf(state.levels[name]),
+  (i) => { state.levels[name] = levels[i]; redraw(); });
 const controls = filled(() => element('div.row.controls', {},
   varied.length > 1 ? dropdown('over', varied.map(({name}) => words(name)), state.x, (i) => { state.x = i; redraw(); }) : null,
   dropdown('of', report.metrics.map((metric) => METRICS[metric]), report.metrics.indexOf(state.metric), (i) => { state.metric = report.metrics[i]; redraw(); }),
   dropdown('DAG', dagNames, dagNames.indexOf(state.dag), (i) => { state.dag = dagNames[i]; redraw(); }),
-  ...varied.filter((factor, i) => i !== state.x).map(({name, levels}) => dropdown(words(name), levels, levels.indexOf(state.levels[name]),
-    (i) => { state.levels[name] = levels[i]; redraw(); }))));
+  ...varied.filter((factor, i) => i !== state.x).map(levelChoice)));
 
 startPage([
   element('div.head', {}, element('h1', {}, report.name), element('div.controls', {}, themeChoice())),
-  element('p.facts', {}, [`${executors.join(', ')}`, DRIVERS[report.world], `${formatCount(report.done)} runs of ${formatTime(report.duration_ns)}`].join(' \u00b7 ')),
+  element('p.facts', {}, [plainNames.join(', '), worlds.map((world) => DRIVERS[world]).join(', '), `${formatCount(report.done)} runs of ${formatTime(report.duration_ns)}`].join(' \u00b7 ')),
   verdict(),
-  element('h2', {id: 'curves'}, 'Over one factor'), controls, filled(() => element('p.soft', {}, varied[state.x] ? where([varied[state.x].name]) : '')), curves.box,
-  element('h3', {}, 'Distance to the ideal'), distance.box,
-  filled(selectionTable),
+  element('h2', {id: 'curves'}, varied.length > 0 ? 'Over one factor' : 'Executors side by side'), controls,
+  ...(varied.length > 0 ? [filled(() => element('p.soft', {}, where([varied[state.x].name]))), curves.box,
+    element('h3', {}, 'Distance to the ideal'), distance.box, filled(selectionTable)] : []),
+  ...(bars === null ? [] : [worlds.length > 1 ? element('h2', {id: 'worlds'}, 'World beside world') : null,
+    varied.length > 0 ? filled(() => element('div.row.controls', {}, levelChoice(varied[state.x]))) : null,
+    varied.length > 0 ? filled(() => element('p.soft', {}, where([]))) : null, bars.box]),
+  ...(varied.length > 0 ? [] : [filled(selectionTable)]),
   ...(pairs.length > 0 ? [element('h2', {id: 'bounds'}, 'Bounds on two DAGs'),
-    map.owners.length > 1 ? element('div.row.controls', {}, choice(map.owners, 0, (i) => { state.owner = i; map.figure.draw(); })) : null,
+    map.owners.length > 1 ? element('div.row.controls', {}, choice(map.owners.map(label), 0, (i) => { state.owner = i; map.figure.draw(); })) : null,
     filled(() => element('p.soft', {}, where(['max_active']))), map.note, map.figure.box] : []),
   ...(effects !== null ? [element('h2', {id: 'effects'}, 'What explains the differences'), effects.box] : []),
   ...howItWasRun(),

@@ -33,7 +33,7 @@ function verticalLine(t, x, text, colour, position) {
  */
 function responseFigure(groups, state) {
   return figure({
-    name: 'responses', height: 360, label: 'Distribution of response times',
+    name: 'responses', height: 368, label: 'Distribution of response times',
     caption: 'Response: from the nominal release to the finish. Jobs that were lost never answer: where some were, a '
       + `curve ends below 1. Of all tasks, the ${MOST_LINES} that came closest to their deadlines. The legend takes lines away and back.`,
     build(t, width) {
@@ -61,7 +61,7 @@ function responseFigure(groups, state) {
         / (one ? 1 : task.deadline_ns)));
       const edge = one ? Math.max(mark.deadline_ns, mark.bound_ns || 0) : 1;
       return {
-        grid: {left: 8, right: 24, top: 66, bottom: 26, containLabel: true},
+        grid: {left: 8, right: 24, top: 66, bottom: 34, containLabel: true},
         legend: {},
         tooltip: {
           trigger: 'item',
@@ -94,7 +94,7 @@ function responseFigure(groups, state) {
 /** How early or late jobs finished, in classes of 1/40 of the deadline. */
 function latenessFigure(groups, state) {
   return figure({
-    name: 'lateness', height: 300, label: 'Histogram of lateness',
+    name: 'lateness', height: 308, label: 'Histogram of lateness',
     caption: 'Lateness: finish minus deadline, as a share of the deadline; \u22121 is the release, right of 0 is late. The last '
       + 'class holds everything later than one whole deadline. Lost jobs have no lateness and are not here. Logarithmic.',
     build(t, width) {
@@ -109,7 +109,7 @@ function latenessFigure(groups, state) {
         : `${((i - half) / half).toFixed(3)} to ${((i + 1 - half) / half).toFixed(3)} of the deadline`);
       const used = group.dags.map((dag, d) => ({dag, d})).filter(({d}) => Math.max(...byDag[d]) > 0);
       return {
-        grid: {left: 8, right: 24, top: 66, bottom: 24, containLabel: true},
+        grid: {left: 8, right: 24, top: 66, bottom: 32, containLabel: true},
         legend: {},
         tooltip: {trigger: 'item', formatter: (item) => tip([item.seriesName, bounds(item.dataIndex), `${formatCount(item.value)} jobs`])},
         xAxis: {
@@ -215,7 +215,7 @@ function comparisonFigure({name, title, groups, rows, value, log, format, format
           ...groups.map((group, g) => ({
             type: 'bar', name: group.label, barGap: '12%', barMaxWidth: 46, itemStyle: {color: colourOf(t, g), borderRadius: [3, 3, 0, 0]},
             data: rows.map((row) => spread(row, g).median),
-            label: {show: groups.length * rows.length * 62 <= width, position: 'top', color: t.soft, fontSize: 11, distance: 6,
+            label: {show: groups.length * rows.length * (log ? 78 : 60) <= width, position: 'top', color: t.soft, fontSize: 11, distance: 6,
               formatter: (item) => format(item.value)},
           })),
           ...groups.map((group, g) => ({

@@ -33,6 +33,7 @@ const DRIVERS = {
   simulator: 'in virtual time', threads: 'on threads of this machine', ros: 'under ROS 2, as the executor saw it',
   ros_nodes: 'under ROS 2, as the nodes saw it', ros2: 'under ROS 2',
 };
+const WORLDS = {simulator: 'virtual time', threads: 'threads', ros: 'ROS 2', ros_nodes: 'ROS 2', ros2: 'ROS 2'};  // in a table
 const OUTCOMES = ['in progress', 'finished', 'skipped', 'aborted'];
 const REASONS = [
   '', 'not started when the next was released', 'not ready when the next was released', 'its queue was full',

@@ -2,7 +2,7 @@
 
 const MARKS = {good: '\u2713', bad: '\u2717', caution: '!', plain: '\u2022'};
 const verdictList = (sentences) => element('ul.verdict', {},
-  ...sentences.map(({tone, text}) => element(`li.${tone}`, {}, element('b', {'aria-hidden': 'true'}, MARKS[tone]), text)));
+  ...sentences.map(({tone, text}) => element(`li.${tone}`, {}, element('b', {'aria-hidden': 'true'}, MARKS[tone]), text.replaceAll(' %', '\u00a0%'))));
 
 /** A place whose content is made again by its `fill`. */
 function place(fill) {

@@ -107,6 +107,17 @@ function detailSections() {
   ];
 }
 
+/** What is not shown; where it is the same of several executors, once. */
+function cuts() {
+  const owners = new Map();
+  report.cuts.forEach((cut) => {
+    const at = several ? cut.indexOf(': ') : -1;
+    const what = cut.slice(at < 0 ? 0 : at + 2);
+    owners.set(what, [...(owners.get(what) || []), ...(at < 0 ? [] : [cut.slice(0, at)])]);
+  });
+  return [...owners].map(([what, names]) => (names.length === 0 ? what : `${names.join(', ')}: ${what}`));
+}
+
 function howItWasRun() {
   const facts = () => {
     const {run} = groups[state.executor];
@@ -125,7 +136,7 @@ function howItWasRun() {
   };
   return [
     element('h2', {id: 'how'}, 'How it was run'), filled(facts), runTable(groups),
-    ...(report.cuts.length === 0 ? [] : [element('h3', {}, 'What is not shown'), element('ul.soft', {}, ...report.cuts.map((cut) => element('li', {}, cut)))]),
+    ...(report.cuts.length === 0 ? [] : [element('h3', {}, 'What is not shown'), element('ul.soft', {}, ...cuts().map((cut) => element('li', {}, cut)))]),
     pageFooter(report.version),
   ];
 }

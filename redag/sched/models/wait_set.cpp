@@ -6,8 +6,8 @@
 
 namespace redag::sched {
 
-WaitSetScheduler::WaitSetScheduler(const Workload &workload, const Config &config)
-    : Lifecycle(config), working_(config.workers, false) {
+WaitSetScheduler::WaitSetScheduler(const Workload &workload, const Config &config, Order order)
+    : Lifecycle(config), order_(order), working_(config.workers, false) {
   REDAG_CHECK(config.workers > 0, "an executor has at least one thread");
   REDAG_CHECK(config.preemption == Preemption::None, "rclcpp's executors do not preempt");
   load(workload);
@@ -25,7 +25,7 @@ Step WaitSetScheduler::dispatch(Time now, std::uint32_t most) {
     if (slot == kNil && wait()) slot = take();
     if (slot == kNil) break;
     Entity &entity = entities_[jobs_[slot].task.value];
-    unlink(entity, slot);
+    entity.ready.remove(jobs_, slot);
     --room_[entity.group];
     working_[worker] = true;
     start(slot, WorkerId(worker), kNil, 0);
@@ -45,7 +45,7 @@ std::uint32_t WaitSetScheduler::take() {
     Entity &entity = entities_[task];
     if (!entity.in_window || room_[entity.group] == 0) continue;
     entity.in_window = false;
-    if (entity.first != kNil) return entity.first;
+    if (!entity.ready.empty()) return entity.ready.first;
   }
   return kNil;
 }
@@ -55,40 +55,28 @@ std::uint32_t WaitSetScheduler::take() {
 bool WaitSetScheduler::wait() {
   bool any = false;
   for (Entity &entity : entities_) {
-    entity.in_window = entity.first != kNil && room_[entity.group] > 0;
+    entity.in_window = !entity.ready.empty() && room_[entity.group] > 0;
     any = any || entity.in_window;
   }
   return any;
 }
 
-void WaitSetScheduler::on_ready(std::uint32_t slot) {
-  Entity &entity = entities_[jobs_[slot].task.value];
-  jobs_[slot].task_next = kNil;
-  (entity.last == kNil ? entity.first : jobs_[entity.last].task_next) = slot;
-  entity.last = slot;
-}
+void WaitSetScheduler::on_ready(std::uint32_t slot) { entities_[jobs_[slot].task.value].ready.push(jobs_, slot); }
 
-void WaitSetScheduler::on_withdrawn(std::uint32_t slot) { unlink(entities_[jobs_[slot].task.value], slot); }
+void WaitSetScheduler::on_withdrawn(std::uint32_t slot) { entities_[jobs_[slot].task.value].ready.remove(jobs_, slot); }
 
 void WaitSetScheduler::on_end(std::uint32_t slot) {
   ++room_[entities_[jobs_[slot].task.value].group];
   working_[jobs_[slot].worker.value] = false;
 }
 
-void WaitSetScheduler::unlink(Entity &entity, std::uint32_t slot) {
-  std::uint32_t before = kNil;
-  for (std::uint32_t s = entity.first; s != slot; s = jobs_[s].task_next) before = s;
-  (before == kNil ? entity.first : jobs_[before].task_next) = jobs_[slot].task_next;
-  if (entity.last == slot) entity.last = before;
-}
-
 // Entities keep their jobs and their place in the window; the groups are numbered anew.
 void WaitSetScheduler::on_reconfigured() {
   entities_.resize(tasks_.size());
   registration_.clear();
-  for (const bool timers : {true, false}) {
+  for (const bool first : {true, false}) {
     for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
-      if (tasks_[t].timer == timers) registration_.push_back(t);
+      if ((tasks_[t].timer == (order_ == Order::TimersFirst)) == first) registration_.push_back(t);
     }
   }
   room_.assign(tasks_.size() + group_count(), 1);
@@ -97,19 +85,11 @@ void WaitSetScheduler::on_reconfigured() {
     Entity &entity = entities_[t];
     entity.group = named == kNil ? t : static_cast<std::uint32_t>(tasks_.size()) + named;
     if (named == kNil) room_[t] = tasks_[t].concurrency;
-    if (entity.first == kNil) entity.in_window = false;  // it may be another task of this id
+    if (entity.ready.empty()) entity.in_window = false;  // it may be another task of this id
   }
   for (const Job &job : jobs_) {
     if (job.started()) --room_[entities_[job.task.value].group];
   }
-}
-
-std::unique_ptr<Scheduler> make_single_threaded(const Workload &workload) { return make_multi_threaded(workload, 1); }
-
-std::unique_ptr<Scheduler> make_multi_threaded(const Workload &workload, std::uint32_t workers) {
-  Config config;
-  config.workers = workers;
-  return std::make_unique<WaitSetScheduler>(workload, config);
 }
 
 }  // namespace redag::sched

@@ -1,12 +1,13 @@
-// Model of rclcpp's SingleThreadedExecutor and MultiThreadedExecutor as of ROS 2 Humble. Owns which ready job runs
-// next; a job's life is Lifecycle's. Not thread-safe. What is modelled and what is not: at the class.
+// Model of rclcpp's executors that wait for a set of entities, as of ROS 2 Humble: SingleThreadedExecutor,
+// MultiThreadedExecutor, StaticSingleThreadedExecutor. Owns which ready job runs next; a job's life is Lifecycle's. Not
+// thread-safe. What is modelled and what is not: at the class.
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "redag/sched/lifecycle.hpp"
+#include "redag/sched/models/ready_jobs.hpp"
 
 namespace redag::sched {
 
@@ -16,17 +17,24 @@ namespace redag::sched {
 ///   ready meanwhile is not seen (the processing window of Casini, Blass, Luetkebohle, Brandenburg, ECRTS 2019).
 /// - From the set: timers first, then subscriptions (get_next_ready_executable_from_map), in the order of registration,
 ///   each once; those whose group is busy are passed over and stay (get_next_timer, get_next_subscription).
+/// - StaticSingleThreadedExecutor walks through the set in the same way, but subscriptions first, then timers
+///   (rclcpp/src/rclcpp/executors/static_single_threaded_executor.cpp, execute_ready_executables).
 /// - MultiThreadedExecutor::run: the threads take one entity each under a lock; a group is busy until its job ends.
 /// Not modelled: what rcl_wait, the lock and waking a thread cost; services, clients, waitables; that groups are walked
-/// in the order of their addresses, which is arbitrary (here: order of DAGs and tasks).
+/// in the order of their addresses, which is arbitrary (here: order of DAGs and tasks). Of the static executor:
+/// messages within the process, which it takes last, even if they came during the walk; and Jazzy's, which waits again
+/// after each callback, so that a ready subscription always goes before every timer.
 ///
 /// A timer task is a timer, a data task a subscription. `group` is the callback group; a task without one is alone in a
 /// group of its own, whereas in ROS 2 all callbacks of a node share its default group unless told otherwise. Bounds of
 /// DAGs (max_active), priorities and preemption are unknown to these executors.
 class WaitSetScheduler final : public Lifecycle {
  public:
-  /// Requires config.workers > 0 and Preemption::None; 1 worker is the SingleThreadedExecutor.
-  WaitSetScheduler(const Workload &workload, const Config &config);
+  enum class Order : std::uint8_t { TimersFirst, SubscriptionsFirst };
+
+  /// Requires config.workers > 0 and Preemption::None; 1 worker is the SingleThreadedExecutor, or, with subscriptions
+  /// first, the static one.
+  WaitSetScheduler(const Workload &workload, const Config &config, Order order);
 
   /// Nothing: these executors know neither budgets nor criticality.
   void exceed(JobSlot /*job*/, Limit /*limit*/, Time /*now*/) override {}
@@ -37,8 +45,7 @@ class WaitSetScheduler final : public Lifecycle {
  private:
   /// A task as rclcpp sees it: a timer or a subscription.
   struct Entity {
-    std::uint32_t first = kNil;  // ready jobs, oldest first, linked by Job::task_next
-    std::uint32_t last = kNil;
+    ReadyJobs ready;
     std::uint32_t group = 0;  // position in room_
     bool in_window = false;
   };
@@ -52,15 +59,12 @@ class WaitSetScheduler final : public Lifecycle {
   [[nodiscard]] std::uint32_t free_worker() const;
   std::uint32_t take();
   bool wait();
-  void unlink(Entity &entity, std::uint32_t slot);
 
+  Order order_;
   std::vector<Entity> entities_;             // by TaskId
   std::vector<std::uint32_t> registration_;  // tasks in the order in which a window is searched
   std::vector<std::uint32_t> room_;          // jobs that groups can start: one group for each task, then the named ones
   std::vector<bool> working_;                // workers
 };
-
-[[nodiscard]] std::unique_ptr<Scheduler> make_single_threaded(const Workload &workload);
-[[nodiscard]] std::unique_ptr<Scheduler> make_multi_threaded(const Workload &workload, std::uint32_t workers);
 
 }  // namespace redag::sched

@@ -10,87 +10,24 @@
 #include <rapidcheck/gtest.h>
 
 #include "redag/base/rng.hpp"
+#include "redag/sched/executors.hpp"
+#include "redag/testing/named_executor.hpp"
 #include "redag/testing/random_workloads.hpp"
 
 namespace redag::sched {
 namespace {
 
-using Names = std::vector<std::string>;
+using testing::NamedExecutor;
+using testing::subscription;
+using testing::timer;
+using Names = NamedExecutor::Names;
 
-Task timer(std::string name, Duration period = 10) {
-  Task task;
-  task.name = std::move(name);
-  task.wcet = 1;
-  task.period = task.deadline = period;
-  return task;
-}
-
-Task subscription(std::string name, std::vector<std::uint32_t> after) {
-  Task task = timer(std::move(name), 0);
-  task.activation = Activation::Data;
-  task.predecessors = std::move(after);
-  return task;
-}
-
-/// Drives an executor by the names of tasks. Time is 0: only the order of events matters.
-class Executor {
- public:
-  Executor(std::vector<std::vector<Task>> dags, std::uint32_t workers) {
-    for (std::vector<Task> &tasks : dags) {
-      Dag dag;
-      dag.tasks = std::move(tasks);
-      dag.max_active = 1;  // which these executors do not know
-      inherit_periods(dag);
-      workload_.dags.push_back(dag);
-    }
-    for (const TaskRef &ref : flatten(workload_)) names_.push_back(ref.task->name);
-    scheduler_ = make_multi_threaded(workload_, workers);
-  }
-
-  void release(const std::string &name) {
-    const TaskId task = id(name);
-    const Duration period = flatten(workload_)[task.value].task->period;
-    scheduler_->release(task, period * releases_[name]++, 0);
-  }
-
-  /// What starts now.
-  Names dispatch() {
-    Names started;
-    for (const Dispatch &d : scheduler_->dispatch(0).dispatches) {
-      started.push_back(names_[d.task.value]);
-      running_[started.back()] = d.job;
-    }
-    return started;
-  }
-
-  Names end(const std::string &name, Outcome outcome = Outcome::Finished) {
-    scheduler_->complete(running_.at(name), 0, outcome);
-    running_.erase(name);
-    return dispatch();
-  }
-
-  Names release_and_dispatch(const Names &names) {
-    for (const std::string &name : names) release(name);
-    return dispatch();
-  }
-
-  [[nodiscard]] Accounting accounting(const std::string &name) const { return scheduler_->accounting(id(name)); }
-  void remove_dag(std::size_t dag) { scheduler_->remove_dag(DagId(dag), 0); }
-
- private:
-  [[nodiscard]] TaskId id(const std::string &name) const {
-    return TaskId(static_cast<std::size_t>(std::find(names_.begin(), names_.end(), name) - names_.begin()));
-  }
-
-  Workload workload_;
-  Names names_;
-  std::unique_ptr<Scheduler> scheduler_;
-  std::map<std::string, Time> releases_;
-  std::map<std::string, JobSlot> running_;
-};
+NamedExecutor single_threaded(std::vector<std::vector<Task>> dags) { return {"ste", std::move(dags), 1}; }
+NamedExecutor static_single_threaded(std::vector<std::vector<Task>> dags) { return {"static", std::move(dags), 1}; }
+NamedExecutor multi_threaded(std::vector<std::vector<Task>> dags) { return {"mte", std::move(dags), 2}; }
 
 TEST(SingleThreaded, ALongSubscriptionBlocksAFastTimer) {
-  Executor ste({{timer("camera", 100), subscription("detect", {0})}, {timer("control")}}, 1);
+  NamedExecutor ste = single_threaded({{timer("camera", 100), subscription("detect", {0})}, {timer("control")}});
   EXPECT_EQ(ste.release_and_dispatch({"camera"}), Names{"camera"});
   EXPECT_EQ(ste.end("camera"), Names{"detect"});
   for (int i = 0; i < 3; ++i) EXPECT_EQ(ste.release_and_dispatch({"control"}), Names{});
@@ -100,10 +37,9 @@ TEST(SingleThreaded, ALongSubscriptionBlocksAFastTimer) {
 }
 
 TEST(SingleThreaded, TimersGoBeforeSubscriptionsAndBothInTheOrderOfRegistration) {
-  Executor ste({{timer("source", 50), subscription("first", {0}), subscription("second", {0})},
-                {timer("slow", 90)},
-                {timer("fast", 10)}},
-               1);
+  NamedExecutor ste = single_threaded({{timer("source", 50), subscription("first", {0}), subscription("second", {0})},
+                                       {timer("slow", 90)},
+                                       {timer("fast", 10)}});
   EXPECT_EQ(ste.release_and_dispatch({"source"}), Names{"source"});
   ste.release("fast");
   ste.release("slow");
@@ -116,7 +52,8 @@ TEST(SingleThreaded, TimersGoBeforeSubscriptionsAndBothInTheOrderOfRegistration)
 
 // The priority inversion of Casini et al.: even a timer waits for all subscriptions of the window.
 TEST(SingleThreaded, WhatBecomesReadyDuringAWindowIsSeenAfterIt) {
-  Executor ste({{timer("source"), subscription("first", {0}), subscription("second", {0})}, {timer("urgent", 1)}}, 1);
+  NamedExecutor ste = single_threaded(
+      {{timer("source"), subscription("first", {0}), subscription("second", {0})}, {timer("urgent", 1)}});
   EXPECT_EQ(ste.release_and_dispatch({"source"}), Names{"source"});
   EXPECT_EQ(ste.end("source"), Names{"first"});
   ste.release("urgent");
@@ -130,7 +67,7 @@ TEST(SingleThreaded, AnEntityIsTakenOnceAWindowSoNobodyStarves) {
   Task often = timer("often", 1);
   often.overrun = Overrun::Queue;
   often.queue_depth = 3;
-  Executor ste({{often}, {timer("other", 100)}}, 1);
+  NamedExecutor ste = single_threaded({{often}, {timer("other", 100)}});
   EXPECT_EQ(ste.release_and_dispatch({"often", "often", "often", "other"}), Names{"often"});
   EXPECT_EQ(ste.end("often"), Names{"other"});
   EXPECT_EQ(ste.end("other"), Names{"often"});
@@ -140,13 +77,13 @@ TEST(SingleThreaded, AnEntityIsTakenOnceAWindowSoNobodyStarves) {
 }
 
 TEST(SingleThreaded, AnAbortedJobFeedsNobody) {
-  Executor ste({{timer("source"), subscription("sink", {0})}}, 1);
+  NamedExecutor ste = single_threaded({{timer("source"), subscription("sink", {0})}});
   EXPECT_EQ(ste.release_and_dispatch({"source"}), Names{"source"});
   EXPECT_EQ(ste.end("source", Outcome::Threw), Names{});
 }
 
 TEST(SingleThreaded, ARemovedDagLeavesTheWindow) {
-  Executor ste({{timer("a")}, {timer("b")}, {timer("c")}}, 1);
+  NamedExecutor ste = single_threaded({{timer("a")}, {timer("b")}, {timer("c")}});
   EXPECT_EQ(ste.release_and_dispatch({"a", "b", "c"}), Names{"a"});
   ste.remove_dag(1);
   EXPECT_EQ(ste.end("a"), Names{"c"});
@@ -154,7 +91,7 @@ TEST(SingleThreaded, ARemovedDagLeavesTheWindow) {
 }
 
 TEST(MultiThreaded, TasksOfADagRunAtTheSameTimeWhateverItsBound) {
-  Executor mte({{timer("a"), timer("b"), timer("c")}}, 2);
+  NamedExecutor mte = multi_threaded({{timer("a"), timer("b"), timer("c")}});
   EXPECT_EQ(mte.release_and_dispatch({"c", "b", "a"}), (Names{"a", "b"}));
   EXPECT_EQ(mte.end("b"), Names{"c"});
 }
@@ -163,7 +100,7 @@ TEST(MultiThreaded, AnExclusiveGroupIsPassedOver) {
   Task a = timer("a");
   Task b = timer("b");
   a.group = b.group = "driver";
-  Executor mte({{a}, {b}, {timer("c")}}, 2);
+  NamedExecutor mte = multi_threaded({{a}, {b}, {timer("c")}});
   EXPECT_EQ(mte.release_and_dispatch({"a", "b", "c"}), (Names{"a", "c"}));
   EXPECT_EQ(mte.end("c"), Names{});  // b's group is busy: the thread waits
   EXPECT_EQ(mte.end("a"), Names{"b"});
@@ -173,7 +110,7 @@ TEST(MultiThreaded, WhatABusyGroupLeavesInTheWindowGoesBeforeWhatCameLater) {
   Task a = timer("a");
   Task b = timer("b");
   a.group = b.group = "driver";
-  Executor mte({{timer("late")}, {a}, {b}, {timer("c")}}, 2);
+  NamedExecutor mte = multi_threaded({{timer("late")}, {a}, {b}, {timer("c")}});
   EXPECT_EQ(mte.release_and_dispatch({"a", "b", "c"}), (Names{"a", "c"}));
   mte.release("late");
   EXPECT_EQ(mte.end("a"), Names{"b"});  // although "late" is registered before it
@@ -184,7 +121,7 @@ TEST(MultiThreaded, AWaitForgetsWhatABusyGroupLeft) {
   Task a = timer("a");
   Task b = timer("b");
   a.group = b.group = "driver";
-  Executor mte({{timer("late")}, {a}, {b}, {timer("c")}}, 2);
+  NamedExecutor mte = multi_threaded({{timer("late")}, {a}, {b}, {timer("c")}});
   EXPECT_EQ(mte.release_and_dispatch({"a", "b", "c"}), (Names{"a", "c"}));
   EXPECT_EQ(mte.end("c"), Names{});  // nothing to take but b: the window is given up
   EXPECT_EQ(mte.release_and_dispatch({"late"}), Names{"late"});
@@ -195,13 +132,30 @@ TEST(MultiThreaded, AWaitForgetsWhatABusyGroupLeft) {
   EXPECT_EQ(mte.end("c"), Names{"b"});
 }
 
+TEST(StaticSingleThreaded, SubscriptionsGoBeforeTimers) {
+  NamedExecutor executor = static_single_threaded({{timer("source"), subscription("sink", {0})}, {timer("other")}});
+  EXPECT_EQ(executor.release_and_dispatch({"source"}), Names{"source"});
+  executor.release("other");
+  EXPECT_EQ(executor.end("source"), Names{"sink"});
+  EXPECT_EQ(executor.end("sink"), Names{"other"});
+}
+
+TEST(StaticSingleThreaded, WhatBecomesReadyDuringAWindowIsSeenAfterIt) {
+  NamedExecutor executor = static_single_threaded({{timer("source"), subscription("sink", {0})}, {timer("other")}});
+  EXPECT_EQ(executor.release_and_dispatch({"source", "other"}), Names{"source"});
+  EXPECT_EQ(executor.end("source"), Names{"other"});  // the message is there, but the set was made before
+  EXPECT_EQ(executor.end("other"), Names{"sink"});
+}
+
 // On random workloads and events: a group never runs twice, and no worker idles while a job could be taken.
 RC_GTEST_PROP(WaitSet, KeepsGroupsApartAndWorkersBusy, (std::uint64_t seed)) {
   Rng rng(seed);
   const Workload workload = testing::random_workload(rng);
   const std::vector<TaskRef> tasks = flatten(workload);
   const auto workers = static_cast<std::uint32_t>(rng.uniform(1, 3));
-  const auto scheduler = make_multi_threaded(workload, workers);
+  Config config;
+  config.workers = workers;
+  const auto scheduler = make_scheduler("mte", workload, config);
   const auto group_of = [&](TaskId id) {
     const Task &task = *tasks[id.value].task;
     return task.group.empty() ? std::to_string(id.value) : task.group;

@@ -1,0 +1,133 @@
+#include "redag/sched/models/events.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "redag/base/check.hpp"
+
+namespace redag::sched {
+
+EventsScheduler::EventsScheduler(const Workload &workload, const Config &config, Kind kind)
+    : Lifecycle(config, kind == Kind::Events ? TimerReleases::AllKept : TimerReleases::AsTheTaskSays),
+      kind_(kind),
+      working_(config.workers, false) {
+  REDAG_CHECK(config.workers > 0, "an executor has at least one thread");
+  REDAG_CHECK(kind != Kind::Events || config.workers == 1, "rclcpp's EventsExecutor has one thread");
+  REDAG_CHECK(config.preemption == Preemption::None, "rclcpp's executors do not preempt");
+  load(workload);
+}
+
+void EventsScheduler::preemption_point(JobSlot /*job*/, Time /*now*/) {
+  REDAG_CHECK(false, "preemption points are for cooperative preemption");
+}
+
+Step EventsScheduler::dispatch(Time now, std::uint32_t most) {
+  begin(now);
+  give_back_groups();
+  for (std::uint32_t worker = free_worker(); worker != kNil && most > 0; worker = free_worker(), --most) {
+    const std::uint32_t slot = take();
+    if (slot == kNil) break;
+    entities_[jobs_[slot].task.value].ready.remove(jobs_, slot);
+    working_[worker] = true;
+    start(slot, WorkerId(worker), kNil, 0);
+  }
+  return step();
+}
+
+std::uint32_t EventsScheduler::free_worker() const {
+  const auto found = std::find(working_.begin(), working_.end(), false);
+  return found == working_.end() ? kNil : static_cast<std::uint32_t>(found - working_.begin());
+}
+
+// FirstInFirstOutScheduler::get_next_ready_entity.
+std::uint32_t EventsScheduler::take() {
+  while (!ready_groups_.empty()) {
+    const std::uint32_t group = ready_groups_.front();
+    ready_groups_.pop_front();
+    const std::uint32_t slot = take_from(groups_[group]);
+    if (slot != kNil) return slot;
+    give_back(group);  // it had no event but one of a message that is gone: the turn is over at once
+  }
+  return kNil;
+}
+
+// FirstInFirstOutCallbackGroupHandle::get_next_ready_entity. An event of a timer that has nothing to run, or of what
+// was removed, is passed over; that of a message that is gone makes a turn.
+std::uint32_t EventsScheduler::take_from(Group &group) {
+  while (!group.events.empty()) {
+    const TaskId task = group.events.front();
+    group.events.pop_front();
+    Entity &entity = entities_[task.value];
+    if (!entity.ready.empty()) return entity.ready.first;
+    entity.armed = true;
+    if (!tasks_[task.value].timer && tasks_[task.value].life == TaskLife::Live) return kNil;
+  }
+  return kNil;
+}
+
+void EventsScheduler::enqueue(TaskId task) {
+  const std::uint32_t position = entities_[task.value].group;
+  Group &group = groups_[position];
+  group.events.push_back(task);
+  if (!group.idle) return;
+  group.idle = false;
+  ready_groups_.push_back(position);
+}
+
+void EventsScheduler::on_ready(std::uint32_t slot) {
+  const TaskId task = jobs_[slot].task;
+  Entity &entity = entities_[task.value];
+  entity.ready.push(jobs_, slot);
+  if (rearms(task) && !std::exchange(entity.armed, false)) return;
+  enqueue(task);
+}
+
+// Its event stays.
+void EventsScheduler::on_withdrawn(std::uint32_t slot) { entities_[jobs_[slot].task.value].ready.remove(jobs_, slot); }
+
+// Its messages come before its group goes back: they were published during the callback, and are reported next.
+void EventsScheduler::on_end(std::uint32_t slot) {
+  give_back_groups();
+  working_[jobs_[slot].worker.value] = false;
+  ended_.push_back(jobs_[slot].task);
+}
+
+// CallbackGroupHandle::mark_as_executed; then the timers' thread sees what expired during the callback.
+void EventsScheduler::give_back_groups() {
+  for (const TaskId task : ended_) {
+    Entity &entity = entities_[task.value];
+    give_back(entity.group);
+    if (!rearms(task)) continue;
+    entity.armed = entity.ready.empty();
+    if (!entity.armed) enqueue(task);
+  }
+  ended_.clear();
+}
+
+void EventsScheduler::give_back(std::uint32_t position) {
+  Group &group = groups_[position];
+  group.idle = group.events.empty();
+  if (!group.idle) ready_groups_.push_back(position);
+}
+
+// Positions last as long as tasks and named groups do: even ones for tasks alone in their group, odd ones for named
+// groups. What is left of events has a job: an id may be another task's now.
+void EventsScheduler::on_reconfigured() {
+  give_back_groups();
+  entities_.resize(tasks_.size());
+  groups_.resize(kind_ == Kind::Events ? 1 : 2 * std::max(tasks_.size(), group_count()) + 1);
+  for (Group &group : groups_) {
+    std::erase_if(group.events, [this](TaskId task) {
+      const bool stale = entities_[task.value].ready.empty();
+      if (stale) entities_[task.value].armed = true;
+      return stale;
+    });
+  }
+  for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
+    const std::uint32_t named = tasks_[t].group;
+    const std::uint32_t own = named == kNil ? 2 * t : 2 * named + 1;
+    entities_[t].group = kind_ == Kind::Events ? 0 : own;
+  }
+}
+
+}  // namespace redag::sched

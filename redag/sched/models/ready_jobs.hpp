@@ -1,0 +1,32 @@
+// The ready jobs of one task, oldest first: a list through Job::task_next. What models of rclcpp's executors have for
+// each timer and subscription.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "redag/sched/job.hpp"
+
+namespace redag::sched {
+
+struct ReadyJobs {
+  std::uint32_t first = kNil;
+  std::uint32_t last = kNil;
+
+  [[nodiscard]] bool empty() const { return first == kNil; }
+
+  void push(std::vector<Job> &jobs, std::uint32_t slot) {
+    jobs[slot].task_next = kNil;
+    (last == kNil ? first : jobs[last].task_next) = slot;
+    last = slot;
+  }
+
+  void remove(std::vector<Job> &jobs, std::uint32_t slot) {
+    std::uint32_t before = kNil;
+    for (std::uint32_t s = first; s != slot; s = jobs[s].task_next) before = s;
+    (before == kNil ? first : jobs[before].task_next) = jobs[slot].task_next;
+    if (last == slot) last = before;
+  }
+};
+
+}  // namespace redag::sched
