@@ -30,7 +30,7 @@ Bridge::~Bridge() {
 
 void Bridge::add(std::shared_ptr<Callback> callback) {
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     callbacks_.push_back(std::move(callback));
   }
   wake();
@@ -42,7 +42,7 @@ void Bridge::add(std::shared_ptr<Callback> callback) {
 void Bridge::remove(const Callback &callback) {
   std::uint64_t begun = 0;
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     const auto found =
         std::find_if(callbacks_.begin(), callbacks_.end(), [&](auto &c) { return c.get() == &callback; });
     if (found == callbacks_.end()) return;
@@ -51,13 +51,12 @@ void Bridge::remove(const Callback &callback) {
     begun = waits_;
   }
   wake();
-  std::unique_lock guard(lock_);
-  left_.wait(guard,
-             [&] { return waiter_ == std::thread::id() || waiter_ == std::this_thread::get_id() || waits_ != begun; });
+  const redag::LockGuard guard(lock_);
+  while (waiter_ != std::thread::id() && waiter_ != std::this_thread::get_id() && waits_ == begun) left_.wait(lock_);
 }
 
 bool Bridge::empty() const {
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   return callbacks_.empty();
 }
 
@@ -72,7 +71,7 @@ void Bridge::wake() {
 void Bridge::wait(std::chrono::nanoseconds timeout) {
   std::vector<Entry> entries;
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     for (const auto &callback : callbacks_) entries.push_back(Entry{callback, callback->waited()});
     waiter_ = std::this_thread::get_id();
     ++waits_;
@@ -81,7 +80,7 @@ void Bridge::wait(std::chrono::nanoseconds timeout) {
   {
     const struct Leave {
       ~Leave() {
-        const std::lock_guard guard(bridge.lock_);
+        const redag::LockGuard guard(bridge.lock_);
         bridge.waiter_ = {};
         bridge.left_.notify_all();
       }

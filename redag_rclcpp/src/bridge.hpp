@@ -6,13 +6,14 @@
 #include <condition_variable>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <thread>
 #include <vector>
 
 #include "callback.hpp"
 #include "rclcpp/context.hpp"
 #include "rclcpp/guard_condition.hpp"
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/mutex.hpp"
 
 namespace redag_rclcpp {
 
@@ -53,11 +54,11 @@ class Bridge {
   std::vector<const rclcpp::GuardCondition *> conditions_;
   rcl_wait_set_t set_;
 
-  mutable std::mutex lock_;  // the rest
-  std::vector<std::shared_ptr<Callback>> callbacks_;
-  std::thread::id waiter_;   // of the thread in rcl_wait(), if there is one
-  std::uint64_t waits_ = 0;  // begun
-  std::condition_variable left_;
+  mutable redag::Mutex lock_;
+  std::vector<std::shared_ptr<Callback>> callbacks_ REDAG_GUARDED_BY(lock_);
+  std::thread::id waiter_ REDAG_GUARDED_BY(lock_);   // of the thread in rcl_wait(), if there is one
+  std::uint64_t waits_ REDAG_GUARDED_BY(lock_) = 0;  // begun
+  std::condition_variable_any left_;
 };
 
 /// What arrived before these callbacks were attached and was not executed by who had them before: hooks do not tell of

@@ -5,7 +5,6 @@
 #include <rcl/subscription.h>
 
 #include <algorithm>
-#include <mutex>
 #include <utility>
 
 #include "compat.hpp"
@@ -134,8 +133,8 @@ void Callback::unhook() {
 void Callback::detach() {
   std::shared_ptr<Intake> intake;
   {
-    const std::lock_guard release_guard(release_lock_);
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard release_guard(release_lock_);
+    const redag::LockGuard guard(lock_);
     intake.swap(intake_);
     tokens_.clear();
     if (intake) intake->timers().schedule(*this, kNever);
@@ -153,13 +152,13 @@ bool Callback::alive() const {
 void Callback::arrived(std::size_t count, Source source, int part, bool seen_only) {
   std::shared_ptr<Intake> to_wake;
   {
-    const std::lock_guard release_guard(release_lock_);
+    const redag::LockGuard release_guard(release_lock_);
     Time now = 0;
     bool begins = false;
     Time arrival = 0;
     std::size_t overwritten = 0;
     {
-      const std::lock_guard guard(lock_);
+      const redag::LockGuard guard(lock_);
       if (!intake_) return;  // and perhaps there is no engine any more
       now = engine_.now();
       if (intake_->learning()) learn_from_arrival(now, count);
@@ -211,7 +210,7 @@ bool Callback::drop_oldest(Source source, std::size_t &overwritten) {
   return false;
 }
 
-// With lock_. True: the first token is to be released, by release() without the lock.
+// True: the first token is to be released, by release() without the lock.
 bool Callback::begin_release(Time &arrival) {
   if (released_ > 0 || !intake_ || tokens_.empty()) return false;
   if (!intake_->direct()) {
@@ -232,17 +231,17 @@ bool Callback::begin_release(Time &arrival) {
 void Callback::release(Time arrival) {
   for (bool again = true; again;) {
     engine_.release(task_, arrival);
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     --releasers_;
     again = begin_release(arrival);
   }
 }
 
 void Callback::admit() {
-  const std::lock_guard release_guard(release_lock_);
+  const redag::LockGuard release_guard(release_lock_);
   Time arrival = kNever;
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     noted_ = false;
     if (!intake_ || released_ > 0 || tokens_.empty()) return;
     ++released_;
@@ -258,7 +257,7 @@ void Callback::skipped(redag::Reason reason) noexcept {
     return;
   }
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     if (!intake_) return;
     // A job that was replaced by the next one's is all that `overrun` means here: the token is that one's now.
     if (released_ == 1 && reason != redag::Reason::Overrun && !tokens_.empty()) {
@@ -274,11 +273,11 @@ void Callback::skipped(redag::Reason reason) noexcept {
     --released_;
     if (releasers_ > 0) return;  // whoever that is looks again
   }
-  const std::lock_guard release_guard(release_lock_);
+  const redag::LockGuard release_guard(release_lock_);
   Time arrival = kNever;
   bool begins = false;
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     begins = begin_release(arrival);
   }
   if (begins) release(arrival);
@@ -288,7 +287,7 @@ bool Callback::take_token(Token &token, std::size_t &dropped) {
   Time next = kNever;
   bool begins = false;
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     if (released_ > 0) --released_;
     if (tokens_.empty()) return false;
     token = tokens_.pop();
@@ -312,12 +311,12 @@ void Callback::learn_from_arrival(Time now, std::size_t count) {
 }
 
 std::vector<TaskId> Callback::publishers() const {
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   return publishers_;
 }
 
 Duration Callback::mean_interval() const {
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   if (arrivals_ < 3) return 0;
   return (last_arrival_ - first_arrival_) / static_cast<Duration>(arrivals_ - 1);
 }
@@ -331,7 +330,7 @@ Callback::Waited Callback::waited() const {
     return waited;
   }
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     if (!by_wait_set_ || seen_ || !intake_) return waited;
   }
   waited.subscription = subscription_.lock();
@@ -355,7 +354,7 @@ void Callback::take_leftovers(bool middleware, bool intra_process) {
   for (const Source source : {Source::Middleware, Source::IntraProcess}) {
     if (!(source == Source::Middleware ? middleware : intra_process)) continue;
     {
-      const std::lock_guard guard(lock_);
+      const redag::LockGuard guard(lock_);
       leftovers_[index_of(source)] = true;
       if (kept_[index_of(source)] > 0) continue;
     }
@@ -365,7 +364,7 @@ void Callback::take_leftovers(bool middleware, bool intra_process) {
 
 void Callback::seen_by_wait_set() {
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     seen_ = true;
   }
   arrived(1, Source::Middleware, 0, true);

@@ -23,6 +23,7 @@
 #include "rclcpp/timer.hpp"
 #include "rclcpp/waitable.hpp"
 #include "redag/base/histogram.hpp"
+#include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/model/callback_match.hpp"
 #include "redag/runtime/engine.hpp"
@@ -135,10 +136,10 @@ class Callback final : public TimerQueue::Timer,
   void hook();
   void unhook();
   void arrived(std::size_t count, Source source, int part, bool seen_only = false);
-  [[nodiscard]] bool drop_oldest(Source source, std::size_t &overwritten);
-  void learn_from_arrival(Time now, std::size_t count);
+  [[nodiscard]] bool drop_oldest(Source source, std::size_t &overwritten) REDAG_REQUIRES(lock_);
+  void learn_from_arrival(Time now, std::size_t count) REDAG_REQUIRES(lock_);
   [[nodiscard]] bool take_token(Token &token, std::size_t &dropped);
-  [[nodiscard]] bool begin_release(Time &arrival);
+  [[nodiscard]] bool begin_release(Time &arrival) REDAG_REQUIRES(lock_);
   void release(Time arrival);
   void drop_expiry();
 
@@ -176,19 +177,21 @@ class Callback final : public TimerQueue::Timer,
   redag::PiMutex release_lock_;
 
   mutable redag::PiMutex lock_;
-  std::shared_ptr<Intake> intake_;      // lock; null once detached
-  TokenQueue<Token> tokens_;            // lock; the first one is that of the released job, if there is one
-  std::size_t kept_[2] = {0, 0};        // lock: tokens by source
-  std::size_t dropped_[2] = {0, 0};     // lock: of the kept, those whose jobs were skipped; they have no token
-  bool leftovers_[2] = {false, false};  // lock: by source, there may be more than tokens
-  std::uint32_t released_ = 0;          // lock: jobs that wait in the scheduler, or whose skip is still to be told
-  std::uint32_t releasers_ = 0;         // lock: threads in release()
-  bool noted_ = false;                  // lock: note()d, and not admitted since
-  bool seen_ = false;                   // lock: by the wait set, and not dealt with
-  std::vector<TaskId> publishers_;      // lock
-  std::uint64_t arrivals_ = 0;          // lock
-  Time first_arrival_ = 0;              // lock
-  Time last_arrival_ = 0;               // lock
+  std::shared_ptr<Intake> intake_ REDAG_GUARDED_BY(lock_);  // null once detached
+  TokenQueue<Token> tokens_ REDAG_GUARDED_BY(lock_);      // the first one is that of the released job, if there is one
+  std::size_t kept_[2] REDAG_GUARDED_BY(lock_) = {0, 0};  // tokens by source
+  std::size_t dropped_[2] REDAG_GUARDED_BY(lock_) = {
+      0, 0};  // of the kept, those whose jobs were skipped; they have no token
+  bool leftovers_[2] REDAG_GUARDED_BY(lock_) = {false, false};  // by source, there may be more than tokens
+  std::uint32_t released_ REDAG_GUARDED_BY(lock_) =
+      0;  // jobs that wait in the scheduler, or whose skip is still to be told
+  std::uint32_t releasers_ REDAG_GUARDED_BY(lock_) = 0;  // threads in release()
+  bool noted_ REDAG_GUARDED_BY(lock_) = false;           // note()d, and not admitted since
+  bool seen_ REDAG_GUARDED_BY(lock_) = false;            // by the wait set, and not dealt with
+  std::vector<TaskId> publishers_ REDAG_GUARDED_BY(lock_);
+  std::uint64_t arrivals_ REDAG_GUARDED_BY(lock_) = 0;
+  Time first_arrival_ REDAG_GUARDED_BY(lock_) = 0;
+  Time last_arrival_ REDAG_GUARDED_BY(lock_) = 0;
 
   // Timers.
   Time last_release_ = redag::kNever;   // the timer queue's lock

@@ -58,7 +58,7 @@ bool Callback::execute_token(const Token &token) {
       if (!token.seen_only) return;
       std::shared_ptr<Intake> intake;
       {
-        const std::lock_guard guard(self.lock_);
+        const redag::LockGuard guard(self.lock_);
         self.seen_ = false;
         intake = self.intake_;
       }
@@ -71,7 +71,7 @@ bool Callback::execute_token(const Token &token) {
   const bool taken = execute_arrival(token);
   bool more = false;
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     bool &leftovers = leftovers_[index_of(token.source)];
     leftovers = leftovers && taken;
     more = leftovers && kept_[index_of(token.source)] == 0;

@@ -2,7 +2,6 @@
 #include <rcl/timer.h>
 
 #include <algorithm>
-#include <mutex>
 
 #include "callback.hpp"
 #include "compat.hpp"
@@ -71,7 +70,7 @@ void Callback::reschedule() {
   const TimerReading reading = read_timer(*timer_handle_, engine_);
   Time due = reading.now + reading.until;
   if (reading.cancelled || (reading.until > 0 && is_simulated(*timer_handle_))) due = kNever;
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   if (intake_ && intake_->timers().schedule(*this, due)) intake_->timers_changed();
 }
 

@@ -1,7 +1,6 @@
 #include "core.hpp"
 
 #include <fmt/format.h>
-#include <pthread.h>
 
 #include <algorithm>
 #include <set>
@@ -10,6 +9,7 @@
 
 #include "compat.hpp"
 #include "middleware_threads.hpp"
+#include "raised_thread.hpp"
 #include "rclcpp/logging.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
@@ -35,27 +35,11 @@ constexpr redag::Duration kNodesAppear = 3 * redag::kSecond;  // after the first
 
 rclcpp::Logger logger() { return rclcpp::get_logger("redag_rclcpp"); }
 
-/// The calling thread at SCHED_FIFO `priority` for as long as this lives; 0: as it is.
-class RaisedThread {
- public:
-  explicit RaisedThread(int priority) {
-    if (priority == 0 || pthread_getschedparam(pthread_self(), &policy_, &parameters_) != 0) return;
-    raised_ = redag::runtime::set_fifo_priority(pthread_self(), priority);
-  }
-  ~RaisedThread() {
-    if (raised_) pthread_setschedparam(pthread_self(), policy_, &parameters_);
-  }
-  RaisedThread(const RaisedThread &) = delete;
-  RaisedThread &operator=(const RaisedThread &) = delete;
-
- private:
-  bool raised_ = false;
-  int policy_ = 0;
-  sched_param parameters_{};
-};
-
 /// The workload checked and complete. Throws std::runtime_error: it is not valid.
 ReDAGOptions prepare(ReDAGOptions options) {
+  if (options.default_period <= nanoseconds(0)) {
+    throw std::invalid_argument("default_period must be greater than 0: the shortest period goes first");
+  }
   if (!options.workload) return options;
   const auto findings = redag::validate(*options.workload, redag::ValidateOptions{.wcet_optional = true});
   if (has_errors(findings)) throw std::runtime_error(to_string(findings));
@@ -78,7 +62,8 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
       setup_(set_up(options_)),
       bridge_(context),
       tasks_(redag::Platform{setup_.config.workers, setup_.mode.mode}, options_.policy,
-             options_.workload ? &*options_.workload : nullptr) {
+             options_.workload ? &*options_.workload : nullptr),
+      warnings_(std::move(setup_.warnings)) {
   redag::runtime::EngineOptions engine;
   engine.config = setup_.config;
   engine.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id means one task
@@ -93,7 +78,7 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
   origin_ = monotonic_now();
   engine_->set_origin(origin_);
   for (const redag::Dag &dag : tasks_.dags()) dag_ids_.push_back(engine_->add_dag(dag, {}).dag);
-  if (options_.workload) matcher_.emplace(*options_.workload);
+  if (options_.workload) matcher_ = std::make_unique<redag::CallbackMatcher>(*options_.workload);
   if (options_.live) go_live();
 }
 
@@ -104,7 +89,7 @@ void ReDAGExecutor::Core::go_live() {
       [this](redag::live::Sample &sample) {
         std::map<std::string, redag::Duration> bounds;
         {
-          const std::lock_guard guard(notes_lock_);
+          const redag::LockGuard guard(notes_lock_);
           bounds = live_bounds_;
         }
         tasks_.sample(*engine_, bounds, sample);
@@ -112,12 +97,13 @@ void ReDAGExecutor::Core::go_live() {
   if (publisher) {
     live_ = *std::move(publisher);
   } else {
-    setup_.warnings.push_back(to_string(publisher.error()));
+    const redag::LockGuard guard(notes_lock_);
+    warnings_.push_back(to_string(publisher.error()));
   }
 }
 
 void ReDAGExecutor::Core::set_live_bounds(std::map<std::string, redag::Duration> bounds) {
-  const std::lock_guard guard(notes_lock_);
+  const redag::LockGuard guard(notes_lock_);
   live_bounds_ = std::move(bounds);
 }
 
@@ -135,7 +121,7 @@ void ReDAGExecutor::Core::close() {
   if (timer_thread_.joinable()) timer_thread_.join();
   engine_->halt();
   engine_->join();
-  const std::lock_guard guard(collect_lock_);
+  const redag::LockGuard guard(collect_lock_);
   closed_ = true;
   while (!callbacks_.empty()) remove(callbacks_.begin()->second);
   for (const auto &weak : nodes_) {
@@ -144,14 +130,14 @@ void ReDAGExecutor::Core::close() {
   for (const auto &[weak, name] : group_names_) {
     if (const auto group = weak.lock()) watch_group(*group, nullptr);
   }
-  const std::lock_guard noted_guard(noted_lock_);
+  const redag::LockGuard noted_guard(noted_lock_);
   noted_.clear();
 }
 
 // ---- arrivals ----
 
 void ReDAGExecutor::Core::note(std::shared_ptr<Callback> callback) {
-  const std::lock_guard guard(noted_lock_);
+  const redag::LockGuard guard(noted_lock_);
   noted_.push_back(std::move(callback));
 }
 
@@ -174,7 +160,7 @@ void ReDAGExecutor::Core::wait_set_changed() {
 }
 
 redag::Time ReDAGExecutor::Core::expire_timers() {
-  const std::lock_guard guard(expire_lock_);
+  const redag::LockGuard guard(expire_lock_);
   due_.clear();
   missed_.clear();
   const redag::Time next = timers_.expire_due(engine_->now(), due_, missed_);
@@ -199,7 +185,7 @@ void ReDAGExecutor::Core::time_releases() noexcept {
 void ReDAGExecutor::Core::admit_noted() {
   std::vector<std::shared_ptr<Callback>> noted;
   {
-    const std::lock_guard guard(noted_lock_);
+    const redag::LockGuard guard(noted_lock_);
     noted.swap(noted_);
   }
   for (const auto &callback : noted) callback->admit();
@@ -230,8 +216,8 @@ void ReDAGExecutor::Core::start() {
   RCLCPP_INFO(logger(), "%u workers, preemption %s%s%s", setup_.config.workers, to_string(setup_.mode.mode),
               setup_.mode.reason.empty() ? "" : ", ", setup_.mode.reason.c_str());
   {
-    const std::lock_guard guard(notes_lock_);
-    for (const std::string &warning : setup_.warnings) RCLCPP_WARN(logger(), "%s", warning.c_str());
+    const redag::LockGuard guard(notes_lock_);
+    for (const std::string &warning : warnings_) RCLCPP_WARN(logger(), "%s", warning.c_str());
   }
   if (matcher_) report_unmatched_at_ = engine_->now() + kNodesAppear;
 }
@@ -239,22 +225,22 @@ void ReDAGExecutor::Core::start() {
 // Tasks of the workload that are still without a callback when nodes and components should have been loaded.
 void ReDAGExecutor::Core::report_unmatched() {
   report_unmatched_at_ = kNever;
-  const std::lock_guard guard(collect_lock_);
+  const redag::LockGuard guard(collect_lock_);
   for (const std::string &line : matcher_->unmatched()) RCLCPP_WARN(logger(), "%s", line.c_str());
 }
 
 void ReDAGExecutor::Core::raise_middleware() {
-  const auto refused = raise_middleware_threads(setup_.band.timer);
+  const auto refused = raise_middleware_threads(setup_.timer_priority());
   std::string warning;
   if (find_middleware_threads().empty()) {
-    warning = "the middleware's threads are not known by name: give its receive threads a SCHED_FIFO priority above " +
-              std::to_string(setup_.band.top_job) + " yourself, or busy workers delay messages (docs/ros2.md)";
+    warning = "the middleware's threads are not known by name: give its receive threads SCHED_FIFO priority " +
+              std::to_string(setup_.timer_priority()) + " yourself, or busy workers delay messages (docs/ros2.md)";
   } else if (!refused.empty()) {
     warning = fmt::format("{} threads of the middleware could not be raised above the workers", refused.size());
   }
-  const std::lock_guard guard(notes_lock_);
-  if (!warning.empty() && std::find(setup_.warnings.begin(), setup_.warnings.end(), warning) == setup_.warnings.end()) {
-    setup_.warnings.push_back(warning);
+  const redag::LockGuard guard(notes_lock_);
+  if (!warning.empty() && std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) {
+    warnings_.push_back(warning);
   }
 }
 
@@ -313,7 +299,7 @@ void ReDAGExecutor::Core::spin_one(nanoseconds timeout) {
     waiting_ = true;
     bool idle = !dirty_;
     {
-      const std::lock_guard guard(noted_lock_);
+      const redag::LockGuard guard(noted_lock_);
       idle = idle && noted_.empty();
     }
     const redag::Time next = std::min({end, timers_.next(), learning_ ? learn_until_ : kNever});
@@ -334,7 +320,7 @@ void ReDAGExecutor::Core::on_exception(const redag::runtime::Job &job, std::exce
     if (options_.on_exception(ExceptionInfo{tasks_.name_of(job.task), exception}) == OnException::Continue) return;
   }
   {
-    const std::lock_guard guard(notes_lock_);
+    const redag::LockGuard guard(notes_lock_);
     if (!failure_) failure_ = std::move(exception);
   }
   host_.stop();
@@ -343,7 +329,7 @@ void ReDAGExecutor::Core::on_exception(const redag::runtime::Job &job, std::exce
 void ReDAGExecutor::Core::throw_failure() {
   std::exception_ptr failure;
   {
-    const std::lock_guard guard(notes_lock_);
+    const redag::LockGuard guard(notes_lock_);
     failure = std::exchange(failure_, nullptr);
   }
   if (failure) std::rethrow_exception(failure);
@@ -359,7 +345,7 @@ void ReDAGExecutor::Core::begin_learning() {
 
 void ReDAGExecutor::Core::stop_learning() {
   learning_ = false;
-  const std::lock_guard collect_guard(collect_lock_);
+  const redag::LockGuard collect_guard(collect_lock_);
   const auto learned = tasks_.adopt_rates();
   for (const auto &[task, period] : learned) engine_->set_timing(task, period, period);
   RCLCPP_INFO(logger(), "learned the rates of %zu callbacks; they are frozen now", learned.size());
@@ -368,9 +354,9 @@ void ReDAGExecutor::Core::stop_learning() {
 // ---- what can be asked ----
 
 std::vector<std::string> ReDAGExecutor::Core::warnings() const {
-  const std::lock_guard collect_guard(collect_lock_);
-  const std::lock_guard guard(notes_lock_);
-  std::vector<std::string> all = setup_.warnings;
+  const redag::LockGuard collect_guard(collect_lock_);
+  const redag::LockGuard guard(notes_lock_);
+  std::vector<std::string> all = warnings_;
   if (matcher_) {
     for (const std::string &line : matcher_->unmatched()) all.push_back(line);
   }

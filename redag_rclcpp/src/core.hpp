@@ -9,7 +9,6 @@
 #include <atomic>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <unordered_map>
@@ -18,6 +17,9 @@
 #include "bridge.hpp"
 #include "callback.hpp"
 #include "rclcpp/callback_group.hpp"
+#include "recursive_mutex.hpp"
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/mutex.hpp"
 #include "redag/live/publisher.hpp"
 #include "redag/runtime/mode.hpp"
 #include "redag/runtime/parker.hpp"
@@ -87,13 +89,13 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
  private:
   struct Found;
 
-  void forget_gone_nodes();
-  void add(const Found &found);
-  void remove(const std::shared_ptr<Callback> &callback);
-  void place(TaskTable::Entry &entry, const Found &found);
+  void forget_gone_nodes() REDAG_REQUIRES(collect_lock_);
+  void add(const Found &found) REDAG_REQUIRES(collect_lock_);
+  void remove(const std::shared_ptr<Callback> &callback) REDAG_REQUIRES(collect_lock_);
+  void place(TaskTable::Entry &entry, const Found &found) REDAG_REQUIRES(collect_lock_);
   void watch_group(rclcpp::CallbackGroup &group, const std::function<void(std::size_t)> &callback);
-  [[nodiscard]] std::vector<Found> find_entities();
-  [[nodiscard]] std::string group_name(const rclcpp::CallbackGroup::SharedPtr &group);
+  [[nodiscard]] std::vector<Found> find_entities() REDAG_REQUIRES(collect_lock_);
+  [[nodiscard]] std::string group_name(const rclcpp::CallbackGroup::SharedPtr &group) REDAG_REQUIRES(collect_lock_);
 
   void go_live();
   void start();
@@ -114,28 +116,31 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   rclcpp::Context::SharedPtr context_;
   const ReDAGOptions options_;
   Host host_;
-  redag::runtime::Setup setup_;  // its warnings: notes_lock_
-  redag::Time origin_ = 0;       // of the engine's clock, on CLOCK_MONOTONIC
+  redag::runtime::Setup setup_;
+  redag::Time origin_ = 0;  // of the engine's clock, on CLOCK_MONOTONIC
   std::unique_ptr<redag::runtime::Engine> engine_;
   TimerQueue timers_;
   Bridge bridge_;
   TaskTable tasks_;
   std::vector<redag::DagId> dag_ids_;  // of tasks_.dags()
-  std::optional<redag::CallbackMatcher> matcher_;
 
-  mutable std::recursive_mutex
-      collect_lock_;  // the next five; recursive because destructors of users' objects run below it
-  std::vector<NodeBase::WeakPtr> nodes_;
-  std::map<const void *, std::shared_ptr<Callback>> callbacks_;  // by entity
-  std::map<rclcpp::CallbackGroup::WeakPtr, std::string, std::owner_less<rclcpp::CallbackGroup::WeakPtr>> group_names_;
-  std::map<rclcpp::CallbackGroup::WeakPtr, NodeBase::WeakPtr, std::owner_less<rclcpp::CallbackGroup::WeakPtr>>
-      manual_groups_;
-  std::map<std::pair<std::string, int>, std::uint32_t> next_index_;  // of timers and waitables, by node and kind
-  std::uint64_t next_group_ = 0;
+  template <class T>
+  using ByGroup = std::map<rclcpp::CallbackGroup::WeakPtr, T, std::owner_less<rclcpp::CallbackGroup::WeakPtr>>;
 
-  mutable std::mutex notes_lock_;  // of the setup's warnings and of the next; innermost
-  std::exception_ptr failure_;
-  std::map<std::string, redag::Duration> live_bounds_;  // notes_lock_
+  mutable RecursiveMutex collect_lock_;  // recursive because destructors of users' objects run below it
+  std::unique_ptr<redag::CallbackMatcher> matcher_ REDAG_PT_GUARDED_BY(collect_lock_);  // null: no workload
+  std::vector<NodeBase::WeakPtr> nodes_ REDAG_GUARDED_BY(collect_lock_);
+  std::map<const void *, std::shared_ptr<Callback>> callbacks_ REDAG_GUARDED_BY(collect_lock_);  // by entity
+  ByGroup<std::string> group_names_ REDAG_GUARDED_BY(collect_lock_);
+  ByGroup<NodeBase::WeakPtr> manual_groups_ REDAG_GUARDED_BY(collect_lock_);
+  // Of timers and waitables, by node and kind.
+  std::map<std::pair<std::string, int>, std::uint32_t> next_index_ REDAG_GUARDED_BY(collect_lock_);
+  std::uint64_t next_group_ REDAG_GUARDED_BY(collect_lock_) = 0;
+
+  mutable redag::Mutex notes_lock_;  // innermost
+  std::vector<std::string> warnings_ REDAG_GUARDED_BY(notes_lock_);
+  std::exception_ptr failure_ REDAG_GUARDED_BY(notes_lock_);
+  std::map<std::string, redag::Duration> live_bounds_ REDAG_GUARDED_BY(notes_lock_);
 
   enum class FirstSpin : std::uint8_t { Awaited, Cancelled, Begun };
   std::atomic<FirstSpin> first_spin_{FirstSpin::Awaited};
@@ -146,19 +151,19 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   redag::Time learn_until_ = redag::kNever;
   redag::Time report_unmatched_at_ = redag::kNever;
   bool started_ = false;
-  bool closed_ = false;
+  bool closed_ REDAG_GUARDED_BY(collect_lock_) = false;
 
-  std::mutex noted_lock_;
-  std::vector<std::shared_ptr<Callback>> noted_;
+  redag::Mutex noted_lock_;
+  std::vector<std::shared_ptr<Callback>> noted_ REDAG_GUARDED_BY(noted_lock_);
   std::atomic<bool> waiting_{false};  // a spin function that pulls waits for work
 
   std::thread timer_thread_;
   redag::runtime::Parker timer_parker_;
   std::atomic<bool> timing_{false};
   std::atomic<bool> timer_exit_{false};
-  redag::PiMutex expire_lock_;  // the next two: of the timer thread, or of who pulls
-  std::vector<redag::runtime::Release> due_;
-  std::vector<redag::runtime::Release> missed_;
+  redag::PiMutex expire_lock_;  // of the timer thread, or of who pulls
+  std::vector<redag::runtime::Release> due_ REDAG_GUARDED_BY(expire_lock_);
+  std::vector<redag::runtime::Release> missed_ REDAG_GUARDED_BY(expire_lock_);
 
   std::unique_ptr<redag::live::Publisher> live_;  // last: it asks for figures until it is gone
 };

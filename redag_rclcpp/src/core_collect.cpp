@@ -29,13 +29,14 @@ struct ReDAGExecutor::Core::Found {
 
 void ReDAGExecutor::Core::change(const std::function<void()> &change) {
   {
-    const std::lock_guard guard(collect_lock_);
+    const redag::LockGuard guard(collect_lock_);
     change();
   }
   collect();
 }
 
 void ReDAGExecutor::Core::add_node(const NodeBase::SharedPtr &node) {
+  collect_lock_.assert_held();  // see change()
   forget_gone_nodes();
   nodes_.push_back(node);
   node->get_notify_guard_condition().set_on_trigger_callback([weak = weak_from_this()](std::size_t) {
@@ -44,17 +45,22 @@ void ReDAGExecutor::Core::add_node(const NodeBase::SharedPtr &node) {
 }
 
 void ReDAGExecutor::Core::remove_node(const NodeBase::SharedPtr &node) {
+  collect_lock_.assert_held();  // see change()
   std::erase_if(nodes_, [&](const NodeBase::WeakPtr &weak) { return weak.lock() == node; });
   forget_gone_nodes();
   node->get_notify_guard_condition().set_on_trigger_callback(nullptr);
 }
 
 void ReDAGExecutor::Core::add_group(const rclcpp::CallbackGroup::SharedPtr &group, const NodeBase::SharedPtr &node) {
+  collect_lock_.assert_held();  // see change()
   forget_gone_nodes();
   manual_groups_[group] = node;
 }
 
-void ReDAGExecutor::Core::remove_group(const rclcpp::CallbackGroup::SharedPtr &group) { manual_groups_.erase(group); }
+void ReDAGExecutor::Core::remove_group(const rclcpp::CallbackGroup::SharedPtr &group) {
+  collect_lock_.assert_held();  // see change()
+  manual_groups_.erase(group);
+}
 
 // Nodes need not be removed, only dropped. One that comes under the same name then begins to count anew.
 void ReDAGExecutor::Core::forget_gone_nodes() {
@@ -76,7 +82,7 @@ void ReDAGExecutor::Core::mark_dirty() {
 void ReDAGExecutor::Core::collect() {
   // What users own is destroyed after the lock is left, if we are the last to hold it.
   std::vector<Found> found;
-  const std::lock_guard guard(collect_lock_);
+  const redag::LockGuard guard(collect_lock_);
   if (closed_) return;
   dirty_ = false;
   found = find_entities();
@@ -236,7 +242,7 @@ void ReDAGExecutor::Core::remove(const std::shared_ptr<Callback> &gone) {
   callback->detach();
   {
     // Releases that were taken out of the timer queue before have been passed on: the id can be another task's now.
-    const std::lock_guard guard(expire_lock_);
+    const redag::LockGuard guard(expire_lock_);
   }
   bridge_.remove(*callback);
   const redag::TaskId task = callback->task();

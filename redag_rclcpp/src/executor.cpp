@@ -11,18 +11,30 @@ using std::chrono::nanoseconds;
 
 namespace {
 
-/// Claims the executor for one spin function.
-class Spinning {
+/// Sets a flag that is clear, and clears it again.
+class Claim {
  public:
-  Spinning(std::atomic_bool &spinning, const char *function) : spinning_(spinning) {
-    if (spinning_.exchange(true)) throw std::runtime_error(std::string(function) + "() called while already spinning");
+  Claim(std::atomic_bool &flag, const char *function) : flag_(flag) {
+    if (flag_.exchange(true)) throw std::runtime_error(std::string(function) + "() called while already spinning");
   }
-  ~Spinning() { spinning_.store(false); }
-  Spinning(const Spinning &) = delete;
-  Spinning &operator=(const Spinning &) = delete;
+  ~Claim() { flag_.store(false); }
+  Claim(const Claim &) = delete;
+  Claim &operator=(const Claim &) = delete;
 
  private:
-  std::atomic_bool &spinning_;
+  std::atomic_bool &flag_;
+};
+
+/// Claims the executor for one spin function. cancel() clears rclcpp's own flag while callbacks still run, and to set
+/// it then would undo the cancel(): so ours comes first.
+class Spinning {
+ public:
+  Spinning(std::atomic_bool &occupied, std::atomic_bool &spinning, const char *function)
+      : occupied_(occupied, function), spinning_(spinning, function) {}
+
+ private:
+  Claim occupied_;
+  Claim spinning_;
 };
 
 }  // namespace
@@ -115,33 +127,32 @@ void ReDAGExecutor::forget_expired() {
 // ---- spinning ----
 
 void ReDAGExecutor::spin() {
-  const Spinning claimed(spinning, "spin");
+  const Spinning claimed(occupied_, spinning, "spin");
   if (!core_->begin_first_spin()) return;
   core_->spin();
 }
 
 void ReDAGExecutor::spin_some(nanoseconds max_duration) {
-  const Spinning claimed(spinning, "spin_some");
+  const Spinning claimed(occupied_, spinning, "spin_some");
   if (!core_->begin_first_spin()) return;
   core_->spin_ready(max_duration, false);
 }
 
 void ReDAGExecutor::spin_all(nanoseconds max_duration) {
   if (max_duration < nanoseconds(0)) throw std::invalid_argument("max_duration must be greater than or equal to 0");
-  const Spinning claimed(spinning, "spin_all");
+  const Spinning claimed(occupied_, spinning, "spin_all");
   if (!core_->begin_first_spin()) return;
   core_->spin_ready(max_duration, true);
 }
 
 void ReDAGExecutor::spin_once(nanoseconds timeout) {
-  const Spinning claimed(spinning, "spin_once");
+  const Spinning claimed(occupied_, spinning, "spin_once");
   if (!core_->begin_first_spin()) return;
   core_->spin_one(timeout);
 }
 
-// Called by spin_until_future_complete, which has claimed the executor. What completes the future need not be one of
-// our callbacks, so that no wait is long.
-void ReDAGExecutor::spin_once_impl(nanoseconds timeout) {
+// What completes the future need not be one of our callbacks, so that no wait is long.
+void ReDAGExecutor::spin_for_future(nanoseconds timeout) {
   constexpr nanoseconds kLongest = std::chrono::milliseconds(10);
   const bool is_long = timeout < nanoseconds(0) || timeout > kLongest;
   if (!core_->begin_first_spin()) {
@@ -151,6 +162,17 @@ void ReDAGExecutor::spin_once_impl(nanoseconds timeout) {
   core_->spin_one(is_long ? kLongest : timeout);
 }
 
+// Called by rclcpp's spin_until_future_complete, which has set its flag without asking for ours.
+void ReDAGExecutor::spin_once_impl(nanoseconds timeout) {
+  try {
+    const Claim occupied(occupied_, "spin_until_future_complete");
+    spin_for_future(timeout);
+  } catch (...) {
+    rclcpp::Executor::cancel();  // a spin that was cancelled and has not returned yet may have seen the flag
+    throw;
+  }
+}
+
 #if RCLCPP_VERSION_MAJOR >= 21
 rclcpp::FutureReturnCode ReDAGExecutor::spin_until_future_complete_impl(
     nanoseconds timeout, const std::function<std::future_status(nanoseconds)> &wait_for_future) {
@@ -158,12 +180,12 @@ rclcpp::FutureReturnCode ReDAGExecutor::spin_until_future_complete_impl(
   const auto is_complete = [&] { return wait_for_future(nanoseconds(0)) == std::future_status::ready; };
   if (is_complete()) return FutureReturnCode::SUCCESS;
   const auto start = std::chrono::steady_clock::now();
-  const Spinning claimed(spinning, "spin_until_future_complete");
+  const Spinning claimed(occupied_, spinning, "spin_until_future_complete");
   while (rclcpp::ok(context_) && spinning.load()) {
     nanoseconds left = timeout;
     if (timeout >= nanoseconds(0))
       left = std::max(nanoseconds(0), timeout - (std::chrono::steady_clock::now() - start));
-    spin_once_impl(left);
+    spin_for_future(left);
     if (is_complete()) return FutureReturnCode::SUCCESS;
     if (timeout >= nanoseconds(0) && std::chrono::steady_clock::now() - start >= timeout) {
       return FutureReturnCode::TIMEOUT;

@@ -7,7 +7,6 @@
 #include <condition_variable>
 #include <filesystem>
 #include <map>
-#include <mutex>
 #include <set>
 #include <thread>
 #include <utility>
@@ -15,6 +14,8 @@
 #include "bounds.hpp"
 #include "rclcpp/exceptions.hpp"
 #include "rclcpp/logging.hpp"
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/mutex.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
 #include "report.hpp"
@@ -61,8 +62,12 @@ class Turn {
 class Monitor::Impl : public std::enable_shared_from_this<Impl> {
  public:
   Impl(rclcpp::Node::SharedPtr node, ReDAGExecutor &executor, MonitorOptions options)
-      : node_(std::move(node)), executor_(executor), options_(std::move(options)), keeper_(options_.trace_events) {
-    if (options_.workload) bounds_.emplace(*options_.workload);
+      : node_(std::move(node)),
+        executor_(executor),
+        options_(std::move(options)),
+        has_bounds_(options_.workload.has_value()),
+        keeper_(options_.trace_events) {
+    if (has_bounds_) bounds_.emplace(*options_.workload);
     config_ = executor_.as_trace({}).info.config;
     if (options_.trace.empty()) return;
     const redag::Result<void> ready = prepare_folder(options_.trace);
@@ -94,8 +99,9 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
   rclcpp::Service<Trigger>::SharedPtr metrics_service_;
   rclcpp::Service<Trigger>::SharedPtr save_service_;
 
-  std::mutex bounds_lock_;
-  std::optional<Bounds> bounds_;  // bounds_lock_
+  const bool has_bounds_;
+  redag::Mutex bounds_lock_;
+  std::optional<Bounds> bounds_ REDAG_GUARDED_BY(bounds_lock_);  // if has_bounds_
 
   // The thread's, and after it finish()'s.
   Diagnoser diagnoser_;
@@ -103,15 +109,15 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
   std::vector<JobEvent> events_;
 
   std::thread thread_;
-  std::mutex stop_lock_;
-  std::condition_variable stop_condition_;
-  bool stop_ = false;      // stop_lock_
-  bool finished_ = false;  // stop_lock_
+  redag::Mutex stop_lock_;
+  std::condition_variable_any stop_condition_;
+  bool stop_ REDAG_GUARDED_BY(stop_lock_) = false;
+  bool finished_ REDAG_GUARDED_BY(stop_lock_) = false;
 };
 
 void Monitor::Impl::start() {
   create_entities();
-  if (bounds_ || !options_.trace.empty() || options_.period.count() > 0) thread_ = std::thread([this] { main(); });
+  if (has_bounds_ || !options_.trace.empty() || options_.period.count() > 0) thread_ = std::thread([this] { main(); });
 }
 
 void Monitor::Impl::create_entities() {
@@ -154,8 +160,8 @@ Snapshot Monitor::Impl::snapshot() {
   result.learning = !executor_.learning_done();
   result.warnings = executor_.warnings();
   const std::vector<CallbackStats> stats = executor_.stats();
-  const std::lock_guard guard(bounds_lock_);
-  result.has_bounds = bounds_.has_value();
+  const redag::LockGuard guard(bounds_lock_);
+  result.has_bounds = has_bounds_;
   if (bounds_) result.bounds_absent = bounds_->absent();
   for (const CallbackStats &callback : stats) {
     TaskFigures task;
@@ -190,20 +196,20 @@ redag::Result<std::string> Monitor::Impl::save(const std::string &path) const {
 // ---- the thread ----
 
 void Monitor::Impl::main() {
-  const bool has_events = bounds_ || !options_.trace.empty();
-  Turn look(bounds_ ? kLookPeriod : std::chrono::nanoseconds(0));
+  const bool has_events = has_bounds_ || !options_.trace.empty();
+  Turn look(has_bounds_ ? kLookPeriod : std::chrono::nanoseconds(0));
   Turn draining(has_events ? kDrainPeriod : std::chrono::nanoseconds(0));
   Turn publishing(options_.period);
-  std::unique_lock lock(stop_lock_);
-  while (!stop_) {
-    lock.unlock();
+  for (;;) {
     const auto now = Turn::Clock::now();
     if (look.is_due(now)) look_at_callbacks();
     if (draining.is_due(now)) drain();
     if (publishing.is_due(now)) publish();
-    lock.lock();
-    stop_condition_.wait_until(lock, std::min({look.next(), draining.next(), publishing.next()}),
-                               [this] { return stop_; });
+    const auto next = std::min({look.next(), draining.next(), publishing.next()});
+    const redag::LockGuard guard(stop_lock_);
+    while (!stop_ && stop_condition_.wait_until(stop_lock_, next) == std::cv_status::no_timeout) {
+    }
+    if (stop_) return;
   }
 }
 
@@ -226,14 +232,14 @@ void Monitor::Impl::publish() {
 }
 
 void Monitor::Impl::look_at_callbacks() {
-  if (!bounds_) return;
+  if (!has_bounds_) return;
   const std::vector<CallbackStats> stats = executor_.stats();
   std::string absent;
   {
     // The analysis works on a copy: who asks for figures does not wait for it.
     std::optional<Bounds> updated;
     {
-      const std::lock_guard guard(bounds_lock_);
+      const redag::LockGuard guard(bounds_lock_);
       updated = bounds_;
     }
     if (!updated->update(stats, config_, [this] { return executor_.learned(); })) return;
@@ -241,7 +247,7 @@ void Monitor::Impl::look_at_callbacks() {
     std::map<std::string, redag::Duration> shown;
     for (const auto &[name, bound] : updated->tasks()) shown[name] = bound.response;
     executor_.set_live_bounds(std::move(shown));
-    const std::lock_guard guard(bounds_lock_);
+    const redag::LockGuard guard(bounds_lock_);
     bounds_ = std::move(updated);
   }
   if (!absent.empty()) RCLCPP_INFO(node_->get_logger(), "bounds on response times: %s", absent.c_str());
@@ -259,8 +265,8 @@ void Monitor::Impl::drain() {
                   keeper_.size());
     }
   }
-  const std::lock_guard guard(bounds_lock_);
-  if (!bounds_) return;
+  if (!has_bounds_) return;
+  const redag::LockGuard guard(bounds_lock_);
   bounds_->count(
       events_, [this](redag::TaskId task) { return executor_.task_name(task); },
       [this](const std::string &name, const TaskBound &bound) {
@@ -274,7 +280,7 @@ void Monitor::Impl::drain() {
 
 void Monitor::Impl::stop_thread() {
   {
-    const std::lock_guard guard(stop_lock_);
+    const redag::LockGuard guard(stop_lock_);
     stop_ = true;
   }
   stop_condition_.notify_all();
@@ -284,11 +290,11 @@ void Monitor::Impl::stop_thread() {
 redag::Result<void> Monitor::Impl::finish() {
   stop_thread();
   {
-    const std::lock_guard guard(stop_lock_);
+    const redag::LockGuard guard(stop_lock_);
     if (std::exchange(finished_, true)) return {};
   }
   const bool has_trace = !options_.trace.empty();
-  if (bounds_ || has_trace) drain();
+  if (has_bounds_ || has_trace) drain();
   const Snapshot last = snapshot();
   RCLCPP_INFO(node_->get_logger(), "%s", summarize(last).c_str());
 

@@ -60,19 +60,19 @@ TaskTable::TaskTable(redag::Platform platform, redag::PolicyKind policy, const W
 }
 
 void TaskTable::set(TaskId task, Entry entry) {
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   if (entries_.size() <= task.value) entries_.resize(task.value + 1);
   entries_[task.value] = std::move(entry);
 }
 
 void TaskTable::drop(TaskId task) {
   std::shared_ptr<Callback> gone;  // not destroyed under the lock
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   gone.swap(entries_[task.value].callback);
 }
 
 std::string TaskTable::name_of(TaskId task) const {
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   return name(entries_.at(task.value));
 }
 
@@ -89,7 +89,7 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
   };
   std::vector<Row> rows;
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     for (std::size_t i = 0; i < entries_.size(); ++i) {
       const Entry &entry = entries_[i];
       if (!entry.callback) continue;
@@ -118,7 +118,7 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
   std::vector<CallbackStats> result;
   {
     // Where the callback has gone meanwhile, the engine may have counted for another task of the same id.
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     for (Row &row : rows) {
       if (entries_[row.task.value].callback == row.callback) result.push_back(std::move(row.stats));
     }
@@ -137,7 +137,7 @@ void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std:
   };
   std::vector<Row> rows;
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     for (std::size_t i = 0; i < entries_.size(); ++i) {
       const Entry &entry = entries_[i];
       if (!entry.callback) continue;
@@ -158,7 +158,7 @@ void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std:
     row.task.misses = row.callback->late() + figures.jobs.skipped;  // as in stats(): no data is no miss
   }
   // As in stats(): what has gone meanwhile may have been counted with another task.
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   for (Row &row : rows) {
     if (entries_[row.task.key].callback == row.callback) sample.tasks.push_back(std::move(row.task));
   }
@@ -167,7 +167,7 @@ void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std:
 // ---- what was seen ----
 
 std::vector<std::pair<TaskId, redag::Duration>> TaskTable::adopt_rates() {
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   std::vector<std::pair<TaskId, redag::Duration>> changed;
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry &entry = entries_[i];
@@ -215,7 +215,7 @@ Workload TaskTable::as_workload(Ids &ids, bool live) const {
       members.push_back(i);
     }
     std::stable_sort(members.begin(), members.end(),
-                     [&](auto a, auto b) { return entries_[a].rank < entries_[b].rank; });
+                     [&](auto a, auto b) REDAG_REQUIRES(lock_) { return entries_[a].rank < entries_[b].rank; });
     for (const std::uint32_t i : members) {
       const Entry &entry = entries_[i];
       Task task = entry.task;
@@ -239,7 +239,7 @@ Workload TaskTable::as_workload(Ids &ids, bool live) const {
 }
 
 Workload TaskTable::learned() const {
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   Ids ids;
   Workload workload = as_workload(ids, true);
   add_seen_edges(workload, ids);
@@ -292,7 +292,7 @@ Workload TaskTable::describe(std::vector<redag::JobEvent> &events) const {
   std::vector<std::uint32_t> position;
   Workload workload;
   {
-    const std::lock_guard guard(lock_);
+    const redag::LockGuard guard(lock_);
     workload = as_workload(ids, false);
     position.assign(entries_.size(), 0);
   }

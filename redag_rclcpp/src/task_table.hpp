@@ -5,12 +5,13 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "callback.hpp"
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/mutex.hpp"
 #include "redag/live/frame_builder.hpp"
 #include "redag/model/callback_match.hpp"
 #include "redag/model/workload.hpp"
@@ -67,9 +68,9 @@ class TaskTable {
   using Ids = std::vector<std::vector<std::uint32_t>>;
 
   [[nodiscard]] std::string name(const Entry &entry) const;
-  [[nodiscard]] redag::Duration seen_period(const Entry &entry, int depth) const;
-  [[nodiscard]] redag::Workload as_workload(Ids &ids, bool live) const;
-  void add_seen_edges(redag::Workload &workload, const Ids &ids) const;
+  [[nodiscard]] redag::Duration seen_period(const Entry &entry, int depth) const REDAG_REQUIRES(lock_);
+  [[nodiscard]] redag::Workload as_workload(Ids &ids, bool live) const REDAG_REQUIRES(lock_);
+  void add_seen_edges(redag::Workload &workload, const Ids &ids) const REDAG_REQUIRES(lock_);
   void add_configured_edges(redag::Dag &dag, std::size_t task, const Entry &entry) const;
 
   const redag::Platform platform_;
@@ -77,8 +78,8 @@ class TaskTable {
   const redag::Workload *const configured_;
   std::vector<redag::Dag> dags_;
 
-  mutable std::mutex lock_;
-  std::vector<Entry> entries_;  // lock; by TaskId
+  mutable redag::Mutex lock_;
+  std::vector<Entry> entries_ REDAG_GUARDED_BY(lock_);  // by TaskId
 };
 
 }  // namespace redag_rclcpp

@@ -7,7 +7,7 @@
 namespace redag_rclcpp {
 
 bool TimerQueue::schedule(Timer &timer, Time due) {
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   if (timer.position_ != kNowhere && due != redag::kNever && std::abs(timer.due_ - due) < kSame) return false;
   const Time before = heap_.empty() ? redag::kNever : heap_.front()->due_;
   place(timer, due);
@@ -15,13 +15,13 @@ bool TimerQueue::schedule(Timer &timer, Time due) {
 }
 
 Time TimerQueue::next() const {
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   return heap_.empty() ? redag::kNever : heap_.front()->due_;
 }
 
 Time TimerQueue::expire_due(Time now, std::vector<redag::runtime::Release> &releases,
                             std::vector<redag::runtime::Release> &missed) {
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   while (!heap_.empty() && heap_.front()->due_ <= now) {
     Timer &timer = *heap_.front();
     place(timer, std::max(timer.expire(now, releases, missed), now + 1));

@@ -2,9 +2,9 @@
 // queue asks it (Timer::expire). Any thread; allocates only while it grows.
 #pragma once
 
-#include <mutex>
 #include <vector>
 
+#include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/runtime/engine.hpp"
 
@@ -47,12 +47,12 @@ class TimerQueue {
                   std::vector<redag::runtime::Release> &missed);
 
  private:
-  void place(Timer &timer, Time due);
-  void sift(std::size_t position);
-  void set(std::size_t position, Timer *timer);
+  void place(Timer &timer, Time due) REDAG_REQUIRES(lock_);
+  void sift(std::size_t position) REDAG_REQUIRES(lock_);
+  void set(std::size_t position, Timer *timer) REDAG_REQUIRES(lock_);
 
   mutable redag::PiMutex lock_;
-  std::vector<Timer *> heap_;  // binary, by due_
+  std::vector<Timer *> heap_ REDAG_GUARDED_BY(lock_);  // binary, by due_
 };
 
 }  // namespace redag_rclcpp

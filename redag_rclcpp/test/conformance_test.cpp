@@ -72,7 +72,9 @@ TYPED_TEST(Conformance, TimersRunUntilCancelled) {
 TYPED_TEST(Conformance, SpinsAgainAfterCancel) {
   // Cancelled between taking a callback and running it, it returns without giving the callback's group back
   // (execute_any_executable() returns early, run() then resets any_exec.callback_group): the timer never runs again.
-  if (kParallel<TypeParam> && !kOurs<TypeParam>) GTEST_SKIP() << "rclcpp's MultiThreadedExecutor can lose a group here";
+  if (kParallel<TypeParam> && !kOurs<TypeParam> && !kCbg<TypeParam>) {
+    GTEST_SKIP() << "rclcpp's MultiThreadedExecutor can lose a group here";
+  }
   std::atomic<int> count{0};
   auto timer = this->node->create_wall_timer(1ms, [&] { ++count; });
   this->executor->add_node(this->node);
@@ -84,6 +86,7 @@ TYPED_TEST(Conformance, SpinsAgainAfterCancel) {
 }
 
 TYPED_TEST(Conformance, ShutdownEndsSpin) {
+  if (kCbg<TypeParam>) GTEST_SKIP() << "it takes back its shutdown callback within it, for which Jazzy's Context waits";
   this->executor->add_node(this->node);
   std::thread thread([&] { this->executor->spin(); });
   EXPECT_TRUE(eventually([&] { return this->executor->is_spinning(); }));
@@ -272,6 +275,7 @@ TYPED_TEST(Conformance, ServiceAndClientOnOneExecutor) {
 }
 
 TYPED_TEST(Conformance, AFutureOfAnotherThreadEndsTheSpin) {
+  if (kCbg<TypeParam>) GTEST_SKIP() << "here the EventsCBGExecutor does not see a timer made after its node was added";
   this->executor->add_node(this->node);
   std::promise<void> promise;
   auto future = promise.get_future().share();
@@ -287,6 +291,7 @@ TYPED_TEST(Conformance, AFutureOfAnotherThreadEndsTheSpin) {
 }
 
 TYPED_TEST(Conformance, ActionsGiveFeedbackAndResults) {
+  if (kCbg<TypeParam>) GTEST_SKIP() << "the EventsCBGExecutor does not deliver every result";
   using Fibonacci = test_msgs::action::Fibonacci;
   using Handle = rclcpp_action::ServerGoalHandle<Fibonacci>;
   std::vector<std::thread> threads;
@@ -328,7 +333,7 @@ TYPED_TEST(Conformance, ActionsGiveFeedbackAndResults) {
 }
 
 TYPED_TEST(Conformance, ExpiredGoalsAreForgotten) {
-  if (kEvents<TypeParam>) GTEST_SKIP() << "depends on the patch level (rclcpp issue 2661)";
+  if (kEvents<TypeParam> || kCbg<TypeParam>) GTEST_SKIP() << "depends on the patch level (rclcpp issue 2661)";
   using Fibonacci = test_msgs::action::Fibonacci;
   using Handle = rclcpp_action::ServerGoalHandle<Fibonacci>;
   rcl_action_server_options_t server_options = rcl_action_server_get_default_options();
@@ -380,6 +385,7 @@ TYPED_TEST(Conformance, AnExclusiveGroupNeverOverlapsWithItself) {
 TYPED_TEST(Conformance, GroupsAndReentrantCallbacksRunInParallel) {
   if (!kParallel<TypeParam>) GTEST_SKIP() << "single-threaded";
   for (const bool reentrant : {false, true}) {
+    if (reentrant && kCbg<TypeParam>) continue;  // it runs one callback of a group at a time, whatever the group
     SCOPED_TRACE(reentrant ? "one reentrant group" : "two exclusive groups");
     auto other = std::make_shared<rclcpp::Node>("other");
     auto type = reentrant ? rclcpp::CallbackGroupType::Reentrant : rclcpp::CallbackGroupType::MutuallyExclusive;
@@ -410,6 +416,7 @@ TYPED_TEST(Conformance, GroupsAndReentrantCallbacksRunInParallel) {
 }
 
 TYPED_TEST(Conformance, AReentrantSubscriptionOverlapsWithItself) {
+  if (kCbg<TypeParam>) GTEST_SKIP() << "it runs one callback of a group at a time, whatever the group";
   if (!kParallel<TypeParam>) GTEST_SKIP() << "single-threaded";
   auto group = this->node->create_callback_group(rclcpp::CallbackGroupType::Reentrant);
   std::atomic<int> inside{0};
@@ -633,6 +640,7 @@ class TriggeredWaitable : public rclcpp::Waitable {
 };
 
 TYPED_TEST(Conformance, WaitablesWithAndWithoutHooks) {
+  if (kCbg<TypeParam>) GTEST_SKIP() << "the EventsCBGExecutor does not execute these";
   for (const bool has_hook : {true, false}) {
     if (kEvents<TypeParam> && !has_hook) continue;
     SCOPED_TRACE(has_hook ? "with a hook" : "only for wait sets");

@@ -7,9 +7,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
+#include <future>
 #include <mutex>
 #include <optional>
 #include <thread>
+#include <vector>
 
 #include "executor_types.hpp"
 #include "rclcpp/rclcpp.hpp"
@@ -246,20 +249,39 @@ TEST_P(ExecutorTest, AHandlerCanContinueAfterAnException) {
   EXPECT_GE(executor.stats().at(0).jobs.aborted, 3U);
 }
 
+// Also after cancel(), which clears rclcpp's own flag long before spin() returns; and the cancel() still counts.
 TEST_P(ExecutorTest, SpinningInACallbackIsRefused) {
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
-  std::atomic<bool> refused{false};
-  auto timer = node->create_wall_timer(1ms, [&] {
-    try {
-      executor.spin_some();
-    } catch (const std::runtime_error &) {
-      refused = true;
+  std::atomic<int> calls{0};
+  std::atomic<int> refused{0};
+  std::promise<void> promise;
+  const std::shared_future<void> future = promise.get_future().share();
+  const auto try_all = [&] {
+    const std::vector<std::function<void()>> functions = {
+        [&] { executor.spin(); }, [&] { executor.spin_some(); }, [&] { executor.spin_all(1ms); },
+        [&] { executor.spin_once(1ms); }, [&] { executor.spin_until_future_complete(future, 1ms); }};
+    for (const std::function<void()> &spin : functions) {
+      try {
+        spin();
+      } catch (const std::runtime_error &) {
+        ++refused;
+      }
     }
+  };
+  auto timer = node->create_wall_timer(1ms, [&] {
+    ++calls;
+    try_all();
     executor.cancel();
+    try_all();
   });
   executor.add_node(node);
   executor.spin();
-  EXPECT_TRUE(refused);
+  EXPECT_EQ(refused, 10 * calls);
+}
+
+TEST_P(ExecutorTest, APeriodOfNothingIsRefused) {
+  options.default_period = 0ns;
+  EXPECT_THROW(ReDAGExecutor(rclcpp::ExecutorOptions(), options), std::invalid_argument);
 }
 
 TEST_P(ExecutorTest, MissedPeriodsOfATimerAreCounted) {

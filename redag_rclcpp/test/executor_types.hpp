@@ -5,12 +5,8 @@
 
 #include <string>
 
-#include "rclcpp/executors.hpp"
-#include "rclcpp/version.h"
 #include "redag_rclcpp/executor.hpp"
-#if RCLCPP_VERSION_MAJOR >= 21
-#include "rclcpp/experimental/executors/events_executor/events_executor.hpp"
-#endif
+#include "workload/peers.hpp"
 
 namespace redag_rclcpp {
 
@@ -34,11 +30,23 @@ using ReDAGOs = ReDAGWith<redag::PreemptionMode::Os>;
 using OurTypes = ::testing::Types<ReDAGNone, ReDAGCooperative, ReDAGOs>;
 using AllTypes = ::testing::Types<ReDAGNone, ReDAGCooperative, ReDAGOs, rclcpp::executors::SingleThreadedExecutor,
                                   rclcpp::executors::MultiThreadedExecutor
-#if RCLCPP_VERSION_MAJOR >= 21
+#if REDAG_HAS_EVENTS
                                   ,
                                   rclcpp::experimental::executors::EventsExecutor
 #endif
+#ifdef REDAG_HAS_CM_EXECUTORS
+                                  ,
+                                  rclcpp::executors::EventsCBGExecutor
+#endif
                                   >;
+
+#ifdef REDAG_HAS_CM_EXECUTORS
+template <class T>
+inline constexpr bool kCbg = std::is_same_v<T, rclcpp::executors::EventsCBGExecutor>;
+#else
+template <class T>
+inline constexpr bool kCbg = false;
+#endif
 
 struct TypeNames {
   template <class T>
@@ -48,19 +56,19 @@ struct TypeNames {
     if (std::is_same_v<T, ReDAGOs>) return "redag_os";
     if (std::is_same_v<T, rclcpp::executors::SingleThreadedExecutor>) return "single_threaded";
     if (std::is_same_v<T, rclcpp::executors::MultiThreadedExecutor>) return "multi_threaded";
-    return "events";
+    return kCbg<T> ? "cbg" : "events";
   }
 };
 
 /// Executes callbacks of several groups at the same time.
 template <class T>
 inline constexpr bool kParallel =
-    std::is_base_of_v<ReDAGExecutor, T> || std::is_same_v<T, rclcpp::executors::MultiThreadedExecutor>;
+    std::is_base_of_v<ReDAGExecutor, T> || std::is_same_v<T, rclcpp::executors::MultiThreadedExecutor> || kCbg<T>;
 
 template <class T>
 inline constexpr bool kOurs = std::is_base_of_v<ReDAGExecutor, T>;
 
-#if RCLCPP_VERSION_MAJOR >= 21
+#if REDAG_HAS_EVENTS
 template <class T>
 inline constexpr bool kEvents = std::is_same_v<T, rclcpp::experimental::executors::EventsExecutor>;
 #else

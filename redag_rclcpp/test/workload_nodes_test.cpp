@@ -18,6 +18,7 @@
 #include "redag/model/demand.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "workload/node_events.hpp"
+#include "workload/peers.hpp"
 #include "workload/workload_run.hpp"
 
 namespace redag_rclcpp {
@@ -416,6 +417,11 @@ TEST(Executors, OnlyThoseOfThisDistributionAreAccepted) {
   EXPECT_TRUE(check_executor("mte").has_value());
   EXPECT_FALSE(check_executor("mtf").has_value());
   EXPECT_EQ(check_executor("events").has_value(), RCLCPP_VERSION_MAJOR >= 21);
+  const auto cbg = check_executor("cbg");
+  ASSERT_EQ(cbg.has_value(), kHasCbg);
+  if (!cbg) {
+    EXPECT_THAT(cbg.error().front().hint, HasSubstr("cm_executors"));
+  }
 }
 
 }  // namespace

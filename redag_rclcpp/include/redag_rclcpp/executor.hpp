@@ -2,9 +2,10 @@
 // the library's scheduler. Takes the place of rclcpp::executors::MultiThreadedExecutor; docs/ros2.md says what changes.
 //
 // Threads: as rclcpp's executors. Everything may be called while spinning and from callbacks, except the spin functions
-// (which throw then).
+// (which throw until the one before has returned, also where that was cancelled).
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <exception>
@@ -46,7 +47,7 @@ struct ReDAGOptions {
   /// Which callback is which task of which DAG (docs/workload_format.md, `callback`). Platform and policy of the
   /// workload are not read here: see load_options().
   std::optional<redag::Workload> workload{};
-  /// Period of what neither the workload nor a timer gives one; decides its priority until it is learned.
+  /// Period of what neither the workload nor a timer gives one; decides its priority until it is learned. Above 0.
   std::chrono::nanoseconds default_period = std::chrono::milliseconds(100);
   /// Rates and edges are learned for so long after the first spin, and then frozen; 0: not at all.
   std::chrono::nanoseconds learn = std::chrono::nanoseconds(0);
@@ -152,9 +153,11 @@ class ReDAGExecutor : public rclcpp::Executor {
 #if RCLCPP_VERSION_MAJOR < 21
   void forget_expired();
 #endif
+  void spin_for_future(std::chrono::nanoseconds timeout);
 
   class Core;
   std::shared_ptr<Core> core_;
+  std::atomic_bool occupied_{false};  // from the begin of a spin function until it returns, also after cancel()
 };
 
 }  // namespace redag_rclcpp

@@ -38,8 +38,8 @@ constexpr const char *kHelp = R"(Runs a workload as real ROS 2 nodes with synthe
 usage: run_workload WORKLOAD.yaml [options]
 
   --executor NAME[,NAME...]  redag (preemption as the workload says), redag-none, redag-cooperative, redag-os,
-                             mte, ste, static, events: rclcpp's own; default redag. Several: each run in a process of
-                             its own, in turn, and compared
+                             mte, ste, static, events: rclcpp's own; cbg: EventsCBGExecutor, where it was built with;
+                             default redag. Several: each run in a process of its own, in turn, and compared
   --duration TIME            releases happen in this time (default 10s)
   --warm-up TIME             jobs released in this time at the start are not counted (default 0)
   --seed N                   of execution times: every executor gets the same jobs (default 1)

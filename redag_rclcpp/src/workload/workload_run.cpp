@@ -7,20 +7,19 @@
 #include <exception>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <numeric>
 #include <thread>
 #include <utility>
 
+#include "raised_thread.hpp"
 #include "rclcpp/rclcpp.hpp"
-#include "rclcpp/version.h"
-#if RCLCPP_VERSION_MAJOR >= 21
-#include "rclcpp/experimental/executors/events_executor/events_executor.hpp"
-#endif
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/mutex.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "workload/node_events.hpp"
+#include "workload/peers.hpp"
 #include "workload/workload_nodes.hpp"
 
 namespace redag_rclcpp {
@@ -40,7 +39,6 @@ constexpr std::uint32_t kSpareThreads = 16;  // of our executor, with os
 constexpr std::size_t kSchedulerEvents = std::size_t{1} << 17U;
 
 bool is_redag(const std::string &name) { return name.rfind("redag", 0) == 0; }
-bool has_one_thread(const std::string &name) { return name == "ste" || name == "static" || name == "events"; }
 
 std::optional<PreemptionMode> preemption_of(const std::string &name) {
   if (name == "redag-none") return PreemptionMode::None;
@@ -77,6 +75,9 @@ class Run {
     const Duration cost = nodes_->measurement_cost();
     for (const auto &node : nodes_->nodes()) executor_->add_node(node);
     std::thread spinning([this] { spin(); });
+    // Under chrt the executor's threads have this one's priority: those of an overloaded one would never let it end the
+    // run.
+    const RaisedThread raised(redag::runtime::fifo_priority_above_this_thread());
     collect_until_end();
     nodes_->halt();
     if (!nodes_->wait_idle(timer_clock_now() + kDrainTimeout)) {
@@ -86,7 +87,7 @@ class Run {
     }
     executor_->cancel();
     spinning.join();
-    if (failure_) return redag::make_error(fmt::format("the executor failed: {}", failure_text()));
+    if (const auto failure = failure_text()) return redag::make_error(fmt::format("the executor failed: {}", *failure));
     collect();
     describe_run(cost);
     evaluate();
@@ -124,29 +125,23 @@ class Run {
       redag.trace_capacity = kSchedulerEvents;
       redag_ = std::make_shared<ReDAGExecutor>(redag);
       executor_ = redag_;
-    } else if (name == "mte") {
-      executor_ = std::make_shared<rclcpp::executors::MultiThreadedExecutor>(rclcpp::ExecutorOptions(), workers_);
-    } else if (name == "ste") {
-      executor_ = std::make_shared<rclcpp::executors::SingleThreadedExecutor>();
-    } else if (name == "static") {
-      executor_ = std::make_shared<rclcpp::executors::StaticSingleThreadedExecutor>();
+    } else {
+      executor_ = make_peer(name, workers_);
     }
-#if RCLCPP_VERSION_MAJOR >= 21
-    if (name == "events") executor_ = std::make_shared<rclcpp::experimental::executors::EventsExecutor>();
-#endif
   }
 
   void spin() {
     try {
       executor_->spin();
     } catch (...) {
-      const std::lock_guard guard(failure_lock_);
+      const redag::LockGuard guard(failure_lock_);
       failure_ = std::current_exception();
     }
   }
 
-  std::string failure_text() {
-    const std::lock_guard guard(failure_lock_);
+  std::optional<std::string> failure_text() {
+    const redag::LockGuard guard(failure_lock_);
+    if (!failure_) return std::nullopt;
     try {
       std::rethrow_exception(failure_);
     } catch (const std::exception &error) {
@@ -226,15 +221,18 @@ class Run {
   std::vector<JobEvent> bodies_;
   std::vector<JobEvent> decisions_;
   Time end_ = 0;
-  std::mutex failure_lock_;
-  std::exception_ptr failure_;
+  redag::Mutex failure_lock_;
+  std::exception_ptr failure_ REDAG_GUARDED_BY(failure_lock_);
 };
 
 }  // namespace
 
 const std::vector<std::string> &executor_names() {
-  static const std::vector<std::string> kNames = {"redag",  "redag-none", "redag-cooperative", "redag-os", "mte", "ste",
-                                                  "static", "events"};
+  static const std::vector<std::string> kNames = [] {
+    std::vector<std::string> all = {"redag", "redag-none", "redag-cooperative", "redag-os"};
+    all.insert(all.end(), peer_names().begin(), peer_names().end());
+    return all;
+  }();
   return kNames;
 }
 
@@ -244,11 +242,7 @@ redag::Result<void> check_executor(const std::string &name) {
     return redag::make_error(fmt::format("there is no executor '{}'", name),
                              fmt::format("one of {}", fmt::join(names, ", ")));
   }
-  if (name == "events" && RCLCPP_VERSION_MAJOR < 21) {
-    return redag::make_error("this ROS 2 has no executor 'events'",
-                             fmt::format("it came with rclcpp 21 (Iron); this is rclcpp {}", RCLCPP_VERSION_MAJOR));
-  }
-  return {};
+  return is_redag(name) ? redag::Result<void>() : check_peer(name);
 }
 
 redag::Result<WorkloadRun> run_as_nodes(const redag::Workload &workload, const WorkloadRunOptions &options) {
