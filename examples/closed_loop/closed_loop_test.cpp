@@ -1,8 +1,15 @@
 #include <gtest/gtest.h>
 
+#include <sys/types.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <numeric>
 
+#include "disturbance.hpp"
 #include "experiment.hpp"
 #include "lqr.hpp"
 #include "pictures.hpp"
@@ -14,6 +21,38 @@ namespace {
 using redag::kMicrosecond;
 using redag::kMillisecond;
 using redag::kSecond;
+
+TEST(Disturbance, EndsWithAllThatItStarted) {
+  pid_t group = 0;
+  {
+    int out[2] = {-1, -1};
+    ASSERT_EQ(pipe(out), 0);
+    // Neither listens to SIGTERM.
+    Disturbance disturbance({"sh", "-c", "trap '' TERM; sleep 100 & echo $$ >&" + std::to_string(out[1]) + "; wait"});
+    disturbance.expect_running();
+    std::array<char, 32> text{};
+    ASSERT_GT(read(out[0], text.data(), text.size() - 1), 0);
+    group = static_cast<pid_t>(std::stol(text.data()));
+    EXPECT_EQ(kill(-group, 0), 0);
+    close(out[0]);
+    close(out[1]);
+  }
+  // The shell is reaped here; its child, by whoever got it, soon.
+  for (int i = 0; i < 500 && kill(-group, 0) == 0; ++i) usleep(10'000);
+  EXPECT_EQ(kill(-group, 0), -1);
+  EXPECT_EQ(errno, ESRCH);
+}
+
+TEST(Disturbance, SaysWhatCannotBeStarted) {
+  try {
+    const Disturbance disturbance({"no-such-program"});
+    FAIL() << "it started";
+  } catch (const std::runtime_error &error) {
+    EXPECT_NE(std::string(error.what()).find("apt-get install no-such-program"), std::string::npos) << error.what();
+  }
+  EXPECT_THROW(Disturbance({"false"}), std::runtime_error);
+  EXPECT_EQ(stress_ng(" --cpu 2  --cache 1").size(), 8U);
+}
 
 TEST(Lqr, OfOneStateIsTheKnownGain) {
   // x+ = x + u, Q = R = 1: P = (1 + sqrt 5) / 2, K = P / (1 + P).

@@ -86,20 +86,22 @@ std::vector<PlantSpec> plants() {
 }
 
 ExecutorChoice executor_choice(const std::string &name) {
-  const std::vector<ExecutorChoice> choices = {
-      {"alone", "redag", PreemptionMode::Auto, true, false},
-      {"redag", "redag", PreemptionMode::Auto, false, false},
-      {"redag-cooperative", "redag", PreemptionMode::Cooperative, false, false},
-      {"redag-none", "redag", PreemptionMode::None, false, false},
-      {"mte", "mte", PreemptionMode::None, false, false},
-      {"ste", "ste", PreemptionMode::None, false, false},
-      {"mte-fifo", "mte", PreemptionMode::None, false, true},
-      {"ste-fifo", "ste", PreemptionMode::None, false, true}};
+  std::vector<ExecutorChoice> choices = {{"alone", "redag", PreemptionMode::Auto, true, false},
+                                         {"redag", "redag", PreemptionMode::Auto, false, false},
+                                         {"redag-cooperative", "redag", PreemptionMode::Cooperative, false, false},
+                                         {"redag-none", "redag", PreemptionMode::None, false, false}};
+  for (const sched::ExecutorKind &kind : sched::executors()) {
+    const std::string peer(kind.name);
+    if (kind.ours) continue;
+    choices.push_back({peer, peer, PreemptionMode::None, false, false});
+    choices.push_back({peer + "-fifo", peer, PreemptionMode::None, false, true});
+  }
+  std::string known;
   for (const ExecutorChoice &choice : choices) {
     if (choice.name == name) return choice;
+    known += (known.empty() ? "" : ", ") + choice.name;
   }
-  throw std::runtime_error("there is no executor '" + name +
-                           "' (one of alone, redag, redag-cooperative, redag-none, mte, ste, mte-fifo, ste-fifo)");
+  throw std::runtime_error("there is no executor '" + name + "' (one of " + known + ")");
 }
 
 RunOutcome run_in_virtual_time(const Workload &workload, const ExecutorChoice &choice, const RunSetup &setup) {
@@ -157,6 +159,7 @@ RunOutcome run_on_threads(const Workload &workload, const ExecutorChoice &choice
   options.seed = setup.seed;
   options.executor = choice.executor;
   options.realtime_threads = choice.realtime_threads;
+  options.stop = setup.stop;
   options.bodies = [&](std::vector<runtime::Body> synthetic, const runtime::Now &now) {
     // Around the synthetic body, which takes the processor for as long as the workload says.
     for (std::size_t t = 0; t < synthetic.size(); ++t) {

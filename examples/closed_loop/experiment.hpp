@@ -1,6 +1,7 @@
 // One executor, one seed, all plants: in virtual time (exact, the same on every machine) or on threads (this machine).
 #pragma once
 
+#include <atomic>
 #include <string>
 #include <vector>
 
@@ -21,8 +22,8 @@ struct ExecutorChoice {
   bool realtime_threads = false;  // on threads: SCHED_FIFO, as those of redag with preemption os
 };
 
-/// alone, redag, redag-cooperative, redag-none, mte, ste, mte-fifo, ste-fifo. Throws std::runtime_error for another
-/// name.
+/// alone, redag, redag-cooperative, redag-none, mte, ste, ..., mte-fifo, ste-fifo, ... Throws std::runtime_error for
+/// another name.
 [[nodiscard]] ExecutorChoice executor_choice(const std::string &name);
 
 struct Snapshot {
@@ -46,7 +47,8 @@ struct PlantResult {
 struct RunSetup {
   Duration duration = 20 * redag::kSecond;
   std::uint64_t seed = 1;
-  Duration snapshots_every = 0;  // 0: none
+  Duration snapshots_every = 0;             // 0: none
+  const std::atomic<bool> *stop = nullptr;  // on threads: ends the run early when set
 };
 
 struct RunOutcome {

@@ -3,16 +3,21 @@
 //
 //     example_closed_loop --seeds 10 --out results/closed_loop        virtual time: the same everywhere
 //     example_closed_loop --threads --executors redag,mte             on this machine
+//     example_closed_loop --threads --stress '--cpu 2 --cache 1'      with stress-ng beside it
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
+#include "disturbance.hpp"
 #include "experiment.hpp"
 #include "pictures.hpp"
 #include "redag/base/text.hpp"
@@ -34,7 +39,20 @@ struct Arguments {
   std::uint64_t seed = 1;
   double seconds = 20;
   std::string out;
+  std::string stress;
 };
+
+// The first Ctrl-C ends the run, and with it what was started beside it; the second ends the process.
+std::atomic<bool> interrupted{false};
+
+void watch_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { interrupted.store(true); };
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
 
 void write(const std::filesystem::path &path, const std::string &text) {
   std::ofstream file(path);
@@ -151,7 +169,13 @@ int run(const Arguments &arguments) {
     fmt::print(stderr, "{}\n", to_string(file.error()));
     return 2;
   }
+  std::optional<Disturbance> disturbance;
+  if (!arguments.stress.empty()) {
+    if (!arguments.threads) throw std::runtime_error("--stress: virtual time cannot be disturbed (--threads)");
+    disturbance.emplace(stress_ng(arguments.stress));
+  }
   RunSetup setup;
+  setup.stop = &interrupted;
   setup.duration = static_cast<Duration>(arguments.seconds * kSecond);
   std::vector<Row> rows;
   std::vector<Recorded> recorded;
@@ -163,6 +187,8 @@ int run(const Arguments &arguments) {
       fmt::print(stderr, "{} with seed {}\n", name, setup.seed);
       RunOutcome outcome = arguments.threads ? run_on_threads(file->workload, choice, setup)
                                              : run_in_virtual_time(file->workload, choice, setup);
+      if (interrupted) throw std::runtime_error("interrupted");
+      if (disturbance) disturbance->expect_running();
       if (s == 0) recorded.push_back({name, outcome.plants});
       rows.push_back({name, outcome.mode, setup.seed, std::move(outcome)});
     }
@@ -195,11 +221,15 @@ int main(int argc, char **argv) {
   CLI::App app("Unstable plants under feedback that shares its workers: what an executor's misses do to a robot");
   app.add_option("workload", arguments.workload, "YAML; DAGs named after the plants, with tasks sense and control")
       ->capture_default_str();
-  app.add_option("--executors", arguments.executors,
-                 "alone, redag, redag-cooperative, redag-none, mte, ste; mte-fifo and ste-fifo: on SCHED_FIFO threads")
+  app.add_option(
+         "--executors", arguments.executors,
+         "alone, redag, redag-cooperative, redag-none, mte, ste, static, events, cbg; mte-fifo, ...: on SCHED_FIFO "
+         "threads")
       ->delimiter(',')
       ->capture_default_str();
   app.add_flag("--threads", arguments.threads, "On threads of this machine, in real time; default: virtual time");
+  app.add_option("--stress", arguments.stress,
+                 "With --threads: run stress-ng with these arguments meanwhile, such as '--cpu 2 --cache 1'");
   app.add_option("--seeds", arguments.seeds, "How many: SEED, SEED+1, ...")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
@@ -209,6 +239,7 @@ int main(int argc, char **argv) {
       ->capture_default_str();
   app.add_option("--out", arguments.out, "Folder for results.csv, states.csv, trajectories.svg, frames.png");
   CLI11_PARSE(app, argc, argv);
+  watch_signals();
   try {
     return run(arguments);
   } catch (const std::exception &error) {
