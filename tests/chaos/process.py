@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Faults from outside, at random moments: signals, limits, full and read-only folders, lost rights, fewer processors.
 
-Usage: process.py PROGRAM SOURCE_DIR [--runs N] [--seed S] [--fault NAME]...
+Usage: process.py PROGRAM SOURCE_DIR [--runs N] [--seed S] [--fault NAME]... [--clock LIBRARY]
 
 Each fault is tried N times, each time from a seed that is printed when something breaks: `--runs 1 --seed S --fault NAME`
 does it again. Whatever happens, the program ends in time, by itself or by the signal, never by a crash; it says why when it
@@ -26,6 +26,7 @@ GOOD = {0, 1, 2}
 TIMEOUT = 600
 PROGRAM = pathlib.Path()
 SOURCE = pathlib.Path()
+CLOCK = None
 
 
 class Broken(Exception):
@@ -148,6 +149,42 @@ def fewer_processors(rng, folder):
         except OSError:  # that thread has ended
             pass
     child.end({0})
+    check_results(folder)
+
+
+def throttled(rng, folder):
+    """More SCHED_FIFO work than one processor has: the kernel takes it away from all threads of the class for a while."""
+    file = folder / "random.yaml"
+    Child("generate", "--dags", 4, "--utilization", 2, "--workers", 2, "--seed", rng.randrange(2**32), "-o", file).end({0})
+    one = {rng.choice(sorted(os.sched_getaffinity(0)))}
+
+    def run(duration, *arguments):
+        return Child("run", file, "--preemption", "os", "--duration", duration, *arguments,
+                     prepare=lambda: os.sched_setaffinity(0, one)).end({0, 2})
+
+    if run("10ms").status == 2:
+        raise Skipped("no real-time rights")
+    limit = pathlib.Path("/proc/sys/kernel/sched_rt_runtime_us")
+    if not limit.exists() or int(limit.read_text()) < 0:
+        raise Skipped("this kernel does not throttle; a processor would be taken from everybody")
+    child = run("2500ms", "--out", folder / "out")
+    expect(child.status == 0, child.err)
+    check_results(folder)
+
+
+def clock_jumps(rng, folder):
+    """The time of day jumps by days and years, to and fro; nobody may wait for one."""
+    if CLOCK is None:
+        raise Skipped("--clock is not given")
+    jumping = {"env": os.environ | {"LD_PRELOAD": str(CLOCK)}}
+    shown = subprocess.run(["date", "+%s"], capture_output=True, check=True, **jumping).stdout
+    expect(abs(int(shown) - time.time()) > 80_000, "the clock does not jump")
+    refused = subprocess.run(["timeout", "60", "true"], capture_output=True, check=False, **jumping)
+    expect(refused.returncode == -signal.SIGABRT, "one may wait for a time of day")
+    file = workload(rng, folder, busy=False)
+    Child("run", file, "--duration", "500ms", "--preemption", rng.choice(["none", "cooperative", "auto"]), "--watchdog",
+          "100ms", "--out", folder / "run", **jumping).end({0})
+    Child(*writing_command(rng, folder, folder / "out"), **jumping).end({0})
     check_results(folder)
 
 
@@ -310,8 +347,8 @@ def few_files(rng, folder):
     check_results(folder)
 
 
-FAULTS = [interrupted, stopped, fewer_processors, without_realtime, no_threads, read_only, small_files, full_disk, killed,
-          little_memory, few_files]
+FAULTS = [interrupted, stopped, fewer_processors, throttled, clock_jumps, without_realtime, no_threads, read_only,
+          small_files, full_disk, killed, little_memory, few_files]
 
 
 def try_one(fault, seed):
@@ -320,14 +357,16 @@ def try_one(fault, seed):
 
 
 def main():
-    global PROGRAM, SOURCE
+    global PROGRAM, SOURCE, CLOCK
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("source", type=pathlib.Path)
     parser.add_argument("--runs", type=int, default=1, help="of each fault")
     parser.add_argument("--seed", type=int, default=1, help="of the first run; the others follow")
     parser.add_argument("--fault", action="append", choices=[fault.__name__ for fault in FAULTS])
+    parser.add_argument("--clock", type=pathlib.Path, help="of clock_jumps: redag_jumping_clock as it was built")
     options = parser.parse_args()
+    CLOCK = options.clock and options.clock.resolve()
     PROGRAM, SOURCE = options.program.resolve(), options.source.resolve()
     failed = 0
     for fault in FAULTS:

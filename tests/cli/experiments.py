@@ -11,7 +11,7 @@ import subprocess
 import time
 import xml.etree.ElementTree
 
-from program import CART, PROGRAM, SOURCE, Case, in_terminal, main, redag
+from program import CART, PROGRAM, SOURCE, Case, in_terminal, interrupt, main, redag
 
 PLAN = """\
 experiment: factorial
@@ -324,7 +324,7 @@ class Factorial(Case):
                           "workloads: cart.yaml\nexecutors: [ideal, redag-none, mte, ste]\n")
         program = self.write("run_workload", f"""#!/bin/sh
 executor=${{2#--executor=}} duration=${{3#--duration=}} warm_up=${{4#--warm-up=}} seed=${{5#--seed=}} out=${{6#--out=}}
-exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --warmup "$warm_up" --seed "$seed" --out "$out"
+exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --warm-up "$warm_up" --seed "$seed" --out "$out"
 """)
         program.chmod(0o755)
         self.run_plan(plan, "ros2", "--run-workload", program)
@@ -336,6 +336,25 @@ exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --w
                                                                            status=2).stderr)
         self.assertIn("source the workspace", self.run_plan(plan, "worse", "--run-workload", "/no/such", status=2).stderr)
 
+    def test_recorded_runs_become_part_of_an_experiment(self):
+        """Stands in for run_workload: a simulated run that says that nodes ran it."""
+        cart = self.folder / "cart.yaml"
+        self.run_plan(self.write("plan.yaml", "experiment: factorial\nduration: 500ms\nrepetitions: 2\n"
+                                 "workloads: cart.yaml\nexecutors: [ideal, mte]\n"), "simulated")
+        for run in ("1", "2"):
+            place = self.folder / "recorded" / "mte" / run
+            self.expect(redag("simulate", cart, "--executor", "mte", "--duration", "500ms", "--seed", run, "--out", place), 0)
+            events = place / "events.jsonl"
+            events.write_text(events.read_text().replace('"driver":"simulator"', '"driver":"ros_nodes"', 1))
+        both = ("experiment", "merge", self.folder / "simulated", self.folder / "recorded")
+        self.expect(redag(*both, "--out", self.folder / "both"), 0)
+        rows = {(row["executor"], row["world"]) for row in csv.DictReader(self.results("both")[1].splitlines())}
+        self.assertEqual(rows, {("ideal", "simulator"), ("mte", "simulator"), ("ros2/mte", "ros_nodes")})
+        self.assertIn("6 of 6", self.expect(redag("report", self.folder / "both", "-o", self.folder / "both.html"), 0).stdout)
+        self.assertIn("too many", self.expect(redag(*both, self.folder / "recorded", "--out", self.folder / "twice"), 2).stderr)
+        self.assertIn("name the folder of the one", self.expect(
+            redag("experiment", "merge", self.folder / "recorded", "--out", self.folder / "alone"), 2).stderr)
+
     def test_plans_of_this_repository(self):
         plans = sorted((SOURCE / "experiments" / "paper").glob("*.yaml"))
         self.assertGreater(len(plans), 5)
@@ -345,8 +364,7 @@ exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --w
             with self.subTest(plan=plan.name):
                 process = subprocess.Popen([PROGRAM, "experiment", "factorial", plan, "--out", self.folder / plan.stem],
                                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-                time.sleep(0.3)
-                process.send_signal(signal.SIGINT)
+                interrupt(process, 0.3)
                 _, error = process.communicate(timeout=120)
                 self.assertEqual(process.returncode, 0, error)
                 self.assertTrue((self.folder / plan.stem / "factorial.json").exists())

@@ -7,11 +7,13 @@ import json
 import os
 import pathlib
 import pty
+import signal
 import struct
 import subprocess
 import sys
 import tempfile
 import termios
+import time
 import unittest
 
 if len(sys.argv) < 3:
@@ -27,11 +29,31 @@ dags:
   - name: slow
     tasks: [{name: plan, wcet: 25ms, period: 100ms}]
 """
+MISTAKEN = """\
+name: cart
+platform: {workers: 1}
+dags:
+  - name: fast
+    tasks:
+      - {name: sense, wect: 1ms, period: 10ms}
+      - {name: act, wcet: 1, activation: data, after: sense}
+"""
 
 
 def redag(*arguments, text=None, **options):
     return subprocess.run([PROGRAM, *map(str, arguments)], input=text, capture_output=True, text=True, timeout=250,
                           check=False, **options)
+
+
+def interrupt(process, after=0.0, by=signal.SIGINT):
+    """Waits until the process listens to the signal, which would just kill it while it starts, and for `after` s more."""
+    listens = 0
+    while process.poll() is None and not listens >> (by - 1) & 1:
+        time.sleep(0.01)
+        status = pathlib.Path(f"/proc/{process.pid}/status").read_text()
+        listens = sum(int(line.split()[1], 16) for line in status.splitlines() if line.startswith("SigCgt:"))
+    time.sleep(after)
+    process.send_signal(by)
 
 
 def in_terminal(*arguments, columns=80, **environment):

@@ -40,7 +40,7 @@ void commands_target(std::string_view input) {
   const std::string duration = format_duration(some_releases(loaded->workload));
   REDAG_CHECK(answers({"validate", file, "--json"}), "validate");
   REDAG_CHECK(answers({"validate", file}), "validate, in words");
-  for (const char *executor : {"redag-none", "redag-cooperative", "mte", "ste"}) {
+  for (const char *executor : {"redag-none", "redag-cooperative", "mte", "ste", "static", "events", "cbg"}) {
     REDAG_CHECK(answers({"simulate", file, "--executor", executor, "--duration", duration, "--json"}), executor);
   }
   REDAG_CHECK(answers({"simulate", file, "--duration", duration, "--out", results, "--force"}), "simulate");

@@ -11,7 +11,7 @@ namespace {
 using namespace experiment;
 
 void factorial(std::string_view input) {
-  const auto executors = [](World) { return std::vector<std::string>{"redag", "mte", "ste"}; };
+  const auto executors = [](World) { return std::vector<std::string>{"redag", "mte", "ste", "events"}; };
   const Result<FactorialPlan> plan = parse_factorial_plan(input, "fuzz.yaml", executors);
   if (!plan) {
     REDAG_CHECK(!plan.error().empty(), "a refusal says why");

@@ -1,8 +1,10 @@
 // Every interleaving of small uses of the engine: how jobs are released, handed to threads, run, preempted, and how the
 // engine is halted.
+#include <array>
 #include <stdexcept>
 
 #include "protocol.hpp"
+#include "redag/runtime/clock.hpp"
 #include "redag/runtime/threads.hpp"
 
 namespace redag::model_check {
@@ -255,6 +257,39 @@ TEST_P(EngineProtocol, ChainsRunInTheirOrder) {
   });
 }
 
+// The last job's body releases the others: one worker is free, and its thread sleeps. Which thread begins the first of
+// them depends on which is free and awake first; a thread that is robbed may be given the second.
+TEST_P(EngineProtocol, AJobIsBegunByItsThreadOrByOneThatIsFreeBefore) {
+  int own = 0;
+  int robbed = 0;
+  expect_holds([&] {
+    Countdown all(3);
+    std::vector<std::uint32_t> begun_by(3);
+    const auto work = [&](std::size_t t) {
+      return [&, t](const Job &) {
+        begun_by[t] = explored::self();
+        all.count();
+        return Outcome::Finished;
+      };
+    };
+    Machine machine(ladder(3), platform(2), {work(0), work(1), nullptr});
+    machine.work(2) = [&, note = work(2)](const Job &job) {
+      machine.release(1);
+      return note(job);
+    };
+    machine.start_calmly();
+    const std::uint32_t source = thread([&] { machine.release(0); });
+    machine.release(2);
+    all.wait();
+    explored::join(source);
+    machine.finish_calmly();
+    for (std::size_t t = 0; t < 3; ++t) explored::check(machine.ran(t) == 1, "a job did not run");
+    ++(begun_by[1] == begun_by[2] ? robbed : own);
+  });
+  EXPECT_GT(own, 0);
+  EXPECT_GT(robbed, 0);
+}
+
 TEST_P(EngineProtocol, AnExceptionEndsItsJobAlone) {
   expect_holds([] {
     Countdown all(2);
@@ -340,6 +375,51 @@ TEST(EngineStart, AThreadThatCannotBeHadEndsTheOthers) {
     explored::check(machine.ran(0) == 0, "a job ran");
   });
   runtime::thread_that_fails.reset();
+}
+
+// A watchdog looks while jobs begin, are preempted and end: what it names is in progress then, and a limit is told
+// once.
+TEST_P(EngineProtocol, AWatchdogSeesOnlyJobsInProgress) {
+  expect_holds([] {
+    Workload workload = ladder(2);
+    for (Task &task : workload.dags[0].tasks) {
+      task.budget = 1;
+      task.on_budget = OnBudget::Log;
+    }
+    runtime::cpu_of_others = kSecond;  // every look finds a budget used
+    Countdown all(2);
+    std::array<int, 2> begun{};
+    const auto work = [&](const Job &job) {
+      ++begun[job.task.value];
+      preemption_point();
+      all.count();
+      return Outcome::Finished;
+    };
+    Platform with_events = platform(1);
+    with_events.trace_capacity = 32;
+    Machine machine(workload, with_events, {work, work});
+    machine.start_calmly();
+    const std::uint32_t watcher = thread([&] {
+      std::vector<runtime::OverdueJob> named;
+      for (int look = 0; look < 2; ++look) machine.engine->watch({1, 0}, kSecond, named);
+      for (const runtime::OverdueJob &job : named) {
+        explored::check(begun[job.job.task.value] == 1, "a job is named that has not begun");
+      }
+      explored::check(named.size() <= 2, "a job is named twice");
+    });
+    machine.release(0);
+    machine.release(1);
+    all.wait();
+    explored::join(watcher);
+    machine.finish_calmly();
+    std::vector<JobEvent> events;
+    machine.engine->drain(events, true);
+    std::array<int, 2> told{};
+    for (const JobEvent &event : events) {
+      if (event.kind == JobEventKind::Exceeded) ++told[event.task.value];
+    }
+    explored::check(told[0] <= 1 && told[1] <= 1, "a limit is told twice");
+  });
 }
 
 }  // namespace

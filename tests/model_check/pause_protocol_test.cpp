@@ -103,6 +103,7 @@ TEST(PauseProtocol, RunOneTakesOneJobThatNobodyElseRuns) {
       machine.release(2);
       explored::check(machine.engine->run_one(), "there was a job to run");
       explored::check(machine.ran(2) == 1, "it was not the most urgent one");
+      explored::check(machine.ran(0) == 0 && machine.ran(1) == 0, "another job ran in the pause");
       machine.engine->resume();
       all.wait();
       explored::join(source);

@@ -10,6 +10,8 @@ const [executable, scratch] = process.argv.slice(2);
 const shot = (name) => path.join(scratch, 'screenshots', `${name}.png`);
 const FIGURES = {comparison: ['missed', 'p99', 'responses', 'lateness', 'timeline', 'schedule']};
 FIGURES.experiment = ['curves', 'distance', 'bounds', 'effects'];
+FIGURES.worlds = ['curves', 'distance', 'worlds'];
+FIGURES.executors = ['worlds'];
 FIGURES.single = FIGURES.hostile = FIGURES.long = FIGURES.wide = FIGURES.comparison.slice(2);
 
 const browser = await chromium.launch({executablePath: executable, args: ['--no-sandbox', '--disable-gpu']});
@@ -57,6 +59,9 @@ async function assertAllDrawn(page, figures) {
   for (const [name, count] of Object.entries(counts)) assert.ok(count >= 10, `figure ${name} is empty (${count})`);
 }
 const none = (problems) => assert.deepEqual(problems, []);
+/** The shapes and words of an SVG figure, without the names that ECharts makes anew for every drawing. */
+const drawing = (page, name) => page.locator(`figure[data-figure=${name}] .chart`).evaluate((box) => [...box.querySelectorAll('svg path, svg text')]
+  .map((shape) => [shape.getAttribute('d'), shape.getAttribute('transform'), shape.textContent].join(' ')).join('\n'));
 const figureShot = (page, name, file) => page.locator(`figure[data-figure=${name}]`).screenshot({path: shot(file)});
 
 for (const [name, figures] of Object.entries(FIGURES)) {
@@ -121,7 +126,7 @@ await test('print: white paper, all figures, also from a dark screen', async () 
 await test('controls: each changes what it says', async () => {
   const {page, problems, close} = await open('comparison');
   const figure = (name) => page.locator(`figure[data-figure=${name}] .chart`);
-  const markup = (name) => figure(name).innerHTML();
+  const markup = (name) => drawing(page, name);
   const pixels = async () => Buffer.from(await figure('schedule').screenshot()).toString('base64');
   const changes = async (read, act, what) => {
     const before = await read();
@@ -151,7 +156,7 @@ await test('controls: each changes what it says', async () => {
 
 await test('experiment: each choice changes its figures', async () => {
   const {page, problems, close} = await open('experiment');
-  const markup = (name) => page.locator(`figure[data-figure=${name}] .chart`).innerHTML();
+  const markup = (name) => drawing(page, name);
   const changes = async (names, act) => {
     const before = await Promise.all(names.map(markup));
     await act();
@@ -174,6 +179,45 @@ await test('experiment: each choice changes its figures', async () => {
   assert.deepEqual([...new Set(cell)].sort(), ['ideal', 'mte', 'redag', 'redag-none']);
   none(problems);
   await close();
+});
+
+await test('worlds: every row says where it ran, and the worlds of an executor are side by side', async () => {
+  const {page, problems, close} = await open('worlds');
+  const rows = await page.locator('.table tbody tr').evaluateAll((lines) => lines.slice(0, lines.length / 2)
+    .map((line) => [...line.querySelectorAll('td.text')].map((cell) => cell.textContent).join(' in ')));
+  assert.deepEqual(rows, ['ideal in virtual time', 'redag in virtual time', 'redag in threads', 'mte in virtual time', 'mte in threads', 'redag-none in threads']);
+  assert.match(await page.locator('p.facts').innerText(), /in virtual time, on threads of this machine/);
+  assert.match(await page.locator('ul.verdict').innerText(), /in virtual time ideal [^;]*; on threads of this machine redag [^;]*mte/);
+  assert.match(await page.locator('h2#how ~ dl').innerText(), /threads\s+redag, mte, redag-none on threads of this machine/);
+  const markup = () => drawing(page, 'worlds');
+  for (const [name, value] of [['of', 'p99 response'], ['DAG', 'control'], ['demand scale', '0.5']]) {
+    const before = await markup();
+    await page.getByLabel(name, {exact: true}).selectOption(value);
+    assert.notEqual(await markup(), before, name);
+  }
+  await figureShot(page, 'worlds', 'worlds-p99');
+  none(problems);
+  await close();
+});
+
+await test('legends end where the buttons begin', async () => {
+  for (const [name, options] of [['comparison', {}], ['wide', {}], ['comparison', {viewport: {width: 390, height: 844}}]]) {
+    const {page, close} = await open(name, options);
+    const beside = await page.evaluate(() => [...document.querySelectorAll('figure[data-figure]')].flatMap((box) => {
+      const buttons = box.querySelector('.save').getBoundingClientRect();
+      // What a legend has no room for is clipped, and comes with its arrows.
+      const end = (text) => {
+        const clipped = text.closest('[clip-path]');
+        const clip = clipped && document.querySelector(clipped.getAttribute('clip-path').slice(4, -1)).firstElementChild.getBBox();
+        return Math.min(text.getBoundingClientRect().right, clip ? clipped.getScreenCTM().e + clip.x + clip.width : Infinity);
+      };
+      return [...box.querySelectorAll('.chart svg text')]
+        .filter((text) => { const {top, bottom} = text.getBoundingClientRect(); return top < buttons.bottom && bottom > buttons.top; })
+        .filter((text) => end(text) > buttons.left).map((text) => `${box.dataset.figure}: ${text.textContent}`);
+    }));
+    assert.deepEqual(beside, [], name);
+    await close();
+  }
 });
 
 await test('hostile names stay text, also in tooltips', async () => {
@@ -209,6 +253,10 @@ await test('every figure is saved as PNG and SVG', async () => {
       const bytes = fs.readFileSync(file);
       assert.equal(bytes.subarray(0, 4).toString('latin1'), magic);
       assert.ok(bytes.length > 3000, `${name}.${kind} has ${bytes.length} bytes`);
+      if (kind === 'svg') {  // other programs read it as XML
+        const mistake = await page.evaluate((text) => new DOMParser().parseFromString(text, 'image/svg+xml').querySelector('parsererror')?.textContent, bytes.toString());
+        assert.equal(mistake, undefined, name);
+      }
     }
     none(problems);
     await close();

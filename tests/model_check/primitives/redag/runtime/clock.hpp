@@ -1,6 +1,8 @@
 // In place of redag/runtime/clock.hpp: the explorer's time. Processor time stands still.
 #pragma once
 
+#include <time.h>
+
 #include "redag/base/time.hpp"
 #include "redag/testing/explorer.hpp"
 
@@ -8,5 +10,9 @@ namespace redag::runtime {
 
 [[nodiscard]] inline Time monotonic_now() noexcept { return testing::explored::now(); }
 [[nodiscard]] inline Duration thread_cpu_now() noexcept { return 0; }
+
+/// What a watchdog reads of the others.
+inline Duration cpu_of_others = 0;
+[[nodiscard]] inline Duration cpu_now(clockid_t) noexcept { return cpu_of_others; }
 
 }  // namespace redag::runtime

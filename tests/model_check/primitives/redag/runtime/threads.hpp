@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <ctime>
 #include <functional>
 #include <optional>
 #include <string>
@@ -50,7 +51,9 @@ inline std::optional<std::string> thread_that_fails;  // by name
   if (thread_that_fails == setup.name) return make_error("thread '" + setup.name + "' cannot be created");
   return ThreadHandle(testing::explored::spawn(std::move(main)));
 }
+[[nodiscard]] inline clockid_t cpu_clock_of(ThreadHandle &) noexcept { return 0; }
 [[nodiscard]] inline bool set_fifo_priority(std::uint32_t, int) noexcept { return true; }
+[[nodiscard]] inline int fifo_priority_above_this_thread() { return 0; }
 [[nodiscard]] inline std::vector<int> usable_cpus() { return {0, 1, 2, 3}; }
 [[nodiscard]] inline int available_fifo_priority(int wanted) { return wanted; }
 [[nodiscard]] inline const char *realtime_hint() { return ""; }

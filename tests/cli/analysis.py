@@ -1,0 +1,318 @@
+#!/usr/bin/env python3
+"""`redag analyze`, `sensitivity` and `assign`.
+
+Usage: analysis.py PROGRAM SOURCE_DIR. Uses the standard library only.
+"""
+import json
+import re
+import subprocess
+
+from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, in_terminal, interrupt, main, redag
+
+# Harmonic, U = 1/4 + 1/8 + 1/8: with rate-monotonic priorities on one worker everything up to U = 1 is schedulable.
+HARMONIC = """\
+name: harmonic
+platform: {workers: 1, preemption: os}
+dags:
+  - name: a
+    tasks: [{name: t, wcet: 1ms, period: 4ms}]
+  - name: b
+    tasks: [{name: t, wcet: 1ms, period: 8ms}]
+  - name: c
+    tasks: [{name: t, wcet: 2ms, period: 16ms}]
+"""
+# By rate b answers after 5 ms, by deadline after 2 ms.
+SHORT_DEADLINE = """\
+name: short
+platform: {workers: 1, preemption: os}
+# a comment, which is not kept
+dags:
+  - name: a
+    tasks: [{name: t, wcet: 3ms, bcet: 1ms, period: 10ms}]
+  - name: b
+    tasks: [{name: t, wcet: 2ms, period: 20ms, deadline: 4ms, group: bus}]
+"""
+
+
+class Analyze(Case):
+    def test_table_and_verdict(self):
+        result = self.expect(redag("analyze", self.cart), 0)
+        # One worker, run to completion: plan (25 ms) blocks fast, which has 10 ms.
+        self.assertRegex(result.stdout, r"fast\.sense +10ms +- +- +no bound")
+        self.assertRegex(result.stdout, r"slow\.plan +100ms +\S+ms +\S+ms +ok +dag_one_worker_deferred")
+        self.assertIn("preemption: none\n", result.stdout)
+        self.assertIn("not shown schedulable: 2 tasks without a bound", result.stdout)
+        self.assertRegex(result.stdout, r"melani +does not apply +\S")
+
+    def test_overrides_and_check(self):
+        self.expect(redag("analyze", self.cart, "--check"), 1)
+        preempted = self.expect(redag("analyze", self.cart, "--check", "--preemption", "os"), 0)
+        self.assertIn("schedulable: every deadline is met, by ", preempted.stdout)
+        self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--policy", "fixed"), 0)
+        self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--workers", "2"), 0)
+        self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--overhead-dispatch", "5ms"), 1)
+
+    def test_edges_between_rates_are_analysed(self):
+        contention = SOURCE / "workloads" / "contention.yaml"
+        self.expect(redag("analyze", contention, "--check"), 0)
+        self.assertIn("data of other rates, waited for",
+                      self.expect(redag("analyze", contention, "--explain", "perception"), 0).stdout)
+
+    def test_auto_is_said(self):
+        self.assertIn("auto is analysed as os", redag("analyze", SOURCE / "workloads" / "hello.yaml").stdout)
+        text = redag("analyze", SOURCE / "workloads" / "hello.yaml", "--preemption", "cooperative").stdout
+        self.assertIn("preemption: cooperative (no task has a region: the same as none)", text)
+
+    def test_overload_is_certain(self):
+        text = redag("analyze", self.write("over.yaml", CART.replace("25ms", "99ms"))).stdout
+        self.assertIn("\nnot schedulable: the utilization, 1.190, is above what 1 worker can do", text)
+
+    def test_explanation(self):
+        text = self.expect(redag("analyze", self.cart, "--preemption", "os", "--explain", "slow.plan"), 0).stdout
+        # 25 ms of its own and four times the 2 ms of fast: in 33 ms, fast comes at 0, 10, 20 and 30.
+        self.assertIn("slow.plan: answers within 33ms of its release, deadline 100ms: ok", text)
+        self.assertRegex(text, r"own execution +slow.plan +1 +25ms +75\.8 %")
+        self.assertRegex(text, r"interference of +fast +4 +8ms +24\.2 %")
+        self.assertIn("what to change: the largest term is 25ms of 33ms", text)
+        text = self.expect(redag("analyze", self.cart, "--explain", "fast"), 0).stdout
+        self.assertIn("fast: no bound", text)
+        self.assertIn("jobs would be skipped", text)
+
+    def test_unknown_task(self):
+        self.expect(redag("analyze", self.cart, "--explain", "slow.plam"), 2, "did you mean 'slow.plan'?")
+        self.expect(redag("analyze", self.cart, "--explain", "act"), 2, "did you mean 'fast.act'?")
+        self.assertEqual(redag("analyze", self.cart, "--json", "--explain", "nobody").stdout, "")
+
+    def test_json(self):
+        document = self.document(redag("analyze", self.cart, "--preemption", "os", "--json"), "redag.analysis/1")
+        self.assertTrue(document["schedulable"])
+        self.assertEqual([task["name"] for task in document["tasks"]], ["fast.sense", "fast.act", "slow.plan"])
+        for row in document["tasks"] + document["dags"]:
+            self.assertEqual(row["bound_ns"], sum(term["amount_ns"] for term in row["terms"]))
+        plan = document["tasks"][2]
+        self.assertEqual((plan["bound_ns"], plan["slack_ns"], plan["verdict"]), (33_000_000, 67_000_000, "ok"))
+        listed = redag("analyze", "--methods").stdout
+        for method in document["methods"]:
+            self.assertIn(f"\n{method['name']} (", "\n" + listed)
+            if method["paper"] and not method["sound"]:
+                self.assertNotIn(method["name"], document["by"])
+        explained = json.loads(redag("analyze", self.cart, "--json", "--explain", "slow").stdout)
+        self.assertEqual(explained["explanation"]["name"], "slow")
+
+    def test_exploration(self):
+        # plan is released with fast, whose two jobs go first, and has ended when fast comes again.
+        short = self.write("short.yaml", CART.replace("25ms", "7ms"))
+        text = self.expect(redag("analyze", "--explore", short, "--check"), 0).stdout
+        self.assertRegex(text, r"exploration +schedulable +bounds 3 of 3 tasks; \d+ states, 21 jobs a hyperperiod, exact")
+        self.assertRegex(text, r"slow\.plan +3ns +9ms")
+        document = json.loads(redag("analyze", "--explore", short, "--json").stdout)
+        self.assertEqual(document["exploration"]["end"], "complete")
+        worst = {task["name"]: task["worst_ns"] for task in document["exploration"]["tasks"]}
+        for task in document["tasks"]:
+            self.assertLessEqual(task["bound_ns"], worst[task["name"]])
+        self.assertNotIn("exploration", json.loads(redag("analyze", short, "--json").stdout))
+
+    def test_exploration_ends_early(self):
+        text = self.expect(redag("analyze", "--explore", self.cart), 0).stdout
+        self.assertRegex(text, r"exploration +not shown .*; fast/\w+ can end after its next release")
+        short = self.write("short.yaml", CART.replace("25ms", "7ms"))
+        text = self.expect(redag("analyze", "--explore=21", short), 0).stdout
+        self.assertIn("gave up at 21 states", text)
+        self.assertIn("dag_one_worker_deferred    schedulable", text)
+        self.expect(redag("analyze", "--explore=0", short), 2, "'0' is not a number of states, 1 or more")
+        self.expect(redag("analyze", "--explore=many", short), 2, "'many' is not a number of states, 1 or more")
+        text = self.expect(redag("analyze", "--explore", short, "--preemption", "os"), 0).stdout
+        self.assertRegex(text, r"exploration +does not apply +for jobs that run to completion")
+
+    def test_bad_input(self):
+        self.expect(redag("analyze"), 2, "FILE is required")
+        self.expect(redag("analyze", self.write("bad.yaml", MISTAKEN)), 2, "did you mean 'wcet'?")
+        self.expect(redag("analyze", self.cart, "--preemption", "os", "--policy", "edf"), 2, "static policy")
+        self.expect(redag("analyze", self.cart, "--overhead-release", "-1us"), 2, "--overhead-release")
+
+    def test_no_simulated_response_is_above_its_bound(self):
+        bounded = 0
+        for seed in range(1, 25):
+            text = redag("generate", "--seed", seed, "--dags", 3, "--utilization", "1.1", "--workers", 1 + seed % 2).stdout
+            for mode in ("none", "os"):
+                analysis = json.loads(redag("analyze", "-", "--preemption", mode, "--json", text=text).stdout)
+                run = json.loads(redag("simulate", "-", "--preemption", mode, "--duration", "2s", "--json", text=text).stdout)
+                for task, seen in zip(analysis["tasks"], run["tasks"]):
+                    if task["bound_ns"] is not None and seen["response"]["count"] > 0:
+                        bounded += 1
+                        self.assertLessEqual(seen["response"]["max_ns"], task["bound_ns"], (seed, mode, task["name"]))
+        self.assertGreater(bounded, 20)
+
+    def test_workloads_of_the_repository(self):
+        for file in sorted((SOURCE / "workloads").rglob("*.yaml")):
+            self.expect(redag("analyze", file), 0)
+            self.expect(redag("analyze", file, "--preemption", "none"), 0)
+
+    def test_narrow_terminal(self):
+        status, text = in_terminal("analyze", self.cart, columns=50, NO_COLOR="1")
+        self.assertEqual(status, 0, text)
+        rows = [line for line in text.splitlines() if re.match(r"(fast|slow|melani)", line)]
+        self.assertLessEqual(max(map(len, rows)), 50, text)
+
+
+class Sensitivity(Case):
+    def limits(self, result):
+        document = self.document(result, "redag.sensitivity/1")
+        return document, {row["name"]: row for row in document["limits"]}
+
+    def test_harmonic_periods(self):
+        file = self.write("harmonic.yaml", HARMONIC)
+        text = self.expect(redag("sensitivity", file), 0).stdout
+        self.assertIn("schedulable: every deadline is met", text)
+        self.assertRegex(text, r"all wcets +- +- +2\.0000 +utilization above 1")
+        self.assertRegex(text, r"wcet of b\.t +1ms +5ms +5\.0000")
+        self.assertIn("all execution times together can grow to 2.0000 times what they are", text)
+        self.assertNotIn("not monotone", text)
+        document, rows = self.limits(redag("sensitivity", file, "--json"))
+        self.assertTrue(document["schedulable"])
+        self.assertEqual(rows["all rates"]["factor"], 2)
+        self.assertEqual(rows["wcet of b.t"]["limit_ns"], 5_000_000)
+        self.assertTrue(all(row["monotone"] for row in rows.values()))
+
+    def test_what_has_to_shrink(self):
+        file = self.write("heavy.yaml", HARMONIC.replace("wcet: 2ms", "wcet: 14ms"))  # U = 5/4
+        text = self.expect(redag("sensitivity", file), 0).stdout
+        self.assertIn("all execution times together have to shrink to 0.8000 of what they are", text)
+        self.assertIn("alone suffices, with the least change: wcet of c.t, from 14ms to 10ms", text)
+        self.expect(redag("sensitivity", file, "--check"), 1)
+        hopeless = self.write("hopeless.yaml", HARMONIC.replace("wcet: 2ms", "wcet: 17ms").replace("1ms", "9ms"))
+        self.assertIn("none of the execution times looked at suffices alone", redag("sensitivity", hopeless).stdout)
+
+    def test_limits_hold_in_the_analysis(self):
+        _, rows = self.limits(redag("sensitivity", self.cart, "--preemption", "os", "--json"))
+        limit = rows["wcet of slow.plan"]["limit_ns"]
+        for wcet, status in ((limit, 0), (limit + 1, 1)):
+            changed = self.write("changed.yaml", CART.replace("25ms", f"{wcet}ns"))
+            self.expect(redag("analyze", changed, "--preemption", "os", "--check"), status)
+        period = rows["period of fast"]["limit_ns"]
+        for value, status in ((period, 0), (period - 1, 1)):
+            changed = self.write("changed.yaml", CART.replace("period: 10ms", f"period: {value}ns"))
+            self.expect(redag("analyze", changed, "--preemption", "os", "--check"), status)
+
+    def test_the_simulator_is_never_behind_the_bounds(self):
+        compared = 0
+        for seed in range(1, 9):
+            text = redag("generate", "--seed", seed, "--dags", 3, "--utilization", "0.8", "--workers", 1 + seed % 2).stdout
+            for mode in ("none", "os"):
+                result = redag("sensitivity", "-", "--preemption", mode, "--simulate", "--probes", "4", "--json", text=text)
+                document, rows = self.limits(result)
+                for row in rows.values():
+                    if document["schedulable"] and row["kind"] in ("wcet", "all_wcets"):
+                        compared += 1
+                        self.assertGreaterEqual(row["simulated"]["factor"], row["factor"], (seed, mode, row["name"]))
+        self.assertGreater(compared, 10)
+
+    def test_where_no_bound_speaks_the_simulator_does(self):
+        text = self.expect(redag("sensitivity", SOURCE / "workloads" / "robot.yaml", "--simulate"), 0).stdout
+        self.assertIn("no method that bounds response times applies", text)
+        self.assertRegex(text, r"in simulation, which proves nothing, all execution times together go to 1\.\d+ times")
+
+    def test_one_task(self):
+        _, rows = self.limits(redag("sensitivity", self.cart, "--task", "fast.act", "--json"))
+        self.assertEqual(set(rows), {"wcet of fast.act", "period of fast"})
+        _, rows = self.limits(redag("sensitivity", self.cart, "--task", "fast", "--json"))
+        self.assertEqual(set(rows), {"wcet of fast.sense", "wcet of fast.act", "period of fast"})
+        self.expect(redag("sensitivity", self.cart, "--task", "slow.plam"), 2, "did you mean 'slow.plan'?")
+
+    def test_bad_input(self):
+        self.expect(redag("sensitivity"), 2, "FILE is required")
+        self.expect(redag("sensitivity", self.write("bad.yaml", MISTAKEN)), 2, "bad.yaml:6")
+        self.expect(redag("sensitivity", self.cart, "--probes", "1000000"), 2, "--probes")
+
+    def test_interrupt_keeps_what_was_found(self):
+        many = redag("generate", "--seed", 3, "--dags", 60, "--shape", "independent", "--utilization", "2.4",
+                     "--workers", 4, "--preemption", "os").stdout
+        process = subprocess.Popen([PROGRAM, "sensitivity", "-", "--simulate", "--probes", "20000", "--json"],
+                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process.stdin.write(many)
+        process.stdin.close()
+        interrupt(process, 2)
+        out, err = process.stdout.read(), process.stderr.read()
+        self.assertEqual(process.wait(timeout=60), 0, err)
+        process.stdout.close()
+        process.stderr.close()
+        self.assertIn("interrupted", err)
+        self.assertTrue(json.loads(out)["stopped"])
+
+
+class Assign(Case):
+    def test_by_deadline(self):
+        file = self.write("short.yaml", SHORT_DEADLINE)
+        tuned = self.folder / "tuned.yaml"
+        result = self.expect(redag("assign", file, "-o", tuned), 0, "wrote")
+        self.assertIn("change policy: rate_monotonic -> deadline_monotonic", result.stdout)
+        self.assertIn("gain: the workload is shown schedulable", result.stdout)
+        self.assertIn("worst lateness (bound - deadline): 1ms -> -2ms", result.stdout)
+        self.expect(redag("analyze", file, "--check"), 1)
+        self.expect(redag("analyze", tuned, "--check"), 0)
+        self.expect(redag("validate", "--strict", tuned), 0)
+        self.assertIn("bcet: 1ms", tuned.read_text())
+        self.assertIn("group: bus", tuned.read_text())
+        again = self.expect(redag("assign", tuned, "--check"), 0)
+        self.assertIn("nothing to change", again.stdout)
+
+    def test_audsley(self):
+        # J. Lehoczky, RTSS 1990: deadlines beyond periods, where neither rates nor deadlines decide.
+        file = self.write("lehoczky.yaml", """\
+name: lehoczky
+platform: {workers: 1, preemption: os}
+dags:
+  - name: a
+    tasks: [{name: t, wcet: 52ms, period: 100ms, deadline: 110ms, overrun: {queue: 2}}]
+  - name: b
+    tasks: [{name: t, wcet: 52ms, period: 140ms, deadline: 154ms, overrun: {queue: 2}}]
+""")
+        tuned = self.folder / "tuned.yaml"
+        text = self.expect(redag("assign", file, "-o", tuned), 0).stdout
+        self.assertIn("change policy: rate_monotonic -> fixed", text)
+        self.assertIn("change priority of b.t: none -> 2", text)
+        self.assertIn("Audsley's assignment, by rta_preemptive: finds an order that passes", text)
+        self.expect(redag("analyze", tuned, "--check"), 0)
+        run = json.loads(self.expect(redag("simulate", tuned, "--json", "--check"), 0).stdout)
+        self.assertTrue(run["check"]["ok"])
+
+    def test_max_active(self):
+        wide = "".join(f", {{name: f{i}, wcet: 40ms, activation: data, after: s}}" for i in range(4))
+        file = self.write("wide.yaml", f"""\
+name: wide
+platform: {{workers: 3, preemption: none}}
+dags:
+  - name: quick
+    tasks: [{{name: t, wcet: 2ms, period: 20ms}}]
+  - name: wide
+    tasks: [{{name: s, wcet: 40ms, period: 400ms}}{wide}]
+""")
+        document = self.document(redag("assign", file, "--json"), "redag.assignment/1")
+        self.assertEqual(document["changes"], ["max_active of wide: none -> 2"])
+        self.assertTrue(document["exhaustive"])
+        self.assertEqual([trial["max_active"]["wide"] for trial in document["trials"]], [0, 1, 2, 3])
+        self.assertEqual([trial["schedulable"] for trial in document["trials"]], [False, True, True, False])
+        kept = self.document(redag("assign", file, "--keep", "max_active", "--json"), "redag.assignment/1")
+        self.assertFalse(kept["schedulable"])
+        self.expect(redag("assign", file, "--keep", "max_active", "--check"), 1)
+        local = redag("assign", file, "--exhaustive", "0", "--seed", "7", "--json")
+        self.assertEqual(json.loads(local.stdout)["best"], document["best"])
+        self.assertEqual(local.stdout, redag("assign", file, "--exhaustive", "0", "--seed", "7", "--json").stdout)
+
+    def test_bad_input(self):
+        self.expect(redag("assign"), 2, "FILE is required")
+        self.expect(redag("assign", self.write("bad.yaml", MISTAKEN)), 2, "bad.yaml:6")
+        self.expect(redag("assign", self.cart, "--objective", "latenes"), 2, "did you mean 'lateness'?")
+        self.expect(redag("assign", self.cart, "-o", self.folder / "no" / "where.yaml"), 2)
+
+    def test_workloads_of_the_repository(self):
+        for file in sorted((SOURCE / "workloads").rglob("*.yaml")):
+            tuned = self.folder / "tuned.yaml"
+            self.expect(redag("assign", file, "--preemption", "none", "--exhaustive", "50", "-o", tuned), 0)
+            self.expect(redag("validate", tuned), 0)
+        text = self.expect(redag("assign", SOURCE / "workloads" / "robot.yaml"), 0).stdout
+        self.assertIn("nothing to compare: no method bounds any response time", text)
+
+
+if __name__ == "__main__":
+    main()

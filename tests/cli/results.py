@@ -1,0 +1,232 @@
+#!/usr/bin/env python3
+"""What is made of results: `redag diff`, `check-trace`, `report`, `tune`.
+
+Usage: results.py PROGRAM SOURCE_DIR. Uses the standard library only.
+"""
+import json
+import subprocess
+
+from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, interrupt, main, redag
+
+
+class Diff(Case):
+    def results(self, name, *arguments, file=None):
+        folder = self.folder / name
+        self.expect(redag("simulate", file or self.cart, "--duration", "20s", "--out", folder, *arguments), 0)
+        return folder
+
+    def test_better_and_worse(self):
+        none = self.results("none")
+        full = self.results("full", "--preemption", "os")
+        result = self.expect(redag("diff", none, full), 0)
+        self.assertIn("differs preemption: none -> os", result.stdout)
+        self.assertIn("better fast.sense: missed 10.0 % -> 0.0 %", result.stdout)
+        self.assertIn("worse slow.plan: p50 27ms -> 33ms", result.stdout)
+        self.assertNotIn("lasts longer than the blocks", result.stdout)
+        self.expect(redag("diff", none, full, "--check"), 1)
+        self.expect(redag("diff", none, none, "--check"), 0)
+        self.assertIn("no figure differs", redag("diff", none, none).stdout)
+        document = self.document(redag("diff", none, full, "--json"), "redag.difference/1")
+        self.assertEqual(document["changes"], [{"kind": "setting", "what": "preemption", "a": "none", "b": "os"}])
+        self.assertEqual([row["task"] for row in document["rows"]], [None, None, "sense", "act", None, "plan"])
+        self.assertTrue(document["worse"] and document["better"])
+        self.assertEqual(redag("diff", none, full, "--json").stdout, redag("diff", none, full, "--json").stdout)
+
+    def test_repetitions(self):
+        file = self.write("random.yaml", CART.replace("wcet: 1ms, period", "wcet: 1ms, bcet: 1us, period"))
+        folder = self.folder / "cmp"
+        self.expect(redag("compare", file, "--simulate", "--duration", "20s", "--repeat", "3", "--executors",
+                          "redag,mte", "--out", folder), 0)
+        result = redag("diff", folder / "mte", folder / "redag", "--json")
+        self.assertEqual(self.document(result, "redag.difference/1")["a"]["seeds"], [1, 2, 3])
+        self.expect(redag("diff", folder, folder / "mte"), 2, "holds runs of several kinds: redag, mte", "name one of them")
+        # Repetitions by any other name, as run_workload of redag_rclcpp has them.
+        for n in 1, 2, 3:
+            (folder / "redag" / f"repetition-{n}").rename(folder / "redag" / str(n))
+        again = self.document(redag("diff", folder / "mte", folder / "redag", "--json"), "redag.difference/1")
+        self.assertEqual(again["b"]["seeds"], [1, 2, 3])
+        self.assertEqual(again["rows"], json.loads(result.stdout)["rows"])
+
+    def test_other_workload(self):
+        one = self.results("one")
+        other = self.results("other", file=self.write("other.yaml", CART.replace("25ms", "20ms")))
+        self.expect(redag("diff", one, other), 2, "different workloads: wcet of slow.plan: 25ms -> 20ms", "--different")
+        result = self.expect(redag("diff", one, other, "--different"), 0)
+        self.assertIn("beware the two ran different workloads", result.stdout)
+
+    def test_bad_input(self):
+        one = self.results("one")
+        self.expect(redag("diff", one), 2, "B is required")
+        self.expect(redag("diff", one, self.folder / "nowhere"), 2, "nowhere")
+        (self.folder / "empty").mkdir()
+        self.expect(redag("diff", one, self.folder / "empty"), 2, "no events.jsonl")
+        self.expect(redag("diff", one, one, "--tolerance", "2"), 2, "not a share from 0 to 1")
+        self.expect(redag("diff", one, one, "--replicates", "1"), 2, "--replicates")
+
+
+class CheckTrace(Case):
+    def trace(self):
+        out = self.folder / "out"
+        self.expect(redag("simulate", self.cart, "--duration", "1s", "--out", out), 0)
+        return out / "events.jsonl"
+
+    def test_damaged_traces(self):
+        trace = self.trace()
+        self.assertIn("trace check: ok", self.expect(redag("check-trace", trace), 0).stdout)
+        lines = trace.read_text().splitlines(keepends=True)
+        cut = self.write("cut.jsonl", "".join(lines[: len(lines) // 2]))
+        self.expect(redag("check-trace", cut), 2, "cut.jsonl")
+        self.expect(redag("check-trace", "--json", cut, trace), 2)
+        self.expect(redag("check-trace", self.write("no.jsonl", "no trace\n")), 2, "no.jsonl:1")
+        self.expect(redag("check-trace", "/dev/null"), 2)
+
+    def test_a_lie_is_found(self):
+        trace = self.trace()
+        text = trace.read_text()
+        # The same events under another policy: somebody was chosen against the rules.
+        lie = text.replace('"policy":"rate_monotonic"', '"policy":"fifo"', 1)
+        self.assertNotEqual(lie, text)
+        result = self.expect(redag("check-trace", self.write("lie.jsonl", lie)), 1)
+        self.assertIn("violations", result.stdout)
+        document = self.document(redag("check-trace", "--json", self.folder / "lie.jsonl"), "redag.check-trace/1", 1)
+        self.assertGreater(document["traces"][0]["check"]["violation_count"], 0)
+
+        # Nodes see no decisions: of them nobody can say that.
+        nodes = lie.replace('"driver":"simulator"', '"driver":"ros_nodes"', 1)
+        self.assertNotEqual(nodes, lie)
+        self.expect(redag("check-trace", self.write("nodes.jsonl", nodes)), 0)
+
+    def test_folder_without_traces(self):
+        self.expect(redag("check-trace", self.folder), 2, "no events.jsonl")
+
+
+class Report(Case):
+    def results(self, name, *arguments):
+        out = self.folder / name
+        self.expect(redag("simulate", self.cart, "--duration", "1s", "--out", out, *arguments), 0)
+        return out
+
+    def test_one_run(self):
+        out = self.results("out")
+        result = self.expect(redag("report", out), 0)
+        self.assertRegex(result.stdout, r"missed their deadline .*\n.*report\.html: [\d.]+ MB")
+        page = (out / "report.html").read_text()
+        self.assertTrue(page.startswith("<!doctype html>") and page.rstrip().endswith("</html>"))
+        self.expect(redag("report", out, "-o", self.folder / "again.html"), 0)
+        self.assertEqual((self.folder / "again.html").read_text(), page, "equal results make equal bytes")
+        # A page among the results does not keep the next run from writing there.
+        self.results("out")
+
+    def test_data(self):
+        document = self.document(redag("report", self.results("out"), "--json"), "redag.report/1")
+        group = document["groups"][0]
+        self.assertEqual(group["label"], "redag")
+        summary = json.loads((self.folder / "out" / "summary.json").read_text())
+        for key in ["released", "finished", "late", "skipped", "in_flight", "max_lateness_ns"]:
+            self.assertEqual(group["total"][key], summary["total"][key], key)
+        self.assertEqual(group["total"]["response"], group["total"]["response"] | summary["total"]["response"])
+        self.assertFalse((self.folder / "out" / "report.html").exists(), "--json alone writes no page")
+
+    def test_comparison(self):
+        out = self.folder / "cmp"
+        self.expect(redag("compare", self.cart, "--simulate", "--executors", "ste,redag", "--repeat", "2", "--duration", "1s",
+                          "--out", out), 0)
+        document = self.document(redag("report", out, "--json"), "redag.report/1")
+        self.assertEqual([group["label"] for group in document["groups"]], ["ste", "redag"], "as they were listed")
+        self.assertEqual([len(group["runs"]) for group in document["groups"]], [2, 2])
+        self.assertEqual([row["name"] for row in document["comparison"]["dags"]], ["fast", "slow"])
+
+    def test_folders_are_told_apart_by_name(self):
+        first, second = self.results("before/redag"), self.results("after/redag", "--executor", "mte")
+        document = self.document(redag("report", first, second, first, "--json"), "redag.report/1")
+        self.assertEqual([group["label"] for group in document["groups"]], ["before/redag", "after/redag"])
+
+    def test_mistakes(self):
+        self.expect(redag("report"), 2, "DIR")
+        self.expect(redag("report", self.folder), 2, "no events.jsonl", "--out")
+        self.expect(redag("report", self.folder / "nowhere"), 2, "nowhere")
+        out = self.results("out")
+        self.expect(redag("report", out, "-o", "/nowhere/report.html"), 2, "/nowhere/report.html")
+        (out / "comparison.json").write_text("{}")
+        self.expect(redag("report", out), 2, "comparison.json:1", "not a comparison")
+        (out / "comparison.json").unlink()
+        events = (out / "events.jsonl").read_text().splitlines(keepends=True)
+        (out / "events.jsonl").write_text("".join(events[:-1]))
+        self.expect(redag("report", out), 2, f"events.jsonl:{len(events) - 1}", "ends too early")
+
+    def test_repetitions_of_different_things(self):
+        self.results("out/repetition-1")
+        self.results("out/repetition-2", "--executor", "mte")
+        self.expect(redag("report", self.folder / "out"), 2, "repetition-2/events.jsonl: is no repetition")
+
+
+class Tune(Case):
+    WIDE = """\
+name: wide
+platform: {workers: 2, preemption: none}
+dags:
+  - name: wide
+    tasks: [{name: s, wcet: 5ms, bcet: 1ms, period: 100ms}%s]
+  - name: quick
+    tasks: [{name: t, wcet: 1ms, bcet: 500us, period: 10ms}]
+""" % "".join(f", {{name: f{i}, wcet: 30ms, bcet: 20ms, activation: data, after: s}}" for i in range(2))
+
+    def test_max_active(self):
+        file = self.write("wide.yaml", self.WIDE)
+        tuned = self.folder / "tuned.yaml"
+        result = self.expect(redag("tune", file, "--simulator-only", "-o", tuned), 0, "wrote")
+        self.assertIn("change max_active of wide: none -> 1", result.stdout)
+        self.assertRegex(result.stdout, r"misses, on seeds that the search has not seen: [\d ]+ \([\d.]+ %\) -> none")
+        self.assertIn("seed by seed: 10 better, 0 equal, 0 worse", result.stdout)
+        self.expect(redag("validate", "--strict", tuned), 0)
+        self.assertIn("bcet: 20ms", tuned.read_text())
+        again = self.expect(redag("tune", tuned, "--simulator-only", "--check"), 0)
+        self.assertIn("nothing to change", again.stdout)
+        self.expect(redag("tune", file, "--simulator-only", "--vary", "workers", "--check"), 1)
+        before = self.folder / "before"
+        after = self.folder / "after"
+        for name, folder in (file, before), (tuned, after):
+            self.expect(redag("simulate", name, "--duration", "20s", "--seed", "77", "--out", folder), 0)
+        differs = self.expect(redag("diff", before, after), 0).stdout
+        self.assertIn("differs max_active of wide: none -> 1", differs)
+        self.assertIn("better quick: missed", differs)
+
+    def test_json_is_the_same_for_every_number_of_processors(self):
+        file = self.write("wide.yaml", self.WIDE)
+        one = redag("tune", file, "--jobs", "1", "--duration", "2s", "--json")
+        document = self.document(one, "redag.tuning/1")
+        self.assertEqual(one.stdout, redag("tune", file, "--jobs", "3", "--duration", "2s", "--json").stdout)
+        self.assertEqual(document["best"]["max_active"], {"wide": 1, "quick": 0})
+        self.assertEqual(len(document["best"]["held_out_runs"]), 10)
+
+    def test_pairs(self):
+        paper = SOURCE / "workloads" / "paper" / "harmonic_u08.yaml"
+        result = redag("tune", paper, "--vary", "max_active", "--caps", "2-5", "--simulator-only", "--duration", "2s",
+                       "--seeds", "1", "--held-out", "1", "--json")
+        trials = self.document(result, "redag.tuning/1")["trials"]
+        pairs = sorted((trial["max_active"]["dag1"], trial["max_active"]["dag2"]) for trial in trials)
+        self.assertEqual(pairs, [(a, b) for a in range(2, 6) for b in range(2, 6)])
+
+    def test_interrupted(self):
+        file = self.write("wide.yaml", self.WIDE)
+        process = subprocess.Popen([PROGRAM, "tune", file, "--duration", "100000s", "--held-out", "0", "--seeds", "1",
+                                    "--jobs", "1", "--simulator-only"],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        interrupt(process, 0.5)
+        out, err = process.communicate(timeout=250)
+        self.assertIn("interrupted", err)
+        self.assertIn(process.returncode, (0, 2))  # 2: not even the workload as it is was judged
+        self.assertEqual(process.returncode == 0, "stopped after" in out)
+
+    def test_bad_input(self):
+        self.expect(redag("tune"), 2, "FILE is required")
+        self.expect(redag("tune", self.write("bad.yaml", MISTAKEN)), 2, "bad.yaml:6")
+        self.expect(redag("tune", self.cart, "--objective", "misess"), 2, "did you mean 'misses'?")
+        self.expect(redag("tune", self.cart, "--vary", "worker"), 2, "did you mean 'workers'?")
+        self.expect(redag("tune", self.cart, "--caps", "5-2"), 2, "write it as 2-5")
+        self.expect(redag("tune", self.cart, "--seeds", "0"), 2, "--seeds")
+        self.expect(redag("tune", self.cart, "-o", self.folder / "no" / "where.yaml"), 2)
+
+
+if __name__ == "__main__":
+    main()

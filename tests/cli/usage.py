@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+"""The program as its users first meet it: help, mistakes, workloads checked and generated.
+
+Usage: usage.py PROGRAM SOURCE_DIR. Uses the standard library only.
+"""
+import json
+import os
+import re
+import subprocess
+
+from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, main, redag
+
+COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["compare"], ["diff"], ["analyze"], ["sensitivity"], ["assign"], ["tune"],
+            ["check-trace"], ["top"], ["report"], ["experiment"], ["experiment", "acceptance"],
+            ["experiment", "factorial"], ["experiment", "merge"]]
+
+
+class Usage(Case):
+    def test_version(self):
+        self.assertRegex(self.expect(redag("--version"), 0).stdout, r"^redag \d+\.\d+\.\d+\n$")
+
+    def test_no_arguments(self):
+        self.expect(redag(), 2, "Subcommands:", "check-trace")
+
+    def test_help_of_every_command(self):
+        listed = redag("--help").stdout
+        for command in COMMANDS:
+            self.assertIn(command[0], listed)
+            text = self.expect(redag(*command, "--help"), 0).stdout
+            self.assertIn(f"Usage: redag {' '.join(command)}", text)
+            self.assertIn("Examples:", text)
+
+    def test_examples_parse(self):
+        """Every option in the examples of --help exists."""
+        for command in COMMANDS:
+            text = redag(*command, "--help").stdout
+            options, examples = text.split("Examples:")
+            for option in re.findall(r"--[a-z-]+", examples):
+                self.assertIn(option, options, command)
+
+    def test_mistakes_are_near_something(self):
+        self.expect(redag("simualte", self.cart), 2, "did you mean 'simulate'?")
+        self.expect(redag("simulate", self.cart, "--durtion", "1s"), 2, "did you mean '--duration'?")
+        self.expect(redag("simulate", self.cart, "--policy", "rate_monotonc"), 2, "did you mean 'rate_monotonic'?")
+        self.expect(redag("simulate", self.cart, "--executor", "mtee"), 2, "did you mean 'mte'?")
+        self.expect(redag("compare", self.cart, "--executors", "redag,stee"), 2, "did you mean 'ste'?")
+
+    def test_bad_values(self):
+        for arguments, words in [(["--duration", "5"], "no unit"), (["--duration", "0s"], "not longer than 0"),
+                                 (["--duration", "-1s"], "not longer than 0"), (["--seed", "-1"], "whole number"),
+                                 (["--seed", "99999999999999999999"], "whole number"),
+                                 (["--workers", "100000"], "workers"), (["--warm-up", "20s"], "leaves nothing"), (["--warmup", "20s"], "leaves nothing")]:
+            self.expect(redag("simulate", self.cart, "--duration=10s" if "--duration" not in arguments else "--seed=1",
+                              *arguments), 2, words)
+        self.expect(redag("run", self.cart, "--affinity", "1-"), 2, "list of processors")
+        self.expect(redag("simulate", self.cart, "--preemption", "os", "--policy", "edf"), 2, "static policy")
+        self.expect(redag("simulate", self.cart, "--executor", "mte-fifo"), 2, "no threads")
+
+
+class Validate(Case):
+    def test_fine(self):
+        self.assertIn("2 DAGs, 3 tasks", self.expect(redag("validate", self.cart), 0).stdout)
+
+    def test_every_mistake_with_its_place(self):
+        bad = self.write("bad.yaml", MISTAKEN)
+        result = self.expect(redag("validate", bad, self.cart), 2, "did you mean 'wcet'?")
+        self.assertRegex(result.stderr, rf"{re.escape(str(bad))}:6:\d+: error: .*wect")
+        self.assertRegex(result.stderr, rf"{re.escape(str(bad))}:7:\d+: error: ")
+        self.assertIn("cart.yaml: ok", result.stdout, "the other files are still looked at")
+
+    def test_json(self):
+        bad = self.write("bad.yaml", MISTAKEN)
+        document = self.document(redag("validate", "--json", bad, self.cart), "redag.validate/1", 2)
+        self.assertEqual([file["ok"] for file in document["files"]], [False, True])
+        self.assertEqual(document["files"][0]["diagnostics"][0]["line"], 6)
+        self.assertEqual(document["files"][1]["workload"]["hyperperiod_ns"], 100_000_000)
+
+    def test_standard_input(self):
+        self.expect(redag("validate", "-", text=CART), 0)
+        self.expect(redag("validate", "-", text=MISTAKEN), 2, "<stdin>:6:")
+
+    def test_what_is_no_workload(self):
+        self.expect(redag("validate", self.folder), 2, str(self.folder))
+        self.expect(redag("validate", "/no/such.yaml"), 2, "/no/such.yaml")
+        self.expect(redag("validate", self.write("empty.yaml", "")), 2, "empty.yaml")
+        binary = self.folder / "binary.yaml"
+        binary.write_bytes(bytes(range(256)))
+        self.expect(redag("validate", "--json", binary), 2)
+
+    def test_name_that_is_not_utf8(self):
+        name = os.fsencode(self.folder) + b"/\xff.yaml"
+        result = subprocess.run([PROGRAM, "validate", "--json", name], capture_output=True, check=False)
+        self.assertEqual(result.returncode, 2)
+        json.loads(result.stdout)
+
+    def test_strict(self):
+        # 3 tasks of 60 % on one worker: legal, and a warning.
+        text = CART.replace("wcet: 25ms", "wcet: 99ms")
+        crowded = self.write("crowded.yaml", text)
+        warned = redag("validate", crowded)
+        if "warning:" not in warned.stderr:
+            self.skipTest("nothing to warn of")
+        self.expect(warned, 0)
+        self.expect(redag("validate", "--strict", crowded), 2, "--strict")
+
+    def test_workloads_of_the_repository(self):
+        files = sorted((SOURCE / "workloads").rglob("*.yaml"))
+        self.assertTrue(files)
+        self.expect(redag("validate", *files), 0)
+
+
+class Generate(Case):
+    def test_same_seed_same_bytes(self):
+        arguments = ["generate", "--dags", "3", "--seed", "5", "--shape", "fork_join"]
+        self.assertEqual(redag(*arguments).stdout, redag(*arguments).stdout)
+        self.assertNotEqual(redag(*arguments).stdout, redag(*arguments[:4], "6", *arguments[5:]).stdout)
+
+    def test_is_valid_and_says_how_it_was_made(self):
+        text = self.expect(redag("generate", "--periods", "robot", "--offsets", "--seed", "9"), 0).stdout
+        self.assertTrue(text.startswith("# redag generate --periods robot --offsets --seed 9\n"), text[:80])
+        self.expect(redag("validate", "-", text=text), 0)
+
+    def test_many(self):
+        sets = self.folder / "sets"
+        self.expect(redag("generate", "--count", "5", "--seed", "10", "--out", sets), 0)
+        files = sorted(sets.iterdir())
+        self.assertEqual([file.name for file in files], [f"workload-{n}.yaml" for n in range(10, 15)])
+        self.expect(redag("validate", *files), 0)
+        self.assertEqual(files[2].read_text(), redag("generate", "--seed", "12").stdout)
+        self.expect(redag("generate", "--count", "2"), 2, "--out")
+
+    def test_impossible(self):
+        self.expect(redag("generate", "--min-tasks", "9", "--max-tasks", "3"), 2, "error:")
+        self.expect(redag("generate", "-o", "/no/such/folder/x.yaml"), 2, "/no/such/folder/x.yaml")
+        self.expect(redag("generate", "-o", "/dev/full"), 2, "No space left")
+
+
+if __name__ == "__main__":
+    main()
