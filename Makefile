@@ -25,15 +25,12 @@ test: ## build everything and run all tests
 	cmake --build --preset dev
 	ctest --preset dev
 
-bench: ## build and run the benchmarks; JSON goes to results/bench/
+BENCH_ROUNDS ?= 7
+bench: ## build the benchmarks, run them BENCH_ROUNDS (7) times, print ratios; JSON goes to results/bench/
 	@tools/bootstrap bench
 	cmake --preset bench
 	cmake --build --preset bench
-	@mkdir -p results/bench
-	@for program in build/bench/benchmarks/bench_*; do \
-	  test -x "$$program" || continue; \
-	  "$$program" --benchmark_out=results/bench/$$(basename "$$program").json --benchmark_out_format=json || exit 1; \
-	done
+	tools/bench --rounds $(BENCH_ROUNDS)
 
 lint: ## layers, formatting, locks, and clang-tidy on the files that differ from the last commit or the main branch
 	@tools/bootstrap lint
@@ -84,11 +81,12 @@ CHAOS_RUNS ?= 2000
 chaos: ## faults by the thousand: CHAOS_RUNS (2000) runs of executor and simulator, a hundredth of it of each fault from outside
 	@tools/bootstrap test
 	cmake --preset dev
-	cmake --build --preset dev --target redag_chaos redag_cli redag_allocation_failures
+	cmake --build --preset dev --target redag_chaos redag_cli redag_allocation_failures redag_jumping_clock
 	build/dev/tests/chaos/redag_chaos simulator $(CHAOS_RUNS)
 	build/dev/tests/chaos/redag_chaos executor $(CHAOS_RUNS)
 	build/dev/tests/chaos/redag_allocation_failures workloads
-	tests/chaos/process.py build/dev/bin/redag . --runs $$(($(CHAOS_RUNS) / 100))
+	tests/chaos/process.py build/dev/bin/redag . --runs $$(($(CHAOS_RUNS) / 100)) \
+	  --clock build/dev/tests/chaos/libredag_jumping_clock.so
 
 ros: ## build redag_rclcpp with colcon and run its tests, for each ROS 2 under /opt/ros
 	@tools/bootstrap test
