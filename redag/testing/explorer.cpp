@@ -94,6 +94,8 @@ struct Fiber {
 struct Event {
   std::uint32_t thread = 0;
   Operation operation;
+  Clock clock;  // this event and all that came before it
+  [[nodiscard]] bool after(std::uint32_t thread_, std::uint32_t index) const { return clock.at[thread_] > index; }
 };
 
 // A state that a run passed, and what has been and what is to be tried there.
@@ -156,8 +158,9 @@ class Explorer {
     return (threads & bit(current_)) != 0 ? current_ : static_cast<std::uint32_t>(__builtin_ctz(threads));
   }
   void record(std::uint32_t thread);
-  void find_race(std::uint32_t thread);
-  void add_backtrack(std::uint32_t event, std::uint32_t thread);
+  void synchronise(Fiber &fiber);
+  void find_races(const Clock &before);
+  void add_backtrack(std::uint32_t event);
   bool next_run();
   [[nodiscard]] std::string describe() const;
 
@@ -253,7 +256,6 @@ void Explorer::stop_at(State state, const Operation &operation, std::uint32_t ta
   fiber.state = state;
   fiber.pending = operation;
   fiber.target = target;
-  if (!redundant_ && !calm_) find_race(current_);
   if (!local_callers_.empty()) {
     const std::uint32_t back = local_callers_.back();
     local_callers_.pop_back();
@@ -271,7 +273,6 @@ void Explorer::perform(const Operation &operation, State state, std::uint32_t ta
 void Explorer::lock(ObjectId mutex) {
   perform(Operation{"lock", {mutex, kNoObject}, {true, false}}, State::Locking, mutex);
   objects_[mutex].locked = true;
-  fibers_[current_].clock.join(objects_[mutex].unlocked);
 }
 
 void Explorer::unlock(ObjectId mutex) {
@@ -280,15 +281,9 @@ void Explorer::unlock(ObjectId mutex) {
   objects_[mutex].unlocked = fibers_[current_].clock;
 }
 
-void Explorer::join(std::uint32_t thread) {
-  perform(Operation{"join", {}, {}}, State::Joining, thread);
-  fibers_[current_].clock.join(fibers_[thread].clock);
-}
+void Explorer::join(std::uint32_t thread) { perform(Operation{"join", {}, {}}, State::Joining, thread); }
 
-void Explorer::settle() {
-  perform(Operation{"settle", {}, {}}, State::Settling);
-  for (std::uint32_t t = 0; t < count_; ++t) fibers_[current_].clock.join(fibers_[t].clock);
-}
+void Explorer::settle() { perform(Operation{"settle", {}, {}}, State::Settling); }
 
 bool Explorer::wait(ObjectId word, const std::function<bool()> &blocked, std::int64_t deadline) {
   perform(Operation{"futex wait", {word, kNoObject}, {true, false}});
@@ -438,64 +433,95 @@ bool Explorer::choose(std::uint32_t &thread, Mask can) {
   return true;
 }
 
+// What made it possible that `fiber` goes on came before.
+void Explorer::synchronise(Fiber &fiber) {
+  switch (fiber.state) {
+    case State::Locking: fiber.clock.join(objects_[fiber.target].unlocked); break;
+    case State::Joining: fiber.clock.join(fibers_[fiber.target].clock); break;
+    case State::Settling:
+      for (std::uint32_t t = 0; t < count_; ++t) fiber.clock.join(fibers_[t].clock);
+      break;
+    default: break;
+  }
+}
+
 // Thread `thread` executes its operation now.
 void Explorer::record(std::uint32_t thread) {
   Fiber &fiber = fibers_[thread];
   const Operation operation = fiber.pending;
+  const Clock before = fiber.clock;
   ++result_.transitions;
+  synchronise(fiber);
   if (calm_) return;
   const auto index = static_cast<std::uint32_t>(events_.size());
-  events_.push_back(Event{thread, operation});
   for (std::size_t i = 0; i < 2; ++i) {
     if (operation.objects[i] == kNoObject) continue;
-    Object &object = objects_[operation.objects[i]];
+    const Object &object = objects_[operation.objects[i]];
     fiber.clock.join(object.written);
     if (operation.writes[i]) fiber.clock.join(object.read);
   }
   fiber.clock.at[thread] = index + 1;
+  events_.push_back(Event{thread, operation, fiber.clock});
+  if (options_.reduce && !redundant_) find_races(before);
   for (std::size_t i = 0; i < 2; ++i) {
     if (operation.objects[i] == kNoObject) continue;
     Object &object = objects_[operation.objects[i]];
     object.events.push_back(index);
     (operation.writes[i] ? object.written : object.read).join(fiber.clock);
   }
-  if (redundant_) return;
-  for (std::uint32_t t = 0; t < count_; ++t) {
-    if (t == thread || fibers_[t].state == State::Ended || fibers_[t].state == State::Local) continue;
-    if (dependent(operation, fibers_[t].pending)) add_backtrack(index, t);
+}
+
+// The events that the last one could have come before: those it depends on, with nothing in between that forces the
+// order. `before`: what its thread knew of.
+void Explorer::find_races(const Clock &before) {
+  const Event &last = events_.back();
+  Clock known = before;
+  std::array<std::size_t, 2> left{};  // of the events of each of its objects, the older ones not looked at yet
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (last.operation.objects[i] != kNoObject) left[i] = objects_[last.operation.objects[i]].events.size();
+  }
+  const auto newest = [&](std::size_t i) { return objects_[last.operation.objects[i]].events[left[i] - 1]; };
+  while (left[0] > 0 || left[1] > 0) {  // from the newest on
+    const std::size_t i = left[1] == 0 || (left[0] > 0 && newest(0) > newest(1)) ? 0 : 1;
+    const std::uint32_t index = newest(i);
+    --left[i];
+    const Event &event = events_[index];
+    if (event.thread == last.thread || known.at[event.thread] > index) continue;
+    if (!dependent(event.operation, last.operation)) continue;
+    add_backtrack(index);
+    known.join(event.clock);
   }
 }
 
-// The last event that could have come after the operation which `thread` has just reached, and did not.
-void Explorer::find_race(std::uint32_t thread) {
-  const Fiber &fiber = fibers_[thread];
-  std::uint32_t last = 0;  // counted from 1
-  for (const ObjectId id : fiber.pending.objects) {
-    if (id == kNoObject) continue;
-    const std::vector<std::uint32_t> &events = objects_[id].events;
-    for (auto event = events.rbegin(); event != events.rend() && *event + 1 > last; ++event) {
-      const Event &e = events_[*event];
-      if (e.thread == thread || fiber.clock.at[e.thread] > *event) continue;
-      if (dependent(e.operation, fiber.pending)) last = *event + 1;
-    }
-  }
-  if (last > 0) add_backtrack(last - 1, thread);
-}
-
-// `thread` should also be tried before `event`: itself, or if it cannot go on there, whoever brings it on its way.
-void Explorer::add_backtrack(std::uint32_t event, std::uint32_t thread) {
-  if (!options_.reduce) return;
+// The last event should also be tried before `event`, with whatever came in between and does not need `event`: whoever
+// can begin with that is to be tried there. Not always the thread of the last event itself: something in between that
+// it depends on may be what has not been tried in this order (`source sets': Abdulla, Aronis, Jonsson, Sagonas, POPL
+// 2014).
+void Explorer::add_backtrack(std::uint32_t event) {
   Node &node = nodes_[event];
-  Mask candidates = node.enabled & bit(thread);
-  if (candidates == 0) {
+  const std::uint32_t reversed = events_[event].thread;
+  const auto last = static_cast<std::uint32_t>(events_.size() - 1);
+  std::array<std::uint32_t, kMaxThreads> first{};  // of each thread in between: its first event there
+  Mask seen = 0;
+  Mask initials = 0;
+  for (std::uint32_t index = event + 1; index <= last; ++index) {
+    const Event &later = events_[index];
+    if (index != last && later.after(reversed, event)) continue;
+    if ((seen & bit(later.thread)) != 0) continue;
+    bool initial = true;
     for (std::uint32_t t = 0; t < count_; ++t) {
-      if ((node.enabled & bit(t)) != 0 && fibers_[thread].clock.at[t] > event + 1) candidates |= bit(t);
+      if ((seen & bit(t)) != 0 && later.after(t, first[t])) initial = false;
     }
+    first[later.thread] = index;
+    seen |= bit(later.thread);
+    if (initial) initials |= bit(later.thread);
   }
-  if (candidates == 0) {
+  initials &= node.enabled;
+  if (initials == 0) {
     node.backtrack |= node.enabled;
-  } else if ((candidates & node.backtrack) == 0) {
-    node.backtrack |= candidates & (~candidates + 1);
+  } else if ((initials & (node.backtrack | node.sleep)) == 0) {
+    const Mask preferred = initials & bit(events_[last].thread);
+    node.backtrack |= preferred != 0 ? preferred : initials & (~initials + 1);
   }
 }
 
