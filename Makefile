@@ -1,7 +1,7 @@
 # The front door: each target does one everyday thing from a fresh clone on. What it runs is plain CMake and the scripts
 # of tools/; nothing is built here that `cmake --preset` could not build.
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench lint format asan tsan coverage mutate fuzz chaos ros install clean
+.PHONY: help demo test seeds bench lint format asan tsan coverage mutate fuzz chaos ros install clean
 PREFIX ?= /usr/local
 
 # ThreadSanitizer of older compilers cannot start where a kernel randomises much of the address space
@@ -24,6 +24,13 @@ test: ## build everything and run all tests
 	cmake --preset dev
 	cmake --build --preset dev
 	ctest --preset dev
+
+SEEDS ?= 10
+seeds: test ## run the tests of random cases SEEDS (10) times, each time with a new seed; make test always has the same one
+	@for i in $$(seq $(SEEDS)); do \
+	  seed=$$(od -An -N4 -tu4 /dev/urandom | tr -d ' '); echo "$$i of $(SEEDS): RC_PARAMS=seed=$$seed"; \
+	  RC_PARAMS="seed=$$seed" ctest --preset dev --progress -L '^(base|metrics|model|runtime|sched|testing|model_check)$$' || exit; \
+	done
 
 BENCH_ROUNDS ?= 7
 bench: ## build the benchmarks, run them BENCH_ROUNDS (7) times, print ratios; JSON goes to results/bench/

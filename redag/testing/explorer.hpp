@@ -1,8 +1,9 @@
 // Runs a concurrent program in every interleaving that can make a difference: its threads are fibers of one thread, and
 // at each operation that another thread could notice the explorer chooses who goes on. Stateless depth-first search
 // with dynamic partial-order reduction by source sets (Abdulla, Aronis, Jonsson and Sagonas, POPL 2014) and sleep sets
-// (Godefroid 1996): of the orders that differ in independent operations alone, one is run. Sequentially consistent: weaker memory orders, and
-// accesses to plain memory without a lock, are ThreadSanitizer's part. One explorer runs at a time in a process.
+// (Godefroid 1996): of the orders that differ in independent operations alone, one is run. Sequentially consistent:
+// weaker memory orders, and accesses to plain memory without a lock, are ThreadSanitizer's part. One explorer runs at a
+// time in a process.
 #pragma once
 
 #include <cstdint>
