@@ -20,6 +20,7 @@
 #include "redag/base/rng.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/engine.hpp"
+#include "redag/runtime/looks.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
@@ -92,7 +93,7 @@ class Cost {
   Duration cpu_ = 0;
 };
 
-void redag_engine(benchmark::State &state, Shape shape, PreemptionMode mode) {
+void redag_engine(benchmark::State &state, Shape shape, PreemptionMode mode, Duration spin = 0) {
   const auto workers = static_cast<std::uint32_t>(state.range(0));
   Result<Setup> setup = set_up(mode, PolicyKind::Fixed, workers, 0, {});
   if (!setup) return state.SkipWithError("this mode cannot be had here");
@@ -110,6 +111,7 @@ void redag_engine(benchmark::State &state, Shape shape, PreemptionMode mode) {
   EngineOptions options;
   options.config = setup->config;
   options.band = setup->band;
+  options.looks = looks_in(spin);
   Engine engine(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
   FutexWord done{0};
   std::uint32_t left = 0;
@@ -200,6 +202,8 @@ void taskflow(benchmark::State &state, Shape shape) {
   for (const Shape shape : {Shape::Chain, Shape::FanOut, Shape::Random}) {
     const std::string name = kShapes[static_cast<std::size_t>(shape)];
     add(name + "/redag_none", [=](benchmark::State &state) { redag_engine(state, shape, PreemptionMode::None); });
+    add(name + "/redag_none_spin_50us",
+        [=](benchmark::State &state) { redag_engine(state, shape, PreemptionMode::None, 50 * kMicrosecond); });
     add(name + "/redag_os", [=](benchmark::State &state) { redag_engine(state, shape, PreemptionMode::Os); });
     add(name + "/tbb_flow_graph", [=](benchmark::State &state) { tbb_flow_graph(state, shape); });
 #ifdef REDAG_HAS_TASKFLOW

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "redag/base/check.hpp"
+#include "redag/base/relax.hpp"
 #include "redag/base/thread_annotations.hpp"
 
 namespace redag {
@@ -78,14 +79,6 @@ class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
       if (pauses > kLongest) return false;
       for (int i = 0; i < pauses; ++i) relax();
     }
-  }
-
-  static void relax() noexcept {
-#if defined(__x86_64__) || defined(__i386__)
-    __builtin_ia32_pause();
-#elif defined(__aarch64__)
-    __asm__ __volatile__("yield");
-#endif
   }
 
   pthread_mutex_t mutex_;

@@ -62,6 +62,9 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments) {
   app.add_flag("--mlockall", arguments.lock_memory, "Lock the memory: no page faults during the run")->group(group);
   app.add_flag("--realtime", arguments.realtime_threads, "SCHED_FIFO threads, also for executors that do not preempt")
       ->group(group);
+  add_duration(app, "--spin", arguments.spin, "How long an idle worker looks for a job before it sleeps; not with os",
+               true)
+      ->group(group);
   add_duration(app, "--watchdog", arguments.watchdog, "Say which jobs are in progress for longer, while they are")
       ->group(group);
 }
@@ -98,6 +101,7 @@ std::optional<SessionOptions> session_options(const RunArguments &arguments, tra
   options.overheads = arguments.overheads;
   options.lock_memory = arguments.lock_memory;
   options.realtime_threads = arguments.realtime_threads;
+  options.spin = arguments.spin;
   options.live = arguments.live;
   options.watchdog = arguments.watchdog.value_or(0);
   if (options.duration > trace::kMaxTraceTime) {

@@ -28,6 +28,7 @@ struct RunArguments {
   std::string cpus;
   bool lock_memory = false;
   bool realtime_threads = false;
+  Duration spin = 0;
   std::optional<Duration> watchdog;
   bool live = false;
   bool json = false;

@@ -131,6 +131,7 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   run.preemption = workload.platform.preemption;
   run.realtime_threads = options.realtime_threads || variant.realtime_threads;
   run.lock_memory = options.lock_memory;
+  run.spin = options.spin;
   run.cpus = options.cpus;
   run.stop = options.stop;
   run.live = options.live;

@@ -30,9 +30,10 @@ struct SessionOptions {
   std::size_t max_events = std::size_t{1} << 22U;
   const std::atomic<bool> *stop = nullptr;  // ends the run early, with the results so far
   sim::Overheads overheads;                 // simulator
-  std::vector<int> cpus;                    // threads, as the two below
+  std::vector<int> cpus;                    // threads, as what follows
   bool lock_memory = false;
   bool realtime_threads = false;
+  Duration spin = 0;
   bool live = false;      // `redag top` sees the run
   Duration watchdog = 0;  // jobs in progress for longer are named, at once to `on_overdue`; 0: none
   std::function<void(const std::string &text)> on_overdue;

@@ -25,6 +25,7 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
       decisions_(options_.trace_capacity) {
   const sched::Config &config = options_.config;
   REDAG_CHECK(!os() || config.max_started >= config.workers, "os: a thread for every processor, at least");
+  REDAG_CHECK(!os() || options_.looks == 0, "os: a thread that looks for a job would keep others off its processor");
   const std::uint32_t count = os() ? config.max_started : config.workers;
   idle_.reserve(count);
   handed_.reserve(count);
@@ -92,7 +93,7 @@ void Engine::main(Thread &self) noexcept {
       continue;
     }
     if (exiting) return;
-    self.parker.park();
+    self.parker.park(options_.looks);
   }
 }
 

@@ -70,6 +70,8 @@ struct EngineOptions {
   ExceptionHandler on_exception;   // empty: exceptions are only counted
   bool start_paused = false;       // as after pause()
   bool measure = false;            // figures() has responses, misses and preemptions
+  // none, cooperative: how often a thread without a job looks for one before it sleeps; looks_in().
+  std::uint32_t looks = 0;
 };
 
 /// Processor time of a task's jobs that ended.

@@ -119,8 +119,8 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
     engine_.lock_.unlock();
     for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
     for (std::size_t i = 0; i < skip_count_; ++i) {
-      few_skips[i].listener->skipped(few_skips[i].reason);
-      std::destroy_at(&few_skips[i]);
+      few_skips_[i].listener->skipped(few_skips_[i].reason);
+      std::destroy_at(&few_skips_[i]);
     }
     for (const Skip &skip : more_skips_) skip.listener->skipped(skip.reason);
   }
@@ -130,14 +130,14 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   /// Allocates only where one decision skips more than kFewSkips jobs (HI mode begins).
   void tell(std::shared_ptr<SkipListener> listener, Reason reason) {
     if (skip_count_ < kFewSkips) {
-      std::construct_at(&few_skips[skip_count_++], Skip{std::move(listener), reason});
+      std::construct_at(&few_skips_[skip_count_++], Skip{std::move(listener), reason});
     } else {
       more_skips_.push_back(Skip{std::move(listener), reason});
     }
   }
   /// What was skipped is what the caller itself called missed.
   void tell_nobody() {
-    std::destroy_n(few_skips, skip_count_);
+    std::destroy_n(few_skips_, skip_count_);
     skip_count_ = 0;
     more_skips_.clear();
   }
@@ -158,7 +158,7 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   };
   static constexpr std::size_t kFewSkips = 8;
   union {
-    Skip few_skips[kFewSkips];  // the first skip_count_ are there: the others cost nothing
+    Skip few_skips_[kFewSkips];  // the first skip_count_ are there: the others cost nothing
   };
   std::size_t skip_count_ = 0;
   std::vector<Skip> more_skips_;

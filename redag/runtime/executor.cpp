@@ -11,6 +11,7 @@
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
+#include "redag/runtime/looks.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
@@ -50,6 +51,7 @@ Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
   engine.cpus = options_.cpus;
   engine.trace_capacity = options_.trace_capacity;
   engine.measure = options_.live;
+  engine.looks = looks_before_sleep(setup_, options_.spin.count());
   engine.on_exception = [this](const Job &job, std::exception_ptr e) { on_exception(job, std::move(e)); };
   auto scheduler = std::make_unique<sched::PriorityScheduler>(Workload{}, engine.config);
   engine_ = std::make_unique<Engine>(std::move(scheduler), std::move(engine));

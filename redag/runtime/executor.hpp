@@ -59,6 +59,7 @@ struct ExecutorOptions {
   PolicyKind policy = PolicyKind::RateMonotonic;
   std::uint32_t threads = 0;       // os: jobs that can be started and unfinished at once; 0: workers + 16
   std::vector<int> cpus{};         // processors for the workers; empty: os takes `workers` of the usable ones
+  nanoseconds spin{};              // none, cooperative: how long a worker looks for a job before it sleeps
   bool lock_memory = false;        // if it cannot be had, warnings() says so
   std::size_t trace_capacity = 0;  // events kept between two drain(); 0: none are recorded
   bool live = false;               // `redag top` sees it: a page of shared memory, and a thread that updates it

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <thread>
 
@@ -37,6 +39,42 @@ TEST(Executor, RunsAChainUntilABodyStopsIt) {
   EXPECT_EQ(stats[1].task, "control.ekf");
   EXPECT_EQ(stats[1].jobs.finished, 5U);
   EXPECT_EQ(stats[1].usage.jobs, 5U);
+}
+
+TEST(Executor, WorkersCanLookForJobsBeforeTheySleep) {
+  for (const PreemptionMode mode : {PreemptionMode::None, PreemptionMode::Cooperative}) {
+    ExecutorOptions options;
+    options.workers = 2;
+    options.preemption = mode;
+    options.spin = 200us;  // some hand-overs find a thread that looks, others one that sleeps
+    Executor executor(options);
+    std::atomic<int> left{0};
+    std::atomic<int> right{0};
+    DagBuilder dag("dag");
+    const TaskHandle source = dag.timer("source", 1ms, [] {});
+    const TaskHandle a = dag.data("a", {source}, [&] { ++left; });
+    const TaskHandle b = dag.data("b", {source}, [&] { ++right; });
+    int joined = 0;
+    dag.data("join", {a, b}, [&] {
+      if (++joined == 50) executor.stop();
+    });
+    executor.add(std::move(dag));
+    executor.run();
+    EXPECT_EQ(joined, 50);
+    EXPECT_GE(left.load(), 50);
+    EXPECT_GE(right.load(), 50);
+    for (const std::string &warning : executor.warnings()) EXPECT_EQ(warning.find("look for jobs"), std::string::npos);
+  }
+}
+
+TEST(Executor, RealTimeWorkersSleepAtOnceAndItSaysSo) {
+  ExecutorOptions options = one_worker(PreemptionMode::Auto);
+  options.spin = 200us;
+  Executor executor(options);
+  const std::vector<std::string> warnings = executor.warnings();
+  const bool said = std::any_of(warnings.begin(), warnings.end(),
+                                [](const auto &text) { return text.find("look for jobs") != std::string::npos; });
+  EXPECT_EQ(said, executor.mode().mode == PreemptionMode::Os);
 }
 
 TEST(Executor, RunForEndsByItselfAndOnlyOnce) {

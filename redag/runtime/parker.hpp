@@ -7,14 +7,17 @@
 #include <cstdint>
 
 #include "redag/base/futex.hpp"
+#include "redag/base/relax.hpp"
 #include "redag/base/time.hpp"
 
 namespace redag::runtime {
 
 class Parker {
  public:
-  /// Owner only: sleeps until a token is there, and takes it.
-  void park() noexcept {
+  /// Owner only: takes a token; sleeps until there is one if it does not come within `looks` looks. A token that does
+  /// spares whoever gives it a system call.
+  void park(std::uint32_t looks = 0) noexcept {
+    static_cast<void>(look(looks));
     if (begin()) return;
     do {
       futex_wait(state_, kParked);
@@ -28,6 +31,15 @@ class Parker {
       if (take()) return true;
     }
     return state_.exchange(kEmpty, std::memory_order_acquire) == kToken;
+  }
+
+  /// Owner only: looks for a token so often, with a pause in between, and leaves it there. True: it has come.
+  [[nodiscard]] bool look(std::uint32_t looks) const noexcept {
+    for (; looks > 0; --looks) {
+      if (state_.load(std::memory_order_relaxed) == kToken) return true;
+      relax();
+    }
+    return false;
   }
 
   /// Leaves a token; several are one.

@@ -10,6 +10,7 @@
 #include "redag/base/mutex.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
+#include "redag/runtime/looks.hpp"
 #include "redag/runtime/release_timer.hpp"
 #include "redag/runtime/synthetic.hpp"
 #include "redag/runtime/threads.hpp"
@@ -59,6 +60,7 @@ class Run {
     if (options_.realtime_threads && setup->band.top_job == 0) {
       return make_error("the workers cannot be SCHED_FIFO threads: this process may not", realtime_hint());
     }
+    const std::uint32_t looks = looks_before_sleep(*setup, options_.spin);
     result_.warnings = std::move(setup->warnings);
     if (options_.lock_memory) {
       if (const Result<void> locked = redag::runtime::lock_memory(); !locked) {
@@ -74,6 +76,7 @@ class Run {
     engine.cpus = options_.cpus;
     engine.trace_capacity = options_.trace_capacity;
     engine.measure = options_.live;
+    engine.looks = looks;
     if (kind != nullptr) engine.config = sched::effective_config(*kind, engine.config);
     auto scheduler = options_.scheduler ? options_.scheduler(workload_, engine.config)
                                         : sched::make_scheduler(options_.executor, workload_, engine.config);

@@ -36,6 +36,7 @@ struct RunOptions {
   std::optional<PreemptionMode> preemption;  // instead of the workload's
   std::uint32_t threads = 0;      // os: jobs that can be started at once; 0: as many as there are tasks, at most 64
   bool realtime_threads = false;  // none, cooperative: workers and release timer at SCHED_FIFO too
+  Duration spin = 0;              // none, cooperative: how long a worker looks for a job before it sleeps
   bool lock_memory = false;       // if it cannot be had, a warning says so
   std::vector<int> cpus;          // processors of the workers; empty: os takes m of the usable ones
   std::size_t trace_capacity = std::size_t{1} << 17;  // events between two collections

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <span>
 
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/runtime/mode.hpp"
@@ -144,13 +145,20 @@ TEST(RunWorkload, TheWatchdogNamesAJobWhileItRuns) {
 TEST(RunWorkload, ABudgetCutsAJobOff) {
   Workload workload = two_rates(1, PreemptionMode::Cooperative);
   workload.dags[1].tasks[0].budget = 2 * kMillisecond;
+  const auto find_cut = [](std::span<const JobEvent> events) {
+    return std::find_if(events.begin(), events.end(),
+                        [](const JobEvent &e) { return e.kind == JobEventKind::Aborted; });
+  };
+  std::atomic<bool> stop{false};
   RunOptions options;
-  options.duration = 50 * kMillisecond;
+  options.duration = 3600 * kSecond;
+  options.stop = &stop;
+  options.progress = [&](Time, std::span<const JobEvent> events) { stop = find_cut(events) != events.end(); };
   const RunResult result = run(workload, options);
   expect_lawful(result);
-  const auto cut = std::find_if(result.trace.events.begin(), result.trace.events.end(),
-                                [](const JobEvent &e) { return e.kind == JobEventKind::Aborted; });
-  ASSERT_NE(cut, result.trace.events.end());
+  const std::span<const JobEvent> events = result.trace.events;
+  const auto cut = find_cut(events);
+  ASSERT_NE(cut, events.end());
   EXPECT_EQ(cut->reason, Reason::Budget);
   EXPECT_EQ(cut->task, TaskId(2));
 }

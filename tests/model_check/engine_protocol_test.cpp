@@ -19,7 +19,7 @@ std::string name_of(Preemption preemption) {
 
 class EngineProtocol : public ::testing::TestWithParam<Preemption> {
  protected:
-  static Platform platform(std::uint32_t workers) { return {GetParam(), workers, workers + 1, false, 0}; }
+  static Platform platform(std::uint32_t workers) { return {GetParam(), workers, workers + 1, false, 0, 0}; }
 };
 INSTANTIATE_TEST_SUITE_P(Modes, EngineProtocol,
                          ::testing::Values(Preemption::None, Preemption::Cooperative, Preemption::Full),
@@ -34,6 +34,32 @@ TEST_P(EngineProtocol, WhatIsReleasedRunsOnce) {
       return Outcome::Finished;
     };
     Machine machine(ladder(3), platform(2), {work, work, work});
+    machine.start_calmly();
+    const std::uint32_t source = thread([&] { machine.release(0); });
+    machine.release(1);
+    machine.release(2);
+    all.wait();
+    explored::join(source);
+    machine.finish_calmly();
+    for (std::size_t t = 0; t < 3; ++t) explored::check(machine.ran(t) == 1, "a job did not run");
+  });
+}
+
+class LookingThreads : public EngineProtocol {};
+INSTANTIATE_TEST_SUITE_P(Modes, LookingThreads, ::testing::Values(Preemption::None, Preemption::Cooperative),
+                         [](const auto &instance) { return name_of(instance.param); });
+
+// A job that is handed to a thread which still looks for one; or which has just looked for the last time.
+TEST_P(LookingThreads, RunWhatIsReleased) {
+  expect_holds([] {
+    Countdown all(3);
+    const auto work = [&](const Job &) {
+      all.count();
+      return Outcome::Finished;
+    };
+    Platform looking = platform(1);
+    looking.looks = 2;
+    Machine machine(ladder(3), looking, {work, work, work});
     machine.start_calmly();
     const std::uint32_t source = thread([&] { machine.release(0); });
     machine.release(1);

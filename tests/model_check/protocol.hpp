@@ -136,6 +136,7 @@ struct Platform {
   std::uint32_t threads = 0;  // Full: jobs that can be in progress
   bool start_paused = false;
   std::size_t trace_capacity = 0;
+  std::uint32_t looks = 0;  // of a thread for a job, before it sleeps
 };
 
 /// An engine that is told what its tasks do. Every job is checked to run once, as what the scheduler counted.
@@ -156,6 +157,7 @@ class Machine {
     }
     options.start_paused = platform.start_paused;
     options.trace_capacity = platform.trace_capacity;
+    options.looks = platform.looks;
     options.on_exception = [this](const Job &, const std::exception_ptr &) { ++exceptions; };
     engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
     std::vector<runtime::Body> bodies;

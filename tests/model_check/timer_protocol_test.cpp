@@ -38,6 +38,21 @@ TEST(ParkerProtocol, NoTokenIsLost) {
   }
 }
 
+TEST(ParkerProtocol, NoTokenIsLostByLookingBeforeSleeping) {
+  expect_holds([] {
+    Parker parker;
+    Atomic<int> sent{0};
+    const std::uint32_t a = thread([&] {
+      for (int i = 0; i < 2; ++i) {
+        sent.fetch_add(1);
+        parker.unpark();
+      }
+    });
+    while (sent.load() < 2) parker.park(2);
+    explored::join(a);
+  });
+}
+
 TEST(ParkerProtocol, ATokenThatIsNotTakenInTimeIsTakenLater) {
   expect_holds(
       [] {

@@ -1,0 +1,42 @@
+#include "redag/runtime/looks.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/parker.hpp"
+
+namespace redag::runtime {
+namespace {
+
+constexpr std::uint32_t kSample = 256;
+
+// The fastest of a few samples: the others were interrupted.
+Duration measure() {
+  Parker parker;
+  Duration fastest = kNever;
+  for (int i = 0; i < 8; ++i) {
+    const Time begin = monotonic_now();
+    static_cast<void>(parker.look(kSample));
+    fastest = std::min(fastest, monotonic_now() - begin);
+  }
+  return std::max<Duration>(fastest, 1);
+}
+
+}  // namespace
+
+std::uint32_t looks_in(Duration duration) {
+  static const Duration sample = measure();
+  const double looks = static_cast<double>(duration) * kSample / static_cast<double>(sample);
+  return static_cast<std::uint32_t>(
+      std::clamp(looks, duration > 0 ? 1.0 : 0.0, static_cast<double>(std::numeric_limits<std::uint32_t>::max())));
+}
+
+std::uint32_t looks_before_sleep(Setup &setup, Duration spin) {
+  if (spin <= 0) return 0;
+  if (setup.mode.mode != PreemptionMode::Os) return looks_in(spin);
+  setup.warnings.push_back("workers do not look for jobs before they sleep: that is for modes none and cooperative");
+  return 0;
+}
+
+}  // namespace redag::runtime
