@@ -20,14 +20,16 @@
 #include <thread>
 #include <vector>
 
+#include "contenders.hpp"
 #include "rclcpp/rclcpp.hpp"
-#include "redag_rclcpp/executor.hpp"
 #include "std_msgs/msg/u_int64.hpp"
-#include "workload/peers.hpp"
 
 namespace {
 
 using namespace std::chrono_literals;
+using redag_rclcpp::Contender;
+using redag_rclcpp::contenders;
+using redag_rclcpp::median;
 using Message = std_msgs::msg::UInt64;
 using std::chrono::nanoseconds;
 using std::chrono::steady_clock;
@@ -41,32 +43,6 @@ double cpu_seconds() {
     return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
   };
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-struct Kind {
-  std::string name;
-  std::function<std::unique_ptr<rclcpp::Executor>()> make;
-  bool is_ours = false;
-};
-
-std::unique_ptr<rclcpp::Executor> make_redag(redag::PreemptionMode mode, bool raise_middleware = true) {
-  redag_rclcpp::ReDAGOptions options;
-  options.preemption = mode;
-  options.raise_middleware = raise_middleware;
-  return std::make_unique<redag_rclcpp::ReDAGExecutor>(options);
-}
-
-std::vector<Kind> kinds() {
-  std::vector<Kind> all;
-  for (const std::string &name : redag_rclcpp::peer_names()) {
-    if (redag_rclcpp::check_peer(name)) all.push_back({name, [name] { return redag_rclcpp::make_peer(name, 2); }});
-  }
-  all.push_back({"redag-none", [] { return make_redag(redag::PreemptionMode::None); }, true});
-  all.push_back({"redag-coop", [] { return make_redag(redag::PreemptionMode::Cooperative); }, true});
-  if (redag::runtime::probe_priority_band().top_job > 0) {
-    all.push_back({"redag-os", [] { return make_redag(redag::PreemptionMode::Os); }, true});
-  }
-  return all;
 }
 
 /// Microseconds, or what the measurement says.
@@ -291,11 +267,6 @@ std::vector<Measurement> measurements() {
   };
 }
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values.empty() ? 0 : values[values.size() / 2];
-}
-
 }  // namespace
 
 int main(int argc, char **argv) {
@@ -312,14 +283,14 @@ int main(int argc, char **argv) {
   rclcpp::init(0, nullptr);
   rclcpp::get_logger("redag_rclcpp").set_level(rclcpp::Logger::Level::Error);
   for (const Measurement &measurement : measurements()) {
-    auto all = kinds();
+    auto all = contenders();
     if (measurement.name == "arrivals_loaded" && all.back().name == "redag-os") {
-      all.push_back({"redag-os-not-raised", [] { return make_redag(redag::PreemptionMode::Os, false); }, true});
+      all.push_back({"redag-os-not-raised", [] { return redag_rclcpp::make_redag(redag::PreemptionMode::Os, false); }});
     }
     if (!only.empty() && ("," + only + ",").find("," + measurement.name + ",") == std::string::npos) continue;
     std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, by executor
     for (int round = 0; round < rounds; ++round) {
-      for (const Kind &kind : all) {
+      for (const Contender &kind : all) {
         const auto executor = kind.make();
         for (const auto &[figure, value] : measurement.run(*executor, seconds))
           results[figure][kind.name].push_back(value);
@@ -328,7 +299,7 @@ int main(int argc, char **argv) {
     std::printf("%s\n", measurement.name.c_str());
     for (auto &[figure, by_kind] : results) {
       std::printf("  %-14s", figure.c_str());
-      for (const Kind &kind : all) std::printf("  %s %.3g", kind.name.c_str(), median(by_kind[kind.name]));
+      for (const Contender &kind : all) std::printf("  %s %.3g", kind.name.c_str(), median(by_kind[kind.name]));
       std::printf("\n");
     }
     std::fflush(stdout);

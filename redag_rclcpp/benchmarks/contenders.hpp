@@ -1,0 +1,47 @@
+// The executors that the benchmarks compare: ours in each preemption mode that can be had here, and its peers.
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "redag_rclcpp/executor.hpp"
+#include "workload/peers.hpp"
+
+namespace redag_rclcpp {
+
+struct Contender {
+  std::string name;
+  std::function<std::unique_ptr<rclcpp::Executor>()> make;
+};
+
+inline std::unique_ptr<rclcpp::Executor> make_redag(redag::PreemptionMode mode, bool raise_middleware = true) {
+  ReDAGOptions options;
+  options.preemption = mode;
+  options.raise_middleware = raise_middleware;
+  return std::make_unique<ReDAGExecutor>(options);
+}
+
+/// With two threads, those that can have more than one.
+inline std::vector<Contender> contenders() {
+  std::vector<Contender> all;
+  for (const std::string &name : peer_names()) {
+    if (check_peer(name)) all.push_back({name, [name] { return make_peer(name, 2); }});
+  }
+  all.push_back({"redag-none", [] { return make_redag(redag::PreemptionMode::None); }});
+  all.push_back({"redag-coop", [] { return make_redag(redag::PreemptionMode::Cooperative); }});
+  if (redag::runtime::probe_priority_band().top_job > 0) {
+    all.push_back({"redag-os", [] { return make_redag(redag::PreemptionMode::Os); }});
+  }
+  return all;
+}
+
+/// 0 if there are none.
+inline double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values.empty() ? 0 : values[values.size() / 2];
+}
+
+}  // namespace redag_rclcpp
