@@ -82,15 +82,6 @@ Shape::Points Shape::limited(const Points &points, std::uint32_t workers) {
   return result;
 }
 
-// Least time with at least so much work. Requires 0 <= work <= the volume.
-Duration Shape::reach(const Points &points, Duration work) {
-  const auto after = std::lower_bound(points.begin(), points.end(), work,
-                                      [](const auto &point, Duration value) { return point.second < value; });
-  if (after == points.begin()) return 0;
-  const auto &[before, done] = *(after - 1);
-  return before + ceil_div(work - done, (after->second - done) / (after->first - before));
-}
-
 Duration Shape::work(Duration x, Duration response, Duration period) const {
   // The first job's response ends `first` after the window begins, in [1, period]; each later one comes a period after
   // the one before, and all but the last of them can be done.
@@ -101,9 +92,10 @@ Duration Shape::work(Duration x, Duration response, Duration period) const {
     const Duration later = rest > 0 ? rest / period * volume + done(rest % period) : 0;
     return std::min(left(first), within) + later;
   };
-  // Between the places where a slope changes the sum is straight. Once the first job does all it can, later is worse.
-  const Duration last = std::clamp<Duration>(reach(left_, within), 1, period);
-  Duration most = std::max(placed(1), placed(last));
+  // Between the places where a slope changes the sum is straight. Once the first job can have done all, later is worse;
+  // nor is its first instant alone ever better than all other places (docs/analysis.md, "Shapes of DAGs").
+  const Duration last = std::clamp<Duration>(left_.back().first, 1, period);
+  Duration most = placed(last);
   for (const auto &[time, work] : left_) {
     if (time > 0 && time < last) most = std::max(most, placed(time));
   }
