@@ -13,30 +13,39 @@
 
 namespace redag::analysis::global {
 
-/// Least fixed point of a monotone `next`, from a `value` below it on. False above `stop`, or after kMaxSteps. The last
-/// call of `next` was with the `value` found, so that what it leaves behind is of that one.
+/// Fixed point of a monotone `next`, from a `value` below the least one on. False above `stop`. The last call of `next`
+/// was with the `value` found, so that what it leaves behind is of that one. It is the least, unless that takes more
+/// than kMaxSteps: then one from farther ahead, by doubling the way and bisection, if there is one where that looks.
 template <class Next>
 [[nodiscard]] bool least_fixed_point(Duration stop, Duration &value, Next next) {
+  const Duration begin = value;
   for (int steps = 0; value <= stop && steps < kMaxSteps; ++steps) {
     const Duration grown = next(value);
     if (grown <= value) return true;
     value = grown;
   }
+  // next(value) > value; where it is not, all between holds a fixed point: the first such place after the last other.
+  for (Duration ahead = value - begin; value < stop; ahead *= 2) {
+    Duration above = ahead < stop - value ? value + ahead : stop;
+    if (next(above) > above) {
+      value = above;
+      continue;
+    }
+    while (above - value > 1) {
+      const Duration middle = value + (above - value) / 2;
+      (next(middle) > middle ? value : above) = middle;
+    }
+    value = above;
+    return next(value) == value;
+  }
   return false;
 }
 
-/// One of several responses (or latest arrivals) that rely on each other.
-struct Reliant {
-  Duration *value = nullptr;
-  Duration limit = 0;  // no bound above it; `value` is never set to more before an evaluation
-};
-
-/// Sets all values to responses that agree: each is at least what evaluate(k) makes of the others. evaluate(k) sets the
-/// k-th value from all of them, and answers false above its limit; it must be monotone. Values start at or below the
-/// least that agree, and those are found, except where they take more than a thousand rounds: then larger ones that
-/// agree, if there are any within reach (docs/analysis.md, "EDF on several workers"). Empty, or why there are none;
-/// `exceeds` if some value exceeds its limit.
-[[nodiscard]] std::string_view agree(std::span<const Reliant> values, std::string_view exceeds,
+/// Sets responses (or latest arrivals) that rely on each other to the least that agree: each is what evaluate(k) makes
+/// of the others. evaluate(k) sets the k-th value from all of them, and answers false above its limit; it must be
+/// monotone. Values start at or below the least that agree. Empty, or why there are none: `exceeds` if one is above its
+/// limit.
+[[nodiscard]] std::string_view agree(std::span<Duration *const> values, std::string_view exceeds,
                                      const std::function<bool(std::size_t k)> &evaluate);
 
 /// The same of the responses of `units`, which respond(k) sets: all have the bound that explain(k) then gives, or none.

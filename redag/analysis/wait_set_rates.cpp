@@ -68,12 +68,12 @@ class Executor {
  private:
   // Of each callback, units in their order and tasks in that of their edges: when it arrives, and its response.
   std::string_view solve() {
-    std::vector<global::Reliant> values;
+    std::vector<Duration *> values;
     std::vector<std::uint32_t> whose;
     for (const Unit &unit : system_.units) {
       for (const std::uint32_t t : unit.tasks) {
-        values.push_back({&callbacks_[t].ready, limit_of(unit)});
-        values.push_back({&callbacks_[t].response, limit_of(unit)});
+        values.push_back(&callbacks_[t].ready);
+        values.push_back(&callbacks_[t].response);
         whose.push_back(t);
       }
     }
@@ -118,12 +118,10 @@ class Executor {
     Duration own = 0;
     Duration earlier = 0;
     Duration jitter = 0;
-    Duration more_than_least = 0;  // responses can agree without being the least that do
     for (bool more = true; more;) {
       const auto found = respond_(callbacks_, at, limit_of(unit) - callbacks_[at].ready);
       own += callbacks_[at].wcet;
       earlier += found->earlier;
-      more_than_least += callbacks_[at].response - found->response;
       for (std::size_t j = 0; j < found->shares.size(); ++j) {
         if (found->shares[j] != 0) shares[j] += found->shares[j];
       }
@@ -141,9 +139,6 @@ class Executor {
     if (earlier != 0) bound.terms.push_back(Term{Term::Kind::Earlier, TaskId(), unit.dag, earlier, 0});
     for (const auto &[j, amount] : shares) {
       bound.terms.push_back(Term{Term::Kind::Interference, TaskId(j), system_.tasks[j].dag, amount, 0});
-    }
-    if (more_than_least > 0) {
-      bound.terms.push_back(Term{Term::Kind::Interference, TaskId(), DagId(), more_than_least, 0});
     }
     if (jitter > 0) bound.terms.push_back(Term{Term::Kind::Jitter, TaskId(), unit.dag, jitter, 0});
     return bound;
