@@ -25,7 +25,6 @@ MethodReport run(const System &system, const Method &method) {
   return report;
 }
 
-// The tightest bounds together, as if one method had given them.
 Bound combine(const std::vector<Tightest> &tasks, const std::vector<Tightest> &dags) {
   Bound bound;
   for (const Tightest &best : tasks) bound.tasks.push_back(best.bound);
@@ -68,6 +67,8 @@ Report analyze(const System &system, std::vector<Method> methods) {
   report.owned = owned;
   return report;
 }
+
+Bound tightest_of(const Report &report) { return combine(report.tasks, report.dags); }
 
 bool is_shown_schedulable(const System &system) {
   if (!system.not_analysable.empty()) return false;

@@ -42,6 +42,9 @@ struct Report {
 /// These methods alone; the report keeps them.
 [[nodiscard]] Report analyze(const System &system, std::vector<Method> methods);
 
+/// The tightest bounds together, as if one method had given them.
+[[nodiscard]] Bound tightest_of(const Report &report);
+
 /// Is analyze(system).verdict Schedulable? Stops at the first method that says so: for those who ask it often.
 [[nodiscard]] bool is_shown_schedulable(const System &system);
 

@@ -6,6 +6,7 @@
 
 #include "redag/analysis/arithmetic.hpp"
 #include "redag/analysis/dag_isolated.hpp"
+#include "redag/analysis/fixed_point.hpp"
 #include "redag/analysis/rate_edges.hpp"
 
 namespace redag::analysis {
@@ -81,15 +82,6 @@ Shape::Points Shape::limited(const Points &points, std::uint32_t workers) {
   return result;
 }
 
-// Least time with at least so much work. Requires 0 <= work <= the volume.
-Duration Shape::reach(const Points &points, Duration work) {
-  const auto after = std::lower_bound(points.begin(), points.end(), work,
-                                      [](const auto &point, Duration value) { return point.second < value; });
-  if (after == points.begin()) return 0;
-  const auto &[before, done] = *(after - 1);
-  return before + ceil_div(work - done, (after->second - done) / (after->first - before));
-}
-
 Duration Shape::work(Duration x, Duration response, Duration period) const {
   // The first job's response ends `first` after the window begins, in [1, period]; each later one comes a period after
   // the one before, and all but the last of them can be done.
@@ -100,9 +92,10 @@ Duration Shape::work(Duration x, Duration response, Duration period) const {
     const Duration later = rest > 0 ? rest / period * volume + done(rest % period) : 0;
     return std::min(left(first), within) + later;
   };
-  // Between the places where a slope changes the sum is straight. Once the first job does all it can, later is worse.
-  const Duration last = std::clamp<Duration>(reach(left_, within), 1, period);
-  Duration most = std::max({placed(1), placed(std::max<Duration>(1, last - 1)), placed(last)});
+  // Between the places where a slope changes the sum is straight. Once the first job can have done all, later is worse;
+  // nor is its first instant alone ever better than all other places (docs/analysis.md, "Shapes of DAGs").
+  const Duration last = std::clamp<Duration>(left_.back().first, 1, period);
+  Duration most = placed(last);
   for (const auto &[time, work] : left_) {
     if (time > 0 && time < last) most = std::max(most, placed(time));
   }
@@ -128,21 +121,17 @@ bool respond(std::span<GlobalUnit> units, std::span<const global::Shape> shapes,
   if (own.volume > multiply(own.limit, workers) || own.length > own.limit) return false;
   const auto m = static_cast<Duration>(workers);
   Duration window = own.length + (own.volume - own.length) / m;
-  for (int step = 0; window <= own.limit - own.jitter && step < global::kMaxSteps; ++step) {
+  const bool found = global::least_fixed_point(own.limit - own.jitter, window, [&](Duration x) {
     Duration sum = own.volume - own.length;
     for (std::size_t i = 0; i < k; ++i) {
       GlobalUnit &other = units[i];
-      other.work = shapes[i].work(window, other.response, other.period);
+      other.work = shapes[i].work(x, other.response, other.period);
       sum += other.work;
     }
-    const Duration grown = own.length + sum / m;
-    if (grown <= window) {
-      own.response = window + own.jitter;
-      return true;
-    }
-    window = grown;
-  }
-  return false;
+    return own.length + sum / m;
+  });
+  own.response = window + own.jitter;
+  return found;
 }
 
 ResponseBound explain(const System &system, std::span<const GlobalUnit> units, std::size_t k, std::uint32_t workers) {

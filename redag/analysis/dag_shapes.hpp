@@ -32,7 +32,6 @@ class Shape {
   /// Where the slope changes: time and work, by time, from (0, 0) to the volume. Straight in between.
   using Points = std::vector<std::pair<Duration, Duration>>;
   [[nodiscard]] static Duration at(const Points &points, Duration time);
-  [[nodiscard]] static Duration reach(const Points &points, Duration work);
   static Points limited(const Points &points, std::uint32_t workers);
 
   Points left_;

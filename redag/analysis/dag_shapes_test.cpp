@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <map>
+
+#include "redag/analysis/dag_isolated.hpp"
 #include "redag/analysis/global_dag.hpp"
 #include "redag/testing/bound_property.hpp"
 
@@ -112,6 +116,62 @@ void for_cases(const BoundCaseLimits &limits, int count, Check check) {
     if (system.not_analysable.empty()) check(bound_case, system, rng);
     if (::testing::Test::HasFailure()) return;
   }
+}
+
+// One task, `wide` in parallel, all of them before one more: wider than the workers.
+Workload wide(std::uint32_t parallel, Duration wcet, std::uint32_t workers) {
+  Workload workload;
+  workload.name = "w";
+  workload.platform.workers = workers;
+  Dag dag;
+  dag.name = "wide";
+  dag.tasks = {make_task("begin", 2, {})};
+  std::vector<std::uint32_t> all;
+  for (std::uint32_t i = 1; i <= parallel; ++i) {
+    dag.tasks.push_back(make_task("t" + std::to_string(i), wcet + i % 3, {0}));
+    all.push_back(i);
+  }
+  dag.tasks.push_back(make_task("end", 1, all));
+  workload.dags.push_back(dag);
+  return workload;
+}
+
+// By their definitions, instant by instant.
+void expect_shape_is_right(const System &system, const Unit &unit, std::uint32_t m) {
+  std::map<std::uint32_t, std::pair<Duration, Duration>> times;  // as early as they can be
+  for (const std::uint32_t t : unit.tasks) {
+    Duration start = 0;
+    for (const std::uint32_t p : system.tasks[t].predecessors) start = std::max(start, times[p].second);
+    times[t] = {start, start + system.tasks[t].wcet};
+  }
+  const std::vector<Duration> paths = disjoint_paths(system, unit, unit.tasks.size(), Heaviest::MostTasks);
+  const Shape shape(system, unit, m);
+  for (Duration time = 0; time <= unit.volume + 1; ++time) {
+    const Duration cut = m * time;
+    Duration left = 0;
+    for (const auto &[task, span] : times) {
+      left += std::max<Duration>(0, span.second - std::max(span.first, unit.length - time));
+    }
+    Duration done = 0;
+    for (const Duration path : paths) done += std::min(path, time);
+    ASSERT_EQ(shape.left(time), std::min(cut, left)) << "left at " << time << " of " << unit.length << ", m " << m;
+    ASSERT_EQ(shape.done(time), std::min(cut, done)) << "done in " << time << ", m " << m;
+  }
+}
+
+TEST(Shape, IsWhatItSaysAtEveryInstant) {
+  for (const std::uint32_t workers : {1U, 2U, 3U, 4U}) {
+    for (std::uint32_t parallel = 1; parallel < 10; ++parallel) {
+      for (const Duration wcet : {1, 2, 5}) {
+        const Workload workload = wide(parallel, wcet, workers);
+        const System system = compile(workload, platform_of(workload)).value();
+        expect_shape_is_right(system, system.units[0], workers);
+      }
+    }
+  }
+  for_cases(graphs(), 300, [&](const testing::BoundCase &bound_case, const System &system, Rng &) {
+    for (const Unit &unit : system.units) expect_shape_is_right(system, unit, bound_case.platform.workers);
+  });
 }
 
 // Where slopes change is enough to look at: the same as all placements of the first job.

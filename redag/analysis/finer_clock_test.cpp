@@ -85,8 +85,8 @@ TEST(FinerClock, LosesFewBounds) {
   for (const auto &[name, of] : counts) {
     if (of.coarse < 20) continue;
     ++compared;
-    // Not none: responses that rely on each other can grow so slowly that the rounds allowed do not reach their end.
-    EXPECT_GE(of.fine * 100, of.coarse * 85) << name << ": " << of.fine << " of " << of.coarse;
+    // Not none: with coarse ticks more is lost where a sum is divided by the workers and rounded down.
+    EXPECT_GE(of.fine * 100, of.coarse * 98) << name << ": " << of.fine << " of " << of.coarse;
   }
   EXPECT_GE(compared, 15U);
 }

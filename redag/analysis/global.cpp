@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/jobs_in_progress.hpp"
 #include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
 
@@ -21,12 +22,20 @@ std::optional<std::string> why_not_mode(const System &system, const Needs &needs
              : "for jobs that run to completion; here they can be preempted";
 }
 
+// A max_active that the DAG's tasks reach only if its instances overlap is none where R <= T.
+bool can_bind(const System &system, DagId id) {
+  const SystemDag &dag = system.dags[id.value];
+  if (dag.max_active == 0) return false;
+  return dag.units.size() > 1 || most_jobs_in_progress(system, id) > dag.max_active;
+}
+
 std::optional<std::string> why_not_structure(const System &system, const Needs &needs) {
   if (auto reason = why_not_directly(system)) return reason;
   if (!needs.edges && system.has_edges()) return "tasks have predecessors: see the bounds for DAGs";
   if (!needs.groups && !system.groups.empty()) return "exclusive groups: a worker can idle while a job waits";
-  for (const SystemDag &dag : system.dags) {
-    if (dag.max_active == 0) continue;
+  for (std::size_t d = 0; d < system.dags.size(); ++d) {
+    const SystemDag &dag = system.dags[d];
+    if (!can_bind(system, DagId(d))) continue;
     if (!needs.bounds) return "DAG '" + dag.name + "' has a max_active: a worker can idle while a job waits";
     if (dag.units.size() > 1) return "DAG '" + dag.name + "': several of its parts share one max_active";
   }
@@ -114,7 +123,11 @@ Units units_of(const System &system, const Needs &needs) {
   if (!result.reason) result.reason = why_not_structure(system, needs);
   if (result.reason) return result;
   result.units.reserve(system.units.size());
-  for (std::uint32_t u = 0; u < system.units.size(); ++u) result.units.push_back(unit_of(system, u));
+  for (std::uint32_t u = 0; u < system.units.size(); ++u) {
+    result.units.push_back(unit_of(system, u));
+    GlobalUnit &unit = result.units.back();
+    if (unit.bound > 0 && !can_bind(system, system.units[u].dag)) unit.bound = 0;
+  }
   std::sort(result.units.begin(), result.units.end(), [&](const GlobalUnit &a, const GlobalUnit &b) {
     return system.units[a.unit].first_rank < system.units[b.unit].first_rank;
   });

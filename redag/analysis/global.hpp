@@ -110,6 +110,6 @@ inline constexpr std::string_view kNoFixedPoint =
     "no fixed point within its limit, above which jobs would be skipped, in the steps allowed";
 
 /// Evaluations of one fixed point; ordinary systems need tens.
-inline constexpr int kMaxSteps = 100'000;
+inline constexpr int kMaxSteps = 10'000;
 
 }  // namespace redag::analysis::global

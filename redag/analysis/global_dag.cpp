@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/fixed_point.hpp"
 #include "redag/analysis/rate_edges.hpp"
 
 namespace redag::analysis {
@@ -15,17 +16,6 @@ constexpr int kRounds = 8;
 // More work than the workers can do in a period; beyond it sums could wrap, and no response is within its limit.
 bool is_hopeless(const GlobalUnit &own, std::uint32_t workers) {
   return own.volume > multiply(own.limit, workers) || own.length > own.limit;
-}
-
-// Least fixed point of a monotone `next` from `window` on; false above `stop`.
-template <class Next>
-bool grow(Duration &window, Duration stop, Next next) {
-  for (int steps = 0; window <= stop && steps < kMaxSteps; ++steps) {
-    const Duration grown = next(window);
-    if (grown <= window) return true;
-    window = grown;
-  }
-  return false;
 }
 
 // floor(a / b + c / d) for small divisors.
@@ -95,7 +85,7 @@ bool melani_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t w
   if (is_hopeless(own, workers)) return false;
   const auto more_urgent = units.first(k);
   Duration window = own.length + (own.volume - own.length) / workers;
-  const bool found = grow(window, own.limit - own.jitter, [&](Duration x) {
+  const bool found = least_fixed_point(own.limit - own.jitter, window, [&](Duration x) {
     Duration sum = own.volume - own.length;
     for (const GlobalUnit &other : more_urgent) sum += dag_work(other, x);
     return own.length + sum / static_cast<Duration>(workers);
@@ -110,7 +100,8 @@ bool bounded_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t 
   if (is_hopeless(own, workers) || blocking >= kUnbounded / 4) return false;
   Window window(units.first(k), own, workers, blocking, std::span(waiting.works).first(k));
   waiting.window = own.length;
-  const bool found = grow(waiting.window, own.limit - own.jitter, [&window](Duration x) { return window.next(x); });
+  const bool found =
+      least_fixed_point(own.limit - own.jitter, waiting.window, [&window](Duration x) { return window.next(x); });
   waiting.busy = window.busy();
   own.response = waiting.window + own.jitter;
   return found;
@@ -226,26 +217,14 @@ class AgainstAll {
     }
   }
 
-  // The least responses that agree with each other, or why there are none.
-  std::string_view solve() {
-    constexpr int kMaxRounds = 1000;
-    bool changed = true;
-    for (int round = 0; changed; ++round) {
-      if (round == kMaxRounds) return "gave up: the responses did not agree in a thousand rounds";
-      changed = false;
-      for (std::size_t k = 0; k < units_.size(); ++k) {
-        const Duration before = units_[k].response;
-        std::swap(units_[k], units_.back());
-        const bool found = respond();
-        std::swap(units_[k], units_.back());
-        if (!found) return "some DAG's response can exceed its limit, which all others rely on";
-        changed = changed || units_[k].response != before;
-      }
-    }
-    return {};
+  bool respond(std::size_t k) {
+    std::swap(units_[k], units_.back());
+    const bool found = respond();
+    std::swap(units_[k], units_.back());
+    return found;
   }
 
-  // Once solved.
+  // Once all responses agree.
   ResponseBound explain(std::size_t k) {
     std::swap(units_[k], units_.back());
     (void)respond();
@@ -276,17 +255,9 @@ Outcome apply_any(const System &system) {
   global::Units view = global::units_of(system, {.mode = mode, .bounds = true, .any_policy = true});
   if (view.reason) return NotApplicable{*view.reason};
   AgainstAll all(system, view.units, view.workers);
-  const std::string_view absent = all.solve();
-  std::vector<ResponseBound> responses(system.units.size());
-  for (std::size_t k = 0; k < view.units.size(); ++k) {
-    ResponseBound &response = responses[view.units[k].unit];
-    if (absent.empty()) {
-      response = all.explain(k);
-    } else {
-      response.absent = absent;
-    }
-  }
-  return from_units(system, std::move(responses));
+  return global::all_that_agree(
+      system, view.units, "some DAG's response can exceed its limit, which all others rely on",
+      [&](std::size_t k) { return all.respond(k); }, [&](std::size_t k) { return all.explain(k); });
 }
 
 Outcome apply_preemptive(const System &system) { return apply_bounded(system, sched::Preemption::Full); }

@@ -211,6 +211,23 @@ TEST(GlobalDag, MaxActiveOfOneIsTheVolume) {
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(melani().apply(compiled(workload, sched::Preemption::Full))));
 }
 
+// The upper DAG never has more than two tasks in progress, the lower one eight.
+TEST(GlobalDag, AMaxActiveThatTasksCannotReachIsNone) {
+  Workload workload = narrow_and_wide();
+  const System without = compiled(workload, sched::Preemption::Full);
+  workload.dags[0].max_active = 2;
+  workload.dags[1].max_active = 8;
+  const System with = compiled(workload, sched::Preemption::Full);
+  for (const Method &method : {melani(), dag_bounded()}) {
+    for (const std::size_t dag : {0U, 1U}) {
+      EXPECT_EQ(dag_response(method, with, dag).response, dag_response(method, without, dag).response) << method.name;
+    }
+  }
+  workload.dags[1].max_active = 7;
+  const Outcome outcome = melani().apply(compiled(workload, sched::Preemption::Full));
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(outcome));
+}
+
 template <class Compare>
 std::uint64_t compare_all(const BoundCaseLimits &limits, int count, Compare compare) {
   std::uint64_t compared = 0;

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/fixed_point.hpp"
 #include "redag/analysis/global_sequential.hpp"
 #include "redag/analysis/waiting_window.hpp"
 
@@ -13,9 +14,6 @@ namespace {
 using global::Division;
 using global::GlobalUnit;
 using global::Largest;
-
-// Rounds of all tasks; each raises some response, and ordinary systems need about ten.
-constexpr int kMaxRounds = 1000;
 
 Duration deadline_of(const System &system, const GlobalUnit &unit) {
   return system.tasks[system.units[unit.unit].tasks.front()].deadline;
@@ -36,22 +34,20 @@ class Edf {
     for (GlobalUnit &unit : units_) unit.response = unit.volume + unit.jitter;
   }
 
-  // The least responses that agree with each other, or why there are none.
-  std::string_view solve() {
-    bool changed = true;
-    for (int round = 0; changed; ++round) {
-      if (round == kMaxRounds) return "gave up: the responses did not agree in a thousand rounds";
-      changed = false;
-      for (std::size_t k = 0; k < units_.size(); ++k) {
-        const Duration before = units_[k].response;
-        if (!respond(k)) return "some task's response can exceed its limit, which all others rely on";
-        changed = changed || units_[k].response != before;
-      }
+  bool respond(std::size_t k) {
+    GlobalUnit &own = units_[k];
+    global::FirstWindow first(system_.platform.workers, 0);
+    for (std::size_t i = 0; i < units_.size(); ++i) {
+      if (i != k) first.add(std::min(units_[i].volume, due_work(units_[i], later(k, i))));
     }
-    return {};
+    Duration d = first.length();
+    const bool found = global::least_fixed_point(own.limit - own.jitter - own.volume + 1, d,
+                                                 [&](Duration waiting) { return window(k, waiting); });
+    own.response = d - 1 + own.volume + own.jitter;
+    return found;
   }
 
-  // Once solved.
+  // Once all responses agree.
   ResponseBound explain(std::size_t k) {
     (void)respond(k);
     const GlobalUnit &own = units_[k];
@@ -77,19 +73,6 @@ class Edf {
   }
 
  private:
-  bool respond(std::size_t k) {
-    GlobalUnit &own = units_[k];
-    global::FirstWindow first(system_.platform.workers, 0);
-    for (std::size_t i = 0; i < units_.size(); ++i) {
-      if (i != k) first.add(std::min(units_[i].volume, due_work(units_[i], later(k, i))));
-    }
-    Duration d = first.length();
-    const bool found = global::least_fixed_point(own.limit - own.jitter - own.volume + 1, d,
-                                                 [&](Duration waiting) { return window(k, waiting); });
-    own.response = d - 1 + own.volume + own.jitter;
-    return found;
-  }
-
   // How much later the deadline of units_[k] is. From its own period on that makes no difference: the window is not
   // longer.
   [[nodiscard]] Duration later(std::size_t k, std::size_t i) const {
@@ -109,7 +92,7 @@ class Edf {
       if (i == k) continue;
       const Duration any = global::sequential_work(other, length);
       other.work = other.carried = std::min(any, due_work(other, later(k, i)));
-      if (deadlines_[i] <= deadlines_[k] - own.jitter) continue;
+      // In the way with a later deadline, of a job that had started. Where jobs of it are due in time it is no more.
       blockers.offer(std::min({any, other.volume - 1, d}) - std::min(other.carried, d), i);
     }
     for (const Largest::Entry &entry : blockers.entries()) {
@@ -145,17 +128,9 @@ Outcome apply_response(const System &system) {
   global::Units view = edf_units(system, mode);
   if (view.reason) return NotApplicable{*view.reason};
   Edf edf(system, view.units);
-  const std::string_view absent = edf.solve();
-  std::vector<ResponseBound> responses(system.units.size());
-  for (std::size_t k = 0; k < view.units.size(); ++k) {
-    ResponseBound &response = responses[view.units[k].unit];
-    if (absent.empty()) {
-      response = edf.explain(k);
-    } else {
-      response.absent = absent;
-    }
-  }
-  return from_units(system, std::move(responses));
+  return global::all_that_agree(
+      system, view.units, "some task's response can exceed its limit, which all others rely on",
+      [&](std::size_t k) { return edf.respond(k); }, [&](std::size_t k) { return edf.explain(k); });
 }
 
 // Densities in units of 2^-40, rounded up.

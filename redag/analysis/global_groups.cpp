@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/fixed_point.hpp"
 #include "redag/analysis/global.hpp"
 #include "redag/analysis/global_dag.hpp"
 #include "redag/analysis/rate_edges.hpp"
@@ -25,7 +26,10 @@ struct Share {
 class Analysis {
  public:
   explicit Analysis(const System &system)
-      : system_(system), view_(global::units_of(system, {.mode = sched::Preemption::None, .groups = true})) {
+      : system_(system),
+        preempts_(system.mode != sched::Preemption::None),
+        view_(global::units_of(
+            system, {.mode = preempts_ ? sched::Preemption::Full : sched::Preemption::None, .groups = true})) {
     if (view_.reason) return;
     shares_.assign(view_.units.size(), std::vector<Share>(system.groups.size()));
     for (std::size_t u = 0; u < view_.units.size(); ++u) {
@@ -80,11 +84,34 @@ class Analysis {
     return share.tasks > 1 ? share.volume - share.least : 0;
   }
 
-  // A less urgent member that started before the task on the path became ready: once a task on the path.
-  [[nodiscard]] Duration less_urgent(std::size_t k, std::size_t group) const {
+  // What is left of the longest less urgent member, once it has started.
+  [[nodiscard]] Duration longest_holder(std::size_t k, std::size_t group) const {
     Duration most = 0;
     for (std::size_t l = k + 1; l < shares_.size(); ++l) most = std::max(most, shares_[l][group].most - 1);
-    return multiply(std::max<Duration>(0, most), shares_[k][group].tasks);
+    return most;
+  }
+
+  // One that started before the task on the path became ready: once a task on the path.
+  [[nodiscard]] Duration less_urgent(std::size_t k, std::size_t group) const {
+    return multiply(longest_holder(k, group), shares_[k][group].tasks);
+  }
+
+  // With preemption a less urgent job takes a worker only while it holds the group that an own or a more urgent job
+  // waits for: each of these finds at most one such holder. Those of own jobs are in less_urgent(), in full.
+  [[nodiscard]] Duration inherited(std::size_t k, Duration x) const {
+    Duration sum = 0;
+    for (std::size_t g = 0; g < system_.groups.size(); ++g) {
+      Duration waiting = 0;
+      for (std::size_t j = 0; j < k; ++j) waiting += jobs_of_group(j, g, x);
+      sum = add(sum, multiply(longest_holder(k, g), waiting));
+    }
+    return sum;
+  }
+
+  // In progress at some time in the window.
+  [[nodiscard]] Duration jobs_of_group(std::size_t j, std::size_t group, Duration x) const {
+    const GlobalUnit &unit = view_.units[j];
+    return shares_[j][group].tasks * ceil_div(x + unit.response, unit.period);
   }
 
   [[nodiscard]] Waits waits(std::size_t k, Duration x) const {
@@ -102,10 +129,10 @@ class Analysis {
       for (std::size_t j = 0; j < k; ++j) {
         const GlobalUnit &other = view_.units[j];
         result.serial = add(result.serial, serial_work(other, shares_[j][g], x));
-        ends += shares_[j][g].tasks * ceil_div(x + other.response, other.period);
+        ends += jobs_of_group(j, g, x);
       }
     }
-    result.shared = add(result.shared, blocking(k, ends));
+    result.shared = add(result.shared, preempts_ ? inherited(k, x) : blocking(k, ends));
     return result;
   }
 
@@ -121,16 +148,12 @@ class Analysis {
     first_[k] = global::largest_remaining(system_, view_.units, k + 1, m);
     later_[k] = m > 1 ? global::largest_remaining(system_, view_.units, k + 1, m - 1) : 0;
     Duration window = own.length;
-    for (int steps = 0; window <= own.limit - own.jitter && steps < global::kMaxSteps; ++steps) {
-      const Waits found = waits(k, window);
-      const Duration grown = add(add(own.length, found.shared / m), found.serial);
-      if (grown <= window) {
-        own.response = window + own.jitter;
-        return true;
-      }
-      window = grown;
-    }
-    return false;
+    const bool found = global::least_fixed_point(own.limit - own.jitter, window, [&](Duration x) {
+      const Waits in_window = waits(k, x);
+      return add(add(own.length, in_window.shared / m), in_window.serial);
+    });
+    own.response = window + own.jitter;
+    return found;
   }
 
   [[nodiscard]] ResponseBound itemise(std::size_t k) const {
@@ -163,6 +186,7 @@ class Analysis {
   }
 
   const System &system_;
+  bool preempts_;
   global::Units view_;
   std::vector<std::vector<Share>> shares_;  // by position in view_, then group
   std::vector<Duration> first_;             // less urgent work that the path can find at its start
@@ -170,7 +194,7 @@ class Analysis {
 };
 
 Outcome apply_groups(const System &system) {
-  if (system.groups.empty()) return NotApplicable{"no exclusive group is shared: see dag_nonpreemptive"};
+  if (system.groups.empty()) return NotApplicable{"no exclusive group is shared: see the bounds without"};
   Analysis analysis(system);
   if (analysis.reason()) return NotApplicable{*analysis.reason()};
   return analysis.run();
@@ -184,8 +208,9 @@ Method dag_groups() {
   method.subject = Subject::Dag;
   method.cite = "docs/analysis.md, \"Exclusive groups\"";
   method.assumptions =
-      "m workers, jobs run to completion, static priorities that keep DAGs together, one rate a DAG, R <= T; release "
-      "jitter, exclusive groups within and across DAGs; no max_active";
+      "m workers, full preemption (a group's holder inherits) or none, static priorities that keep DAGs together, one "
+      "rate "
+      "a DAG, R <= T; release jitter, exclusive groups within and across DAGs; no max_active, no shared levels";
   method.complexity = "pseudo-polynomial; O(DAGs^2 groups) a step";
   method.apply = [](const System &system) { return across_rates(system, apply_groups); };
   return method;

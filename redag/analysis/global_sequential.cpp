@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/fixed_point.hpp"
 #include "redag/analysis/rate_edges.hpp"
 #include "redag/analysis/waiting_window.hpp"
 

@@ -7,15 +7,13 @@
 #include <vector>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/fixed_point.hpp"
 #include "redag/analysis/global.hpp"
 #include "redag/analysis/rate_edges.hpp"
 #include "redag/analysis/waiting_window.hpp"
 
 namespace redag::analysis {
 namespace {
-
-constexpr int kMaxRounds = 1000;
-constexpr std::string_view kOverloaded = "the executor's busy window was not found to end: it is overloaded, or nearly";
 
 // From a task's arrival to its finish: C + the shares of others + what its own earlier jobs add (or take away).
 struct FromReady {
@@ -68,28 +66,37 @@ class Executor {
   }
 
  private:
+  // Of each callback, units in their order and tasks in that of their edges: when it arrives, and its response.
   std::string_view solve() {
-    bool changed = true;
-    for (int round = 0; changed; ++round) {
-      if (round == kMaxRounds) return "gave up: arrivals and responses did not agree in a thousand rounds";
-      changed = false;
-      for (const Unit &unit : system_.units) {
-        for (const std::uint32_t t : unit.tasks) {
-          Callback &callback = callbacks_[t];
-          const Duration ready = latest_arrival(t);
-          changed = changed || ready != callback.ready;
-          callback.ready = ready;
-          const Duration limit = std::min(unit.limit, unit.period) - ready;
-          if (limit < callback.wcet) return kExceeds;
-          const auto found = respond_(callbacks_, t, limit);
-          if (!found || found->response > limit) return kExceeds;
-          changed = changed || found->response != callback.response;
-          callback.response = found->response;
-        }
+    std::vector<Duration *> values;
+    std::vector<std::uint32_t> whose;
+    for (const Unit &unit : system_.units) {
+      for (const std::uint32_t t : unit.tasks) {
+        values.push_back(&callbacks_[t].ready);
+        values.push_back(&callbacks_[t].response);
+        whose.push_back(t);
       }
     }
-    return {};
+    return global::agree(values, "some callback's response can exceed its limit, which all others rely on",
+                         [&](std::size_t k) {
+                           const std::uint32_t t = whose[k / 2];
+                           if (k % 2 == 1) return respond(t);
+                           callbacks_[t].ready = latest_arrival(t);
+                           return true;
+                         });
   }
+
+  bool respond(std::uint32_t t) {
+    Callback &callback = callbacks_[t];
+    const Duration limit = limit_of(system_.units[system_.tasks[t].unit]) - callback.ready;
+    if (limit < callback.wcet) return false;
+    const auto found = respond_(callbacks_, t, limit);
+    if (!found || found->response > limit) return false;
+    callback.response = found->response;
+    return true;
+  }
+
+  static Duration limit_of(const Unit &unit) { return std::min(unit.limit, unit.period); }
 
   [[nodiscard]] Duration latest_arrival(std::uint32_t t) const {
     const SystemTask &task = system_.tasks[t];
@@ -112,7 +119,7 @@ class Executor {
     Duration earlier = 0;
     Duration jitter = 0;
     for (bool more = true; more;) {
-      const auto found = respond_(callbacks_, at, std::min(unit.limit, unit.period) - callbacks_[at].ready);
+      const auto found = respond_(callbacks_, at, limit_of(unit) - callbacks_[at].ready);
       own += callbacks_[at].wcet;
       earlier += found->earlier;
       for (std::size_t j = 0; j < found->shares.size(); ++j) {
@@ -137,9 +144,6 @@ class Executor {
     return bound;
   }
 
-  static constexpr std::string_view kExceeds =
-      "some callback's response can exceed its limit, which all others rely on";
-
   const System &system_;
   Respond respond_;
   std::vector<Callback> callbacks_;  // by TaskId
@@ -159,51 +163,16 @@ std::optional<std::string> why_not_one_thread(const System &system) {
   return why_not(system);
 }
 
-// Least fixed point of a monotone `next` from `value` on; false above `stop`.
-template <class Next>
-bool grow(Duration &value, Duration stop, Next next) {
-  for (int step = 0; value <= stop && step < global::kMaxSteps; ++step) {
-    const Duration grown = next(value);
-    if (grown <= value) return true;
-    value = grown;
+// The published busy window holds one job of each callback where all keep J + R <= T (docs/analysis.md, "rclcpp's
+// executors"), so that nothing of it is left but the sum of all.
+std::optional<FromReady> casini_response(const std::vector<Callback> &callbacks, std::size_t i, Duration /*limit*/) {
+  FromReady found;
+  for (const Callback &callback : callbacks) {
+    found.response = add(found.response, callback.wcet);
+    found.shares.push_back(callback.wcet);
   }
-  return false;
-}
-
-Duration arrived_work(const std::vector<Callback> &callbacks, std::size_t skip, Duration length) {
-  Duration sum = 0;
-  for (std::size_t j = 0; j < callbacks.size(); ++j) {
-    if (j != skip) sum = add(sum, multiply(arrivals(callbacks[j], length), callbacks[j].wcet));
-  }
-  return sum;
-}
-
-std::optional<FromReady> casini_response(const std::vector<Callback> &callbacks, std::size_t i, Duration limit) {
-  const Callback &own = callbacks[i];
-  Duration window = 1;
-  constexpr std::size_t kNobody = SIZE_MAX;
-  if (!grow(window, kUnbounded - 1, [&](Duration length) { return arrived_work(callbacks, kNobody, length); })) {
-    return std::nullopt;
-  }
-  // The arrivals of its own at which another job has come: the n-th no sooner than A.
-  std::optional<FromReady> worst;
-  for (Duration n = 1; n < global::kMaxSteps; ++n) {
-    const Duration arrival = std::max<Duration>(0, multiply(n - 1, own.period) - own.ready);
-    if (arrival >= window) return worst;
-    Duration start = multiply(n - 1, own.wcet);
-    const bool found = grow(start, add(arrival, limit), [&](Duration begin) {
-      return add(multiply(n - 1, own.wcet), arrived_work(callbacks, i, begin + 1));
-    });
-    // It waits for nothing that comes after its own arrival if it can start at once.
-    const Duration response = start - arrival + own.wcet;
-    if (!found || response > limit) return std::nullopt;
-    if (worst && response <= worst->response) continue;
-    worst = FromReady{response, (n - 1) * own.wcet - arrival, {}};
-    for (std::size_t j = 0; j < callbacks.size(); ++j) {
-      worst->shares.push_back(j == i ? 0 : arrivals(callbacks[j], start + 1) * callbacks[j].wcet);
-    }
-  }
-  return std::nullopt;
+  found.shares[i] = 0;
+  return found;
 }
 
 // 1 where j is registered before i.
@@ -217,7 +186,7 @@ std::optional<FromReady> blass_response(const std::vector<Callback> &callbacks, 
   FromReady found;
   found.shares.resize(callbacks.size());
   Duration window = 1;
-  const bool ends = grow(window, limit, [&](Duration length) {
+  const bool ends = global::least_fixed_point(limit, window, [&](Duration length) {
     found.earlier = (arrivals(own, length + own.response - 1) - 1) * own.wcet;
     Duration sum = found.earlier;
     for (std::size_t j = 0; j < callbacks.size(); ++j) {
@@ -278,17 +247,6 @@ std::optional<FromReady> rates_response(const std::vector<Callback> &callbacks, 
 
 Outcome apply_casini(const System &system) {
   if (auto reason = why_not_one_thread(system)) return NotApplicable{*reason};
-  Int128 share = 0;  // of the processor, in units of 2^-40, rounded up
-  for (const SystemTask &task : system.tasks) {
-    const Duration period = system.units[task.unit].period;
-    share += ((Int128{task.wcet} << 40U) + period - 1) / period;
-  }
-  // Above one, windows would not end; just below it, they would take too long to.
-  if (share >= Int128{1} << 40U) {
-    ResponseBound none;
-    none.absent = kOverloaded;
-    return from_units(system, std::vector<ResponseBound>(system.units.size(), none));
-  }
   return Executor(system, casini_response).run();
 }
 
@@ -332,7 +290,7 @@ Method casini() {
   return make("casini",
               "D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, Response-time analysis of ROS 2 processing chains "
               "under reservation-based scheduling, ECRTS 2019",
-              kOneThread, "pseudo-polynomial; O(tasks^2) a step, at most 1000 rounds", apply_casini);
+              kOneThread, "O(tasks^2) a round, at most 1000 rounds", apply_casini);
 }
 
 Method blass() {

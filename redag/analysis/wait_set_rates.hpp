@@ -14,7 +14,8 @@ namespace redag::analysis {
 
 /// One thread. For a job that arrives A after the begin of a busy window, the least R with
 /// A + R >= C_i eta_i(A + 1) + sum_j C_j eta_j(A + R - C_i + 1), the largest over all A: every other callback delays
-/// it, whatever its priority. D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, ECRTS 2019, lemmas 4 to 7.
+/// it, whatever its priority. D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, ECRTS 2019, lemmas 4 to 7. With the
+/// requirement above that is the sum of all C (proof: docs/analysis.md, "rclcpp's executors").
 [[nodiscard]] Method casini();
 
 /// One thread. The least S with S >= 1 + sum_j C_j min(eta_j(S + R_j - 1), p + h_ij) + C_i (eta_i(S + R_i - 1) - 1), p

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "redag/analysis/executors.hpp"
 #include "redag/analysis/wait_set_rates.hpp"
@@ -182,11 +183,72 @@ TEST(WaitSetBound, MoreExecutionNeverShrinksABoundAndTermsAddUp) {
   EXPECT_GT(compared, 1000U);
 }
 
+// The published form for callbacks without predecessors: a busy window, and every arrival of i's own in it.
+std::optional<Duration> published_casini(const System &system, std::size_t i) {
+  const auto arrivals = [&](std::size_t j, Duration length) {
+    const SystemTask &task = system.tasks[j];
+    return (length + task.jitter + task.period - 1) / task.period;
+  };
+  const auto work = [&](Duration length, std::size_t skip) {
+    Duration sum = 0;
+    for (std::size_t j = 0; j < system.tasks.size(); ++j) {
+      if (j != skip) sum += arrivals(j, length) * system.tasks[j].wcet;
+    }
+    return sum;
+  };
+  const SystemTask &own = system.tasks[i];
+  Duration window = 1;
+  for (Duration next = 0; (next = work(window, system.tasks.size())) > window; window = next) {
+    if (next > 1'000'000) return std::nullopt;
+  }
+  Duration worst = 0;
+  for (Duration n = 1;; ++n) {
+    const Duration arrival = std::max<Duration>(0, (n - 1) * own.period - own.jitter);
+    if (arrival >= window) return worst;
+    Duration start = (n - 1) * own.wcet;
+    for (Duration next = 0; (next = (n - 1) * own.wcet + work(start + 1, i)) > start; start = next) {
+      if (next > 1'000'000) return std::nullopt;
+    }
+    worst = std::max(worst, start - arrival + own.wcet);
+  }
+}
+
+TEST(WaitSetBound, CasiniIsThePublishedForm) {
+  std::uint64_t bounded = 0;
+  std::uint64_t unbounded = 0;
+  for (std::uint64_t seed = 0; seed < 5000; ++seed) {
+    Rng rng(mix(seed));
+    const testing::BoundCase bound_case = callbacks(1, 0.9, false)(rng);
+    const System system = compile(bound_case.workload, bound_case.platform).value();
+    const Outcome outcome = casini().apply(system);
+    if (!system.not_analysable.empty() || !std::holds_alternative<Bound>(outcome)) continue;
+    bool all = true;
+    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+      const SystemTask &task = system.tasks[t];
+      const auto published = published_casini(system, t);
+      const auto ours = std::get<Bound>(outcome).tasks[t].response;
+      all = all && published && *published + task.jitter <= task.period;
+      if (ours) {
+        ASSERT_EQ(*ours, published.value_or(kNever) + task.jitter) << describe(bound_case);
+      }
+    }
+    for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) {
+      ASSERT_EQ(bound.response.has_value(), all) << describe(bound_case);
+    }
+    ++(all ? bounded : unbounded);
+  }
+  EXPECT_GT(bounded, 500U);
+  EXPECT_GT(unbounded, 500U);
+}
+
 TEST(WaitSetBound, OverloadIsNotBounded) {
-  Workload workload = three_timers(1);
-  for (Dag &dag : workload.dags) dag.tasks[0].period = dag.tasks[0].deadline = 15;
-  const Outcome outcome = casini().apply(compile(workload, platform_of(workload)).value());
-  for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) EXPECT_FALSE(bound.response);
+  const auto with_period = [](Duration period) {
+    Workload workload = three_timers(1);
+    for (Dag &dag : workload.dags) dag.tasks[0].period = dag.tasks[0].deadline = period;
+    return std::get<Bound>(casini().apply(compile(workload, platform_of(workload)).value())).tasks[0].response;
+  };
+  EXPECT_EQ(with_period(15), 15);
+  EXPECT_FALSE(with_period(14));
 }
 
 TEST(WaitSetBound, TimesNearTheLargestDoNotWrap) {

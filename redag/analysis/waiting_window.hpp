@@ -53,23 +53,12 @@ class Largest {
   return least;
 }
 
-// The least d, from the given one on, with sum_i min(W_i(d), d) + rest < m d, by steps of least_window(): work grows
+// The least d with sum_i min(W_i(d), d) + rest < m d is sought by steps of least_window() (fixed_point.hpp): work grows
 // with the window, so no d that one of them skips can do. That a job waits in d instants would take m d of work, so it
-// waits in less. Plain iteration instead creeps, a nanosecond a step, while m tasks interfere in every instant. False
-// above `stop`.
-template <class Window>
-[[nodiscard]] bool least_fixed_point(Duration stop, Duration &d, Window next) {
-  for (int steps = 0; d <= stop && steps < kMaxSteps; ++steps) {
-    const Duration grown = next(d);
-    if (grown <= d) return true;
-    d = grown;
-  }
-  return false;
-}
-
-// Where to begin to look for it if each of the others does at least min(least_i, d) in the window: no smaller d does.
-// From 1 on, where work grows as fast as the window, one step a nanosecond would be all that as many others as workers
-// allow.
+// waits in less. Plain iteration instead creeps, a nanosecond a step, while m tasks interfere in every instant.
+//
+// This says where to begin if each of the others does at least min(least_i, d) in the window: no smaller d does. From 1
+// on, where work grows as fast as the window, one step a nanosecond would be all that as many others as workers allow.
 class FirstWindow {
  public:
   FirstWindow(std::uint32_t workers, Duration rest) : workers_(workers), sum_(rest), largest_(workers - 1) {}

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <charconv>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "redag/cli/analysis_arguments.hpp"
+#include "redag/cli/analysis_chains.hpp"
 #include "redag/cli/analysis_explanation.hpp"
 #include "redag/cli/analysis_report.hpp"
 #include "redag/cli/commands.hpp"
@@ -21,6 +24,7 @@ struct Options {
   AnalysisArguments analysis;
   std::string executor = "redag";
   std::string explain;
+  std::vector<std::string> chains;
   bool methods = false;
   std::uint64_t explore = 0;  // states; 0: not asked for
 };
@@ -36,10 +40,27 @@ const Choices<std::string> &executor_choices() {
 
 constexpr std::uint64_t kUsualStates = 1'000'000;
 
+// Nothing if there is no such task; the console was told.
+std::optional<std::vector<ChainRow>> find_chains(const Analysed &analysed, const Options &options, Console &console) {
+  std::vector<ChainRow> rows;
+  for (const std::string &chain : options.chains) {
+    Result<ChainRow> row = find_chain(analysed, chain);
+    if (!row) {
+      console.error("--chain: " + row.error().front().message, row.error().front().hint);
+      return std::nullopt;
+    }
+    rows.push_back(*std::move(row));
+  }
+  return rows;
+}
+
 // One task or DAG in words, or all of it. False if the one is not there.
 bool report(const Analysed &analysed, const Options &options, Console &console) {
+  const std::optional<std::vector<ChainRow>> chains = find_chains(analysed, options, console);
+  if (!chains) return false;
   Json document;
   if (options.analysis.run.json) document = to_json(analysed);
+  if (options.analysis.run.json && !chains->empty()) document["chains"] = to_json(analysed, *chains);
   if (!options.explain.empty()) {
     const Result<Row> row = find_row(analysed, options.explain);
     if (!row) {
@@ -53,6 +74,9 @@ bool report(const Analysed &analysed, const Options &options, Console &console) 
     }
   } else if (!options.analysis.run.json) {
     console.print(describe(analysed, console.out_traits(), options.analysis.run.all_tasks));
+  }
+  if (!options.analysis.run.json && !chains->empty()) {
+    console.print("\n" + describe(analysed, *chains, console.out_traits()));
   }
   if (options.analysis.run.json) {
     console.print(to_text(document));
@@ -104,6 +128,10 @@ int analyze_file(const Options &options, Console &console) {
     console.error("--explore follows our executor alone, not '" + options.executor + "'", "leave one of the two out");
     return kExitBad;
   }
+  if (!options.chains.empty() && options.executor != "redag") {
+    console.error("--chain is for our executor alone, not '" + options.executor + "'", "leave one of the two out");
+    return kExitBad;
+  }
   const std::optional<Workload> workload = load_configured(options.analysis.run, console);
   if (!workload) return kExitBad;
   const Result<Analysed> analysed = analyse_configured(*workload, options, console);
@@ -126,6 +154,13 @@ Action add_analyze(CLI::App &app) {
       ->default_str(options->executor);
   app.add_option("--explain", options->explain, "Where the bound of one task (dag.task) or DAG comes from")
       ->type_name("TASK");
+  app.add_option(
+         "--chain", options->chains,
+         "Reaction time and data age of a cause-effect chain, also over several DAGs: dag.task,dag.task; can be "
+         "given several times")
+      ->type_name("TASK,TASK...")
+      ->expected(1)
+      ->take_all();
   app.add_flag("--methods", options->methods,
                "Every method's assumptions, citation and complexity; FILE may be missing");
   app.add_flag(

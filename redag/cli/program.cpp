@@ -50,6 +50,7 @@ constexpr std::array kCommands = {
           "  redag analyze cart.yaml\n"
           "  redag analyze cart.yaml --preemption none --workers 2 --check\n"
           "  redag analyze cart.yaml --explain control.pid\n"
+          "  redag analyze cart.yaml --chain sensors.camera,control.pid\n"
           "  redag analyze cart.yaml --executor ste\n"
           "  redag analyze cart.yaml --preemption none --explore\n"
           "  redag analyze --methods\n"},

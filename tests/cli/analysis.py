@@ -78,6 +78,21 @@ class Analyze(Case):
         self.assertIn("fast: no bound", text)
         self.assertIn("jobs would be skipped", text)
 
+    def test_chains(self):
+        chain = ("--preemption", "os", "--chain", "fast.sense,fast.act,slow.plan", "--chain", "slow.plan")
+        text = self.expect(redag("analyze", self.cart, *chain), 0).stdout
+        self.assertRegex(text, r"chain +reaction +age +LET\n")
+        self.assertIn("\n  fast.sense to fast.act: period 10ms, response ", text)
+        document = json.loads(redag("analyze", self.cart, "--json", *chain).stdout)
+        first, second = document["chains"]
+        self.assertEqual(first["age_ns"], sum(part["period_ns"] + part["response_ns"] for part in first["segments"]))
+        self.assertLessEqual(first["reaction_ns"], first["age_ns"])
+        # Right after a read at 0: read at 100 ms, written at its deadline.
+        self.assertEqual((second["age_ns"], second["let_ns"]), (133_000_000, 200_000_000))
+        self.expect(redag("analyze", self.cart, "--chain", "fast.sense,slow.plam"), 2, "did you mean 'slow.plan'?")
+        self.expect(redag("analyze", self.cart, "--chain", "fast"), 2, "'fast' is a DAG")
+        self.expect(redag("analyze", self.cart, "--chain", "fast.act", "--executor", "ste"), 2, "our executor alone")
+
     def test_unknown_task(self):
         self.expect(redag("analyze", self.cart, "--explain", "slow.plam"), 2, "did you mean 'slow.plan'?")
         self.expect(redag("analyze", self.cart, "--explain", "act"), 2, "did you mean 'fast.act'?")

@@ -1,0 +1,67 @@
+#include "redag/cli/analysis_chains.hpp"
+
+#include <gtest/gtest.h>
+
+namespace redag::cli {
+namespace {
+
+// One worker: sensor (T 10, C 3) above a DAG of two (T 20, C 2 and 5), in milliseconds.
+Analysed sensor_and_pipeline() {
+  const auto timer = [](std::string name, Duration period, Duration wcet) {
+    Task task;
+    task.name = std::move(name);
+    task.period = task.deadline = period * kMillisecond;
+    task.wcet = task.bcet = wcet * kMillisecond;
+    return task;
+  };
+  Task second = timer("second", 20, 5);
+  second.activation = Activation::Data;
+  second.predecessors = {0};
+  Workload workload;
+  workload.name = "chains";
+  workload.platform = Platform{1, PreemptionMode::Os};
+  workload.dags = {Dag{"sensor", {timer("read", 10, 3)}, 0, 0, 0, Criticality::Normal, {}},
+                   Dag{"pipeline", {timer("first", 20, 2), second}, 0, 0, 0, Criticality::Normal, {}}};
+  Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload));
+  EXPECT_TRUE(analysed) << to_string(analysed.error());
+  return *std::move(analysed);
+}
+
+TEST(AnalysisChains, OverSeveralDags) {
+  const Analysed analysed = sensor_and_pipeline();
+  const Result<ChainRow> row = find_chain(analysed, "sensor.read,pipeline.first,pipeline.second");
+  ASSERT_TRUE(row) << to_string(row.error());
+  const auto &bound = std::get<analysis::ChainBound>(row->bound);
+  ASSERT_EQ(bound.segments.size(), 2U);  // the edge hands over job by job
+  EXPECT_EQ(bound.segments[1].response, (2 + 5 + 3) * kMillisecond);
+  EXPECT_EQ(bound.age(), (10 + 3 + 20 + 10) * kMillisecond);
+  // The sensor ends before a pipeline of the same release starts: 10 + max(3, 20) + 10.
+  EXPECT_EQ(bound.reaction(), 40 * kMillisecond);
+  EXPECT_FALSE(row->let);  // not a timer, the last one
+
+  const std::string text = describe(analysed, {*row}, StreamTraits{});
+  EXPECT_NE(text.find("sensor.read > pipeline.first > pipeline.second"), std::string::npos) << text;
+  EXPECT_NE(text.find("  pipeline.first to pipeline.second: period 20ms, response 10ms\n"), std::string::npos) << text;
+  const Json json = to_json(analysed, {*row});
+  EXPECT_EQ(json[0]["reaction_ns"], 40 * kMillisecond);
+  EXPECT_EQ(json[0]["segments"].size(), 2U);
+}
+
+TEST(AnalysisChains, OfTimersLogicalExecutionTimeIsExact) {
+  const Result<ChainRow> row = find_chain(sensor_and_pipeline(), "sensor.read,pipeline.first");
+  ASSERT_TRUE(row);
+  // Right after 10: read at 20 and written at 30, read at 40 and written at 60.
+  EXPECT_EQ(row->let, 50 * kMillisecond);
+}
+
+TEST(AnalysisChains, SaysWhatIsWrongWithAName) {
+  const Analysed analysed = sensor_and_pipeline();
+  for (const char *chain : {"", "sensor.read,", "sensor.raed", "pipeline"}) {
+    const Result<ChainRow> row = find_chain(analysed, chain);
+    ASSERT_FALSE(row) << chain;
+    EXPECT_FALSE(row.error().front().message.empty());
+  }
+}
+
+}  // namespace
+}  // namespace redag::cli
