@@ -47,6 +47,7 @@ Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
   EngineOptions engine;
   engine.name = options_.name;
   engine.config = setup_.config;
+  engine.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id means one task
   engine.band = setup_.band;
   engine.cpus = options_.cpus;
   engine.trace_capacity = options_.trace_capacity;
@@ -94,11 +95,28 @@ DagId Executor::add(DagBuilder builder) {
   }
   const LockGuard guard(lock_);
   if (options_.admission) admit(dag);
-  const AddedDag ids = engine_->add_dag(dag, std::move(bodies));
-  const TaskId first = ids.tasks.empty() ? TaskId(0) : ids.tasks.front();  // the others follow: ids are not reused
-  dags_.push_back(Added{dag.name, dag.tasks, dag.max_active, first, false, options_.admission ? dag : Dag{}});
-  timer_->add(dag, first, running_ ? std::max<Time>(0, engine_->now()) : 0);
-  return ids.dag;
+  const DagId id(next_dag_);
+  Added added{dag.name, dag.tasks, dag.max_active, engine_->add_dag(dag, std::move(bodies)), 0, false, {}};
+  if (options_.admission) added.dag = dag;
+  own(id, added.ids.tasks);
+  added.left = added.ids.tasks.size();
+  timer_->add(dag, added.ids.tasks, running_ ? std::max<Time>(0, engine_->now()) : 0);
+  dags_.emplace(id.value, std::move(added));
+  ++next_dag_;
+  return id;
+}
+
+// A DAG is forgotten once all its tasks' ids are others'.
+void Executor::own(DagId dag, const std::vector<TaskId> &tasks) {
+  for (std::uint32_t position = 0; position < tasks.size(); ++position) {
+    const std::uint32_t task = tasks[position].value;
+    if (task >= owners_.size()) {
+      owners_.resize(task + 1);
+    } else if (const auto former = dags_.find(owners_[task].dag.value); former != dags_.end()) {
+      if (--former->second.left == 0) dags_.erase(former);
+    }
+    owners_[task] = Owner{dag, position};
+  }
 }
 
 void Executor::admit(const Dag &dag) const {
@@ -106,7 +124,7 @@ void Executor::admit(const Dag &dag) const {
   workload.name = options_.name;
   workload.platform = Platform{options_.workers, setup_.mode.mode};
   workload.policy = options_.policy;
-  for (const Added &other : dags_) {
+  for (const auto &[id, other] : dags_) {
     if (!other.removed) workload.dags.push_back(other.dag);
   }
   workload.dags.push_back(dag);
@@ -116,13 +134,18 @@ void Executor::admit(const Dag &dag) const {
 }
 
 void Executor::remove(DagId dag) {
+  DagId removed;
   {
     const LockGuard guard(lock_);
-    Added &gone = dags_[added_position(dag)];
+    if (dag.value >= next_dag_) throw std::out_of_range("there is no such DAG");
+    const auto found = dags_.find(dag.value);
+    if (found == dags_.end() || found->second.removed) return;
+    Added &gone = found->second;
     gone.removed = true;
-    timer_->remove(gone.first, gone.tasks.size());
+    timer_->remove(gone.ids.tasks);
+    removed = gone.ids.dag;
   }
-  engine_->remove_dag(dag);  // destroys bodies, which may own anything: not under our lock
+  engine_->remove_dag(removed);  // destroys bodies, which may own anything: not under our lock
 }
 
 // ---- the run ----
@@ -231,17 +254,15 @@ void Executor::on_exception(const Job &job, std::exception_ptr exception) {
 
 void Executor::drain(std::vector<JobEvent> &events) { engine_->drain(events, finished_); }
 
-std::size_t Executor::added_position(DagId dag) const {
-  if (dag.value >= dags_.size()) throw std::out_of_range("there is no such DAG");
-  return dag.value;
-}
-
 std::vector<TaskStats> Executor::stats(DagId dag) const {
   const LockGuard guard(lock_);
-  const Added &of = dags_[added_position(dag)];
+  const auto found = dags_.find(dag.value);
+  if (found == dags_.end()) throw std::out_of_range("there is no such DAG");
+  const Added &of = found->second;
+  if (of.left < of.tasks.size()) throw std::out_of_range("the DAG was removed, and another one has its place");
   std::vector<TaskStats> result;
   for (std::size_t i = 0; i < of.tasks.size(); ++i) {
-    const TaskId task(of.first.value + i);
+    const TaskId task = of.ids.tasks[i];
     result.push_back(TaskStats{of.name + "." + of.tasks[i].name, engine_->accounting(task), engine_->usage(task)});
   }
   return result;
@@ -249,21 +270,19 @@ std::vector<TaskStats> Executor::stats(DagId dag) const {
 
 std::string Executor::task_name(TaskId task) const {
   const LockGuard guard(lock_);
-  for (const Added &dag : dags_) {
-    if (task.value - dag.first.value < dag.tasks.size() && task.value >= dag.first.value) {
-      return dag.name + "." + dag.tasks[task.value - dag.first.value].name;
-    }
-  }
-  return fmt::format("task {}", task.value);
+  if (task.value >= owners_.size()) return fmt::format("task {}", task.value);
+  const Owner &owner = owners_[task.value];  // which is there as long as it owns a task
+  const Added &dag = dags_.at(owner.dag.value);
+  return dag.name + "." + dag.tasks[owner.position].name;
 }
 
 void Executor::sample(live::Sample &sample) const {
   const LockGuard guard(lock_);
-  for (const Added &dag : dags_) {
+  for (const auto &[number, dag] : dags_) {
     if (dag.removed) continue;
     sample.dags.push_back({dag.name, dag.max_active});
     for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
-      const TaskId id(dag.first.value + i);
+      const TaskId id = dag.ids.tasks[i];
       live::TaskSample task;
       fill(task, engine_->figures(id));
       task.key = id.value;

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <exception>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -95,9 +96,10 @@ class Executor {
 
   /// Adds a DAG, before or while running; its release grid begins at the start, or now. Throws std::invalid_argument
   /// with all mistakes if it is not valid, AdmissionRefused with the reason if `admission` says no; nothing is changed
-  /// then.
+  /// then. Ids of DAGs are not used again.
   DagId add(DagBuilder dag);
-  /// What has not started is skipped, what has started ends as usual; a body is destroyed once it no longer runs.
+  /// What has not started is skipped, what has started ends as usual; a body is destroyed once it no longer runs. Does
+  /// nothing the second time. Throws std::out_of_range if there has been no such DAG.
   void remove(DagId dag);
 
   /// start(), and wait(). Throws what start() and wait() throw.
@@ -129,8 +131,9 @@ class Executor {
   /// to started jobs afterwards follows no rules.
   [[nodiscard]] Time stopped_at() const { return engine_->halted_at(); }
   [[nodiscard]] std::uint64_t lost_events() const { return engine_->lost_events(); }
+  /// Of a DAG that was removed as long as no later one has its place; with a trace always. Throws std::out_of_range.
   [[nodiscard]] std::vector<TaskStats> stats(DagId dag) const;
-  /// "control.ekf"
+  /// "control.ekf"; of a task that was removed as long as none has its id, which is as long as a job of it runs.
   [[nodiscard]] std::string task_name(TaskId task) const;
 
  private:
@@ -138,9 +141,14 @@ class Executor {
     std::string name;
     std::vector<Task> tasks;
     std::uint32_t max_active = 0;
-    TaskId first;
+    AddedDag ids;          // the engine's
+    std::size_t left = 0;  // of the tasks' ids, those that no later task has
     bool removed = false;
     Dag dag;  // for `admission` only
+  };
+  struct Owner {
+    DagId dag;  // ours
+    std::uint32_t position = 0;
   };
   void finish();
   void admit(const Dag &dag) const REDAG_REQUIRES(lock_);
@@ -148,8 +156,7 @@ class Executor {
   [[nodiscard]] Result<void> start_watchdog();
   void sample(live::Sample &sample) const;
   void on_exception(const Job &job, std::exception_ptr exception);
-  /// Throws std::out_of_range.
-  [[nodiscard]] std::size_t added_position(DagId dag) const REDAG_REQUIRES(lock_);
+  void own(DagId dag, const std::vector<TaskId> &tasks) REDAG_REQUIRES(lock_);
 
   ExecutorOptions options_;
   Setup setup_;
@@ -157,7 +164,10 @@ class Executor {
   std::unique_ptr<ReleaseTimer> timer_;
   std::unique_ptr<Watchdog> watchdog_;  // from start() until no body is left
   mutable PiMutex lock_;
-  std::vector<Added> dags_ REDAG_GUARDED_BY(lock_);
+  // Without a trace the engine uses ids again, so that memory does not grow with the DAGs there have been.
+  std::map<std::uint32_t, Added> dags_ REDAG_GUARDED_BY(lock_);  // by DagId
+  std::uint32_t next_dag_ REDAG_GUARDED_BY(lock_) = 0;
+  std::vector<Owner> owners_ REDAG_GUARDED_BY(lock_);   // by TaskId
   std::exception_ptr failure_ REDAG_GUARDED_BY(lock_);  // the first that stopped us
   bool running_ REDAG_GUARDED_BY(lock_) = false;
   Mutex finishing_;  // one thread at a time begins or ends the run

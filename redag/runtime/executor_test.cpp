@@ -166,6 +166,69 @@ TEST(Executor, DagsComeAndGoWhileItRunsAlsoFromBodies) {
   }
 }
 
+// Without a trace, what is kept does not grow with the DAGs there have been; a trace needs ids that name one task.
+TEST(Executor, WhatWasRemovedMakesRoom) {
+  for (const bool traced : {false, true}) {
+    ExecutorOptions options = one_worker();
+    options.trace_capacity = traced ? 64 : 0;
+    Executor executor(options);
+    const auto dag = [](int number) {
+      DagBuilder builder("dag" + std::to_string(number));
+      const TaskHandle first = builder.timer("first", 1s, [] {});
+      builder.data("second", {first}, [] {});
+      return builder;
+    };
+    constexpr std::uint32_t kDags = 100;
+    DagId last;
+    for (std::uint32_t number = 0; number < kDags; ++number) {
+      if (last.valid()) {
+        executor.remove(last);
+        EXPECT_EQ(executor.stats(last).size(), 2U) << "nobody has its place yet";
+      }
+      last = executor.add(dag(static_cast<int>(number)));
+      EXPECT_EQ(last, DagId(number));
+      EXPECT_EQ(executor.stats(last)[1].task, "dag" + std::to_string(number) + ".second");
+    }
+    EXPECT_EQ(executor.task_name(TaskId(2 * kDags - 1)), traced ? "dag99.second" : "task 199");
+    EXPECT_EQ(executor.task_name(TaskId(2)), traced ? "dag1.first" : "task 2");
+    if (traced) {
+      EXPECT_EQ(executor.stats(DagId(0))[0].task, "dag0.first");
+    } else {
+      EXPECT_THROW(executor.stats(DagId(0)), std::out_of_range);
+    }
+    executor.remove(DagId(0));  // once more: nothing happens
+    EXPECT_EQ(executor.stats(last).size(), 2U);
+    EXPECT_THROW(executor.remove(DagId(kDags)), std::out_of_range);
+    EXPECT_THROW(executor.stats(DagId(kDags)), std::out_of_range);
+  }
+}
+
+// Another DAG takes the place of its sibling while a job of the removed DAG is in progress.
+TEST(Executor, AJobOfARemovedDagKeepsItsName) {
+  std::vector<std::string> failed;
+  ExecutorOptions options = one_worker();
+  options.on_exception = [&](const ExceptionInfo &info) {
+    failed.push_back(info.task);
+    return OnException::Stop;
+  };
+  Executor executor(options);
+  DagId self;
+  DagBuilder dag("removed");
+  const TaskHandle first = dag.timer("runs", 1ms, [&] {
+    executor.remove(self);
+    DagBuilder other("other");
+    other.timer("alone", 1h, [] {});
+    EXPECT_EQ(executor.stats(executor.add(std::move(other)))[0].task, "other.alone");
+    EXPECT_EQ(executor.task_name(TaskId(1)), "other.alone");
+    EXPECT_THROW(executor.stats(self), std::out_of_range) << "figures of another DAG are given";
+    throw std::runtime_error("while it ends");
+  });
+  dag.data("waits", {first}, [] {});
+  self = executor.add(std::move(dag));
+  EXPECT_THROW(executor.run(), std::runtime_error);
+  EXPECT_EQ(failed, std::vector<std::string>{"removed.runs"});
+}
+
 TEST(Executor, ABodyThatRemovesItsOwnDagFinishes) {
   Executor executor(one_worker());
   auto owned = std::make_shared<int>(0);

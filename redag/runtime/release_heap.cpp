@@ -25,9 +25,9 @@ void ReleaseHeap::add(const Task &task, TaskId id, Time base) {
   std::push_heap(heap_.begin(), heap_.end(), later);
 }
 
-void ReleaseHeap::remove(TaskId first, std::size_t count) {
+void ReleaseHeap::remove(std::span<const TaskId> tasks) {
   const auto removed = [&](const Entry &entry) {
-    return entry.id.value >= first.value && entry.id.value - first.value < count;
+    return std::find(tasks.begin(), tasks.end(), entry.id) != tasks.end();
   };
   heap_.erase(std::remove_if(heap_.begin(), heap_.end(), removed), heap_.end());
   std::make_heap(heap_.begin(), heap_.end(), later);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "redag/base/ids.hpp"
@@ -18,8 +19,8 @@ class ReleaseHeap {
 
   /// Job k of a timer task is released at base + offset + k * period; data tasks are ignored.
   void add(const Task &task, TaskId id, Time base);
-  /// The tasks [first, first + count) release no more.
-  void remove(TaskId first, std::size_t count);
+  /// These tasks release no more.
+  void remove(std::span<const TaskId> tasks);
 
   /// When the next release is to be seen; kNever if there is none.
   [[nodiscard]] Time next() const { return heap_.empty() ? kNever : heap_.front().seen; }

@@ -1,6 +1,7 @@
 #include "redag/runtime/release_heap.hpp"
 
 #include <gtest/gtest.h>
+#include <array>
 
 #include "redag/model/demand.hpp"
 
@@ -59,7 +60,7 @@ TEST(ReleaseHeap, RemovedTasksAndDataTasksReleaseNothing) {
   heap.add(data, TaskId(0), 0);
   EXPECT_EQ(heap.next(), kNever);
   for (std::size_t t = 1; t < 6; ++t) heap.add(timer(10), TaskId(t), 0);
-  heap.remove(TaskId(2), 3);
+  heap.remove(std::array{TaskId(2), TaskId(3), TaskId(4)});
   const auto left = due(heap, 0);
   ASSERT_EQ(left.size(), 2U);
   EXPECT_EQ(left[0].task, TaskId(1));

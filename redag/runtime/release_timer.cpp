@@ -22,17 +22,17 @@ ReleaseTimer::~ReleaseTimer() {
   join();
 }
 
-void ReleaseTimer::add(const Dag &dag, TaskId first_task, Time base) {
+void ReleaseTimer::add(const Dag &dag, std::span<const TaskId> tasks, Time base) {
   {
     const LockGuard guard(lock_);
-    for (std::size_t i = 0; i < dag.tasks.size(); ++i) heap_.add(dag.tasks[i], TaskId(first_task.value + i), base);
+    for (std::size_t i = 0; i < dag.tasks.size(); ++i) heap_.add(dag.tasks[i], tasks[i], base);
   }
   parker_.unpark();
 }
 
-void ReleaseTimer::remove(TaskId first_task, std::size_t count) {
+void ReleaseTimer::remove(std::span<const TaskId> tasks) {
   const LockGuard guard(lock_);
-  heap_.remove(first_task, count);
+  heap_.remove(tasks);
 }
 
 Result<void> ReleaseTimer::start(Time origin, Time horizon, ThreadSetup setup) {
@@ -56,15 +56,16 @@ void ReleaseTimer::main() noexcept {
     const bool stopping = stopping_.load(std::memory_order_acquire);
     const Time now = monotonic_now() - origin_;
     Time next = kNever;
-    due_.clear();
     {
+      // Kept while it reports: whoever removes a task then knows that no release of it is on its way.
       const LockGuard guard(lock_);
+      due_.clear();
       heap_.pop_due(std::min(now, horizon_ - 1), due_);
       next = heap_.next();
-    }
-    if (!due_.empty()) {
-      sink_(due_);
-      continue;
+      if (!due_.empty()) {
+        sink_(due_);
+        continue;
+      }
     }
     if (stopping) return;
     if (next >= horizon_) {

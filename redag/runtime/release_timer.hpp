@@ -20,7 +20,7 @@ namespace redag::runtime {
 
 class ReleaseTimer {
  public:
-  /// Called on the timer's thread, with no lock held.
+  /// Called on the timer's thread, under the timer's lock: it must not call the timer.
   using Sink = std::function<void(std::span<const Release>)>;
 
   ReleaseTimer(Sink sink, std::uint64_t seed);
@@ -29,9 +29,9 @@ class ReleaseTimer {
   ReleaseTimer &operator=(const ReleaseTimer &) = delete;
 
   /// `base`: on the clock whose zero is start()'s `origin`. Before or after start().
-  void add(const Dag &dag, TaskId first_task, Time base);
-  /// A release that is under way can still be reported.
-  void remove(TaskId first_task, std::size_t count);
+  void add(const Dag &dag, std::span<const TaskId> tasks, Time base);
+  /// When it returns, no release of these tasks is reported any more, nor is one under way: their ids are free.
+  void remove(std::span<const TaskId> tasks);
 
   /// Nothing is released at or after `horizon` (kNever: for ever). Error: the thread cannot be set up as asked.
   [[nodiscard]] Result<void> start(Time origin, Time horizon, ThreadSetup setup);
@@ -47,7 +47,7 @@ class ReleaseTimer {
   Sink sink_;
   PiMutex lock_;
   ReleaseHeap heap_ REDAG_GUARDED_BY(lock_);
-  std::vector<Release> due_;
+  std::vector<Release> due_ REDAG_GUARDED_BY(lock_);
   Parker parker_;
   Atomic<bool> stopping_{false};
   Time origin_ = 0;

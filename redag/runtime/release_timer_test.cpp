@@ -1,6 +1,7 @@
 #include "redag/runtime/release_timer.hpp"
 
 #include <gtest/gtest.h>
+#include <array>
 
 #include "redag/runtime/clock.hpp"
 
@@ -31,7 +32,7 @@ TEST(ReleaseTimer, ReportsExactlyTheGridUpToTheHorizon) {
   Collector collector;
   collector.wanted = 20;
   ReleaseTimer timer(collector.sink(), 1);
-  timer.add(one_timer(kMillisecond), TaskId(0), 0);
+  timer.add(one_timer(kMillisecond), std::array{TaskId(0)}, 0);
   ASSERT_TRUE(timer.start(monotonic_now(), 20 * kMillisecond, {}));
   collector.enough.wait();
   timer.stop();
@@ -48,7 +49,7 @@ TEST(ReleaseTimer, AnEarlierReleaseAddedLaterWakesIt) {
   ReleaseTimer timer(collector.sink(), 1);
   const Time origin = monotonic_now();
   ASSERT_TRUE(timer.start(origin, kNever, {}));  // nothing to do: sleeps for ever
-  timer.add(one_timer(3600 * kSecond), TaskId(4), monotonic_now() - origin);
+  timer.add(one_timer(3600 * kSecond), std::array{TaskId(4)}, monotonic_now() - origin);
   collector.enough.wait();
   timer.stop();
   timer.join();
@@ -59,7 +60,7 @@ TEST(ReleaseTimer, AnEarlierReleaseAddedLaterWakesIt) {
 TEST(ReleaseTimer, WhatIsDueAtTheStopIsReported) {
   Collector collector;
   ReleaseTimer timer(collector.sink(), 1);
-  timer.add(one_timer(kMillisecond), TaskId(0), 0);
+  timer.add(one_timer(kMillisecond), std::array{TaskId(0)}, 0);
   timer.stop();
   ASSERT_TRUE(timer.start(monotonic_now() - 10 * kSecond, 10 * kSecond, {}));
   timer.join();

@@ -86,10 +86,11 @@ class Run {
       bodies = options_.bodies(std::move(bodies), [engine_ptr = engine_.get()] { return engine_ptr->now(); });
     engine_->bind(workload_, std::move(bodies));
     timer_ = std::make_unique<ReleaseTimer>([this](auto releases) { engine_->release(releases); }, options_.seed);
-    TaskId first(0);
+    std::size_t next = 0;
     for (const Dag &dag : workload_.dags) {
-      timer_->add(dag, first, 0);
-      first = TaskId(first.value + dag.tasks.size());
+      std::vector<TaskId> tasks;
+      for (std::size_t i = 0; i < dag.tasks.size(); ++i) tasks.emplace_back(next++);
+      timer_->add(dag, tasks, 0);
     }
     if (options_.live) go_live();
     return {};

@@ -1,4 +1,6 @@
 // Every interleaving of what sleeps by time: the parker, the event, the release timer, and an executor around it all.
+#include <array>
+
 #include "protocol.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/release_timer.hpp"
@@ -129,7 +131,7 @@ TEST(TimerProtocol, ReleasesAreOnTheGridUntilTheStop) {
               explored::check(!joined, "a release after the timer's end");
             },
             0);
-        timer.add(one_timer_task(10), TaskId(0), 0);
+        timer.add(one_timer_task(10), std::array{TaskId(0)}, 0);
         explored::check(timer.start(0, 35, {}).has_value(), "the timer does not start");
         explored::tick(12);
         const Time stopped = explored::now();
@@ -155,11 +157,31 @@ TEST(TimerProtocol, AnAdditionIsNotSleptThrough) {
         },
         0);
     explored::check(timer.start(0, 5, {}).has_value(), "the timer does not start");
-    const std::uint32_t other = thread([&] { timer.add(one_timer_task(100), TaskId(1), 0); });
-    timer.add(one_timer_task(100), TaskId(0), 0);
+    const std::uint32_t other = thread([&] { timer.add(one_timer_task(100), std::array{TaskId(1)}, 0); });
+    timer.add(one_timer_task(100), std::array{TaskId(0)}, 0);
     seen.wait();
     explored::join(other);
-    timer.remove(TaskId(0), 2);
+    timer.remove(std::array{TaskId(0), TaskId(1)});
+  });
+}
+
+// Once remove() has returned, the id can be another task's: no release of before comes then.
+TEST(TimerProtocol, WhatWasRemovedIsNotReported) {
+  expect_holds([] {
+    Quiet removed;
+    runtime::ReleaseTimer timer(
+        [&](std::span<const runtime::Release>) {
+          removed.job_begins();
+          removed.job_ends();
+        },
+        0);
+    timer.add(one_timer_task(100), std::array{TaskId(0)}, 0);
+    explored::check(timer.start(0, 5, {}).has_value(), "the timer does not start");
+    const std::uint32_t other = thread([&] {
+      timer.remove(std::array{TaskId(0)});
+      removed.begin();
+    });
+    explored::join(other);
   });
 }
 

@@ -1,0 +1,190 @@
+// A day of scheduler time in the simulator, for random systems: what a long run could wear out. REDAG_LONG_RUN=<n>: so
+// many systems (24), each for 24 hours (otherwise for 2); REDAG_LONG_RUN_SEED=<s>: the first one's seed (1).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "redag/analysis/analyze.hpp"
+#include "redag/base/rng.hpp"
+#include "redag/metrics/deadline_watch.hpp"
+#include "redag/model/generate.hpp"
+#include "redag/sched/executors.hpp"
+#include "redag/sim/simulator.hpp"
+#include "redag/testing/allocation_counter.hpp"
+
+namespace redag::testing {
+namespace {
+
+constexpr Duration kHour = 3600 * kSecond;
+
+// From far below what the workers can do to a little beyond it, with everything that keeps jobs waiting.
+Workload random_system(std::uint64_t seed) {
+  Rng rng(seed);
+  GenerateOptions options;
+  options.dags = static_cast<std::uint32_t>(rng.uniform(2, 4));
+  options.min_tasks = 1;
+  options.max_tasks = 4;
+  options.workers = static_cast<std::uint32_t>(rng.uniform(1, 4));
+  constexpr PreemptionMode kModes[] = {PreemptionMode::None, PreemptionMode::Os};
+  options.preemption = kModes[rng.uniform(0, 1)];
+  options.policy = static_cast<PolicyKind>(rng.uniform(0, 5));
+  options.utilization = options.workers * (0.2 + 0.9 * rng.uniform01());
+  options.utilization = std::min(options.utilization, static_cast<double>(options.dags) * 0.9);
+  options.period_min = kSecond;
+  options.period_max = 60 * kSecond;
+  options.bcet_min = 0.5;
+  options.data_share = rng.uniform01();
+  options.offsets = rng.uniform01() < 0.5;
+  options.jitter = rng.uniform01() < 0.3 ? 0.1 : 0.0;
+  options.max_active_max = static_cast<std::uint32_t>(rng.uniform(0, 2));
+  options.groups = static_cast<std::uint32_t>(rng.uniform(0, 2));
+  options.group_share = options.groups > 0 ? 0.3 : 0.0;
+  options.queue_share = 0.3;
+  const Result<Workload> workload = generate(options, seed);
+  return workload ? *workload : Workload{};
+}
+
+struct Figures {
+  std::uint64_t systems = 0;
+  std::uint64_t jobs = 0;
+  std::uint64_t lost = 0;
+  std::uint64_t bounded = 0;  // tasks and DAGs with a bound
+  double largest_ratio = 0;   // observed / bound
+};
+
+// Looks at the events as they come.
+class Day {
+ public:
+  Day(const Workload &workload, const analysis::Report &report)
+      : report_(report),
+        watch_(workload),
+        released_(workload.task_count()),
+        finished_(workload.task_count()),
+        lost_(workload.task_count()),
+        slowest_(workload.task_count()),
+        slowest_dag_(workload.dags.size()) {
+    for (const TaskRef &ref : flatten(workload)) dag_of_.push_back(ref.dag.value);
+  }
+
+  void add(std::span<const JobEvent> events) {
+    for (const JobEvent &event : events) {
+      EXPECT_GE(event.time, last_) << "time goes back";
+      last_ = event.time;
+      if (event.kind == JobEventKind::Released) ++released_[event.task.value];
+    }
+    watch_.add(events, [this](const metrics::JudgedJob &job) { see(job); });
+  }
+
+  void finish(Time end) {
+    watch_.finish(end, [this](const metrics::JudgedJob &job) { see(job); });
+  }
+
+  void judge(const Workload &workload, const sched::Scheduler &scheduler, Duration length, Figures &figures) const {
+    for (const TaskRef &ref : flatten(workload)) {
+      const std::size_t t = ref.id.value;
+      const sched::Accounting &counted = scheduler.accounting(ref.id);
+      EXPECT_EQ(counted.released, released_[t]);
+      EXPECT_EQ(counted.finished, finished_[t]);
+      EXPECT_EQ(counted.skipped + counted.aborted, lost_[t]);
+      if (ref.task->activation == Activation::Timer && ref.task->jitter == 0) {
+        const auto grid = static_cast<std::uint64_t>((length - 1 - ref.task->offset) / ref.task->period + 1);
+        EXPECT_EQ(counted.released, grid) << "a release of " << ref.task->name << " is missing, or one too many";
+      }
+      figures.jobs += finished_[t];
+      figures.lost += lost_[t];
+      compare(slowest_[t], report_.tasks[t].response, figures);
+    }
+    for (std::size_t d = 0; d < slowest_dag_.size(); ++d) compare(slowest_dag_[d], report_.dags[d].response, figures);
+  }
+
+ private:
+  void see(const metrics::JudgedJob &job) {
+    const std::size_t t = job.record.task.value;
+    if (job.miss == metrics::Miss::Lost) ++lost_[t];
+    if (job.record.outcome == metrics::JobOutcome::Finished) ++finished_[t];
+    if (job.response) slowest_[t] = std::max(slowest_[t], *job.response);
+    Duration &dag = slowest_dag_[dag_of_[t]];
+    if (job.end_to_end) dag = std::max(dag, *job.end_to_end);
+  }
+
+  static void compare(Duration seen, const std::optional<Duration> &bound, Figures &figures) {
+    if (!bound) return;
+    EXPECT_LE(seen, *bound) << "a job answered later than its bound";
+    ++figures.bounded;
+    figures.largest_ratio = std::max(figures.largest_ratio, static_cast<double>(seen) / static_cast<double>(*bound));
+  }
+
+  const analysis::Report &report_;
+  metrics::DeadlineWatch watch_;
+  std::vector<std::size_t> dag_of_;  // by TaskId
+  std::vector<std::uint64_t> released_, finished_, lost_;
+  std::vector<Duration> slowest_;
+  std::vector<Duration> slowest_dag_;
+  Time last_ = 0;
+};
+
+void run_a_day(std::uint64_t seed, Duration length, Figures &figures) {
+  const Workload workload = random_system(seed);
+  if (workload.dags.empty()) return;
+  const sched::Config config = sim::simulated_config(workload);
+  const auto system = analysis::compile(workload, analysis::platform_of(workload));
+  ASSERT_TRUE(system) << to_string(system.error());
+  const analysis::Report report = analysis::analyze(*system);
+  const auto scheduler = sched::make_scheduler("redag", workload, config);
+  Day day(workload, report);
+
+  sim::Options options;
+  options.horizon = length;
+  options.seed = seed;
+  // Of the simulator and the scheduler alone: between the end of one call of the sink and the next.
+  std::uint64_t allocations = 0;
+  std::uint64_t seen = allocation_count();
+  const sim::Result result =
+      sim::simulate(workload, *scheduler, config.workers, options, [&](std::span<const JobEvent> events) {
+        if (!events.empty() && events.front().time > length / 24) allocations += allocation_count() - seen;
+        day.add(events);
+        seen = allocation_count();
+        return !::testing::Test::HasFailure();
+      });
+  EXPECT_EQ(allocations, 0U) << "memory is asked for after the first of 24 hours";
+  if (!::testing::Test::HasFailure()) {
+    day.finish(result.end);
+    day.judge(workload, *scheduler, length, figures);
+  }
+  ++figures.systems;
+}
+
+std::optional<std::uint64_t> environment(const char *name) {
+  const char *text = std::getenv(name);
+  if (text == nullptr) return std::nullopt;
+  return std::strtoull(text, nullptr, 10);
+}
+
+TEST(LongRun, NothingWearsOut) {
+  const std::optional<std::uint64_t> many = environment("REDAG_LONG_RUN");
+  const std::uint64_t wanted = many.value_or(24);
+  const Duration length = many ? 24 * kHour : 2 * kHour;
+  const std::uint64_t first = environment("REDAG_LONG_RUN_SEED").value_or(1);
+  Figures figures;
+  std::uint64_t seed = first;
+  for (; figures.systems < wanted; ++seed) {
+    run_a_day(seed, length, figures);
+    ASSERT_FALSE(HasFailure()) << "seed " << seed;
+  }
+  fmt::print(
+      "[ figures  ] {} systems (seeds {} to {}), {} each: {} jobs finished, {} skipped; {} bounds, largest "
+      "observed/bound {:.3f}\n",
+      figures.systems, first, seed - 1, format_duration(length), figures.jobs, figures.lost, figures.bounded,
+      figures.largest_ratio);
+  EXPECT_GT(figures.bounded, 0U);
+}
+
+}  // namespace
+}  // namespace redag::testing
