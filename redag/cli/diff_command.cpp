@@ -10,6 +10,7 @@
 #include "redag/cli/recorded_runs.hpp"
 #include "redag/cli/signals.hpp"
 #include "redag/trace/events_file.hpp"
+#include "redag/trace/worker_count.hpp"
 
 namespace redag::cli {
 namespace {
@@ -103,7 +104,8 @@ class Diffing {
     if (!side.jobs.runs().empty()) {
       const trace::RunInfo &first = side.jobs.runs().front();
       const bool same_way = first.executor == trace.info.executor && first.preemption == trace.info.preemption &&
-                            first.driver == trace.info.driver && first.config.workers == trace.info.config.workers;
+                            first.driver == trace.info.driver &&
+                            trace::worker_count(first) == trace::worker_count(trace.info);
       if (!same_way) return "its executor, mode, workers or driver differ";
       const std::vector<Change> changes = changes_between(first.workload, trace.info.workload);
       if (!changes.empty()) return changes.front().text();

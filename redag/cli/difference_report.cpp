@@ -9,6 +9,7 @@
 
 #include "redag/base/text.hpp"
 #include "redag/cli/table.hpp"
+#include "redag/trace/worker_count.hpp"
 
 namespace redag::cli {
 namespace {
@@ -74,8 +75,9 @@ std::string run_words(const DiffSide &side) {
   const std::vector<trace::RunInfo> &runs = side.jobs.runs();
   const trace::RunInfo &first = runs.front();
   return fmt::format("{}: {}, {}, {} worker{}, {}, {} run{} of {}", side.name, first.executor, first.preemption,
-                     first.config.workers, first.config.workers == 1 ? "" : "s", trace::to_string(first.driver),
-                     runs.size(), runs.size() == 1 ? "" : "s", humanize_duration(first.end - first.start));
+                     trace::worker_count(first), trace::worker_count(first) == 1 ? "" : "s",
+                     trace::to_string(first.driver), runs.size(), runs.size() == 1 ? "" : "s",
+                     humanize_duration(first.end - first.start));
 }
 
 std::string differences_table(const Diffed &diffed, const StreamTraits &terminal, bool all) {
@@ -174,7 +176,7 @@ Json side_json(const DiffSide &side) {
   return Json{{"name", side.name},
               {"executor", first.executor},
               {"preemption", first.preemption},
-              {"workers", first.config.workers},
+              {"workers", trace::worker_count(first)},
               {"driver", trace::to_string(first.driver)},
               {"runs", side.jobs.runs().size()},
               {"duration_ns", first.end - first.start},

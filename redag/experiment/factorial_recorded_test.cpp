@@ -63,6 +63,7 @@ RecordedRun recorded(std::uint64_t seed, Duration duration = kSecond, Duration w
   workload.dags[1].tasks[0].wcet = workload.dags[1].tasks[0].bcet = 60 * kMillisecond;
   trace::Trace trace = simulated(std::move(workload), "mte", seed, duration);
   trace.info.driver = trace::Driver::RosNodes;
+  trace.info.config.workers = 5;  // threads that executed callbacks
   return record("a/events.jsonl", trace, plan());
 }
 
@@ -107,6 +108,9 @@ TEST(Recorded, RunsStandBesideTheSimulators) {
     ASSERT_EQ(row.runs.size(), is_recorded && !is_double ? 0U : 2U);
     if (row.runs.empty()) continue;
     EXPECT_EQ(row.runs[0].world, is_recorded ? "ros_nodes" : "simulator");
+    if (is_recorded) {
+      EXPECT_EQ(row.runs[0].workers, 3U) << "not the threads";
+    }
     EXPECT_TRUE(median_of(factorial, counter.results(), row, 0, Metric::ExcessMissRatio).has_value());
   }
 }

@@ -13,6 +13,7 @@
 #include "redag/metrics/distribution.hpp"
 #include "redag/metrics/jobs.hpp"
 #include "redag/metrics/paper_accounting.hpp"
+#include "redag/trace/worker_count.hpp"
 
 namespace redag::experiment {
 namespace {
@@ -119,7 +120,7 @@ Observation observe(const FinishedRun &run, const ObserveOptions &options) {
   seen.seed = info.seed;
   seen.world = trace::to_string(info.driver);
   seen.preemption = info.preemption;
-  seen.workers = info.config.workers;
+  seen.workers = trace::worker_count(info);
   seen.violations = run.check.violation_count;
   seen.check_count =
       std::accumulate(run.check.checks_by_rule.begin(), run.check.checks_by_rule.end(), std::uint64_t{0});

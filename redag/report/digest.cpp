@@ -4,6 +4,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/metrics/trace_checker.hpp"
+#include "redag/trace/worker_count.hpp"
 
 namespace redag::report {
 namespace {
@@ -32,7 +33,7 @@ void append(std::vector<Duration> &to, const std::vector<Duration> &from) {
 bool Group::fits(const trace::RunInfo &run) const {
   if (runs_.empty()) return true;
   return run.executor == info().executor && run.preemption == info().preemption && run.driver == info().driver &&
-         run.config.workers == info().config.workers && same_tasks(run.workload, workload());
+         trace::worker_count(run) == trace::worker_count(info()) && same_tasks(run.workload, workload());
 }
 
 void Group::add(const std::string &path, const trace::Trace &trace) {

@@ -17,6 +17,8 @@
 #include "redag/model/callback_match.hpp"
 #include "redag/model/demand.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag/runtime/mode.hpp"
+#include "redag/trace/worker_count.hpp"
 #include "workload/node_events.hpp"
 #include "workload/peers.hpp"
 #include "workload/workload_run.hpp"
@@ -50,6 +52,11 @@ class Bodies {
               std::uint32_t worker = 0) {
     events_.push_back({ms(start), ms(trigger), TaskId(task), job, worker, JobEventKind::Started});
     events_.push_back({ms(end), ms(end), TaskId(task), job, worker, JobEventKind::Finished});
+    return *this;
+  }
+  Bodies &was_absent(std::uint32_t task, std::uint32_t job, double from, double to, std::uint32_t worker = 0) {
+    events_.push_back({ms(from), 0, TaskId(task), job, worker, JobEventKind::Preempted});
+    events_.push_back({ms(to), 0, TaskId(task), job, worker, JobEventKind::Resumed});
     return *this;
   }
   [[nodiscard]] std::vector<JobRecord> jobs(const Workload &workload, double end, bool timers_queue = false) const {
@@ -234,6 +241,35 @@ TEST(NodeEvents, ABodyInsideABodySuspendsIt) {
   EXPECT_EQ(outer.on_worker, Bodies::ms(6));
 }
 
+TEST(NodeEvents, ABodyWithoutAProcessorHoldsNone) {
+  const Workload workload = workload_of(kTimer);
+  const auto bodies = Bodies()
+                          .ran(0, 0, 3, 8)
+                          .was_absent(0, 0, 4, 5)
+                          .was_absent(0, 0, 6, 7.5)
+                          .was_absent(0, 1, 12.000001, 15)  // from its beginning to its end
+                          .ran(0, 1, 12, 15);
+  const auto jobs = bodies.jobs(workload, 20);
+  ASSERT_EQ(jobs.size(), 2U);
+  EXPECT_EQ(jobs[0].preemptions, 2U);
+  EXPECT_EQ(jobs[0].on_worker, Bodies::ms(2.5));
+  EXPECT_EQ(jobs[1].preemptions, 1U);
+  EXPECT_EQ(jobs[1].on_worker, 2);  // a nanosecond before and after: within the body
+  const auto report = check(workload, bodies.stream(workload, 20), Bodies::ms(20));
+  EXPECT_TRUE(report.ok()) << report.to_string();
+}
+
+TEST(NodeEvents, ABodyThatIsAbsentWhenTheRunEndsIsInFlight) {
+  const Workload workload = workload_of(kTimer);
+  const auto bodies = Bodies().ran(0, 0, 3, 8).was_absent(0, 0, 4, 7);
+  const auto events = bodies.stream(workload, 5);
+  ASSERT_FALSE(events.empty());
+  EXPECT_EQ(events.back().kind, JobEventKind::Preempted);
+  EXPECT_THAT(rows(bodies.jobs(workload, 5)), ElementsAre(Row{0, 0, 2, 3, kOpen, kNone}));
+  const auto report = check(workload, events, Bodies::ms(5));
+  EXPECT_TRUE(report.ok()) << report.to_string();
+}
+
 // ---- real nodes ----
 
 class Nodes : public testing::Test {
@@ -360,6 +396,54 @@ TEST_F(Nodes, ExpiriesThatATimerDropsAreCounted) {
   for (const JobRecord &job : jobs) skipped += job.outcome == JobOutcome::Skipped ? 1 : 0;
   EXPECT_GE(skipped, 30U - 300 / 25 - 2);  // at most 12 bodies fit; the last release is open
   for (std::size_t i = 1; i < jobs.size(); ++i) EXPECT_EQ(jobs[i].release - jobs[i - 1].release, 10 * kMillisecond);
+}
+
+// Who should say halt() may not get to it: under SCHED_FIFO an overloaded executor can keep it from every processor.
+TEST_F(Nodes, NoBodyBeginsAtOrAfterTheEndThoughNobodySaysHalt) {
+  const Workload workload =
+      workload_of("{dags: [{name: d, tasks: [{name: a, wcet: 4ms, period: 2ms, deadline: 2ms}]}]}");
+  rclcpp::executors::SingleThreadedExecutor executor;
+  NodesOptions options;
+  options.end = 100 * kMillisecond;
+  const Collected collected = collect(workload, executor, options, 200 * kMillisecond);
+  std::size_t began = 0;
+  for (const JobEvent &event : collected.bodies) {
+    if (event.kind != JobEventKind::Started) continue;
+    EXPECT_LT(event.time, options.end);
+    ++began;
+  }
+  EXPECT_GT(began, 0U);
+}
+
+// Twice what the processors can do, in each of our modes: the record is whole and lawful, at the end and when broken
+// off.
+TEST_F(Nodes, ARunInOverloadIsRecordedWhole) {
+  const Workload workload = workload_of(
+      "{name: overload, platform: {workers: 2}, dags: ["
+      " {name: fast, deadline: 2ms, tasks: [{name: a, wcet: 1ms, period: 2ms},"
+      "   {name: b, wcet: 500us, activation: data, after: a}]},"
+      " {name: slow, tasks: [{name: x, wcet: 30ms, period: 20ms, region: 500us},"
+      "   {name: y, wcet: 40ms, period: 50ms, region: 500us}]},"
+      " {name: never, tasks: [{name: z, wcet: 150ms, period: 200ms, region: 500us}]}]}");
+  for (const char *executor : {"redag-none", "redag-cooperative", "redag-os"}) {
+    for (const bool broken_off : {false, true}) {
+      SCOPED_TRACE(std::string(executor) + (broken_off ? ", broken off" : ""));
+      const bool os = std::string(executor) == "redag-os";
+      if (os && redag::runtime::probe_priority_band().top_job == 0) continue;
+      const std::atomic<bool> stop{broken_off};  // at once: nothing may have run
+      WorkloadRunOptions options;
+      options.executor = executor;
+      options.duration = 300 * kMillisecond;
+      options.stop = &stop;
+      const auto run = run_as_nodes(workload, options);
+      ASSERT_TRUE(run.has_value()) << redag::to_string(run.error());
+      EXPECT_EQ(run->trace.info.lost_events, 0U);
+      EXPECT_TRUE(run->check.ok()) << run->check.to_string();
+      EXPECT_TRUE(run->scheduler->check.ok()) << run->scheduler->check.to_string();
+      EXPECT_EQ(run->stopped, broken_off);
+      EXPECT_EQ(redag::trace::worker_count(run->trace.info), 2U);
+    }
+  }
 }
 
 TEST_F(Nodes, TasksOfAGroupShareANodeAndDoNotOverlap) {

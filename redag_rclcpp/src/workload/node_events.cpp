@@ -19,7 +19,13 @@ using redag::Time;
 
 namespace {
 
-// A body, from its two events.
+// While it had no processor.
+struct Absence {
+  Time from = 0;
+  Time to = kNever;
+};
+
+// A body, from its events.
 struct Body {
   std::uint32_t job = 0;
   std::uint32_t worker = 0;
@@ -28,6 +34,7 @@ struct Body {
   Time end = kNever;
   bool aborted = false;
   Reason reason = Reason::None;
+  std::vector<Absence> absences;
 };
 
 struct Job {
@@ -89,7 +96,13 @@ class Assembly {
       std::vector<Body> &bodies = tasks_[event.task.value].bodies;
       if (event.kind == JobEventKind::Started) {
         bodies.push_back(Body{event.job, event.worker, event.value, event.time});
-      } else if (!bodies.empty()) {
+      } else if (bodies.empty()) {
+        continue;
+      } else if (event.kind == JobEventKind::Preempted) {
+        bodies.back().absences.push_back(Absence{event.time});
+      } else if (event.kind == JobEventKind::Resumed) {
+        if (!bodies.back().absences.empty()) bodies.back().absences.back().to = event.time;
+      } else {
         bodies.back().end = event.time;
         bodies.back().aborted = event.kind == JobEventKind::Aborted;
         bodies.back().reason = event.reason;
@@ -246,6 +259,14 @@ class Assembly {
         const Body &body = *job.body;
         add(body.start, JobEventKind::Dispatched, job.release + task.task->deadline, body.worker, Reason::None);
         add(body.start, JobEventKind::Started, body.start, body.worker, Reason::None);
+        for (const Absence &absence : body.absences) {
+          // Within the body: at the time of its beginning or end it would stand on the other side of that event.
+          const Time from = std::max(absence.from, body.start + 1);
+          const Time to = std::min(absence.to, body.end - 1);
+          if (from >= to) continue;
+          add(from, JobEventKind::Preempted, 0, body.worker, Reason::None);
+          add(to, JobEventKind::Resumed, 0, body.worker, Reason::None);
+        }
         if (body.end != kNever) {
           add(body.end, body.aborted ? JobEventKind::Aborted : JobEventKind::Finished, body.end, body.worker,
               body.reason);

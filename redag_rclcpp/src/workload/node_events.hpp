@@ -17,12 +17,13 @@ struct NodeEventsOptions {
   bool timers_queue = false;        // the executor keeps every expiry: those that have not run at the end are in flight
 };
 
-/// `bodies`: Started and Finished or Aborted of each body that began, in any order. `job` of a timer task is the point
-/// of its grid, and `value` of a data task's Started the end of its last predecessor, as the messages told. Times count
-/// from the origin of the grid. The result is a stream as other drivers make it: job numbers, Released to Finished, in
-/// order of time. Dispatched has the time of Started: when the executor decided, the nodes do not see. A release that
-/// the executor overlooked while it began the job before (its timer was called in time, its message taken) is noted
-/// right after that beginning, several one after the other.
+/// `bodies`: Started and Finished or Aborted of each body that began, and Preempted and Resumed of one that was kept
+/// from its processor, in any order. `job` of a timer task is the point of its grid, and `value` of a data task's
+/// Started the end of its last predecessor, as the messages told. Times count from the origin of the grid. The result
+/// is a stream as other drivers make it: job numbers, Released to Finished, in order of time. Dispatched has the time
+/// of Started: when the executor decided, the nodes do not see. A release that the executor overlooked while it began
+/// the job before (its timer was called in time, its message taken) is noted right after that beginning, several one
+/// after the other.
 [[nodiscard]] std::vector<redag::JobEvent> node_events(const redag::Workload &workload,
                                                        std::span<const redag::JobEvent> bodies,
                                                        const NodeEventsOptions &options);

@@ -41,6 +41,8 @@ namespace {
 constexpr Duration kPhaseTolerance = redag::kMicrosecond;  // of a timer's first expiry
 constexpr int kPhaseAttempts = 1000;
 constexpr Duration kConnectLook = 5 * redag::kMillisecond;
+// An absence from the processor that is recorded: longer than what the kernel itself takes, interrupts and the like.
+constexpr Duration kAbsence = 50 * redag::kMicrosecond;
 
 std::atomic<std::uint64_t> instances{0};
 
@@ -371,15 +373,16 @@ void WorkloadNodes::run_if_complete(TaskNode &task) {
 
 void WorkloadNodes::execute(TaskNode &task, const Job &job) {
   running_.fetch_add(1);
-  if (!halting_.load()) {
+  if (const Time begin = now(); !halting_.load() && begin < options_.end) {
     std::uint32_t thread = 0;
     redag::trace::Ring *const events = ring(thread);
     const auto number = static_cast<std::uint32_t>(job.number);
-    record({now(), job.trigger, task.id, number, thread, JobEventKind::Started}, events);
+    const JobEvent started{begin, job.trigger, task.id, number, thread, JobEventKind::Started};
+    record(started, events);
     const Duration demand = redag::execution_time(*task.task, task.id, number, options_.seed);
     const bool cut_off =
         task.task->on_budget == redag::OnBudget::Abort && task.task->budget > 0 && demand > task.task->budget;
-    use_processor(cut_off ? task.task->budget : demand, task.task->region);
+    use_processor(cut_off ? task.task->budget : demand, task.task->region, started, events);
     const Time finish = now();
     record({finish, finish, task.id, number, thread, cut_off ? JobEventKind::Aborted : JobEventKind::Finished,
             cut_off ? redag::Reason::Budget : redag::Reason::None},
@@ -411,17 +414,33 @@ void WorkloadNodes::publish(TaskNode &task, const Job &job, Time finish) {
 }
 
 // Of its own processor time: being preempted does not shorten its work.
-void WorkloadNodes::use_processor(Duration demand, Duration region) const {
+void WorkloadNodes::use_processor(Duration demand, Duration region, JobEvent job, redag::trace::Ring *events) {
   const auto used = [this] { return options_.redag ? redag::job_cpu_time() : redag::runtime::thread_cpu_now(); };
   const Duration begin = used();
   Duration next_point = region > 0 ? region : kNever;
-  for (Duration so_far = 0; so_far < demand; so_far = used() - begin) {
+  const Time begun = job.time;
+  Time seen = begun;
+  for (Duration so_far = 0; so_far < demand;) {
     if (give_up_.load(std::memory_order_relaxed)) return;
     if (options_.redag && so_far >= next_point) {
       redag::preemption_point();
       next_point += region;
     }
     spin_briefly();
+    const Time time = notes_absences_ ? now() : seen;
+    const Duration before = std::exchange(so_far, used() - begin);
+    // What passed of time and not of its own was another's.
+    const Duration absent = time - seen - (so_far - before);
+    if (absent >= kAbsence) {
+      job.value = 0;
+      job.time = std::max(seen, begun + 1);  // after Started
+      job.kind = JobEventKind::Preempted;
+      record(job, events);
+      job.time = seen + absent;
+      job.kind = JobEventKind::Resumed;
+      record(job, events);
+    }
+    seen = time;
   }
 }
 

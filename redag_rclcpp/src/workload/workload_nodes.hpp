@@ -27,9 +27,10 @@ namespace redag_rclcpp {
 
 struct NodesOptions {
   std::uint64_t seed = 1;
-  bool intra_process = true;  // messages as pointers, or through the middleware
-  bool redag = false;         // the executor is ours: bodies can be suspended at preemption points
-  std::uint32_t threads = 1;  // at most so many threads execute bodies
+  bool intra_process = true;        // messages as pointers, or through the middleware
+  bool redag = false;               // the executor is ours: bodies can be suspended at preemption points
+  std::uint32_t threads = 1;        // at most so many threads execute bodies
+  redag::Time end = redag::kNever;  // no body begins at or after it, though nobody may get to say halt() in time
   std::size_t trace_capacity = std::size_t{1} << 15U;  // events a thread between two drain()
 };
 
@@ -59,6 +60,9 @@ class WorkloadNodes {
 
   /// The current time on the origin's clock.
   [[nodiscard]] redag::Time now() const noexcept { return timer_clock_now() - origin_; }
+
+  /// Bodies record when they were without a processor (preemption os). Before the nodes are given to an executor.
+  void note_absences() noexcept { notes_absences_ = true; }
 
   /// No body begins from now on.
   void halt() noexcept { halting_.store(true); }
@@ -93,7 +97,7 @@ class WorkloadNodes {
   void run_if_complete(TaskNode &task);
   void execute(TaskNode &task, const Job &job);
   void publish(TaskNode &task, const Job &job, redag::Time finish);
-  void use_processor(redag::Duration demand, redag::Duration region) const;
+  void use_processor(redag::Duration demand, redag::Duration region, redag::JobEvent job, redag::trace::Ring *events);
   [[nodiscard]] std::int64_t expired_job(TaskNode &task) const;
   redag::trace::Ring *ring(std::uint32_t &thread) noexcept;
   void record(const redag::JobEvent &event, redag::trace::Ring *ring) noexcept;
@@ -103,6 +107,7 @@ class WorkloadNodes {
   std::uint64_t instance_;  // of this object: threads may have worked for another one
   redag::Time origin_ = 0;
   redag::Duration phase_error_ = 0;
+  bool notes_absences_ = false;
   std::deque<TaskNode> tasks_;  // by TaskId
   std::vector<rclcpp::Node::SharedPtr> nodes_;
   std::vector<std::unique_ptr<redag::trace::Ring>> rings_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <exception>
 #include <functional>
@@ -64,6 +65,7 @@ class Run {
     nodes.intra_process = options_.intra_process;
     nodes.redag = is_redag(options_.executor);
     nodes.threads = workers_ + (nodes.redag ? kSpareThreads : 0) + 1;
+    nodes.end = options_.duration;
     nodes_ = std::make_unique<WorkloadNodes>(workload_, nodes);
     if (auto connected = nodes_->connect(kConnectTimeout); !connected) return tl::unexpected(connected.error());
     try {
@@ -71,21 +73,12 @@ class Run {
     } catch (const std::runtime_error &error) {  // preemption that this process may not have
       return redag::make_error(error.what(), options_.executor == "redag-os" ? redag::runtime::realtime_hint() : "");
     }
+    if (preempts_by_priority()) nodes_->note_absences();
     nodes_->arm(timer_clock_now() + kStartMargin);
     const Duration cost = nodes_->measurement_cost();
     for (const auto &node : nodes_->nodes()) executor_->add_node(node);
     std::thread spinning([this] { spin(); });
-    // Under chrt the executor's threads have this one's priority: those of an overloaded one would never let it end the
-    // run.
-    const RaisedThread raised(redag::runtime::fifo_priority_above_this_thread());
-    collect_until_end();
-    nodes_->halt();
-    if (!nodes_->wait_idle(timer_clock_now() + kDrainTimeout)) {
-      nodes_->give_up();
-      result_.warnings.push_back(
-          fmt::format("bodies were still running {} after the end", redag::format_duration(kDrainTimeout)));
-    }
-    executor_->cancel();
+    collect_and_end();
     spinning.join();
     if (const auto failure = failure_text()) return redag::make_error(fmt::format("the executor failed: {}", *failure));
     collect();
@@ -137,6 +130,7 @@ class Run {
       const redag::LockGuard guard(failure_lock_);
       failure_ = std::current_exception();
     }
+    spin_ended_ = true;
   }
 
   std::optional<std::string> failure_text() {
@@ -148,6 +142,35 @@ class Run {
       return error.what();
     } catch (...) {
       return "an exception of an unknown type";
+    }
+  }
+
+  // Full preemption: the priorities of threads are those of the jobs.
+  [[nodiscard]] bool preempts_by_priority() const {
+    return redag_ != nullptr && redag_->mode().mode == PreemptionMode::Os;
+  }
+
+  // Above the threads that execute bodies, which in overload leave no time: with os those have priorities of their own,
+  // under chrt this thread's.
+  [[nodiscard]] int collecting_priority() const {
+    return preempts_by_priority() ? redag::runtime::probe_priority_band().top_job + 1
+                                  : redag::runtime::fifo_priority_above_this_thread();
+  }
+
+  void collect_and_end() {
+    const RaisedThread raised(collecting_priority());
+    collect_until_end();
+    nodes_->halt();
+    if (!nodes_->wait_idle(timer_clock_now() + kDrainTimeout)) {
+      nodes_->give_up();
+      result_.warnings.push_back(
+          fmt::format("bodies were still running {} after the end", redag::format_duration(kDrainTimeout)));
+    }
+    // A cancel() before the spin began is lost, by rclcpp's executors and, where it is not virtual (Humble), here by
+    // ours.
+    while (!spin_ended_) {
+      executor_->cancel();
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
 
@@ -172,7 +195,7 @@ class Run {
     redag::trace::RunInfo &info = result_.trace.info;
     info.workload = workload_;
     info.executor = options_.executor;
-    // Threads that ran bodies: with os more than run at the same time.
+    // Threads that ran bodies: with os more than run at the same time, which the workload's platform says.
     info.config.workers = std::max(workers_, nodes_->threads_seen());
     info.config.policy = workload_.policy;
     info.preemption = "none";
@@ -221,6 +244,7 @@ class Run {
   std::vector<JobEvent> bodies_;
   std::vector<JobEvent> decisions_;
   Time end_ = 0;
+  std::atomic<bool> spin_ended_{false};
   redag::Mutex failure_lock_;
   std::exception_ptr failure_ REDAG_GUARDED_BY(failure_lock_);
 };

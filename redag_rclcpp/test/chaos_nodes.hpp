@@ -1,0 +1,346 @@
+// Nodes whose callbacks misbehave, at random from a seed: what the chaos test gives an executor.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "rclcpp/rclcpp.hpp"
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/pi_mutex.hpp"
+#include "redag/base/rng.hpp"
+#include "redag/runtime/preemption_point.hpp"
+#include "redag_rclcpp/executor.hpp"
+#include "rosgraph_msgs/msg/clock.hpp"
+#include "test_msgs/msg/strings.hpp"
+#include "test_msgs/srv/empty.hpp"
+
+namespace redag_rclcpp::chaos {
+
+using EmptyService = test_msgs::srv::Empty;
+using redag::Duration;
+using redag::Rng;
+using rosgraph_msgs::msg::Clock;
+using std::chrono::nanoseconds;
+using test_msgs::msg::Strings;
+
+inline constexpr Duration kWcet = 30 * redag::kMicrosecond;
+
+enum class Fault : std::uint8_t {
+  None,
+  Throws,
+  ThrowsNoException,
+  RunsOutOfMemory,
+  Sleeps,
+  Overruns,
+  Locks,
+  WaitsForAnAnswer,
+  Recurses,
+  Asks,
+  Floods,
+  StopsItsTimer,
+  LosesItsTimer,
+  LosesItsSubscription,
+  LosesItsNode,
+  LeavesTheExecutor,
+  AddsAnEntity,
+  AddsANode,
+  MovesTime,
+  Cancels,
+};
+inline constexpr std::array kFaultNames = {"callbacks without a fault",
+                                           "callbacks that throw",
+                                           "callbacks that throw what is no exception",
+                                           "callbacks that throw bad_alloc",
+                                           "callbacks that sleep",
+                                           "callbacks that run 100 times their wcet",
+                                           "callbacks that share a lock",
+                                           "callbacks that wait for a service's answer",
+                                           "callbacks that spin their own executor",
+                                           "callbacks that ask the executor",
+                                           "callbacks that publish bursts",
+                                           "callbacks that cancel or reset a timer",
+                                           "callbacks that destroy a timer of their node",
+                                           "callbacks that destroy a subscription of their node",
+                                           "callbacks that destroy their node",
+                                           "callbacks that take their node from the executor",
+                                           "callbacks that add a timer or subscription, in a group of its own or not",
+                                           "callbacks that add a node",
+                                           "callbacks that let ROS time jump",
+                                           "callbacks that cancel"};
+inline constexpr std::size_t kFaults = kFaultNames.size();
+
+/// What an episode has to be judged by.
+struct Record {
+  std::array<std::atomic<std::uint64_t>, kFaults> faults{};
+  std::atomic<std::uint64_t> thrown{0};
+  std::atomic<std::uint64_t> overlaps{0};            // of callbacks of one exclusive group
+  std::atomic<std::uint64_t> spun_in_a_callback{0};  // it was not refused
+};
+
+/// A node with what it has, which its own callbacks change too. Those hold it while they run: it can go in one.
+struct Troublemaker {
+  struct Group {
+    rclcpp::CallbackGroup::SharedPtr group;
+    bool exclusive = true;
+    std::shared_ptr<std::atomic<int>> inside = std::make_shared<std::atomic<int>>(0);
+  };
+  rclcpp::Node::SharedPtr node;
+  std::mutex lock;  // the rest
+  std::vector<Group> groups;
+  std::vector<rclcpp::TimerBase::SharedPtr> timers;
+  std::vector<rclcpp::SubscriptionBase::SharedPtr> subscriptions;
+  std::vector<rclcpp::Publisher<Strings>::SharedPtr> publishers;
+  rclcpp::ServiceBase::SharedPtr service;
+  rclcpp::Client<EmptyService>::SharedPtr client;
+};
+
+/// The nodes of one episode. Threads: any.
+class Troublemakers {
+ public:
+  Troublemakers(ReDAGExecutor &executor, Record &record, std::uint64_t seed, double fault_rate)
+      : executor_(executor), record_(record), seed_(seed), fault_rate_(fault_rate) {
+    clock_publisher_ = here_->create_publisher<Clock>("/clock", rclcpp::ClockQoS());
+  }
+
+  /// A node more, known to the executor.
+  void add_node() {
+    const std::uint64_t number = next_node_.fetch_add(1);
+    if (number >= kMostNodes) return;
+    Rng dice = Rng::stream(seed_, kNodeStream, number);
+    auto made = std::make_shared<Troublemaker>();
+    auto options = node_options().use_clock_thread(dice.uniform01() < 0.5);
+    if (dice.uniform01() < 0.5) options.parameter_overrides({{"use_sim_time", true}});
+    made->node = std::make_shared<rclcpp::Node>("trouble" + std::to_string(number), options);
+    {
+      const std::lock_guard guard(made->lock);
+      made->publishers.push_back(made->node->create_publisher<Strings>(topic(dice), rclcpp::QoS(10)));
+      made->service = made->node->create_service<EmptyService>(
+          "~/work", [](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) {});
+      made->client = made->node->create_client<EmptyService>("~/work");
+      for (auto entities = dice.uniform(2, 5); entities > 0; --entities) add_entity(made, dice);
+    }
+    {
+      const std::lock_guard guard(lock_);
+      nodes_.push_back(made);
+    }
+    executor_.add_node(made->node);
+  }
+
+  /// One node less: taken from the executor before, or not.
+  void remove_one(Rng &dice) {
+    std::shared_ptr<Troublemaker> gone;
+    {
+      const std::lock_guard guard(lock_);
+      if (nodes_.empty()) return;
+      const auto position = dice.uniform(0, std::ssize(nodes_) - 1);
+      gone = nodes_[static_cast<std::size_t>(position)];
+      nodes_.erase(nodes_.begin() + position);
+    }
+    if (dice.uniform01() < 0.5) leave(*gone);
+  }
+
+  /// On /clock: some time within an hour of the start, before the last one or after it.
+  void move_time(Rng &dice) {
+    Clock message;
+    const Duration time = kClockStart + dice.uniform(0, 3600) * redag::kSecond + dice.uniform(0, redag::kSecond - 1);
+    message.clock.sec = static_cast<std::int32_t>(time / redag::kSecond);
+    message.clock.nanosec = static_cast<std::uint32_t>(time % redag::kSecond);
+    clock_publisher_->publish(message);
+  }
+
+  void clear() {
+    std::vector<std::shared_ptr<Troublemaker>> gone;
+    const std::lock_guard guard(lock_);
+    gone.swap(nodes_);
+  }
+
+  [[nodiscard]] std::uint64_t calls() const { return next_call_; }
+  [[nodiscard]] std::size_t nodes_made() const { return std::min<std::size_t>(next_node_, kMostNodes); }
+
+  /// Little of its own, so that there can be many.
+  static rclcpp::NodeOptions node_options() {
+    return rclcpp::NodeOptions().enable_rosout(false).start_parameter_services(false).start_parameter_event_publisher(
+        false);
+  }
+
+ private:
+  static constexpr std::uint64_t kMostNodes = 16;
+  static constexpr std::size_t kMostEntities = 8;
+  static constexpr std::uint64_t kNodeStream = 1;
+  static constexpr std::uint64_t kCallStream = 2;
+  static constexpr Duration kClockStart = 1'000'000 * redag::kSecond;
+
+  static std::string topic(Rng &dice) { return "/trouble" + std::to_string(dice.uniform(0, 2)); }
+
+  // With the lock of `of` held.
+  Troublemaker::Group group(Troublemaker &of, Rng &dice) {
+    if (of.groups.empty() || (of.groups.size() < 3 && dice.uniform01() < 0.4)) {
+      Troublemaker::Group made;
+      made.exclusive = dice.uniform01() < 0.7;
+      made.group = of.node->create_callback_group(made.exclusive ? rclcpp::CallbackGroupType::MutuallyExclusive
+                                                                 : rclcpp::CallbackGroupType::Reentrant);
+      of.groups.push_back(made);
+    }
+    return of.groups[static_cast<std::size_t>(dice.uniform(0, std::ssize(of.groups) - 1))];
+  }
+
+  // With the lock of `to` held.
+  void add_entity(const std::shared_ptr<Troublemaker> &to, Rng &dice) {
+    if (to->timers.size() + to->subscriptions.size() >= kMostEntities) return;
+    const Troublemaker::Group in = group(*to, dice);
+    const auto call = [this, weak = std::weak_ptr(to), exclusive = in.exclusive, inside = in.inside] {
+      const auto self = weak.lock();  // perhaps the last to hold it, and its node
+      if (self) enter(self, exclusive, *inside);
+    };
+    const nanoseconds period(dice.uniform(1, 8) * redag::kMillisecond);
+    switch (dice.uniform(0, 3)) {
+      case 0:
+      case 1: to->timers.push_back(to->node->create_wall_timer(period, call, in.group)); break;
+      case 2:
+        // Of a variable it would keep a reference.
+        to->timers.push_back(rclcpp::create_timer(
+            to->node, to->node->get_clock(), rclcpp::Duration(period), [call] { call(); }, in.group));
+        break;
+      default: {
+        rclcpp::SubscriptionOptions options;
+        options.callback_group = in.group;
+        to->subscriptions.push_back(to->node->create_subscription<Strings>(
+            topic(dice), rclcpp::QoS(static_cast<std::size_t>(dice.uniform(1, 10))),
+            [call](Strings::ConstSharedPtr) { call(); }, options));
+      }
+    }
+  }
+
+  void enter(const std::shared_ptr<Troublemaker> &self, bool exclusive, std::atomic<int> &inside) {
+    struct Inside {
+      explicit Inside(std::atomic<int> &of) : count(of), before(of.fetch_add(1)) {}
+      ~Inside() { count.fetch_sub(1); }
+      std::atomic<int> &count;
+      int before;
+    } const entered(inside);
+    if (exclusive && entered.before != 0) ++record_.overlaps;
+    misbehave(self);
+  }
+
+  void misbehave(const std::shared_ptr<Troublemaker> &self) {
+    Rng dice = Rng::stream(seed_, kCallStream, next_call_.fetch_add(1));
+    const Fault fault = dice.uniform01() < fault_rate_
+                            ? static_cast<Fault>(dice.uniform(1, static_cast<std::int64_t>(kFaults) - 1))
+                            : Fault::None;
+    ++record_.faults[static_cast<std::size_t>(fault)];
+    switch (fault) {
+      case Fault::None: burn(dice.uniform(0, kWcet), true); break;
+      case Fault::Throws: ++record_.thrown; throw std::runtime_error("a fault");
+      case Fault::ThrowsNoException: ++record_.thrown; throw 7;
+      case Fault::RunsOutOfMemory: ++record_.thrown; throw std::bad_alloc();
+      case Fault::Sleeps: std::this_thread::sleep_for(nanoseconds(dice.uniform(1, redag::kMillisecond))); break;
+      case Fault::Overruns: burn(100 * kWcet, dice.uniform01() < 0.5); break;
+      case Fault::Locks: {
+        const redag::LockGuard guard(shared_);  // may be held by a preempted callback
+        burn(kWcet, false);
+        break;
+      }
+      case Fault::Recurses: recurse(dice); break;
+      case Fault::Asks:
+        (void)executor_.stats();
+        (void)executor_.learned();
+        (void)executor_.warnings();
+        break;
+      case Fault::AddsANode: add_node(); break;
+      case Fault::MovesTime: move_time(dice); break;
+      case Fault::Cancels: executor_.cancel(); break;
+      case Fault::LeavesTheExecutor: leave(*self); break;
+      case Fault::LosesItsNode: {
+        const std::lock_guard guard(lock_);
+        std::erase(nodes_, self);
+        break;
+      }
+      default: change(self, fault, dice);
+    }
+  }
+
+  // What needs the node's lock. A callback does not wait for it: on top of its holder (cooperative) it would for ever.
+  void change(const std::shared_ptr<Troublemaker> &self, Fault fault, Rng &dice) {
+    std::future<EmptyService::Response::SharedPtr> answer;
+    // Destroyed without the lock: that waits for nobody then.
+    std::vector<std::shared_ptr<void>> gone;
+    {
+      const std::unique_lock guard(self->lock, std::try_to_lock);
+      if (!guard) return;
+      switch (fault) {
+        case Fault::Floods:
+          for (int i = 0; i < 20; ++i) self->publishers.front()->publish(Strings());
+          break;
+        case Fault::WaitsForAnAnswer:
+          answer = self->client->async_send_request(std::make_shared<EmptyService::Request>()).future;
+          break;
+        case Fault::StopsItsTimer:
+          for (const auto &timer : self->timers) dice.uniform01() < 0.5 ? timer->cancel() : timer->reset();
+          break;
+        case Fault::LosesItsTimer: lose_last(self->timers, gone); break;
+        case Fault::LosesItsSubscription: lose_last(self->subscriptions, gone); break;
+        case Fault::AddsAnEntity: add_entity(self, dice); break;
+        default: break;
+      }
+    }
+    if (answer.valid()) (void)answer.wait_for(std::chrono::milliseconds(1));
+  }
+
+  template <class Entities>
+  static void lose_last(Entities &entities, std::vector<std::shared_ptr<void>> &gone) {
+    if (entities.empty()) return;
+    gone.push_back(std::move(entities.back()));
+    entities.pop_back();
+  }
+
+  void recurse(Rng &dice) {
+    try {
+      switch (dice.uniform(0, 3)) {
+        case 0: executor_.spin(); break;
+        case 1: executor_.spin_some(); break;
+        case 2: executor_.spin_all(nanoseconds(1)); break;
+        default: executor_.spin_once(nanoseconds(1));
+      }
+      ++record_.spun_in_a_callback;
+    } catch (const std::runtime_error &) {
+    }
+  }
+
+  // It may have been taken from the executor before, which says so.
+  void leave(Troublemaker &node) {
+    try {
+      executor_.remove_node(node.node);
+    } catch (const std::runtime_error &) {
+    }
+  }
+
+  static void burn(Duration processor_time, bool with_points) {
+    for (const Duration until = redag::job_cpu_time() + processor_time; redag::job_cpu_time() < until;) {
+      if (with_points) redag::preemption_point();
+    }
+  }
+
+  ReDAGExecutor &executor_;
+  Record &record_;
+  std::uint64_t seed_;
+  double fault_rate_;
+  const rclcpp::Node::SharedPtr here_ = std::make_shared<rclcpp::Node>("here", node_options());
+  rclcpp::Publisher<Clock>::SharedPtr clock_publisher_;
+  std::atomic<std::uint64_t> next_node_{0};
+  std::atomic<std::uint64_t> next_call_{0};
+  redag::PiMutex shared_;
+  std::mutex lock_;
+  std::vector<std::shared_ptr<Troublemaker>> nodes_;
+};
+
+}  // namespace redag_rclcpp::chaos
