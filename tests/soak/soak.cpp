@@ -90,6 +90,15 @@ class Load {
   }
 
   Executor &executor() { return executor_; }
+  /// Jobs of control0.act that finished. Waits for the first one: a busy machine takes its time.
+  [[nodiscard]] std::uint64_t finished() const {
+    const auto give_up = steady_clock::now() + std::chrono::seconds(60);
+    for (;;) {
+      const std::uint64_t jobs = executor_.stats(DagId(0))[2].jobs.finished;
+      if (jobs > 0 || steady_clock::now() > give_up) return jobs;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  }
   [[nodiscard]] std::uint64_t guests() const { return number_; }
 
  private:
@@ -271,6 +280,7 @@ int run(const Arguments &arguments) {
                record.detect.values.back(), load.guests());
     std::fflush(csv);
   }
+  finished = load.finished();
   load.executor().stop();
   if (csv != stdout) std::fclose(csv);
   fmt::print("preemption {}, {} workers, load {}, {} s; {} DAGs came; {} jobs of control0.act, {} late or skipped\n",
