@@ -223,7 +223,8 @@ class Sensitivity(Case):
         self.assertGreater(compared, 10)
 
     def test_where_no_bound_speaks_the_simulator_does(self):
-        text = self.expect(redag("sensitivity", SOURCE / "workloads" / "robot.yaml", "--simulate"), 0).stdout
+        robot = SOURCE / "workloads" / "robot.yaml"
+        text = self.expect(redag("sensitivity", robot, "--preemption", "cooperative", "--simulate"), 0).stdout
         self.assertIn("no method that bounds response times applies", text)
         self.assertRegex(text, r"in simulation, which proves nothing, all execution times together go to 1\.\d+ times")
 
@@ -325,7 +326,7 @@ dags:
             tuned = self.folder / "tuned.yaml"
             self.expect(redag("assign", file, "--preemption", "none", "--exhaustive", "50", "-o", tuned), 0)
             self.expect(redag("validate", tuned), 0)
-        text = self.expect(redag("assign", SOURCE / "workloads" / "robot.yaml"), 0).stdout
+        text = self.expect(redag("assign", SOURCE / "workloads" / "robot.yaml", "--preemption", "cooperative"), 0).stdout
         self.assertIn("nothing to compare: no method bounds any response time", text)
 
 
