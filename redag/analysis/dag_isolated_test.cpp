@@ -10,6 +10,7 @@ namespace redag::analysis {
 namespace {
 
 using testing::BoundCaseLimits;
+using testing::cases;
 using testing::expect_bound_holds;
 
 BoundCaseLimits graphs(sched::Preemption preemption) {
@@ -26,10 +27,6 @@ BoundCaseLimits graphs(sched::Preemption preemption) {
   limits.min_period = 20;
   limits.max_period = 200;
   return limits;
-}
-
-testing::BoundGenerator cases(const BoundCaseLimits &limits) {
-  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
 }
 
 TEST(BoundProperty, Graham) {

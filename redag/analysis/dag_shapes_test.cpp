@@ -14,7 +14,9 @@ namespace {
 
 using global::Shape;
 using testing::BoundCaseLimits;
+using testing::cases;
 using testing::expect_bound_holds;
+using testing::for_cases;
 
 BoundCaseLimits graphs() {
   BoundCaseLimits limits;
@@ -29,10 +31,6 @@ BoundCaseLimits graphs() {
   limits.min_period = 10;
   limits.max_period = 120;
   return limits;
-}
-
-testing::BoundGenerator cases(const BoundCaseLimits &limits) {
-  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
 }
 
 TEST(BoundProperty, DagShapes) { expect_bound_holds(dag_shapes(), cases(graphs()), {.workloads = 2000}); }
@@ -106,18 +104,6 @@ TEST(Shape, OneWorkerDoesOneThingAtATime) {
   }
 }
 
-template <class Check>
-void for_cases(const BoundCaseLimits &limits, int count, Check check) {
-  for (int i = 0; i < count; ++i) {
-    Rng rng(mix(static_cast<std::uint64_t>(i)));
-    const testing::BoundCase bound_case = random_bound_case(rng, limits);
-    const System system = compile(bound_case.workload, bound_case.platform).value();
-    SCOPED_TRACE(describe(bound_case));
-    if (system.not_analysable.empty()) check(bound_case, system, rng);
-    if (::testing::Test::HasFailure()) return;
-  }
-}
-
 // One task, `wide` in parallel, all of them before one more: wider than the workers.
 Workload wide(std::uint32_t parallel, Duration wcet, std::uint32_t workers) {
   Workload workload;
@@ -169,7 +155,7 @@ TEST(Shape, IsWhatItSaysAtEveryInstant) {
       }
     }
   }
-  for_cases(graphs(), 300, [&](const testing::BoundCase &bound_case, const System &system, Rng &) {
+  for_cases(cases(graphs()), 300, [&](const testing::BoundCase &bound_case, const System &system, Rng &) {
     for (const Unit &unit : system.units) expect_shape_is_right(system, unit, bound_case.platform.workers);
   });
 }
@@ -178,7 +164,7 @@ TEST(Shape, IsWhatItSaysAtEveryInstant) {
 TEST(Shape, WorkIsTheMostOverAllPlacements) {
   std::uint64_t checked = 0;
   std::uint64_t single = 0;
-  for_cases(graphs(), 400, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
+  for_cases(cases(graphs()), 400, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
     for (const Unit &unit : system.units) {
       single += unit.tasks.size() == 1 ? 1U : 0U;
       const std::uint32_t m = bound_case.platform.workers;
@@ -207,7 +193,7 @@ TEST(Shape, WorkIsTheMostOverAllPlacements) {
 TEST(DagShapes, AreNeverAboveMelani) {
   std::uint64_t smaller = 0;
   std::uint64_t bounds = 0;
-  for_cases(graphs(), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
+  for_cases(cases(graphs()), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
     const Outcome melanis = melani().apply(system);
     const Outcome shapes = dag_shapes().apply(system);
     ASSERT_EQ(std::holds_alternative<Bound>(shapes), std::holds_alternative<Bound>(melanis) && system.has_edges());
@@ -230,7 +216,7 @@ TEST(DagShapes, AreNeverAboveMelani) {
 TEST(DagShapes, AndWidthsAreIncomparable) {
   std::uint64_t smaller = 0;
   std::uint64_t larger = 0;
-  for_cases(graphs(), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
+  for_cases(cases(graphs()), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
     const Outcome bounded = dag_bounded().apply(system);
     const Outcome shapes = dag_shapes().apply(system);
     if (!std::holds_alternative<Bound>(shapes)) return;
@@ -247,7 +233,7 @@ TEST(DagShapes, AndWidthsAreIncomparable) {
 
 TEST(DagShapes, MoreExecutionNeverShrinksABound) {
   std::uint64_t compared = 0;
-  for_cases(graphs(), 1500, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
+  for_cases(cases(graphs()), 1500, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
     const Outcome before = dag_shapes().apply(system);
     if (!std::holds_alternative<Bound>(before)) return;
     Workload more = bound_case.workload;
@@ -266,7 +252,7 @@ TEST(DagShapes, MoreExecutionNeverShrinksABound) {
 }
 
 TEST(DagShapes, TermsAddUp) {
-  for_cases(graphs(), 1000, [](const testing::BoundCase &, const System &system, Rng &) {
+  for_cases(cases(graphs()), 1000, [](const testing::BoundCase &, const System &system, Rng &) {
     const Outcome outcome = dag_shapes().apply(system);
     if (!std::holds_alternative<Bound>(outcome)) return;
     for (const ResponseBound &bound : std::get<Bound>(outcome).dags) {

@@ -11,6 +11,7 @@ namespace redag::analysis {
 namespace {
 
 using testing::BoundCaseLimits;
+using testing::cases;
 using testing::expect_bound_holds;
 
 BoundCaseLimits graphs(sched::Preemption preemption) {
@@ -32,10 +33,6 @@ BoundCaseLimits graphs(sched::Preemption preemption) {
 BoundCaseLimits with_max_active(BoundCaseLimits limits) {
   limits.caps = true;
   return limits;
-}
-
-testing::BoundGenerator cases(const BoundCaseLimits &limits) {
-  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
 }
 
 TEST(BoundProperty, Melani) {

@@ -12,7 +12,9 @@ namespace redag::analysis {
 namespace {
 
 using testing::BoundCaseLimits;
+using testing::cases;
 using testing::expect_bound_holds;
+using testing::for_cases;
 
 BoundCaseLimits several_workers(sched::Preemption preemption) {
   BoundCaseLimits limits;
@@ -24,10 +26,6 @@ BoundCaseLimits several_workers(sched::Preemption preemption) {
   limits.max_deadline = 1.5;
   limits.max_utilization = 0.7;
   return limits;
-}
-
-testing::BoundGenerator cases(const BoundCaseLimits &limits) {
-  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
 }
 
 TEST(BoundProperty, EdfGlobalDensity) {
@@ -128,18 +126,6 @@ TEST(EdfGlobalResponse, BlockingWithoutPreemption) {
             (Responses{1, 20}));
 }
 
-template <class Check>
-void for_cases(const BoundCaseLimits &limits, int count, Check check) {
-  for (int i = 0; i < count; ++i) {
-    Rng rng(mix(static_cast<std::uint64_t>(i)));
-    const testing::BoundCase bound_case = random_bound_case(rng, limits);
-    const System system = compile(bound_case.workload, bound_case.platform).value();
-    SCOPED_TRACE(describe(bound_case));
-    if (system.not_analysable.empty()) check(bound_case, system, rng);
-    if (::testing::Test::HasFailure()) return;
-  }
-}
-
 TEST(EdfGlobalResponse, IsNeverAboveThatForAnyOrder) {
   std::uint64_t smaller = 0;
   std::uint64_t compared = 0;
@@ -147,7 +133,7 @@ TEST(EdfGlobalResponse, IsNeverAboveThatForAnyOrder) {
     BoundCaseLimits limits = several_workers(mode);
     limits.min_utilization = 0.1;
     limits.max_utilization = 0.6;
-    for_cases(limits, 2000, [&](const testing::BoundCase &, const System &system, Rng &) {
+    for_cases(cases(limits), 2000, [&](const testing::BoundCase &, const System &system, Rng &) {
       const Outcome any = bertogna_cirinei_any().apply(system);
       const Outcome edf = edf_global_response().apply(system);
       if (!std::holds_alternative<Bound>(any)) return;
@@ -174,7 +160,7 @@ TEST(EdfGlobal, AcceptsNothingThatTheDemandOfOneWorkerRefuses) {
   limits.max_deadline = 1.0;
   limits.jitter = false;
   std::uint64_t accepted = 0;
-  for_cases(limits, 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
+  for_cases(cases(limits), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
     const Outcome demand = edf_demand().apply(system);
     if (!std::holds_alternative<Bound>(demand)) return;
     for (const Method &method : {edf_global_density(), edf_global_response()}) {
@@ -194,7 +180,7 @@ TEST(EdfGlobalResponse, MoreExecutionNeverShrinksABoundAndTermsAddUp) {
     BoundCaseLimits limits = several_workers(mode);
     limits.min_utilization = 0.1;
     limits.max_utilization = 0.6;
-    for_cases(limits, 1500, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
+    for_cases(cases(limits), 1500, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
       const Outcome before = edf_global_response().apply(system);
       if (!std::holds_alternative<Bound>(before)) return;
       for (const ResponseBound &bound : std::get<Bound>(before).tasks) {

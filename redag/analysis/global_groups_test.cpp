@@ -8,6 +8,7 @@ namespace redag::analysis {
 namespace {
 
 using testing::BoundCaseLimits;
+using testing::cases;
 using testing::expect_bound_holds;
 
 BoundCaseLimits with_groups(bool edges) {
@@ -26,10 +27,6 @@ BoundCaseLimits with_groups(bool edges) {
   limits.min_period = 10;
   limits.max_period = 150;
   return limits;
-}
-
-testing::BoundGenerator cases(const BoundCaseLimits &limits) {
-  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
 }
 
 TEST(BoundProperty, DagGroups) { expect_bound_holds(dag_groups(), cases(with_groups(true)), {.workloads = 2000}); }

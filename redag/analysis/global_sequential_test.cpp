@@ -10,6 +10,7 @@ namespace redag::analysis {
 namespace {
 
 using testing::BoundCaseLimits;
+using testing::cases;
 using testing::expect_bound_holds;
 
 BoundCaseLimits several_workers(sched::Preemption preemption) {
@@ -21,10 +22,6 @@ BoundCaseLimits several_workers(sched::Preemption preemption) {
   limits.max_deadline = 1.5;
   limits.max_utilization = 0.8;
   return limits;
-}
-
-testing::BoundGenerator cases(const BoundCaseLimits &limits) {
-  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
 }
 
 TEST(BoundProperty, BertognaCirinei) {

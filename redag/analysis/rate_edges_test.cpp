@@ -20,6 +20,7 @@ namespace {
 
 using testing::BoundCase;
 using testing::BoundCaseLimits;
+using testing::cases;
 using testing::expect_bound_holds;
 
 BoundCaseLimits rates(sched::Preemption preemption, std::uint32_t workers) {
@@ -33,10 +34,6 @@ BoundCaseLimits rates(sched::Preemption preemption, std::uint32_t workers) {
   limits.max_utilization = workers == 1 ? 0.9 : 0.6;
   limits.jitter = limits.overheads = true;
   return limits;
-}
-
-testing::BoundGenerator cases(const BoundCaseLimits &limits) {
-  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
 }
 
 // Threads for fewer jobs than tasks.

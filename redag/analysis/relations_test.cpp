@@ -19,22 +19,10 @@ namespace {
 
 using testing::BoundCase;
 using testing::BoundCaseLimits;
+using testing::cases;
+using testing::for_cases;
 
-constexpr int kCases = 1000;
-
-// Calls check(case, system) for random cases that can be analysed.
-template <class Check>
-void for_cases(const BoundCaseLimits &limits, Check check, int cases = kCases) {
-  for (int i = 0; i < cases; ++i) {
-    Rng rng(mix(static_cast<std::uint64_t>(i)));
-    const BoundCase bound_case = testing::random_bound_case(rng, limits);
-    const auto system = compile(bound_case.workload, bound_case.platform);
-    ASSERT_TRUE(system);
-    SCOPED_TRACE(describe(bound_case));
-    if (system->not_analysable.empty()) check(bound_case, *system, rng);
-    if (::testing::Test::HasFailure()) return;
-  }
-}
+constexpr std::uint32_t kCases = 1000;
 
 const Bound *bound_of(const Outcome &outcome) { return std::get_if<Bound>(&outcome); }
 
@@ -52,14 +40,14 @@ BoundCaseLimits blocked() {
 
 // The exact test and the response-time analysis are the same question where priorities are all that counts.
 TEST(Relations, ExactPointsIsResponseTimeWithinDeadline) {
-  int schedulable = 0;
-  for_cases(blocked(), [&](const BoundCase &, const System &system, Rng &) {
+  std::uint32_t schedulable = 0;
+  for_cases(cases(blocked()), kCases, [&](const BoundCase &, const System &system, Rng &) {
     const Outcome points = exact_points().apply(system);
     const Outcome rta = rta_preemptive().apply(system);
     ASSERT_EQ(bound_of(points) != nullptr, bound_of(rta) != nullptr);
     if (bound_of(points) == nullptr) return;
     EXPECT_EQ(verdict(system, *bound_of(points)), verdict(system, *bound_of(rta)));
-    schedulable += *bound_of(points)->accepts ? 1 : 0;
+    schedulable += *bound_of(points)->accepts ? 1U : 0U;
   });
   EXPECT_GT(schedulable, kCases / 5);
   EXPECT_LT(schedulable, kCases * 4 / 5);
@@ -70,8 +58,8 @@ TEST(Relations, UtilizationTestsAreOrdered) {
   limits.policies = {PolicyKind::RateMonotonic};
   limits.min_deadline = 1.0;
   limits.max_utilization = 0.9;
-  int accepted = 0;
-  for_cases(limits, [&](const BoundCase &, const System &system, Rng &) {
+  std::uint32_t accepted = 0;
+  for_cases(cases(limits), kCases, [&](const BoundCase &, const System &system, Rng &) {
     const bool liu = accepts(liu_layland(), system);
     const bool hyper = accepts(hyperbolic(), system);
     const bool liu_blocked = accepts(liu_layland_blocking(), system);
@@ -90,7 +78,7 @@ TEST(Relations, UtilizationTestsAreOrdered) {
 }
 
 TEST(Relations, LinearBoundIsAboveTheFixedPoint) {
-  for_cases(blocked(), [](const BoundCase &, const System &system, Rng &) {
+  for_cases(cases(blocked()), kCases, [](const BoundCase &, const System &system, Rng &) {
     const Outcome linear = linear_bound().apply(system);
     const Outcome rta = rta_preemptive().apply(system);
     if (bound_of(linear) == nullptr) return;
@@ -130,31 +118,26 @@ void expect_not_smaller(const std::vector<ResponseBound> &before, const std::vec
 TEST(Relations, MoreExecutionNeverShrinksABound) {
   std::size_t compared = 0;
   for (const BoundCaseLimits &limits : all_kinds()) {
-    for_cases(
-        limits,
-        [&](const BoundCase &bound_case, const System &system, Rng &rng) {
-          BoundCase longer = bound_case;
-          Dag &dag = longer.workload.dags[static_cast<std::size_t>(
-              rng.uniform(0, static_cast<std::int64_t>(longer.workload.dags.size()) - 1))];
-          Task &task =
-              dag.tasks[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(dag.tasks.size()) - 1))];
-          task.wcet += 1;
-          if (task.region > 0 && limits.preemption == sched::Preemption::Cooperative)
-            return;  // a last region can shrink
-          const auto after = compile(longer.workload, longer.platform);
-          if (!after) return;
-          for (const Method &method : {rta_preemptive(), rta_nonpreemptive(), rta_deferred(),
-                                       dag_one_worker_preemptive(), dag_one_worker_deferred(), linear_bound()}) {
-            const Outcome first = method.apply(system);
-            const Outcome second = method.apply(*after);
-            if (bound_of(first) == nullptr || bound_of(second) == nullptr) continue;
-            SCOPED_TRACE(std::string(method.name));
-            expect_not_smaller(bound_of(first)->tasks, bound_of(second)->tasks);
-            expect_not_smaller(bound_of(first)->dags, bound_of(second)->dags);
-            ++compared;
-          }
-        },
-        kCases / 5);
+    for_cases(cases(limits), kCases / 5, [&](const BoundCase &bound_case, const System &system, Rng &rng) {
+      BoundCase longer = bound_case;
+      Dag &dag = longer.workload.dags[static_cast<std::size_t>(
+          rng.uniform(0, static_cast<std::int64_t>(longer.workload.dags.size()) - 1))];
+      Task &task = dag.tasks[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(dag.tasks.size()) - 1))];
+      task.wcet += 1;
+      if (task.region > 0 && limits.preemption == sched::Preemption::Cooperative) return;  // a last region can shrink
+      const auto after = compile(longer.workload, longer.platform);
+      if (!after) return;
+      for (const Method &method : {rta_preemptive(), rta_nonpreemptive(), rta_deferred(), dag_one_worker_preemptive(),
+                                   dag_one_worker_deferred(), linear_bound()}) {
+        const Outcome first = method.apply(system);
+        const Outcome second = method.apply(*after);
+        if (bound_of(first) == nullptr || bound_of(second) == nullptr) continue;
+        SCOPED_TRACE(std::string(method.name));
+        expect_not_smaller(bound_of(first)->tasks, bound_of(second)->tasks);
+        expect_not_smaller(bound_of(first)->dags, bound_of(second)->dags);
+        ++compared;
+      }
+    });
   }
   EXPECT_GT(compared, 500U);
 }
@@ -162,26 +145,22 @@ TEST(Relations, MoreExecutionNeverShrinksABound) {
 TEST(Relations, TermsAddUpToTheResponse) {
   std::size_t checked = 0;
   for (const BoundCaseLimits &limits : all_kinds()) {
-    for_cases(
-        limits,
-        [&](const BoundCase &, const System &system, Rng &) {
-          const Report report = analyze(system);
-          for (const MethodReport &method : report.methods) {
-            if (method.bound() == nullptr) continue;
-            for (const ResponseBound &bound : method.bound()->tasks) {
-              if (!bound.response) {
-                EXPECT_FALSE(bound.absent.empty()) << method.method->name;
-                continue;
-              }
-              const Duration sum =
-                  std::accumulate(bound.terms.begin(), bound.terms.end(), Duration{0},
-                                  [](Duration total, const Term &term) { return total + term.amount; });
-              EXPECT_EQ(sum, *bound.response) << method.method->name;
-              ++checked;
-            }
+    for_cases(cases(limits), kCases / 5, [&](const BoundCase &, const System &system, Rng &) {
+      const Report report = analyze(system);
+      for (const MethodReport &method : report.methods) {
+        if (method.bound() == nullptr) continue;
+        for (const ResponseBound &bound : method.bound()->tasks) {
+          if (!bound.response) {
+            EXPECT_FALSE(bound.absent.empty()) << method.method->name;
+            continue;
           }
-        },
-        kCases / 5);
+          const Duration sum = std::accumulate(bound.terms.begin(), bound.terms.end(), Duration{0},
+                                               [](Duration total, const Term &term) { return total + term.amount; });
+          EXPECT_EQ(sum, *bound.response) << method.method->name;
+          ++checked;
+        }
+      }
+    });
   }
   EXPECT_GT(checked, 1000U);
 }
@@ -189,7 +168,7 @@ TEST(Relations, TermsAddUpToTheResponse) {
 // The critical instant of Liu and Layland: all released at once, each for its wcet. The bound is what happens.
 TEST(Relations, ResponseTimeIsReachedAtTheCriticalInstant) {
   std::size_t compared = 0;
-  for_cases(BoundCaseLimits{}, [&](const BoundCase &bound_case, const System &system, Rng &) {
+  for_cases(cases(BoundCaseLimits{}), kCases, [&](const BoundCase &bound_case, const System &system, Rng &) {
     const Outcome outcome = rta_preemptive().apply(system);
     ASSERT_NE(bound_of(outcome), nullptr);
     sched::Config config;
@@ -219,7 +198,7 @@ TEST(Report, TrustsNoUnsoundEquationAndNamesWhoSpoke) {
   std::size_t by_response = 0;
   BoundCaseLimits limits;
   limits.policies = {PolicyKind::RateMonotonic};
-  for_cases(limits, [&](const BoundCase &, const System &system, Rng &) {
+  for_cases(cases(limits), kCases, [&](const BoundCase &, const System &system, Rng &) {
     const Report report = analyze(system);
     ASSERT_EQ(report.methods.size(), methods().size());
     for (const MethodReport &method : report.methods) {
@@ -244,7 +223,7 @@ TEST(Report, TrustsNoUnsoundEquationAndNamesWhoSpoke) {
 // A report outlives the methods it was asked with, and so does a copy of it.
 TEST(Report, KeepsTheMethodsItWasGiven) {
   std::size_t named = 0;
-  for_cases(BoundCaseLimits{}, [&](const BoundCase &, const System &system, Rng &) {
+  for_cases(cases(BoundCaseLimits{}), kCases, [&](const BoundCase &, const System &system, Rng &) {
     std::optional<Report> report = analyze(system, {linear_bound(), rta_preemptive()});
     const Report copy = *report;
     report.reset();

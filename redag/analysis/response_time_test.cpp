@@ -8,11 +8,8 @@ namespace redag::analysis {
 namespace {
 
 using testing::BoundCaseLimits;
+using testing::cases;
 using testing::expect_bound_holds;
-
-testing::BoundGenerator cases(const BoundCaseLimits &limits) {
-  return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
-}
 
 BoundCaseLimits everything(sched::Preemption preemption) {
   BoundCaseLimits limits;

@@ -202,4 +202,8 @@ std::vector<PolicyKind> priorities_of_tasks() {
 
 BoundCase random_bound_case(Rng &rng, const BoundCaseLimits &limits) { return CaseGenerator(rng, limits).run(); }
 
+BoundGenerator cases(const BoundCaseLimits &limits) {
+  return [limits](Rng &rng) { return random_bound_case(rng, limits); };
+}
+
 }  // namespace redag::testing

@@ -295,6 +295,19 @@ void expect_bound_holds(const analysis::Method &method, const BoundGenerator &ge
   EXPECT_GT(result.bounds, 0U) << method.name << " never gave a bound";
 }
 
+void for_cases(const BoundGenerator &generator, std::uint32_t count,
+               const std::function<void(const BoundCase &, const analysis::System &, Rng &)> &check) {
+  for (std::uint32_t i = 0; i < count; ++i) {
+    Rng rng(mix(i));
+    const BoundCase bound_case = generator(rng);
+    const auto system = analysis::compile(bound_case.workload, bound_case.platform);
+    SCOPED_TRACE(describe(bound_case));
+    ASSERT_TRUE(system);
+    if (system->not_analysable.empty()) check(bound_case, *system, rng);
+    if (::testing::Test::HasFailure()) return;
+  }
+}
+
 std::string describe(const BoundCase &bound_case) {
   const analysis::AnalysisPlatform &platform = bound_case.platform;
   std::string text =

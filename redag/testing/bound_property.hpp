@@ -49,6 +49,8 @@ struct BoundCaseLimits {
 };
 
 [[nodiscard]] BoundCase random_bound_case(Rng &rng, const BoundCaseLimits &limits);
+/// random_bound_case() within `limits`, case after case.
+[[nodiscard]] BoundGenerator cases(const BoundCaseLimits &limits);
 
 struct BoundPropertyOptions {
   std::uint64_t seed = 1;
@@ -79,6 +81,11 @@ struct BoundPropertyResult {
 /// check_bound() as a test: no violation, and the method did apply. Prints a line of figures.
 void expect_bound_holds(const analysis::Method &method, const BoundGenerator &generator,
                         const BoundPropertyOptions &options = {});
+
+/// Calls `check` for `count` cases, those that can be analysed, with what they compile to; the first that fails a
+/// test's expectation is described and ends it.
+void for_cases(const BoundGenerator &generator, std::uint32_t count,
+               const std::function<void(const BoundCase &, const analysis::System &, Rng &)> &check);
 
 /// One workload for people: a line a task, with the platform.
 [[nodiscard]] std::string describe(const BoundCase &bound_case);
