@@ -140,7 +140,8 @@ void timer(benchmark::State &state, const Setup &setup) {
     const Time origin = monotonic_now() + 20 * kMillisecond;
     task.engine().set_origin(origin);
     ReleaseTimer releases([&](std::span<const Release> due) { task.engine().release(due); }, 0);
-    releases.add(one_task().dags[0], TaskId(0), 0);
+    constexpr TaskId kOnly(0);
+    releases.add(one_task().dags[0], std::span(&kOnly, 1), 0);
     if (!releases.start(origin, kNever, ThreadSetup{"timer", setup.timer_priority(), {}})) std::abort();
     // Between the releases.
     Result<ThreadHandle> bare = start_thread(ThreadSetup{"bare", setup.timer_priority(), {}}, [&] {
