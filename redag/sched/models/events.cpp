@@ -8,35 +8,10 @@
 namespace redag::sched {
 
 EventsScheduler::EventsScheduler(const Workload &workload, const Config &config, Kind kind)
-    : Lifecycle(config, kind == Kind::Events ? TimerReleases::AllKept : TimerReleases::AsTheTaskSays),
-      kind_(kind),
-      working_(config.workers, false) {
-  REDAG_CHECK(config.workers > 0, "an executor has at least one thread");
+    : CallbackThreads(config, kind == Kind::Events ? TimerReleases::AllKept : TimerReleases::AsTheTaskSays),
+      kind_(kind) {
   REDAG_CHECK(kind != Kind::Events || config.workers == 1, "rclcpp's EventsExecutor has one thread");
-  REDAG_CHECK(config.preemption == Preemption::None, "rclcpp's executors do not preempt");
   load(workload);
-}
-
-void EventsScheduler::preemption_point(JobSlot /*job*/, Time /*now*/) {
-  REDAG_CHECK(false, "preemption points are for cooperative preemption");
-}
-
-Step EventsScheduler::dispatch(Time now, std::uint32_t most) {
-  begin(now);
-  give_back_groups();
-  for (std::uint32_t worker = free_worker(); worker != kNil && most > 0; worker = free_worker(), --most) {
-    const std::uint32_t slot = take();
-    if (slot == kNil) break;
-    entities_[jobs_[slot].task.value].ready.remove(jobs_, slot);
-    working_[worker] = true;
-    start(slot, WorkerId(worker), kNil, 0);
-  }
-  return step();
-}
-
-std::uint32_t EventsScheduler::free_worker() const {
-  const auto found = std::find(working_.begin(), working_.end(), false);
-  return found == working_.end() ? kNil : static_cast<std::uint32_t>(found - working_.begin());
 }
 
 // FirstInFirstOutScheduler::get_next_ready_entity.
@@ -58,7 +33,7 @@ std::uint32_t EventsScheduler::take_from(Group &group) {
     const TaskId task = group.events.front();
     group.events.pop_front();
     Entity &entity = entities_[task.value];
-    if (!entity.ready.empty()) return entity.ready.first;
+    if (!entity.ready.empty()) return entity.ready.pop(jobs_);
     entity.armed = true;
     if (!tasks_[task.value].timer && tasks_[task.value].life == TaskLife::Live) return kNil;
   }
@@ -86,9 +61,8 @@ void EventsScheduler::on_ready(std::uint32_t slot) {
 void EventsScheduler::on_withdrawn(std::uint32_t slot) { entities_[jobs_[slot].task.value].ready.remove(jobs_, slot); }
 
 // Its messages come before its group goes back: they were published during the callback, and are reported next.
-void EventsScheduler::on_end(std::uint32_t slot) {
+void EventsScheduler::on_over(std::uint32_t slot) {
   give_back_groups();
-  working_[jobs_[slot].worker.value] = false;
   ended_.push_back(jobs_[slot].task);
 }
 

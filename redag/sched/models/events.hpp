@@ -1,5 +1,5 @@
 // Models of the event-driven executors of ROS 2: rclcpp's experimental EventsExecutor, and EventsCBGExecutor. Owns
-// which ready job runs next; a job's life is Lifecycle's. Not thread-safe. Allocates where the executors' queues do:
+// which ready job runs next. Not thread-safe. Allocates where the executors' queues do:
 // events in them have no bound.
 #pragma once
 
@@ -7,7 +7,7 @@
 #include <deque>
 #include <vector>
 
-#include "redag/sched/lifecycle.hpp"
+#include "redag/sched/models/callback_threads.hpp"
 #include "redag/sched/models/ready_jobs.hpp"
 
 namespace redag::sched {
@@ -35,18 +35,12 @@ namespace redag::sched {
 ///
 /// A timer task is a timer, a data task a subscription; `group` is as in models/wait_set.hpp. Bounds of DAGs,
 /// priorities and preemption are unknown to these executors.
-class EventsScheduler final : public Lifecycle {
+class EventsScheduler final : public CallbackThreads {
  public:
   enum class Kind : std::uint8_t { Events, CallbackGroups };
 
   /// Requires Preemption::None and config.workers > 0, of which Kind::Events has 1.
   EventsScheduler(const Workload &workload, const Config &config, Kind kind);
-
-  /// Nothing: these executors know neither budgets nor criticality.
-  void exceed(JobSlot /*job*/, Limit /*limit*/, Time /*now*/) override {}
-  void preemption_point(JobSlot job, Time now) override;
-  Step dispatch(Time now, std::uint32_t most = kNoLimit) override;
-  [[nodiscard]] bool outranked(JobSlot /*job*/) const override { return false; }
 
  private:
   struct Entity {
@@ -61,13 +55,12 @@ class EventsScheduler final : public Lifecycle {
 
   void on_ready(std::uint32_t slot) override;
   void on_withdrawn(std::uint32_t slot) override;
-  void on_end(std::uint32_t slot) override;
-  void on_lowered(std::uint32_t /*slot*/) override {}
+  void on_over(std::uint32_t slot) override;
   void on_reconfigured() override;
 
-  [[nodiscard]] std::uint32_t free_worker() const;
   [[nodiscard]] bool rearms(TaskId task) const { return kind_ == Kind::CallbackGroups && tasks_[task.value].timer; }
-  std::uint32_t take();
+  std::uint32_t take() override;
+  void before_taking() override { give_back_groups(); }
   std::uint32_t take_from(Group &group);
   void enqueue(TaskId task);
   void give_back_groups();
@@ -78,7 +71,6 @@ class EventsScheduler final : public Lifecycle {
   std::vector<Group> groups_;               // Events: one; else as group_of() says
   std::deque<std::uint32_t> ready_groups_;  // those with events of which no job runs, in turn
   std::vector<TaskId> ended_;               // jobs whose group is still to go back
-  std::vector<bool> working_;               // workers
 };
 
 }  // namespace redag::sched

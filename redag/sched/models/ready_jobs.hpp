@@ -21,6 +21,13 @@ struct ReadyJobs {
     last = slot;
   }
 
+  /// Takes the oldest one out. Requires !empty().
+  std::uint32_t pop(std::vector<Job> &jobs) {
+    const std::uint32_t slot = first;
+    remove(jobs, slot);
+    return slot;
+  }
+
   void remove(std::vector<Job> &jobs, std::uint32_t slot) {
     std::uint32_t before = kNil;
     for (std::uint32_t s = first; s != slot; s = jobs[s].task_next) before = s;

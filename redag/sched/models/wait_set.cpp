@@ -1,51 +1,28 @@
 #include "redag/sched/models/wait_set.hpp"
 
-#include <algorithm>
-
-#include "redag/base/check.hpp"
-
 namespace redag::sched {
 
 WaitSetScheduler::WaitSetScheduler(const Workload &workload, const Config &config, Order order)
-    : Lifecycle(config), order_(order), working_(config.workers, false) {
-  REDAG_CHECK(config.workers > 0, "an executor has at least one thread");
-  REDAG_CHECK(config.preemption == Preemption::None, "rclcpp's executors do not preempt");
+    : CallbackThreads(config), order_(order) {
   load(workload);
 }
 
-void WaitSetScheduler::preemption_point(JobSlot /*job*/, Time /*now*/) {
-  REDAG_CHECK(false, "preemption points are for cooperative preemption");
-}
-
 // Executor::get_next_executable, by one free thread after the other: from the window, or else from a new one.
-Step WaitSetScheduler::dispatch(Time now, std::uint32_t most) {
-  begin(now);
-  for (std::uint32_t worker = free_worker(); worker != kNil && most > 0; worker = free_worker(), --most) {
-    std::uint32_t slot = take();
-    if (slot == kNil && wait()) slot = take();
-    if (slot == kNil) break;
-    Entity &entity = entities_[jobs_[slot].task.value];
-    entity.ready.remove(jobs_, slot);
-    --room_[entity.group];
-    working_[worker] = true;
-    start(slot, WorkerId(worker), kNil, 0);
-  }
-  return step();
-}
-
-std::uint32_t WaitSetScheduler::free_worker() const {
-  const auto found = std::find(working_.begin(), working_.end(), false);
-  return found == working_.end() ? kNil : static_cast<std::uint32_t>(found - working_.begin());
+std::uint32_t WaitSetScheduler::take() {
+  const std::uint32_t slot = take_from_window();
+  return slot == kNil && wait() ? take_from_window() : slot;
 }
 
 // get_next_ready_executable: the first entity of the window whose group is free leaves the window. An entity whose job
 // was skipped meanwhile has nothing to take and leaves it too.
-std::uint32_t WaitSetScheduler::take() {
+std::uint32_t WaitSetScheduler::take_from_window() {
   for (const std::uint32_t task : registration_) {
     Entity &entity = entities_[task];
     if (!entity.in_window || room_[entity.group] == 0) continue;
     entity.in_window = false;
-    if (!entity.ready.empty()) return entity.ready.first;
+    if (entity.ready.empty()) continue;
+    --room_[entity.group];
+    return entity.ready.pop(jobs_);
   }
   return kNil;
 }
@@ -65,10 +42,7 @@ void WaitSetScheduler::on_ready(std::uint32_t slot) { entities_[jobs_[slot].task
 
 void WaitSetScheduler::on_withdrawn(std::uint32_t slot) { entities_[jobs_[slot].task.value].ready.remove(jobs_, slot); }
 
-void WaitSetScheduler::on_end(std::uint32_t slot) {
-  ++room_[entities_[jobs_[slot].task.value].group];
-  working_[jobs_[slot].worker.value] = false;
-}
+void WaitSetScheduler::on_over(std::uint32_t slot) { ++room_[entities_[jobs_[slot].task.value].group]; }
 
 // Entities keep their jobs and their place in the window; the groups are numbered anew.
 void WaitSetScheduler::on_reconfigured() {

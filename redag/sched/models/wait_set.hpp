@@ -1,12 +1,12 @@
 // Model of rclcpp's executors that wait for a set of entities, as of ROS 2 Humble: SingleThreadedExecutor,
-// MultiThreadedExecutor, StaticSingleThreadedExecutor. Owns which ready job runs next; a job's life is Lifecycle's. Not
-// thread-safe. What is modelled and what is not: at the class.
+// MultiThreadedExecutor, StaticSingleThreadedExecutor. Owns which ready job runs next. Not thread-safe. What is
+// modelled and what is not: at the class.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "redag/sched/lifecycle.hpp"
+#include "redag/sched/models/callback_threads.hpp"
 #include "redag/sched/models/ready_jobs.hpp"
 
 namespace redag::sched {
@@ -28,19 +28,13 @@ namespace redag::sched {
 /// A timer task is a timer, a data task a subscription. `group` is the callback group; a task without one is alone in a
 /// group of its own, whereas in ROS 2 all callbacks of a node share its default group unless told otherwise. Bounds of
 /// DAGs (max_active), priorities and preemption are unknown to these executors.
-class WaitSetScheduler final : public Lifecycle {
+class WaitSetScheduler final : public CallbackThreads {
  public:
   enum class Order : std::uint8_t { TimersFirst, SubscriptionsFirst };
 
   /// Requires config.workers > 0 and Preemption::None; 1 worker is the SingleThreadedExecutor, or, with subscriptions
   /// first, the static one.
   WaitSetScheduler(const Workload &workload, const Config &config, Order order);
-
-  /// Nothing: these executors know neither budgets nor criticality.
-  void exceed(JobSlot /*job*/, Limit /*limit*/, Time /*now*/) override {}
-  void preemption_point(JobSlot job, Time now) override;
-  Step dispatch(Time now, std::uint32_t most = kNoLimit) override;
-  [[nodiscard]] bool outranked(JobSlot /*job*/) const override { return false; }
 
  private:
   /// A task as rclcpp sees it: a timer or a subscription.
@@ -52,19 +46,17 @@ class WaitSetScheduler final : public Lifecycle {
 
   void on_ready(std::uint32_t slot) override;
   void on_withdrawn(std::uint32_t slot) override;
-  void on_end(std::uint32_t slot) override;
-  void on_lowered(std::uint32_t /*slot*/) override {}
+  void on_over(std::uint32_t slot) override;
   void on_reconfigured() override;
 
-  [[nodiscard]] std::uint32_t free_worker() const;
-  std::uint32_t take();
+  std::uint32_t take() override;
+  std::uint32_t take_from_window();
   bool wait();
 
   Order order_;
   std::vector<Entity> entities_;             // by TaskId
   std::vector<std::uint32_t> registration_;  // tasks in the order in which a window is searched
   std::vector<std::uint32_t> room_;          // jobs that groups can start: one group for each task, then the named ones
-  std::vector<bool> working_;                // workers
 };
 
 }  // namespace redag::sched
