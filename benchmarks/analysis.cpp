@@ -70,14 +70,14 @@ void run_method(benchmark::State &state, const analysis::Method &method, redag::
 void BM_GuanBare(benchmark::State &state) {
   const auto sets = systems(redag::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
   run_bare(state, bare(sets), [](std::vector<GlobalUnit> &units, std::size_t k) {
-    return analysis::global::guan_response(units, k, kWorkers);
+    return analysis::global::guan_response(units, k, kWorkers, analysis::global::start_after(units, k));
   });
 }
 
 void BM_BertognaCirineiBare(benchmark::State &state) {
   const auto sets = systems(redag::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
   run_bare(state, bare(sets), [](std::vector<GlobalUnit> &units, std::size_t k) {
-    return analysis::global::bertogna_cirinei_response(units, k, kWorkers);
+    return analysis::global::bertogna_cirinei_response(units, k, kWorkers, analysis::global::start_after(units, k));
   });
 }
 

@@ -201,8 +201,7 @@ Method graham() {
       "R. Graham, Bounds on multiprocessing timing anomalies, SIAM Journal on Applied Mathematics 17(2), 1969";
   method.assumptions =
       "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared groups, "
-      "not "
-      "cooperative";
+      "not cooperative";
   method.complexity = "O(tasks + edges)";
   method.apply = apply_graham;
   return method;
@@ -216,8 +215,7 @@ Method long_paths() {
       "Q. He, N. Guan, M. Lv, X. Jiang, W. Chang, Bounding the response time of DAG tasks using long paths, RTSS 2022";
   method.assumptions =
       "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared groups, "
-      "not "
-      "cooperative";
+      "not cooperative";
   method.complexity = "O(workers (tasks + edges))";
   method.apply = apply_long_paths;
   return method;
@@ -229,12 +227,10 @@ Method isolated() {
   method.subject = Subject::Dag;
   method.cite =
       "docs/analysis.md, \"Isolation\"; J. Li, J. Chen, K. Agrawal, C. Lu, C. Gill, A. Saifullah, Analysis of "
-      "federated "
-      "and global scheduling for parallel real-time tasks, ECRTS 2014; RTSS 2022 (see long_paths)";
+      "federated and global scheduling for parallel real-time tasks, ECRTS 2014; RTSS 2022 (see long_paths)";
   method.assumptions =
       "the max_active of the DAG and of all that can take a worker from it sum up to at most m; any policy and mode; "
-      "one "
-      "rate a DAG with edges, R <= T; no shared groups";
+      "one rate a DAG with edges, R <= T; no shared groups";
   method.complexity = "O(DAGs tasks + workers (tasks + edges))";
   method.apply = apply_isolated;
   return method;

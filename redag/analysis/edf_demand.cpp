@@ -174,8 +174,7 @@ Method edf_demand_nonpreemptive() {
       "1996";
   method.assumptions =
       "one worker, jobs run to completion or to a preemption point, edf, no edges, deadlines before the next release "
-      "is "
-      "refused, jitter below the deadline; groups and max_active where jobs run to completion";
+      "is refused, jitter below the deadline; groups and max_active where jobs run to completion";
   method.complexity = "pseudo-polynomial; O(n) an interval";
   method.apply = apply_nonpreemptive;
   return method;

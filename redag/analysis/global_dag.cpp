@@ -271,8 +271,7 @@ Method melani() {
   method.subject = Subject::Dag;
   method.cite =
       "A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo, Response-time analysis of "
-      "conditional "
-      "DAG tasks in multiprocessor systems, ECRTS 2015";
+      "conditional DAG tasks in multiprocessor systems, ECRTS 2015";
   method.assumptions =
       "m workers, full preemption, static priorities that keep DAGs together, R <= T; release jitter; "
       "no max_active, shared groups or levels";

@@ -209,8 +209,7 @@ Method dag_groups() {
   method.cite = "docs/analysis.md, \"Exclusive groups\"";
   method.assumptions =
       "m workers, full preemption (a group's holder inherits) or none, static priorities that keep DAGs together, one "
-      "rate "
-      "a DAG, R <= T; release jitter, exclusive groups within and across DAGs; no max_active, no shared levels";
+      "rate a DAG, R <= T; release jitter, exclusive groups within and across DAGs; no max_active, no shared levels";
   method.complexity = "pseudo-polynomial; O(DAGs^2 groups) a step";
   method.apply = [](const System &system) { return across_rates(system, apply_groups); };
   return method;

@@ -93,11 +93,21 @@ Duration first_window(std::span<const GlobalUnit> others, std::size_t skip, Dura
   return first.length();
 }
 
+Duration window_of(const GlobalUnit &unit) { return unit.response - unit.jitter - unit.volume + 1; }
+
 }  // namespace
 
-bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
+Duration start_after(std::span<const GlobalUnit> units, std::size_t k) {
+  Duration start = 0;
+  for (const GlobalUnit &other : units.first(k)) {
+    if (other.volume <= units[k].volume) start = std::max(start, window_of(other));
+  }
+  return start;
+}
+
+bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration start) {
   GlobalUnit &own = units[k];
-  Duration d = first_window(units.first(k), kNobody, 0, workers);
+  Duration d = std::max(start, first_window(units.first(k), kNobody, 0, workers));
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
     return carrying_window(units.first(k), kNobody, waiting + own.volume - 1, waiting, 0, workers);
   });
@@ -105,11 +115,11 @@ bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::
   return found;
 }
 
-bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
+bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration start) {
   GlobalUnit &own = units[k];
   const Duration stop = own.limit - own.jitter - own.volume + 1;
   const auto window = [&](Duration d) { return d + own.volume - 1; };
-  Duration d = first_window(units.first(k), kNobody, 0, workers);
+  Duration d = std::max(start, first_window(units.first(k), kNobody, 0, workers));
   const bool found =
       least_fixed_point(stop, d, [&](Duration w) { return fresh_window(units.first(k), window(w), w, workers); }) &&
       least_fixed_point(stop, d, [&](Duration w) { return guan_window(units.first(k), window(w), w, workers); });
@@ -155,7 +165,7 @@ ResponseBound itemise(const System &system, std::span<const GlobalUnit> units, s
   SharedTerms terms(system, own);
   terms.add_path();
   terms.add_jitter();
-  const Duration waiting = own.response - own.jitter - own.volume + 1;
+  const Duration waiting = global::window_of(own);
   if (remaining > 0) terms.add_share(Term::Kind::Blocking, own, remaining, workers);
   for (std::size_t i = 0; i < k; ++i) {
     terms.add_share(Term::Kind::Interference, units[i], std::min(units[i].work, waiting), workers);
@@ -194,13 +204,13 @@ Outcome from_most_urgent(const System &system, sched::Preemption mode, Respond r
 
 Outcome apply_bertogna_cirinei(const System &system) {
   return from_most_urgent(system, sched::Preemption::Full, [](global::Units &view, std::size_t k, Duration &) {
-    return global::bertogna_cirinei_response(view.units, k, view.workers);
+    return global::bertogna_cirinei_response(view.units, k, view.workers, global::start_after(view.units, k));
   });
 }
 
 Outcome apply_guan(const System &system) {
   return from_most_urgent(system, sched::Preemption::Full, [](global::Units &view, std::size_t k, Duration &) {
-    return global::guan_response(view.units, k, view.workers);
+    return global::guan_response(view.units, k, view.workers, global::start_after(view.units, k));
   });
 }
 

@@ -19,10 +19,16 @@ namespace global {
   return jobs.quotient * task.volume + std::min(task.volume, jobs.remainder);
 }
 
+/// Where the two bounds for full preemption may begin for units[k] if the same one gave the responses of all before it:
+/// what delays a more urgent task delays this one, too, and in a window that is not shorter if that one's wcet is not
+/// longer.
+[[nodiscard]] Duration start_after(std::span<const GlobalUnit> units, std::size_t k);
+
 /// Each fills in `response` of units[k] given those of the more urgent ones, units[0 .. k). False: above its limit, or
-/// `steps` ran out.
-[[nodiscard]] bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers);
-[[nodiscard]] bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers);
+/// `steps` ran out. `start`: below which there is no fixed point.
+[[nodiscard]] bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
+                                             Duration start = 0);
+[[nodiscard]] bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration start = 0);
 /// `remaining`: sum of the m largest C - 1 of less urgent tasks.
 [[nodiscard]] bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
                                                      Duration remaining);

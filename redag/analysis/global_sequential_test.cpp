@@ -166,6 +166,33 @@ TEST(GlobalSequential, GuanIsNeverAboveBertognaCirinei) {
   EXPECT_GT(smaller, 100U);
 }
 
+// Fixed points that begin at a more urgent task's are the least ones all the same.
+TEST(GlobalSequential, WhereTheWindowsBeginDoesNotShow) {
+  using Respond = bool (*)(std::span<global::GlobalUnit>, std::size_t, std::uint32_t, Duration);
+  std::uint64_t later = 0;
+  std::uint64_t compared = 0;
+  for (const Respond respond : {&global::guan_response, &global::bertogna_cirinei_response}) {
+    testing::for_cases(cases(several_workers(sched::Preemption::Full)), 2000,
+                       [&](const testing::BoundCase &, const System &system, Rng &) {
+                         global::Units view =
+                             global::units_of(system, {.mode = sched::Preemption::Full, .edges = false});
+                         if (view.reason) return;
+                         for (std::size_t k = 0; k < view.units.size(); ++k) {
+                           const Duration start = global::start_after(view.units, k);
+                           const bool found = respond(view.units, k, view.workers, start);
+                           const Duration response = view.units[k].response;
+                           ASSERT_EQ(respond(view.units, k, view.workers, 0), found);
+                           if (!found) return;
+                           ASSERT_EQ(view.units[k].response, response);
+                           ++compared;
+                           if (start > 1) ++later;
+                         }
+                       });
+  }
+  EXPECT_GT(compared, 5000U);
+  EXPECT_GT(later, 1000U);
+}
+
 TEST(GlobalSequential, TermsAddUp) {
   BoundCaseLimits limits = several_workers(sched::Preemption::Full);
   for (std::uint64_t seed = 0; seed < 1500; ++seed) {

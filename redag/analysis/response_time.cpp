@@ -58,8 +58,7 @@ Method rta_preemptive() {
       "Real-Time Systems 6(2), 1994";
   method.assumptions =
       "one worker, full preemption, static priorities, edges only between rates; any deadlines, release jitter, shared "
-      "groups with "
-      "priority inheritance, shared levels";
+      "groups with priority inheritance, shared levels";
   method.complexity = "pseudo-polynomial; O(n) a step";
   method.apply = [](const System &system) { return across_rates(system, independent_full); };
   return method;
@@ -103,8 +102,7 @@ Method dag_one_worker_preemptive() {
   method.cite = "as rta_preemptive, with C = volume of the DAG (docs/analysis.md, \"DAGs on one worker\")";
   method.assumptions =
       "one worker, full preemption, static priorities; R <= T for DAGs; timers that keep their periods where edges "
-      "join "
-      "rates; jitter, groups with inheritance, shared levels, max_active";
+      "join rates; jitter, groups with inheritance, shared levels, max_active";
   method.complexity = "pseudo-polynomial; O(n) a step";
   method.apply = [](const System &system) { return across_rates(system, dags_full); };
   return method;

@@ -280,17 +280,13 @@ Method make(std::string_view name, std::string_view cite, std::string_view assum
 
 constexpr std::string_view kOneWorker =
     "one worker, full preemption, rate-monotonic order, D >= T, no jitter, no blocking; a DAG of one rate counts as "
-    "one "
-    "task with C = volume";
+    "one task with C = volume";
 constexpr std::string_view kOneWorkerBlocking =
     "one worker, any preemption, rate-monotonic order, D >= T, no jitter; a DAG of one rate counts as one task with C "
-    "= "
-    "volume";
+    "= volume";
 constexpr std::string_view kGlobal =
     "m >= 2 workers, full preemption, rate-monotonic order, independent tasks, D >= T, no jitter, groups, max_active "
-    "or "
-    "shared "
-    "levels";
+    "or shared levels";
 
 }  // namespace
 
@@ -314,10 +310,10 @@ Method harmonic_chains() {
 }
 
 Method liu_layland_blocking() {
-  return make("liu_layland_blocking",
-              "L. Sha, R. Rajkumar, J. Lehoczky, Priority inheritance protocols, IEEE Transactions on Computers 39(9), "
-              "1990",
-              kOneWorkerBlocking, "O(n^2)", apply_liu_layland_blocking);
+  return make(
+      "liu_layland_blocking",
+      "L. Sha, R. Rajkumar, J. Lehoczky, Priority inheritance protocols, IEEE Transactions on Computers 39(9), 1990",
+      kOneWorkerBlocking, "O(n^2)", apply_liu_layland_blocking);
 }
 
 Method hyperbolic_blocking() {

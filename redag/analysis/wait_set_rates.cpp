@@ -269,8 +269,7 @@ Outcome apply_rates(const System &system) {
 
 constexpr std::string_view kOneThread =
     "rclcpp's SingleThreadedExecutor of Humble with a processor of its own, timers polled like subscriptions; one rate "
-    "a "
-    "DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups";
+    "a DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups";
 
 Method make(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
             Outcome (*apply)(const System &)) {

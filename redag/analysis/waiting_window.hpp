@@ -15,7 +15,7 @@ namespace redag::analysis::global {
 // The `kept` largest of the values offered, with what they belong to; a few workers need a few.
 class Largest {
  public:
-  explicit Largest(std::size_t kept) : kept_(std::min(kept, kMost)) {}
+  explicit Largest(std::size_t kept) : kept_(std::min(kept, kMost)) { std::fill_n(entries_.begin(), kept_, Entry{}); }
 
   void offer(Duration value, std::size_t whose = 0) {
     if (kept_ == 0 || value <= entries_[kept_ - 1].value) return;
@@ -25,8 +25,8 @@ class Largest {
   }
 
   struct Entry {
-    Duration value = 0;
-    std::size_t whose = 0;
+    Duration value;
+    std::size_t whose;
   };
   [[nodiscard]] std::span<const Entry> entries() const { return std::span(entries_).first(kept_); }
 
@@ -34,7 +34,7 @@ class Largest {
 
  private:
   std::size_t kept_;
-  std::array<Entry, kMost> entries_{};
+  std::array<Entry, kMost> entries_;  // of which kept_ have values: to clear all of them takes longer than a bound
 };
 
 // Least d with sum_i min(w_i, d) + rest < m d, where `all` is the sum of the w_i and rest, and `largest` holds the m -

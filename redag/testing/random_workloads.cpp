@@ -134,8 +134,7 @@ std::string describe(const Workload &workload, const sched::Config &config) {
     for (const Task &task : dag.tasks) {
       text += fmt::format(
           "  task {}: {}, T {}, D {}, offset {}, after {{{}}}, group '{}', concurrency {}, queue {}, priority {}, "
-          "on_budget "
-          "{}\n",
+          "on_budget {}\n",
           id++, to_string(task.activation), format_duration(task.period), format_duration(task.deadline),
           format_duration(task.offset), fmt::join(task.predecessors, ","), task.group, task.concurrency,
           task.overrun == Overrun::Queue ? task.queue_depth : 0, task.priority.value_or(0), to_string(task.on_budget));

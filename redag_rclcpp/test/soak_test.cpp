@@ -1,15 +1,19 @@
 // What an executor costs while nothing happens, and what it holds on to in the long run. REDAG_SOAK_SECONDS says how
-// long the busy part is (10); REDAG_SOAK_EXECUTOR=multi_threaded does the same with rclcpp's, to compare with.
+// long the busy part is (10), REDAG_SOAK_WORKERS how many workers there are (2), REDAG_SOAK_LOAD what share of them is
+// used (0); REDAG_SOAK_EXECUTOR=multi_threaded does the same with rclcpp's, to compare with.
 #include <gtest/gtest.h>
-#include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
+#include <filesystem>
 #include <fstream>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -35,6 +39,17 @@ std::size_t resident_kib() {
   std::size_t resident = 0;
   statm >> total >> resident;
   return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE)) / 1024;
+}
+
+std::size_t open_files() {
+  std::error_code ignored;
+  const std::filesystem::directory_iterator files("/proc/self/fd", ignored);
+  return static_cast<std::size_t>(std::distance(begin(files), end(files)));
+}
+
+double number_from(const char *variable, double otherwise) {
+  const char *text = std::getenv(variable);
+  return text == nullptr ? otherwise : std::atof(text);
 }
 
 /// Wake-ups of our threads, and of the one that spins.
@@ -145,6 +160,60 @@ class Graph {
   std::uint64_t guests_ = 0;
 };
 
+/// Two timers for each worker, which use `load` of it: a quarter of that in short periods, the rest in long jobs.
+class Load {
+ public:
+  Load(rclcpp::Executor &executor, std::size_t workers, double load) {
+    for (std::size_t i = 0; i < workers && load > 0; ++i) {
+      add(5ms, load / 4, i == 0);
+      add(50ms, load * 3 / 4, false);
+    }
+    executor.add_node(node_);
+  }
+
+  /// The 99th percentile of the first short one's responses since the last call, in microseconds; 0 without any.
+  double take_p99() {
+    const std::lock_guard lock(mutex_);
+    if (responses_.empty()) return 0;
+    const auto p99 = responses_.begin() + static_cast<std::ptrdiff_t>(responses_.size() * 99 / 100);
+    std::nth_element(responses_.begin(), p99, responses_.end());
+    const double value = *p99;
+    responses_.clear();
+    return value;
+  }
+
+ private:
+  using microseconds = std::chrono::duration<double, std::micro>;
+
+  void add(std::chrono::nanoseconds period, double share, bool is_measured) {
+    groups_.push_back(node_->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive));
+    const auto slot = timers_.size();
+    timers_.push_back(node_->create_wall_timer(
+        period,
+        [this, slot, period, work = share * std::chrono::duration<double>(period).count(), is_measured] {
+          for (const double begin = processor_time(); processor_time() < begin + work;) {
+          }
+          if (!is_measured) return;
+          const microseconds response = period - timers_[slot]->time_until_trigger();
+          const std::lock_guard lock(mutex_);
+          responses_.push_back(response.count());
+        },
+        groups_.back()));
+  }
+
+  static double processor_time() {
+    timespec time{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
+
+  rclcpp::Node::SharedPtr node_ = std::make_shared<rclcpp::Node>("load");
+  std::vector<rclcpp::CallbackGroup::SharedPtr> groups_;  // the node does not keep them
+  std::vector<rclcpp::TimerBase::SharedPtr> timers_;
+  std::mutex mutex_;
+  std::vector<double> responses_;
+};
+
 /// Least-squares slope, a minute.
 double slope(const std::vector<double> &minutes, const std::vector<double> &values, std::size_t from) {
   const auto n = static_cast<double>(values.size() - from);
@@ -162,21 +231,23 @@ double slope(const std::vector<double> &minutes, const std::vector<double> &valu
 }
 
 TEST_F(SoakTest, ABusyGraphGoesOnAndThreadsDoNotPileUp) {
-  const char *text = std::getenv("REDAG_SOAK_SECONDS");
-  const std::chrono::seconds time(text == nullptr ? 10 : std::atoi(text));
+  const std::chrono::seconds time(static_cast<int>(number_from("REDAG_SOAK_SECONDS", 10)));
+  const auto workers = static_cast<std::uint32_t>(number_from("REDAG_SOAK_WORKERS", 2));
   const char *kind = std::getenv("REDAG_SOAK_EXECUTOR");
   std::unique_ptr<rclcpp::Executor> executor;
   if (kind != nullptr && std::string(kind) == "multi_threaded") {
-    executor = std::make_unique<rclcpp::executors::MultiThreadedExecutor>(rclcpp::ExecutorOptions(), 2);
+    executor = std::make_unique<rclcpp::executors::MultiThreadedExecutor>(rclcpp::ExecutorOptions(), workers);
   } else {
-    executor = std::make_unique<ReDAGExecutor>(ReDAGOptions{.workers = 2});
+    executor = std::make_unique<ReDAGExecutor>(ReDAGOptions{.workers = workers});
   }
   Graph graph(*executor);
+  Load load(*executor, workers, number_from("REDAG_SOAK_LOAD", 0));
   const Spinner spinner(*executor);
   graph.churn();
   ASSERT_TRUE(eventually([&] { return graph.received > 0 && graph.answered > 0; }));
 
   const std::size_t threads = process_tasks().size();
+  const std::size_t files = open_files();
   std::vector<double> minutes;
   std::vector<double> resident;
   const auto begin = steady_clock::now();
@@ -191,12 +262,14 @@ TEST_F(SoakTest, ABusyGraphGoesOnAndThreadsDoNotPileUp) {
     minutes.push_back(std::chrono::duration<double>(steady_clock::now() - begin).count() / 60);
     resident.push_back(static_cast<double>(resident_kib()));
     if (resident.size() % 60 == 0) {
-      std::printf("%5.1f min: %.0f KiB, %zu threads, %lu wake-ups\n", minutes.back(), resident.back(),
-                  process_tasks().size(), wake_ups(spinner.thread_id()));
+      std::printf("%5.1f min: %.0f KiB, %zu threads, %zu files, %lu wake-ups, p99 of 5 ms timer %.0f us\n",
+                  minutes.back(), resident.back(), process_tasks().size(), open_files(), wake_ups(spinner.thread_id()),
+                  load.take_p99());
       std::fflush(stdout);
     }
   }
   EXPECT_LE(process_tasks().size(), threads);
+  EXPECT_LE(open_files(), files);
   std::printf("%.0f KiB at first, %.0f KiB at last; in the second half %+.1f KiB a minute\n", resident.front(),
               resident.back(), slope(minutes, resident, resident.size() / 2));
 }
