@@ -19,7 +19,8 @@ enum class JobState : std::uint8_t {
   Suspended,  // started, lost its worker: in the ready queue (Full) or under another job on its worker (Cooperative)
 };
 
-struct Job {
+// Never in more than two cache lines.
+struct alignas(32) Job {
   TaskId task;
   std::uint32_t number = 0;
   Time release = 0;

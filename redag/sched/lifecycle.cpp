@@ -44,14 +44,20 @@ void Lifecycle::miss(TaskId id, Time nominal, Time now, Reason reason) {
   refuse(id, nominal, refused == Reason::None ? reason : refused);
 }
 
+// The number of the job that this makes.
+std::uint32_t Lifecycle::count_release(TaskState &task) {
+  const std::uint32_t number = task.next_number++;
+  if (task.next_number == 0) task.released_earlier += std::uint64_t{1} << 32U;
+  return number;
+}
+
 void Lifecycle::refuse(TaskId id, Time nominal, Reason reason) {
   TaskState &task = tasks_[id.value];
   Job fresh;
   fresh.task = id;
-  fresh.number = task.next_number++;
-  ++task.accounting.released;
+  fresh.number = count_release(task);
   emit(fresh, JobEventKind::Released, nominal);
-  ++task.accounting.skipped;
+  ++task.skipped;
   emit(fresh, JobEventKind::Skipped, 0, reason);
 }
 
@@ -63,10 +69,10 @@ void Lifecycle::complete(JobSlot job_slot, Time now, Outcome outcome) {
   const Job job = jobs_[slot];
   TaskState &task = tasks_[job.task.value];
   if (outcome == Outcome::Finished) {
-    ++task.accounting.finished;
+    ++task.finished;
     emit(job, JobEventKind::Finished, now);
   } else {
-    ++task.accounting.aborted;
+    ++task.aborted;
     emit(job, JobEventKind::Aborted, now, reason_of(outcome));
   }
   // It used its budget and ended at one instant: its new level is nobody's business any more.
@@ -293,14 +299,15 @@ void Lifecycle::prioritise() {
   const std::vector<Priority> priorities = assign_priorities(ranked, config_.policy, config_.levels);
   for (std::size_t i = 0; i < ranked.size(); ++i) {
     TaskState &task = tasks_[ranked[i].task.value];
-    task.priority = priorities[i];
-    task.key = task.degraded ? demoted_key() : task.priority.rank;
+    task.rank = priorities[i].rank;
+    task.level = priorities[i].level;
+    task.key = task.degraded ? demoted_key() : task.rank;
   }
   for (Job &job : jobs_) {
     if (job.state == JobState::Free || job.state == JobState::Waiting) continue;
-    const std::uint32_t own_rank = tasks_[job.task.value].priority.rank;
+    const std::uint32_t own_rank = tasks_[job.task.value].rank;
     const bool has_inherited = job.priority_of != job.task;
-    job.rank = tasks_[job.priority_of.value].priority.rank;
+    job.rank = tasks_[job.priority_of.value].rank;
     if (is_static(config_.policy)) {
       job.key = has_inherited ? tasks_[job.priority_of.value].key : own_key(job);
     }
@@ -365,7 +372,7 @@ void Lifecycle::defer(std::uint32_t slot) {
   Job &job = jobs_[slot];
   if (job.deferred) return;
   job.deferred = true;
-  ++tasks_[job.task.value].accounting.deferred;
+  ++tasks_[job.task.value].deferred;
   emit(job, JobEventKind::Deferred, 0);
 }
 
@@ -375,10 +382,9 @@ void Lifecycle::admit(TaskId id, Time nominal, Time origin) {
   DagState &dag = dag_states_[task.dag.value];
   Job fresh;
   fresh.task = id;
-  fresh.number = task.next_number++;
+  fresh.number = count_release(task);
   fresh.release = nominal;
   fresh.deadline = nominal + task.deadline;
-  ++task.accounting.released;
   emit(fresh, JobEventKind::Released, nominal);
 
   if (task.waiting != kNil) skip(task.waiting, Reason::Precedence);
@@ -391,7 +397,7 @@ void Lifecycle::admit(TaskId id, Time nominal, Time origin) {
   const bool queue_is_full = task.queue_depth > 0 && task.ready_count >= task.queue_depth;
   const bool dag_is_full = dag.max_pending > 0 && dag.pending >= dag.max_pending;
   if (queue_is_full || dag_is_full) {
-    ++task.accounting.skipped;
+    ++task.skipped;
     emit(fresh, JobEventKind::Skipped, 0, queue_is_full ? Reason::QueueFull : Reason::DagFull);
     return;
   }
@@ -417,7 +423,7 @@ void Lifecycle::make_ready(std::uint32_t slot, Time origin) {
   job.origin = origin;
   job.sequence = next_sequence_++;
   job.priority_of = job.task;
-  job.rank = task.priority.rank;
+  job.rank = task.rank;
   switch (config_.policy) {
     case PolicyKind::Edf: job.key = task.degraded ? kDemotedKey : job.deadline; break;
     case PolicyKind::Fifo: job.key = task.degraded ? kDemotedKey : static_cast<std::int64_t>(job.sequence); break;
@@ -437,7 +443,7 @@ void Lifecycle::skip(std::uint32_t slot, Reason reason) {
     task.waiting = kNil;
   }
   --dag_states_[task.dag.value].pending;
-  ++task.accounting.skipped;
+  ++task.skipped;
   emit(job, JobEventKind::Skipped, 0, reason);
   free_slot(slot);
 }

@@ -34,7 +34,11 @@ class Lifecycle : public Scheduler {
   [[nodiscard]] std::span<const TaskId> tasks_of(DagId dag) const final { return dag_states_[dag.value].tasks; }
   [[nodiscard]] std::size_t task_slots() const final { return tasks_.size(); }
   [[nodiscard]] std::size_t dag_slots() const final { return dag_states_.size(); }
-  [[nodiscard]] Accounting accounting(TaskId task) const final { return tasks_[task.value].accounting; }
+  [[nodiscard]] Accounting accounting(TaskId task) const final {
+    const TaskState &state = tasks_[task.value];
+    return Accounting{state.released_earlier + state.next_number, state.finished, state.skipped, state.aborted,
+                      state.deferred};
+  }
   [[nodiscard]] std::uint32_t ready(TaskId task) const final { return tasks_[task.value].ready_count; }
 
   [[nodiscard]] const Job &job(JobSlot slot) const { return jobs_[slot.value]; }
@@ -47,30 +51,35 @@ class Lifecycle : public Scheduler {
   // Live -> Removed -> Gone (no job of it is left, and none has its priority) -> with reuse_ids another Live task.
   enum class TaskLife : std::uint8_t { Live, Removed, Gone };
 
-  // What each job needs is in the first 64 bytes, then what is counted.
+  // What a job needs that is released, starts and finishes is in the first 64 bytes.
   struct alignas(64) TaskState {
     Duration deadline = 0;
     std::int64_t key = 0;  // static policies: of its jobs that have inherited nothing
-    Priority priority;     // not of one that is gone
+    std::uint64_t finished = 0;
+    std::uint32_t rank = 0;  // its place in the order of priority; not of one that is gone
     DagId dag;
     std::uint32_t queue_depth = 0;      // 0: overrun by skipping; kUnboundedQueue
     std::uint32_t free_slot = kNil;     // list through Job::next
     std::uint32_t waiting = kNil;       // the job whose predecessors are incomplete
     std::uint32_t latest_ready = kNil;  // the job that became ready last; not started if ready_count > 0
     std::uint32_t ready_count = 0;      // ready and not started
-    std::uint32_t next_number = 0;
+    std::uint32_t next_number = 0;      // so many were released, and the earlier ones
     bool timer = true;
     bool joined = false;  // it has predecessors or successors
     TaskLife life = TaskLife::Live;
     OnBudget on_budget = OnBudget::Abort;
     bool skips_next = false;  // a job used its budget, and the next release is not taken
     bool degraded = false;    // its jobs are demoted from the start: HI mode, and its DAG is of lower criticality
-    Accounting accounting;
 
+    std::uint64_t released_earlier = 0;  // before numbers began anew at 0
+    std::uint64_t skipped = 0;
+    std::uint64_t aborted = 0;
+    std::uint64_t deferred = 0;
     Duration period = 0;
     Duration offset = 0;
     Time let_through = kNoRelease;  // degraded: its newest release that was taken
-    std::uint32_t group = kNil;     // position among the groups
+    std::uint32_t level = 0;
+    std::uint32_t group = kNil;  // position among the groups
     std::uint32_t concurrency = 1;
     std::uint32_t topological_rank = 0;
     int fixed_priority = 0;
@@ -143,6 +152,7 @@ class Lifecycle : public Scheduler {
   void admit(TaskId id, Time nominal, Time origin);
   void admit_or_refuse(TaskId id, Time nominal, Time origin);
   void refuse(TaskId id, Time nominal, Reason reason);
+  static std::uint32_t count_release(TaskState &task);
   [[nodiscard]] Reason refusal(TaskState &task, Time nominal);
   [[nodiscard]] bool is_let_through(TaskState &task, Time nominal);
   [[nodiscard]] static bool shares_grid(const TaskState &a, const TaskState &b);

@@ -110,7 +110,7 @@ void Lifecycle::restore() {
     TaskState &task = tasks_[t];
     if (!task.degraded) continue;
     task.degraded = false;
-    task.key = task.priority.rank;
+    task.key = task.rank;
     if (task.life == TaskLife::Live) precedence_.discard(TaskId(t));
   }
   high_mode_ = false;
@@ -126,7 +126,7 @@ void Lifecycle::demote(std::uint32_t slot) {
 std::int64_t Lifecycle::own_key(const Job &job) const {
   const TaskState &task = tasks_[job.task.value];
   if (job.demoted || task.degraded) return demoted_key();
-  return is_static(config_.policy) ? task.priority.rank : job.deadline;
+  return is_static(config_.policy) ? task.rank : job.deadline;
 }
 
 }  // namespace redag::sched

@@ -108,19 +108,15 @@ bool PriorityScheduler::outranks(const Job &a, const Job &b) const {
 }
 
 std::uint32_t PriorityScheduler::level_of(const Job &job) const {
-  return static_ ? level_of_rank_[static_cast<std::size_t>(job.key)] : 0;
+  if (!static_) return 0;
+  return level_of_rank_.empty() ? static_cast<std::uint32_t>(job.key)
+                                : level_of_rank_[static_cast<std::size_t>(job.key)];
 }
 
 void PriorityScheduler::run(std::uint32_t slot, const Place &place) {
   const bool resumes = jobs_[slot].started();
   remove(slot);
-  if (!resumes) {
-    const TaskGates &passed = task_gates_[jobs_[slot].task.value];
-    for (std::uint32_t i = 0; i < passed.count; ++i) {
-      ++gates_[passed.gates[i]].used;
-      gates_[passed.gates[i]].holder = slot;
-    }
-  }
+  if (!resumes) hold_gates(slot);
   make_way(place);
   jobs_[slot].under = config_.preemption == Preemption::Cooperative ? place.victim : kNil;
   const std::uint32_t level = level_of(jobs_[slot]);
@@ -169,19 +165,26 @@ void PriorityScheduler::restore_if_idle() {
 bool PriorityScheduler::park_if_not_eligible(std::uint32_t slot) {
   Job &job = jobs_[slot];
   if (job.started()) return false;
-  const TaskGates &to_pass = task_gates_[job.task.value];
-  std::uint32_t full = 0;
-  while (full < to_pass.count && gates_[to_pass.gates[full]].used < gates_[to_pass.gates[full]].capacity) ++full;
-  if (full == to_pass.count) return false;
+  TaskGates &to_pass = task_gates_[job.task.value];
+  const auto is_full = [](const Gate &gate) { return gate.used >= gate.capacity; };
+  GateKind kind = GateKind::Task;
+  std::uint32_t position = job.task.value;
+  if (!is_full(to_pass.own)) {
+    std::uint32_t i = 0;
+    while (i < to_pass.count && !is_full(shared_gates_[to_pass.shared[i]])) ++i;
+    if (i == to_pass.count) return false;
+    kind = to_pass.kinds[i];
+    position = static_cast<std::uint32_t>(task_gates_.size()) + to_pass.shared[i];
+  }
 
-  Gate &gate = gates_[to_pass.gates[full]];
+  Gate &gate = gate_at(position);
   remove(slot);
   gate.parked.push(jobs_, slot);
-  job.parked_at = to_pass.gates[full];
-  if (to_pass.kinds[full] == GateKind::Dag) defer(slot);
-  if (to_pass.kinds[full] == GateKind::Group) inherit(gate.holder, job);
+  job.parked_at = position;
+  if (kind == GateKind::Dag) defer(slot);
+  if (kind == GateKind::Group) inherit(gate.holder, job);
   // Others may now use what this job would have used elsewhere.
-  for (std::uint32_t i = 0; i < to_pass.count; ++i) promote_one(gates_[to_pass.gates[i]]);
+  for_gates_of(job, [this](Gate &other) { promote_one(other); });
   return true;
 }
 
@@ -207,7 +210,7 @@ void PriorityScheduler::on_lowered(std::uint32_t slot) {
   if (is_queued) remove(slot);
   const std::uint32_t old_level = level_of(job);
   job.key = own_key(job);
-  job.rank = task_of(job).priority.rank;
+  job.rank = task_of(job).rank;
   job.priority_of = job.task;
   if (is_queued) push(slot);
   if (job.state == JobState::Running && level_of(job) != old_level) change_level(slot, level_of(job));
@@ -217,7 +220,7 @@ void PriorityScheduler::on_lowered(std::uint32_t slot) {
   const TaskGates &held = task_gates_[job.task.value];
   for (std::uint32_t i = 0; i < held.count; ++i) {
     if (held.kinds[i] != GateKind::Group && held.kinds[i] != GateKind::Threads) continue;
-    Gate &gate = gates_[held.gates[i]];
+    Gate &gate = shared_gates_[held.shared[i]];
     for (std::uint32_t waiter = gate.parked.top(); waiter != kNil; waiter = gate.parked.top()) {
       gate.parked.remove(jobs_, waiter);
       jobs_[waiter].parked_at = kNil;
@@ -231,13 +234,12 @@ void PriorityScheduler::on_ready(std::uint32_t slot) { push(slot); }
 void PriorityScheduler::on_withdrawn(std::uint32_t slot) {
   Job &job = jobs_[slot];
   if (job.parked_at != kNil) {
-    gates_[job.parked_at].parked.remove(jobs_, slot);
+    gate_at(job.parked_at).parked.remove(jobs_, slot);
     job.parked_at = kNil;
     return;
   }
   remove(slot);
-  const TaskGates &to_pass = task_gates_[job.task.value];
-  for (std::uint32_t i = 0; i < to_pass.count; ++i) promote_one(gates_[to_pass.gates[i]]);
+  for_gates_of(job, [this](Gate &gate) { promote_one(gate); });
 }
 
 void PriorityScheduler::on_end(std::uint32_t slot) {
@@ -257,11 +259,10 @@ void PriorityScheduler::on_end(std::uint32_t slot) {
       open(job.worker.value);
     }
   }
-  const TaskGates &held = task_gates_[job.task.value];
-  for (std::uint32_t i = 0; i < held.count; ++i) {
-    --gates_[held.gates[i]].used;
-    promote_one(gates_[held.gates[i]]);
-  }
+  for_gates_of(job, [this](Gate &gate) {
+    --gate.used;
+    promote_one(gate);
+  });
 }
 
 void PriorityScheduler::open(std::uint32_t worker) {
@@ -290,38 +291,39 @@ void PriorityScheduler::remove(std::uint32_t slot) {
 
 // Gates, levels and the ready queue are built anew; parked jobs go back to the ready queue and find their gates again.
 void PriorityScheduler::on_reconfigured() {
-  level_of_rank_.resize(rank_count() + 1);
-  for (const TaskState &task : tasks_) {
-    if (task.life != TaskLife::Gone) level_of_rank_[task.priority.rank] = task.priority.level;
-  }
   const auto ranks = static_cast<std::uint32_t>(rank_count());
-  level_of_rank_[ranks] = config_.levels > 0 ? config_.levels : ranks;  // of demoted jobs: below all others
+  if (config_.levels > 0) {
+    level_of_rank_.resize(ranks + 1);
+    for (const TaskState &task : tasks_) {
+      if (task.life != TaskLife::Gone) level_of_rank_[task.rank] = task.level;
+    }
+    level_of_rank_[ranks] = config_.levels;  // of demoted jobs: below all others
+  }
   levels_ = LevelQueue(static_ ? ranks + 1 : 0);
   heap_ = HeapQueue();
 
-  gates_.clear();
+  shared_gates_.clear();
   task_gates_.assign(tasks_.size(), TaskGates{});
   std::vector<std::uint32_t> dag_gates(dag_states_.size(), kNil);
   std::vector<std::uint32_t> group_gates(group_count(), kNil);
   std::uint32_t threads_gate = kNil;
-  const auto pass = [&](TaskGates &list, GateKind kind, std::uint32_t &gate, std::uint32_t capacity) {
+  const auto share = [&](TaskGates &list, GateKind kind, std::uint32_t &gate, std::uint32_t capacity) {
     if (gate == kNil) {
-      gate = static_cast<std::uint32_t>(gates_.size());
-      gates_.push_back(Gate{capacity, 0, kNil, {}});
+      gate = static_cast<std::uint32_t>(shared_gates_.size());
+      shared_gates_.push_back(Gate{capacity, 0, kNil, {}});
     }
     list.kinds[list.count] = kind;
-    list.gates[list.count++] = gate;
+    list.shared[list.count++] = gate;
   };
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     const TaskState &task = tasks_[t];
     if (task.life == TaskLife::Gone) continue;
     TaskGates &list = task_gates_[t];
-    std::uint32_t own = kNil;
-    pass(list, GateKind::Task, own, task.concurrency);
+    list.own.capacity = task.concurrency;
     const std::uint32_t max_active = dag_states_[task.dag.value].max_active;
-    if (max_active > 0) pass(list, GateKind::Dag, dag_gates[task.dag.value], max_active);
-    if (task.group != kNil) pass(list, GateKind::Group, group_gates[task.group], 1);
-    if (config_.max_started > 0) pass(list, GateKind::Threads, threads_gate, config_.max_started);
+    if (max_active > 0) share(list, GateKind::Dag, dag_gates[task.dag.value], max_active);
+    if (task.group != kNil) share(list, GateKind::Group, group_gates[task.group], 1);
+    if (config_.max_started > 0) share(list, GateKind::Threads, threads_gate, config_.max_started);
   }
 
   for (std::uint32_t slot = 0; slot < jobs_.size(); ++slot) {
@@ -331,11 +333,7 @@ void PriorityScheduler::on_reconfigured() {
     if (!job.started()) continue;
     if (job.state == JobState::Running) change_level(slot, level_of(job));
     if (job.state == JobState::Suspended && config_.preemption == Preemption::Full) push(slot);
-    const TaskGates &held = task_gates_[job.task.value];
-    for (std::uint32_t i = 0; i < held.count; ++i) {
-      ++gates_[held.gates[i]].used;
-      gates_[held.gates[i]].holder = slot;
-    }
+    hold_gates(slot);
   }
 }
 

@@ -35,10 +35,13 @@ class PriorityScheduler final : public Lifecycle {
     HeapQueue parked;
   };
   enum class GateKind : std::uint8_t { Task, Dag, Group, Threads };
-  struct TaskGates {
-    std::array<std::uint32_t, 4> gates{};
-    std::array<GateKind, 4> kinds{};
-    std::uint32_t count = 0;
+  // The gates of one task, in the order in which they are tried: its own, and those that it shares with others. All
+  // that most tasks ever need is within a cache line.
+  struct alignas(32) TaskGates {
+    Gate own;
+    std::array<std::uint32_t, 3> shared{};  // positions in shared_gates_
+    std::array<GateKind, 3> kinds{};
+    std::uint8_t count = 0;  // of those shared
   };
   struct Worker {
     std::uint32_t running = kNil;  // the job that executes; kNil while the worker is free or awaits a decision
@@ -74,14 +77,31 @@ class PriorityScheduler final : public Lifecycle {
   void remove(std::uint32_t slot);
   [[nodiscard]] std::uint32_t top() const { return static_ ? levels_.top() : heap_.top(); }
   void promote_one(Gate &gate);
+  /// The gate that Job::parked_at says: a task's own has the number of the task, the shared ones follow.
+  [[nodiscard]] Gate &gate_at(std::uint32_t position) {
+    return position < task_gates_.size() ? task_gates_[position].own : shared_gates_[position - task_gates_.size()];
+  }
+  template <class F>
+  void for_gates_of(const Job &job, F f) {
+    TaskGates &gates = task_gates_[job.task.value];
+    f(gates.own);
+    for (std::uint32_t i = 0; i < gates.count; ++i) f(shared_gates_[gates.shared[i]]);
+  }
+  /// A started job holds its gates, up to its end.
+  void hold_gates(std::uint32_t slot) {
+    for_gates_of(jobs_[slot], [slot](Gate &gate) {
+      ++gate.used;
+      gate.holder = slot;
+    });
+  }
   void open(std::uint32_t worker);
 
   bool static_;
   LevelQueue levels_;  // the ready queue of static policies; otherwise heap_
   HeapQueue heap_;
-  std::vector<std::uint32_t> level_of_rank_;
-  std::vector<Gate> gates_;
-  std::vector<TaskGates> task_gates_;
+  std::vector<std::uint32_t> level_of_rank_;  // empty: each rank is a level
+  std::vector<TaskGates> task_gates_;         // by TaskId
+  std::vector<Gate> shared_gates_;
   std::vector<Worker> workers_;
   LevelBitmap free_workers_;
   std::vector<std::uint32_t> open_workers_;
