@@ -380,99 +380,6 @@ bool Engine::run_one() {
   return true;
 }
 
-// ---- tasks ----
-
-void Engine::bind(const Workload &workload, std::vector<Body> bodies) {
-  REDAG_CHECK(bodies.size() == workload.task_count(), "every task needs a body");
-  Locked locked(*this);
-  for (const TaskRef &ref : flatten(workload)) register_task(ref.id, *ref.task, bodies[ref.id.value]);
-}
-
-AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
-  REDAG_CHECK(bodies.size() == dag.tasks.size(), "every task needs a body");
-  const Time at = now();
-  Locked locked(*this);
-  withdraw_if_halting();
-  AddedDag added;
-  added.dag = scheduler_->add_dag(dag, at);
-  const std::span<const TaskId> tasks = scheduler_->tasks_of(added.dag);
-  added.tasks.assign(tasks.begin(), tasks.end());
-  for (std::size_t i = 0; i < bodies.size(); ++i) register_task(added.tasks[i], dag.tasks[i], bodies[i]);
-  decide(locked, at, nullptr, JobSlot());
-  return added;
-}
-
-TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body body,
-                        std::shared_ptr<SkipListener> listener) {
-  const Time at = now();
-  Locked locked(*this);
-  withdraw_if_halting();
-  const TaskId id = scheduler_->add_task(dag, rank, task, at);
-  register_task(id, task, body, std::move(listener));
-  decide(locked, at, nullptr, JobSlot());
-  return id;
-}
-
-void Engine::remove_dag(DagId dag) {
-  std::vector<Body> doomed;  // destroyed without the lock: destructors are the user's code
-  const Time at = now();
-  Locked locked(*this);
-  withdraw_if_halting();
-  REDAG_CHECK(dag.value < scheduler_->dag_slots(), "removal of a DAG that does not exist");
-  for (const TaskId task : scheduler_->tasks_of(dag)) remove_entry(task, doomed);
-  scheduler_->remove_dag(dag, at);
-  decide(locked, at, nullptr, JobSlot());
-}
-
-void Engine::remove_task(TaskId task) {
-  std::vector<Body> doomed;
-  const Time at = now();
-  Locked locked(*this);
-  withdraw_if_halting();
-  REDAG_CHECK(task.value < tasks_.size(), "removal of a task that does not exist");
-  remove_entry(task, doomed);
-  scheduler_->remove_task(task, at);
-  decide(locked, at, nullptr, JobSlot());
-}
-
-void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
-  const Time at = now();
-  Locked locked(*this);
-  withdraw_if_halting();
-  scheduler_->set_timing(task, period, deadline, at);
-  tasks_[task.value].deadline = deadline;
-  decide(locked, at, nullptr, JobSlot());
-}
-
-// An id that is used again begins anew; the body of before went when its last job ended.
-void Engine::register_task(TaskId id, const Task &task, Body &body, std::shared_ptr<SkipListener> listener) {
-  REDAG_CHECK(id.value <= tasks_.size(), "the scheduler numbers tasks differently");
-  if (id.value == tasks_.size()) tasks_.emplace_back();
-  TaskEntry &entry = tasks_[id.value];
-  REDAG_CHECK(!entry.body && entry.busy == 0, "a task that is still there is replaced");
-  most_started_ += task.concurrency;
-  most_started_ -= entry.concurrency;
-  entry = TaskEntry{};
-  entry.body.swap(body);
-  has_listeners_ = has_listeners_ || listener != nullptr;
-  entry.listener = std::move(listener);
-  entry.wcet = task.wcet;
-  entry.wcet_low = task.wcet_low;
-  entry.budget = task.budget;
-  entry.cuts_off = task.on_budget == OnBudget::Abort;
-  entry.deadline = task.deadline;
-  if (options_.measure) entry.response = std::make_shared<Histogram>();
-  entry.concurrency = task.concurrency;
-  for (auto &thread : threads_) thread->stack.reserve(most_started_);
-}
-
-void Engine::remove_entry(TaskId id, std::vector<Body> &doomed) {
-  TaskEntry &entry = tasks_[id.value];
-  entry.removed = true;
-  entry.listener.reset();
-  if (entry.busy == 0) doomed.emplace_back().swap(entry.body);
-}
-
 // ---- the end ----
 
 // The first to take the lock after halt() takes away what has not started. Those skips are the engine's, not the
@@ -526,32 +433,6 @@ std::uint64_t Engine::lost_events() const {
   for (const auto &thread : threads_) lost += thread->events.dropped();
   lost += caller_->events.dropped();
   return lost;
-}
-
-sched::Accounting Engine::accounting(TaskId task) const {
-  const LockGuard guard(lock_);
-  sched::Accounting accounting = scheduler_->accounting(task);
-  accounting.skipped -= tasks_[task.value].withdrawn;
-  return accounting;
-}
-
-Usage Engine::usage(TaskId task) const {
-  const LockGuard guard(lock_);
-  return tasks_[task.value].usage;
-}
-
-TaskFigures Engine::figures(TaskId task) const {
-  const LockGuard guard(lock_);
-  const TaskEntry &entry = tasks_[task.value];
-  TaskFigures figures{scheduler_->accounting(task),
-                      entry.usage,
-                      entry.busy,
-                      scheduler_->ready(task),
-                      entry.late,
-                      entry.preemptions,
-                      entry.response};
-  figures.jobs.skipped -= entry.withdrawn;
-  return figures;
 }
 
 }  // namespace redag::runtime
