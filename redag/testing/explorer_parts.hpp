@@ -1,0 +1,191 @@
+// The explorer's own types: fibers, what they are about to do, and the tree of what was tried. For explorer*.cpp only.
+#pragma once
+
+#include <ucontext.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "redag/testing/explorer.hpp"
+
+namespace redag::testing::exploring {
+
+inline constexpr std::uint32_t kMaxThreads = 10;
+inline constexpr ObjectId kClock = 0;
+inline constexpr ObjectId kSpurious = 1;  // the wake-ups for no reason that are left
+using Mask = std::uint32_t;
+inline constexpr Mask bit(std::uint32_t thread) { return Mask{1} << thread; }
+
+// Which event of each thread, counted from 1 over all of a run, is known to have come before.
+struct Clock {
+  std::array<std::uint32_t, kMaxThreads> at{};
+  void join(const Clock &other) {
+    for (std::uint32_t t = 0; t < kMaxThreads; ++t) at[t] = std::max(at[t], other.at[t]);
+  }
+};
+
+// A visible operation: up to two objects, read or written. Operations of two threads depend on each other if they share
+// an object and one of them writes it.
+struct Operation {
+  const char *what = "";
+  std::array<ObjectId, 2> objects{kNoObject, kNoObject};
+  std::array<bool, 2> writes{};
+};
+
+inline bool dependent(const Operation &a, const Operation &b) {
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (a.objects[i] == kNoObject) continue;
+    for (std::size_t j = 0; j < 2; ++j) {
+      if (a.objects[i] == b.objects[j] && (a.writes[i] || b.writes[j])) return true;
+    }
+  }
+  return false;
+}
+
+struct Object {
+  Clock written;
+  Clock read;
+  std::vector<std::uint32_t> events;  // that touched it, in order
+  // Of a mutex.
+  bool locked = false;
+  Clock unlocked;
+};
+
+enum class State : std::uint8_t {
+  Local,     // on its way to its next operation
+  Ready,     // its operation can be executed
+  Locking,   // ready once the mutex is free
+  Joining,   // ready once the thread has ended
+  Settling,  // ready once nobody else is
+  Sleeping,  // in a futex wait that only a wake ends
+  Dozing,    // in a futex wait that can also end otherwise: that is its operation
+  Ended,
+};
+
+// The exceptions of a thread that are being handled: each fiber has its own.
+struct EhGlobals {
+  void *caught = nullptr;
+  unsigned int uncaught = 0;
+};
+static_assert(sizeof(EhGlobals) == 2 * sizeof(void *));
+
+struct Fiber {
+  ucontext_t context{};
+  std::unique_ptr<char[]> stack;
+  std::function<void()> body;
+  void *thread_state = nullptr;
+  EhGlobals eh;
+  State state = State::Ended;
+  Operation pending;
+  std::uint32_t target = 0;  // Joining: whom; Locking: the mutex; Sleeping, Dozing: the word
+  std::int64_t deadline = 0;
+  bool woken = false;
+  std::uint64_t queued = 0;  // order of falling asleep
+  Clock clock;
+};
+
+struct Event {
+  std::uint32_t thread = 0;
+  Operation operation;
+  Clock clock;  // this event and all that came before it
+  [[nodiscard]] bool after(std::uint32_t thread_, std::uint32_t index) const { return clock.at[thread_] > index; }
+};
+
+// A state that a run passed, and what has been and what is to be tried there.
+struct Node {
+  Mask enabled = 0;
+  Mask backtrack = 0;
+  Mask done = 0;
+  Mask sleep = 0;
+  std::uint32_t chosen = 0;
+  std::array<Operation, kMaxThreads> pending;
+};
+
+class Explorer {
+ public:
+  Explorer(const std::function<void()> &program, const ExploreOptions &options, ThreadState thread_state)
+      : program_(program), options_(options), thread_state_(thread_state) {}
+
+  Exploration run();
+
+  // ---- called by fibers ----
+  ObjectId new_object() {
+    if (object_count_ == objects_.size()) objects_.emplace_back();
+    Object &object = objects_[object_count_];
+    object.written = object.read = object.unlocked = Clock{};
+    object.events.clear();
+    object.locked = false;
+    return object_count_++;
+  }
+  void perform(const Operation &operation, State state = State::Ready, std::uint32_t target = 0);
+  void unlock(ObjectId mutex);
+  bool wait(ObjectId word, const std::function<bool()> &blocked, std::int64_t deadline);
+  void wake(ObjectId word, int count);
+  std::uint32_t spawn(std::function<void()> body);
+  void join(std::uint32_t thread);
+  void settle();
+  void calm(bool on) { calm_ = on; }
+  void lock(ObjectId mutex);
+  [[noreturn]] void fail(const std::string &message);
+  [[nodiscard]] std::uint32_t self() const { return current_; }
+
+  std::int64_t time = 0;
+  [[nodiscard]] bool time_passes() const { return options_.time_passes; }
+
+ private:
+  void run_fibers();
+  void abandon_fibers();
+  static void entry();
+  void begin_run();
+  void stop_at(State state, const Operation &operation, std::uint32_t target);
+  void run_until_visible(std::uint32_t thread);
+  void switch_to(std::uint32_t thread);
+  void leave();
+  [[nodiscard]] bool enabled(std::uint32_t thread) const;
+  // Nobody woke it: it could only time out, or wake for no reason.
+  [[nodiscard]] bool dozes(std::uint32_t thread) const {
+    return fibers_[thread].state == State::Dozing && !fibers_[thread].woken;
+  }
+  void schedule();
+  bool choose(std::uint32_t &thread, Mask can);
+  // Who is on its way goes on: as few changes of thread as can be.
+  [[nodiscard]] std::uint32_t first_of(Mask threads) const {
+    return (threads & bit(current_)) != 0 ? current_ : static_cast<std::uint32_t>(__builtin_ctz(threads));
+  }
+  void record(std::uint32_t thread);
+  void synchronise(Fiber &fiber);
+  void find_races(const Clock &before);
+  void add_backtrack(std::uint32_t event);
+  bool next_run();
+  [[nodiscard]] std::string describe() const;
+
+  const std::function<void()> &program_;
+  ExploreOptions options_;
+  ThreadState thread_state_;
+  Exploration result_;
+  std::vector<Node> nodes_;
+  std::deque<Object> objects_;
+  ObjectId object_count_ = 0;
+  std::vector<Event> events_;
+  std::array<Fiber, kMaxThreads> fibers_;
+  std::uint32_t count_ = 0;                   // of fibers in this run
+  std::uint32_t current_ = 0;                 // the fiber that executes
+  std::vector<std::uint32_t> local_callers_;  // who waits until current_ reaches its next operation
+  ucontext_t home_{};
+  std::uint32_t steps_ = 0;
+  bool calm_ = false;
+  bool redundant_ = false;  // this run repeats another: to be finished somehow
+  bool failed_ = false;
+  std::uint64_t queue_ = 0;
+  std::uint32_t spurious_left_ = 0;
+};
+
+extern Explorer *explorer;  // the one that runs, or null
+
+}  // namespace redag::testing::exploring
