@@ -10,7 +10,6 @@
 namespace redag::cli {
 namespace {
 
-using analysis::MethodReport;
 using analysis::Term;
 
 // Whose share it is. A unit of several tasks is called by its DAG.
@@ -108,20 +107,8 @@ std::string explain_bound(const Analysed &analysed, const Row &row, const Stream
 std::string explain_absence(const Analysed &analysed, const Row &row) {
   std::string text = fmt::format("why there is no bound: {}\n", row.reason);
   if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return text;
-  std::vector<std::pair<std::string, std::string>> reasons;  // why not, and which methods say so
-  for (const MethodReport &report : analysed.report.methods) {
-    const auto *reason = std::get_if<analysis::NotApplicable>(&report.outcome);
-    if (reason == nullptr || report.method->subject == analysis::Subject::System) continue;
-    const auto same =
-        std::find_if(reasons.begin(), reasons.end(), [&](const auto &known) { return known.first == reason->reason; });
-    if (same == reasons.end()) {
-      reasons.emplace_back(reason->reason, std::string(report.method->name));
-    } else {
-      same->second += ", " + std::string(report.method->name);
-    }
-  }
-  if (!reasons.empty()) text += "what does not apply:\n";
-  for (const auto &[reason, methods] : reasons) text += fmt::format("  {}\n    {}\n", reason, methods);
+  const std::string reasons = methods_that_do_not_apply(analysed.report, false);
+  if (!reasons.empty()) text += "what does not apply:\n" + reasons;
   std::vector<std::pair<double, std::string>> loads;
   for (const analysis::Unit &unit : analysed.system.units) {
     loads.emplace_back(share(unit.volume, unit.period), unit.tasks.size() > 1

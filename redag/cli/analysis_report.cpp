@@ -110,8 +110,6 @@ std::vector<Row> shown_rows(std::vector<Row> rows, bool all) {
 
 // What a method says in a few words, and how good that is.
 Cell answer(const MethodReport &report) {
-  const analysis::Bound *bound = report.bound();
-  if (bound == nullptr) return {"does not apply", Tint::Faint};
   if (!report.trusted) return {"not sound here", Tint::Caution};
   if (report.verdict == Verdict::Schedulable) return {"schedulable", Tint::Good};
   return {"not shown", Tint::Caution};
@@ -119,7 +117,6 @@ Cell answer(const MethodReport &report) {
 
 std::string remark(const Analysed &analysed, const MethodReport &report) {
   const analysis::Bound *bound = report.bound();
-  if (bound == nullptr) return std::get<NotApplicable>(report.outcome).reason;
   std::string text;
   if (!bound->tasks.empty()) {
     const auto has_response = [](const analysis::ResponseBound &task) { return task.response.has_value(); };
@@ -136,20 +133,20 @@ std::string method_table(const Analysed &analysed, const StreamTraits &terminal)
     return fmt::format("none of the {} methods applies: {}\n", analysed.report.methods.size(),
                        analysed.system.not_analysable);
   }
-  std::vector<const MethodReport *> order;
-  for (const MethodReport &report : analysed.report.methods) order.push_back(&report);
-  // What speaks first, what does not apply last.
-  const auto place = [](const MethodReport *report) {
-    return report->bound() == nullptr ? 2 : report->trusted ? 0 : 1;
-  };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](const MethodReport *a, const MethodReport *b) { return place(a) < place(b); });
+  std::vector<const MethodReport *> order;  // those to be trusted first
+  for (const bool trusted : {true, false}) {
+    for (const MethodReport &report : analysed.report.methods) {
+      if (report.bound() != nullptr && report.trusted == trusted) order.push_back(&report);
+    }
+  }
   Table table({{"method", false, 9, true}, {"answer", false, 8, true}, {"why", false, 1}});
   for (const MethodReport *report : order) {
     const std::string paper = report->method->is_paper() ? "paper: " : "";
     table.add({{std::string(report->method->name)}, answer(*report), {paper + remark(analysed, *report), Tint::Faint}});
   }
-  return table.render(terminal.width, terminal.colour);
+  const std::string others = methods_that_do_not_apply(analysed.report, true);
+  return (order.empty() ? "" : table.render(terminal.width, terminal.colour)) +
+         (others.empty() ? "" : "does not apply:\n" + others);
 }
 
 // Over all schedules there are: what a bound does not tell is the best case.
@@ -354,6 +351,24 @@ std::string describe(const Analysed &analysed, const StreamTraits &terminal, boo
   if (analysed.exploration != nullptr && analysed.exploration->end == analysis::Exploration::End::Complete) {
     text += "\n" + exploration_table(analysed, terminal, all);
   }
+  return text;
+}
+
+std::string methods_that_do_not_apply(const analysis::Report &report, bool tests) {
+  std::vector<std::pair<std::string, std::string>> reasons;  // and which methods say so
+  for (const MethodReport &method : report.methods) {
+    const auto *reason = std::get_if<NotApplicable>(&method.outcome);
+    if (reason == nullptr || (!tests && method.method->subject == analysis::Subject::System)) continue;
+    const auto same =
+        std::find_if(reasons.begin(), reasons.end(), [&](const auto &known) { return known.first == reason->reason; });
+    if (same == reasons.end()) {
+      reasons.emplace_back(reason->reason, std::string(method.method->name));
+    } else {
+      same->second += ", " + std::string(method.method->name);
+    }
+  }
+  std::string text;
+  for (const auto &[reason, methods] : reasons) text += fmt::format("  {}\n    {}\n", reason, methods);
   return text;
 }
 

@@ -54,6 +54,10 @@ struct Row {
   std::string reason;  // why there is no bound; can be empty
 };
 
+/// Which methods do not apply, by the reason: two lines for each, indented. Without `tests` only those that bound
+/// responses.
+[[nodiscard]] std::string methods_that_do_not_apply(const analysis::Report &report, bool tests);
+
 [[nodiscard]] std::vector<Row> task_rows(const Analysed &analysed);  // by TaskId
 [[nodiscard]] std::vector<Row> dag_rows(const Analysed &analysed);   // by DagId
 
