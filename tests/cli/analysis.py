@@ -133,7 +133,7 @@ class Analyze(Case):
         short = self.write("short.yaml", CART.replace("25ms", "7ms"))
         text = self.expect(redag("analyze", "--explore=21", short), 0).stdout
         self.assertIn("gave up at 21 states", text)
-        self.assertIn("dag_one_worker_deferred    schedulable", text)
+        self.assertRegex(text, r"dag_one_worker_deferred +schedulable")
         self.expect(redag("analyze", "--explore=0", short), 2, "'0' is not a number of states, 1 or more")
         self.expect(redag("analyze", "--explore=many", short), 2, "'many' is not a number of states, 1 or more")
         text = self.expect(redag("analyze", "--explore", short, "--preemption", "os"), 0).stdout
