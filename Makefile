@@ -1,7 +1,7 @@
 # The front door: each target does one everyday thing from a fresh clone on. What it runs is plain CMake and the scripts
 # of tools/; nothing is built here that `cmake --preset` could not build.
 .DEFAULT_GOAL := help
-.PHONY: help demo test seeds bench lint format asan tsan coverage mutate fuzz chaos ros install clean
+.PHONY: help demo test seeds bench instructions lint format asan tsan coverage mutate fuzz chaos ros install clean
 PREFIX ?= /usr/local
 
 # ThreadSanitizer of older compilers cannot start where a kernel randomises much of the address space
@@ -38,6 +38,12 @@ bench: ## build the benchmarks, run them BENCH_ROUNDS (7) times, print ratios; J
 	cmake --preset bench
 	cmake --build --preset bench
 	tools/bench --rounds $(BENCH_ROUNDS)
+
+instructions: ## what the scheduler executes for a job, counted by valgrind: the same at any load
+	@tools/bootstrap instructions
+	cmake --preset bench
+	cmake --build --preset bench --target redag_scheduler_steps
+	tools/count_instructions
 
 lint: ## layers, formatting, locks, and clang-tidy on the files that differ from the last commit or the main branch
 	@tools/bootstrap lint
