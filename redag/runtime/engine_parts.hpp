@@ -158,7 +158,8 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   };
   static constexpr std::size_t kFewSkips = 8;
   union {
-    Skip few_skips_[kFewSkips];  // the first skip_count_ are there: the others cost nothing
+    // The first skip_count_ are there: the others cost nothing.
+    Skip few_skips_[kFewSkips];  // NOLINT(readability-identifier-naming): a private member, of a union without a name
   };
   std::size_t skip_count_ = 0;
   std::vector<Skip> more_skips_;

@@ -235,7 +235,6 @@ using exploring::Explorer;
 using exploring::explorer;
 using exploring::kClock;
 using exploring::Operation;
-using exploring::State;
 
 Exploration explore(const std::function<void()> &program, const ExploreOptions &options, ThreadState thread_state) {
   const auto it = std::make_unique<Explorer>(program, options, thread_state);

@@ -94,7 +94,7 @@ struct Event {
   std::uint32_t thread = 0;
   Operation operation;
   Clock clock;  // this event and all that came before it
-  [[nodiscard]] bool after(std::uint32_t thread_, std::uint32_t index) const { return clock.at[thread_] > index; }
+  [[nodiscard]] bool after(std::uint32_t whose, std::uint32_t index) const { return clock.at[whose] > index; }
 };
 
 // A state that a run passed, and what has been and what is to be tried there.

@@ -1,7 +1,7 @@
 // In place of redag/runtime/clock.hpp: the explorer's time. Processor time stands still.
 #pragma once
 
-#include <time.h>
+#include <ctime>
 
 #include "redag/base/time.hpp"
 #include "redag/testing/explorer.hpp"
