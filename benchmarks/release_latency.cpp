@@ -43,13 +43,13 @@ Workload one_task() {
 
 class OneTask {
  public:
-  OneTask(const Setup &setup, Body body) {
+  OneTask(const Setup &setup, const Body &body) {
     const Workload workload = one_task();
     EngineOptions options;
     options.config = setup.config;
     options.band = setup.band;
     engine_ = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
-    std::vector<Body> bodies(1, std::move(body));
+    std::vector<Body> bodies(1, body);
     engine_->bind(workload, std::move(bodies));
     if (!engine_->start()) std::abort();
   }
