@@ -41,6 +41,7 @@ std::vector<analysis::System> systems(redag::DagShape shape, std::uint32_t perce
 
 std::vector<std::vector<GlobalUnit>> bare(const std::vector<analysis::System> &sets) {
   std::vector<std::vector<GlobalUnit>> result;
+  result.reserve(sets.size());
   for (const analysis::System &system : sets) result.push_back(analysis::global::units_of(system, {}).units);
   return result;
 }
