@@ -19,7 +19,7 @@ testing::BoundGenerator edf_cases(sched::Preemption preemption) {
   return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
 }
 
-constexpr testing::BoundPropertyOptions kFew{.workloads = 250};
+const testing::BoundPropertyOptions kFew{.workloads = 250};
 
 TEST(BoundProperty, EdfDemand) { expect_bound_holds(edf_demand(), edf_cases(sched::Preemption::Full), kFew); }
 

@@ -18,7 +18,7 @@ testing::BoundGenerator cases(double max_deadline, bool edges) {
   return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
 }
 
-constexpr testing::BoundPropertyOptions kFew{.workloads = 250};
+const testing::BoundPropertyOptions kFew{.workloads = 250};
 
 TEST(BoundProperty, PointsTest) { expect_bound_holds(exact_points(), cases(1.0, false), kFew); }
 TEST(BoundProperty, PointsTestOnDags) { expect_bound_holds(exact_points(), cases(1.0, true), kFew); }

@@ -21,7 +21,7 @@ testing::BoundGenerator cases(sched::Preemption preemption, bool different_perio
   return [limits](Rng &rng) { return testing::random_bound_case(rng, limits); };
 }
 
-constexpr testing::BoundPropertyOptions kFew{.workloads = 250};
+const testing::BoundPropertyOptions kFew{.workloads = 250};
 
 // Where the hypotheses hold, the paper's equations are bounds.
 TEST(BoundProperty, PaperWhereSound) {

@@ -57,7 +57,7 @@ BoundCaseLimits with_max_active(BoundCaseLimits limits) {
   return limits;
 }
 
-constexpr testing::BoundPropertyOptions kFew{.workloads = 300, .runs = 6};
+const testing::BoundPropertyOptions kFew{.workloads = 300, .runs = 6};
 
 TEST(BoundProperty, RatesOneWorkerPreemptive) {
   expect_bound_holds(dag_one_worker_preemptive(), cases(rates(sched::Preemption::Full, 1)), kFew);

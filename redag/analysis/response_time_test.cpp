@@ -19,7 +19,7 @@ BoundCaseLimits everything(sched::Preemption preemption) {
   return limits;
 }
 
-constexpr testing::BoundPropertyOptions kFew{.workloads = 250};
+const testing::BoundPropertyOptions kFew{.workloads = 250};
 
 TEST(BoundProperty, RtaPreemptiveClassic) { expect_bound_holds(rta_preemptive(), cases({}), kFew); }
 

@@ -31,7 +31,7 @@ BoundCaseLimits with_blocking(sched::Preemption preemption) {
   return limits;
 }
 
-constexpr testing::BoundPropertyOptions kFew{.workloads = 250};
+const testing::BoundPropertyOptions kFew{.workloads = 250};
 
 TEST(BoundProperty, LiuLayland) {
   expect_bound_holds(liu_layland(), cases(rate_monotonic(sched::Preemption::Full)), kFew);
