@@ -1,6 +1,7 @@
 #include "redag/sched/lifecycle.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <tuple>
 
 #include "redag/base/check.hpp"
@@ -187,6 +188,7 @@ DagId Lifecycle::append_dag(const Dag &dag) {
 }
 
 TaskId Lifecycle::append_task(DagId dag, std::uint32_t rank, const Task &task) {
+  static_assert(offsetof(TaskState, released_earlier) == 64, "what every job needs of its task is in one cache line");
   REDAG_CHECK(task.period > 0 && task.deadline > 0, "a task needs a period and a deadline (inherit_periods)");
   REDAG_CHECK(task.concurrency > 0, "a task that may have no job in progress never runs");
   TaskId id(tasks_.size());

@@ -302,6 +302,7 @@ void PriorityScheduler::on_reconfigured() {
   levels_ = LevelQueue(static_ ? ranks + 1 : 0);
   heap_ = HeapQueue();
 
+  static_assert(sizeof(TaskGates) == 32, "two tasks' gates in a cache line");
   shared_gates_.clear();
   task_gates_.assign(tasks_.size(), TaskGates{});
   std::vector<std::uint32_t> dag_gates(dag_states_.size(), kNil);
