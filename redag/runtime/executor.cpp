@@ -98,16 +98,17 @@ DagId Executor::add(DagBuilder builder) {
   const DagId id(next_dag_);
   Added added{dag.name, dag.tasks, dag.max_active, engine_->add_dag(dag, std::move(bodies)), 0, false, {}};
   if (options_.admission) added.dag = dag;
-  own(id, added.ids.tasks);
+  const Time now = running_ ? std::max<Time>(0, engine_->now()) : 0;
+  own(id, added.ids.tasks, now);
   added.left = added.ids.tasks.size();
-  timer_->add(dag, added.ids.tasks, running_ ? std::max<Time>(0, engine_->now()) : 0);
+  timer_->add(dag, added.ids.tasks, now);
   dags_.emplace(id.value, std::move(added));
   ++next_dag_;
   return id;
 }
 
 // A DAG is forgotten once all its tasks' ids are others'.
-void Executor::own(DagId dag, const std::vector<TaskId> &tasks) {
+void Executor::own(DagId dag, const std::vector<TaskId> &tasks, Time since) {
   for (std::uint32_t position = 0; position < tasks.size(); ++position) {
     const std::uint32_t task = tasks[position].value;
     if (task >= owners_.size()) {
@@ -115,7 +116,7 @@ void Executor::own(DagId dag, const std::vector<TaskId> &tasks) {
     } else if (const auto former = dags_.find(owners_[task].dag.value); former != dags_.end()) {
       if (--former->second.left == 0) dags_.erase(former);
     }
-    owners_[task] = Owner{dag, position};
+    owners_[task] = Owner{dag, position, since};
   }
 }
 
@@ -189,7 +190,13 @@ Result<void> Executor::start_watchdog() {
 }
 
 void Executor::on_overdue(const OverdueJob &job) {
-  OverdueInfo info{task_name(job.job.task), job.job.number, job.elapsed, job.used, {}};
+  OverdueInfo info{{}, job.job.number, job.elapsed, job.used, {}};
+  {
+    // It may have ended since it was seen, and its id be another task's.
+    const LockGuard guard(lock_);
+    const Owner &owner = owners_[job.job.task.value];
+    info.task = job.job.release < owner.since ? "a task that was removed meanwhile" : name_of(owner);
+  }
   info.text = fmt::format("{} #{} is overdue: {}", info.task, info.job, describe(job));
   if (options_.on_overdue) {
     options_.on_overdue(info);
@@ -271,8 +278,11 @@ std::vector<TaskStats> Executor::stats(DagId dag) const {
 std::string Executor::task_name(TaskId task) const {
   const LockGuard guard(lock_);
   if (task.value >= owners_.size()) return fmt::format("task {}", task.value);
-  const Owner &owner = owners_[task.value];  // which is there as long as it owns a task
-  const Added &dag = dags_.at(owner.dag.value);
+  return name_of(owners_[task.value]);
+}
+
+std::string Executor::name_of(const Owner &owner) const {
+  const Added &dag = dags_.at(owner.dag.value);  // which is there as long as it owns a task
   return dag.name + "." + dag.tasks[owner.position].name;
 }
 

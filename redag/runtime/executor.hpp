@@ -149,6 +149,7 @@ class Executor {
   struct Owner {
     DagId dag;  // ours
     std::uint32_t position = 0;
+    Time since = 0;  // jobs that were released earlier are another task's, which had the id
   };
   void finish();
   void admit(const Dag &dag) const REDAG_REQUIRES(lock_);
@@ -156,7 +157,8 @@ class Executor {
   [[nodiscard]] Result<void> start_watchdog();
   void sample(live::Sample &sample) const;
   void on_exception(const Job &job, std::exception_ptr exception);
-  void own(DagId dag, const std::vector<TaskId> &tasks) REDAG_REQUIRES(lock_);
+  void own(DagId dag, const std::vector<TaskId> &tasks, Time since) REDAG_REQUIRES(lock_);
+  [[nodiscard]] std::string name_of(const Owner &owner) const REDAG_REQUIRES(lock_);
 
   ExecutorOptions options_;
   Setup setup_;

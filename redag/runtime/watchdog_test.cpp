@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
+#include <string>
+#include <thread>
 #include <vector>
 
 #include "redag/runtime/clock.hpp"
@@ -18,9 +21,11 @@ namespace redag::runtime {
 namespace {
 
 using namespace std::chrono_literals;
+using ::testing::Each;
 using ::testing::HasSubstr;
 using testing::make_dag;
 using testing::make_workload;
+using ::testing::Not;
 
 constexpr Time kForever = 3600 * kSecond;
 
@@ -252,6 +257,48 @@ TEST(Watchdog, OfAnExecutorNamesTheBody) {
   ASSERT_EQ(texts.size(), 1U);
   EXPECT_THAT(texts[0], ::testing::ContainsRegex("^control.ekf #[0-9]+ is overdue: in progress for "));
   EXPECT_EQ(executor.stats(dag)[0].usage.overdue, 1U);
+}
+
+// To tell of one job takes time. Meanwhile the next one, seen in the same look, ends, and another task has its id.
+TEST(Watchdog, NamesNoTaskThatCameLater) {
+  std::vector<std::string> names;
+  Event told;
+  ExecutorOptions options = watching(names, told);
+  options.workers = 2;
+  options.watchdog->interval = 100 * kMillisecond;  // both are overdue by then
+  std::array<Event, 2> let_go;
+  std::array<DagId, 2> dags;
+  Executor *running = nullptr;
+  options.on_overdue = [&](const OverdueInfo &info) {
+    names.push_back(info.task);
+    if (names.size() > 1) return;
+    const std::size_t other = info.task == "d0.t" ? 1 : 0;
+    let_go[other].set();
+    running->remove(dags[other]);
+    while (running->stats(dags[other])[0].jobs.finished == 0) std::this_thread::yield();
+    DagBuilder later("later");
+    later.timer("t", 1h, [] {}, {.offset = 1h});
+    running->add(std::move(later));
+    EXPECT_EQ(running->task_name(TaskId(static_cast<std::uint32_t>(other))), "later.t");
+    told.set();
+  };
+  Executor executor(options);
+  running = &executor;
+  std::array<Event, 2> begun;
+  for (std::size_t i = 0; i < 2; ++i) {
+    DagBuilder builder("d" + std::to_string(i));
+    builder.timer("t", 1h, [&begin = begun[i], &end = let_go[i]] {
+      begin.set();
+      end.wait();
+    });
+    dags[i] = executor.add(std::move(builder));
+  }
+  executor.start();
+  for (Event &event : begun) event.wait();
+  told.wait();
+  for (Event &event : let_go) event.set();
+  executor.stop();
+  EXPECT_THAT(names, Each(Not(HasSubstr("later"))));
 }
 
 // The body that keeps a stop from ending is the one that has to be named.

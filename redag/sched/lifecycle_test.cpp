@@ -1,0 +1,57 @@
+#include "redag/sched/lifecycle.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "redag/testing/timeline.hpp"
+
+namespace redag::sched {
+namespace {
+
+using testing::make_dag;
+using testing::make_workload;
+
+// One task whose next job has `number`; it decides nothing.
+class Counter final : public Lifecycle {
+ public:
+  explicit Counter(std::uint32_t number) : Lifecycle(Config{}) {
+    load(make_workload({make_dag("d", {{"t", 10, 5}})}, 1, PreemptionMode::None));
+    tasks_[0].next_number = number;
+  }
+  Step dispatch(Time now, std::uint32_t /*most*/) override {
+    begin(now);
+    return step();
+  }
+  void preemption_point(JobSlot /*job*/, Time /*now*/) override {}
+  [[nodiscard]] bool outranked(JobSlot /*job*/) const override { return false; }
+
+ private:
+  void on_ready(std::uint32_t /*slot*/) override {}
+  void on_withdrawn(std::uint32_t /*slot*/) override {}
+  void on_end(std::uint32_t /*slot*/) override {}
+  void on_lowered(std::uint32_t /*slot*/) override {}
+  void on_reconfigured() override {}
+};
+
+// At 1 kHz that is after 49 days and 17 hours.
+TEST(Lifecycle, AfterTheLastNumberComesTheFirst) {
+  constexpr std::uint64_t kNumbers = std::uint64_t{1} << 32U;
+  constexpr std::uint64_t kBefore = 2;
+  Counter counter(static_cast<std::uint32_t>(kNumbers - kBefore));
+  std::vector<std::uint32_t> numbers;
+  for (Time now = 1; now <= 4; ++now) {
+    counter.miss(TaskId(0), now, now, Reason::Overrun);
+    for (const JobEvent &event : counter.dispatch(now, 1).events) {
+      if (event.kind == JobEventKind::Skipped) numbers.push_back(event.job);
+    }
+  }
+  EXPECT_EQ(numbers, (std::vector<std::uint32_t>{0xfffffffe, 0xffffffff, 0, 1}));
+  EXPECT_EQ(counter.accounting(TaskId(0)).released, kNumbers - kBefore + 4);
+  EXPECT_EQ(counter.accounting(TaskId(0)).skipped, 4U);
+}
+
+}  // namespace
+}  // namespace redag::sched
