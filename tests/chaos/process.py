@@ -9,6 +9,7 @@ fails; what it leaves behind is whole; what it says it did is lawful. Standard l
 """
 import argparse
 import ctypes
+import functools
 import json
 import os
 import pathlib
@@ -316,10 +317,20 @@ def killed(rng, folder):
         expect((folder / "out" / name).read_bytes() == (folder / "whole" / name).read_bytes(), f"{name} differs")
 
 
+@functools.cache
+def least_memory():
+    """MiB of address space: with less the kernel kills the program while it is being mapped, before it begins."""
+    def begins(limit):
+        limits = (limit << 20, limit << 20)
+        return subprocess.run([PROGRAM, "--version"], capture_output=True, check=False,
+                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, limits)).returncode != -signal.SIGSEGV
+    return next(limit for limit in range(8, 1024, 4) if begins(limit))
+
+
 def little_memory(rng, folder):
     """RLIMIT_AS: an allocation fails somewhere."""
     file = workload(rng, folder, tasks=rng.choice([4, 40, 400]))
-    limit = rng.randint(8, 160) << 20
+    limit = (least_memory() + rng.randint(0, 152)) << 20
     command = rng.choice([["validate", file], ["simulate", file, "--duration", "5s", "--out", folder / "out"],
                           ["analyze", file], ["run", file, "--duration", "100ms", "--preemption", "none"],
                           ["generate", "--dags", "20000"], ["assign", SOURCE / "workloads" / "robot.yaml"],

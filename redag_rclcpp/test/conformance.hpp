@@ -1,0 +1,39 @@
+// What users of any rclcpp executor rely on, for ours and for rclcpp's own: conformance_*_test.cpp. Waits are for
+// things to happen, with a generous limit; nothing is asserted about how fast.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "executor_types.hpp"
+#include "rclcpp/rclcpp.hpp"
+
+namespace redag_rclcpp {
+
+template <class T>
+class Conformance : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!can_run<T>()) GTEST_SKIP() << "SCHED_FIFO is not to be had here";
+    rclcpp::init(0, nullptr);
+    node = std::make_shared<rclcpp::Node>("node");
+    executor = std::make_unique<T>();
+  }
+  void TearDown() override {
+    executor.reset();
+    node.reset();
+    if (rclcpp::ok()) rclcpp::shutdown();
+  }
+  /// After a node with several groups was removed. Humble's executors keep pointers to the guard conditions of its
+  /// groups and use them when they are spun again; ours has to go on.
+  void renew_executor() {
+    if (!kOurs<T>) executor = std::make_unique<T>();
+  }
+
+  std::shared_ptr<rclcpp::Node> node;
+  std::unique_ptr<T> executor;
+};
+TYPED_TEST_SUITE(Conformance, AllTypes, TypeNames);
+
+}  // namespace redag_rclcpp
