@@ -3,27 +3,18 @@
 
 #include <gtest/gtest.h>
 
+#include "redag/testing/expect_trace.hpp"
 #include "redag/testing/timeline.hpp"
 #include "redag/testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {
 
+using testing::expect_broken;
+using testing::expect_kept;
 using testing::make_dag;
 using testing::make_workload;
 using testing::TraceBuilder;
-
-// The trace breaks `rule`; what else it breaks as a consequence does not matter.
-void expect_broken(const trace::Trace &trace, Rule rule) {
-  const CheckReport report = check_trace(trace);
-  EXPECT_GT(report.violated(rule), 0U) << "expected: " << to_string(rule) << "\n" << report.to_string();
-}
-
-void expect_kept(const trace::Trace &trace, Rule rule) {
-  const CheckReport report = check_trace(trace);
-  EXPECT_TRUE(report.ok()) << report.to_string();
-  EXPECT_GT(report.checks(rule), 0U) << to_string(rule) << " was never tested";
-}
 
 // hi: T 10, C 1; lo: T 20, C 4. One worker.
 Workload two_tasks(PreemptionMode preemption = PreemptionMode::None, std::uint32_t workers = 1) {

@@ -55,6 +55,11 @@ class TraceBuilder {
   TraceBuilder &aborted(const char *task, std::uint32_t job, std::uint32_t worker, Reason reason) {
     return add(JobEventKind::Aborted, task, job, now_, worker, reason);
   }
+  TraceBuilder &exceeded(const char *task, std::uint32_t job) { return add(JobEventKind::Exceeded, task, job, 0); }
+  TraceBuilder &high_mode(const char *task, std::uint32_t job) { return add(JobEventKind::HighMode, task, job, 0); }
+  TraceBuilder &low_mode(const char *task, std::uint32_t job, Time since_ms) {
+    return add(JobEventKind::LowMode, task, job, since_ms * kMillisecond);
+  }
   TraceBuilder &skipped(const char *task, std::uint32_t job, Reason reason) {
     return add(JobEventKind::Skipped, task, job, 0, WorkerId::kNoneValue, reason);
   }

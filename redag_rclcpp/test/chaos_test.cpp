@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "chaos_nodes.hpp"
+#include "environment.hpp"
 #include "spinning.hpp"
 
 namespace redag_rclcpp::chaos {
@@ -22,11 +23,6 @@ namespace {
 using namespace std::chrono_literals;
 using redag::PreemptionMode;
 using std::chrono::steady_clock;
-
-std::uint64_t from_environment(const char *name, std::uint64_t otherwise) {
-  const char *value = std::getenv(name);
-  return value == nullptr ? otherwise : std::strtoull(value, nullptr, 10);
-}
 
 /// Ends the process, and says where, if it is not destroyed in time: what hangs has no other end.
 class Watchdog {

@@ -7,7 +7,6 @@
 #include <atomic>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -18,6 +17,7 @@
 #include <tuple>
 #include <vector>
 
+#include "environment.hpp"
 #include "process_tasks.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/runtime/preemption_point.hpp"
@@ -38,11 +38,6 @@ using Random = std::mt19937_64;
 constexpr int kThreads = 3;
 constexpr std::size_t kNodesOfAThread = 3;
 constexpr std::size_t kEntitiesOfANode = 12;
-
-std::uint64_t from_environment(const char *name, std::uint64_t otherwise) {
-  const char *value = std::getenv(name);
-  return value == nullptr ? otherwise : std::strtoull(value, nullptr, 10);
-}
 
 std::uint64_t below(Random &random, std::uint64_t end) { return random() % end; }
 

@@ -4,9 +4,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <limits>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
 
+#include "environment.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/runtime/threads.hpp"
 
@@ -192,6 +199,108 @@ TEST_F(OptionsTest, MistakesInTheWorkloadAreNamedByLine) {
   EXPECT_THAT(mistake_with({{"config", file}}),
               AllOf(HasSubstr("'config'"), HasSubstr(file + ":7:"), HasSubstr("wcet")));
   EXPECT_THAT(mistake_with({{"config", "/nowhere/robot.yaml"}}), AllOf(HasSubstr("'config'"), HasSubstr("/nowhere")));
+}
+
+// A value of any type, most of them near what is allowed or at its limits.
+rclcpp::ParameterValue any_value(std::mt19937_64 &random, const std::string &workload) {
+  const auto one_of = [&](const auto &values) { return values[random() % std::size(values)]; };
+  static constexpr std::int64_t kIntegers[] = {0,
+                                               1,
+                                               2,
+                                               5,
+                                               -1,
+                                               4096,
+                                               4097,
+                                               std::int64_t{1} << 32U,
+                                               std::numeric_limits<std::int64_t>::min(),
+                                               std::numeric_limits<std::int64_t>::max()};
+  static constexpr double kNumbers[] = {0.0,
+                                        -0.0,
+                                        1e-9,
+                                        1e-10,
+                                        0.5,
+                                        1e6,
+                                        1.1e6,
+                                        -1.0,
+                                        1e308,
+                                        5e-324,
+                                        std::numeric_limits<double>::infinity(),
+                                        std::numeric_limits<double>::quiet_NaN()};
+  const std::string kTexts[] = {"",
+                                "auto",
+                                "os",
+                                "none",
+                                "edf",
+                                "fifo",
+                                "rate_monotonic",
+                                "/",
+                                "/dev/null",
+                                "/dev/zero",
+                                "\xff\xfe",
+                                std::string(1, '\0'),
+                                std::string(100'000, 'a'),
+                                workload};
+  switch (random() % 10) {
+    case 0: return rclcpp::ParameterValue(random() % 2 == 0);
+    case 1:
+    case 2: return rclcpp::ParameterValue(one_of(kIntegers));
+    case 3: return rclcpp::ParameterValue(one_of(kNumbers));
+    case 4:
+    case 5: return rclcpp::ParameterValue(one_of(kTexts));
+    case 6: return rclcpp::ParameterValue(std::vector<std::int64_t>(random() % 3, one_of(kIntegers)));
+    case 7: return rclcpp::ParameterValue(std::vector<double>(random() % 3, one_of(kNumbers)));
+    case 8: return rclcpp::ParameterValue(std::vector<std::string>(random() % 3, one_of(kTexts)));
+    default: return rclcpp::ParameterValue(std::vector<std::uint8_t>(random() % 3, 0xff));
+  }
+}
+
+// REDAG_SEED chooses the values, REDAG_OPTION_ROUNDS how many.
+TEST_F(OptionsTest, AnyValuesAreReadOrRefused) {
+  const std::vector<std::string> names{"workers",          "preemption",   "policy",         "threads",
+                                       "cpu_affinity",     "config",       "default_period", "learn",
+                                       "raise_middleware", "live",         "metrics_period", "trace",
+                                       "bounds",           "trace_events", "metrics_file",   "save_path"};
+  const std::string workload = file_with(kWorkload);
+  const std::uint64_t seed = from_environment("REDAG_SEED", 1);
+  const std::uint64_t rounds = from_environment("REDAG_OPTION_ROUNDS", 400);
+  // The middleware's participant goes with its last node: another one each time would take most of the time.
+  const auto stays = node_with({});
+  std::mt19937_64 random(seed);
+  std::uint64_t refused = 0;
+  for (std::uint64_t round = 0; round < rounds; ++round) {
+    std::map<std::string, rclcpp::ParameterValue> values;
+    for (auto left = 1 + random() % 3; left > 0; --left) {
+      values[names[random() % names.size()]] = any_value(random, workload);
+    }
+    std::vector<Parameter> overrides;
+    std::string what = "REDAG_SEED=" + std::to_string(seed) + ", round " + std::to_string(round) + ":";
+    for (const auto &[name, value] : values) {
+      overrides.emplace_back(name, value);
+      what += " " + name + "=" + rclcpp::to_string(value).substr(0, 100);
+    }
+    SCOPED_TRACE(what);
+    const auto node = node_with(overrides);
+    try {
+      const ReDAGOptions options = declare_options(*node);
+      EXPECT_LE(options.workers, 4096U);
+      EXPECT_TRUE(options.threads == 0 || options.threads >= options.workers);
+      EXPECT_LE(options.threads, 4096U);
+      EXPECT_GT(options.default_period, 0ns);
+      EXPECT_GE(options.learn, 0ns);
+      const std::vector<int> usable = redag::runtime::usable_cpus();
+      EXPECT_THAT(options.cpus, ::testing::Each(::testing::AnyOfArray(usable)));
+      const MonitorOptions monitor = declare_monitor_options(*node, options);
+      EXPECT_GE(monitor.period, 0ns);
+      EXPECT_GT(monitor.trace_events, 0U);
+    } catch (const rclcpp::exceptions::InvalidParameterValueException &error) {
+      ++refused;
+      EXPECT_TRUE(std::any_of(values.begin(), values.end(), [&](const auto &value) {
+        return std::string(error.what()).find("parameter '" + value.first + "' is ") != std::string::npos;
+      })) << error.what();
+    }
+  }
+  EXPECT_GT(refused, rounds / 4);
+  EXPECT_LT(refused, rounds);
 }
 
 TEST_F(OptionsTest, ParametersSayWhatTheyAreAndStay) {
