@@ -52,18 +52,17 @@ TEST(CheckBudgets, OnThreadsTheTimeItUsedIsNotInTheTrace) {
 
 TEST(CheckBudgets, OnlyWhatHasABudgetUsesIt) {
   TraceBuilder t = budget_run();
-  expect_broken(t.at(3)
-                    .exceeded("lo", 0)
-                    .at(5)
-                    .finished("lo", 0, 0)
-                    .at(10)
-                    .arrives("hi", 1)
-                    .dispatched("hi", 1, 0, 20)
-                    .at(11)
-                    .exceeded("hi", 1)
-                    .finished("hi", 1, 0)
-                    .until(12),
-                Rule::Budget);
+  t.at(3).exceeded("lo", 0).at(5).started("lo", 0, 0).finished("lo", 0, 0);
+  t.at(10)
+      .arrives("hi", 1)
+      .dispatched("hi", 1, 0, 20)
+      .at(11)
+      .exceeded("hi", 1)
+      .started("hi", 1, 0)
+      .finished("hi", 1, 0);
+  trace::Trace trace = t.until(12);
+  trace.info.driver = trace::Driver::Threads;  // which knows of no times that were used
+  expect_broken(trace, Rule::Budget);
 }
 
 TEST(CheckBudgets, WhatIsCutOffDoesNotGoOn) {
@@ -114,11 +113,21 @@ TEST(CheckHighMode, BeginsNeitherEarlyNorLate) {
 }
 
 TEST(CheckHighMode, IsBegunByAStartedJobOfHighCriticality) {
-  TraceBuilder low = mode_run();
-  expect_broken(
-      low.at(10).arrives("l", 1).preempted("h", 0, 0).dispatched("l", 1, 0, 20).at(12).high_mode("l", 1).until(13),
-      Rule::Budget);
   expect_broken(mode_run().at(3).high_mode("h", 7).until(4), Rule::Budget);
+  TraceBuilder without_limit = mode_run();
+  without_limit.at(10).arrives("l", 1).preempted("h", 0, 0).dispatched("l", 1, 0, 20);
+  expect_broken(without_limit.at(12).high_mode("l", 1).until(13), Rule::Budget);
+  Workload low = two_criticalities();
+  low.dags[1].tasks[0].wcet_low = 2 * kMillisecond;  // which no file can say
+  TraceBuilder by_low(low);
+  by_low.at(0)
+      .arrives("h", 0)
+      .arrives("l", 0)
+      .dispatched("l", 0, 0, 10)
+      .at(2)
+      .high_mode("l", 0)
+      .skipped("h", 0, Reason::Removed);
+  expect_broken(by_low.at(3).finished("l", 0, 0).low_mode("l", 0, 2).until(4), Rule::Budget);
 }
 
 TEST(CheckHighMode, EndsWhenNothingIsReadyOrStartedAndNoLater) {
