@@ -77,12 +77,16 @@ TEST(CheckBudgets, AJobThatRunsUsesItsBudgetOnce) {
 }
 
 // h: T 20, C 9, 2 in LO mode, of high criticality; l: T 10, C 3. One worker; h starts at 3, and has used its 2 at 5.
-TraceBuilder mode_run() {
+Workload two_criticalities() {
   Workload workload =
       make_workload({make_dag("hi", {{"h", 20, 9}}), make_dag("lo", {{"l", 10, 3}})}, 1, PreemptionMode::Os);
   workload.dags[0].criticality = Criticality::High;
   workload.dags[0].tasks[0].wcet_low = 2 * kMillisecond;
-  TraceBuilder t(workload);
+  return workload;
+}
+
+TraceBuilder mode_run() {
+  TraceBuilder t(two_criticalities());
   t.at(0).arrives("h", 0).arrives("l", 0).dispatched("l", 0, 0, 10);
   t.at(3).finished("l", 0, 0).dispatched("h", 0, 0, 20);
   return t;
