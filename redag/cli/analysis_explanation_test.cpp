@@ -1,0 +1,109 @@
+#include "redag/cli/analysis_explanation.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <utility>
+
+#include "redag/testing/timeline.hpp"
+
+namespace redag::cli {
+namespace {
+
+using analysis::Term;
+using ::testing::HasSubstr;
+using testing::make_dag;
+using testing::make_workload;
+using ::testing::Not;
+using Kind = Term::Kind;
+
+// One worker: fast.a (T 10, C 3), slow.b (T 20, C 7, with a preemption point every millisecond).
+Analysed two_tasks(PreemptionMode mode) {
+  Workload workload =
+      make_workload({make_dag("fast", {{"a", 10, 3}}), make_dag("slow", {{"b", 20, 7}})}, 1, mode);
+  workload.dags[1].tasks[0].region = kMillisecond;
+  Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload));
+  EXPECT_TRUE(analysed);
+  return *std::move(analysed);
+}
+
+Term term(Kind kind, Duration ms, TaskId task = {}, std::int64_t jobs = 0) {
+  Term made;
+  made.kind = kind;
+  made.task = task;
+  made.amount = ms * kMillisecond;
+  made.jobs = jobs;
+  return made;
+}
+
+// What is said of slow.b if `largest` is 6 of its 10 ms.
+std::string explained(const Term &largest, PreemptionMode mode = PreemptionMode::Os) {
+  const Analysed analysed = two_tasks(mode);
+  Result<Row> row = find_row(analysed, "slow.b");
+  EXPECT_TRUE(row);
+  row->tightest.response = row->tightest.bound.response = 10 * kMillisecond;
+  row->tightest.bound.terms = {term(Kind::Own, 4, TaskId(1), 1), largest};
+  return explain(analysed, *row, StreamTraits{});
+}
+
+TEST(Explanation, OfEachKindOfTermSaysWhatItIsAndWhatHelps) {
+  struct Case {
+    Term largest;
+    const char *what;
+    const char *advice;
+  };
+  const TaskId a(0);
+  const Case cases[] = {
+      {term(Kind::Own, 6, TaskId(1), 1), "own execution", "a smaller wcet of its own counts most"},
+      {term(Kind::Own, 6, TaskId(1)), "own tasks beside the path", "a larger max_active, count most"},
+      {term(Kind::Earlier, 6, TaskId(1), 1), "earlier jobs of its own", "a smaller wcet or a longer period"},
+      {term(Kind::Blocking, 6, a, 1), "blocking by", "fast.a holds a group or shares a priority level"},
+      {term(Kind::Blocking, 6), "less urgent work", "less urgent work holds a group"},
+      {term(Kind::Interference, 6, a, 2), "interference of", "fast.a comes 2 times before it ends"},
+      {term(Kind::Interference, 6, a, 1), "interference of", "fast.a goes first: shorten it"},
+      {term(Kind::Interference, 6), "more urgent work, together", "more urgent work, together goes first"},
+      {term(Kind::Jitter, 6), "release jitter", "a release that is seen sooner counts most"},
+      {term(Kind::Wait, 6), "data of other rates, waited for", "response of its predecessors counts most"},
+      {term(Kind::Overhead, 6), "overhead", "fewer and longer jobs"},
+      {term(Kind::Waiting, 6), "waiting, for all that comes before", "without --explore the bounds name the causes"},
+  };
+  for (const Case &c : cases) {
+    const std::string text = explained(c.largest);
+    EXPECT_THAT(text, HasSubstr(c.what));
+    EXPECT_THAT(text, HasSubstr("the largest term is 6ms of 10ms, 60.0 %: "));
+    EXPECT_THAT(text, HasSubstr(c.advice));
+  }
+}
+
+TEST(Explanation, OfBlockingDependsOnHowTheBlockerCanBePreempted) {
+  const Term blocking = term(Kind::Blocking, 6, TaskId(0), 1);
+  EXPECT_THAT(explained(blocking, PreemptionMode::None), HasSubstr("fast.a keeps its worker until it ends"));
+  EXPECT_THAT(explained(blocking, PreemptionMode::Cooperative), HasSubstr("until its next preemption point"));
+}
+
+TEST(Explanation, OfAUnitOfSeveralTasksNamesItsDag) {
+  Term of_dag = term(Kind::Interference, 6, {}, 1);
+  of_dag.dag = DagId(0);
+  EXPECT_THAT(explained(of_dag), HasSubstr("fast goes first"));
+}
+
+TEST(Explanation, WhatIsTakenOffHasNoShareAndWhatIsNothingNoRow) {
+  const std::string text = explained(term(Kind::Earlier, -1, TaskId(1), 1));
+  EXPECT_THAT(text, HasSubstr("since earlier jobs were released"));
+  EXPECT_THAT(text, HasSubstr("-1ms"));
+  EXPECT_THAT(text, HasSubstr("the largest term is 4ms of 10ms"));
+  EXPECT_THAT(explained(term(Kind::Jitter, 0)), Not(HasSubstr("release jitter")));
+}
+
+TEST(Explanation, SaysWhenADeadlineBeyondThePeriodCannotBeUsed) {
+  const Analysed analysed = two_tasks(PreemptionMode::Os);
+  Result<Row> row = find_row(analysed, "slow/b");
+  ASSERT_TRUE(row);
+  row->deadline = 30 * kMillisecond;
+  row->due = 20 * kMillisecond;
+  EXPECT_THAT(explain(analysed, *row, StreamTraits{}), HasSubstr("held to 20ms: beyond, the next release would skip"));
+}
+
+}  // namespace
+}  // namespace redag::cli
