@@ -11,6 +11,7 @@ import pty
 import signal
 import struct
 import subprocess
+import tempfile
 import termios
 import time
 import unittest
@@ -115,53 +116,141 @@ class Top(Case):
             self.expect(redag("top", "--folder", self.folder, "--once"), 2)
             self.expect(redag("top", "--folder", self.folder, "--list"), 0)
 
+    def linked(self, folder, process):
+        """The page of `process`, in a folder where those of others are not. In /dev/shm too, as links need."""
+        self.frame_of(process)
+        os.link(self.page(process), folder / self.page(process).name)
+
     def test_on_a_terminal(self):
         """Keys, a restart of the executor, and the terminal afterwards."""
         first = self.start()
         self.frame_of(first)
-        try:
-            pid, terminal = pty.fork()
-        except OSError as error:
-            raise unittest.SkipTest(f"no pseudo-terminal to be had here: {error}") from error
-        if pid == 0:
-            os.environ.update(TERM="xterm")
-            try:
-                os.execv(PROGRAM, [str(PROGRAM), "top", str(first.pid), "--interval", "50ms"])
-            finally:
-                os._exit(127)
-        fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 120, 0, 0))
-        seen = ""
-
-        def read_until(text):
-            nonlocal seen
-            deadline = time.monotonic() + 100
-            while text not in seen:
-                self.assertLess(time.monotonic(), deadline, seen[-3000:])
-                seen += os.read(terminal, 65536).decode(errors="replace")
-            before, _, seen = seen.partition(text)
-            return before
-
-        read_until("\033[?1049h")
-        read_until(f"redag {first.pid}")
-        os.write(terminal, b"n")
-        read_until("by name")
-        read_until("fast.sense")
-        os.write(terminal, b"t")
-        read_until("since the start")
-        fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 10, 40, 0, 0))
-        read_until("fast.act")
+        screen = Screen(self, first.pid)
+        screen.read_until(f"redag {first.pid}")
+        screen.press("n")
+        screen.read_until("by name")
+        screen.read_until("fast.sense")
+        screen.press("t")
+        screen.read_until("since the start")
+        screen.resize(10, 40)
+        screen.read_until("fast.act")
         # Erased before it is written: afterwards the last character of a line as wide as the terminal would go, too.
-        self.assertRegex(read_until("q quit"), r"\033\[J(\033\[\d+m)?\Z")
+        self.assertRegex(screen.read_until("q quit"), r"\033\[J(\033\[\d+m)?\Z")
         first.kill()
         first.wait(timeout=100)
-        read_until("it has ended")
+        screen.read_until("it has ended")
         second = self.start()
-        read_until(f"redag {second.pid}")
-        os.write(terminal, b"q")
-        read_until("\033[?1049l")
+        screen.read_until(f"redag {second.pid}")
+        screen.press("q")
+        screen.end()
+
+    def test_an_executor_is_chosen(self):
+        with tempfile.TemporaryDirectory(dir="/dev/shm") as name:
+            folder = pathlib.Path(name)
+            screen = Screen(self, "--folder", folder)
+            screen.read_until("waiting for one")
+            first, second = sorted((self.start(), self.start()), key=lambda process: process.pid)
+            self.linked(folder, first)
+            screen.read_until(f"redag {first.pid}")  # the only one
+            self.linked(folder, second)
+            screen.press("l")
+            screen.read_until("which executor?")
+            screen.read_until(f"> 1 {first.pid}")
+            screen.read_until(f"2 {second.pid}")
+            screen.press(DOWN)
+            screen.read_until(f"> 2 {second.pid}")
+            screen.press(DOWN + UP)  # it stays within the list
+            screen.read_until(f"> 1 {first.pid}")
+            screen.press(PAGE_DOWN)
+            screen.read_until(f"> 2 {second.pid}")
+            screen.press(PAGE_UP)
+            screen.read_until(f"> 1 {first.pid}")
+            screen.press("7")  # there are two
+            screen.press(END)
+            screen.read_until(f"> 2 {second.pid}")
+            screen.press("\r")
+            screen.read_until(f"redag {second.pid}")
+            screen.press("l")
+            screen.read_until("which executor?")
+            screen.press("1")
+            screen.read_until(f"redag {first.pid}")
+            screen.press("l")
+            screen.read_until("which executor?")
+            screen.press(ESCAPE)
+            screen.read_until(f"redag {first.pid}")
+            screen.press(ESCAPE)
+            screen.end()
+
+    def test_what_is_shown_is_chosen(self):
+        process = self.start()
+        self.frame_of(process)
+        screen = Screen(self, process.pid)
+        for key, order in {"r": "rate", "p": "p99", "x": "max", "m": "misses", "c": "cpu", "d": "dag"}.items():
+            screen.press(key)
+            screen.read_until(f"by {order}")
+        screen.press("i")
+        screen.read_until("inverted")
+        screen.press("g")
+        screen.read_until("inverted")
+        self.assertNotIn("sense", screen.read_until("q quit"))
+        screen.press("g")
+        screen.read_until("sense")
+        screen.press(" ")
+        screen.read_until("paused")
+        screen.press(" ")
+        # Room for two rows of five: two DAGs and three tasks.
+        screen.press("i")
+        screen.resize(8, 120)
+        screen.press(END)
+        screen.read_until("plan")
+        screen.press(HOME)
+        screen.read_until("sense")
+        screen.press("q")
+        screen.end()
+
+
+UP, DOWN, PAGE_UP, PAGE_DOWN, HOME, END = "\033[A", "\033[B", "\033[5~", "\033[6~", "\033[H", "\033[F"
+ESCAPE = "\033"
+
+
+class Screen:
+    """`redag top` on a terminal of its own."""
+
+    def __init__(self, case, *arguments):
+        self.case, self.seen = case, ""
+        try:
+            self.pid, self.terminal = pty.fork()
+        except OSError as error:
+            raise unittest.SkipTest(f"no pseudo-terminal to be had here: {error}") from error
+        if self.pid == 0:
+            os.environ.update(TERM="xterm")
+            try:
+                os.execv(PROGRAM, [str(PROGRAM), "top", *map(str, arguments), "--interval", "50ms"])
+            finally:
+                os._exit(127)
+        self.resize(24, 120)
+        self.read_until("\033[?1049h")
+
+    def resize(self, lines, columns):
+        fcntl.ioctl(self.terminal, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
+
+    def press(self, keys):
+        os.write(self.terminal, keys.encode())
+
+    def read_until(self, text):
+        """What comes before."""
+        deadline = time.monotonic() + 100
+        while text not in self.seen:
+            self.case.assertLess(time.monotonic(), deadline, f"no '{text}' in: {self.seen[-3000:]}")
+            self.seen += os.read(self.terminal, 65536).decode(errors="replace")
+        before, _, self.seen = self.seen.partition(text)
+        return before
+
+    def end(self):
+        self.read_until("\033[?1049l")
         # Not closed before it has ended: that would hang it up.
-        self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), 0)
-        os.close(terminal)
+        self.case.assertEqual(os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1]), 0)
+        os.close(self.terminal)
 
 
 if __name__ == "__main__":
