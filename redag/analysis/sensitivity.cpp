@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numeric>
 #include <set>
+#include <utility>
 
 #include "redag/analysis/analyze.hpp"
 #include "redag/analysis/arithmetic.hpp"
@@ -277,7 +278,9 @@ std::vector<Knob> knobs_of(const Workload &workload, const System &system) {
   std::vector<Knob> knobs = {{Knob::Kind::AllWcets, all}, {Knob::Kind::Rates, all}};
   for (const std::uint32_t t : all) knobs.push_back({Knob::Kind::Wcet, {t}});
   for (const SystemDag &dag : system.dags) {
-    knobs.push_back(rate_of(tasks, dag.tasks));
+    Knob knob = rate_of(tasks, dag.tasks);
+    const bool is_there = knob.kind == Knob::Kind::Rates && knob.tasks.size() == all.size();  // the only DAG
+    if (!is_there) knobs.push_back(std::move(knob));
     if (dag.units.size() < 2) continue;
     for (const std::uint32_t unit : dag.units) knobs.push_back(rate_of(tasks, system.units[unit].tasks));
   }

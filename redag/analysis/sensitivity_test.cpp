@@ -1,5 +1,6 @@
 #include "redag/analysis/sensitivity.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -163,6 +164,19 @@ TEST(Sensitivity, KnobsAreThoseOfTasksAndRates) {
                                       {Kind::Wcet, {1}},           {Kind::Wcet, {2}},        {Kind::Rates, {0, 1}},
                                       {Kind::Period, {0}},         {Kind::Period, {1}},      {Kind::Period, {2}}};
   EXPECT_EQ(knobs_of(workload, *system), expected);
+}
+
+TEST(Sensitivity, TheRatesOfTheOnlyDagAreAllRates) {
+  Workload workload = workload_of({single("a", 1, 10)});
+  workload.dags[0].tasks.push_back(workload.dags[0].tasks[0]);
+  workload.dags[0].tasks[1].name = "u";
+  const auto of_one_rate = compile(workload, platform_of(workload));
+  ASSERT_TRUE(of_one_rate);
+  EXPECT_THAT(knobs_of(workload, *of_one_rate), ::testing::Contains(Knob{Kind::Period, {0, 1}}));
+  workload.dags[0].tasks[1].period = workload.dags[0].tasks[1].deadline = 30;
+  const auto of_two = compile(workload, platform_of(workload));
+  ASSERT_TRUE(of_two);
+  EXPECT_THAT(knobs_of(workload, *of_two), ::testing::Contains(Knob{Kind::Rates, {0, 1}}).Times(1));
 }
 
 // No deadline missed and no job skipped when all start together and run for their wcet.

@@ -20,8 +20,7 @@ using Kind = Term::Kind;
 
 // One worker: fast.a (T 10, C 3), slow.b (T 20, C 7, with a preemption point every millisecond).
 Analysed two_tasks(PreemptionMode mode) {
-  Workload workload =
-      make_workload({make_dag("fast", {{"a", 10, 3}}), make_dag("slow", {{"b", 20, 7}})}, 1, mode);
+  Workload workload = make_workload({make_dag("fast", {{"a", 10, 3}}), make_dag("slow", {{"b", 20, 7}})}, 1, mode);
   workload.dags[1].tasks[0].region = kMillisecond;
   Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload));
   EXPECT_TRUE(analysed);

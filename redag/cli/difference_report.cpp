@@ -198,7 +198,8 @@ std::vector<std::string> caveats(const DiffSide &a, const DiffSide &b) {
     list.emplace_back("the sides ran on different machines or kernels: that is part of the difference");
   }
   if (x.overheads != y.overheads) {
-    list.push_back(fmt::format("overheads differ: '{}' and '{}'", x.overheads, y.overheads));
+    const auto said = [](const trace::RunInfo &run) { return run.overheads.empty() ? "none" : run.overheads.c_str(); };
+    list.push_back(fmt::format("overheads differ: {}, and {}", said(x), said(y)));
   }
   const std::size_t fewest = std::min(a.jobs.runs().size(), b.jobs.runs().size());
   if (fewest == 1 && (x.driver != trace::Driver::Simulator || y.driver != trace::Driver::Simulator)) {

@@ -24,7 +24,7 @@ bool is_of_rates(const Knob &knob) { return knob.kind == Kind::Period || knob.ki
 
 bool is_of_all(const Sensitivity &sensitivity, const Knob &knob) {
   const std::size_t tasks = sensitivity.analysed.system.tasks.size();
-  return knob.kind == Kind::AllWcets || (is_of_rates(knob) && knob.tasks.size() == tasks);
+  return knob.kind == Kind::AllWcets || (knob.kind == Kind::Rates && knob.tasks.size() == tasks);
 }
 
 // Rounded down, so that nobody reads more room than there is.

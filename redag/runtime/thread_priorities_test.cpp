@@ -98,6 +98,20 @@ TEST(ThreadPriorities, AJobMoreThanProcessorsPutsAllInOrder) {
   EXPECT_TRUE(kernel.ordered());
 }
 
+// Though its own place is clear: two that each had a processor are not in order.
+TEST(ThreadPriorities, AJobAboveAllOthersPutsThemInOrder) {
+  Kernel kernel(3, 2);
+  for (const std::size_t thread : {0, 1}) {
+    kernel.start(thread, 50, false);
+    kernel.end(thread);
+  }
+  kernel.start(0, 20, true);
+  kernel.start(1, 10, true);
+  EXPECT_FALSE(kernel.ordered());
+  kernel.start(2, 70, true);
+  EXPECT_TRUE(kernel.ordered());
+}
+
 TEST(ThreadPriorities, AShortJobAboveAPreemptedOneKeepsWhatItHas) {
   Kernel kernel(2, 1);
   kernel.start(0, 10, false);

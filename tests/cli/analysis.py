@@ -198,6 +198,18 @@ class Sensitivity(Case):
         hopeless = self.write("hopeless.yaml", HARMONIC.replace("wcet: 2ms", "wcet: 17ms").replace("1ms", "9ms"))
         self.assertIn("none of the execution times looked at suffices alone", redag("sensitivity", hopeless).stdout)
 
+    def test_of_many_those_with_the_least_room_are_shown(self):
+        tasks = "".join(f"      - {{name: t{i:02}, wcet: {1 + i % 7}us, period: 10ms}}\n" for i in range(60))
+        file = self.write("many.yaml", f"name: many\nplatform: {{workers: 1}}\ndags:\n  - name: d\n    tasks:\n{tasks}")
+        text = self.expect(redag("sensitivity", file), 0).stdout
+        shown, of = map(int, re.search(r"\(the (\d+) of (\d+) with the least room; --all-tasks shows every one\)", text).groups())
+        self.assertLess(shown, of)
+        row = r"(?m)^(?:all|wcet of|period of) \S+ +[\d-]"
+        self.assertEqual((len(re.findall(row, text)), shown), (50, 50))
+        self.assertEqual(len(re.findall(row, redag("sensitivity", file, "--all-tasks").stdout)), of)
+        self.assertEqual(text.count("all rates together can grow"), 1)
+        self.assertIn("the rate with the least room: period of d, from 10ms", text)
+
     def test_limits_hold_in_the_analysis(self):
         _, rows = self.limits(redag("sensitivity", self.cart, "--preemption", "os", "--json"))
         limit = rows["wcet of slow.plan"]["limit_ns"]

@@ -54,6 +54,24 @@ class Diff(Case):
         result = self.expect(redag("diff", one, other, "--different"), 0)
         self.assertIn("beware the two ran different workloads", result.stdout)
 
+    def test_what_else_differs(self):
+        simulated = self.results("simulated")
+        slowed = self.results("slowed", "--overhead-dispatch", "100us")
+        self.assertIn("beware overheads differ: none, and release 0s, dispatch 0.1ms, preempt 0s",
+                      self.expect(redag("diff", simulated, slowed), 0).stdout)
+        on_threads = self.folder / "threads"
+        self.expect(redag("run", self.cart, "--duration", "500ms", "--out", on_threads), 0)
+        text = self.expect(redag("diff", simulated, on_threads), 0).stdout
+        self.assertIn("beware one side comes from 'simulator', the other from 'threads'", text)
+        self.assertIn("beware a side has a single run", text)
+        info, *events = (on_threads / "events.jsonl").read_text().splitlines(keepends=True)
+        (self.folder / "elsewhere").mkdir()
+        changed = json.loads(info)
+        changed["run"]["machine"]["kernel"] += "-other"
+        (self.folder / "elsewhere" / "events.jsonl").write_text("".join([json.dumps(changed) + "\n", *events]))
+        self.assertIn("beware the sides ran on different machines or kernels",
+                      self.expect(redag("diff", on_threads, self.folder / "elsewhere"), 0).stdout)
+
     def test_bad_input(self):
         one = self.results("one")
         self.expect(redag("diff", one), 2, "B is required")
@@ -190,6 +208,17 @@ dags:
         differs = self.expect(redag("diff", before, after), 0).stdout
         self.assertIn("differs max_active of wide: none -> 1", differs)
         self.assertIn("better quick: missed", differs)
+
+    def test_objectives(self):
+        file = self.write("wide.yaml", self.WIDE.replace("name: quick", "name: quick\n    criticality: high"))
+        options = ["--simulator-only", "--duration", "2s", "--seeds", "2"]
+        text = self.expect(redag("tune", file, "--objective", "max_lateness", "--per-criticality", *options), 0).stdout
+        self.assertIn("objective: max_lateness, the most critical DAGs first", text)
+        self.assertRegex(text, r"criticality high: \d+ lost, [\d.]+us -> 0 lost, -9ms")
+        self.assertRegex(text, r"criticality normal: 0 lost, ")
+        text = self.expect(redag("tune", file, "--objective", "slack", "--exhaustive", "1", *options), 0).stdout
+        self.assertRegex(text, r"slack, on seeds that the search has not seen: \d+ lost, -[\d.]+ % -> 0 lost, [\d.]+ %")
+        self.assertIn("local search (seed 1), not every combination", text)
 
     def test_json_is_the_same_for_every_number_of_processors(self):
         file = self.write("wide.yaml", self.WIDE)
