@@ -101,7 +101,7 @@ TEST(ThreadPriorities, AJobMoreThanProcessorsPutsAllInOrder) {
 // Though its own place is clear: two that each had a processor are not in order.
 TEST(ThreadPriorities, AJobAboveAllOthersPutsThemInOrder) {
   Kernel kernel(3, 2);
-  for (const std::size_t thread : {0, 1}) {
+  for (std::size_t thread = 0; thread < 2; ++thread) {
     kernel.start(thread, 50, false);
     kernel.end(thread);
   }
