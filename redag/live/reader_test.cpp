@@ -174,6 +174,59 @@ TEST_F(LivePage, NamesCannotCommandTheTerminal) {
   EXPECT_EQ(page->frame.name, "??");
 }
 
+// At the edges of what UTF-8 can say, and of what turns or hides the text beside it.
+TEST_F(LivePage, OnlyCharactersThatShowThemselvesAreKept) {
+  const auto writer = make_writer();
+  const auto shown = [&](const std::string &name) {
+    Frame frame = make_frame(1, 1);
+    frame.name = "<" + name + ">";
+    writer->publish(frame);
+    const Result<Page> page = read_page(writer->path());
+    return page ? page->frame.name : to_string(page.error());
+  };
+  for (const char *good :
+       {" ", "~", "\xc2\xa0", "\xdf\xbf", "\xe0\xa0\x80", "\xed\x9f\xbf", "\xee\x80\x80", "\xef\xbf\xbd",
+        "\xf0\x90\x80\x80", "\xf4\x8f\xbf\xbf", "\xe2\x80\x8a", "\xe2\x80\xb0", "\xe2\x81\x9f"}) {
+    EXPECT_EQ(shown(good), "<" + std::string(good) + ">");
+  }
+  for (const char *bad : {"\x1f",
+                          "\x7f",
+                          "\x80",
+                          "\xbf",
+                          "\xc0\xaf",
+                          "\xc1\xbf",
+                          "\xc2\x9f",
+                          "\xc2>",
+                          "\xe0\x9f\xbf",
+                          "\xed\xa0\x80",
+                          "\xed\xbf\xbf",
+                          "\xf0\x8f\xbf\xbf",
+                          "\xf4\x90\x80\x80",
+                          "\xf5\x80\x80\x80",
+                          "\xe2\x80\x8b",
+                          "\xe2\x80\xaf",
+                          "\xe2\x81\xa0",
+                          "\xe2\x81\xa9",
+                          "\xe1\x80",
+                          "\xf0\x90\x80"}) {
+    const std::string text = shown(bad);
+    EXPECT_EQ(text.find(bad), std::string::npos) << text;
+    EXPECT_EQ(text[1], '?') << text;
+  }
+}
+
+TEST_F(LivePage, OtherFilesBesideThemAreNone) {
+  const auto writer = make_writer();
+  writer->publish(make_frame());
+  for (const char *name : {"redag", "redag.", "redag.1", "redag.1.", "redag..0", "redag.0.0", "redag.-1.0", "redag.x.0",
+                           "redag.1.x", "redag.1.0x", "redag.1-0", "redag.99999999999999999999.0", "other.1.0"}) {
+    std::ofstream(folder_ + "/" + name) << "something";
+  }
+  EXPECT_THAT(list_pages(folder_), SizeIs(1));
+  remove_stale_pages(folder_);
+  EXPECT_TRUE(std::filesystem::exists(folder_ + "/redag.1.0x"));
+}
+
 TEST_F(LivePage, OnlyTheOwnerCanOpenIt) {
   const mode_t old = ::umask(0);
   const auto writer = make_writer();

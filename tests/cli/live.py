@@ -107,6 +107,21 @@ class Top(Case):
         self.expect(redag("top", "cart"), 2, "'cart' is no process")
         self.expect(redag("top", "12."), 2, "'12.' is no process")
         self.expect(redag("top", "--folder", self.folder), 1, "no executor runs")
+        self.expect(redag("top", "--folder", self.folder, "--list"), 1, "no executor runs")
+
+    def test_of_several_one_has_to_be_named(self):
+        with tempfile.TemporaryDirectory(dir="/dev/shm") as name:
+            folder = pathlib.Path(name)
+            first, second = self.start(), self.start()
+            for process in first, second:
+                self.linked(folder, process)
+            lower = min(first.pid, second.pid)
+            result = self.expect(redag("top", "--folder", folder, "--once"), 2, "several executors run", f"redag top {lower}")
+            self.assertIn(str(first.pid), result.stderr)
+            self.assertIn(str(second.pid), result.stderr)
+            one = self.document(redag("top", f"{second.pid}.0", "--folder", folder, "--json"), "redag.live/1")
+            self.assertEqual(one["pid"], second.pid)
+            self.expect(redag("top", f"{second.pid}.1", "--folder", folder, "--once"), 1, "has no live page")
 
     def test_damaged_pages(self):
         page = self.folder / f"redag.{os.getpid()}.0"

@@ -5,7 +5,9 @@ Usage: runs.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
 import csv
 import json
+import os
 import re
+import resource
 import signal
 import subprocess
 import time
@@ -140,6 +142,16 @@ class Interrupts(Case):
         self.assertTrue({task["method"] for task in mte["tasks"]} <= {"wait_set", "wait_set_rates", "dag_any"}, mte)
         self.assertIn("\nbounds: 3 of 3 tasks", redag("run", light, "--duration", "300ms", "--preemption", "none").stdout)
 
+    def test_memory_is_locked_or_a_warning_says_why_not(self):
+        def little():
+            resource.setrlimit(resource.RLIMIT_MEMLOCK, (0, 0))
+        command = [PROGRAM, "run", self.cart, "--duration", "50ms", "--preemption", "none", "--mlockall"]
+        for prepare in None, little:
+            result = subprocess.run(command, capture_output=True, text=True, check=True, preexec_fn=prepare)
+            if prepare and os.geteuid() != 0:
+                self.assertIn("memory cannot be locked", result.stderr)
+                self.assertIn("memlock unlimited", result.stderr)
+
     def test_run_is_finished_and_written(self):
         out = self.folder / "out"
         process = self.start("run", self.cart, "--duration", "1h", "--json", "--out", out)
@@ -208,6 +220,11 @@ class Compare(Case):
     def test_on_threads(self):
         result = self.expect(redag("compare", self.cart, "--duration", "300ms", "--repeat", "1"), 0)
         self.assertRegex(result.stdout, r"fast: redag misses .* %, mte .* %, ste .* %: ")
+
+    def test_bad_values(self):
+        self.expect(redag("compare", self.cart, "--repeat", "20000"), 2, "--repeat: 20000 is more than 10000")
+        self.expect(redag("compare", self.cart, "--simulate", "--executors", "redag,mte-fifo"), 2,
+                    "the simulator has no threads: 'mte-fifo' is 'mte' there")
 
     def test_preemption_is_what_makes_the_difference(self):
         result = redag("compare", self.cart, "--simulate", "--executors", "redag-none,redag-os", "--duration", "1s")
