@@ -458,11 +458,11 @@ class MonitorTest : public ::testing::Test {
 
 TEST_F(MonitorTest, ATaskThatMissesIsWarnedOfAlsoWhileNothingElseGetsToRun) {
   configure(kOneTimer);
-  std::atomic<bool> slow{true};
-  add_timer(10ms, [&] { std::this_thread::sleep_for(slow ? 35ms : 0ms); });
+  const auto slow = std::make_shared<std::atomic<bool>>(true);  // the timer goes on until TearDown
+  add_timer(10ms, [slow] { std::this_thread::sleep_for(*slow ? 35ms : 0ms); });
   start();
   EXPECT_TRUE(eventually_status("ReDAG: DAG control", DiagnosticStatus::WARN, "loop missed"));
-  slow = false;
+  *slow = false;
   EXPECT_TRUE(eventually_status("ReDAG: DAG control", DiagnosticStatus::OK, "no new misses"));
 }
 
