@@ -166,12 +166,15 @@ void Callback::arrived(std::size_t count, Source source, int part, bool seen_onl
       if (depth_ > 0) count = std::min(count, depth_);
       bool replaces = false;
       for (std::size_t i = 0; i < count; ++i) {
-        // The job that waits for a dropped token is now the next one's: its release takes the place of the old one.
         if (depth_ > 0 && kept_[index_of(source)] >= depth_) {
-          if (drop_oldest(source, overwritten) && direct && !replaces) {
+          const Overwritten whose = drop_oldest(source);
+          if (whose == Overwritten::Released && direct && !replaces) {
+            // The job that waits for a dropped token is now the next one's: its release takes the place of the old one.
             replaces = true;
-            --overwritten;
+          } else if (whose != Overwritten::Skipped) {
+            ++overwritten;
           }
+          if (whose == Overwritten::Started) continue;
         }
         tokens_.push(Token{now, source, part, seen_only});
         ++kept_[index_of(source)];
@@ -193,21 +196,22 @@ void Callback::arrived(std::size_t count, Source source, int part, bool seen_onl
   if (to_wake) to_wake->wake();
 }
 
-// The middleware overwrote its oldest message, one more of those that were. True if that was the released job's.
-bool Callback::drop_oldest(Source source, std::size_t &overwritten) {
-  if (dropped_[index_of(source)] > 0) {  // was skipped, and counted, before
-    --dropped_[index_of(source)];
-    --kept_[index_of(source)];
-    return false;
+// The middleware overwrote its oldest message.
+Callback::Overwritten Callback::drop_oldest(Source source) {
+  const std::size_t at = index_of(source);
+  for (std::size_t *skipped : {&dropping_[at], &dropped_[at]}) {
+    if (*skipped == 0) continue;
+    --*skipped;
+    --kept_[at];
+    return Overwritten::Skipped;
   }
-  ++overwritten;
   for (std::size_t i = 0; i < tokens_.size(); ++i) {
     if (tokens_.at(i).source != source) continue;
     tokens_.erase(i);
-    --kept_[index_of(source)];
-    return i == 0 && released_ > 0;
+    --kept_[at];
+    return i == 0 && released_ > 0 ? Overwritten::Released : Overwritten::Waiting;
   }
-  return false;
+  return Overwritten::Started;
 }
 
 // True: the first token is to be released, by release() without the lock.
@@ -283,7 +287,7 @@ void Callback::skipped(redag::Reason reason) noexcept {
   if (begins) release(arrival);
 }
 
-bool Callback::take_token(Token &token, std::size_t &dropped) {
+bool Callback::take_token(Token &token) {
   Time next = kNever;
   bool begins = false;
   {
@@ -291,8 +295,7 @@ bool Callback::take_token(Token &token, std::size_t &dropped) {
     if (released_ > 0) --released_;
     if (tokens_.empty()) return false;
     token = tokens_.pop();
-    dropped = std::exchange(dropped_[index_of(token.source)], 0);
-    kept_[index_of(token.source)] -= dropped + 1;
+    dropping_[index_of(token.source)] += std::exchange(dropped_[index_of(token.source)], 0);
     begins = begin_release(next);
   }
   if (begins) release(next);

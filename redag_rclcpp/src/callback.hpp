@@ -136,9 +136,15 @@ class Callback final : public TimerQueue::Timer,
   void hook();
   void unhook();
   void arrived(std::size_t count, Source source, int part, bool seen_only = false);
-  [[nodiscard]] bool drop_oldest(Source source, std::size_t &overwritten) REDAG_REQUIRES(lock_);
+  enum class Overwritten : std::uint8_t {
+    Skipped,   // a message whose job was skipped, and counted, before
+    Released,  // that of the job that waits in the scheduler
+    Waiting,   // that of a later token
+    Started,   // that of a job that has started and not yet taken it: it takes the one that came instead
+  };
+  [[nodiscard]] Overwritten drop_oldest(Source source) REDAG_REQUIRES(lock_);
   void learn_from_arrival(Time now, std::size_t count) REDAG_REQUIRES(lock_);
-  [[nodiscard]] bool take_token(Token &token, std::size_t &dropped);
+  [[nodiscard]] bool take_token(Token &token);
   [[nodiscard]] bool begin_release(Time &arrival) REDAG_REQUIRES(lock_);
   void release(Time arrival);
   void drop_expiry();
@@ -155,7 +161,7 @@ class Callback final : public TimerQueue::Timer,
   [[nodiscard]] bool execute_service();
   [[nodiscard]] bool execute_client();
   [[nodiscard]] bool execute_waitable(rclcpp::Waitable &waitable, const Token &token);
-  void drop_messages(Source source, std::size_t count);
+  void drop_messages(Source source);
 
   const redag::CallbackId id_;
   redag::runtime::Engine &engine_;  // not after detach(), except by a job
@@ -178,11 +184,12 @@ class Callback final : public TimerQueue::Timer,
 
   mutable redag::PiMutex lock_;
   std::shared_ptr<Intake> intake_ REDAG_GUARDED_BY(lock_);  // null once detached
-  TokenQueue<Token> tokens_ REDAG_GUARDED_BY(lock_);      // the first one is that of the released job, if there is one
-  std::size_t kept_[2] REDAG_GUARDED_BY(lock_) = {0, 0};  // tokens by source
-  std::size_t dropped_[2] REDAG_GUARDED_BY(lock_) = {
-      0, 0};  // of the kept, those whose jobs were skipped; they have no token
-  bool leftovers_[2] REDAG_GUARDED_BY(lock_) = {false, false};  // by source, there may be more than tokens
+  TokenQueue<Token> tokens_ REDAG_GUARDED_BY(lock_);  // the first one is that of the released job, if there is one
+  // By source. Messages are kept until the moment before they are taken: what arrives earlier may overwrite them.
+  std::size_t kept_[2] REDAG_GUARDED_BY(lock_) = {0, 0};      // by the middleware
+  std::size_t dropped_[2] REDAG_GUARDED_BY(lock_) = {0, 0};   // of these, whose jobs were skipped; they have no token
+  std::size_t dropping_[2] REDAG_GUARDED_BY(lock_) = {0, 0};  // the same, before a job that has started: it drops them
+  bool leftovers_[2] REDAG_GUARDED_BY(lock_) = {false, false};  // there may be more messages than tokens
   std::uint32_t released_ REDAG_GUARDED_BY(lock_) =
       0;  // jobs that wait in the scheduler, or whose skip is still to be told
   std::uint32_t releasers_ REDAG_GUARDED_BY(lock_) = 0;  // threads in release()

