@@ -31,7 +31,7 @@ class LivePage : public ::testing::Test {
     EXPECT_NE(::mkdtemp(name.data()), nullptr);
     folder_ = name;
   }
-  ~LivePage() override { std::filesystem::remove_all(folder_); }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
 
   std::unique_ptr<PageWriter> make_writer(std::size_t slot_size = kSlotSize) {
     Result<std::unique_ptr<PageWriter>> writer = PageWriter::create(folder_, slot_size);
@@ -41,7 +41,7 @@ class LivePage : public ::testing::Test {
 
   /// A page as `writer` left it, under another name that tests may spoil.
   std::string copy(const PageWriter &writer) const {
-    const std::string path = page_path(folder_, 1, 0);
+    std::string path = page_path(folder_, 1, 0);
     std::filesystem::copy_file(writer.path(), path, std::filesystem::copy_options::overwrite_existing);
     std::filesystem::permissions(path, std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
     return path;

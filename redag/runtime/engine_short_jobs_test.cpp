@@ -159,7 +159,8 @@ TEST_P(ShortJobsWithPriorities, OnlyOneThatIsExpectedToBeShortKeepsAHigherPriori
   run(1);
   EXPECT_EQ(last, band_.of_level(1));
   is_long = false;
-  for (int i = 0; i < 100 && last == band_.of_level(1); ++i) {
+  // A machine that others use makes them long now and then.
+  for (const Time limit = monotonic_now() + 60 * kSecond; last == band_.of_level(1) && monotonic_now() < limit;) {
     run(1, 10);
     run(0);
     run(1);
