@@ -102,7 +102,7 @@ class Checker {
       say("sets", fmt::format("{} points of {} sets are more than {}", count, plan_.sets, kMostUnits));
       return;
     }
-    std::uint64_t to_draw = 1'000'000;  // tasks
+    std::uint64_t to_draw = 100'000;  // tasks: a third of a second
     for (const AcceptancePoint &point : points_of(plan_)) {
       const GenerateOptions options = generate_options(plan_, point);
       Diagnostics mistakes = redag::find_mistakes(options);
