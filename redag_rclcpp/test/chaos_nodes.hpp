@@ -119,8 +119,13 @@ class Troublemakers {
     Rng dice = Rng::stream(seed_, kNodeStream, number);
     auto made = std::make_shared<Troublemaker>();
     auto options = node_options().use_clock_thread(dice.uniform01() < 0.5);
-    if (dice.uniform01() < 0.5) options.parameter_overrides({{"use_sim_time", true}});
+    const bool simulated_time = dice.uniform01() < 0.5;
+    if (simulated_time) options.parameter_overrides({{"use_sim_time", true}});
     made->node = std::make_shared<rclcpp::Node>("trouble" + std::to_string(number), options);
+    if (simulated_time && !options.use_clock_thread()) {
+      const std::lock_guard guard(lock_);
+      hear_clock_.push_back(made->node);
+    }
     {
       const std::lock_guard guard(made->lock);
       made->publishers.push_back(made->node->create_publisher<Strings>(topic(dice), rclcpp::QoS(10)));
@@ -341,6 +346,9 @@ class Troublemakers {
   redag::PiMutex shared_;
   std::mutex lock_;
   std::vector<std::shared_ptr<Troublemaker>> nodes_;
+  // Until the executor is gone: their /clock callback, which runs there, uses what belongs to the node (rclcpp's
+  // TimeSource captures a plain pointer), and would still do so when the node is destroyed meanwhile.
+  std::vector<rclcpp::Node::SharedPtr> hear_clock_;
 };
 
 }  // namespace redag_rclcpp::chaos
