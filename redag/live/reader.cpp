@@ -26,7 +26,6 @@ using page::TaskRow;
 
 constexpr std::uint64_t kMostBytes = std::uint64_t{64} << 20U;
 constexpr std::uint32_t kMostRow = 4096;
-constexpr int kTries = 10;  // while the writer is faster than we are
 constexpr auto kPause = std::chrono::milliseconds(2);
 
 class File {
@@ -252,11 +251,11 @@ bool remove_if_stale(const std::string &path) {
 
 }  // namespace
 
-Result<Page> read_page(const std::string &path) {
+Result<Page> read_page(const std::string &path, int tries) {
   const File file(path);
   struct stat info {};
   if (auto problem = problem_with(file, path, info)) return tl::unexpected<Diagnostics>(*std::move(problem));
-  for (int i = 0; i < kTries; ++i) {
+  for (int i = 0; i < tries; ++i) {
     if (i > 0) std::this_thread::sleep_for(kPause);
     const Result<Header> header = read_header(file, path, static_cast<std::uint64_t>(info.st_size));
     if (!header) return tl::unexpected<Diagnostics>(header.error());

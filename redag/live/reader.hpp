@@ -19,8 +19,9 @@ struct Page {
   Frame frame;
 };
 
+/// Looks up to `tries` times, 2 ms apart, for a frame that is not just being written.
 /// Error: there is none, it is not ours (owned by the user or by root, nobody else may open it), or it is damaged.
-[[nodiscard]] Result<Page> read_page(const std::string &path);
+[[nodiscard]] Result<Page> read_page(const std::string &path, int tries = 10);
 
 struct Listed {
   std::string path;
