@@ -176,7 +176,7 @@ void Callback::arrived(std::size_t count, Source source, int part, bool seen_onl
           }
           if (whose == Overwritten::Started) continue;
         }
-        tokens_.push(Token{now, source, part, seen_only});
+        tokens_.push(Token{.arrival = now, .source = source, .part = part, .seen_only = seen_only});
         ++kept_[index_of(source)];
       }
       if (replaces) {
@@ -295,7 +295,9 @@ bool Callback::take_token(Token &token) {
     if (released_ > 0) --released_;
     if (tokens_.empty()) return false;
     token = tokens_.pop();
-    dropping_[index_of(token.source)] += std::exchange(dropped_[index_of(token.source)], 0);
+    const std::size_t at = index_of(token.source);
+    dropping_[at] += std::exchange(dropped_[at], 0);
+    token.after_skipped = dropping_[at] > 0;
     begins = begin_release(next);
   }
   if (begins) release(next);

@@ -125,9 +125,11 @@ class Callback final : public TimerQueue::Timer,
   struct Token {
     Time arrival = 0;
     Source source = Source::Middleware;
-    int part = 0;            // of a waitable
-    bool seen_only = false;  // by the wait set: what arrived has to be asked for
+    int part = 0;                // of a waitable
+    bool seen_only = false;      // by the wait set: what arrived has to be asked for
+    bool after_skipped = false;  // there are messages to be dropped before it; set by take_token()
   };
+  class Taking;
 
   static std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
 
@@ -156,12 +158,14 @@ class Callback final : public TimerQueue::Timer,
   // False: there was nothing to do.
   [[nodiscard]] bool execute_timer();
   [[nodiscard]] bool execute_token(const Token &token);
-  [[nodiscard]] bool execute_arrival(const Token &token);
-  [[nodiscard]] bool execute_subscription();
+  [[nodiscard]] bool execute_arrival(const Token &token, Taking &taking);
+  [[nodiscard]] bool execute_subscription(rclcpp::SubscriptionBase &subscription, Taking &taking);
   [[nodiscard]] bool execute_service();
   [[nodiscard]] bool execute_client();
   [[nodiscard]] bool execute_waitable(rclcpp::Waitable &waitable, const Token &token);
   void drop_messages(Source source);
+  template <class Take>
+  void drop_messages(Source source, Take take) REDAG_EXCLUDES(lock_);
 
   const redag::CallbackId id_;
   redag::runtime::Engine &engine_;  // not after detach(), except by a job

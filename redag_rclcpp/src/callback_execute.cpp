@@ -35,13 +35,38 @@ bool take_and_handle(const char *what, const char *name, Take take, Handle handl
 
 }  // namespace
 
+// What a job that has started is to take. The middleware keeps it until begin(), and may overwrite it: what comes
+// instead is the job's then. So begin() stands as late as it can: to make a message to take into can take long.
+class Callback::Taking {
+ public:
+  Taking(Callback &callback, Source source) : callback_(callback), source_(source) {}
+  ~Taking() {
+    if (begun_) return;
+    begin();
+    const redag::LockGuard guard(callback_.lock_);
+    callback_.leftovers_[index_of(source_)] = true;  // it may still be there
+  }
+  Taking(const Taking &) = delete;
+  Taking &operator=(const Taking &) = delete;
+
+  void begin() {
+    begun_ = true;
+    const redag::LockGuard guard(callback_.lock_);
+    --callback_.kept_[index_of(source_)];
+  }
+
+ private:
+  Callback &callback_;
+  const Source source_;
+  bool begun_ = false;
+};
+
 Outcome Callback::execute(const redag::runtime::Job &job) {
   Token token;
   bool executed = false;
   if (is_timer()) {
     executed = execute_timer();
   } else if (take_token(token)) {
-    drop_messages(token.source);
     executed = execute_token(token);
   }
   if (!executed) return Outcome::NoData;
@@ -69,11 +94,9 @@ bool Callback::execute_token(const Token &token) {
     const Token &token;
   } watch{*this, token};
 
-  {
-    const redag::LockGuard guard(lock_);
-    --kept_[index_of(token.source)];
-  }
-  const bool taken = execute_arrival(token);
+  Taking taking(*this, token.source);
+  if (token.after_skipped) drop_messages(token.source);
+  const bool taken = execute_arrival(token, taking);
   bool more = false;
   {
     const redag::LockGuard guard(lock_);
@@ -85,15 +108,18 @@ bool Callback::execute_token(const Token &token) {
   return taken;
 }
 
-bool Callback::execute_arrival(const Token &token) {
+bool Callback::execute_arrival(const Token &token, Taking &taking) {
   if (token.source == Source::IntraProcess) {
+    taking.begin();
     const auto waitable = intra_process_.lock();
     // An empty buffer must not be taken from.
     rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
     return waitable && compat::is_ready(*waitable, unused) && execute_waitable(*waitable, token);
   }
+  if (const auto subscription = subscription_.lock()) return execute_subscription(*subscription, taking);
+  taking.begin();
   if (const auto waitable = waitable_.lock()) return execute_waitable(*waitable, token);
-  return execute_subscription() || execute_service() || execute_client();
+  return execute_service() || execute_client();
 }
 
 bool Callback::execute_waitable(rclcpp::Waitable &waitable, const Token &token) {
@@ -106,26 +132,36 @@ bool Callback::execute_waitable(rclcpp::Waitable &waitable, const Token &token) 
 // Jobs of theirs were skipped.
 void Callback::drop_messages(Source source) {
   const auto subscription = subscription_.lock();
-  const auto intra_process = intra_process_.lock();
-  rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
-  rclcpp::MessageInfo info;
-  const auto drop = [&] {
-    if (!subscription) return false;
-    if (source == Source::IntraProcess) {
+  if (!subscription) return;
+  if (source == Source::IntraProcess) {
+    const auto intra_process = intra_process_.lock();
+    rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
+    return drop_messages(source, [&] {
       return intra_process && compat::is_ready(*intra_process, unused) && intra_process->take_data() != nullptr;
-    }
-    return take_and_handle(
-        "a message of topic", subscription->get_topic_name(),
-        [&] {
-          if (subscription->is_serialized())
-            return subscription->take_serialized(*subscription->create_serialized_message(), info);
-          const std::shared_ptr<void> message = subscription->create_message();
-          return subscription->take_type_erased(message.get(), info);
-        },
-        [] {});
+    });
+  }
+  const auto drop = [&](auto take) {
+    const auto dropped = [] {};
+    drop_messages(source,
+                  [&] { return take_and_handle("a message of topic", subscription->get_topic_name(), take, dropped); });
   };
+  rclcpp::MessageInfo info;
+  if (subscription->is_serialized()) {
+    auto message = subscription->create_serialized_message();
+    drop([&] { return subscription->take_serialized(*message, info); });
+    subscription->return_serialized_message(message);
+  } else {
+    std::shared_ptr<void> message = subscription->create_message();
+    drop([&] { return subscription->take_type_erased(message.get(), info); });
+    subscription->return_message(message);
+  }
+}
+
+// `take` takes one; false: there is none. Of those to be dropped, some may have been overwritten meanwhile.
+template <class Take>
+void Callback::drop_messages(Source source, Take take) {
   const std::size_t at = index_of(source);
-  for (bool more = true; more; more = drop()) {
+  for (bool taken = true; taken; taken = take()) {
     const redag::LockGuard guard(lock_);
     if (dropping_[at] == 0) return;
     --dropping_[at];
@@ -135,23 +171,23 @@ void Callback::drop_messages(Source source) {
   kept_[at] -= std::exchange(dropping_[at], 0);
 }
 
-bool Callback::execute_subscription() {
-  const auto subscription = subscription_.lock();
-  if (!subscription) return false;
+bool Callback::execute_subscription(rclcpp::SubscriptionBase &subscription, Taking &taking) {
   TRACETOOLS_TRACEPOINT(rclcpp_executor_execute,
-                        static_cast<const void *>(subscription->get_subscription_handle().get()));
-  if (subscription->is_serialized() || subscription->can_loan_messages()) {
-    Rclcpp::execute_subscription(subscription);
+                        static_cast<const void *>(subscription.get_subscription_handle().get()));
+  if (subscription.is_serialized() || subscription.can_loan_messages()) {
+    taking.begin();
+    Rclcpp::execute_subscription(subscription.shared_from_this());
     return true;
   }
   rclcpp::MessageInfo info;
   info.get_rmw_message_info().from_intra_process = false;
-  std::shared_ptr<void> message = subscription->create_message();
+  std::shared_ptr<void> message = subscription.create_message();
+  taking.begin();
   const bool taken = take_and_handle(
-      "a message of topic", subscription->get_topic_name(),
-      [&] { return subscription->take_type_erased(message.get(), info); },
-      [&] { subscription->handle_message(message, info); });
-  subscription->return_message(message);
+      "a message of topic", subscription.get_topic_name(),
+      [&] { return subscription.take_type_erased(message.get(), info); },
+      [&] { subscription.handle_message(message, info); });
+  subscription.return_message(message);
   return taken;
 }
 

@@ -14,68 +14,24 @@
 #include <thread>
 #include <vector>
 
-#include "executor_types.hpp"
+#include "mode_test.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/live/writer.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/model/validate.hpp"
-#include "redag/model/workload_yaml.hpp"
-#include "redag/runtime/clock.hpp"
 #include "redag/runtime/preemption_point.hpp"
 #include "spinning.hpp"
-#include "test_msgs/msg/basic_types.hpp"
-#include "test_msgs/msg/empty.hpp"
-#include "test_msgs/srv/empty.hpp"
 
 namespace redag_rclcpp {
 namespace {
 
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
-using test_msgs::msg::BasicTypes;
-using test_msgs::msg::Empty;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class ExecutorTest : public ::testing::TestWithParam<redag::PreemptionMode> {
- protected:
-  void SetUp() override {
-    if (GetParam() == redag::PreemptionMode::Os && redag::runtime::probe_priority_band().top_job == 0) {
-      GTEST_SKIP() << "SCHED_FIFO is not to be had here";
-    }
-    rclcpp::init(0, nullptr);
-    node = std::make_shared<rclcpp::Node>("node", rclcpp::NodeOptions().use_intra_process_comms(true));
-    options.preemption = GetParam();
-    options.workers = 1;
-  }
-  void TearDown() override {
-    node.reset();
-    if (rclcpp::ok()) rclcpp::shutdown();
-  }
-
-  rclcpp::CallbackGroup::SharedPtr new_group() {
-    return groups.emplace_back(node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive));
-  }
-  rclcpp::Subscription<Empty>::SharedPtr subscribe(const std::string &topic, std::function<void()> body) {
-    rclcpp::SubscriptionOptions subscription;
-    subscription.callback_group = new_group();
-    return node->create_subscription<Empty>(
-        topic, rclcpp::QoS(10), [body](Empty::ConstSharedPtr) { body(); }, subscription);
-  }
-  rclcpp::Publisher<Empty>::SharedPtr publisher(const std::string &topic) {
-    return node->create_publisher<Empty>(topic, rclcpp::QoS(10));
-  }
-  redag::Workload parse(const std::string &text) {
-    auto workload = redag::parse_workload(text, "test.yaml", redag::LoadOptions{.wcet_optional = true});
-    EXPECT_TRUE(workload) << to_string(workload.error());
-    return workload->workload;
-  }
-
-  rclcpp::Node::SharedPtr node;
-  std::vector<rclcpp::CallbackGroup::SharedPtr> groups;
-  ReDAGOptions options;
-};
+using ExecutorTest = ModeTest;
 
 constexpr const char *kThreeRates = R"(
 name: rates
@@ -305,25 +261,6 @@ TEST_P(ExecutorTest, MissedPeriodsOfATimerAreCounted) {
   EXPECT_GE(stats.misses, 9U);
 }
 
-TEST_P(ExecutorTest, OverwrittenMessagesAreCounted) {
-  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
-  std::atomic<int> count{0};
-  rclcpp::SubscriptionOptions subscription_options;
-  auto subscription = node->create_subscription<Empty>("/x", rclcpp::QoS(3), [&](Empty::ConstSharedPtr) { ++count; });
-  executor.add_node(node);
-  auto to_x = node->create_publisher<Empty>("/x", rclcpp::QoS(3));
-  for (int i = 0; i < 10; ++i) to_x->publish(Empty());
-  executor.spin_all(kLimit);
-  EXPECT_EQ(count, 3);
-  CallbackStats stats;
-  for (const CallbackStats &s : executor.stats()) {
-    if (s.id.name == "/x") stats = s;
-  }
-  EXPECT_EQ(stats.jobs.released, 10U);
-  EXPECT_EQ(stats.jobs.finished, 3U);
-  EXPECT_EQ(stats.jobs.skipped, 7U);
-}
-
 TEST_P(ExecutorTest, WhatOneExecutorLeavesTheNextOneTakes) {
   for (const bool intra_process : {false, true}) {
     SCOPED_TRACE(intra_process);
@@ -425,191 +362,6 @@ TEST_P(ExecutorTest, LearnsRatesAndEdges) {
   executor.remove_node(node);
   again.add_node(node);
   EXPECT_THAT(again.warnings(), ::testing::Not(::testing::Contains(HasSubstr("no callback matches"))));
-}
-
-// ---- budgets and criticality ----
-
-void use_processor(redag::Duration duration) {
-  const redag::Time end = redag::runtime::thread_cpu_now() + duration;
-  while (redag::runtime::thread_cpu_now() < end) {
-  }
-}
-
-/// A subscription of numbered messages, in a group of its own.
-struct Numbers {
-  Numbers(const rclcpp::Node::SharedPtr &node, const std::string &topic, bool in_process,
-          redag::Duration execution = 0) {
-    rclcpp::SubscriptionOptions options;
-    rclcpp::PublisherOptions publishing;
-    options.callback_group = group = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
-    options.use_intra_process_comm = publishing.use_intra_process_comm =
-        in_process ? rclcpp::IntraProcessSetting::Enable : rclcpp::IntraProcessSetting::Disable;
-    subscription = node->create_subscription<BasicTypes>(
-        topic, rclcpp::QoS(10),
-        [this, execution](BasicTypes::ConstSharedPtr message) {
-          received.push_back(message->int32_value);
-          use_processor(execution);
-        },
-        options);
-    publisher = node->create_publisher<BasicTypes>(topic, rclcpp::QoS(10), publishing);
-  }
-  void publish(int number) {
-    auto message = std::make_unique<BasicTypes>();
-    message->int32_value = number;
-    publisher->publish(std::move(message));
-  }
-
-  std::vector<int> received;
-  rclcpp::CallbackGroup::SharedPtr group;
-  rclcpp::Subscription<BasicTypes>::SharedPtr subscription;
-  rclcpp::Publisher<BasicTypes>::SharedPtr publisher;
-};
-
-redag::sched::Accounting jobs_of(const ReDAGExecutor &executor, const std::string &task) {
-  for (const CallbackStats &stats : executor.stats()) {
-    if (stats.task == task) return stats.jobs;
-  }
-  ADD_FAILURE() << "no task " << task;
-  return {};
-}
-
-TEST_P(ExecutorTest, AfterASkippedReleaseTheNextMessageIsTaken) {
-  options.workload = parse(R"(
-name: budgets
-dags:
-  - name: d
-    tasks:
-      - {name: a, period: 10ms, wcet: 1ms, budget: 1ms, on_budget: skip_next,
-         callback: {node: /node, subscription: /numbers}}
-)");
-  for (const bool in_process : {true, false}) {
-    SCOPED_TRACE(in_process);
-    ReDAGExecutor executor(options);
-    Numbers numbers(node, "/numbers", in_process, 2 * redag::kMillisecond);
-    executor.add_node(node);
-    for (int i = 1; i <= 5; ++i) {
-      numbers.publish(i);
-      executor.spin_some();
-    }
-    EXPECT_THAT(numbers.received, ElementsAre(1, 3, 5));
-    EXPECT_EQ(jobs_of(executor, "d.a").skipped, 2u);
-    executor.remove_node(node);
-  }
-}
-
-TEST_P(ExecutorTest, AMessageBeyondMaxPendingIsDroppedAndTheNextOneTaken) {
-  options.workload = parse(R"(
-name: admission
-dags:
-  - name: d
-    max_pending: 1
-    tasks:
-      - {name: a, period: 10ms, callback: {node: /node, subscription: /a}}
-      - {name: b, period: 20ms, callback: {node: /node, subscription: /b}}
-)");
-  ReDAGExecutor executor(options);
-  Numbers a(node, "/a", true);
-  Numbers b(node, "/b", true);
-  executor.add_node(node);
-  a.publish(1);
-  b.publish(1);
-  executor.spin_some();
-  b.publish(2);
-  executor.spin_some();
-  EXPECT_THAT(a.received, ElementsAre(1));
-  EXPECT_THAT(b.received, ElementsAre(2));
-  EXPECT_EQ(jobs_of(executor, "d.b").skipped, 1u);
-}
-
-constexpr const char *kTwoCriticalities = R"(
-name: criticality
-dags:
-  - name: high
-    criticality: high
-    tasks:
-      - {name: control, period: 10ms, wcet: 5ms, wcet_low: 1ms, callback: {node: /node, subscription: /control}}
-  - name: low
-    tasks:
-      - {name: map, period: 100ms, wcet: 5ms, callback: {node: /node, subscription: /map}}
-      - {name: ask, period: 100ms, wcet: 5ms, callback: {node: /node, service: /ask}}
-)";
-
-TEST_P(ExecutorTest, HighModeDropsMessagesOfLowerCriticalityUntilItEnds) {
-  options.workload = parse(kTwoCriticalities);
-  for (const bool in_process : {true, false}) {
-    SCOPED_TRACE(in_process);
-    ReDAGExecutor executor(options);
-    Numbers control(node, "/control", in_process, 2 * redag::kMillisecond);
-    Numbers map(node, "/map", in_process);
-    executor.add_node(node);
-    for (int i = 1; i <= 3; ++i) {
-      if (i == 2) control.publish(i);  // HI mode begins and, as nothing else is there to do, ends
-      map.publish(i);
-      executor.spin_some();
-    }
-    EXPECT_THAT(control.received, ElementsAre(2));
-    EXPECT_THAT(map.received, ElementsAre(1, 3));
-    EXPECT_EQ(jobs_of(executor, "low.map").skipped, 1u);
-    executor.remove_node(node);
-  }
-}
-
-TEST_P(ExecutorTest, HighModeDelaysRequestsAndDropsNone) {
-  options.workload = parse(kTwoCriticalities);
-  ReDAGExecutor executor(options);
-  Numbers control(node, "/control", true, 2 * redag::kMillisecond);
-  int asked = 0;
-  const auto service = node->create_service<test_msgs::srv::Empty>(
-      "/ask", [&](test_msgs::srv::Empty::Request::SharedPtr, test_msgs::srv::Empty::Response::SharedPtr) { ++asked; });
-  const auto client = node->create_client<test_msgs::srv::Empty>("/ask");
-  executor.add_node(node);
-  ASSERT_TRUE(client->wait_for_service(10s));
-  control.publish(1);
-  auto answer = client->async_send_request(std::make_shared<test_msgs::srv::Empty::Request>());
-  ASSERT_TRUE(eventually([&] { return jobs_of(executor, "low.ask").skipped > 0; },
-                         [&] {
-                           if (asked > 0) control.publish(1);
-                           executor.spin_some();
-                         }));
-  EXPECT_EQ(executor.spin_until_future_complete(answer, 10s), rclcpp::FutureReturnCode::SUCCESS);
-  EXPECT_EQ(asked, 1);
-}
-
-TEST_P(ExecutorTest, LowerCriticalityGoesOnAfterHighModeOnWorkers) {
-  options.workload = parse(kTwoCriticalities);
-  ReDAGExecutor executor(options);
-  Numbers control(node, "/control", false, 2 * redag::kMillisecond);
-  Numbers map(node, "/map", false);
-  executor.add_node(node);
-  std::uint64_t sent = 0;
-  std::uint64_t rounds = 0;
-  const auto all_ended = [&] {
-    const auto controls = jobs_of(executor, "high.control");
-    const auto maps = jobs_of(executor, "low.map");
-    // Aborted: where the queue is full, a message can be overwritten and its successor taken before that is told.
-    return controls.finished + controls.skipped == rounds && maps.finished + maps.skipped + maps.aborted == sent;
-  };
-  {
-    Spinner spinner(executor);
-    ASSERT_TRUE(eventually([&] { return rounds >= 20 && jobs_of(executor, "low.map").skipped > 0; },
-                           [&] {
-                             control.publish(0);
-                             ++rounds;
-                             for (int i = 0; i < 3; ++i) map.publish(static_cast<int>(++sent));
-                             std::this_thread::sleep_for(5ms);
-                           }));
-    ASSERT_TRUE(eventually(all_ended));
-    // HI mode goes on as long as anything else is in progress, such as the node's own callbacks.
-    const std::uint64_t before = jobs_of(executor, "low.map").finished;
-    ASSERT_TRUE(eventually([&] { return jobs_of(executor, "low.map").finished > before; },
-                           [&] {
-                             map.publish(1'000'000);
-                             ++sent;
-                             std::this_thread::sleep_for(5ms);
-                           }));
-    ASSERT_TRUE(eventually(all_ended));
-  }
-  EXPECT_EQ(map.received.back(), 1'000'000);
 }
 
 TEST_P(ExecutorTest, ItsTraceHoldsToTheModel) {
