@@ -29,8 +29,12 @@ Bound all_that_agree(const System &system, std::vector<GlobalUnit> &units, std::
                      const std::function<ResponseBound(std::size_t)> &explain) {
   std::vector<Duration *> values;
   values.reserve(units.size());
-  for (GlobalUnit &unit : units) values.push_back(&unit.response);
-  const std::string_view absent = agree(values, exceeds, respond);
+  bool possible = true;  // otherwise what is far above its limit would have the others compute with it
+  for (GlobalUnit &unit : units) {
+    values.push_back(&unit.response);
+    possible = possible && unit.response <= unit.limit;
+  }
+  const std::string_view absent = possible ? agree(values, exceeds, respond) : exceeds;
   std::vector<ResponseBound> responses(system.units.size());
   for (std::size_t k = 0; k < units.size(); ++k) {
     ResponseBound &response = responses[units[k].unit];
