@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "diagnostic_msgs/msg/diagnostic_array.hpp"
 #include "monitor_test.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/metrics/trace_checker.hpp"

@@ -3,10 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include <diagnostic_msgs/msg/diagnostic_status.hpp>
 #include <string>
 #include <vector>
 
+#include "diagnostic_msgs/msg/diagnostic_status.hpp"
 #include "redag/model/workload_yaml.hpp"
 
 namespace redag_rclcpp {
