@@ -18,13 +18,23 @@ using testing::make_workload;
 using ::testing::Not;
 using Kind = Term::Kind;
 
+Analysed look_at(const Workload &workload) {
+  Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload));
+  EXPECT_TRUE(analysed) << to_string(analysed.error());
+  return *std::move(analysed);
+}
+
 // One worker: fast.a (T 10, C 3), slow.b (T 20, C 7, with a preemption point every millisecond).
 Analysed two_tasks(PreemptionMode mode) {
   Workload workload = make_workload({make_dag("fast", {{"a", 10, 3}}), make_dag("slow", {{"b", 20, 7}})}, 1, mode);
   workload.dags[1].tasks[0].region = kMillisecond;
-  Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload));
-  EXPECT_TRUE(analysed);
-  return *std::move(analysed);
+  return look_at(workload);
+}
+
+Row row_of(const Analysed &analysed, const std::string &name) {
+  Result<Row> row = find_row(analysed, name);
+  EXPECT_TRUE(row) << to_string(row.error());
+  return *std::move(row);
 }
 
 Term term(Kind kind, Duration ms, TaskId task = {}, std::int64_t jobs = 0) {
@@ -39,11 +49,34 @@ Term term(Kind kind, Duration ms, TaskId task = {}, std::int64_t jobs = 0) {
 // What is said of slow.b if `largest` is 6 of its 10 ms.
 std::string explained(const Term &largest, PreemptionMode mode = PreemptionMode::Os) {
   const Analysed analysed = two_tasks(mode);
-  Result<Row> row = find_row(analysed, "slow.b");
-  EXPECT_TRUE(row);
-  row->tightest.response = row->tightest.bound.response = 10 * kMillisecond;
-  row->tightest.bound.terms = {term(Kind::Own, 4, TaskId(1), 1), largest};
-  return explain(analysed, *row, StreamTraits{});
+  Row row = row_of(analysed, "slow.b");
+  row.tightest.response = row.tightest.bound.response = 10 * kMillisecond;
+  row.tightest.bound.terms = {term(Kind::Own, 4, TaskId(1), 1), largest};
+  return explain(analysed, row, StreamTraits{});
+}
+
+TEST(Explanation, TermsAddUpAndTheLargestIsNamed) {
+  const Analysed analysed = two_tasks(PreemptionMode::None);
+  // Not preempted, a waits for b (7 ms, of which one nanosecond at least is done) and for nothing else.
+  const Row row = row_of(analysed, "fast/a");
+  EXPECT_EQ(row.tightest.response, 10 * kMillisecond - 1);
+  const std::string text = explain(analysed, row, StreamTraits{});
+  EXPECT_THAT(text, HasSubstr("blocking by    slow.b     1   7ms  70.0 %"));
+  EXPECT_THAT(text, HasSubstr("own execution  fast.a     1   3ms  30.0 %"));
+  EXPECT_THAT(text, HasSubstr("slow.b keeps its worker until it ends"));
+}
+
+// 1, then three times 4 side by side, on two workers: the longest path is 5, and L + (V - L) / m = 5 + 8 / 2.
+TEST(Explanation, OfADagOnSeveralWorkersTellsThePathFromTheRest) {
+  const Dag fork =
+      make_dag("fork", {{"first", 10, 1}, {"left", 0, 4, {0}}, {"right", 0, 4, {0}}, {"third", 0, 4, {0}}});
+  const Analysed analysed = look_at(make_workload({fork}, 2, PreemptionMode::Os));
+  const Row row = row_of(analysed, "fork.right");
+  EXPECT_EQ(row.tightest.response, 9 * kMillisecond);
+  EXPECT_EQ(row.tightest.response, row_of(analysed, "fork").tightest.response);
+  const std::string text = explain(analysed, row, StreamTraits{});
+  EXPECT_THAT(text, HasSubstr("own execution              fork     1   5ms  55.6 %"));
+  EXPECT_THAT(text, HasSubstr("own tasks beside the path  fork     -   4ms  44.4 %"));
 }
 
 TEST(Explanation, OfEachKindOfTermSaysWhatItIsAndWhatHelps) {

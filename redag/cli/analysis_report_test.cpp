@@ -170,39 +170,7 @@ TEST(AnalysisReport, ManyTasksAreCutToThoseWithTheLeastSlack) {
   EXPECT_NE(describe(analysed, StreamTraits{}, true).find("d0.t "), std::string::npos);
 }
 
-TEST(Explanation, TermsAddUpAndTheLargestIsNamed) {
-  const Analysed analysed = look_at(two_tasks(PreemptionMode::None));
-  // Not preempted, a waits for b (7 ms, of which one nanosecond at least is done) and for nothing else.
-  const Row row = row_of(analysed, "fast/a");
-  EXPECT_EQ(row.tightest.response, 10 * kMillisecond - 1);
-  const std::string text = explain(analysed, row, StreamTraits{});
-  EXPECT_NE(text.find("blocking by    slow.b     1   7ms  70.0 %"), std::string::npos) << text;
-  EXPECT_NE(text.find("own execution  fast.a     1   3ms  30.0 %"), std::string::npos) << text;
-  EXPECT_NE(text.find("slow.b keeps its worker until it ends"), std::string::npos) << text;
-}
-
-TEST(Explanation, OfADagOnSeveralWorkersTellsThePathFromTheRest) {
-  // 1, then three times 4 side by side, on two workers: the longest path is 5, and L + (V - L) / m = 5 + 8 / 2.
-  Workload workload = two_tasks(PreemptionMode::Os);
-  workload.platform.workers = 2;
-  Task left = timer("left", 10 * kMillisecond, 4 * kMillisecond);
-  left.activation = Activation::Data;
-  left.predecessors = {0};
-  Task right = left;
-  right.name = "right";
-  Task third = left;
-  third.name = "third";
-  workload.dags = {dag_of("fork", {timer("first", 10 * kMillisecond, kMillisecond), left, right, third})};
-  const Analysed analysed = look_at(workload);
-  const Row row = row_of(analysed, "fork.right");
-  EXPECT_EQ(row.tightest.response, 9 * kMillisecond);
-  EXPECT_EQ(row.tightest.response, row_of(analysed, "fork").tightest.response);
-  const std::string text = explain(analysed, row, StreamTraits{});
-  EXPECT_NE(text.find("own execution              fork     1   5ms  55.6 %"), std::string::npos) << text;
-  EXPECT_NE(text.find("own tasks beside the path  fork     -   4ms  44.4 %"), std::string::npos) << text;
-}
-
-TEST(Explanation, UnknownNamesGetTheNearest) {
+TEST(AnalysisReport, UnknownNamesGetTheNearest) {
   const Analysed analysed = look_at(two_tasks(PreemptionMode::Os));
   for (const auto &[given, meant] : {std::pair{"fast.b", "fast.a"}, {"b", "slow.b"}, {"slwo", "slow"}}) {
     const Result<Row> row = find_row(analysed, given);
