@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "redag/analysis/arithmetic.hpp"
+
 namespace redag::analysis {
 
 Duration ResponseBound::sum(Term::Kind kind) const {
@@ -56,6 +58,11 @@ Verdict verdict(const System &system, const Bound &bound) {
 }
 
 Bound from_units(const System &system, std::vector<ResponseBound> units) {
+  for (ResponseBound &unit : units) {
+    if (unit.response.value_or(0) < kUnbounded) continue;
+    unit = {};
+    unit.absent = "longer than any time that can be told";
+  }
   Bound bound;
   bound.tasks.resize(system.tasks.size());
   bound.dags.resize(system.dags.size());

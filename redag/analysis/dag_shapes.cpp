@@ -118,7 +118,7 @@ using global::SharedTerms;
 // many steps.
 bool respond(std::span<GlobalUnit> units, std::span<const global::Shape> shapes, std::size_t k, std::uint32_t workers) {
   GlobalUnit &own = units[k];
-  if (own.volume > multiply(own.limit, workers) || own.length > own.limit) return false;
+  if (global::is_hopeless(own, workers)) return false;
   const auto m = static_cast<Duration>(workers);
   Duration window = own.length + (own.volume - own.length) / m;
   const bool found = global::least_fixed_point(own.limit - own.jitter, window, [&](Duration x) {

@@ -29,10 +29,10 @@ Bound all_that_agree(const System &system, std::vector<GlobalUnit> &units, std::
                      const std::function<ResponseBound(std::size_t)> &explain) {
   std::vector<Duration *> values;
   values.reserve(units.size());
-  bool possible = true;  // otherwise what is far above its limit would have the others compute with it
+  bool possible = true;
   for (GlobalUnit &unit : units) {
     values.push_back(&unit.response);
-    possible = possible && unit.response <= unit.limit;
+    possible = possible && !is_hopeless(unit, system.platform.workers);
   }
   const std::string_view absent = possible ? agree(values, exceeds, respond) : exceeds;
   std::vector<ResponseBound> responses(system.units.size());

@@ -48,7 +48,8 @@ template <class Next>
 [[nodiscard]] std::string_view agree(std::span<Duration *const> values, std::string_view exceeds,
                                      const std::function<bool(std::size_t k)> &evaluate);
 
-/// The same of the responses of `units`, which respond(k) sets: all have the bound that explain(k) then gives, or none.
+/// The same of the responses of `units`, which respond(k) sets: all have the bound that explain(k) then gives, or none;
+/// none either where one is hopeless.
 [[nodiscard]] Bound all_that_agree(const System &system, std::vector<GlobalUnit> &units, std::string_view exceeds,
                                    const std::function<bool(std::size_t k)> &respond,
                                    const std::function<ResponseBound(std::size_t k)> &explain);

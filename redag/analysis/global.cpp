@@ -63,7 +63,7 @@ std::optional<std::string> why_not_order(const System &system, const std::vector
 // Times so small that no sum of workloads wraps and divide() is exact.
 bool fits(const std::vector<GlobalUnit> &units, std::uint32_t workers) {
   Duration longest = 1;
-  for (const GlobalUnit &unit : units) longest = std::max(longest, unit.period);
+  for (const GlobalUnit &unit : units) longest = std::max({longest, unit.period, ceil_div(unit.volume, workers)});
   const Int128 sum = Int128{longest} * 4 * workers * (static_cast<Duration>(units.size()) + 2);
   return Int128{longest} * workers < (Int128{1} << 50U) && sum < (Int128{1} << 62U);
 }
@@ -132,8 +132,12 @@ Units units_of(const System &system, const Needs &needs) {
     return system.units[a.unit].first_rank < system.units[b.unit].first_rank;
   });
   if (!needs.any_policy) result.reason = why_not_order(system, result.units);
-  if (!result.reason && !fits(result.units, result.workers)) result.reason = "periods too long for exact sums";
+  if (!result.reason && !fits(result.units, result.workers)) result.reason = "times too long for exact sums";
   return result;
+}
+
+bool is_hopeless(const GlobalUnit &unit, std::uint32_t workers) {
+  return unit.volume > multiply(unit.limit, workers) || unit.length > unit.limit;
 }
 
 void set_width(GlobalUnit &unit, std::uint32_t width) {

@@ -54,6 +54,9 @@ struct Units {
 /// One unit alone; its order among the others is not looked at.
 [[nodiscard]] GlobalUnit unit_of(const System &system, std::uint32_t unit);
 
+/// No response is within its limit: more work than the workers can do until then. With such a unit sums can wrap.
+[[nodiscard]] bool is_hopeless(const GlobalUnit &unit, std::uint32_t workers);
+
 /// Lets at most `width` jobs of the unit execute at once.
 void set_width(GlobalUnit &unit, std::uint32_t width);
 

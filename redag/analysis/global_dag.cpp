@@ -13,11 +13,6 @@ namespace {
 // How often the waiting time of one window is tightened; every round gives a valid one.
 constexpr int kRounds = 8;
 
-// More work than the workers can do in a period; beyond it sums could wrap, and no response is within its limit.
-bool is_hopeless(const GlobalUnit &own, std::uint32_t workers) {
-  return own.volume > multiply(own.limit, workers) || own.length > own.limit;
-}
-
 // floor(a / b + c / d) for small divisors.
 Duration floor_of_sum(Duration a, Duration b, Duration c, Duration d) {
   return a / b + c / d + (a % b * d + c % d * b) / (b * d);

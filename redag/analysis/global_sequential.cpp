@@ -241,20 +241,25 @@ Outcome apply_any(const System &system) {
   if (view.reason) return NotApplicable{*view.reason};
   // As if every task kept its limit. If the first round confirms that for all, it is so, and each further round may
   // rely on what the last one found: the first job ever to break a bound would have to come after another such job.
-  for (GlobalUnit &unit : view.units) unit.response = unit.limit;
+  bool possible = true;
+  for (GlobalUnit &unit : view.units) {
+    unit.response = unit.limit;
+    possible = possible && !global::is_hopeless(unit, view.workers);
+  }
   constexpr int kRounds = 50;
-  bool changed = true;
+  bool changed = possible;
   for (int round = 0; round < kRounds && changed; ++round) {
     changed = false;
     for (std::size_t k = 0; k < view.units.size(); ++k) {
       const Duration before = view.units[k].response;
-      if (!global::any_order_response(view.units, k, view.workers)) {
-        ResponseBound none;
-        none.absent = "some task's response can exceed its limit, which all others rely on";
-        return from_units(system, std::vector<ResponseBound>(system.units.size(), none));
-      }
+      possible = possible && global::any_order_response(view.units, k, view.workers);
       changed = changed || view.units[k].response < before;
     }
+  }
+  if (!possible) {
+    ResponseBound none;
+    none.absent = "some task's response can exceed its limit, which all others rely on";
+    return from_units(system, std::vector<ResponseBound>(system.units.size(), none));
   }
   std::vector<ResponseBound> responses(system.units.size());
   for (const GlobalUnit &unit : view.units) responses[unit.unit] = any_order_bound(system, unit);

@@ -187,7 +187,7 @@ std::optional<FromReady> blass_response(const std::vector<Callback> &callbacks, 
   found.shares.resize(callbacks.size());
   Duration window = 1;
   const bool ends = global::least_fixed_point(limit, window, [&](Duration length) {
-    found.earlier = (arrivals(own, length + own.response - 1) - 1) * own.wcet;
+    found.earlier = multiply(arrivals(own, length + own.response - 1) - 1, own.wcet);
     Duration sum = found.earlier;
     for (std::size_t j = 0; j < callbacks.size(); ++j) {
       if (j == i) continue;
@@ -206,7 +206,7 @@ std::optional<FromReady> blass_response(const std::vector<Callback> &callbacks, 
 // In any window of length x, by jobs that execute one after the other, within J + R of their releases.
 Duration work_of(const Callback &callback, Duration x) {
   const Duration until = add(x, callback.ready + callback.response - callback.wcet);
-  return until / callback.period * callback.wcet + std::min(callback.wcet, until % callback.period);
+  return add(multiply(until / callback.period, callback.wcet), std::min(callback.wcet, until % callback.period));
 }
 
 std::optional<FromReady> rates_response(const std::vector<Callback> &callbacks, std::size_t i, Duration limit,

@@ -1,0 +1,126 @@
+// Every method on systems whose times lie anywhere between a nanosecond and the longest there is: no bound may come of
+// a sum or product that wrapped. UndefinedBehaviorSanitizer (make asan) sees what wraps; here only what comes of it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+
+#include "redag/analysis/analyze.hpp"
+#include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/chains.hpp"
+#include "redag/analysis/executors.hpp"
+#include "redag/model/validate.hpp"
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+std::uint64_t cases_to_try() {
+  const char *text = std::getenv("REDAG_BOUND_WORKLOADS");
+  return text == nullptr ? 400 : std::strtoull(text, nullptr, 10);
+}
+
+template <class Values>
+auto any_of(Rng &rng, const Values &values) {
+  return values[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(std::size(values)) - 1))];
+}
+
+// From a nanosecond to the longest, all magnitudes alike; or at an end.
+Duration any_time(Rng &rng) {
+  constexpr std::array kEnds{Duration{1}, Duration{2}, kMaxDuration / 2, kMaxDuration - 1, kMaxDuration};
+  if (rng.uniform(0, 2) == 0) return any_of(rng, kEnds);
+  return static_cast<Duration>(std::exp(rng.uniform01() * std::log(static_cast<double>(kMaxDuration))));
+}
+
+testing::BoundCaseLimits any_limits(Rng &rng) {
+  constexpr std::array kPolicies{PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic,
+                                 PolicyKind::Fixed,         PolicyKind::Edf,
+                                 PolicyKind::Fifo,          PolicyKind::ChainAware};
+  constexpr std::array kModes{sched::Preemption::None, sched::Preemption::Cooperative, sched::Preemption::Full};
+  const auto now_and_then = [&] { return rng.uniform(0, 2) == 0; };
+  testing::BoundCaseLimits limits;
+  limits.max_workers = any_of(rng, std::array{1U, 3U, 80U});
+  limits.preemption = any_of(rng, kModes);
+  limits.policies = {any_of(rng, kPolicies)};
+  limits.edges = now_and_then();
+  limits.rates = limits.edges && now_and_then();
+  limits.max_dags = 4;
+  limits.jitter = now_and_then();
+  limits.groups = now_and_then();
+  limits.caps = now_and_then();
+  limits.levels = now_and_then();
+  limits.overheads = now_and_then();
+  limits.queues = now_and_then();
+  return limits;
+}
+
+// All times longer by one factor, as far as they can, and some of them anything.
+void stretch(Rng &rng, testing::BoundCase &drawn) {
+  Duration longest = 1;
+  for (const Dag &dag : drawn.workload.dags) {
+    for (const Task &task : dag.tasks) longest = std::max({longest, task.period, task.deadline, task.offset});
+  }
+  const Duration factor = std::max<Duration>(1, any_time(rng) / longest);
+  const auto change = [&](Duration &time) { time = rng.uniform(0, 9) == 0 ? any_time(rng) : time * factor; };
+  for (Dag &dag : drawn.workload.dags) {
+    if (dag.deadline > 0) change(dag.deadline);
+    for (Task &task : dag.tasks) {
+      for (Duration *time : {&task.period, &task.deadline, &task.wcet, &task.offset, &task.jitter, &task.region}) {
+        if (*time > 0) change(*time);
+      }
+      task.bcet = std::min(std::max<Duration>(1, task.bcet * factor), task.wcet);
+      task.wcet_low = std::min(task.wcet_low * factor, task.wcet);
+      task.region = std::min(task.region, task.wcet);
+      task.jitter = std::min(task.jitter, task.period);
+    }
+  }
+}
+
+void expect_in_range(const std::vector<ResponseBound> &bounds, const Method &method) {
+  for (const ResponseBound &bound : bounds) {
+    if (!bound.response) continue;
+    EXPECT_GT(*bound.response, 0) << method.name;
+    EXPECT_LT(*bound.response, kUnbounded) << method.name;
+  }
+}
+
+TEST(ExtremeTimes, NoBoundWraps) {
+  std::uint64_t analysed = 0;
+  std::uint64_t bounded = 0;
+  for (std::uint64_t seed = 0; seed < cases_to_try() && !HasFailure(); ++seed) {
+    SCOPED_TRACE(seed);
+    Rng rng(seed);
+    testing::BoundCase drawn = random_bound_case(rng, any_limits(rng));
+    stretch(rng, drawn);
+    if (has_errors(validate(drawn.workload))) continue;
+    for (const sched::ExecutorKind &executor : sched::executors()) {
+      const Result<System> system = compile_for(executor, drawn.workload, drawn.platform);
+      if (!system || !system->not_analysable.empty()) continue;
+      ++analysed;
+      const Report report = analyze(*system, methods_of(executor));
+      for (const MethodReport &method : report.methods) {
+        if (method.bound() == nullptr) continue;
+        expect_in_range(method.bound()->tasks, *method.method);
+        expect_in_range(method.bound()->dags, *method.method);
+      }
+      std::vector<TaskId> chain;
+      for (std::uint32_t task = 0; task < system->tasks.size(); ++task) {
+        chain.emplace_back(task);
+        bounded += report.tasks[task].response.has_value() ? 1U : 0U;
+      }
+      const auto end_to_end = chain_bound(*system, chain, tightest_of(report));
+      if (const auto *bound = std::get_if<ChainBound>(&end_to_end)) {
+        EXPECT_GT(bound->reaction(), 0);
+        EXPECT_LE(bound->reaction(), kMaxDuration);
+      }
+    }
+  }
+  RecordProperty("bounded", static_cast<int>(bounded));
+  EXPECT_GT(analysed, cases_to_try() / 2);
+  EXPECT_GT(bounded, cases_to_try() / 4);
+}
+
+}  // namespace
+}  // namespace redag::analysis
