@@ -1,6 +1,7 @@
 #include "redag/analysis/bound.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "redag/analysis/arithmetic.hpp"
 
@@ -57,12 +58,15 @@ Verdict verdict(const System &system, const Bound &bound) {
   return Verdict::Schedulable;
 }
 
+ResponseBound if_bounded(ResponseBound bound) {
+  if (bound.response.value_or(0) < kUnbounded) return bound;
+  ResponseBound none;
+  none.absent = "longer than any time that can be told";
+  return none;
+}
+
 Bound from_units(const System &system, std::vector<ResponseBound> units) {
-  for (ResponseBound &unit : units) {
-    if (unit.response.value_or(0) < kUnbounded) continue;
-    unit = {};
-    unit.absent = "longer than any time that can be told";
-  }
+  for (ResponseBound &unit : units) unit = if_bounded(std::move(unit));
   Bound bound;
   bound.tasks.resize(system.tasks.size());
   bound.dags.resize(system.dags.size());

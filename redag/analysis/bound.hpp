@@ -101,6 +101,9 @@ enum class Verdict : std::uint8_t { Schedulable, NotShown };
 /// Says nothing of `unsound`.
 [[nodiscard]] Verdict verdict(const System &system, const Bound &bound);
 
+/// The bound, or none where its response is kUnbounded.
+[[nodiscard]] ResponseBound if_bounded(ResponseBound bound);
+
 /// Responses of units (by unit) as those of their tasks and DAGs: a task answers no later than its unit, a DAG with
 /// its last unit.
 [[nodiscard]] Bound from_units(const System &system, std::vector<ResponseBound> units);

@@ -126,11 +126,11 @@ TEST(EdfGlobalResponse, BlockingWithoutPreemption) {
             (Responses{1, 20}));
 }
 
-// One that asks for ten years of every second: what it does in a window is more than a time can hold.
+// One that asks for ten days of every second: what it would do in ten days is more than a time can hold.
 TEST(EdfGlobalResponse, ThereIsNoneBesideATaskFarBeyondItsLimit) {
   const Duration second = kSecond;
   const System system =
-      edf_system(1, {{second / 3, second - 63}, {333'333'321 * second, second - 71}, {second / 3, second - 107}},
+      edf_system(1, {{second / 3, second - 63}, {864'000 * second, second - 71}, {second / 3, second - 107}},
                  sched::Preemption::Full);
   EXPECT_EQ(responses(edf_global_response(), system), (Responses{std::nullopt, std::nullopt, std::nullopt}));
 }

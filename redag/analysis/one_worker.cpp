@@ -63,8 +63,8 @@ Duration demand(Int128 start, std::span<const Interferer> more_urgent, Count cou
   return saturate(sum);
 }
 
-// The least w >= `w` with w = start + sum, or nothing where it exceeds `stop`, or what a time can hold, or the steps run
-// out.
+// The least w >= `w` with w = start + sum, or nothing where it exceeds `stop`, or what a time can hold, or the steps
+// run out.
 template <bool kDeferred>
 bool fixed_point(Int128 start, std::span<const Interferer> more_urgent, Duration stop, Duration &w, int &steps) {
   while (w <= stop && w < kUnbounded) {

@@ -185,7 +185,7 @@ class Resolver {
     for (std::uint32_t d = 0; d < system_.dags.size(); ++d) {
       const auto waits = [&](std::uint32_t u) { return !system_.units[u].awaits.empty(); };
       const std::vector<std::uint32_t> &units = system_.dags[d].units;
-      if (std::any_of(units.begin(), units.end(), waits)) bound.dags[d] = end_to_end(d);
+      if (std::any_of(units.begin(), units.end(), waits)) bound.dags[d] = if_bounded(end_to_end(d));
     }
     return bound;
   }
@@ -226,7 +226,7 @@ class Resolver {
         task = ResponseBound{};
         task.absent = absent_[u];
       } else if (task.response) {
-        task = with_wait(u, system_.tasks[t].data ? from_ready(u) : *task.response);
+        task = if_bounded(with_wait(u, system_.tasks[t].data ? from_ready(u) : *task.response));
       }
     }
   }

@@ -12,6 +12,8 @@
 namespace redag::analysis {
 namespace {
 
+constexpr Duration kLongestSum = kUnbounded / 8;
+
 class Compiler {
  public:
   Compiler(const Workload &workload, const AnalysisPlatform &platform) : workload_(workload) {
@@ -38,6 +40,7 @@ class Compiler {
     for (const SystemTask &task : system_.tasks) {
       system_.utilization += static_cast<double>(task.wcet) / static_cast<double>(task.period);
     }
+    check_sums();
     check_threads();
     // With several workers the preempted job pays in its own time, which no interference divided by m covers.
     if (system_.platform.workers > 1 && system_.mode != sched::Preemption::None &&
@@ -52,6 +55,13 @@ class Compiler {
  private:
   void refuse(std::string reason) {
     if (system_.not_analysable.empty()) system_.not_analysable = std::move(reason);
+  }
+
+  // So that the bounds can add up what tasks execute without looking at each sum.
+  void check_sums() {
+    Int128 sum = 0;
+    for (const SystemTask &task : system_.tasks) sum += Int128{task.wcet} + task.jitter;
+    if (sum > kLongestSum) refuse("execution times and jitter add up to more than 18 years");
   }
 
   // A started job keeps its thread while it is preempted.

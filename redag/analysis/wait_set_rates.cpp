@@ -260,7 +260,7 @@ Outcome apply_rates(const System &system) {
   const std::uint32_t threads = system.platform.workers;
   const Duration longest = kUnbounded / 4 / threads / static_cast<Duration>(system.tasks.size() + 2);
   for (const Unit &unit : system.units) {
-    if (unit.period > longest) return NotApplicable{"periods too long for exact sums"};
+    if (std::max(unit.period, unit.volume) > longest) return NotApplicable{"times too long for exact sums"};
   }
   return Executor(system, [threads](const std::vector<Callback> &callbacks, std::size_t i,
                                     Duration limit) { return rates_response(callbacks, i, limit, threads); })
