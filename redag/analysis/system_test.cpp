@@ -105,6 +105,15 @@ TEST(System, SeveralTasksThatWaitAreUnitsOfTheirOwn) {
   EXPECT_THAT(system.units[4].awaits, ElementsAre(2, 3));
 }
 
+TEST(System, ExecutionTimesThatAddUpToDecadesAreNotAnalysed) {
+  Workload workload = two_dags();
+  Task &task = workload.dags[0].tasks[0];
+  task.wcet = kMaxDuration / 8 - kSecond;
+  EXPECT_EQ(compiled(workload, mode(sched::Preemption::Full)).not_analysable, "");
+  task.jitter = kSecond;
+  EXPECT_THAT(compiled(workload, mode(sched::Preemption::Full)).not_analysable, HasSubstr("more than 18 years"));
+}
+
 TEST(System, WhatCutsOrRefusesJobsIsNotAnalysed) {
   Workload budget = two_dags();
   budget.dags[0].tasks[0].budget = kMillisecond;
