@@ -73,6 +73,7 @@ void stretch(Rng &rng, testing::BoundCase &drawn) {
       task.bcet = std::min(std::max<Duration>(1, task.bcet * factor), task.wcet);
       task.wcet_low = std::min(task.wcet_low * factor, task.wcet);
       task.region = std::min(task.region, task.wcet);
+      task.jitter = std::min(task.jitter, task.period);
     }
   }
 }
