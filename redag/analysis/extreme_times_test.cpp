@@ -9,8 +9,11 @@
 
 #include "redag/analysis/analyze.hpp"
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/assignment.hpp"
 #include "redag/analysis/chains.hpp"
 #include "redag/analysis/executors.hpp"
+#include "redag/analysis/exploration.hpp"
+#include "redag/analysis/sensitivity.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/testing/bound_property.hpp"
 
@@ -19,7 +22,7 @@ namespace {
 
 std::uint64_t cases_to_try() {
   const char *text = std::getenv("REDAG_BOUND_WORKLOADS");
-  return text == nullptr ? 400 : std::strtoull(text, nullptr, 10);
+  return text == nullptr ? 3000 : std::strtoull(text, nullptr, 10);
 }
 
 template <class Values>
@@ -78,6 +81,12 @@ void stretch(Rng &rng, testing::BoundCase &drawn) {
   }
 }
 
+testing::BoundCase any_case(Rng &rng) {
+  testing::BoundCase drawn = random_bound_case(rng, any_limits(rng));
+  stretch(rng, drawn);
+  return drawn;
+}
+
 void expect_in_range(const std::vector<ResponseBound> &bounds, const Method &method) {
   for (const ResponseBound &bound : bounds) {
     if (!bound.response) continue;
@@ -92,8 +101,7 @@ TEST(ExtremeTimes, NoBoundWraps) {
   for (std::uint64_t seed = 0; seed < cases_to_try() && !HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     Rng rng(seed);
-    testing::BoundCase drawn = random_bound_case(rng, any_limits(rng));
-    stretch(rng, drawn);
+    const testing::BoundCase drawn = any_case(rng);
     if (has_errors(validate(drawn.workload))) continue;
     for (const sched::ExecutorKind &executor : sched::executors()) {
       const Result<System> system = compile_for(executor, drawn.workload, drawn.platform);
@@ -120,6 +128,40 @@ TEST(ExtremeTimes, NoBoundWraps) {
   RecordProperty("bounded", static_cast<int>(bounded));
   EXPECT_GT(analysed, cases_to_try() / 2);
   EXPECT_GT(bounded, cases_to_try() / 4);
+}
+
+// Those that analyse again and again, with other times and orders, and the one that looks at every schedule.
+TEST(ExtremeTimes, NoSearchWraps) {
+  const std::uint64_t cases = cases_to_try() / 30;
+  std::uint64_t searched = 0;
+  for (std::uint64_t seed = 0; seed < cases && !HasFailure(); ++seed) {
+    SCOPED_TRACE(seed);
+    Rng rng(seed);
+    const testing::BoundCase drawn = any_case(rng);
+    if (has_errors(validate(drawn.workload))) continue;
+    const Result<System> system = compile(drawn.workload, drawn.platform);
+    if (!system) continue;
+    ++searched;
+    int analyses = 0;
+    const auto enough = [&analyses] { return ++analyses > 200; };
+    for (const Knob &knob : knobs_of(drawn.workload, *system)) {
+      const auto margin = margin_of(drawn.workload, drawn.platform, knob, accepted_by_analysis, {4, enough});
+      if (!margin) break;
+    }
+    analyses = 0;
+    AssignmentOptions options;
+    options.exhaustive = 8;
+    options.restarts = 0;
+    options.stop = enough;
+    const Result<Assignment> assignment = assign(drawn.workload, drawn.platform, options);
+    EXPECT_TRUE(assignment || !assignment.error().empty());
+    if (!why_not_explore(*system)) {
+      ExplorationOptions few;
+      few.max_states = 1000;
+      expect_in_range(to_bound(*system, explore(*system, few)).tasks, exploration());
+    }
+  }
+  EXPECT_GT(searched, cases / 2);
 }
 
 }  // namespace
