@@ -130,6 +130,15 @@ TEST(ExtremeTimes, NoBoundWraps) {
   EXPECT_GT(bounded, cases_to_try() / 4);
 }
 
+TEST(ExtremeTimes, WhatSaturatedIsNoBound) {
+  ResponseBound bound;
+  bound.response = kUnbounded - 1;
+  EXPECT_EQ(if_bounded(bound).response, kUnbounded - 1);
+  bound.response = kUnbounded;
+  EXPECT_FALSE(if_bounded(bound).response);
+  EXPECT_FALSE(if_bounded(bound).absent.empty());
+}
+
 // Those that analyse again and again, with other times and orders, and the one that looks at every schedule.
 TEST(ExtremeTimes, NoSearchWraps) {
   const std::uint64_t cases = cases_to_try() / 30;
