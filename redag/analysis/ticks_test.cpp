@@ -1,10 +1,12 @@
 // Bounds are computed in nanoseconds. The other tests draw times of a few ticks, where an iteration that goes a tick a
-// step ends soon: here the same workloads with a tick of 100 ns, and of a millisecond.
+// step ends soon: here the same workloads with a tick of 100 ns, and of a millisecond; and with ticks so long that sums
+// come near what a time can hold.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <map>
 #include <string>
+#include <utility>
 
 #include "redag/analysis/executors.hpp"
 #include "redag/testing/bound_property.hpp"
@@ -89,6 +91,34 @@ TEST(FinerClock, LosesFewBounds) {
     EXPECT_GE(of.fine * 100, of.coarse * 98) << name << ": " << of.fine << " of " << of.coarse;
   }
   EXPECT_GE(compared, 15U);
+}
+
+// A quarter of an hour, and eleven days.
+TEST(CoarserClock, NoBoundIsBroken) {
+  std::map<std::string, std::uint64_t> bounds;
+  for (const Duration tick : {Duration{1'000'000'000'000}, Duration{1'000'000'000'000'000}}) {
+    for (const auto preemption : {sched::Preemption::Full, sched::Preemption::None}) {
+      for (const auto &[workers, edges] : {std::pair{1U, false}, {1U, true}, {3U, false}, {3U, true}}) {
+        testing::BoundCaseLimits limits;
+        limits.min_workers = limits.max_workers = workers;
+        limits.preemption = preemption;
+        limits.policies.push_back(PolicyKind::Edf);
+        limits.edges = limits.rates = edges;
+        limits.jitter = limits.caps = true;
+        limits.max_dags = 4;
+        limits.max_utilization = 0.8;
+        const auto generator = [&](Rng &rng) { return with_tick(random_bound_case(rng, limits), tick); };
+        for (const Method &method : methods()) {
+          const testing::BoundPropertyResult result =
+              testing::check_bound(method, generator, {.workloads = 10, .runs = 3, .periods = 5});
+          EXPECT_EQ(result.violations, 0U) << result.first_violation;
+          bounds[std::string(method.name)] += result.bounds;
+        }
+      }
+    }
+  }
+  const auto spoken = std::count_if(bounds.begin(), bounds.end(), [](const auto &of) { return of.second > 0; });
+  EXPECT_GT(spoken, 15) << "of " << bounds.size();
 }
 
 }  // namespace
