@@ -125,7 +125,6 @@ TEST(ExtremeTimes, NoBoundWraps) {
       }
     }
   }
-  RecordProperty("bounded", static_cast<int>(bounded));
   EXPECT_GT(analysed, cases_to_try() / 2);
   EXPECT_GT(bounded, cases_to_try() / 4);
 }
@@ -141,7 +140,7 @@ TEST(ExtremeTimes, WhatSaturatedIsNoBound) {
 
 // Those that analyse again and again, with other times and orders, and the one that looks at every schedule.
 TEST(ExtremeTimes, NoSearchWraps) {
-  const std::uint64_t cases = cases_to_try() / 30;
+  const std::uint64_t cases = std::max<std::uint64_t>(10, cases_to_try() / 30);
   std::uint64_t searched = 0;
   for (std::uint64_t seed = 0; seed < cases && !HasFailure(); ++seed) {
     SCOPED_TRACE(seed);

@@ -29,12 +29,9 @@ Bound all_that_agree(const System &system, std::vector<GlobalUnit> &units, std::
                      const std::function<ResponseBound(std::size_t)> &explain) {
   std::vector<Duration *> values;
   values.reserve(units.size());
-  bool possible = true;
-  for (GlobalUnit &unit : units) {
-    values.push_back(&unit.response);
-    possible = possible && !is_hopeless(unit, system.platform.workers);
-  }
-  const std::string_view absent = possible ? agree(values, exceeds, respond) : exceeds;
+  for (GlobalUnit &unit : units) values.push_back(&unit.response);
+  const std::string_view absent =
+      is_any_hopeless(units, system.platform.workers) ? exceeds : agree(values, exceeds, respond);
   std::vector<ResponseBound> responses(system.units.size());
   for (std::size_t k = 0; k < units.size(); ++k) {
     ResponseBound &response = responses[units[k].unit];

@@ -140,6 +140,10 @@ bool is_hopeless(const GlobalUnit &unit, std::uint32_t workers) {
   return unit.volume > multiply(unit.limit, workers) || unit.length > unit.limit;
 }
 
+bool is_any_hopeless(std::span<const GlobalUnit> units, std::uint32_t workers) {
+  return std::any_of(units.begin(), units.end(), [&](const GlobalUnit &unit) { return is_hopeless(unit, workers); });
+}
+
 void set_width(GlobalUnit &unit, std::uint32_t width) {
   unit.width = width;
   unit.turn = multiply(unit.period, width);

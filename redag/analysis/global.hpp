@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -56,6 +57,7 @@ struct Units {
 
 /// No response is within its limit: more work than the workers can do until then. With such a unit sums can wrap.
 [[nodiscard]] bool is_hopeless(const GlobalUnit &unit, std::uint32_t workers);
+[[nodiscard]] bool is_any_hopeless(std::span<const GlobalUnit> units, std::uint32_t workers);
 
 /// Lets at most `width` jobs of the unit execute at once.
 void set_width(GlobalUnit &unit, std::uint32_t width);

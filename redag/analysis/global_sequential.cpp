@@ -241,18 +241,15 @@ Outcome apply_any(const System &system) {
   if (view.reason) return NotApplicable{*view.reason};
   // As if every task kept its limit. If the first round confirms that for all, it is so, and each further round may
   // rely on what the last one found: the first job ever to break a bound would have to come after another such job.
-  bool possible = true;
-  for (GlobalUnit &unit : view.units) {
-    unit.response = unit.limit;
-    possible = possible && !global::is_hopeless(unit, view.workers);
-  }
+  for (GlobalUnit &unit : view.units) unit.response = unit.limit;
   constexpr int kRounds = 50;
+  bool possible = !global::is_any_hopeless(view.units, view.workers);
   bool changed = possible;
   for (int round = 0; round < kRounds && changed; ++round) {
     changed = false;
-    for (std::size_t k = 0; k < view.units.size(); ++k) {
+    for (std::size_t k = 0; k < view.units.size() && possible; ++k) {
       const Duration before = view.units[k].response;
-      possible = possible && global::any_order_response(view.units, k, view.workers);
+      possible = global::any_order_response(view.units, k, view.workers);
       changed = changed || view.units[k].response < before;
     }
   }

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "parse.hpp"
 #include "rclcpp/rclcpp.hpp"
-#include "redag/model/workload_yaml.hpp"
 #include "redag/runtime/mode.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "test_msgs/msg/empty.hpp"
@@ -45,11 +45,6 @@ class ModeTest : public ::testing::TestWithParam<redag::PreemptionMode> {
   }
   rclcpp::Publisher<Empty>::SharedPtr publisher(const std::string &topic) {
     return node->create_publisher<Empty>(topic, rclcpp::QoS(10));
-  }
-  redag::Workload parse(const std::string &text) {
-    auto workload = redag::parse_workload(text, "test.yaml", redag::LoadOptions{.wcet_optional = true});
-    EXPECT_TRUE(workload) << to_string(workload.error());
-    return workload->workload;
   }
 
   rclcpp::Node::SharedPtr node;

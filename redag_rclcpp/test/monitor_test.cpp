@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rcutils/logging.h>
-#include <time.h>
 
 #include <atomic>
 #include <cstdarg>
@@ -33,16 +32,6 @@ using diagnostic_msgs::msg::DiagnosticArray;
 using redag::kMillisecond;
 using ::testing::HasSubstr;
 using Json = nlohmann::json;
-
-void use_processor(std::chrono::nanoseconds amount) {
-  const auto now = [] {
-    timespec time{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-    return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
-  };
-  for (const auto start = now(); now() - start < amount;) {
-  }
-}
 
 // What is logged, for as long as this lives.
 class LogCapture {

@@ -11,7 +11,6 @@
 
 #include "mode_test.hpp"
 #include "rclcpp/rclcpp.hpp"
-#include "redag/runtime/clock.hpp"
 #include "spinning.hpp"
 #include "test_msgs/msg/basic_types.hpp"
 #include "test_msgs/srv/empty.hpp"
@@ -25,12 +24,6 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 using OverloadTest = ModeTest;
-
-void use_processor(redag::Duration duration) {
-  const redag::Time end = redag::runtime::thread_cpu_now() + duration;
-  while (redag::runtime::thread_cpu_now() < end) {
-  }
-}
 
 /// A subscription of numbered messages, in a group of its own.
 class Numbers {
@@ -46,7 +39,7 @@ class Numbers {
         topic, rclcpp::QoS(depth),
         [this](BasicTypes::ConstSharedPtr message) {
           received.push_back(message->int32_value);
-          use_processor(execution);
+          use_processor(std::chrono::nanoseconds(execution));
         },
         options, std::make_shared<Messages>(before_next_take));
     publisher_ = node->create_publisher<BasicTypes>(topic, rclcpp::QoS(depth), publishing);
@@ -101,7 +94,6 @@ dags:
 TEST_P(OverloadTest, OverwrittenMessagesAreCounted) {
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
   std::atomic<int> count{0};
-  rclcpp::SubscriptionOptions subscription_options;
   auto subscription = node->create_subscription<Empty>("/x", rclcpp::QoS(3), [&](Empty::ConstSharedPtr) { ++count; });
   executor.add_node(node);
   auto to_x = node->create_publisher<Empty>("/x", rclcpp::QoS(3));

@@ -1,4 +1,4 @@
-// What tests need that spin an executor in a thread of its own.
+// What tests need that spin an executor in a thread of its own, and callbacks that take time.
 #pragma once
 
 #include <sys/syscall.h>
@@ -7,6 +7,8 @@
 #include <atomic>
 #include <chrono>
 #include <thread>
+
+#include "redag/runtime/clock.hpp"
 
 namespace redag_rclcpp {
 
@@ -27,6 +29,13 @@ bool eventually(Condition condition, Meanwhile meanwhile) {
 template <class Condition>
 bool eventually(Condition condition) {
   return eventually(condition, [] { std::this_thread::sleep_for(std::chrono::milliseconds(1)); });
+}
+
+/// Processor time of this thread.
+inline void use_processor(std::chrono::nanoseconds amount) {
+  const redag::Time end = redag::runtime::thread_cpu_now() + amount.count();
+  while (redag::runtime::thread_cpu_now() < end) {
+  }
 }
 
 /// Spins in a thread of its own for as long as it lives.

@@ -1,0 +1,18 @@
+// A workload out of text, for tests.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "redag/model/workload_yaml.hpp"
+
+namespace redag_rclcpp {
+
+inline redag::Workload parse(const std::string &text) {
+  auto workload = redag::parse_workload(text, "test.yaml", redag::LoadOptions{.wcet_optional = true});
+  EXPECT_TRUE(workload) << to_string(workload.error());
+  return workload->workload;
+}
+
+}  // namespace redag_rclcpp
