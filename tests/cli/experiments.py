@@ -89,15 +89,15 @@ class Acceptance(Case):
         self.expect(result, 2, "another plan: 'sets: 5' there, 'sets: 4' now")
 
     def test_killed_and_gone_on(self):
-        size = ["--sets", "120", "--simulation-periods", "40", "-j1"]
+        size = ["--sets", "40", "--simulation-periods", "40", "-j1"]
         for _ in range(2):
             process = self.start("killed", *size)
             process.kill()
             process.communicate()
         with open(self.folder / "killed" / "units.csv", "a") as units:
-            units.write("959,0")  # the kill came in the middle of a line
+            units.write("319,0")  # the kill came in the middle of a line
         result = self.acceptance("killed", *size)
-        self.assertRegex(result.stderr, r"\d+ of 960 workloads are done already")
+        self.assertRegex(result.stderr, r"\d+ of 320 workloads are done already")
         self.acceptance("whole", *size[:-1], "-j2")
         self.assertEqual(self.results("killed"), self.results("whole"))
         document = json.loads((self.folder / "killed" / "acceptance.json").read_text())

@@ -19,6 +19,9 @@ import unittest
 if len(sys.argv) < 3:
     sys.exit(f"usage: {sys.argv[0]} PROGRAM SOURCE_DIR [unittest arguments]")
 PROGRAM, SOURCE = (pathlib.Path(argument).resolve() for argument in sys.argv[1:3])
+# Set where the program is built with sanitizers, several times as slow: they look for other faults than these tests,
+# which run in whole without them.
+SANITIZED = os.environ.get("REDAG_SANITIZED") == "1"
 
 CART = """\
 name: cart
