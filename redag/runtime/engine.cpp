@@ -34,6 +34,10 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
   }
   caller_ = std::make_unique<Thread>(count, options_.trace_capacity);
   caller_->stack.reserve(1);
+  if (os() && options_.throttling) {
+    share_.emplace(*options_.throttling);
+    share_keeper_ = std::make_unique<ShareKeeper>();
+  }
 }
 
 Engine::~Engine() {
@@ -68,6 +72,16 @@ Result<void> Engine::start() {
     }
     thread->handle = *std::move(started);
     thread->cpu_clock = cpu_clock_of(thread->handle);
+  }
+  if (share_keeper_) {
+    Result<ThreadHandle> started =
+        start_thread({options_.name + "-share", options_.band.timer, {}}, [this] { keep_share(); });
+    if (!started) {
+      halt();
+      join();
+      return tl::unexpected(started.error());
+    }
+    share_keeper_->handle = *std::move(started);
   }
   const Time at = now();
   Locked locked(*this);
@@ -108,6 +122,22 @@ void Engine::join() {
   for (auto &thread : threads_) thread->parker.unpark();
   for (auto &thread : threads_) {
     if (thread->handle.joinable()) thread->handle.join();
+  }
+  if (!share_keeper_) return;
+  share_keeper_->parker.unpark();
+  if (share_keeper_->handle.joinable()) share_keeper_->handle.join();
+}
+
+// Sleeps until a job is in progress, and then looks several times a second as long as some are.
+void Engine::keep_share() noexcept {
+  for (Duration until_next = kNever;;) {
+    if (until_next == kNever) {
+      share_keeper_->parker.park();
+    } else {
+      share_keeper_->parker.park_until(monotonic_now() + until_next);
+    }
+    if (exit_.load(std::memory_order_acquire)) return;
+    until_next = look_at_share();
   }
 }
 
@@ -406,6 +436,12 @@ bool Engine::wait_idle(Time deadline) {
 }
 
 // ---- what can be asked ----
+
+Duration Engine::gave_way() const {
+  const Time at = now();
+  const LockGuard guard(lock_);
+  return gave_way_ + (giving_way_ ? std::max<Duration>(0, at - giving_way_since_) : 0);
+}
 
 Time Engine::halted_at() const {
   const LockGuard guard(lock_);

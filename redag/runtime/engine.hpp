@@ -25,6 +25,7 @@
 #include "redag/runtime/event_merge.hpp"
 #include "redag/runtime/mode.hpp"
 #include "redag/runtime/parker.hpp"
+#include "redag/runtime/realtime_share.hpp"
 #include "redag/runtime/running_job.hpp"
 #include "redag/runtime/thread_priorities.hpp"
 #include "redag/sched/scheduler.hpp"
@@ -61,9 +62,12 @@ struct Release {
 };
 
 struct EngineOptions {
-  std::string name = "redag";      // prefix of the threads' names
-  sched::Config config;            // what the scheduler was built with; Full means `os`: threads = max_started
-  PriorityBand band;               // os, or realtime_threads
+  std::string name = "redag";  // prefix of the threads' names
+  sched::Config config;        // what the scheduler was built with; Full means `os`: threads = max_started
+  PriorityBand band;           // os, or realtime_threads
+  // os: the kernel's. Where there are DAGs of high criticality, jobs of the others leave the real-time class before the
+  // kernel takes the processor from all.
+  std::optional<Throttling> throttling;
   bool realtime_threads = false;   // none, cooperative: all workers at SCHED_FIFO band.top_job
   std::vector<int> cpus;           // worker threads run there only; empty: anywhere, with `os` on m processors
   std::size_t trace_capacity = 0;  // events the rings hold between two drain(); 0: no events
@@ -187,6 +191,8 @@ class Engine {
   [[nodiscard]] sched::Accounting accounting(TaskId task) const;
   [[nodiscard]] Usage usage(TaskId task) const;
   [[nodiscard]] TaskFigures figures(TaskId task) const;
+  /// For how long jobs that are not of high criticality had to be ordinary threads, because of throttling.
+  [[nodiscard]] Duration gave_way() const;
   /// Priority changes that the system refused while running (rights were taken away).
   [[nodiscard]] std::uint64_t refused_priorities() const noexcept { return refused_priorities_.load(); }
   /// Is the calling thread inside one of this engine's bodies?
@@ -199,12 +205,14 @@ class Engine {
  private:
   friend struct RunningJob;
   struct Thread;
+  struct ShareKeeper;
   struct TaskEntry;
   struct Assignment;
   struct Next;
   class Locked;
 
   void main(Thread &self) noexcept;
+  void keep_share() noexcept;
   Next run(Thread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;
   sched::Outcome call(const Assignment &assignment);
   Duration charge(Thread &self, const TaskEntry &entry, const RunningJob &running, Time at) noexcept;
@@ -220,17 +228,22 @@ class Engine {
   static const sched::Dispatch *choose_own(const sched::Step &step, JobSlot below);
   Thread *rob(std::uint32_t level) REDAG_REQUIRES(lock_);
   Assignment move_job(Thread &from, Thread &to) REDAG_REQUIRES(lock_);
+  Duration look_at_share() REDAG_EXCLUDES(lock_);
   void set_priority_for_job(Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
+  [[nodiscard]] bool gives_way(const Thread &thread) const REDAG_REQUIRES(lock_);
+  [[nodiscard]] int priority_of(const Thread &thread) const REDAG_REQUIRES(lock_);
   void change_level(const sched::Dispatch &dispatch) REDAG_REQUIRES(lock_);
   Assignment assign(Thread &thread, const sched::Dispatch &dispatch) REDAG_REQUIRES(lock_);
   void hand(Locked &locked, Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
   void apply(std::span<const ThreadPriorities::Change> changes) REDAG_REQUIRES(lock_);
   void refresh_outranked() REDAG_REQUIRES(lock_);
-  void register_task(TaskId id, const Task &task, Body &body, std::shared_ptr<SkipListener> listener = nullptr)
-      REDAG_REQUIRES(lock_);
+  void register_task(TaskId id, const Task &task, DagId dag, Body &body,
+                     std::shared_ptr<SkipListener> listener = nullptr) REDAG_REQUIRES(lock_);
   void remove_entry(TaskId id, std::vector<Body> &doomed) REDAG_REQUIRES(lock_);
   void withdraw_if_halting() REDAG_REQUIRES(lock_);
   void wake_pause_waiters() REDAG_REQUIRES(lock_);
+  /// Some tasks are to be spared when the kernel takes processors away, and others can bear it.
+  [[nodiscard]] bool can_give_way() const REDAG_REQUIRES(lock_) { return high_tasks_ > 0 && other_tasks_ > 0; }
   [[nodiscard]] bool may_start() const REDAG_REQUIRES(lock_) { return running_ && !paused_; }
 
   [[nodiscard]] bool os() const { return options_.config.preemption == sched::Preemption::Full; }
@@ -240,15 +253,22 @@ class Engine {
   mutable PiMutex lock_;
   std::unique_ptr<sched::Scheduler> scheduler_ REDAG_PT_GUARDED_BY(lock_);
   std::vector<std::unique_ptr<Thread>> threads_;
-  std::unique_ptr<Thread> caller_;                        // whoever is in run_one()
-  std::vector<Thread *> idle_ REDAG_GUARDED_BY(lock_);    // threads without a job, the last one first
-  std::vector<Thread *> handed_ REDAG_GUARDED_BY(lock_);  // threads that may have mail; each once
-  std::deque<TaskEntry> tasks_ REDAG_GUARDED_BY(lock_);   // by TaskId; entries stay where they are
-  std::size_t most_started_ REDAG_GUARDED_BY(lock_) = 0;  // jobs that all tasks together can have in progress
-  std::uint32_t unfinished_ REDAG_GUARDED_BY(lock_) = 0;  // jobs dispatched and not ended
-  ThreadPriorities priorities_ REDAG_GUARDED_BY(lock_);   // os
-  bool running_ REDAG_GUARDED_BY(lock_) = false;          // the threads are there
-  bool has_listeners_ REDAG_GUARDED_BY(lock_) = false;    // some task has or had one
+  std::unique_ptr<Thread> caller_;                              // whoever is in run_one()
+  std::vector<Thread *> idle_ REDAG_GUARDED_BY(lock_);          // threads without a job, the last one first
+  std::vector<Thread *> handed_ REDAG_GUARDED_BY(lock_);        // threads that may have mail; each once
+  std::deque<TaskEntry> tasks_ REDAG_GUARDED_BY(lock_);         // by TaskId; entries stay where they are
+  std::size_t most_started_ REDAG_GUARDED_BY(lock_) = 0;        // jobs that all tasks together can have in progress
+  std::uint32_t unfinished_ REDAG_GUARDED_BY(lock_) = 0;        // jobs dispatched and not ended
+  ThreadPriorities priorities_ REDAG_GUARDED_BY(lock_);         // os
+  std::optional<RealtimeShare> share_ REDAG_GUARDED_BY(lock_);  // os, throttled
+  bool share_is_kept_ REDAG_GUARDED_BY(lock_) = false;          // somebody looks at it again, without being woken
+  bool giving_way_ REDAG_GUARDED_BY(lock_) = false;
+  Time giving_way_since_ REDAG_GUARDED_BY(lock_) = 0;
+  Duration gave_way_ REDAG_GUARDED_BY(lock_) = 0;       // before that
+  std::size_t high_tasks_ REDAG_GUARDED_BY(lock_) = 0;  // of DAGs of high criticality, not removed
+  std::size_t other_tasks_ REDAG_GUARDED_BY(lock_) = 0;
+  bool running_ REDAG_GUARDED_BY(lock_) = false;        // the threads are there
+  bool has_listeners_ REDAG_GUARDED_BY(lock_) = false;  // some task has or had one
   bool paused_ REDAG_GUARDED_BY(lock_);
   std::uint32_t pause_waiters_ REDAG_GUARDED_BY(lock_) = 0;
   FutexWord pause_changes_{0};  // counts what wait_paused() waits for; written under the lock
@@ -256,6 +276,7 @@ class Engine {
   trace::Ring decisions_;  // written under the lock
   EventMerge merge_;       // drain() only
   Event idle_event_;
+  std::unique_ptr<ShareKeeper> share_keeper_;  // os, throttled
   Atomic<Time> origin_{kNever};
   Atomic<bool> halting_{false};
   Atomic<bool> exit_{false};

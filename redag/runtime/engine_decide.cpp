@@ -30,6 +30,13 @@ Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot belo
   }
   const Next next = place(locked, step, self, below);
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
+  if (share_) {
+    share_->set_busy(priorities_.any_realtime(), now);
+    if (!share_is_kept_ && unfinished_ > 0 && can_give_way()) {
+      share_is_kept_ = true;
+      locked.wake_share_keeper();
+    }
+  }
   return next;
 }
 
@@ -108,6 +115,7 @@ Engine::Assignment Engine::move_job(Thread &from, Thread &to) {
   to.stack.push_back(from.stack.back());
   from.stack.pop_back();
   to.level = from.level;
+  to.own_level = from.own_level;
   if (os()) priorities_.end(from.index);
   set_priority_for_job(to, assignment);
   idle_.push_back(&from);
@@ -115,7 +123,38 @@ Engine::Assignment Engine::move_job(Thread &from, Thread &to) {
 }
 
 void Engine::set_priority_for_job(Thread &thread, const Assignment &assignment) {
-  if (os()) apply(priorities_.start(thread.index, options_.band.of_level(thread.level), assignment.expected_short));
+  if (!os()) return;
+  // One that gives way must not keep a priority of a job before it.
+  const bool is_short = assignment.expected_short && !gives_way(thread);
+  apply(priorities_.start(thread.index, priority_of(thread), is_short));
+}
+
+// Its job is an ordinary thread's, so that it does not count as real-time where that is throttled: not that of a DAG of
+// high criticality, and nothing that is more urgent waits for it.
+bool Engine::gives_way(const Thread &thread) const {
+  return giving_way_ && thread.level >= thread.own_level && !tasks_[thread.stack.back().task.value].is_high;
+}
+
+int Engine::priority_of(const Thread &thread) const {
+  return gives_way(thread) ? 0 : options_.band.of_level(thread.level);
+}
+
+// Returns when to look again; kNever: not before somebody is woken for it.
+Duration Engine::look_at_share() {
+  const Time at = now();
+  Locked locked(*this);
+  const bool give_way = share_->used_up(at) && can_give_way();
+  if (give_way != giving_way_) {
+    if (giving_way_) gave_way_ += std::max<Duration>(0, at - giving_way_since_);
+    giving_way_ = give_way;
+    giving_way_since_ = at;
+    for (const auto &thread : threads_) {
+      if (!thread->stack.empty()) apply(priorities_.change(thread->index, priority_of(*thread)));
+    }
+    share_->set_busy(priorities_.any_realtime(), at);
+  }
+  share_is_kept_ = giving_way_ || (unfinished_ > 0 && can_give_way());
+  return share_is_kept_ ? share_->until_change() : kNever;
 }
 
 void Engine::change_level(const Dispatch &dispatch) {
@@ -124,7 +163,7 @@ void Engine::change_level(const Dispatch &dispatch) {
   const auto thread = std::find_if(threads_.begin(), threads_.end(), runs_it);
   REDAG_CHECK(thread != threads_.end(), "a job goes on that no thread has");
   (*thread)->level = dispatch.level;
-  apply(priorities_.change((*thread)->index, options_.band.of_level(dispatch.level)));
+  apply(priorities_.change((*thread)->index, priority_of(**thread)));
 }
 
 Engine::Assignment Engine::assign(Thread &thread, const Dispatch &dispatch) {
@@ -134,7 +173,7 @@ Engine::Assignment Engine::assign(Thread &thread, const Dispatch &dispatch) {
   ++unfinished_;
   const Job job{dispatch.task, dispatch.number, dispatch.release, dispatch.job, dispatch.worker};
   thread.stack.push_back(job);
-  thread.level = dispatch.level;
+  thread.level = thread.own_level = dispatch.level;
   return Assignment{job, &entry, entry.expected_short()};
 }
 

@@ -52,6 +52,7 @@ struct Engine::TaskEntry {
   Duration wcet_low = 0;
   Duration budget = 0;
   bool cuts_off = false;  // on_budget: abort
+  bool is_high = false;   // of a DAG of high criticality
   Usage usage;
   Duration deadline = 0;
   std::shared_ptr<Histogram> response;  // null: not measured
@@ -97,6 +98,7 @@ struct alignas(64) Engine::Thread {
   Atomic<bool> has_mail{false};
   bool is_handed = false;         // lock: is among Engine::handed_
   std::uint32_t level = 0;        // lock: of the job it was given last; inherited only with `os`
+  std::uint32_t own_level = 0;    // lock: the same, as it was when it was given
   Atomic<bool> outranked{false};  // written under the lock
   std::vector<Job> stack;         // lock: the jobs started here, the running one last
   trace::Ring events;             // Started; written by the thread
@@ -109,6 +111,12 @@ struct alignas(64) Engine::Thread {
   clockid_t cpu_clock = 0;  // of `handle`; set before the engine runs
 };
 
+/// The thread that looks at what the kernel leaves real-time threads.
+struct Engine::ShareKeeper {
+  Parker parker;
+  ThreadHandle handle;
+};
+
 /// Holds the engine's lock; wakes threads and tells of skips after it. Real-time threads are woken under the lock
 /// instead: one that were preempted between its decision and the wake-up would leave an urgent job asleep, and only as
 /// the lock's owner is it raised when the next decision is due.
@@ -117,6 +125,7 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   explicit Locked(Engine &engine) REDAG_ACQUIRE(engine.lock_) : engine_(engine) { engine_.lock_.lock(); }
   ~Locked() REDAG_RELEASE() {
     engine_.lock_.unlock();
+    if (wakes_keeper_) engine_.share_keeper_->parker.unpark();
     for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
     for (std::size_t i = 0; i < skip_count_; ++i) {
       few_skips_[i].listener->skipped(few_skips_[i].reason);
@@ -142,6 +151,7 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
     more_skips_.clear();
   }
 
+  void wake_share_keeper() { wakes_keeper_ = true; }
   void wake(Thread &thread) {
     if (engine_.realtime() || count_ == late_.size()) {
       thread.parker.unpark();
@@ -165,6 +175,7 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   std::vector<Skip> more_skips_;
   std::array<Thread *, 32> late_;
   std::size_t count_ = 0;
+  bool wakes_keeper_ = false;
 };
 
 }  // namespace redag::runtime

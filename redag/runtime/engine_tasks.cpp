@@ -9,7 +9,7 @@ namespace redag::runtime {
 void Engine::bind(const Workload &workload, std::vector<Body> bodies) {
   REDAG_CHECK(bodies.size() == workload.task_count(), "every task needs a body");
   Locked locked(*this);
-  for (const TaskRef &ref : flatten(workload)) register_task(ref.id, *ref.task, bodies[ref.id.value]);
+  for (const TaskRef &ref : flatten(workload)) register_task(ref.id, *ref.task, ref.dag, bodies[ref.id.value]);
 }
 
 AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
@@ -21,7 +21,7 @@ AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
   added.dag = scheduler_->add_dag(dag, at);
   const std::span<const TaskId> tasks = scheduler_->tasks_of(added.dag);
   added.tasks.assign(tasks.begin(), tasks.end());
-  for (std::size_t i = 0; i < bodies.size(); ++i) register_task(added.tasks[i], dag.tasks[i], bodies[i]);
+  for (std::size_t i = 0; i < bodies.size(); ++i) register_task(added.tasks[i], dag.tasks[i], added.dag, bodies[i]);
   decide(locked, at, nullptr, JobSlot());
   return added;
 }
@@ -32,7 +32,7 @@ TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body bo
   Locked locked(*this);
   withdraw_if_halting();
   const TaskId id = scheduler_->add_task(dag, rank, task, at);
-  register_task(id, task, body, std::move(listener));
+  register_task(id, task, dag, body, std::move(listener));
   decide(locked, at, nullptr, JobSlot());
   return id;
 }
@@ -69,7 +69,7 @@ void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
 }
 
 // An id that is used again begins anew; the body of before went when its last job ended.
-void Engine::register_task(TaskId id, const Task &task, Body &body, std::shared_ptr<SkipListener> listener) {
+void Engine::register_task(TaskId id, const Task &task, DagId dag, Body &body, std::shared_ptr<SkipListener> listener) {
   REDAG_CHECK(id.value <= tasks_.size(), "the scheduler numbers tasks differently");
   if (id.value == tasks_.size()) tasks_.emplace_back();
   TaskEntry &entry = tasks_[id.value];
@@ -84,6 +84,8 @@ void Engine::register_task(TaskId id, const Task &task, Body &body, std::shared_
   entry.wcet_low = task.wcet_low;
   entry.budget = task.budget;
   entry.cuts_off = task.on_budget == OnBudget::Abort;
+  entry.is_high = scheduler_->criticality(dag) == Criticality::High;
+  ++(entry.is_high ? high_tasks_ : other_tasks_);
   entry.deadline = task.deadline;
   if (options_.measure) entry.response = std::make_shared<Histogram>();
   entry.concurrency = task.concurrency;
@@ -92,6 +94,7 @@ void Engine::register_task(TaskId id, const Task &task, Body &body, std::shared_
 
 void Engine::remove_entry(TaskId id, std::vector<Body> &doomed) {
   TaskEntry &entry = tasks_[id.value];
+  if (!entry.removed) --(entry.is_high ? high_tasks_ : other_tasks_);
   entry.removed = true;
   entry.listener.reset();
   if (entry.busy == 0) doomed.emplace_back().swap(entry.body);

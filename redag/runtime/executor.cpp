@@ -49,6 +49,7 @@ Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
   engine.config = setup_.config;
   engine.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id means one task
   engine.band = setup_.band;
+  engine.throttling = setup_.throttling;
   engine.cpus = options_.cpus;
   engine.trace_capacity = options_.trace_capacity;
   engine.measure = options_.live;

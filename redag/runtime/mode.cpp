@@ -80,20 +80,22 @@ Result<Setup> set_up(PreemptionMode wanted, PolicyKind policy, std::uint32_t wor
   if (workers == 0) workers = static_cast<std::uint32_t>(processors);
   threads = std::max(threads == 0 ? workers + kSpareThreads : threads, workers);
   setup.config = make_config(setup.mode, workers, policy, setup.band, threads);
-  setup.warnings = mode_warnings(setup.mode, workers, processors);
+  if (setup.mode.mode == PreemptionMode::Os) setup.throttling = realtime_throttling();
+  setup.warnings = mode_warnings(workers, processors, setup.throttling);
   return setup;
 }
 
-std::vector<std::string> mode_warnings(const Mode &mode, std::uint32_t workers, std::size_t cpus) {
+std::vector<std::string> mode_warnings(std::uint32_t workers, std::size_t cpus,
+                                       const std::optional<Throttling> &throttling) {
   std::vector<std::string> warnings;
   if (workers > cpus) {
     warnings.push_back(
         fmt::format("{} workers share {} processor(s): jobs that run together slow each other down", workers, cpus));
   }
-  const auto throttling = realtime_throttling();
-  if (mode.mode == PreemptionMode::Os && throttling) {
+  if (throttling) {
     warnings.push_back(
-        fmt::format("real-time throttling is on: SCHED_FIFO threads get at most {} of every {} us of a busy processor "
+        fmt::format("real-time throttling is on: SCHED_FIFO threads get at most {} of every {} us of a busy processor; "
+                    "where some DAGs are of high criticality, the others' jobs bear it "
                     "('sysctl kernel.sched_rt_runtime_us=-1' lifts it)",
                     throttling->runtime_us, throttling->period_us));
   }

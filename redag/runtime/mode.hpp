@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "redag/base/result.hpp"
 #include "redag/model/workload.hpp"
+#include "redag/runtime/realtime_share.hpp"
 #include "redag/sched/scheduler.hpp"
 
 namespace redag::runtime {
@@ -44,6 +46,7 @@ struct Setup {
   Mode mode;
   PriorityBand band;
   sched::Config config;
+  std::optional<Throttling> throttling;  // of what runs at SCHED_FIFO with `os`
   std::vector<std::string> warnings;
 
   /// SCHED_FIFO priority of what must not wait for jobs, the release timer first of all; 0: none. Without `os`, one
@@ -57,6 +60,7 @@ struct Setup {
                                    std::uint32_t threads, const std::vector<int> &cpus);
 
 /// What a user should know before trusting the figures: too few processors, real-time throttling.
-[[nodiscard]] std::vector<std::string> mode_warnings(const Mode &mode, std::uint32_t workers, std::size_t cpus);
+[[nodiscard]] std::vector<std::string> mode_warnings(std::uint32_t workers, std::size_t cpus,
+                                                     const std::optional<Throttling> &throttling);
 
 }  // namespace redag::runtime

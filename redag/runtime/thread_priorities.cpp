@@ -14,6 +14,7 @@ std::span<const ThreadPriorities::Change> ThreadPriorities::start(std::size_t th
   REDAG_CHECK(!threads_[thread].started, "a thread has two jobs");
   threads_[thread].started = true;
   ++started_;
+  threads_[thread].of_job = 0;
   return place(threads_[thread], priority, is_short);
 }
 
@@ -24,10 +25,13 @@ std::span<const ThreadPriorities::Change> ThreadPriorities::change(std::size_t t
 void ThreadPriorities::end(std::size_t thread) {
   threads_[thread].started = false;
   --started_;
+  if (threads_[thread].of_job > 0) --realtime_;
 }
 
 std::span<const ThreadPriorities::Change> ThreadPriorities::place(Thread &self, int priority, bool is_short) {
   changes_.clear();
+  if (self.of_job > 0) --realtime_;
+  if (priority > 0) ++realtime_;
   self.of_job = priority;
   const bool all_run = started_ <= processors_;
   if (unordered_ && !all_run) {

@@ -1,6 +1,6 @@
-// SCHED_FIFO priorities of threads that run one job each, changed as seldom as can be: a change is a system call of
-// about 1 us. A thread that is given a short job keeps a higher priority which it has from the job before where that
-// makes no difference among these threads, until it does. A value, without threads of its own.
+// SCHED_FIFO priorities of threads that run one job each (0: an ordinary thread), changed as seldom as can be: a change
+// is a system call of about 1 us. A thread that is given a short job keeps a higher priority which it has from the job
+// before where that makes no difference among these threads, until it does. A value, without threads of its own.
 #pragma once
 
 #include <cstddef>
@@ -30,6 +30,9 @@ class ThreadPriorities {
   std::span<const Change> change(std::size_t thread, int priority);
   void end(std::size_t thread);
 
+  /// Has a thread with a job a priority?
+  [[nodiscard]] bool any_realtime() const { return realtime_ > 0; }
+
  private:
   struct Thread {
     int priority = 0;
@@ -44,7 +47,8 @@ class ThreadPriorities {
   std::vector<Change> changes_;
   std::size_t processors_ = 0;
   std::size_t started_ = 0;
-  bool unordered_ = false;  // a priority was kept although another job's lies in between
+  std::size_t realtime_ = 0;  // of them; what their jobs ask for counts
+  bool unordered_ = false;    // a priority was kept although another job's lies in between
 };
 
 }  // namespace redag::runtime

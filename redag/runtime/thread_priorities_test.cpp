@@ -58,6 +58,9 @@ struct Kernel {
     }
     return true;
   }
+  [[nodiscard]] bool any_realtime() const {
+    return std::any_of(jobs.begin(), jobs.end(), [](const auto &job) { return job.value_or(0) > 0; });
+  }
   [[nodiscard]] bool none_below() const {
     for (std::size_t t = 0; t < jobs.size(); ++t) {
       if (jobs[t] && priorities[t] < *jobs[t]) return false;
@@ -130,7 +133,7 @@ RC_GTEST_PROP(ThreadPriorities, MoreJobsThanProcessorsAreAlwaysInOrder, ()) {
   Kernel kernel(count, *rc::gen::inRange<std::size_t>(1, 4));
   for (int steps = *rc::gen::inRange(1, 60); steps > 0; --steps) {
     const auto thread = *rc::gen::inRange<std::size_t>(0, count);
-    const int priority = *rc::gen::inRange(1, *rc::gen::element(5, kFirst));
+    const int priority = *rc::gen::inRange(0, *rc::gen::element(5, kFirst));
     if (!kernel.jobs[thread]) {
       kernel.start(thread, priority, *rc::gen::arbitrary<bool>());
     } else if (*rc::gen::inRange(0, 4) == 0) {
@@ -139,6 +142,7 @@ RC_GTEST_PROP(ThreadPriorities, MoreJobsThanProcessorsAreAlwaysInOrder, ()) {
       kernel.end(thread);
     }
     RC_ASSERT(kernel.none_below());
+    RC_ASSERT(kernel.threads.any_realtime() == kernel.any_realtime());
     RC_ASSERT(kernel.all_run() || kernel.ordered());
   }
 }

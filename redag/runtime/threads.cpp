@@ -67,7 +67,7 @@ clockid_t cpu_clock_of(ThreadHandle &thread) noexcept {
 bool set_fifo_priority(pthread_t thread, int priority) noexcept {
   sched_param parameters{};
   parameters.sched_priority = priority;
-  return pthread_setschedparam(thread, SCHED_FIFO, &parameters) == 0;
+  return pthread_setschedparam(thread, priority > 0 ? SCHED_FIFO : SCHED_OTHER, &parameters) == 0;
 }
 
 namespace {
@@ -75,8 +75,7 @@ namespace {
 // What a thread does after its work, such as destroying what is its own, is urgent to nobody; and under ThreadSanitizer
 // threads that end at several priorities wait for each other for ever, since its spin locks do not inherit them.
 void leave_fifo() noexcept {
-  const sched_param ordinary{};
-  if (fifo_priority(pthread_self()) > 0) pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
+  if (fifo_priority(pthread_self()) > 0) static_cast<void>(set_fifo_priority(pthread_self(), 0));
 }
 
 }  // namespace

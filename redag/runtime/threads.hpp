@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
+#include "redag/runtime/realtime_share.hpp"
 
 namespace redag::runtime {
 
@@ -36,7 +37,7 @@ struct ThreadSetup {
 /// The clock of a running thread's processor time.
 [[nodiscard]] clockid_t cpu_clock_of(ThreadHandle &thread) noexcept;
 
-/// False if the system refused.
+/// 0: an ordinary thread (SCHED_OTHER). False if the system refused.
 [[nodiscard]] bool set_fifo_priority(pthread_t thread, int priority) noexcept;
 
 /// SCHED_FIFO priority of a thread; 0 if it is scheduled otherwise.
@@ -59,11 +60,7 @@ struct ThreadSetup {
 /// become resident. Error: RLIMIT_MEMLOCK or no right.
 [[nodiscard]] Result<void> lock_memory();
 
-/// Real-time throttling: what SCHED_FIFO threads may use of each `period_us`. None: unlimited or unknown.
-struct Throttling {
-  std::int64_t runtime_us = 0;
-  std::int64_t period_us = 0;
-};
+/// Of this kernel. None: unlimited or unknown.
 [[nodiscard]] std::optional<Throttling> realtime_throttling();
 
 }  // namespace redag::runtime

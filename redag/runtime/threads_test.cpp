@@ -114,8 +114,8 @@ TEST(Setup, TheTimerOutranksWorkersThatInheritAPriority) {
 }
 
 TEST(ModeWarnings, TellOfTooFewProcessors) {
-  EXPECT_TRUE(mode_warnings(Mode{PreemptionMode::None, {}}, 2, 2).empty());
-  ASSERT_EQ(mode_warnings(Mode{PreemptionMode::None, {}}, 4, 2).size(), 1U);
+  EXPECT_TRUE(mode_warnings(2, 2, std::nullopt).empty());
+  ASSERT_EQ(mode_warnings(4, 2, std::nullopt).size(), 1U);
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ class Lifecycle : public Scheduler {
   void set_timing(TaskId task, Duration period, Duration deadline, Time now) final;
   void close(Time now) final;
   [[nodiscard]] std::span<const TaskId> tasks_of(DagId dag) const final { return dag_states_[dag.value].tasks; }
+  [[nodiscard]] Criticality criticality(DagId dag) const final { return dag_states_[dag.value].criticality; }
   [[nodiscard]] std::size_t task_slots() const final { return tasks_.size(); }
   [[nodiscard]] std::size_t dag_slots() const final { return dag_states_.size(); }
   [[nodiscard]] Accounting accounting(TaskId task) const final {

@@ -134,6 +134,7 @@ class Scheduler {
   /// The DAG's tasks, removed ones as long as their ids are theirs; first those it was added with, in its order. Valid
   /// until the next reconfiguration.
   [[nodiscard]] virtual std::span<const TaskId> tasks_of(DagId dag) const = 0;
+  [[nodiscard]] virtual Criticality criticality(DagId dag) const = 0;
   /// Ids in use are smaller than these.
   [[nodiscard]] virtual std::size_t task_slots() const = 0;
   [[nodiscard]] virtual std::size_t dag_slots() const = 0;

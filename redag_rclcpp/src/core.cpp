@@ -68,6 +68,7 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
   engine.config = setup_.config;
   engine.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id means one task
   engine.band = setup_.band;
+  engine.throttling = setup_.throttling;
   engine.cpus = options_.cpus;
   engine.trace_capacity = options_.trace_capacity;
   engine.measure = options_.live;

@@ -392,6 +392,51 @@ TEST(EngineStart, AThreadThatCannotBeHadEndsTheOthers) {
   runtime::thread_that_fails.reset();
 }
 
+// Nothing is left for real-time threads, from when the keeper of their share first looks: at any moment of a run.
+TEST(EngineShare, OnlyJobsOfLowerCriticalityAreOrdinaryThreads) {
+  int ordinary = 0;
+  int realtime = 0;
+  expect_holds([&] {
+    std::array<int, 16> priorities{};  // of the explorer's threads
+    priorities.fill(1);
+    const testing::ObjectId object = explored::new_object();
+    runtime::on_set_priority = [&](std::uint32_t thread, int priority) {
+      explored::write(object, "set priority");
+      priorities.at(thread) = priority;
+    };
+    const auto is_realtime = [&] {
+      explored::read(object, "priority");
+      return priorities.at(explored::self()) > 0;
+    };
+    Workload workload = ladder(1);
+    workload.dags.push_back(ladder(1).dags[0]);
+    workload.dags[1].criticality = Criticality::High;
+    Countdown all(2);
+    Platform platform{Preemption::Full, 1, 2, false, 0};
+    platform.throttling = runtime::Throttling{0, explored::kForever / kMicrosecond + 1};  // it looks when it is woken
+    Machine machine(workload, platform,
+                    {[&](const Job &) {
+                       ++(is_realtime() ? realtime : ordinary);
+                       all.count();
+                       return Outcome::Finished;
+                     },
+                     [&](const Job &) {
+                       explored::check(is_realtime(), "a job of high criticality is an ordinary thread");
+                       all.count();
+                       return Outcome::Finished;
+                     }});
+    machine.start_calmly();
+    const std::uint32_t source = thread([&] { machine.release(1); });
+    machine.release(0);
+    explored::join(source);
+    all.wait();
+    machine.finish_calmly();
+  });
+  runtime::on_set_priority = nullptr;
+  EXPECT_GT(ordinary, 0);
+  EXPECT_GT(realtime, 0);
+}
+
 // A watchdog looks while jobs begin, are preempted and end: what it names is in progress then, and a limit is told
 // once.
 TEST_P(EngineProtocol, AWatchdogSeesOnlyJobsInProgress) {

@@ -8,6 +8,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -137,6 +138,7 @@ struct Platform {
   bool start_paused = false;
   std::size_t trace_capacity = 0;
   std::uint32_t looks = 0;  // of a thread for a job, before it sleeps
+  std::optional<runtime::Throttling> throttling = std::nullopt;
 };
 
 /// An engine that is told what its tasks do. Every job is checked to run once, as what the scheduler counted.
@@ -155,6 +157,7 @@ class Machine {
       options.config.levels = 8;
       options.band = runtime::PriorityBand{8, 9};
     }
+    options.throttling = platform.throttling;
     options.start_paused = platform.start_paused;
     options.trace_capacity = platform.trace_capacity;
     options.looks = platform.looks;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
+#include "redag/runtime/realtime_share.hpp"
 #include "redag/testing/explorer.hpp"
 
 namespace redag::runtime {
@@ -52,16 +53,16 @@ inline std::optional<std::string> thread_that_fails;  // by name
   return ThreadHandle(testing::explored::spawn(std::move(main)));
 }
 [[nodiscard]] inline clockid_t cpu_clock_of(ThreadHandle &) noexcept { return 0; }
-[[nodiscard]] inline bool set_fifo_priority(std::uint32_t, int) noexcept { return true; }
+inline std::function<void(std::uint32_t thread, int priority)> on_set_priority;
+[[nodiscard]] inline bool set_fifo_priority(std::uint32_t thread, int priority) noexcept {
+  if (on_set_priority) on_set_priority(thread, priority);
+  return true;
+}
 [[nodiscard]] inline int fifo_priority_above_this_thread() { return 0; }
 [[nodiscard]] inline std::vector<int> usable_cpus() { return {0, 1, 2, 3}; }
 [[nodiscard]] inline int available_fifo_priority(int wanted) { return wanted; }
 [[nodiscard]] inline const char *realtime_hint() { return ""; }
 [[nodiscard]] inline Result<void> lock_memory() { return {}; }
-struct Throttling {
-  std::int64_t runtime_us = 0;
-  std::int64_t period_us = 0;
-};
 [[nodiscard]] inline std::optional<Throttling> realtime_throttling() { return std::nullopt; }
 
 }  // namespace redag::runtime

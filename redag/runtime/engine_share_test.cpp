@@ -1,0 +1,184 @@
+// Real-time throttling on threads: who leaves the real-time class before the kernel takes a processor from all. What
+// the kernel leaves is said by the test, and is mostly nothing: then what gives way does so all the time.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/engine.hpp"
+#include "redag/runtime/threads.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+
+namespace redag::runtime {
+namespace {
+
+using sched::Outcome;
+
+constexpr Throttling kNothingIsLeft{0, 20'000};
+
+// Two DAGs of one task each; the second one is more urgent.
+class EngineShare : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (band_.top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+  }
+
+  void start(const Throttling &throttling, Criticality first, Criticality second, std::vector<Body> bodies,
+             const std::string &group = "") {
+    Workload workload;
+    workload.policy = PolicyKind::Fixed;
+    for (const Criticality criticality : {first, second}) {
+      Dag &dag = workload.dags.emplace_back();
+      dag.criticality = criticality;
+      Task &task = dag.tasks.emplace_back();
+      task.period = task.deadline = task.wcet = kSecond;
+      task.priority = static_cast<int>(workload.dags.size());
+      task.group = group;
+    }
+    EngineOptions options;
+    options.config = make_config(Mode{PreemptionMode::Os, {}}, 1, workload.policy, band_, 4);
+    options.band = band_;
+    options.throttling = throttling;
+    engine_ = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+    engine_->bind(workload, std::move(bodies));
+    ASSERT_TRUE(engine_->start());
+    engine_->set_origin(monotonic_now());
+  }
+
+  void release(std::size_t task) { engine_->release(TaskId(task), engine_->now()); }
+  void finish() {
+    engine_->halt();
+    ASSERT_TRUE(engine_->wait_idle(kNever));
+    engine_->join();
+  }
+
+  // In a body: false if it does not come true for long.
+  template <typename Condition>
+  static bool wait_for(Condition condition) {
+    const Time end = monotonic_now() + 20 * kSecond;
+    while (!condition()) {
+      if (monotonic_now() > end) return false;
+    }
+    return true;
+  }
+  static int own_priority() { return fifo_priority(pthread_self()); }
+
+  const PriorityBand band_ = probe_priority_band();
+  std::unique_ptr<Engine> engine_;
+};
+
+TEST_F(EngineShare, AJobOfLowerCriticalityGivesWayAndComesBack) {
+  bool gave_way = false;
+  bool came_back = false;
+  // A credit of 20 ms, and 170 ms in a second come back.
+  start(Throttling{200'000, 1'000'000}, Criticality::Normal, Criticality::High,
+        {[&](const Job &) {
+           gave_way = wait_for([] { return own_priority() == 0; });
+           came_back = wait_for([] { return own_priority() > 0; });
+           return Outcome::Finished;
+         },
+         [](const Job &) { return Outcome::Finished; }});
+  release(0);
+  finish();
+  EXPECT_TRUE(gave_way);
+  EXPECT_TRUE(came_back);
+  EXPECT_GT(engine_->gave_way(), 10 * kMillisecond);
+  EXPECT_EQ(engine_->refused_priorities(), 0U);
+}
+
+TEST_F(EngineShare, AJobOfHighCriticalityNeverDoes) {
+  std::atomic<bool> stop{false};
+  std::atomic<int> ordinary{0};
+  std::atomic<int> ran{0};
+  bool gave_way = false;
+  start(kNothingIsLeft, Criticality::Low, Criticality::High,
+        {[&](const Job &) {
+           gave_way = wait_for([] { return own_priority() == 0; });
+           static_cast<void>(wait_for([&] { return stop.load(); }));
+           return Outcome::Finished;
+         },
+         [&](const Job &) {
+           if (own_priority() != band_.of_level(0)) ++ordinary;
+           ++ran;
+           return Outcome::Finished;
+         }});
+  release(0);
+  for (int i = 1; i <= 50; ++i) {
+    release(1);
+    while (ran < i) std::this_thread::yield();
+  }
+  stop = true;
+  finish();
+  EXPECT_TRUE(gave_way);
+  EXPECT_EQ(ordinary, 0);
+}
+
+// It would be preempted by ordinary threads while the urgent job waits.
+TEST_F(EngineShare, AJobThatAnUrgentOneWaitsForIsRaised) {
+  std::atomic<bool> is_ordinary{false};
+  int raised = 0;
+  std::atomic<bool> after{false};
+  start(kNothingIsLeft, Criticality::Low, Criticality::High,
+        {[&](const Job &) {
+           is_ordinary = wait_for([] { return own_priority() == 0; });
+           static_cast<void>(wait_for([] { return own_priority() > 0; }));
+           raised = own_priority();
+           return Outcome::Finished;
+         },
+         [&](const Job &) {
+           after = true;
+           return Outcome::Finished;
+         }},
+        "shared");
+  release(0);
+  ASSERT_TRUE(wait_for([&] { return is_ordinary.load(); }));
+  release(1);
+  ASSERT_TRUE(wait_for([&] { return after.load(); }));
+  finish();
+  EXPECT_EQ(raised, band_.of_level(0));
+}
+
+TEST_F(EngineShare, WhereNobodyIsSparedNobodyGivesWay) {
+  for (const Criticality all : {Criticality::Normal, Criticality::High}) {
+    std::atomic<int> ordinary{0};
+    const Body body = [&](const Job &) {
+      const Time end = monotonic_now() + 60 * kMillisecond;  // three times what the kernel looks at
+      while (monotonic_now() < end) {
+        if (own_priority() == 0) ++ordinary;
+      }
+      return Outcome::Finished;
+    };
+    start(kNothingIsLeft, all, all, {body, body});
+    release(0);
+    release(1);
+    finish();
+    EXPECT_EQ(ordinary, 0);
+    EXPECT_EQ(engine_->gave_way(), 0);
+  }
+}
+
+// The only task that was spared goes while another gives way.
+TEST_F(EngineShare, WithTheLastOneThatIsSparedItEnds) {
+  std::atomic<bool> is_ordinary{false};
+  bool came_back = false;
+  start(kNothingIsLeft, Criticality::Low, Criticality::High,
+        {[&](const Job &) {
+           is_ordinary = wait_for([] { return own_priority() == 0; });
+           came_back = wait_for([] { return own_priority() > 0; });
+           return Outcome::Finished;
+         },
+         [](const Job &) { return Outcome::Finished; }});
+  release(0);
+  ASSERT_TRUE(wait_for([&] { return is_ordinary.load(); }));
+  engine_->remove_task(TaskId(1));
+  finish();
+  EXPECT_TRUE(came_back);
+}
+
+}  // namespace
+}  // namespace redag::runtime
