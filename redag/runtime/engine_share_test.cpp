@@ -118,6 +118,35 @@ TEST_F(EngineShare, AJobOfHighCriticalityNeverDoes) {
   EXPECT_EQ(ordinary, 0);
 }
 
+// A thread keeps a higher priority for a job that is expected to be short: not for one that gives way.
+TEST_F(EngineShare, ShortJobsDoToo) {
+  constexpr int kRounds = 300;
+  std::atomic<int> ran{0};
+  std::atomic<bool> gives_way{false};
+  int realtime = 0;
+  start(kNothingIsLeft, Criticality::Low, Criticality::High,
+        {[&](const Job &) {
+           if (!gives_way) {
+             gives_way = wait_for([] { return own_priority() == 0; });
+           } else if (own_priority() > 0) {
+             ++realtime;
+           }
+           ++ran;
+           return Outcome::Finished;
+         },
+         [&](const Job &) {
+           ++ran;
+           return Outcome::Finished;
+         }});
+  for (int i = 0; i < kRounds; ++i) {
+    release(static_cast<std::size_t>(i % 2));
+    while (ran <= i) std::this_thread::yield();
+  }
+  finish();
+  EXPECT_TRUE(gives_way);
+  EXPECT_EQ(realtime, 0);
+}
+
 // It would be preempted by ordinary threads while the urgent job waits.
 TEST_F(EngineShare, AJobThatAnUrgentOneWaitsForIsRaised) {
   std::atomic<bool> is_ordinary{false};

@@ -33,6 +33,7 @@ struct Processor {
         next_urgent = now + std::max(size + 1, static_cast<Duration>(static_cast<double>(size) / urgent));
       }
       if (now >= next_look) {
+        changes += share.used_up(now) == gives_way ? 0 : 1;
         gives_way = share.used_up(now);
         next_look = now + share.until_change() + rng.uniform(0, lateness);
       }
@@ -70,6 +71,7 @@ struct Processor {
   Rng rng;
   Time now = 0;
   Duration used = 0;
+  int changes = 0;
   Duration most = 0;  // in any period
   Duration in_window = 0;
   std::deque<std::pair<Time, Time>> pieces;
@@ -80,6 +82,7 @@ TEST(RealtimeShare, OneThatAlwaysWantsToRunGetsNearlyWhatTheKernelLeaves) {
   processor.run(60 * kSecond, 1e-9, 1, 0);
   EXPECT_LE(processor.most, 950 * kMillisecond);
   EXPECT_GT(processor.used, 60 * kSecond * 91 / 100);
+  EXPECT_LT(processor.changes, 1000);
 }
 
 TEST(RealtimeShare, IsNotUsedUpByWhatIsIdleNowAndThen) {

@@ -218,10 +218,10 @@ class Run {
     info.warm_up = options_.warm_up;
     info.machine = trace::this_machine();
     if (const Duration gave_way = engine_->gave_way(); gave_way > 0) {
-      result_.warnings.push_back(
-          fmt::format("jobs of lower criticality were ordinary threads for {}, so that the kernel did not stop those of "
-                      "high criticality (real-time throttling)",
-                      humanize_duration(gave_way)));
+      result_.warnings.push_back(fmt::format(
+          "jobs of lower criticality were ordinary threads for {}, so that the kernel did not stop those of "
+          "high criticality (real-time throttling)",
+          humanize_duration(gave_way)));
     }
     if (engine_->refused_priorities() > 0) {
       result_.warnings.push_back(fmt::format("{} priority changes were refused", engine_->refused_priorities()));
