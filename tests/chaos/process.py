@@ -153,6 +153,21 @@ def fewer_processors(rng, folder):
     check_results(folder)
 
 
+# Ten times what its processor can do, and a DAG that is to be spared.
+SPARED = """\
+name: spared
+platform: {workers: 1}
+policy: chain_aware
+dags:
+  - name: control
+    criticality: high
+    tasks: [{name: loop, wcet: 2ms, period: 10ms}]
+  - name: map
+    criticality: low
+    tasks: [{name: build, wcet: 200ms, period: 20ms}]
+"""
+
+
 def throttled(rng, folder):
     """More SCHED_FIFO work than one processor has: the kernel takes it away from all threads of the class for a while."""
     file = folder / "random.yaml"
@@ -170,6 +185,12 @@ def throttled(rng, folder):
         raise Skipped("this kernel does not throttle; a processor would be taken from everybody")
     child = run("2500ms", "--out", folder / "out")
     expect(child.status == 0, child.err)
+    check_results(folder)
+
+    file.write_text(SPARED)
+    child = run("1500ms", "--out", folder / "spared")
+    expect(child.status == 0, child.err)
+    expect("jobs of lower criticality were ordinary threads for " in child.err, child.err)
     check_results(folder)
 
 
