@@ -40,7 +40,7 @@ Duration RealtimeShare::until_change() const {
 
 // More than a period's worth is neither saved nor owed: the kernel, too, forgets what lies further back.
 void RealtimeShare::settle(Time now) {
-  const Duration passed = std::clamp<Duration>(now - settled_, 0, period_);
+  const Duration passed = std::max<Duration>(0, now - settled_);
   settled_ = std::max(settled_, now);
   const auto back = static_cast<Duration>(static_cast<double>(passed) * share_);
   credit_ = std::clamp(credit_ + back - (busy_ ? passed : 0), burst_ - period_, burst_);

@@ -94,6 +94,17 @@ TEST(RealtimeShare, IsNotUsedUpByWhatIsIdleNowAndThen) {
   }
 }
 
+TEST(RealtimeShare, IsUsedUpUntilHalfOfItIsThereAgain) {
+  RealtimeShare share(kDefault);  // 20 ms; 920 of 1000 come back
+  share.set_busy(true, 0);
+  EXPECT_FALSE(share.used_up(249 * kMillisecond));
+  EXPECT_TRUE(share.used_up(251 * kMillisecond));
+  share.set_busy(false, 251 * kMillisecond);
+  EXPECT_TRUE(share.used_up(260 * kMillisecond));
+  EXPECT_NEAR(static_cast<double>(share.until_change()), 2e6, 1e6);
+  EXPECT_FALSE(share.used_up(263 * kMillisecond));
+}
+
 TEST(RealtimeShare, NothingIsOwedForLongerThanAPeriod) {
   RealtimeShare share(kDefault);
   share.set_busy(true, 0);
