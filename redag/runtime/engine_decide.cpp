@@ -30,9 +30,9 @@ Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot belo
   }
   const Next next = place(locked, step, self, below);
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
-  if (share_) {
+  if (share_ && can_give_way()) {
     share_->set_busy(priorities_.any_realtime(), now);
-    if (!share_is_kept_ && unfinished_ > 0 && can_give_way()) {
+    if (!share_is_kept_ && unfinished_ > 0) {
       share_is_kept_ = true;
       locked.wake_share_keeper();
     }
