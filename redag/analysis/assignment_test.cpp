@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <limits>
 #include <numeric>
 
@@ -189,20 +188,16 @@ UnderTest under(const OrderFreeTest &test, const BoundCase &bound_case, const Sy
   return result;
 }
 
-int cases_to_try() {
-  const char *text = std::getenv("REDAG_BOUND_WORKLOADS");
-  return text == nullptr ? 150 : std::atoi(text);
-}
-
 // Where the test is said to suit Audsley's assignment, no order of all n! is better; and what is found is schedulable
 // by analyze() too.
 void expect_optimal(BoundCaseLimits limits) {
   limits.max_dags = 4;
   limits.min_utilization = limits.max_workers > 1 ? 0.2 : 0.6;
   limits.policies = {PolicyKind::RateMonotonic};
+  const auto cases = static_cast<int>(testing::how_many(150));
   int tried = 0;
   int found_some = 0;
-  for (int i = 0; i < cases_to_try(); ++i) {
+  for (int i = 0; i < cases; ++i) {
     Rng rng(mix(static_cast<std::uint64_t>(i) + 31));
     const BoundCase bound_case = testing::random_bound_case(rng, limits);
     const System system = compile(bound_case.workload, bound_case.platform).value();
@@ -228,8 +223,8 @@ void expect_optimal(BoundCaseLimits limits) {
     const System ordered = compile(with_order(bound_case.workload, system, found->order), bound_case.platform).value();
     ASSERT_EQ(analyze(ordered).verdict, Verdict::Schedulable);
   }
-  EXPECT_GT(tried, cases_to_try() / 4);
-  EXPECT_GT(found_some, cases_to_try() / 20);
+  EXPECT_GT(tried, cases / 4);
+  EXPECT_GT(found_some, cases / 20);
   EXPECT_LT(found_some, tried);
 }
 
@@ -279,8 +274,9 @@ TEST(AudsleyProperty, SeveralWorkersDags) {
 }
 
 TEST(AssignmentProperty, NeverWorseAndWhatIsWrittenMeansTheSame) {
+  const auto cases = static_cast<int>(testing::how_many(150));
   int better = 0;
-  for (int i = 0; i < cases_to_try(); ++i) {
+  for (int i = 0; i < cases; ++i) {
     Rng rng(mix(static_cast<std::uint64_t>(i) + 901));
     BoundCaseLimits limits;
     limits.max_workers = 3;

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 
 #include <fmt/format.h>
 
@@ -145,7 +144,7 @@ void check_chain(const testing::BoundCase &bound_case, const Method &method, Rng
 }
 
 void expect_chains_hold(const Method &method, const testing::BoundCaseLimits &limits, std::uint64_t count) {
-  if (const char *many = std::getenv("REDAG_BOUND_WORKLOADS")) count = std::strtoull(many, nullptr, 10);
+  count = testing::how_many(count);
   Tally tally;
   for (std::uint64_t seed = 0; tally.chains < count && seed < 20 * count; ++seed) {
     Rng rng(mix(seed));

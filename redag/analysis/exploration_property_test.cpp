@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <map>
 
 #include <fmt/format.h>
@@ -84,11 +83,6 @@ BoundCase random_case(Rng &rng, const Limits &limits) {
     workload.dags.push_back(std::move(dag));
   }
   return result;
-}
-
-std::uint64_t wanted(std::uint64_t usual) {
-  const char *text = std::getenv("REDAG_BOUND_WORKLOADS");
-  return text == nullptr ? usual : std::strtoull(text, nullptr, 10);
 }
 
 // ---- what the scheduler does ----
@@ -252,7 +246,7 @@ void enumerate_systems(const Limits &limits, std::uint64_t systems, Judge judge)
 
 TEST(ExplorationProperty, OneWorkerIsExact) {
   std::uint64_t exact = 0;
-  const std::uint64_t systems = wanted(1000);
+  const std::uint64_t systems = testing::how_many(1000);
   enumerate_systems(Limits{}, systems, [&](const Exploration &exploration, const Seen &seen) {
     EXPECT_TRUE(exploration.exact);
     EXPECT_EQ(exploration.end == Exploration::End::Overrun, seen.overrun);
@@ -273,7 +267,7 @@ TEST(ExplorationProperty, SeveralWorkersAreSafe) {
     limits.max_dags = 4;
     limits.max_tasks = 4;
     limits.max_wcet = 4;
-    enumerate_systems(limits, wanted(500), [&](const Exploration &exploration, const Seen &seen) {
+    enumerate_systems(limits, testing::how_many(500), [&](const Exploration &exploration, const Seen &seen) {
       EXPECT_FALSE(exploration.exact);
       if (seen.overrun) {
         EXPECT_EQ(exploration.end, Exploration::End::Overrun);
@@ -296,7 +290,7 @@ TEST(ExplorationProperty, SeveralWorkersAreSafe) {
 // Longer times, more jobs: at random, for several hyperperiods.
 TEST(ExplorationProperty, NoSimulatedResponseIsOutside) {
   std::uint64_t complete = 0;
-  const std::uint64_t systems = wanted(1000);
+  const std::uint64_t systems = testing::how_many(1000);
   for (std::uint64_t seed = 1; seed <= systems; ++seed) {
     Rng rng(mix(seed) + 1);
     Limits limits;
@@ -342,7 +336,7 @@ TEST(ExplorationProperty, NoSimulatedResponseIsOutside) {
 // The bounds for one worker hold for all offsets and gaps: nothing explored exceeds them.
 TEST(ExplorationProperty, OneWorkerIsNeverAboveTheBounds) {
   std::uint64_t compared = 0;
-  for (std::uint64_t seed = 1; seed <= wanted(500); ++seed) {
+  for (std::uint64_t seed = 1; seed <= testing::how_many(500); ++seed) {
     Rng rng(mix(seed) + 2);
     Limits limits;
     limits.scale = 10;

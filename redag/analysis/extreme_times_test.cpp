@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 
 #include "redag/analysis/analyze.hpp"
 #include "redag/analysis/arithmetic.hpp"
@@ -20,10 +19,7 @@
 namespace redag::analysis {
 namespace {
 
-std::uint64_t cases_to_try() {
-  const char *text = std::getenv("REDAG_BOUND_WORKLOADS");
-  return text == nullptr ? 3000 : std::strtoull(text, nullptr, 10);
-}
+std::uint64_t cases_to_try() { return testing::how_many(3000); }
 
 template <class Values>
 auto any_of(Rng &rng, const Values &values) {

@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-
 #include "redag/model/validate.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag/sim/simulator.hpp"
@@ -215,15 +213,9 @@ bool simulated_without_a_miss(const BoundCase &bound_case, const Workload &workl
   return ok;
 }
 
-// Environment: REDAG_BOUND_WORKLOADS, for a long run.
-int cases_to_try() {
-  const char *text = std::getenv("REDAG_BOUND_WORKLOADS");
-  return text == nullptr ? 200 : std::atoi(text);
-}
-
 // What was found is accepted, the next position is not, and a simulation of what was found misses nothing.
 void expect_consistent(const BoundCaseLimits &limits) {
-  const int cases = cases_to_try();
+  const auto cases = static_cast<int>(testing::how_many(200));
   int found_some = 0;
   for (int i = 0; i < cases; ++i) {
     Rng rng(mix(static_cast<std::uint64_t>(i) + 77));

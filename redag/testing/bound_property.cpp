@@ -259,6 +259,11 @@ std::optional<std::uint64_t> environment(const char *name) {
 
 }  // namespace
 
+std::uint64_t how_many(std::uint64_t usual) {
+  const std::uint64_t wanted = environment("REDAG_BOUND_WORKLOADS").value_or(usual);
+  return std::min(wanted, environment("REDAG_BOUND_AT_MOST").value_or(wanted));
+}
+
 BoundPropertyResult check_bound(const analysis::Method &method, const BoundGenerator &generator,
                                 const BoundPropertyOptions &options) {
   BoundPropertyResult result;
@@ -266,7 +271,7 @@ BoundPropertyResult check_bound(const analysis::Method &method, const BoundGener
   if (const auto seed = environment("REDAG_BOUND_SEED")) {
     check_one(method, generator, options, *seed, result, ratios);
   } else {
-    const std::uint64_t wanted = environment("REDAG_BOUND_WORKLOADS").value_or(options.workloads);
+    const std::uint64_t wanted = how_many(options.workloads);
     for (std::uint64_t i = 0; result.workloads < wanted && i < 20 * wanted; ++i) {
       check_one(method, generator, options, mix(options.seed ^ mix(i)), result, ratios);
       if (::testing::Test::HasFatalFailure()) return result;

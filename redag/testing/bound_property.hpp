@@ -52,9 +52,13 @@ struct BoundCaseLimits {
 /// random_bound_case() within `limits`, case after case.
 [[nodiscard]] BoundGenerator cases(const BoundCaseLimits &limits);
 
+/// How many random cases a test tries: `usual`, or what the environment says: REDAG_BOUND_WORKLOADS, for a long run;
+/// and never more than REDAG_BOUND_AT_MOST, for a slow build.
+[[nodiscard]] std::uint64_t how_many(std::uint64_t usual);
+
 struct BoundPropertyOptions {
   std::uint64_t seed = 1;
-  std::uint32_t workloads = 1000;  // to which the method applies; environment: REDAG_BOUND_WORKLOADS
+  std::uint32_t workloads = 1000;  // to which the method applies; how_many()
   std::uint32_t runs = 5;          // simulations of each
   std::uint32_t periods = 10;      // length of a simulation, in largest periods
   std::string executor = "redag";  // sched::executors(): under which the bound is to hold

@@ -1,7 +1,6 @@
 // Budgets and modes as people would check them: schedules worked out by hand, and what jobs of high criticality are
 // owed however large the rest of the load is.
 #include <algorithm>
-#include <cstdlib>
 #include <functional>
 #include <utility>
 #include <vector>
@@ -174,12 +173,6 @@ std::vector<JobEvent> simulate_overruns(const BoundCase &drawn, Duration horizon
   });
 }
 
-// REDAG_BOUND_WORKLOADS=<n>: how many workloads, for a long run.
-std::uint64_t wanted_workloads(std::uint64_t otherwise) {
-  const char *text = std::getenv("REDAG_BOUND_WORKLOADS");
-  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
-}
-
 // No job of high criticality answers later than its bound, and no job that ends in LO mode later than its bound there.
 // Where a deadline is not shown met in LO mode, jobs can be skipped, and lower criticality is not judged.
 void check_amc(std::uint64_t seed, std::uint64_t &judged, std::uint64_t &changes) {
@@ -217,7 +210,7 @@ void check_amc(std::uint64_t seed, std::uint64_t &judged, std::uint64_t &changes
 }
 
 TEST(HighMode, AmcBoundsHoldUnderRandomOverruns) {
-  const std::uint64_t wanted = wanted_workloads(1500);
+  const std::uint64_t wanted = how_many(1500);
   std::uint64_t judged = 0;
   std::uint64_t changes = 0;
   for (std::uint64_t seed = 1; judged < wanted && !::testing::Test::HasFatalFailure(); ++seed) {
@@ -265,7 +258,7 @@ void check_overload(std::uint64_t seed, std::uint64_t &judged, std::uint64_t &cu
 }
 
 TEST(Overload, WithinAmcRtbHighCriticalityMissesNothingBesideTenTimesTheCapacity) {
-  const std::uint64_t wanted = wanted_workloads(2000);
+  const std::uint64_t wanted = how_many(2000);
   std::uint64_t judged = 0;
   std::uint64_t cut_off = 0;
   std::uint64_t changes = 0;
