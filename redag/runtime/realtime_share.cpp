@@ -31,7 +31,7 @@ bool RealtimeShare::used_up(Time now) {
 }
 
 Duration RealtimeShare::until_change() const {
-  const double needed = static_cast<double>(used_up_ ? burst_ / 2 - credit_ : credit_);
+  const auto needed = static_cast<double>(used_up_ ? burst_ / 2 - credit_ : credit_);
   const double rate = used_up_ ? share_ : 1.0 - share_;
   // Where nothing comes back: as long as the kernel itself looks at.
   return rate * static_cast<double>(period_) <= needed ? period_
