@@ -29,6 +29,7 @@ void DispatchRules::dispatched(const JobEvent &event, const LiveJob &job) {
   });
   check_bounds(event);
   check_place(event, job);
+  check_eviction(event, job);
   if (job.state == State::Ready) check_choice(job, job.own);
 }
 
@@ -79,6 +80,25 @@ void DispatchRules::check_place(const JobEvent &event, const LiveJob &job) {
                   [&] { return "it runs on top of " + name(stack.back()) + " although a worker is free"; });
 }
 
+// Full: whoever gets the worker of a preempted job must outrank that job. Judged here and not when time moves on, since
+// threads decide more than once at what their clocks call one instant: what the job inherits later takes nothing back.
+void DispatchRules::check_eviction(const JobEvent &event, const LiveJob &by) {
+  const auto eviction = std::find_if(evictions_.begin(), evictions_.end(),
+                                     [&](const Eviction &one) { return one.worker == event.worker; });
+  if (eviction == evictions_.end()) return;
+  const Replay::JobRef evicted = eviction->job;
+  evictions_.erase(eviction);
+  const Replay &replay = context_.replay;
+  const LiveJob *job = replay.find(evicted.task, evicted.number);
+  if (job == nullptr) return;
+  // Where levels are shared, the job may inherit from one that was looked at only after the preemption: so its own
+  // level decides, and what it inherits only in the total order.
+  const bool outranked = replay.preempts(by.raised, job->own) && by.raised < urgency_of(*job);
+  context_.expect(Rule::Preemption, outranked, evicted.task, evicted.number, [&] {
+    return "preempted by " + context_.job_name(by.task, by.number) + ", which does not outrank it";
+  });
+}
+
 // Whoever gets a worker must be the most urgent of those who could.
 void DispatchRules::check_choice(const LiveJob &chosen, const Urgency &urgency) {
   const Replay &replay = context_.replay;
@@ -117,7 +137,7 @@ void DispatchRules::deferred(const JobEvent &event) {
 void DispatchRules::preempted(const JobEvent &event, const LiveJob &job) {
   context_.expect(Rule::Preemption, mode() != Preemption::None, event.task, event.job,
                   [] { return std::string("preempted on a platform without preemption"); });
-  evictions_.push_back(Eviction{Replay::JobRef{event.task, event.job}, job.worker});
+  if (mode() == Preemption::Full) evictions_.push_back(Eviction{Replay::JobRef{event.task, event.job}, job.worker});
   if (mode() != Preemption::Cooperative || !exact()) return;
   const Duration region = context_.replay.task(event.task).region;
   const Duration executed = job.executed + (event.time - job.on_worker_since);
@@ -130,7 +150,9 @@ void DispatchRules::preempted(const JobEvent &event, const LiveJob &job) {
 void DispatchRules::resumed(const JobEvent &event, const LiveJob &job) {
   context_.expect(Rule::Preemption, mode() != Preemption::None, event.task, event.job,
                   [] { return std::string("resumed on a platform without preemption"); });
-  if (job.state == State::Suspended) check_choice(job, job.raised);
+  if (job.state != State::Suspended) return;
+  check_eviction(event, job);
+  check_choice(job, job.raised);
 }
 
 void DispatchRules::ended(const JobEvent &event, const LiveJob &job) {
@@ -163,7 +185,11 @@ void DispatchRules::end_of_instant() {
                     [&] { return "it was eligible and more urgent, but " + name(complaint.chosen) + " was chosen"; });
   }
   complaints_.clear();
-  check_evictions();
+  for (const Eviction &eviction : evictions_) {
+    context_.expect(Rule::Preemption, false, eviction.job.task, eviction.job.number,
+                    [] { return std::string("preempted by nobody"); });
+  }
+  evictions_.clear();
   check_free_workers();
   if (mode() == Preemption::Full) check_running();
 }
@@ -181,24 +207,6 @@ void DispatchRules::end_of_trace() {
     context_.expect(Rule::Execution, executed < demand, job->task, job->number,
                     [&] { return "it never ended, although it needs only " + format_duration(demand); });
   }
-}
-
-// Who preempted must outrank whom it preempted.
-void DispatchRules::check_evictions() {
-  const Replay &replay = context_.replay;
-  for (const Eviction &eviction : evictions_) {
-    const LiveJob *job = replay.find(eviction.job.task, eviction.job.number);
-    if (job == nullptr || job->state != State::Suspended || eviction.worker >= replay.worker_count()) continue;
-    const LiveJob *by = replay.running(eviction.worker);
-    // Where levels are shared, the job may inherit from one that was looked at only after the preemption: so its own
-    // level decides, and what it inherits only in the total order.
-    const bool outranked = by != nullptr && replay.preempts(by->raised, job->own) && by->raised < urgency_of(*job);
-    context_.expect(Rule::Preemption, outranked, eviction.job.task, eviction.job.number, [&] {
-      return by == nullptr ? std::string("preempted by nobody")
-                           : "preempted by " + context_.job_name(by->task, by->number) + ", which does not outrank it";
-    });
-  }
-  evictions_.clear();
 }
 
 void DispatchRules::check_free_workers() {

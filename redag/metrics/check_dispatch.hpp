@@ -33,12 +33,12 @@ class DispatchRules {
   void dispatched(const JobEvent &event, const LiveJob &job);
   void check_bounds(const JobEvent &event);
   void check_place(const JobEvent &event, const LiveJob &job);
+  void check_eviction(const JobEvent &event, const LiveJob &by);
   void check_choice(const LiveJob &chosen, const Urgency &urgency);
   void deferred(const JobEvent &event);
   void preempted(const JobEvent &event, const LiveJob &job);
   void resumed(const JobEvent &event, const LiveJob &job);
   void ended(const JobEvent &event, const LiveJob &job);
-  void check_evictions();
   void check_free_workers();
   void check_running();
   [[nodiscard]] Urgency urgency_of(const LiveJob &job) const;

@@ -3,7 +3,7 @@
 //
 // Simultaneous events: several decisions can share one time. A choice against an eligible job counts as a violation
 // only if that job has still not started when time moves on; states (free workers, priorities) are judged when time
-// moves on.
+// moves on, preemptions when the more urgent job gets the worker.
 #pragma once
 
 #include "redag/metrics/check_report.hpp"

@@ -501,6 +501,29 @@ TEST(CheckTrace, PriorityIsInherited) {
   expect_broken(t.preempted("lo", 0, 0).dispatched("mid", 0, 0, 17).until(3), Rule::Priority);
 }
 
+// Threads decide more than once at what their clocks call one instant: what lo inherits after mid took its worker takes
+// nothing back, where lo cannot return at once (cooperative; a level that it shares with mid).
+TEST(CheckTrace, WhatIsInheritedTooLateKeepsNobodyFromPreempting) {
+  for (const PreemptionMode mode : {PreemptionMode::Cooperative, PreemptionMode::Os}) {
+    Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "g", 5}}), make_dag("b", {{"mid", 15, 3, {}, "", 5}}),
+                                make_dag("c", {{"lo", 20, 9, {}, "g"}})},
+                               1, mode);
+    w.dags[2].tasks[0].region = 5 * kMillisecond;
+    const auto run = [&](bool too_late) {
+      TraceBuilder t(w);
+      t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(5).arrives("mid", 0);
+      if (!too_late) t.arrives("hi", 0);
+      t.preempted("lo", 0, 0).dispatched("mid", 0, 0, 20);
+      if (too_late) t.arrives("hi", 0);
+      trace::Trace trace = t.until(6);
+      if (mode == PreemptionMode::Os) trace.info.config.levels = 2;  // hi and mid share one
+      return trace;
+    };
+    expect_kept(run(true), Rule::Preemption);
+    expect_broken(run(false), Rule::Preemption);
+  }
+}
+
 TEST(CheckTrace, WorkIsConserved) {
   TraceBuilder t(two_tasks());
   expect_broken(t.at(0).arrives("hi", 0).arrives("lo", 0).until(1), Rule::WorkConservation);
