@@ -150,7 +150,7 @@ class Run {
     if (alive_.use_count() != 1) return "bodies are left over\n" + verdict;
     for (std::size_t fault = 0; fault < kFaultNames.size(); ++fault) survived[kFaultNames[fault]] += faults_[fault];
     survived["exceptions told"] += exceptions_;
-    survived["DAGs added while running"] += dags_.size();
+    survived["DAGs, most of them added while running"] += dags_.size();
     survived["runs with processors taken away"] += moved ? 1 : 0;
     survived[fmt::format("runs, preemption {}", to_string(trace_preemption_))] += 1;
     survived["runs with more tasks than priority levels"] += levels_shared_ ? 1 : 0;
