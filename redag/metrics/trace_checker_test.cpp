@@ -392,6 +392,7 @@ TEST(CheckTrace, FullPreemption) {
   expect_broken(preemptive(PreemptionMode::Os).until(6), Rule::Priority);  // hi waits
   TraceBuilder nobody = preemptive(PreemptionMode::Os);
   expect_broken(nobody.preempted("lo", 0, 0).until(6), Rule::WorkConservation);
+  expect_broken(nobody.until(6), Rule::Preemption);
   TraceBuilder not_here = preemptive(PreemptionMode::None);
   expect_broken(not_here.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).until(6), Rule::Preemption);
   TraceBuilder forgotten = preemptive(PreemptionMode::Os);
@@ -499,6 +500,15 @@ TEST(CheckTrace, PriorityIsInherited) {
   good.at(4).finished("lo", 0, 0).dispatched("hi", 0, 0, 11).at(5).finished("hi", 0, 0).dispatched("mid", 0, 0, 17);
   expect_kept(good.until(6), Rule::Priority);
   expect_broken(t.preempted("lo", 0, 0).dispatched("mid", 0, 0, 17).until(3), Rule::Priority);
+
+  // mid came first: lo takes the worker back when hi waits for it, and not before.
+  TraceBuilder back(w);
+  back.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(2).arrives("mid", 0);
+  back.preempted("lo", 0, 0).dispatched("mid", 0, 0, 17).at(3);
+  TraceBuilder inherits = back;
+  inherits.arrives("hi", 0).preempted("mid", 0, 0).resumed("lo", 0, 0);
+  expect_kept(inherits.until(4), Rule::Preemption);
+  expect_broken(back.preempted("mid", 0, 0).resumed("lo", 0, 0).until(4), Rule::Preemption);
 }
 
 // Threads decide more than once at what their clocks call one instant: what lo inherits after mid took its worker takes
