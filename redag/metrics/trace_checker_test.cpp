@@ -501,8 +501,10 @@ TEST(CheckTrace, PriorityIsInherited) {
   expect_kept(good.until(6), Rule::Priority);
   expect_broken(t.preempted("lo", 0, 0).dispatched("mid", 0, 0, 17).until(3), Rule::Priority);
 
-  // mid came first: lo takes the worker back when hi waits for it, and not before.
-  TraceBuilder back(w);
+  // mid comes first: lo takes the worker back when hi waits for it, and not before.
+  Workload late = w;
+  late.dags[0].tasks[0].offset = 3 * kMillisecond;
+  TraceBuilder back(late);
   back.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(2).arrives("mid", 0);
   back.preempted("lo", 0, 0).dispatched("mid", 0, 0, 17).at(3);
   TraceBuilder inherits = back;
