@@ -141,7 +141,7 @@ class Run {
     move_to(usable_);
     signalled = nullptr;
     executor_->drain(events_);
-    const std::string verdict = judge();
+    std::string verdict = judge();
     executor_.reset();
     // A thread that was joined can be listed for a moment more.
     const Time give_up = runtime::monotonic_now() + 10 * kSecond;
