@@ -1,4 +1,5 @@
-// Every rule with a trace that keeps it and at least one that breaks it, written by hand.
+// Every rule with a trace that keeps it and at least one that breaks it, written by hand; those of preemption and of
+// overload in check_dispatch_test.cpp and check_overload_test.cpp.
 #include "redag/metrics/trace_checker.hpp"
 
 #include <gtest/gtest.h>
@@ -374,93 +375,6 @@ TEST(CheckTrace, WorkersRunOneJobAtATime) {
   expect_broken(nowhere.at(1).finished("hi", 0, 0).dispatched("lo", 0, 5, 20).until(2), Rule::Worker);
 }
 
-// lo runs from 0; hi comes at 5 (offset).
-TraceBuilder preemptive(PreemptionMode mode, Duration region_ms = 0) {
-  Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "", 5}}), make_dag("b", {{"lo", 20, 8}})}, 1, mode);
-  w.dags[1].tasks[0].region = region_ms * kMillisecond;
-  TraceBuilder t(w);
-  t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(5).arrives("hi", 0);
-  return t;
-}
-
-TEST(CheckTrace, FullPreemption) {
-  TraceBuilder good = preemptive(PreemptionMode::Os);
-  good.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).at(6).finished("hi", 0, 0).resumed("lo", 0, 0);
-  good.at(9).finished("lo", 0, 0);
-  expect_kept(good.until(10), Rule::Preemption);
-
-  expect_broken(preemptive(PreemptionMode::Os).until(6), Rule::Priority);  // hi waits
-  TraceBuilder nobody = preemptive(PreemptionMode::Os);
-  expect_broken(nobody.preempted("lo", 0, 0).until(6), Rule::WorkConservation);
-  expect_broken(nobody.until(6), Rule::Preemption);
-  TraceBuilder not_here = preemptive(PreemptionMode::None);
-  expect_broken(not_here.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).until(6), Rule::Preemption);
-  TraceBuilder forgotten = preemptive(PreemptionMode::Os);
-  forgotten.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).at(6).finished("hi", 0, 0);
-  expect_broken(forgotten.until(8), Rule::WorkConservation);
-  TraceBuilder ended = preemptive(PreemptionMode::Os);
-  ended.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).finished("lo", 0, 0);
-  expect_broken(ended.until(6), Rule::Life);
-}
-
-TEST(CheckTrace, OnlyTheMoreUrgentPreempt) {
-  TraceBuilder t(make_workload({make_dag("a", {{"hi", 10, 5}}), make_dag("b", {{"lo", 20, 4, {}, "", 2}})}, 1,
-                               PreemptionMode::Os));
-  t.at(0).arrives("hi", 0).dispatched("hi", 0, 0, 10).at(2).arrives("lo", 0);
-  t.preempted("hi", 0, 0).dispatched("lo", 0, 0, 22);
-  expect_broken(t.until(3), Rule::Preemption);
-  expect_broken(t.until(3), Rule::Priority);
-}
-
-TEST(CheckTrace, TasksThatShareALevelDoNotPreempt) {
-  TraceBuilder waits = preemptive(PreemptionMode::Os);
-  trace::Trace shared = waits.until(6);
-  shared.info.config.levels = 1;
-  expect_kept(shared, Rule::Priority);
-  trace::Trace preempts = waits.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).until(6);
-  preempts.info.config.levels = 1;
-  expect_broken(preempts, Rule::Preemption);
-}
-
-TEST(CheckTrace, CooperativePreemptionAtPointsAndLifo) {
-  TraceBuilder good = preemptive(PreemptionMode::Cooperative, 3);  // points at 3 and 6
-  good.at(6).preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).at(7).finished("hi", 0, 0).resumed("lo", 0, 0);
-  good.at(9).finished("lo", 0, 0);
-  expect_kept(good.until(10), Rule::Preemption);
-
-  TraceBuilder between = preemptive(PreemptionMode::Cooperative, 3);
-  expect_broken(between.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).until(6), Rule::Preemption);
-  TraceBuilder not_last = preemptive(PreemptionMode::Cooperative, 3);
-  not_last.at(6).preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).finished("lo", 0, 0);
-  expect_broken(not_last.until(7), Rule::Life);
-  TraceBuilder idle = preemptive(PreemptionMode::Cooperative, 3);
-  idle.at(6).preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).at(7).finished("hi", 0, 0);
-  expect_broken(idle.until(8), Rule::WorkConservation);
-}
-
-TEST(CheckTrace, CooperativeResumesOnlyBelowEverybodyElse) {
-  Workload w = make_workload(
-      {make_dag("a", {{"h1", 10, 2, {}, "", 5}, {"h2", 10, 2, {}, "", 6}}), make_dag("b", {{"lo", 20, 9}})}, 1,
-      PreemptionMode::Cooperative);
-  w.dags[1].tasks[0].region = 5 * kMillisecond;
-  TraceBuilder t(w);
-  t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(5).arrives("h1", 0);
-  t.preempted("lo", 0, 0).dispatched("h1", 0, 0, 15).at(6).arrives("h2", 0).at(7).finished("h1", 0, 0);
-  TraceBuilder good = t;
-  good.dispatched("h2", 0, 0, 16).at(9).finished("h2", 0, 0).resumed("lo", 0, 0);
-  expect_kept(good.until(10), Rule::Priority);
-  expect_broken(t.resumed("lo", 0, 0).until(8), Rule::Priority);
-}
-
-TEST(CheckTrace, CooperativePrefersAFreeWorker) {
-  Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "", 5}}), make_dag("b", {{"lo", 20, 8}})}, 2,
-                             PreemptionMode::Cooperative);
-  w.dags[1].tasks[0].region = 5 * kMillisecond;
-  TraceBuilder t(w);
-  t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(5).arrives("hi", 0);
-  expect_broken(t.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).until(6), Rule::Priority);
-}
-
 TEST(CheckTrace, PriorityOfTheChosen) {
   TraceBuilder t(two_tasks());
   t.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("lo", 0, 0, 20);
@@ -485,54 +399,6 @@ TEST(CheckTrace, PriorityFollowsThePolicy) {
   for (const PolicyKind policy : {PolicyKind::DeadlineMonotonic, PolicyKind::Edf, PolicyKind::Fifo}) {
     EXPECT_TRUE(run(policy, "lo", 6)) << to_string(policy);
     EXPECT_FALSE(run(policy, "hi", 12)) << to_string(policy);
-  }
-}
-
-// lo holds the group that hi wants; mid must not run in between (one worker, full preemption).
-TEST(CheckTrace, PriorityIsInherited) {
-  const Workload w =
-      make_workload({make_dag("a", {{"hi", 10, 1, {}, "g", 1}}), make_dag("b", {{"mid", 15, 3, {}, "", 2}}),
-                     make_dag("c", {{"lo", 20, 4, {}, "g"}})},
-                    1, PreemptionMode::Os);
-  TraceBuilder t(w);
-  t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(1).arrives("hi", 0).at(2).arrives("mid", 0);
-  TraceBuilder good = t;
-  good.at(4).finished("lo", 0, 0).dispatched("hi", 0, 0, 11).at(5).finished("hi", 0, 0).dispatched("mid", 0, 0, 17);
-  expect_kept(good.until(6), Rule::Priority);
-  expect_broken(t.preempted("lo", 0, 0).dispatched("mid", 0, 0, 17).until(3), Rule::Priority);
-
-  // mid comes first: lo takes the worker back when hi waits for it, and not before.
-  Workload late = w;
-  late.dags[0].tasks[0].offset = 3 * kMillisecond;
-  TraceBuilder back(late);
-  back.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(2).arrives("mid", 0);
-  back.preempted("lo", 0, 0).dispatched("mid", 0, 0, 17).at(3);
-  TraceBuilder inherits = back;
-  inherits.arrives("hi", 0).preempted("mid", 0, 0).resumed("lo", 0, 0);
-  expect_kept(inherits.until(4), Rule::Preemption);
-  expect_broken(back.preempted("mid", 0, 0).resumed("lo", 0, 0).until(4), Rule::Preemption);
-}
-
-// Threads decide more than once at what their clocks call one instant: what lo inherits after mid took its worker takes
-// nothing back, where lo cannot return at once (cooperative; a level that it shares with mid).
-TEST(CheckTrace, WhatIsInheritedTooLateKeepsNobodyFromPreempting) {
-  for (const PreemptionMode mode : {PreemptionMode::Cooperative, PreemptionMode::Os}) {
-    Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "g", 5}}), make_dag("b", {{"mid", 15, 3, {}, "", 5}}),
-                                make_dag("c", {{"lo", 20, 9, {}, "g"}})},
-                               1, mode);
-    w.dags[2].tasks[0].region = 5 * kMillisecond;
-    const auto run = [&](bool too_late) {
-      TraceBuilder t(w);
-      t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(5).arrives("mid", 0);
-      if (!too_late) t.arrives("hi", 0);
-      t.preempted("lo", 0, 0).dispatched("mid", 0, 0, 20);
-      if (too_late) t.arrives("hi", 0);
-      trace::Trace trace = t.until(6);
-      if (mode == PreemptionMode::Os) trace.info.config.levels = 2;  // hi and mid share one
-      return trace;
-    };
-    expect_kept(run(true), Rule::Preemption);
-    expect_broken(run(false), Rule::Preemption);
   }
 }
 

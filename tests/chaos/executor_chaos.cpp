@@ -323,7 +323,7 @@ class Run {
   std::vector<int> usable_;
   bool points_ = false;
   double fault_rate_ = 0;
-  bool crowded_ = false;  // soon more tasks than the system has priority levels
+  bool crowded_ = false;  // many DAGs at a time: often more tasks than the system has priority levels
   PolicyKind policy_ = PolicyKind::RateMonotonic;
   PreemptionMode trace_preemption_ = PreemptionMode::None;
   bool levels_shared_ = false;  // for some time, perhaps
