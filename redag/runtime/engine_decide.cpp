@@ -28,15 +28,16 @@ Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot belo
       if (event.kind == JobEventKind::Skipped && listener) locked.tell(listener, event.reason);
     }
   }
+  const bool shares = share_ && can_give_way();
+  if (shares && !share_is_kept_ && (unfinished_ > 0 || !step.dispatches.empty())) {
+    // Before any job: one that is above the calling thread may keep it from all that comes after. And the keeper, above
+    // all, waits for the lock, so that until then nobody preempts its owner.
+    share_is_kept_ = true;
+    share_keeper_->parker.unpark();
+  }
   const Next next = place(locked, step, self, below);
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
-  if (share_ && can_give_way()) {
-    share_->set_busy(priorities_.any_realtime(), now);
-    if (!share_is_kept_ && unfinished_ > 0) {
-      share_is_kept_ = true;
-      locked.wake_share_keeper();
-    }
-  }
+  if (shares) share_->set_busy(priorities_.any_realtime(), now);
   return next;
 }
 

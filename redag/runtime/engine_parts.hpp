@@ -125,7 +125,6 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   explicit Locked(Engine &engine) REDAG_ACQUIRE(engine.lock_) : engine_(engine) { engine_.lock_.lock(); }
   ~Locked() REDAG_RELEASE() {
     engine_.lock_.unlock();
-    if (wakes_keeper_) engine_.share_keeper_->parker.unpark();
     for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
     for (std::size_t i = 0; i < skip_count_; ++i) {
       few_skips_[i].listener->skipped(few_skips_[i].reason);
@@ -151,7 +150,6 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
     more_skips_.clear();
   }
 
-  void wake_share_keeper() { wakes_keeper_ = true; }
   void wake(Thread &thread) {
     if (engine_.realtime() || count_ == late_.size()) {
       thread.parker.unpark();
@@ -175,7 +173,6 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   std::vector<Skip> more_skips_;
   std::array<Thread *, 32> late_;
   std::size_t count_ = 0;
-  bool wakes_keeper_ = false;
 };
 
 }  // namespace redag::runtime

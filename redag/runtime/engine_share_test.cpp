@@ -1,6 +1,7 @@
 // Real-time throttling on threads: who leaves the real-time class before the kernel takes a processor from all. What
 // the kernel leaves is said by the test, and is mostly nothing: then what gives way does so all the time.
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <atomic>
@@ -72,6 +73,24 @@ class EngineShare : public ::testing::Test {
   std::unique_ptr<Engine> engine_;
 };
 
+// The calling thread, and threads that it starts, for as long as this lives.
+class OnOneProcessor {
+ public:
+  OnOneProcessor() {
+    EXPECT_EQ(sched_getaffinity(0, sizeof(before_), &before_), 0);
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(static_cast<std::size_t>(usable_cpus().back()), &one);
+    EXPECT_EQ(sched_setaffinity(0, sizeof(one), &one), 0);
+  }
+  ~OnOneProcessor() { sched_setaffinity(0, sizeof(before_), &before_); }
+  OnOneProcessor(const OnOneProcessor &) = delete;
+  OnOneProcessor &operator=(const OnOneProcessor &) = delete;
+
+ private:
+  cpu_set_t before_{};
+};
+
 TEST_F(EngineShare, AJobOfLowerCriticalityGivesWayAndComesBack) {
   bool gave_way = false;
   bool came_back = false;
@@ -116,6 +135,23 @@ TEST_F(EngineShare, AJobOfHighCriticalityNeverDoes) {
   finish();
   EXPECT_TRUE(gave_way);
   EXPECT_EQ(ordinary, 0);
+}
+
+// The job takes the only processor from the ordinary thread that releases it, in the middle of that, and keeps it until
+// the kernel throttles: after most of a second.
+TEST_F(EngineShare, AJobGivesWayThatPreemptsWhoReleasesIt) {
+  const OnOneProcessor one;
+  Duration used = kNever;
+  start(kNothingIsLeft, Criticality::Low, Criticality::High,
+        {[&](const Job &) {
+           const Time begin = thread_cpu_now();
+           if (wait_for([] { return own_priority() == 0; })) used = thread_cpu_now() - begin;
+           return Outcome::Finished;
+         },
+         [](const Job &) { return Outcome::Finished; }});
+  release(0);
+  finish();
+  EXPECT_LT(used, kSecond / 2);
 }
 
 // A thread keeps a higher priority for a job that is expected to be short: not for one that gives way.
