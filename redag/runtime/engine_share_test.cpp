@@ -138,20 +138,22 @@ TEST_F(EngineShare, AJobOfHighCriticalityNeverDoes) {
 }
 
 // The job takes the only processor from the ordinary thread that releases it, in the middle of that, and keeps it until
-// the kernel throttles: after most of a second.
+// the kernel serves ordinary threads again: that is up to a second, by chance less.
 TEST_F(EngineShare, AJobGivesWayThatPreemptsWhoReleasesIt) {
   const OnOneProcessor one;
-  Duration used = kNever;
-  start(kNothingIsLeft, Criticality::Low, Criticality::High,
-        {[&](const Job &) {
-           const Time begin = thread_cpu_now();
-           if (wait_for([] { return own_priority() == 0; })) used = thread_cpu_now() - begin;
-           return Outcome::Finished;
-         },
-         [](const Job &) { return Outcome::Finished; }});
-  release(0);
-  finish();
-  EXPECT_LT(used, kSecond / 2);
+  for (int round = 0; round < 5; ++round) {
+    Duration used = kNever;
+    start(kNothingIsLeft, Criticality::Low, Criticality::High,
+          {[&](const Job &) {
+             const Time begin = thread_cpu_now();
+             if (wait_for([] { return own_priority() == 0; })) used = thread_cpu_now() - begin;
+             return Outcome::Finished;
+           },
+           [](const Job &) { return Outcome::Finished; }});
+    release(0);
+    finish();
+    EXPECT_LT(used, 100 * kMillisecond);
+  }
 }
 
 // A thread keeps a higher priority for a job that is expected to be short: not for one that gives way.
