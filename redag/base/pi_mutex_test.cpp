@@ -36,6 +36,7 @@ TEST(PiMutex, CountsRightUnderContention) {
     }
   };
   std::vector<std::thread> threads;
+  threads.reserve(8);
   for (int i = 0; i < 8; ++i) threads.emplace_back(add);
   for (std::thread &thread : threads) thread.join();
   EXPECT_EQ(count, 80'000);
