@@ -6,321 +6,34 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <future>
 #include <memory>
-#include <mutex>
-#include <random>
-#include <set>
-#include <stdexcept>
+#include <string>
 #include <thread>
 #include <tuple>
 #include <vector>
 
+#include "churn_nodes.hpp"
 #include "environment.hpp"
 #include "process_tasks.hpp"
-#include "rclcpp/rclcpp.hpp"
-#include "redag/runtime/preemption_point.hpp"
-#include "redag_rclcpp/executor.hpp"
 #include "spinning.hpp"
-#include "test_msgs/msg/strings.hpp"
-#include "test_msgs/srv/empty.hpp"
 
 namespace redag_rclcpp {
 namespace {
 
 using namespace std::chrono_literals;
+using churn::below;
+using churn::Churn;
+using churn::Counts;
+using churn::EmptyService;
+using churn::Gardener;
+using churn::Random;
 using std::chrono::steady_clock;
 using test_msgs::msg::Strings;
-using EmptyService = test_msgs::srv::Empty;
-using Random = std::mt19937_64;
 
 constexpr int kThreads = 3;
-constexpr std::size_t kNodesOfAThread = 3;
-constexpr std::size_t kEntitiesOfANode = 12;
-
-std::uint64_t below(Random &random, std::uint64_t end) { return random() % end; }
-
-void burn(std::chrono::microseconds time) {
-  for (const auto end = steady_clock::now() + time; steady_clock::now() < end;) redag::preemption_point();
-}
-
-/// A node with what it has, which its own callbacks change too.
-struct Patch {
-  rclcpp::Node::SharedPtr node;
-  std::mutex lock;  // the rest
-  Random random;
-  std::vector<rclcpp::CallbackGroup::SharedPtr> groups;
-  std::vector<rclcpp::TimerBase::SharedPtr> timers;
-  std::vector<rclcpp::SubscriptionBase::SharedPtr> subscriptions;
-  std::vector<rclcpp::Publisher<Strings>::SharedPtr> publishers;
-  std::vector<rclcpp::ServiceBase::SharedPtr> services;
-  std::vector<rclcpp::Client<EmptyService>::SharedPtr> clients;
-};
-
-struct Counts {
-  std::atomic<std::uint64_t> operations{0};
-  std::atomic<std::uint64_t> callbacks{0};
-  std::atomic<std::uint64_t> thrown{0};
-  std::atomic<std::uint64_t> silent{0};  // callbacks that nothing calls
-};
-
-/// The changes, at random.
-class Churn {
- public:
-  explicit Churn(Counts &counts) : counts_(counts) {
-    for (std::uint64_t i = 0; i < kTopics; ++i) {
-      publishers_.push_back(here_->create_publisher<Strings>(topic(i), rclcpp::QoS(10)));
-    }
-  }
-
-  std::shared_ptr<Patch> make_patch(std::uint64_t seed) {
-    auto patch = std::make_shared<Patch>();
-    patch->random.seed(seed);
-    Random &random = patch->random;
-    // No parameter events: where they arrive they use the node's time source, which Humble destroys under them when a
-    // node is dropped, whatever the executor.
-    const auto options = rclcpp::NodeOptions()
-                             .use_intra_process_comms(below(random, 2) == 0)
-                             .start_parameter_services(below(random, 8) == 0)
-                             .start_parameter_event_publisher(false);
-    patch->node = std::make_shared<rclcpp::Node>("patch" + std::to_string(next_++), options);
-    {
-      const std::lock_guard guard(lock_);
-      nodes_.push_back(patch->node);
-    }
-    add_silent(*patch);
-    const std::lock_guard guard(patch->lock);
-    for (int i = 0; i < 5; ++i) add(patch);
-    return patch;
-  }
-
-  // With the patch's lock held, from here on.
-
-  void add(const std::shared_ptr<Patch> &patch) {
-    const std::size_t entities =
-        patch->timers.size() + patch->subscriptions.size() + patch->services.size() + patch->clients.size();
-    if (entities >= kEntitiesOfANode) return;
-    switch (below(patch->random, 6)) {
-      case 0:
-      case 1: return add_timer(patch);
-      case 2: return add_subscription(patch);
-      case 3: return add_publisher(*patch);
-      case 4: return add_service(*patch);
-      default: patch->clients.push_back(patch->node->create_client<EmptyService>("~/work"));
-    }
-  }
-
-  void take_away(Patch &patch) {
-    switch (below(patch.random, 6)) {
-      case 0: return drop(patch, patch.timers);
-      case 1: return drop(patch, patch.subscriptions);
-      case 2: return drop(patch, patch.publishers);
-      case 3: return drop(patch, patch.services);
-      case 4: return drop(patch, patch.clients);
-      default: drop(patch, patch.groups);
-    }
-  }
-
-  void use(Patch &patch) {
-    if (!patch.timers.empty()) {
-      auto &timer = *patch.timers[below(patch.random, patch.timers.size())];
-      below(patch.random, 2) == 0 ? timer.cancel() : timer.reset();
-    }
-    const auto &publishers = patch.publishers.empty() || below(patch.random, 2) == 0 ? publishers_ : patch.publishers;
-    auto &publisher = *publishers[below(patch.random, publishers.size())];
-    for (int i = 0; i < 3; ++i) publisher.publish(std::make_unique<Strings>());
-    if (!patch.clients.empty()) {
-      auto &client = *patch.clients[below(patch.random, patch.clients.size())];
-      client.async_send_request(std::make_shared<EmptyService::Request>(),
-                                [this](rclcpp::Client<EmptyService>::SharedFuture) { ++counts_.callbacks; });
-    }
-  }
-
-  /// Nodes that somebody still holds.
-  [[nodiscard]] std::size_t living() {
-    const std::lock_guard guard(lock_);
-    return static_cast<std::size_t>(std::count_if(nodes_.begin(), nodes_.end(), [](auto &n) { return !n.expired(); }));
-  }
-
- private:
-  static constexpr std::uint64_t kTopics = 3;
-
-  static std::string topic(std::uint64_t index) { return "/churn" + std::to_string(index); }
-  static std::string topic(Patch &patch) { return topic(below(patch.random, kTopics)); }
-  static rclcpp::QoS depth(Patch &patch) { return rclcpp::QoS(1 + below(patch.random, 10)); }
-
-  template <class Entities>
-  static void drop(Patch &patch, Entities &entities) {
-    if (!entities.empty()) {
-      entities.erase(entities.begin() + static_cast<std::ptrdiff_t>(below(patch.random, entities.size())));
-    }
-  }
-
-  rclcpp::CallbackGroup::SharedPtr group(Patch &patch) {
-    const std::uint64_t choice = below(patch.random, 4);
-    if (choice == 0) return nullptr;
-    if (choice == 1 || patch.groups.empty()) {
-      patch.groups.push_back(patch.node->create_callback_group(below(patch.random, 2) == 0
-                                                                   ? rclcpp::CallbackGroupType::MutuallyExclusive
-                                                                   : rclcpp::CallbackGroupType::Reentrant));
-    }
-    return patch.groups[below(patch.random, patch.groups.size())];
-  }
-
-  void add_timer(const std::shared_ptr<Patch> &patch) {
-    const std::chrono::milliseconds period(2 + below(patch->random, 20));
-    // Now and then longer than the period.
-    const std::chrono::microseconds longest = below(patch->random, 8) == 0 ? period * 3 / 2 : 200us;
-    std::weak_ptr<Patch> weak = patch;
-    patch->timers.push_back(patch->node->create_wall_timer(
-        period, [this, weak, longest] { run(weak, longest); }, group(*patch)));
-  }
-
-  void add_subscription(const std::shared_ptr<Patch> &patch) {
-    rclcpp::SubscriptionOptions options;
-    options.callback_group = group(*patch);
-    patch->subscriptions.push_back(patch->node->create_subscription<Strings>(
-        topic(*patch), depth(*patch),
-        [this, weak = std::weak_ptr<Patch>(patch)](Strings::ConstSharedPtr) { run(weak, 100us); }, options));
-  }
-
-  // Not within the process: rclcpp, up to Rolling at least, locks itself up when a publisher goes while some
-  // subscription gets a message from elsewhere (IntraProcessManager::matches_any_publishers is then the last to hold
-  // it, and its destructor wants the lock that is held there). Those within the process stay: publishers_.
-  void add_publisher(Patch &patch) {
-    rclcpp::PublisherOptions options;
-    options.use_intra_process_comm = rclcpp::IntraProcessSetting::Disable;
-    patch.publishers.push_back(patch.node->create_publisher<Strings>(topic(patch), depth(patch), options));
-  }
-
-  void add_service(Patch &patch) {
-    patch.services.push_back(patch.node->create_service<EmptyService>(
-        "~/work",
-        [this](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) { ++counts_.callbacks; }));
-  }
-
-  /// Nothing ever calls these. Were a task's id used for another's arrivals, they would be given jobs.
-  void add_silent(Patch &patch) {
-    patch.services.push_back(patch.node->create_service<EmptyService>(
-        "~/silent", [this](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) { ++counts_.silent; }));
-    patch.timers.push_back(patch.node->create_wall_timer(1h, [this] { ++counts_.silent; }));
-    patch.subscriptions.push_back(patch.node->create_subscription<Strings>(
-        "/silent", rclcpp::QoS(1), [this](Strings::ConstSharedPtr) { ++counts_.silent; }));
-  }
-
-  void run(const std::weak_ptr<Patch> &weak, std::chrono::microseconds longest) {
-    ++counts_.callbacks;
-    const auto patch = weak.lock();  // perhaps the last to hold it, and its node
-    if (!patch) return;
-    burn(longest);
-    const std::unique_lock guard(patch->lock, std::try_to_lock);
-    if (!guard) return;
-    switch (below(patch->random, 64)) {
-      case 0: return add(patch);
-      case 1: return take_away(*patch);
-      case 2: ++counts_.thrown; throw std::runtime_error("as callbacks do");
-      default: use(*patch);
-    }
-  }
-
-  Counts &counts_;
-  const rclcpp::Node::SharedPtr here_ = std::make_shared<rclcpp::Node>(
-      "here", rclcpp::NodeOptions().use_intra_process_comms(true).start_parameter_services(false));
-  std::vector<rclcpp::Publisher<Strings>::SharedPtr> publishers_;
-  std::atomic<std::uint64_t> next_{0};
-  std::mutex lock_;
-  std::vector<std::weak_ptr<rclcpp::Node>> nodes_;
-};
-
-/// A thread that changes what the executor has, until stopped; then it drops everything.
-class Gardener {
- public:
-  Gardener(ReDAGExecutor &executor, Churn &churn, Counts &counts, std::uint64_t seed)
-      : executor_(executor), churn_(churn), counts_(counts), random_(seed), thread_([this] { work(); }) {}
-  ~Gardener() {
-    stop_ = true;
-    thread_.join();
-  }
-
- private:
-  struct Bed {
-    std::shared_ptr<Patch> patch;
-    std::vector<rclcpp::CallbackGroup::SharedPtr> manual;  // added without the node
-  };
-
-  void work() {
-    while (!stop_) {
-      step();
-      ++counts_.operations;
-      std::this_thread::sleep_for(std::chrono::microseconds(below(random_, 500)));
-    }
-    while (!beds_.empty()) dig_up();
-  }
-
-  void step() {
-    const std::uint64_t choice = below(random_, 32);
-    if (beds_.empty() || (choice < 2 && beds_.size() < kNodesOfAThread)) return plant();
-    if (choice < 4) return dig_up();
-    Bed &bed = beds_[below(random_, beds_.size())];
-    if (choice < 5) {
-      executor_.remove_node(bed.patch->node);
-      executor_.add_node(bed.patch->node);
-      return;
-    }
-    if (choice < 7) return change_manual(bed);
-    if (choice < 8) return look();
-    const std::lock_guard guard(bed.patch->lock);
-    if (choice < 16) return churn_.add(bed.patch);
-    if (choice < 22) return churn_.take_away(*bed.patch);
-    churn_.use(*bed.patch);
-  }
-
-  void plant() {
-    beds_.push_back(Bed{churn_.make_patch(random_()), {}});
-    executor_.add_node(beds_.back().patch->node);
-  }
-
-  void dig_up() {
-    const std::size_t position = below(random_, beds_.size());
-    const Bed bed = beds_[position];
-    beds_.erase(beds_.begin() + static_cast<std::ptrdiff_t>(position));
-    // Else it is dropped as it is.
-    if (below(random_, 2) == 0) executor_.remove_node(bed.patch->node);
-  }
-
-  void change_manual(Bed &bed) {
-    if (!bed.manual.empty()) {
-      const auto group = bed.manual.back();
-      bed.manual.pop_back();
-      if (below(random_, 2) == 0) executor_.remove_callback_group(group);
-      return;
-    }
-    const auto group = bed.patch->node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive, false);
-    bed.manual.push_back(group);
-    const std::lock_guard guard(bed.patch->lock);
-    bed.patch->timers.push_back(bed.patch->node->create_wall_timer(
-        3ms, [counts = &counts_] { ++counts->callbacks; }, group));
-    executor_.add_callback_group(group, bed.patch->node->get_node_base_interface());
-  }
-
-  void look() {
-    for (const CallbackStats &stats : executor_.stats()) {
-      EXPECT_LE(stats.jobs.finished + stats.jobs.skipped + stats.jobs.aborted, stats.jobs.released) << stats.task;
-      EXPECT_FALSE(stats.id.node.empty()) << stats.task;
-    }
-    (void)executor_.learned();
-    (void)executor_.warnings();
-  }
-
-  ReDAGExecutor &executor_;
-  Churn &churn_;
-  Counts &counts_;
-  Random random_;
-  std::vector<Bed> beds_;
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
-};
 
 enum class Driver { Spin, Pull, Restart };
 
