@@ -63,7 +63,7 @@ asan: ## all tests under AddressSanitizer and UndefinedBehaviorSanitizer
 	cmake --build --preset asan-ubsan
 	ctest --preset asan-ubsan
 
-tsan: ## the tests of what has threads, under ThreadSanitizer
+tsan: ## the tests of what has threads, and chaos, under ThreadSanitizer
 	@tools/bootstrap test
 	cmake --preset tsan
 	$(NO_RANDOMISATION) cmake --build --preset tsan
