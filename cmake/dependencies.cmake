@@ -7,6 +7,7 @@ find_package(tl-expected REQUIRED)
 find_package(Threads REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(TBB REQUIRED)
+find_package(ZLIB REQUIRED)
 # yaml-cpp 0.8 renamed its target.
 if(TARGET yaml-cpp::yaml-cpp)
   set(redag_yaml_cpp yaml-cpp::yaml-cpp)

@@ -57,6 +57,16 @@ def with_task(**changes):
 
 
 class SchemaTest(unittest.TestCase):
+    def test_refuses_what_the_loader_refuses(self):
+        for key in ("budget", "region", "period", "deadline", "wcet"):
+            self.assertTrue(errors(with_task(**{key: "0ms"})), key)
+        for key in ("offset", "jitter", "bcet"):
+            self.assertEqual(errors(with_task(**{key: "0ms"})), [], key)
+        for name in ("a\x1bb", "a\u009bb", " a", "a ", "x" * 1001):
+            self.assertTrue(errors(with_task(name=name)), repr(name))
+        self.assertEqual(errors(with_task(name="µ arm 2")), [])
+        self.assertTrue(errors({"dags": [{"name": "d", "max_active": 1000001, "tasks": [TASK]}]}))
+
     def test_is_a_schema(self):
         jsonschema.Draft7Validator.check_schema(SCHEMA)
 

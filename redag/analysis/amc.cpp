@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/one_worker.hpp"
 
 namespace redag::analysis {
@@ -34,6 +35,7 @@ std::optional<std::string> why_not(const System &system) {
     return "jitter in a DAG of lower criticality: HI mode can end between the releases of one instance";
   if (system.threads_suffice_if_bounded) return "fewer threads than tasks: a demoted job may hold the last one";
   if (!system.groups.empty()) return "groups: a job of lower criticality that holds one runs on in HI mode";
+  if (system.frozen > 0) return "stalls of the machine: they can begin or prolong HI mode";
   if (system.platform.preempt_overhead > 0) return "an overhead of preemption: the change of mode preempts, too";
   return std::nullopt;
 }
@@ -57,9 +59,10 @@ struct Others {
   std::vector<std::uint32_t> units;  // of `low`
 };
 
-Others others_of(const System &system, const View &view) {
+Others others_of(const System &system, const std::vector<std::uint32_t> &more_urgent) {
   Others others;
-  for (const std::uint32_t u : view.units) {
+  Effort::spend(more_urgent.size());
+  for (const std::uint32_t u : more_urgent) {
     const Unit &unit = system.units[u];
     others.units.push_back(u);
     others.low.push_back(Interferer{low_volume(system, unit), unit.period, unit.jitter});
@@ -90,10 +93,11 @@ std::vector<Term> terms_of(const System &system, const Unit &unit, const View &v
 
 // HI mode begins at most R(LO) after the start of a busy period in which the unit has a job: in LO mode that would have
 // ended by then. So from lower criticality there are the releases of R(LO), and no more.
-void bound_unit(const System &system, std::uint32_t u, ResponseBound &bound, ModeResponses &modes) {
+void bound_unit(const System &system, one_worker::Views &views, std::uint32_t u, ResponseBound &bound,
+                ModeResponses &modes) {
   const Unit &unit = system.units[u];
-  const View view = one_worker::view_of(system, u);
-  const Others others = others_of(system, view);
+  const View view = views.of(u);
+  const Others others = others_of(system, views.more_urgent(u));
 
   const FixedPoint low =
       one_worker::preemptive_response(own_of(unit, low_volume(system, unit), view.blocking), others.low);
@@ -117,7 +121,7 @@ void bound_unit(const System &system, std::uint32_t u, ResponseBound &bound, Mod
   if (!change.found) return;
   modes.change = change.found->response;
   bound.response = change.found->response;
-  bound.terms = terms_of(system, unit, view, others, low.found->window, change.found->window);
+  if (Effort::itemises(u)) bound.terms = terms_of(system, unit, view, others, low.found->window, change.found->window);
 }
 
 Outcome apply(const System &system) {
@@ -126,8 +130,9 @@ Outcome apply(const System &system) {
   std::vector<ModeResponses> modes(system.units.size());
   bool low_is_met = true;
   bool high_is_met = true;
+  one_worker::Views views(system);
   for (std::uint32_t u = 0; u < units.size(); ++u) {
-    bound_unit(system, u, units[u], modes[u]);
+    bound_unit(system, views, u, units[u], modes[u]);
     const Duration deadline = std::min(system.units[u].deadline, system.units[u].limit);
     low_is_met = low_is_met && modes[u].low.value_or(kNever) <= deadline;
     if (system.dags[system.units[u].dag.value].high) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "redag/analysis/bound.hpp"
+#include "redag/analysis/effort.hpp"
 
 namespace redag::analysis {
 
@@ -17,6 +18,7 @@ struct MethodReport {
   bool trusted = false;  // it applies and its numbers are sound here
 
   [[nodiscard]] const Bound *bound() const { return std::get_if<Bound>(&outcome); }
+  [[nodiscard]] bool gave_up() const { return bound() == nullptr && std::get<NotApplicable>(outcome).gave_up; }
 };
 
 /// The smallest trusted response bound; of equal ones the first in the order of methods().
@@ -37,15 +39,36 @@ struct Report {
   std::shared_ptr<const std::vector<Method>> owned;
 };
 
-/// Runs methods(). Its cost is that of its dearest method; each states its own.
-[[nodiscard]] Report analyze(const System &system);
+struct AnalysisProgress {
+  const Method &method;
+  std::size_t index = 0;  // of `count` methods
+  std::size_t count = 0;
+  EffortAt at;
+};
+
+struct AnalyzeOptions {
+  std::uint64_t effort = kUsualEffort;  // steps of one method; 0: no limit
+  /// Asked now and then while a method works: a reason, a clause without a period, ends the method. Null: never.
+  std::function<std::string(const AnalysisProgress &progress)> stop;
+  /// n^2 terms in all: of few tasks, or else one at a time with itemised().
+  bool itemise = false;
+};
+
+/// Runs methods(). Memory is linear in the size of the system unless it itemises. A method that is ended is
+/// NotApplicable with `gave_up`; the others say what they say.
+[[nodiscard]] Report analyze(const System &system, const AnalyzeOptions &options = {});
 /// These methods alone; the report keeps them.
-[[nodiscard]] Report analyze(const System &system, std::vector<Method> methods);
+[[nodiscard]] Report analyze(const System &system, std::vector<Method> methods, const AnalyzeOptions &options = {});
+
+/// The same bound with its terms: runs the method again. Requires one with a method.
+[[nodiscard]] ResponseBound itemised(const System &system, const Tightest &tightest, TaskId task);
+[[nodiscard]] ResponseBound itemised(const System &system, const Tightest &tightest, DagId dag);
 
 /// The tightest bounds together, as if one method had given them.
 [[nodiscard]] Bound tightest_of(const Report &report);
 
-/// Is analyze(system).verdict Schedulable? Stops at the first method that says so: for those who ask it often.
+/// Is analyze(system).verdict Schedulable? Asks tests that answer at once first, and stops at the first method that
+/// says so: for those who ask it often. Throws Effort::GaveUp where a scope of the caller's ends it.
 [[nodiscard]] bool is_shown_schedulable(const System &system);
 
 }  // namespace redag::analysis

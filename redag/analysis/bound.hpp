@@ -36,7 +36,7 @@ struct Term {
 };
 
 /// Bound on the response time of every job of a task, or of every instance of a DAG. Invariant: with a response, the
-/// terms add up to it.
+/// terms add up to it; there are none where it was not to be itemised (effort.hpp).
 struct ResponseBound {
   std::optional<Duration> response;  // nothing: no bound, see `absent`
   std::string_view absent;           // why there is none: a sentence without a period
@@ -50,6 +50,7 @@ struct ResponseBound {
 
 struct NotApplicable {
   std::string reason;
+  bool gave_up = false;  // it would apply, and was ended at a limit or by the caller
 };
 
 /// What a task answers within in each mode (amc_rtb); nothing: no bound, or none is given in that mode.
@@ -85,6 +86,7 @@ struct Method {
   std::string_view assumptions;  // when it applies, in words
   std::string_view complexity;
   std::string_view sound_only_if;  // of the paper's own equations; empty: sound wherever it applies
+  bool quick = false;              // about linear in the tasks: worth asking first
   bool knows_modes = false;        // applies where there is a HI mode (System::has_modes)
   std::function<Outcome(const System &system)> apply;
 

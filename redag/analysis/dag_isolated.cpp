@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/global.hpp"
 #include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
@@ -32,6 +33,7 @@ std::vector<std::uint32_t> take_heaviest_path(const System &system, const Unit &
     paths[t] = step;
     if (step.length > paths[last].length) last = t;
   }
+  Effort::spend(unit.tasks.size());
   std::vector<std::uint32_t> taken;
   for (std::uint32_t t = last; t != TaskId::kNoneValue; t = paths[t].before) {
     if (left[t] > 0) taken.push_back(t);
@@ -103,6 +105,7 @@ std::uint32_t own_workers(const System &system, std::size_t dag) {
   std::uint32_t last_rank = 0;
   for (const std::uint32_t t : system.dags[dag].tasks) last_rank = std::max(last_rank, system.tasks[t].rank);
   std::uint64_t others = 0;
+  Effort::spend(system.dags.size());
   for (std::size_t d = 0; d < system.dags.size(); ++d) {
     const SystemDag &other = system.dags[d];
     const bool interferes =

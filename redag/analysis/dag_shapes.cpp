@@ -6,6 +6,7 @@
 
 #include "redag/analysis/arithmetic.hpp"
 #include "redag/analysis/dag_isolated.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/fixed_point.hpp"
 #include "redag/analysis/rate_edges.hpp"
 
@@ -125,6 +126,7 @@ bool respond(std::span<GlobalUnit> units, std::span<const global::Shape> shapes,
     Duration sum = own.volume - own.length;
     for (std::size_t i = 0; i < k; ++i) {
       GlobalUnit &other = units[i];
+      Effort::spend(other.tasks + 1);
       other.work = shapes[i].work(x, other.response, other.period);
       sum += other.work;
     }
@@ -158,6 +160,7 @@ Outcome apply_shapes(const System &system) {
   std::vector<ResponseBound> responses(system.units.size());
   bool known = true;
   for (std::size_t k = 0; k < view.units.size(); ++k) {
+    Effort::reached(k, view.units.size());
     ResponseBound &response = responses[view.units[k].unit];
     if (!known) {
       response.absent = global::kMoreUrgent;

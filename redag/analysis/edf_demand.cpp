@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/rate_edges.hpp"
 
 namespace redag::analysis {
@@ -53,6 +54,7 @@ std::vector<Demand> demands_of(const System &system) {
 
 Duration demand_until(const std::vector<Demand> &demands, Duration t) {
   Int128 sum = 0;
+  Effort::spend(demands.size());
   for (const Demand &task : demands) {
     if (t >= task.deadline) sum += Int128{(t - task.deadline) / task.period + 1} * task.wcet;
   }
@@ -64,6 +66,7 @@ std::optional<Duration> busy_period(const std::vector<Demand> &demands, Duration
   Duration length = 1;
   for (int step = 0; step < kMaxSteps && length < kUnbounded; ++step) {
     Int128 sum = blocking;
+    Effort::spend(demands.size());
     for (const Demand &task : demands) {
       const Duration jitter = task.nominal_deadline - task.deadline;
       sum += Int128{ceil_div(add(length, jitter), task.period)} * task.wcet;

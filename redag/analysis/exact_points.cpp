@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/one_worker.hpp"
 
 namespace redag::analysis {
@@ -15,6 +16,7 @@ std::vector<Duration> points(Duration deadline, const std::vector<one_worker::In
   std::vector<Duration> found = {deadline};
   for (auto task = more_urgent.rbegin(); task != more_urgent.rend(); ++task) {
     const std::size_t count = found.size();
+    Effort::spend(count);
     for (std::size_t i = 0; i < count; ++i) {
       const Duration multiple = found[i] / task->period * task->period;
       if (multiple > 0) found.push_back(multiple);
@@ -27,6 +29,7 @@ std::vector<Duration> points(Duration deadline, const std::vector<one_worker::In
 }
 
 bool fits(Duration start, Duration point, const std::vector<one_worker::Interferer> &more_urgent) {
+  Effort::spend(more_urgent.size());
   Int128 demand = start;
   for (const one_worker::Interferer &other : more_urgent) {
     demand += Int128{ceil_div(point, other.period)} * other.wcet;
@@ -52,8 +55,9 @@ Outcome apply(const System &system) {
   Bound bound;
   bound.accepts = true;
   std::size_t examined = 0;
+  one_worker::Views views(system);
   for (std::uint32_t u = 0; u < system.units.size(); ++u) {
-    const one_worker::View view = one_worker::view_of(system, u);
+    const one_worker::View view = views.of(u);
     const Unit &unit = system.units[u];
     const std::vector<Duration> candidates = points(unit.deadline, view.more_urgent);
     if (candidates.empty()) return NotApplicable{"gave up: more than a million points"};

@@ -65,6 +65,7 @@ std::optional<std::string> why_not_explore(const System &system) {
   if (system.has_rate_edges()) return "edges join tasks of different periods or offsets: see the bounds for DAGs";
   if (system.mode != sched::Preemption::None) return "for jobs that run to completion; here they can be preempted";
   if (system.policy == PolicyKind::Fifo) return "fifo: the order of two jobs depends on when they became ready";
+  if (system.frozen > 0) return "stalls of the machine: they can come at any time";
   const bool has_data =
       std::any_of(system.tasks.begin(), system.tasks.end(), [](const SystemTask &task) { return task.data; });
   if (system.policy == PolicyKind::Edf && has_data) {

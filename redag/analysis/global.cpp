@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/jobs_in_progress.hpp"
 #include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
@@ -150,9 +151,11 @@ void set_width(GlobalUnit &unit, std::uint32_t width) {
   unit.rate = 1.0 / static_cast<double>(unit.turn);
 }
 
-SharedTerms::SharedTerms(const System &system, const GlobalUnit &unit) : system_(system), unit_(unit) {}
+SharedTerms::SharedTerms(const System &system, const GlobalUnit &unit)
+    : system_(system), unit_(unit), wanted_(Effort::itemises(unit.unit)) {}
 
 void SharedTerms::push(Term::Kind kind, const GlobalUnit &whose, Duration amount, std::int64_t jobs) {
+  if (!wanted_) return;
   const Unit &unit = system_.units[whose.unit];
   const TaskId task = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
   terms_.push_back(Term{kind, task, unit.dag, amount, jobs});
@@ -169,6 +172,10 @@ void SharedTerms::add_jitter() {
 
 void SharedTerms::add(Term::Kind kind, const GlobalUnit &whose, Duration amount, std::int64_t jobs) {
   if (amount != 0) push(kind, whose, amount, jobs);
+}
+
+void SharedTerms::add(const Term &term) {
+  if (wanted_ && term.amount != 0) terms_.push_back(term);
 }
 
 void SharedTerms::add_share(Term::Kind kind, const GlobalUnit &whose, Duration numerator, Duration denominator,
@@ -188,6 +195,7 @@ Duration largest_remaining(const System &system, const std::vector<GlobalUnit> &
                            std::uint32_t count) {
   std::vector<Duration> all;
   std::vector<Duration> own;
+  Effort::spend(units.size() - from);
   for (std::size_t u = from; u < units.size(); ++u) {
     own.clear();
     for (const std::uint32_t t : system.units[units[u].unit].tasks) own.push_back(system.tasks[t].wcet - 1);

@@ -81,6 +81,7 @@ struct Division {
 }
 
 /// Terms of a response out of shares of a sum that is divided by the workers and rounded down once: they add up to it.
+/// None where the unit is not to be itemised (effort.hpp).
 class SharedTerms {
  public:
   SharedTerms(const System &system, const GlobalUnit &unit);
@@ -89,16 +90,19 @@ class SharedTerms {
   void add_path();
   void add_jitter();
   void add(Term::Kind kind, const GlobalUnit &whose, Duration amount, std::int64_t jobs = 0);
+  void add(const Term &term);
   /// `numerator` / `denominator` more; what has been added so far is always rounded down once.
   void add_share(Term::Kind kind, const GlobalUnit &whose, Duration numerator, Duration denominator,
                  std::int64_t jobs = 0);
   [[nodiscard]] std::vector<Term> take() { return std::move(terms_); }
+  [[nodiscard]] bool wanted() const { return wanted_; }
 
  private:
   void push(Term::Kind kind, const GlobalUnit &whose, Duration amount, std::int64_t jobs);
 
   const System &system_;
   const GlobalUnit &unit_;
+  bool wanted_;
   std::vector<Term> terms_;
   Duration remainder_ = 0;
   Duration denominator_ = 1;
@@ -111,6 +115,7 @@ class SharedTerms {
 
 inline constexpr std::string_view kExceedsLimit = "its response exceeds the limit: jobs would be skipped";
 inline constexpr std::string_view kMoreUrgent = "something more urgent has no bound";
+inline constexpr std::string_view kPeer = "something of the same priority has no bound";
 inline constexpr std::string_view kNoFixedPoint =
     "no fixed point within its limit, above which jobs would be skipped, in the steps allowed";
 

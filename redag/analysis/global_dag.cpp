@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/fixed_point.hpp"
 #include "redag/analysis/rate_edges.hpp"
 
@@ -31,6 +32,7 @@ class Window {
   }
 
   Duration next(Duration window) {
+    Effort::spend(works_.size() + 1);
     sum_ = 0;
     for (std::size_t i = 0; i < works_.size(); ++i) sum_ += works_[i] = dag_work(more_urgent_[i], window);
     busy_ = busy_instants();
@@ -43,6 +45,7 @@ class Window {
  private:
   // Work of others in so many instants: no DAG does more than its width in each.
   [[nodiscard]] Duration others_in(Duration busy) const {
+    Effort::spend(works_.size() + 1);
     Duration sum = busy > 0 ? blocking_ : 0;
     for (std::size_t i = 0; i < works_.size(); ++i) {
       sum += std::min(works_[i], busy * static_cast<Duration>(more_urgent_[i].width));
@@ -81,6 +84,7 @@ bool melani_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t w
   const auto more_urgent = units.first(k);
   Duration window = own.length + (own.volume - own.length) / workers;
   const bool found = least_fixed_point(own.limit - own.jitter, window, [&](Duration x) {
+    Effort::spend(more_urgent.size() + 1);
     Duration sum = own.volume - own.length;
     for (const GlobalUnit &other : more_urgent) sum += dag_work(other, x);
     return own.length + sum / static_cast<Duration>(workers);
@@ -123,6 +127,7 @@ Bound from_most_urgent(const System &system, const std::vector<GlobalUnit> &unit
   std::vector<ResponseBound> responses(system.units.size());
   bool known = true;
   for (std::size_t k = 0; k < units.size(); ++k) {
+    Effort::reached(k, units.size());
     ResponseBound &response = responses[units[k].unit];
     if (!known) {
       response.absent = global::kMoreUrgent;
@@ -130,7 +135,7 @@ Bound from_most_urgent(const System &system, const std::vector<GlobalUnit> &unit
       response.response = units[k].response;
       SharedTerms terms(system, units[k]);
       terms.add_path();
-      explain(k, terms);
+      if (terms.wanted()) explain(k, terms);
       terms.add_jitter();
       response.terms = terms.take();
     } else {
@@ -221,11 +226,12 @@ class AgainstAll {
 
   // Once all responses agree.
   ResponseBound explain(std::size_t k) {
+    ResponseBound bound;
+    bound.response = units_[k].response;
+    if (!Effort::itemises(units_[k].unit)) return bound;
     std::swap(units_[k], units_.back());
     (void)respond();
     const GlobalUnit &own = units_.back();
-    ResponseBound bound;
-    bound.response = own.response;
     SharedTerms terms(system_, own);
     terms.add_path();
     explain_bounded(units_, units_.size() - 1, workers_, 0, waiting_, terms);

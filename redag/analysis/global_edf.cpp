@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/fixed_point.hpp"
 #include "redag/analysis/global_sequential.hpp"
 #include "redag/analysis/waiting_window.hpp"
@@ -49,6 +50,11 @@ class Edf {
 
   // Once all responses agree.
   ResponseBound explain(std::size_t k) {
+    if (!Effort::itemises(units_[k].unit)) {
+      ResponseBound bound;
+      bound.response = units_[k].response;
+      return bound;
+    }
     (void)respond(k);
     const GlobalUnit &own = units_[k];
     const Duration waiting = own.response - own.jitter - own.volume + 1;
@@ -81,6 +87,7 @@ class Edf {
 
   // least_window() of all others; leaves each one's work in `work`, and in `carried` what of it has a deadline in time.
   Duration window(std::size_t k, Duration d) {
+    Effort::spend(units_.size());
     const bool preempts = system_.mode == sched::Preemption::Full;
     const GlobalUnit &own = units_[k];
     const std::uint32_t workers = system_.platform.workers;
@@ -182,6 +189,7 @@ Method edf_global_density() {
       "m workers, full preemption, edf, no edges, D <= T and no jobs skipped before it, jitter below the deadline; no "
       "shared groups, no max_active";
   method.complexity = "O(n)";
+  method.quick = true;
   method.apply = apply_density;
   return method;
 }

@@ -4,9 +4,10 @@
 #include <vector>
 
 #include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/fixed_point.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/global.hpp"
-#include "redag/analysis/global_dag.hpp"
+#include "redag/analysis/group_windows.hpp"
+#include "redag/analysis/jobs_in_progress.hpp"
 #include "redag/analysis/rate_edges.hpp"
 
 namespace redag::analysis {
@@ -14,190 +15,287 @@ namespace {
 
 using global::GlobalUnit;
 using global::SharedTerms;
+using groups::Chain;
+using groups::Question;
 
-// What a unit does in a group.
-struct Share {
-  std::uint32_t tasks = 0;
-  Duration volume = 0;
-  Duration least = kUnbounded;
-  Duration most = 0;
-};
+constexpr std::string_view kOverlap = "its response can exceed 16 of its periods";
+constexpr std::string_view kMixed = "instances overlap, and where paths of its DAG join data of two of them could meet";
+constexpr std::string_view kSkipped = "a job can wait so long to start that the next release skips it";
+constexpr std::string_view kBinds =
+    "instances overlap, so that its max_active binds: with groups and an overhead of preemption that is not covered";
+constexpr int kMostRounds = 1000;
+
+// Whether a task may answer after its next release. Without preemption, and where other bounds rely on whole units
+// that answer within their period, it may not.
+enum class Beyond : bool { Never, Allowed };
 
 class Analysis {
  public:
-  explicit Analysis(const System &system)
+  Analysis(const System &system, Beyond beyond)
       : system_(system),
         preempts_(system.mode != sched::Preemption::None),
-        view_(global::units_of(
-            system, {.mode = preempts_ ? sched::Preemption::Full : sched::Preemption::None, .groups = true})) {
-    if (view_.reason) return;
-    shares_.assign(view_.units.size(), std::vector<Share>(system.groups.size()));
-    for (std::size_t u = 0; u < view_.units.size(); ++u) {
-      for (const std::uint32_t t : system.units[view_.units[u].unit].tasks) add_task(shares_[u], system.tasks[t]);
-    }
-  }
+        beyond_(preempts_ ? beyond : Beyond::Never),
+        view_(global::units_of(system, {.mode = preempts_ ? sched::Preemption::Full : sched::Preemption::None,
+                                        .bounds = preempts_,
+                                        .groups = true,
+                                        .any_policy = true})),
+        windows_(system, view_.units),
+        answers_(system.tasks.size()),
+        instances_(view_.units.size(), 1) {}
 
   [[nodiscard]] const std::optional<std::string> &reason() const { return view_.reason; }
 
+  // A job that waits for a max_active can find another holder each time, and make it preempt.
+  [[nodiscard]] bool preempts_too_often() const {
+    return system_.platform.preempt_overhead > 0 &&
+           std::any_of(view_.units.begin(), view_.units.end(), [](const GlobalUnit &unit) { return unit.bound > 0; });
+  }
+
   Bound run() {
-    std::vector<ResponseBound> responses(system_.units.size());
+    std::vector<ResponseBound> of_units(system_.units.size());
+    std::vector<ResponseBound> of_tasks(system_.tasks.size());
     bool known = true;
-    for (std::size_t k = 0; k < view_.units.size(); ++k) {
-      ResponseBound &response = responses[view_.units[k].unit];
-      if (!known) {
-        response.absent = global::kMoreUrgent;
-      } else if (respond(k)) {
-        response = itemise(k);
-      } else {
-        known = false;
-        response.absent = global::kNoFixedPoint;
+    for (std::size_t b = 0; b < windows_.blocks().size(); ++b) {
+      const groups::Block &block = windows_.blocks()[b];
+      Effort::reached(block.begin, view_.units.size());
+      std::size_t culprit = block.begin;
+      const std::string_view absent = known ? solve(b, culprit) : global::kMoreUrgent;
+      for (std::size_t k = block.begin; k < block.end; ++k) {
+        const std::uint32_t u = view_.units[k].unit;
+        if (absent.empty()) {
+          of_units[u] = itemise(b, k, last_of(k), false);
+          for (const std::uint32_t t : system_.units[u].tasks) of_tasks[t] = itemise(b, k, t, answers_readiness(t));
+          continue;
+        }
+        of_units[u].absent = known && k != culprit ? global::kPeer : absent;
+        for (const std::uint32_t t : system_.units[u].tasks) of_tasks[t].absent = of_units[u].absent;
       }
+      known = known && absent.empty();
     }
-    return from_units(system_, std::move(responses));
+    Bound bound = from_units(system_, std::move(of_units));
+    if (beyond_ == Beyond::Allowed) bound.tasks = std::move(of_tasks);
+    return bound;
   }
 
  private:
-  // The waits in one window.
-  struct Waits {
-    Duration shared = 0;  // work that all workers do together
-    Duration serial = 0;  // for groups
+  // The window that a task's response comes from.
+  struct Answer {
+    std::uint32_t instances = 1;
+    Duration repeated = 0;  // the largest response of a job that waits for its task's previous one
+    Duration from_ready = 0;
   };
 
-  static void add_task(std::vector<Share> &shares, const SystemTask &task) {
-    if (task.group == kNoGroup) return;
-    Share &share = shares[task.group];
-    ++share.tasks;
-    share.volume = add(share.volume, task.wcet);
-    share.least = std::min(share.least, task.wcet);
-    share.most = std::max(share.most, task.wcet);
+  [[nodiscard]] const std::vector<std::uint32_t> &tasks_of(std::size_t k) const {
+    return system_.units[view_.units[k].unit].tasks;
   }
 
-  // Work of one DAG's members of a group in a window: they run one after the other, like one task.
-  [[nodiscard]] static Duration serial_work(const GlobalUnit &dag, const Share &share, Duration x) {
-    if (share.tasks == 0) return 0;
-    const Duration until = x + dag.response - share.volume;
-    return until / dag.period * share.volume + std::min(share.volume, until % dag.period);
+  [[nodiscard]] bool waits_for_group(std::uint32_t t) const { return preempts_ && system_.tasks[t].group != kNoGroup; }
+
+  [[nodiscard]] Duration latest(const GlobalUnit &unit) const {
+    return beyond_ == Beyond::Allowed ? multiply(unit.period, groups::kMostInstances) : unit.limit;
   }
 
-  // Of the group's members in the DAG at least one is on the path that waits, or the path does not wait for the group.
-  [[nodiscard]] static Duration own_others(const Share &share) {
-    return share.tasks > 1 ? share.volume - share.least : 0;
-  }
-
-  // What is left of the longest less urgent member, once it has started.
-  [[nodiscard]] Duration longest_holder(std::size_t k, std::size_t group) const {
-    Duration most = 0;
-    for (std::size_t l = k + 1; l < shares_.size(); ++l) most = std::max(most, shares_[l][group].most - 1);
-    return most;
-  }
-
-  // One that started before the task on the path became ready: once a task on the path.
-  [[nodiscard]] Duration less_urgent(std::size_t k, std::size_t group) const {
-    return multiply(longest_holder(k, group), shares_[k][group].tasks);
-  }
-
-  // With preemption a less urgent job takes a worker only while it holds the group that an own or a more urgent job
-  // waits for: each of these finds at most one such holder. Those of own jobs are in less_urgent(), in full.
-  [[nodiscard]] Duration inherited(std::size_t k, Duration x) const {
-    Duration sum = 0;
-    for (std::size_t g = 0; g < system_.groups.size(); ++g) {
-      Duration waiting = 0;
-      for (std::size_t j = 0; j < k; ++j) waiting += jobs_of_group(j, g, x);
-      sum = add(sum, multiply(longest_holder(k, g), waiting));
-    }
-    return sum;
-  }
-
-  // In progress at some time in the window.
-  [[nodiscard]] Duration jobs_of_group(std::size_t j, std::size_t group, Duration x) const {
-    const GlobalUnit &unit = view_.units[j];
-    return shares_[j][group].tasks * ceil_div(x + unit.response, unit.period);
-  }
-
-  [[nodiscard]] Waits waits(std::size_t k, Duration x) const {
-    const GlobalUnit &own = view_.units[k];
-    Waits result;
-    result.shared = own.volume - own.length;
-    Duration ends = own.path_tasks - 1;  // after which less urgent jobs can be found started
-    for (std::size_t j = 0; j < k; ++j) result.shared = add(result.shared, global::dag_work(view_.units[j], x));
-    for (std::size_t g = 0; g < system_.groups.size(); ++g) {
-      const Share &mine = shares_[k][g];
-      if (mine.tasks == 0) continue;
-      const Duration lower = less_urgent(k, g);
-      result.serial = add(result.serial, add(own_others(mine), lower));
-      ends += mine.tasks - 1 + (lower > 0 ? mine.tasks : 0);
-      for (std::size_t j = 0; j < k; ++j) {
-        const GlobalUnit &other = view_.units[j];
-        result.serial = add(result.serial, serial_work(other, shares_[j][g], x));
-        ends += jobs_of_group(j, g, x);
+  // Responses that rely on each other: the least that agree. Empty, or why there are none.
+  std::string_view solve(std::size_t b, std::size_t &culprit) {
+    const groups::Block &block = windows_.blocks()[b];
+    for (std::size_t k = block.begin; k < block.end; ++k) windows_.start(k);
+    changed_ = true;
+    for (int round = 0; changed_; ++round) {
+      if (round == kMostRounds) return global::kNoFixedPoint;
+      changed_ = false;
+      for (culprit = block.begin; culprit < block.end; ++culprit) {
+        if (!respond(b, culprit)) return beyond_ == Beyond::Allowed ? kOverlap : global::kNoFixedPoint;
       }
     }
-    result.shared = add(result.shared, preempts_ ? inherited(k, x) : blocking(k, ends));
-    return result;
+    for (culprit = block.begin; culprit < block.end; ++culprit) {
+      if (binds_now(culprit)) return system_.platform.preempt_overhead > 0 ? kBinds : solve(b, culprit);
+      const std::string_view why = why_overlap_harms(b, culprit);
+      if (!why.empty()) return why;
+      for (const std::uint32_t t : tasks_of(culprit)) find_answer_from_ready(b, culprit, t);
+    }
+    return {};
   }
 
-  [[nodiscard]] Duration blocking(std::size_t k, Duration ends) const {
-    return add(first_[k], multiply(later_[k], ends));
+  void raise(Duration &value, Duration to) {
+    if (to <= value) return;
+    value = to;
+    changed_ = true;
   }
 
-  bool respond(std::size_t k) {
-    GlobalUnit &own = view_.units[k];
-    const std::uint32_t m = view_.workers;
-    first_.resize(view_.units.size());
-    later_.resize(view_.units.size());
-    first_[k] = global::largest_remaining(system_, view_.units, k + 1, m);
-    later_[k] = m > 1 ? global::largest_remaining(system_, view_.units, k + 1, m - 1) : 0;
-    Duration window = own.length;
-    const bool found = global::least_fixed_point(own.limit - own.jitter, window, [&](Duration x) {
-      const Waits in_window = waits(k, x);
-      return add(add(own.length, in_window.shared / m), in_window.serial);
+  // False: beyond what counts as bounded.
+  bool respond(std::size_t b, std::size_t k) {
+    const GlobalUnit &unit = view_.units[k];
+    if (unit.volume > multiply(unit.period, view_.workers)) return false;
+    const Duration stop = latest(unit) - unit.jitter;
+    const std::vector<std::uint32_t> &tasks = tasks_of(k);
+    for (const std::uint32_t t : tasks) {
+      if (!waits_for_group(t)) continue;
+      const auto wait =
+          windows_.window_of(b, windows_.chain_of(b, k, {.task = t, .from_ready = true, .first_tick = true}), stop);
+      if (!wait) return false;
+      raise(windows_.of(t).wait, *wait);
+    }
+    // A chain of one more instance begins where a task of it can be late for its next job.
+    std::vector<bool> late(tasks.size(), true);
+    for (std::uint32_t instances = 1;; ++instances) {
+      std::vector<bool> late_again(tasks.size(), false);
+      for (std::size_t i = 0; i < tasks.size(); ++i) {
+        if (!is_any_late(k, late, tasks[i])) continue;
+        const Duration since = static_cast<Duration>(instances - 1) * unit.period;
+        const auto window =
+            windows_.window_of(b, windows_.chain_of(b, k, {.task = tasks[i], .instances = instances}), stop + since);
+        if (!window) return false;
+        const Duration response = unit.jitter + *window - since;
+        late_again[i] = response > unit.period;
+        Answer &answer = answers_[tasks[i]];
+        if (instances > 1) answer.repeated = std::max(answer.repeated, response);
+        if (response > windows_.of(tasks[i]).response) answer.instances = instances;
+        raise(windows_.of(tasks[i]).response, response);
+      }
+      instances_[k] = instances;
+      if (std::none_of(late_again.begin(), late_again.end(), [](bool is) { return is; })) return true;
+      if (beyond_ == Beyond::Never || instances == groups::kMostInstances) return false;
+      late = std::move(late_again);
+    }
+  }
+
+  [[nodiscard]] bool is_any_late(std::size_t k, const std::vector<bool> &late, std::uint32_t task) const {
+    const std::vector<std::uint32_t> &tasks = tasks_of(k);
+    for (std::size_t i = 0; i < tasks.size(); ++i) {
+      if (late[i] && (tasks[i] == task || windows_.follows(k, tasks[i], task))) return true;
+    }
+    return false;
+  }
+
+  // Instances of one unit that are in progress together: does anything that the proof needs break?
+  std::string_view why_overlap_harms(std::size_t b, std::size_t k) {
+    const GlobalUnit &unit = view_.units[k];
+    if (longest_of(k) <= unit.limit) return {};
+    for (const std::uint32_t t : tasks_of(k)) {
+      const SystemTask &task = system_.tasks[t];
+      const bool joins = task.predecessors.size() > 1 || (!task.data && !task.predecessors.empty());
+      for (const std::uint32_t p : task.predecessors) {
+        if (joins && windows_.of(p).response >= unit.period) return kMixed;
+      }
+      if (windows_.of(t).response > task.limit && !starts_in_time(b, k, t)) return kSkipped;
+    }
+    return {};
+  }
+
+  // A max_active that one instance cannot reach, but several that overlap can: from now on it counts.
+  bool binds_now(std::size_t k) {
+    GlobalUnit &unit = view_.units[k];
+    const DagId dag = system_.units[unit.unit].dag;
+    const std::uint32_t max_active = system_.dags[dag.value].max_active;
+    if (max_active == 0 || unit.bound > 0) return false;
+    const Duration together = ceil_div(longest_of(k), unit.period);
+    if (together < 2) return false;
+    if (multiply(together, static_cast<Duration>(most_jobs_in_progress(system_, dag))) <= max_active) return false;
+    unit.bound = std::min(max_active, view_.workers);
+    return true;
+  }
+
+  [[nodiscard]] Duration longest_of(std::size_t k) const { return windows_.bound_of(last_of(k)).response; }
+
+  // Each job starts before the release that would skip it.
+  bool starts_in_time(std::size_t b, std::size_t k, std::uint32_t task) {
+    const GlobalUnit &unit = view_.units[k];
+    const Duration limit = system_.tasks[task].limit - unit.jitter;
+    for (std::uint32_t instances = 1; instances <= instances_[k]; ++instances) {
+      const Question question = {
+          .task = task, .instances = instances, .first_tick = true, .until = system_.tasks[task].limit};
+      const Duration since = static_cast<Duration>(instances - 1) * unit.period;
+      if (!windows_.window_of(b, windows_.chain_of(b, k, question), add(limit, since))) return false;
+    }
+    return true;
+  }
+
+  // A data task's response runs from its own release.
+  [[nodiscard]] bool answers_readiness(std::uint32_t t) const {
+    return answers_[t].from_ready > 0 && answers_[t].from_ready < windows_.bound_of(t).response;
+  }
+
+  void find_answer_from_ready(std::size_t b, std::size_t k, std::uint32_t t) {
+    if (beyond_ == Beyond::Never || !system_.tasks[t].data) return;
+    const auto window =
+        windows_.window_of(b, windows_.chain_of(b, k, {.task = t, .from_ready = true}), windows_.bound_of(t).response);
+    // What the machine takes in the window is part of the jitter of releases, and of nothing here.
+    if (window && *window > answers_[t].repeated) answers_[t].from_ready = add(*window, system_.frozen);
+  }
+
+  [[nodiscard]] std::uint32_t last_of(std::size_t k) const {
+    const std::vector<std::uint32_t> &tasks = tasks_of(k);
+    return *std::max_element(tasks.begin(), tasks.end(), [&](std::uint32_t a, std::uint32_t c) {
+      return windows_.bound_of(a).response < windows_.bound_of(c).response;
     });
-    own.response = window + own.jitter;
-    return found;
   }
 
-  [[nodiscard]] ResponseBound itemise(std::size_t k) const {
-    const GlobalUnit &own = view_.units[k];
-    const std::uint32_t m = view_.workers;
-    const Duration x = own.response - own.jitter;
-    SharedTerms terms(system_, own);
-    terms.add_path();
-    terms.add_share(Term::Kind::Own, own, own.volume - own.length, m);
-    Duration shared = own.volume - own.length;
-    for (std::size_t j = 0; j < k; ++j) {
-      const Duration work = global::dag_work(view_.units[j], x);
-      terms.add_share(Term::Kind::Interference, view_.units[j], work, m);
-      shared += work;
-    }
-    terms.add_share(Term::Kind::Blocking, own, waits(k, x).shared - shared, m);
-    for (std::size_t g = 0; g < system_.groups.size(); ++g) {
-      if (shares_[k][g].tasks == 0) continue;
-      terms.add(Term::Kind::Own, own, own_others(shares_[k][g]));
-      terms.add(Term::Kind::Blocking, own, less_urgent(k, g));
-      for (std::size_t j = 0; j < k; ++j) {
-        terms.add(Term::Kind::Interference, view_.units[j], serial_work(view_.units[j], shares_[j][g], x));
-      }
-    }
-    terms.add_jitter();
+  [[nodiscard]] ResponseBound itemise(std::size_t b, std::size_t k, std::uint32_t task, bool from_ready) {
+    const GlobalUnit &unit = view_.units[k];
+    const Answer &answer = answers_[task];
     ResponseBound bound;
-    bound.response = own.response;
+    bound.response = from_ready ? answer.from_ready : windows_.bound_of(task).response;
+    if (!Effort::itemises(unit.unit)) return bound;
+    const std::uint32_t instances = from_ready ? 1 : answer.instances;
+    const Chain chain = windows_.chain_of(b, k, {.task = task, .instances = instances, .from_ready = from_ready});
+    (void)windows_.window_of(b, chain, kUnbounded);
+    const groups::Shares &shares = windows_.shares();
+    const std::uint32_t m = view_.workers;
+    SharedTerms terms(system_, unit);
+    const TaskId self = tasks_of(k).size() == 1 || from_ready ? TaskId(task) : TaskId();
+    const DagId dag = system_.units[unit.unit].dag;
+    terms.add(Term{Term::Kind::Own, self, dag, chain.path - chain.overhead, 1});
+    terms.add(Term{Term::Kind::Overhead, self, dag, chain.overhead, 0});
+    const Duration since = static_cast<Duration>(instances - 1) * unit.period;
+    terms.add(Term{Term::Kind::Earlier, self, dag, chain.length - chain.path - since, instances - 1});
+    terms.add(Term{Term::Kind::Own, self, dag, shares.executes - chain.length, 0});
+    terms.add_share(Term::Kind::Own, unit, shares.own_shared, unit.bound > 0 ? unit.bound : m);
+    for (std::size_t j = 0; j < windows_.blocks()[b].end; ++j) {
+      if (j == k) continue;
+      terms.add(Term::Kind::Interference, view_.units[j], shares.serial[j]);
+      terms.add_share(Term::Kind::Interference, view_.units[j], shares.shared[j], m);
+    }
+    for (const Chain::Group &group : chain.groups) {
+      if (!group.holder) continue;
+      const DagId whose = system_.tasks[*group.holder].dag;
+      terms.add(
+          Term{Term::Kind::Blocking, TaskId(*group.holder), whose, multiply(group.found, group.held), group.found});
+    }
+    terms.add_share(Term::Kind::Blocking, unit, shares.less_urgent, m);
+    if (!from_ready) terms.add_jitter();
+    if (from_ready) terms.add(Term{Term::Kind::Overhead, self, dag, system_.frozen, 0});
     bound.terms = terms.take();
     return bound;
   }
 
   const System &system_;
   bool preempts_;
+  Beyond beyond_;
   global::Units view_;
-  std::vector<std::vector<Share>> shares_;  // by position in view_, then group
-  std::vector<Duration> first_;             // less urgent work that the path can find at its start
-  std::vector<Duration> later_;             // and after each further end
+  groups::Windows windows_;
+  std::vector<Answer> answers_;           // by TaskId
+  std::vector<std::uint32_t> instances_;  // by position: most on a chain
+  bool changed_ = false;                  // in this round
 };
+
+Outcome apply(const System &system, Beyond beyond) {
+  Analysis analysis(system, beyond);
+  if (analysis.reason()) return NotApplicable{*analysis.reason()};
+  if (analysis.preempts_too_often()) {
+    return NotApplicable{"groups and a max_active that binds, together with an overhead of preemption"};
+  }
+  return analysis.run();
+}
+
+Outcome apply_units(const System &system) { return apply(system, Beyond::Never); }
 
 Outcome apply_groups(const System &system) {
   if (system.groups.empty()) return NotApplicable{"no exclusive group is shared: see the bounds without"};
-  Analysis analysis(system);
-  if (analysis.reason()) return NotApplicable{*analysis.reason()};
-  return analysis.run();
+  // Who inherits can preempt once more than when it started: one worker has no charge for that.
+  if (system.platform.preempt_overhead > 0 && system.platform.workers == 1) {
+    return NotApplicable{"groups together with an overhead of preemption, on one worker"};
+  }
+  return is_across_rates(system) ? across_rates(system, apply_units) : apply(system, Beyond::Allowed);
 }
 
 }  // namespace
@@ -206,12 +304,16 @@ Method dag_groups() {
   Method method;
   method.name = "dag_groups";
   method.subject = Subject::Dag;
-  method.cite = "docs/analysis.md, \"Exclusive groups\"";
+  method.cite =
+      "docs/analysis.md, \"Exclusive groups\"; after L. Sha, R. Rajkumar, J. Lehoczky, IEEE TC 39(9), 1990, and A. "
+      "Melani et al., ECRTS 2015";
   method.assumptions =
-      "m workers, full preemption (a group's holder inherits) or none, static priorities that keep DAGs together, one "
-      "rate a DAG, R <= T; release jitter, exclusive groups within and across DAGs; no max_active, no shared levels";
-  method.complexity = "pseudo-polynomial; O(DAGs^2 groups) a step";
-  method.apply = [](const System &system) { return across_rates(system, apply_groups); };
+      "m workers, full preemption (a group's holder inherits) or none, any policy, one rate a DAG; with full "
+      "preemption "
+      "responses up to 16 T where no job is skipped, else R <= T; release jitter, shared levels, exclusive groups "
+      "within and across DAGs; with full preemption max_active of DAGs in one part";
+  method.complexity = "pseudo-polynomial; O(tasks^2) a step";
+  method.apply = apply_groups;
   return method;
 }
 

@@ -62,6 +62,64 @@ TEST(BoundProperty, DagGroupsPreemptiveCrowded) {
   expect_bound_holds(dag_groups(), cases(limits), {.workloads = 1000, .runs = 20, .periods = 20});
 }
 
+// Deadlines and utilizations at which instances of one DAG overlap.
+BoundCaseLimits overlapping(bool edges) {
+  BoundCaseLimits limits = preempted(with_groups(edges));
+  limits.max_dags = edges ? 3 : 5;
+  limits.max_tasks = 4;
+  limits.caps = false;
+  limits.min_utilization = 0.3;
+  limits.max_utilization = 0.6;
+  limits.min_period = 15;
+  limits.max_period = 60;
+  limits.max_deadline = 4;
+  return limits;
+}
+
+TEST(BoundProperty, DagGroupsOfInstancesThatOverlap) {
+  expect_bound_holds(dag_groups(), cases(overlapping(true)), {.workloads = 2000, .runs = 10});
+}
+
+TEST(BoundProperty, DagGroupsOfJobsThatOverlap) {
+  BoundCaseLimits limits = overlapping(false);
+  limits.queues = true;
+  expect_bound_holds(dag_groups(), cases(limits), {.workloads = 2000, .runs = 10});
+}
+
+TEST(BoundProperty, DagGroupsWithMaxActive) {
+  BoundCaseLimits limits = overlapping(true);
+  limits.caps = true;
+  limits.max_tasks = 6;
+  expect_bound_holds(dag_groups(), cases(limits), {.workloads = 2000, .runs = 10});
+}
+
+TEST(BoundProperty, DagGroupsAnyOrder) {
+  for (const PolicyKind policy : {PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::ChainAware, PolicyKind::Fixed}) {
+    BoundCaseLimits limits = overlapping(true);
+    limits.policies = {policy};
+    limits.levels = policy == PolicyKind::ChainAware || policy == PolicyKind::Fixed;
+    limits.caps = true;
+    expect_bound_holds(dag_groups(), cases(limits), {.workloads = 1000, .runs = 10});
+    limits.preemption = sched::Preemption::None;
+    limits.max_utilization = 0.6;
+    limits.levels = false;
+    expect_bound_holds(dag_groups(), cases(limits), {.workloads = 1000, .runs = 10});
+  }
+}
+
+TEST(BoundProperty, DagGroupsOfSharedLevels) {
+  BoundCaseLimits limits = overlapping(true);
+  limits.levels = limits.caps = true;
+  expect_bound_holds(dag_groups(), cases(limits), {.workloads = 2000, .runs = 10});
+}
+
+TEST(BoundProperty, DagGroupsOnOneWorker) {
+  BoundCaseLimits limits = overlapping(true);
+  limits.min_workers = limits.max_workers = 1;
+  limits.caps = true;
+  expect_bound_holds(dag_groups(), cases(limits), {.workloads = 2000, .runs = 10});
+}
+
 Task in_group(std::string name, Duration wcet, Duration period) {
   Task task;
   task.name = std::move(name);
@@ -117,6 +175,27 @@ TEST(GlobalGroups, AHolderThatInheritsIsInTheWayOfOthers) {
   workload.dags[0].tasks[0].group.clear();
   const System system = compile(workload, platform_of(workload)).value();
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(dag_groups().apply(system)));
+}
+
+// The properties above do meet what they are about.
+TEST(GlobalGroups, ResponsesAboveThePeriodAreBounded) {
+  std::uint32_t beyond = 0;
+  std::uint32_t binding = 0;
+  BoundCaseLimits limits = overlapping(true);
+  limits.caps = true;
+  testing::for_cases(cases(limits), 2000, [&](const testing::BoundCase &, const System &system, Rng &) {
+    const Outcome outcome = dag_groups().apply(system);
+    const Bound *bound = std::get_if<Bound>(&outcome);
+    if (bound == nullptr) return;
+    for (std::size_t d = 0; d < bound->dags.size(); ++d) {
+      const SystemDag &dag = system.dags[d];
+      if (!bound->dags[d].response) continue;
+      beyond += *bound->dags[d].response > system.tasks[dag.tasks.front()].period ? 1U : 0U;
+      binding += dag.max_active > 0 && dag.tasks.size() > dag.max_active ? 1U : 0U;
+    }
+  });
+  EXPECT_GT(beyond, 40U);
+  EXPECT_GT(binding, 50U);
 }
 
 TEST(GlobalGroups, TermsAddUp) {

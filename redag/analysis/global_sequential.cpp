@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/fixed_point.hpp"
 #include "redag/analysis/rate_edges.hpp"
 #include "redag/analysis/waiting_window.hpp"
@@ -33,6 +34,7 @@ Work guan_work(const GlobalUnit &task, Duration x) {
 
 // least_window() for the m - 1 tasks that carry in most at `d`.
 Duration guan_window(std::span<GlobalUnit> more_urgent, Duration x, Duration d, std::uint32_t workers) {
+  Effort::spend(more_urgent.size() + 1);
   const std::size_t carrying = workers - 1;
   const bool all_carry = carrying >= more_urgent.size() || carrying > Largest::kMost;
   Largest most_carried(all_carry ? 0 : carrying);
@@ -57,6 +59,7 @@ Duration guan_window(std::span<GlobalUnit> more_urgent, Duration x, Duration d, 
 
 // least_window() if no task carried work in: not above guan_window(), and cheaper.
 Duration fresh_window(std::span<const GlobalUnit> more_urgent, Duration x, Duration d, std::uint32_t workers) {
+  Effort::spend(more_urgent.size() + 1);
   Largest largest(workers - 1);
   Duration sum = 0;
   for (const GlobalUnit &other : more_urgent) {
@@ -71,6 +74,7 @@ Duration fresh_window(std::span<const GlobalUnit> more_urgent, Duration x, Durat
 // least_window() with sequential_work() of all but `skip`, and `rest`.
 Duration carrying_window(std::span<GlobalUnit> others, std::size_t skip, Duration x, Duration d, Duration rest,
                          std::uint32_t workers) {
+  Effort::spend(others.size() + 1);
   Largest largest(workers - 1);
   Duration sum = rest;
   for (std::size_t i = 0; i < others.size(); ++i) {
@@ -165,6 +169,7 @@ ResponseBound itemise(const System &system, std::span<const GlobalUnit> units, s
   SharedTerms terms(system, own);
   terms.add_path();
   terms.add_jitter();
+  if (!terms.wanted()) return bound;
   const Duration waiting = global::window_of(own);
   if (remaining > 0) terms.add_share(Term::Kind::Blocking, own, remaining, workers);
   for (std::size_t i = 0; i < k; ++i) {
@@ -188,6 +193,7 @@ Outcome from_most_urgent(const System &system, sched::Preemption mode, Respond r
   std::vector<ResponseBound> responses(system.units.size());
   bool known = true;
   for (std::size_t k = 0; k < view.units.size(); ++k) {
+    Effort::reached(k, view.units.size());
     ResponseBound &response = responses[view.units[k].unit];
     Duration remaining = 0;
     if (!known) {
@@ -230,7 +236,7 @@ ResponseBound any_order_bound(const System &system, const GlobalUnit &unit) {
   terms.add_jitter();
   bound.terms = terms.take();
   const Duration others = unit.response - unit.jitter - unit.volume;
-  if (others > 0) bound.terms.push_back(Term{Term::Kind::Interference, TaskId(), DagId(), others, 0});
+  if (others > 0 && terms.wanted()) bound.terms.push_back(Term{Term::Kind::Interference, TaskId(), DagId(), others, 0});
   return bound;
 }
 

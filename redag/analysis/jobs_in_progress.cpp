@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "redag/analysis/effort.hpp"
+
 namespace redag::analysis {
 namespace {
 
@@ -24,6 +26,7 @@ class Antichain {
     for (std::size_t via = 0; via < count_; ++via) {
       for (std::size_t a = 0; a < count_; ++a) {
         if (!follows_[a][via]) continue;
+        Effort::spend(count_);
         for (std::size_t b = 0; b < count_; ++b) follows_[a][b] = follows_[a][b] || follows_[via][b];
       }
     }
@@ -32,6 +35,7 @@ class Antichain {
   std::size_t size() {
     std::size_t chains = count_;
     for (std::size_t a = 0; a < count_; ++a) {
+      Effort::spend(count_);
       visited_.assign(count_, false);
       if (extend(a)) --chains;
     }

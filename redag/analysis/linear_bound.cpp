@@ -1,6 +1,9 @@
 #include "redag/analysis/linear_bound.hpp"
 
+#include <span>
+
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/one_worker.hpp"
 
 namespace redag::analysis {
@@ -15,23 +18,33 @@ constexpr Duration kLongest = Duration{1} << 50;
 
 Int128 ceil_of(Int128 numerator, Int128 denominator) { return (numerator + denominator - 1) / denominator; }
 
-ResponseBound bound_unit(const System &system, std::uint32_t u) {
-  const Unit &unit = system.units[u];
-  const one_worker::View view = one_worker::view_of(system, u);
+// Sums over units.
+struct Line {
   Int128 utilization = 0;
   Int128 slopes = 0;  // sum C_j (1 - U_j)
-  for (const one_worker::Interferer &other : view.more_urgent) {
-    utilization += ceil_of(Int128{other.wcet} << kShareBits, other.period);
-    if (other.wcet < other.period) {
-      slopes += ceil_of((Int128{other.wcet} << kTimeBits) * (other.period - other.wcet), other.period);
+
+  void add(const Unit &unit, Int128 sign) {
+    utilization += sign * ceil_of(Int128{unit.volume} << kShareBits, unit.period);
+    if (unit.volume < unit.period) {
+      slopes += sign * ceil_of((Int128{unit.volume} << kTimeBits) * (unit.period - unit.volume), unit.period);
     }
   }
+};
+
+// `above`: of all units of its level and above, itself among them.
+ResponseBound bound_unit(const System &system, const one_worker::Views &views, std::uint32_t u, Line above) {
+  const Unit &unit = system.units[u];
+  above.add(unit, -1);
+  const auto &[utilization, slopes] = above;
+  const std::vector<one_worker::Blocker> blockers = views.blockers(u);
+  Duration blocking = 0;
+  for (const one_worker::Blocker &blocker : blockers) blocking = add(blocking, blocker.amount);
   ResponseBound bound;
   if (utilization + ceil_of(Int128{unit.volume} << kShareBits, unit.period) > kOne) {
     bound.absent = "the utilization of its level may exceed one";
     return bound;
   }
-  const Int128 fixed = (Int128{view.blocking} + unit.volume) << kTimeBits;
+  const Int128 fixed = (Int128{blocking} + unit.volume) << kTimeBits;
   const Int128 rest = kOne - utilization;  // > 0: the unit's own share is
   const Duration response = saturate(((fixed + slopes) << (kShareBits - kTimeBits)) / rest);
   if (response > unit.limit) {
@@ -40,16 +53,17 @@ ResponseBound bound_unit(const System &system, std::uint32_t u) {
   }
 
   bound.response = response;
+  if (!Effort::itemises(u)) return bound;
   Duration overhead = 0;
   for (const std::uint32_t t : unit.tasks) overhead += system.tasks[t].overhead;
   bound.terms.push_back(Term{Term::Kind::Own, TaskId(), unit.dag, unit.volume - overhead, 1});
   if (overhead > 0) bound.terms.push_back(Term{Term::Kind::Overhead, TaskId(), unit.dag, overhead, 0});
-  for (const one_worker::Blocker &blocker : view.blockers) {
+  for (const one_worker::Blocker &blocker : blockers) {
     const DagId dag = system.tasks[blocker.task].dag;
     bound.terms.push_back(Term{Term::Kind::Blocking, TaskId(blocker.task), dag, blocker.amount, 1});
   }
   // The formula mixes what the others do; it has no share for each.
-  const Duration interference = response - unit.volume - view.blocking;
+  const Duration interference = response - unit.volume - blocking;
   if (interference > 0) bound.terms.push_back(Term{Term::Kind::Interference, TaskId(), DagId(), interference, 0});
   return bound;
 }
@@ -63,8 +77,15 @@ Outcome apply(const System &system) {
     }
     if (unit.volume > kLongest) return NotApplicable{"an execution time above 13 days"};
   }
-  std::vector<ResponseBound> units;
-  for (std::uint32_t u = 0; u < system.units.size(); ++u) units.push_back(bound_unit(system, u));
+  std::vector<ResponseBound> units(system.units.size());
+  const one_worker::Views views(system);
+  Line above;
+  std::size_t counted = 0;
+  for (const std::uint32_t u : views.order()) {
+    const std::span<const std::uint32_t> level = views.down_to(views.level(u));
+    for (; counted < level.size(); ++counted) above.add(system.units[level[counted]], 1);
+    units[u] = bound_unit(system, views, u, above);
+  }
   return from_units(system, std::move(units));
 }
 
@@ -80,7 +101,7 @@ Method linear_bound() {
   method.assumptions =
       "one worker, full preemption, static priorities, any deadlines, no jitter; blocking added; a DAG of one rate "
       "counts as one task with C = volume";
-  method.complexity = "O(n) a task";
+  method.complexity = "O(n log n)";
   method.apply = apply;
   return method;
 }

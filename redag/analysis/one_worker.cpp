@@ -1,8 +1,12 @@
 #include "redag/analysis/one_worker.hpp"
 
 #include <algorithm>
+#include <map>
+#include <numeric>
+#include <utility>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
 
@@ -12,49 +16,6 @@ namespace {
 // Evaluations of the right-hand side for one task. Only busy periods with a utilization within a few millionths of one,
 // or periods many orders of magnitude apart, need more.
 constexpr int kMaxSteps = 1'000'000;
-
-// The level of the busy period as a rank: all work of this rank and above belongs to whole units.
-std::uint32_t closed_level(const System &system, std::uint32_t unit) {
-  std::uint32_t level = system.units[unit].last_rank;
-  for (bool grew = true; grew;) {
-    grew = false;
-    for (const Unit &other : system.units) {
-      if (other.first_rank > level || other.last_rank <= level) continue;
-      level = other.last_rank;
-      grew = true;
-    }
-  }
-  return level;
-}
-
-// Less urgent jobs that hold up the level although it has work: what was started before the busy period and cannot be
-// preempted. "- 1": it started at an instant strictly before, and times are integers.
-void find_blockers(const System &system, std::uint32_t level, View &view) {
-  Blocker longest;
-  std::vector<Blocker> holders(system.groups.size());
-  const std::uint32_t platform_level = system.tasks[system.by_rank[level]].level;
-  const bool shares = system.mode != sched::Preemption::None;
-  for (std::uint32_t rank = level + 1; rank < system.by_rank.size(); ++rank) {
-    const std::uint32_t t = system.by_rank[rank];
-    const SystemTask &task = system.tasks[t];
-    const bool whole = shares && task.level == platform_level;
-    const Duration stretch = (whole ? task.wcet : task.region) - 1;
-    if (stretch > longest.amount) longest = Blocker{t, stretch};
-    if (system.mode != sched::Preemption::Full || task.group == kNoGroup) continue;
-    const auto &group = system.groups[task.group];
-    // While it holds the group for a task of this platform level or above, no task of the level preempts it.
-    const bool is_needed = std::any_of(
-        group.begin(), group.end(), [&](std::uint32_t other) { return system.tasks[other].level <= platform_level; });
-    Blocker &holder = holders[task.group];
-    if (is_needed && task.wcet - 1 > holder.amount) holder = Blocker{t, task.wcet - 1};
-  }
-  holders.push_back(longest);
-  for (const Blocker &blocker : holders) {
-    if (blocker.amount <= 0) continue;
-    view.blockers.push_back(blocker);
-    view.blocking = add(view.blocking, blocker.amount);
-  }
-}
 
 template <class Count>
 Duration demand(Int128 start, std::span<const Interferer> more_urgent, Count count) {
@@ -69,6 +30,7 @@ template <bool kDeferred>
 bool fixed_point(Int128 start, std::span<const Interferer> more_urgent, Duration stop, Duration &w, int &steps) {
   while (w <= stop && w < kUnbounded) {
     if (++steps > kMaxSteps) return false;
+    Effort::spend(more_urgent.size() + 1);
     const Duration next = demand(start, more_urgent, [w](const Interferer &other) {
       const Duration until = add(w, other.jitter);
       return kDeferred ? until / other.period + 1 : ceil_div(until, other.period);
@@ -86,8 +48,8 @@ Duration stop_of(const Own &own, std::int64_t q) {
   return saturate(Int128{own.limit} - own.jitter + Int128{q} * own.period);
 }
 
-std::vector<Term> terms_of(const System &system, const Unit &unit, const View &view, const Response &response,
-                           bool deferred) {
+std::vector<Term> terms_of(const System &system, const Unit &unit, const View &view,
+                           const std::vector<std::uint32_t> &more_urgent, const Response &response, bool deferred) {
   Duration overhead = 0;
   for (const std::uint32_t t : unit.tasks) overhead = add(overhead, system.tasks[t].overhead);
   std::vector<Term> terms;
@@ -102,9 +64,9 @@ std::vector<Term> terms_of(const System &system, const Unit &unit, const View &v
     terms.push_back(
         Term{Term::Kind::Blocking, TaskId(blocker.task), system.tasks[blocker.task].dag, blocker.amount, 1});
   }
-  for (std::size_t i = 0; i < view.more_urgent.size(); ++i) {
-    const Unit &other = system.units[view.units[i]];
-    const std::int64_t jobs = jobs_in(view.more_urgent[i], response.window, deferred);
+  for (const std::uint32_t u : more_urgent) {
+    const Unit &other = system.units[u];
+    const std::int64_t jobs = jobs_in({other.volume, other.period, other.jitter}, response.window, deferred);
     const TaskId task = other.tasks.size() == 1 ? TaskId(other.tasks.front()) : TaskId();
     terms.push_back(Term{Term::Kind::Interference, task, other.dag, jobs * other.volume, jobs});
   }
@@ -145,17 +107,123 @@ std::optional<std::string> why_not(const System &system) {
   return std::nullopt;
 }
 
-View view_of(const System &system, std::uint32_t unit) {
-  const std::uint32_t level = closed_level(system, unit);
-  View view;
-  view.interleaved = level != system.units[unit].last_rank;
-  for (std::uint32_t u = 0; u < system.units.size(); ++u) {
-    const Unit &other = system.units[u];
-    if (u == unit || other.first_rank > level) continue;
-    view.units.push_back(u);
-    view.more_urgent.push_back(Interferer{other.volume, other.period, other.jitter});
+Views::Views(const System &system) : system_(system), by_first_rank_(system.units.size()) {
+  std::iota(by_first_rank_.begin(), by_first_rank_.end(), 0);
+  std::sort(by_first_rank_.begin(), by_first_rank_.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return system.units[a].first_rank < system.units[b].first_rank; });
+  close_levels();
+  order_ = by_first_rank_;
+  std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) { return level(a) < level(b); });
+  find_longest();
+  std::map<std::pair<Duration, Duration>, std::uint32_t> known;
+  for (const Unit &unit : system.units) {
+    const auto next = static_cast<std::uint32_t>(classes_.size());
+    const auto [found, is_new] = known.emplace(std::pair(unit.period, unit.jitter), next);
+    if (is_new) classes_.push_back({unit.period, unit.jitter, 0});
+    class_of_.push_back(found->second);
   }
-  find_blockers(system, level, view);
+}
+
+void Views::close_levels() {
+  const auto ranks = static_cast<std::uint32_t>(system_.by_rank.size());
+  std::vector<std::uint32_t> reach(ranks);  // by rank: the least urgent task of units that begin at it or above
+  std::iota(reach.begin(), reach.end(), 0);
+  for (const Unit &unit : system_.units) reach[unit.first_rank] = std::max(reach[unit.first_rank], unit.last_rank);
+  for (std::uint32_t rank = 1; rank < ranks; ++rank) reach[rank] = std::max(reach[rank], reach[rank - 1]);
+  closed_.resize(ranks);
+  for (std::uint32_t rank = ranks; rank-- > 0;) closed_[rank] = reach[rank] == rank ? rank : closed_[rank + 1];
+}
+
+void Views::find_longest() {
+  longest_.resize(system_.by_rank.size() + 1);
+  for (std::size_t rank = system_.by_rank.size(); rank-- > 0;) {
+    const std::uint32_t t = system_.by_rank[rank];
+    const Duration stretch = system_.tasks[t].region - 1;
+    longest_[rank] = stretch > 0 && stretch >= longest_[rank + 1].amount ? Blocker{t, stretch} : longest_[rank + 1];
+  }
+}
+
+std::span<const std::uint32_t> Views::down_to(std::uint32_t level) const {
+  const auto end = std::partition_point(by_first_rank_.begin(), by_first_rank_.end(),
+                                        [&](std::uint32_t u) { return system_.units[u].first_rank <= level; });
+  return {by_first_rank_.begin(), end};
+}
+
+std::vector<std::uint32_t> Views::more_urgent(std::uint32_t unit) const {
+  const std::span<const std::uint32_t> above = down_to(level(unit));
+  std::vector<std::uint32_t> units(above.begin(), above.end());
+  units.erase(std::find(units.begin(), units.end(), unit));
+  std::sort(units.begin(), units.end());
+  return units;
+}
+
+// Less urgent jobs that hold up the level although it has work: what was started before the busy period and cannot be
+// preempted. "- 1": it started at an instant strictly before, and times are integers.
+std::vector<Blocker> Views::blockers(std::uint32_t unit) const {
+  const std::uint32_t last = level(unit);
+  const std::uint32_t platform_level = system_.tasks[system_.by_rank[last]].level;
+  Blocker longest = longest_[last + 1];
+  if (system_.mode != sched::Preemption::None) {
+    // Tasks of one platform level are neighbours in the order, and keep the worker from each other.
+    for (std::uint32_t rank = last + 1; rank < system_.by_rank.size(); ++rank) {
+      const std::uint32_t t = system_.by_rank[rank];
+      if (system_.tasks[t].level != platform_level) break;
+      Effort::spend(1);
+      const Duration amount = system_.tasks[t].wcet - 1;
+      const bool is_first = amount == longest.amount && rank < system_.tasks[longest.task].rank;
+      if (amount > longest.amount || is_first) longest = Blocker{t, amount};
+    }
+  }
+  std::vector<Blocker> found;
+  if (system_.mode == sched::Preemption::Full) {
+    for (const std::vector<std::uint32_t> &group : system_.groups) {
+      Effort::spend(group.size());
+      // While it holds the group for a task of this platform level or above, no task of the level preempts it.
+      bool is_needed = false;
+      Blocker holder;
+      for (const std::uint32_t t : group) {
+        const SystemTask &task = system_.tasks[t];
+        is_needed = is_needed || task.level <= platform_level;
+        if (task.rank <= last) continue;
+        const bool is_longer = task.wcet - 1 > holder.amount ||
+                               (task.wcet - 1 == holder.amount && task.rank < system_.tasks[holder.task].rank);
+        if (is_longer && task.wcet > 1) holder = Blocker{t, task.wcet - 1};
+      }
+      if (is_needed && holder.amount > 0) found.push_back(holder);
+    }
+  }
+  if (longest.amount > 0) found.push_back(longest);
+  return found;
+}
+
+Duration Views::blocking(std::uint32_t unit) const {
+  Duration sum = 0;
+  for (const Blocker &blocker : blockers(unit)) sum = add(sum, blocker.amount);
+  return sum;
+}
+
+void Views::count_down_to(std::uint32_t level) {
+  const std::size_t wanted = down_to(level).size();
+  const auto change = [&](std::size_t i, Int128 sign) {
+    const std::uint32_t u = by_first_rank_[i];
+    classes_[class_of_[u]].wcet += sign * system_.units[u].volume;
+  };
+  for (; counted_ < wanted; ++counted_) change(counted_, 1);
+  for (; counted_ > wanted; --counted_) change(counted_ - 1, -1);
+}
+
+View Views::of(std::uint32_t unit) {
+  const std::uint32_t last = level(unit);
+  View view;
+  view.interleaved = last != system_.units[unit].last_rank;
+  count_down_to(last);
+  for (std::uint32_t c = 0; c < classes_.size(); ++c) {
+    const Class &one = classes_[c];
+    const Int128 wcet = one.wcet - (c == class_of_[unit] ? system_.units[unit].volume : 0);
+    if (wcet > 0) view.more_urgent.push_back(Interferer{saturate(wcet), one.period, one.jitter});
+  }
+  view.blockers = blockers(unit);
+  for (const Blocker &blocker : view.blockers) view.blocking = add(view.blocking, blocker.amount);
   return view;
 }
 
@@ -209,9 +277,12 @@ FixedPoint deferred_response(const Own &own, std::span<const Interferer> more_ur
 
 Bound bound_units(const System &system, bool deferred) {
   std::vector<ResponseBound> responses(system.units.size());
-  for (std::uint32_t u = 0; u < system.units.size(); ++u) {
+  Views views(system);
+  std::size_t done = 0;
+  for (const std::uint32_t u : views.order()) {
+    Effort::reached(done++, system.units.size());
     const Unit &unit = system.units[u];
-    const View view = view_of(system, u);
+    const View view = views.of(u);
     const Own own{unit.volume, unit.period,   unit.jitter,
                   unit.limit,  view.blocking, deferred ? last_region_of(system, unit) : 0};
     const FixedPoint result =
@@ -222,7 +293,9 @@ Bound bound_units(const System &system, bool deferred) {
     }
     responses[u].response = result.found->response;
     responses[u].from_ready = result.found->from_ready;
-    responses[u].terms = terms_of(system, unit, view, *result.found, deferred);
+    if (Effort::itemises(u)) {
+      responses[u].terms = terms_of(system, unit, view, views.more_urgent(u), *result.found, deferred);
+    }
   }
   return from_units(system, std::move(responses));
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "redag/analysis/bound.hpp"
+#include "redag/base/int128.hpp"
 
 namespace redag::analysis::one_worker {
 
@@ -31,17 +32,55 @@ struct Blocker {
 
 /// One unit's view of the system.
 struct View {
-  std::vector<Interferer> more_urgent;
-  std::vector<std::uint32_t> units;  // of `more_urgent`, position by position
-  std::vector<Blocker> blockers;     // each at most once in a busy period
-  Duration blocking = 0;             // their sum
+  std::vector<Interferer> more_urgent;  // those of one period and jitter together, as one
+  std::vector<Blocker> blockers;        // each at most once in a busy period
+  Duration blocking = 0;                // their sum
   /// The unit's own priorities and those of others are interleaved, so that its view is coarser than its priority.
   bool interleaved = false;
 };
 
-/// Who can delay `unit`. The level of the busy period is the least urgent task of the unit, lowered until no other unit
-/// lies on both sides of it (docs/analysis.md, "One worker"). O(n log n).
-[[nodiscard]] View view_of(const System &system, std::uint32_t unit);
+/// Who can delay each unit. The level of the busy period is the least urgent task of the unit, lowered until no other
+/// unit lies on both sides of it (docs/analysis.md, "One worker"). Memory is linear in the size of the system.
+class Views {
+ public:
+  /// `system` must outlive it. O(n log n).
+  explicit Views(const System &system);
+
+  /// Units from the most urgent level to the least: of() is cheap in this order.
+  [[nodiscard]] const std::vector<std::uint32_t> &order() const { return order_; }
+  /// The level of the busy period as a rank: all work of this rank and above belongs to whole units.
+  [[nodiscard]] std::uint32_t level(std::uint32_t unit) const { return closed_[system_.units[unit].last_rank]; }
+  /// Units with a task of this rank or above, `unit` among them, most urgent first.
+  [[nodiscard]] std::span<const std::uint32_t> down_to(std::uint32_t level) const;
+  /// The units that can interfere, in the order of System::units.
+  [[nodiscard]] std::vector<std::uint32_t> more_urgent(std::uint32_t unit) const;
+  /// Who blocks, and for how long in all. O(members of groups).
+  [[nodiscard]] std::vector<Blocker> blockers(std::uint32_t unit) const;
+  [[nodiscard]] Duration blocking(std::uint32_t unit) const;
+  /// O(different periods), beyond what the step from the unit asked for before costs.
+  [[nodiscard]] View of(std::uint32_t unit);
+
+ private:
+  // Units of one period and jitter.
+  struct Class {
+    Duration period = 0;
+    Duration jitter = 0;
+    Int128 wcet = 0;  // of those in `counted_`
+  };
+
+  void count_down_to(std::uint32_t level);
+  void close_levels();
+  void find_longest();
+
+  const System &system_;
+  std::vector<std::uint32_t> by_first_rank_;  // units
+  std::vector<std::uint32_t> order_;
+  std::vector<std::uint32_t> closed_;  // by rank: the first level from it on that splits no unit
+  std::vector<Blocker> longest_;       // by rank: the longest stretch from it on that nothing preempts
+  std::vector<Class> classes_;
+  std::vector<std::uint32_t> class_of_;  // by unit
+  std::size_t counted_ = 0;              // first so many of by_first_rank_ are in classes_
+};
 
 /// A task in its busy period.
 struct Own {

@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
+#include <span>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
+#include "redag/analysis/exact_utilization.hpp"
 #include "redag/analysis/one_worker.hpp"
 #include "redag/analysis/utilization.hpp"
 
@@ -29,8 +33,9 @@ std::string broken_assumption(const System &system, bool with_blocking) {
   }
   if (with_blocking) return {};
   if (system.mode != sched::Preemption::Full) return "less urgent callbacks are not preempted at once";
+  const one_worker::Views views(system);
   for (std::uint32_t u = 0; u < system.units.size(); ++u) {
-    if (one_worker::view_of(system, u).blocking > 0) return "less urgent callbacks can block";
+    if (views.blocking(u) > 0) return "less urgent callbacks can block";
   }
   return {};
 }
@@ -44,15 +49,34 @@ std::vector<std::uint32_t> more_urgent(const System &system, const SystemTask &t
   return found;
 }
 
+// Callbacks of one period, together.
+struct Rate {
+  Duration period = 0;
+  Duration wcet = 0;
+};
+
+std::vector<Rate> rates_of(const System &system) {
+  std::map<Duration, Duration> wcets;
+  for (const SystemTask &task : system.tasks) wcets[task.period] = add(wcets[task.period], task.wcet);
+  std::vector<Rate> rates;
+  for (const auto &[period, wcet] : wcets) rates.push_back({period, wcet});
+  return rates;
+}
+
+// The rates of hp(i).
+std::span<const Rate> more_urgent(std::span<const Rate> rates, const SystemTask &task) {
+  const auto end =
+      std::partition_point(rates.begin(), rates.end(), [&](const Rate &rate) { return rate.period < task.period; });
+  return rates.first(static_cast<std::size_t>(end - rates.begin()));
+}
+
 // R = start + sum ceil(R / T_j) C_j up to `limit`.
-std::optional<Duration> recurrence(const System &system, Duration start, const std::vector<std::uint32_t> &others,
-                                   Duration limit) {
+std::optional<Duration> recurrence(Duration start, std::span<const Rate> others, Duration limit) {
   Duration response = start;
   for (int step = 0; step < kMaxSteps && response <= limit; ++step) {
+    Effort::spend(others.size() + 1);
     Int128 sum = start;
-    for (const std::uint32_t j : others) {
-      sum += Int128{ceil_div(response, system.tasks[j].period)} * system.tasks[j].wcet;
-    }
+    for (const Rate &rate : others) sum += Int128{ceil_div(response, rate.period)} * rate.wcet;
     if (saturate(sum) == response) return response;
     response = saturate(sum);
   }
@@ -60,7 +84,7 @@ std::optional<Duration> recurrence(const System &system, Duration start, const s
 }
 
 ResponseBound itemise(const System &system, std::uint32_t t, std::optional<Duration> response, bool once,
-                      const std::vector<std::uint32_t> &others, const std::vector<one_worker::Blocker> &blockers) {
+                      const std::vector<one_worker::Blocker> &blockers) {
   ResponseBound bound;
   const SystemTask &task = system.tasks[t];
   if (!response || *response >= kUnbounded || *response > task.limit) {
@@ -68,13 +92,14 @@ ResponseBound itemise(const System &system, std::uint32_t t, std::optional<Durat
     return bound;
   }
   bound.response = response;
+  if (!Effort::itemises(task.unit)) return bound;
   bound.terms.push_back(Term{Term::Kind::Own, TaskId(t), task.dag, task.wcet - task.overhead, 1});
   if (task.overhead > 0) bound.terms.push_back(Term{Term::Kind::Overhead, TaskId(t), task.dag, task.overhead, 0});
   for (const one_worker::Blocker &blocker : blockers) {
     const DagId dag = system.tasks[blocker.task].dag;
     bound.terms.push_back(Term{Term::Kind::Blocking, TaskId(blocker.task), dag, blocker.amount, 1});
   }
-  for (const std::uint32_t j : others) {
+  for (const std::uint32_t j : more_urgent(system, task)) {
     const SystemTask &other = system.tasks[j];
     const std::int64_t jobs = once ? 1 : ceil_div(*response, other.period);
     bound.terms.push_back(Term{Term::Kind::Interference, TaskId(j), other.dag, multiply(jobs, other.wcet), jobs});
@@ -102,8 +127,9 @@ Outcome apply_rm_bound(const System &system) {
   Bound bound;
   const auto n = static_cast<double>(system.tasks.size());
   const double limit = n * std::expm1(std::log(2.0) / n);
-  // Nothing is accepted by rounding.
-  bound.accepts = !system.tasks.empty() && system.utilization <= limit - 1e-9;
+  Shares shares;
+  for (const SystemTask &task : system.tasks) shares.push({static_cast<Uint128>(task.wcet), task.period});
+  bound.accepts = shares.size() > 0 && is_within_liu_layland(shares, shares.size());
   char text[96];
   std::snprintf(text, sizeof text, "U = %.4f, limit %.4f for %zu callbacks", system.utilization, limit,
                 system.tasks.size());
@@ -117,19 +143,18 @@ Outcome apply_rm_bound(const System &system) {
 Outcome apply_interference(const System &system) {
   Bound bound;
   bound.unsound = broken_assumption(system, false);
+  const std::vector<Rate> rates = rates_of(system);
   for (std::uint32_t t = 0; t < system.tasks.size(); ++t) {
     const SystemTask &task = system.tasks[t];
-    const std::vector<std::uint32_t> others = more_urgent(system, task);
     Duration response = task.wcet;
-    Duration shortest = kNever;
-    for (const std::uint32_t j : others) {
-      response = add(response, system.tasks[j].wcet);
-      shortest = std::min(shortest, system.tasks[j].period);
-    }
+    const std::span<const Rate> others = more_urgent(rates, task);
+    Effort::spend(others.size());
+    for (const Rate &rate : others) response = add(response, rate.wcet);
+    const Duration shortest = others.empty() ? kNever : others.front().period;
     if (bound.unsound.empty() && response > shortest) {
       bound.unsound = "'" + task.name + "': a more urgent task comes again before it ends and is counted once";
     }
-    bound.tasks.push_back(itemise(system, t, response, true, others, {}));
+    bound.tasks.push_back(itemise(system, t, response, true, {}));
   }
   fill_dags(system, bound);
   return bound;
@@ -138,13 +163,16 @@ Outcome apply_interference(const System &system) {
 Outcome apply_recurrence(const System &system, bool with_blocking) {
   Bound bound;
   bound.unsound = broken_assumption(system, with_blocking);
+  const std::vector<Rate> rates = rates_of(system);
+  const one_worker::Views views(system);
   for (std::uint32_t t = 0; t < system.tasks.size(); ++t) {
     const SystemTask &task = system.tasks[t];
-    const std::vector<std::uint32_t> others = more_urgent(system, task);
-    one_worker::View view;
-    if (with_blocking) view = one_worker::view_of(system, task.unit);
-    const auto response = recurrence(system, add(task.wcet, view.blocking), others, task.period);
-    bound.tasks.push_back(itemise(system, t, response, false, others, view.blockers));
+    std::vector<one_worker::Blocker> blockers;
+    if (with_blocking) blockers = views.blockers(task.unit);
+    Duration start = task.wcet;
+    for (const one_worker::Blocker &blocker : blockers) start = add(start, blocker.amount);
+    const auto response = recurrence(start, more_urgent(rates, task), task.period);
+    bound.tasks.push_back(itemise(system, t, response, false, blockers));
   }
   fill_dags(system, bound);
   return bound;

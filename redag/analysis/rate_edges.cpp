@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/jobs_in_progress.hpp"
 
 namespace redag::analysis {
@@ -205,7 +206,8 @@ class Resolver {
       return !system_.tasks[t].data && system_.tasks[t].jitter > 0;
     });
     if (is_seen_later) return *bound.response;
-    return std::max(bound.from_ready, *bound.response - alone_.units[u].jitter);
+    // The jitter of a timer counts what the machine can take during the response, too.
+    return add(std::max(bound.from_ready, *bound.response - alone_.units[u].jitter), system_.frozen);
   }
 
   // The unit's bound, with all that goes by before it is ready replaced by a term that makes it `response`.
@@ -214,7 +216,8 @@ class Resolver {
     std::erase_if(bound.terms, [](const Term &term) { return term.kind == Term::Kind::Jitter; });
     const Duration wait = response - (*bound.response - alone_.units[u].jitter);
     const TaskId first(system_.units[u].tasks.front());
-    if (wait > 0) bound.terms.push_back(Term{Term::Kind::Wait, first, system_.units[u].dag, wait, 0});
+    if (wait > 0 && Effort::itemises(u))
+      bound.terms.push_back(Term{Term::Kind::Wait, first, system_.units[u].dag, wait, 0});
     bound.response = response;
     return bound;
   }
@@ -300,8 +303,10 @@ std::optional<std::string> why_not_directly(const System &system) {
   return std::nullopt;
 }
 
+bool is_across_rates(const System &system) { return why_not_directly(system) || shares_max_active(system); }
+
 Outcome across_rates(const System &system, Outcome (*apply)(const System &system)) {
-  if (!why_not_directly(system) && !shares_max_active(system)) return apply(system);
+  if (!is_across_rates(system)) return apply(system);
   return Resolver(system, apply).run();
 }
 

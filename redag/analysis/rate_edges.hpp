@@ -14,6 +14,9 @@ namespace redag::analysis {
 /// Nothing, or what a method may not meet on its own: rate edges, or threads that suffice only if all is bounded.
 [[nodiscard]] std::optional<std::string> why_not_directly(const System &system);
 
+/// across_rates() does more than to apply: there are rate edges, few threads, or a max_active over several units.
+[[nodiscard]] bool is_across_rates(const System &system);
+
 /// `apply` on the system with waits as jitter and rate edges taken away. `apply` must bound responses by units, take
 /// release jitter, and answer nothing for a unit whose jitter is at least its limit. A max_active of a DAG in several
 /// parts, and few threads, are taken away too where most_jobs_in_progress() is within them; then all tasks concerned

@@ -146,7 +146,9 @@ TEST(Relations, TermsAddUpToTheResponse) {
   std::size_t checked = 0;
   for (const BoundCaseLimits &limits : all_kinds()) {
     for_cases(cases(limits), kCases / 5, [&](const BoundCase &, const System &system, Rng &) {
-      const Report report = analyze(system);
+      AnalyzeOptions options;
+      options.itemise = true;
+      const Report report = analyze(system, options);
       for (const MethodReport &method : report.methods) {
         if (method.bound() == nullptr) continue;
         for (const ResponseBound &bound : method.bound()->tasks) {

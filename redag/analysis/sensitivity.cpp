@@ -9,6 +9,7 @@
 
 #include "redag/analysis/analyze.hpp"
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -78,6 +79,22 @@ class Search {
   }
 
   std::optional<Margin> run() {
+    Effort::Limits limits;
+    limits.itemised.which = Itemised::Which::None;
+    limits.stop = [this](const EffortAt &) { return std::string(is_stopped() ? "stopped" : ""); };
+    const Effort effort(limits);
+    try {
+      return search();
+    } catch (const Effort::GaveUp &gave_up) {
+      if (gave_up.scope != &effort) throw;
+      return std::nullopt;
+    }
+  }
+
+ private:
+  [[nodiscard]] bool is_stopped() const { return options_.stop && options_.stop(); }
+
+  std::optional<Margin> search() {
     if (accepts(margin_.nominal)) {
       between(margin_.nominal, first_impossible(margin_.nominal));
     } else if (const std::optional<std::int64_t> start = light_start(); start && !stopped_) {
@@ -95,9 +112,8 @@ class Search {
     return margin_;
   }
 
- private:
   bool accepts(std::int64_t position) {
-    stopped_ = stopped_ || (options_.stop && options_.stop());
+    stopped_ = stopped_ || is_stopped();
     if (stopped_) return false;
     ++margin_.tested;
     const Workload candidate = turned(workload_, margin_.knob, position);

@@ -27,6 +27,7 @@ class Compiler {
         std::none_of(workload.dags.begin(), workload.dags.end(), has_region)) {
       system_.mode = sched::Preemption::None;
     }
+    find_losses();
   }
 
   System run() {
@@ -42,11 +43,7 @@ class Compiler {
     }
     check_sums();
     check_threads();
-    // With several workers the preempted job pays in its own time, which no interference divided by m covers.
-    if (system_.platform.workers > 1 && system_.mode != sched::Preemption::None &&
-        system_.platform.preempt_overhead > 0) {
-      refuse("a preemption overhead on several workers");
-    }
+    if (lost_.per_second >= kSecond) refuse("stalls, releases and preemptions leave no processor time");
     system_.has_modes = system_.not_analysable.empty() && !modes_.empty();
     if (system_.has_modes) refuse(std::move(modes_));
     return std::move(system_);
@@ -55,6 +52,46 @@ class Compiler {
  private:
   void refuse(std::string reason) {
     if (system_.not_analysable.empty()) system_.not_analysable = std::move(reason);
+  }
+
+  // With several workers who resumes pays in its own time, which no interference divided by m covers: as if nothing ran
+  // meanwhile. The same holds for stalls and for the release timer.
+  [[nodiscard]] bool preemptions_freeze() const {
+    return system_.platform.workers > 1 && system_.mode != sched::Preemption::None &&
+           system_.platform.preempt_overhead > 0;
+  }
+
+  // Time in which nothing is assumed to run. Sound: each loss on one processor is one on all.
+  void find_losses() {
+    const AnalysisPlatform &platform = system_.platform;
+    lost_.longest = multiply(platform.stall.longest, platform.workers);
+    lost_.per_second = multiply(platform.stall.per_second, platform.workers);
+    // `each` for every release of a task; `more`: releases within a window besides those that its length explains.
+    const auto add_releases = [this](Duration each, const Task &task, Duration more) {
+      lost_.longest = add(lost_.longest, multiply(each, more));
+      const Int128 rate = (Int128{each} * kSecond + task.period - 1) / std::max<Duration>(task.period, 1);
+      lost_.per_second = add(lost_.per_second, static_cast<Duration>(std::min(rate, Int128{kSecond})));
+    };
+    for (const Dag &dag : workload_.dags) {
+      for (const Task &task : dag.tasks) {
+        const Duration late = ceil_div(add(task.jitter, platform.lateness), std::max<Duration>(task.period, 1));
+        if (task.activation == Activation::Timer) add_releases(platform.timer_overhead, task, late + 1);
+        // A job preempts at most once, when it becomes eligible: also one that was released before the window. One that
+        // waits for its group can make the holder preempt, too.
+        const Duration waiting = task.overrun == Overrun::Queue ? task.queue_depth : 1;
+        const Duration times = task.group.empty() ? 1 : 2;
+        if (preemptions_freeze()) add_releases(multiply(platform.preempt_overhead, times), task, late + waiting + 2);
+      }
+    }
+    system_.frozen = lost_.per_second < kSecond ? lengthened(lost_.longest) : 0;
+  }
+
+  // An execution with the share of the processor that is lost all the time.
+  [[nodiscard]] Duration lengthened(Duration execution) const {
+    if (lost_.per_second == 0 || lost_.per_second >= kSecond) return execution;
+    const Duration left = kSecond - lost_.per_second;
+    const Int128 all = (Int128{execution} * kSecond + left - 1) / left;
+    return static_cast<Duration>(std::min(all, Int128{kUnbounded}));
   }
 
   // So that the bounds can add up what tasks execute without looking at each sum.
@@ -106,13 +143,18 @@ class Compiler {
     compiled.dag = DagId(system_.dags.size());
     // Who preempts pays for the resumption; a job preempts at most once, when it starts.
     const Duration lead = add(platform.release_overhead, platform.dispatch_overhead);
-    compiled.overhead = system_.mode == sched::Preemption::None ? lead : add(lead, platform.preempt_overhead);
-    compiled.wcet = add(task.wcet, compiled.overhead);
-    compiled.wcet_low = task.wcet_low > 0 ? add(task.wcet_low, compiled.overhead) : compiled.wcet;
-    compiled.bcet = add(std::max<Duration>(1, task.bcet), compiled.overhead);
+    const bool pays = system_.mode != sched::Preemption::None && !preemptions_freeze();
+    const Duration overhead = pays ? add(lead, platform.preempt_overhead) : lead;
+    compiled.wcet = lengthened(add(task.wcet, overhead));
+    compiled.overhead = compiled.wcet - task.wcet;
+    compiled.wcet_low = task.wcet_low > 0 ? lengthened(add(task.wcet_low, overhead)) : compiled.wcet;
+    compiled.bcet = add(std::max<Duration>(1, task.bcet), overhead);
     compiled.period = task.period;
     compiled.deadline = task.deadline;
     compiled.jitter = task.jitter;
+    if (task.activation == Activation::Timer) {
+      compiled.jitter = add(add(task.jitter, platform.lateness), system_.frozen);
+    }
     compiled.limit = task.overrun == Overrun::Queue ? multiply(task.period, task.queue_depth) : task.period;
     compiled.data = task.activation == Activation::Data;
     for (const std::uint32_t p : task.predecessors) compiled.predecessors.push_back(first + p);
@@ -124,7 +166,7 @@ class Compiler {
       compiled.region = compiled.last_region = compiled.wcet;
     } else if (system_.mode == sched::Preemption::Cooperative) {
       const bool whole = task.region == 0 || task.region >= task.wcet;
-      compiled.region = whole ? compiled.wcet : add(task.region, compiled.overhead);
+      compiled.region = whole ? compiled.wcet : lengthened(add(task.region, overhead));
       // Preemption points are at multiples of the region that lie strictly inside the job.
       compiled.last_region = whole ? add(task.wcet, lead) : (task.wcet - 1) % task.region + 1;
     }
@@ -305,10 +347,20 @@ class Compiler {
   std::string modes_;  // why there is a HI mode
   const Workload &workload_;
   System system_;
+  Loss lost_;
   std::map<std::string, std::uint32_t> group_ids_;
 };
 
 }  // namespace
+
+AnalysisPlatform charge(AnalysisPlatform platform, const Overheads &overheads) {
+  platform.dispatch_overhead = overheads.dispatch;
+  platform.preempt_overhead = overheads.preempt;
+  platform.timer_overhead = overheads.timer;
+  platform.lateness = overheads.lateness;
+  platform.stall = overheads.stall;
+  return platform;
+}
 
 AnalysisPlatform platform_of(const sched::Config &config) {
   AnalysisPlatform platform;
@@ -341,7 +393,8 @@ bool System::has_rate_edges() const {
 
 Result<System> compile(const Workload &workload, const AnalysisPlatform &platform) {
   if (platform.workers == 0) return make_error("a platform has at least one worker");
-  if (std::min({platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead}) < 0) {
+  if (std::min({platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead, platform.lateness,
+                platform.timer_overhead, platform.stall.longest, platform.stall.per_second}) < 0) {
     return make_error("an overhead is negative");
   }
   Diagnostics mistakes = validate(workload);

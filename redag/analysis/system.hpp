@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
+#include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/scheduler.hpp"
 
@@ -23,10 +24,17 @@ struct AnalysisPlatform {
   std::uint32_t max_started = 0;  // jobs started and unfinished at once; 0: no bound (sched::Config::max_started)
   Duration release_overhead = 0;  // each job, before its body
   Duration dispatch_overhead = 0;
-  Duration preempt_overhead = 0;  // each resumption; charged to the job that preempted (one worker only)
+  Duration preempt_overhead = 0;  // each resumption; charged to the job that preempted, on several workers to all
+  // What a real machine does besides: charge().
+  Duration lateness = 0;        // a timer's release is seen up to so much late
+  Duration timer_overhead = 0;  // processor time that the release timer takes from some job, for each release
+  Loss stall;                   // of each processor
 
   friend bool operator==(const AnalysisPlatform &, const AnalysisPlatform &) = default;
 };
+
+/// `platform` with what was measured of a machine (docs/calibration.md, "What is charged").
+[[nodiscard]] AnalysisPlatform charge(AnalysisPlatform platform, const Overheads &overheads);
 
 /// What a scheduler was told, no overheads.
 [[nodiscard]] AnalysisPlatform platform_of(const sched::Config &config);
@@ -108,6 +116,11 @@ struct System {
   /// Some wcet_low is below its wcet, so that there is a HI mode, and that is all that not_analysable is about: methods
   /// that know modes (Method::knows_modes) apply.
   bool has_modes = false;
+
+  /// Time in which the machine can leave all jobs without a processor during any response time, besides a share that
+  /// lengthens executions. It is part of the timers' jitter: that a window begins late and that it lasts longer is the
+  /// same (docs/analysis.md, "Stalls"). Responses from another point than the nominal release have to add it.
+  Duration frozen = 0;
 
   /// The platform's mode, or None where it is cooperative and no task has a preemption point.
   sched::Preemption mode = sched::Preemption::Full;

@@ -131,9 +131,6 @@ TEST(System, WhatCutsOrRefusesJobsIsNotAnalysed) {
   threads.max_started = 4;
   EXPECT_FALSE(compiled(two_dags(), threads).threads_suffice_if_bounded);
   EXPECT_EQ(compiled(two_dags(), threads).not_analysable, "");
-  AnalysisPlatform preempt = mode(sched::Preemption::Full, 2);
-  preempt.preempt_overhead = 1;
-  EXPECT_THAT(compiled(two_dags(), preempt).not_analysable, HasSubstr("overhead"));
 }
 
 TEST(System, OverlappingJobsOfOneTaskAreNotAnalysed) {

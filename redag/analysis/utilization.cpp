@@ -1,10 +1,13 @@
 #include "redag/analysis/utilization.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
+#include <span>
+#include <vector>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
+#include "redag/analysis/exact_utilization.hpp"
 #include "redag/analysis/one_worker.hpp"
 #include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
@@ -12,22 +15,9 @@
 namespace redag::analysis {
 namespace {
 
-// Utilizations in units of 2^-60: one is 2^60, and a sum of 2^60 of them still fits into 128 bits.
-constexpr Int128 kOne = Int128{1} << 60;
+constexpr Int128 kOne = Int128{1} << 60;  // for figures: utilizations in units of 2^-60
 
-// numerator / denominator, rounded up. Durations have 62 bits, so the product fits.
-Int128 share(Duration numerator, Duration denominator) {
-  const Int128 scaled = Int128{numerator} * kOne;
-  return scaled / denominator + (scaled % denominator != 0 ? 1 : 0);
-}
-
-// n (2^(1/n) - 1), rounded down: long double has 64 bits, its functions are right to a few of the last.
-Int128 liu_layland_limit(std::size_t n) {
-  if (n == 0) return kOne;
-  const auto count = static_cast<long double>(n);
-  const long double limit = n == 1 ? 1.0L : count * std::expm1(std::log(2.0L) / count);
-  return static_cast<Int128>(limit * static_cast<long double>(kOne)) - (n == 1 ? 0 : 1024);
-}
+Int128 rounded(const ShareRange &range) { return static_cast<Int128>(range.low); }
 
 double as_double(Int128 value) { return static_cast<double>(value) / static_cast<double>(kOne); }
 
@@ -86,8 +76,9 @@ std::optional<std::string> prepare(const System &system, bool with_blocking, Pre
   if (!with_blocking && system.mode != sched::Preemption::Full)
     return "for full preemption: see the test with blocking";
   prepared.order = *order;
+  const one_worker::Views views(system);
   for (const std::uint32_t u : *order) {
-    prepared.blocking.push_back(one_worker::view_of(system, u).blocking);
+    prepared.blocking.push_back(views.blocking(u));
     if (!with_blocking && prepared.blocking.back() > 0) {
       return "less urgent jobs can block (groups or shared levels): see the test with blocking";
     }
@@ -95,127 +86,130 @@ std::optional<std::string> prepare(const System &system, bool with_blocking, Pre
   return std::nullopt;
 }
 
-Int128 total_share(const System &system) {
-  Int128 sum = 0;
-  for (const Unit &unit : system.units) sum += share(unit.volume, unit.period);
-  return sum;
+Share share_of(const Unit &unit, Duration blocking = 0) {
+  return Share{static_cast<Uint128>(unit.volume) + static_cast<Uint128>(blocking), unit.period};
 }
 
-// sum C_i / T_i <= 1 without rounding, where all periods divide the largest one.
-bool harmonic_fits(const System &system) {
-  Duration longest = 1;
-  for (const Unit &unit : system.units) longest = std::max(longest, unit.period);
-  Int128 demand = 0;
-  for (const Unit &unit : system.units) {
-    if (longest % unit.period != 0) return false;
-    demand += Int128{longest / unit.period} * unit.volume;
-  }
-  return demand <= longest;
+Shares shares_of(const System &system) {
+  Shares shares;
+  for (const Unit &unit : system.units) shares.push(share_of(unit));
+  return shares;
 }
 
 Outcome apply_liu_layland(const System &system) {
   Prepared prepared;
   if (auto reason = prepare(system, false, prepared)) return NotApplicable{*reason};
-  const Int128 utilization = total_share(system);
-  const Int128 limit = liu_layland_limit(system.units.size());
-  return answer(utilization <= limit, figures("U", utilization, limit));
-}
-
-// x (U + 1), rounded up; saturates well above two.
-Int128 times_one_plus(Int128 x, Int128 utilization) {
-  if (x > 4 * kOne || utilization > 4 * kOne) return 8 * kOne;
-  const Int128 product = x * (utilization + kOne);
-  return product / kOne + (product % kOne != 0 ? 1 : 0);
+  const Shares shares = shares_of(system);
+  return answer(is_within_liu_layland(shares, shares.size()),
+                figures("U", rounded(shares.sum()), liu_layland_limit(shares.size())));
 }
 
 Outcome apply_hyperbolic(const System &system) {
   Prepared prepared;
   if (auto reason = prepare(system, false, prepared)) return NotApplicable{*reason};
-  Int128 product = kOne;
-  for (const Unit &unit : system.units) product = times_one_plus(product, share(unit.volume, unit.period));
-  return answer(product <= 2 * kOne, figures("prod (U_i + 1)", product, 2 * kOne));
+  const Shares shares = shares_of(system);
+  return answer(is_within_hyperbolic(shares), figures("prod (U_i + 1)", rounded(shares.product()), 2 * kOne));
 }
 
-// A matching of maximum size between periods and their multiples (Kuhn); what is not matched starts a chain.
+// A matching of maximum size between periods and their multiples (Kuhn); what is not matched starts a chain. Units of
+// one period are always in one chain, so that only different periods matter.
 class ChainCover {
  public:
-  explicit ChainCover(const System &system) : system_(system), next_(system.units.size(), kNone) {}
+  explicit ChainCover(const System &system) {
+    for (const Unit &unit : system.units) periods_.push_back(unit.period);
+    std::sort(periods_.begin(), periods_.end());
+    periods_.erase(std::unique(periods_.begin(), periods_.end()), periods_.end());
+    next_.assign(periods_.size(), kNone);
+  }
 
   std::size_t chains() {
     std::size_t matched = 0;
-    for (std::uint32_t u = 0; u < system_.units.size(); ++u) {
-      visited_.assign(system_.units.size(), false);
-      matched += extend(u) ? 1U : 0U;
-    }
-    return system_.units.size() - matched;
+    for (std::size_t u = 0; u < periods_.size(); ++u) matched += extend(u) ? 1U : 0U;
+    return periods_.size() - matched;
   }
 
  private:
-  static constexpr std::uint32_t kNone = 0xffffffff;
+  static constexpr std::size_t kNone = SIZE_MAX;
 
-  [[nodiscard]] bool before(std::uint32_t a, std::uint32_t b) const {
-    const Duration shorter = system_.units[a].period;
-    const Duration longer = system_.units[b].period;
-    return a != b && longer % shorter == 0 && (longer > shorter || a < b);
-  }
-  bool extend(std::uint32_t u) {
-    for (std::uint32_t v = 0; v < system_.units.size(); ++v) {
-      if (visited_[v] || !before(u, v)) continue;
-      visited_[v] = true;
-      if (next_[v] == kNone || extend(next_[v])) {
-        next_[v] = u;
+  // Breadth first from the unmatched `root`; true if an augmenting path was found.
+  bool extend(std::size_t root) {
+    std::vector<std::size_t> reached_by(periods_.size(), kNone);  // by longer period
+    std::vector<std::size_t> waiting = {root};
+    for (std::size_t i = 0; i < waiting.size(); ++i) {
+      const std::size_t u = waiting[i];
+      Effort::spend(periods_.size() - u);
+      for (std::size_t v = u + 1; v < periods_.size(); ++v) {
+        if (reached_by[v] != kNone || periods_[v] % periods_[u] != 0) continue;
+        reached_by[v] = u;
+        if (next_[v] != kNone) {
+          waiting.push_back(next_[v]);
+          continue;
+        }
+        turn_around(v, root, reached_by);
         return true;
       }
     }
     return false;
   }
 
-  const System &system_;
-  std::vector<std::uint32_t> next_;  // by longer period: the shorter one before it in its chain
-  std::vector<bool> visited_;
+  void turn_around(std::size_t last, std::size_t root, const std::vector<std::size_t> &reached_by) {
+    for (std::size_t v = last;;) {
+      const std::size_t u = reached_by[v];
+      const std::size_t before = match_of(u);
+      next_[v] = u;
+      if (u == root) return;
+      v = before;
+    }
+  }
+
+  // The longer period that `u` is matched with.
+  [[nodiscard]] std::size_t match_of(std::size_t u) const {
+    return static_cast<std::size_t>(std::find(next_.begin(), next_.end(), u) - next_.begin());
+  }
+
+  std::vector<Duration> periods_;  // different ones, ascending
+  std::vector<std::size_t> next_;  // by longer period: the shorter one before it in its chain
 };
 
 Outcome apply_harmonic_chains(const System &system) {
   Prepared prepared;
   if (auto reason = prepare(system, false, prepared)) return NotApplicable{*reason};
   const std::size_t chains = ChainCover(system).chains();
-  const Int128 utilization = total_share(system);
-  const Int128 limit = liu_layland_limit(chains);
-  const bool fits = utilization <= limit || (chains <= 1 && harmonic_fits(system));
-  return answer(fits, figures("U", utilization, limit) + ", " + std::to_string(chains) + " harmonic chains");
+  const Shares shares = shares_of(system);
+  return answer(is_within_liu_layland(shares, chains), figures("U", rounded(shares.sum()), liu_layland_limit(chains)) +
+                                                           ", " + std::to_string(chains) + " harmonic chains");
+}
+
+// Level by level, each with its blocking; the first that is above its limit is told.
+template <class Within, class Figures>
+Outcome apply_by_level(const System &system, Within is_within, Figures figures_of) {
+  Prepared prepared;
+  if (auto reason = prepare(system, true, prepared)) return NotApplicable{*reason};
+  Shares shares;
+  for (std::size_t i = 0; i < prepared.order.size(); ++i) {
+    const Unit &unit = system.units[prepared.order[i]];
+    shares.push(share_of(unit, prepared.blocking[i]));
+    if (!is_within(shares)) {
+      return answer(false, figures_of(shares) + " at '" + system.tasks[unit.tasks.front()].name + "'");
+    }
+    shares.pop();
+    shares.push(share_of(unit));
+  }
+  return answer(true, "every level within its limit");
 }
 
 Outcome apply_liu_layland_blocking(const System &system) {
-  Prepared prepared;
-  if (auto reason = prepare(system, true, prepared)) return NotApplicable{*reason};
-  Int128 above = 0;
-  for (std::size_t i = 0; i < prepared.order.size(); ++i) {
-    const Unit &unit = system.units[prepared.order[i]];
-    above += share(unit.volume, unit.period);
-    const Int128 demand = above + share(prepared.blocking[i], unit.period);
-    const Int128 limit = liu_layland_limit(i + 1);
-    if (demand > limit) {
-      return answer(false, figures("U + B / T", demand, limit) + " at '" + system.tasks[unit.tasks.front()].name + "'");
-    }
-  }
-  return answer(true, "every level within its limit");
+  return apply_by_level(
+      system, [](const Shares &shares) { return is_within_liu_layland(shares, shares.size()); },
+      [](const Shares &shares) {
+        return figures("U + B / T", rounded(shares.sum()), liu_layland_limit(shares.size()));
+      });
 }
 
 Outcome apply_hyperbolic_blocking(const System &system) {
-  Prepared prepared;
-  if (auto reason = prepare(system, true, prepared)) return NotApplicable{*reason};
-  Int128 above = kOne;
-  for (std::size_t i = 0; i < prepared.order.size(); ++i) {
-    const Unit &unit = system.units[prepared.order[i]];
-    const Int128 own = share(unit.volume, unit.period);
-    const Int128 product = times_one_plus(above, own + share(prepared.blocking[i], unit.period));
-    if (product > 2 * kOne) {
-      return answer(false,
-                    figures("product", product, 2 * kOne) + " at '" + system.tasks[unit.tasks.front()].name + "'");
-    }
-    above = times_one_plus(above, own);
-  }
-  return answer(true, "every level within its limit");
+  return apply_by_level(
+      system, [](const Shares &shares) { return is_within_hyperbolic(shares); },
+      [](const Shares &shares) { return figures("product", rounded(shares.product()), 2 * kOne); });
 }
 
 // m workers, full preemption, independent tasks, nothing that holds up a started or ready job but priority.
@@ -240,30 +234,35 @@ std::optional<std::string> why_not_global(const System &system) {
   return why_not_by_rate(system, *units_by_rank(system));
 }
 
-Int128 largest_share(const System &system) {
-  Int128 largest = 0;
-  for (const Unit &unit : system.units) largest = std::max(largest, share(unit.volume, unit.period));
-  return largest;
+// Alone.
+Shares largest(const Shares &shares) {
+  Shares one;
+  const auto found = std::max_element(shares.all().begin(), shares.all().end(), is_smaller);
+  if (found != shares.all().end()) one.push(*found);
+  return one;
 }
 
 Outcome apply_global_rm_light(const System &system) {
   if (auto reason = why_not_global(system)) return NotApplicable{*reason};
-  const Int128 m = system.platform.workers;
-  const Int128 utilization = total_share(system);
-  const Int128 largest = largest_share(system);
-  const bool fits = utilization * (3 * m - 2) <= m * m * kOne && largest * (3 * m - 2) <= m * kOne;
-  return answer(fits, figures("U", utilization, m * m * kOne / (3 * m - 2)) + "; " +
-                          figures("max U_i", largest, m * kOne / (3 * m - 2)));
+  const std::uint64_t m = system.platform.workers;
+  const Shares shares = shares_of(system);
+  const Shares most = largest(shares);
+  const bool fits = is_sum_within(shares, m * m, 3 * m - 2) && is_sum_within(most, m, 3 * m - 2);
+  const auto divisor = static_cast<Int128>(3 * m - 2);
+  return answer(fits, figures("U", rounded(shares.sum()), static_cast<Int128>(m * m) * kOne / divisor) + "; " +
+                          figures("max U_i", rounded(most.sum()), static_cast<Int128>(m) * kOne / divisor));
 }
 
 Outcome apply_global_rm_utilization(const System &system) {
   if (auto reason = why_not_global(system)) return NotApplicable{*reason};
-  const Int128 m = system.platform.workers;
-  const Int128 utilization = total_share(system);
-  const Int128 largest = largest_share(system);
-  // The limit falls with u (m >= 2), so that u rounded up is safe.
-  const Int128 twice = m * (kOne - largest) + 2 * largest;
-  return answer(largest <= kOne && 2 * utilization <= twice, figures("U", utilization, twice / 2));
+  const std::uint64_t m = system.platform.workers;
+  const Shares shares = shares_of(system);
+  const Shares most = largest(shares);
+  Shares weighted;  // 2 U + (m - 2) u <= m
+  for (const Share &share : shares.all()) weighted.push({share.amount * 2, share.period});
+  for (const Share &share : most.all()) weighted.push({share.amount * (m - 2), share.period});
+  const Int128 limit = (static_cast<Int128>(m) * (kOne - rounded(most.sum())) + 2 * rounded(most.sum())) / 2;
+  return answer(is_sum_within(most, 1, 1) && is_sum_within(weighted, m, 1), figures("U", rounded(shares.sum()), limit));
 }
 
 Method make(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
@@ -274,6 +273,7 @@ Method make(std::string_view name, std::string_view cite, std::string_view assum
   method.cite = cite;
   method.assumptions = assumptions;
   method.complexity = complexity;
+  method.quick = true;
   method.apply = apply;
   return method;
 }
@@ -306,20 +306,20 @@ Method hyperbolic() {
 
 Method harmonic_chains() {
   return make("harmonic_chains", "T.-W. Kuo, A. K. Mok, Load adjustment in adaptive real-time systems, RTSS 1991",
-              kOneWorker, "O(n^3), a maximum matching", apply_harmonic_chains);
+              kOneWorker, "O(n), and a maximum matching of the different periods", apply_harmonic_chains);
 }
 
 Method liu_layland_blocking() {
   return make(
       "liu_layland_blocking",
       "L. Sha, R. Rajkumar, J. Lehoczky, Priority inheritance protocols, IEEE Transactions on Computers 39(9), 1990",
-      kOneWorkerBlocking, "O(n^2)", apply_liu_layland_blocking);
+      kOneWorkerBlocking, "O(n log n)", apply_liu_layland_blocking);
 }
 
 Method hyperbolic_blocking() {
   return make("hyperbolic_blocking",
               "the hyperbolic bound (Bini, Buttazzo, Buttazzo 2003) with the blocking of Sha, Rajkumar, Lehoczky 1990",
-              kOneWorkerBlocking, "O(n^2)", apply_hyperbolic_blocking);
+              kOneWorkerBlocking, "O(n log n)", apply_hyperbolic_blocking);
 }
 
 Method global_rm_light() {

@@ -1,6 +1,5 @@
 // Tests that compare utilizations with a limit: O(n) or nearly so, and sufficient only. Those for one worker take a DAG
-// of one rate as one task with C = its volume. Utilizations are rounded up to 2^-60, limits down; nothing is accepted
-// by rounding.
+// of one rate as one task with C = its volume. Nothing is accepted or refused by rounding (exact_utilization.hpp).
 #pragma once
 
 #include "redag/analysis/bound.hpp"

@@ -2,6 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "redag/analysis/exact_utilization.hpp"
 #include "redag/testing/bound_property.hpp"
 
 namespace redag::analysis {
@@ -81,6 +87,131 @@ TEST(BoundProperty, GlobalRateMonotonic) {
   limits.max_utilization = 0.6;
   expect_bound_holds(global_rm_light(), cases(limits), kFew);
   expect_bound_holds(global_rm_utilization(), cases(limits), kFew);
+}
+
+// ---- exactly at, just below and just above ----
+
+struct Load {
+  Duration wcet;
+  Duration period;
+};
+
+System independent(const std::vector<Load> &loads, std::uint32_t workers = 1) {
+  Workload workload;
+  workload.name = "w";
+  workload.platform.workers = workers;
+  workload.platform.preemption = PreemptionMode::Os;
+  for (const Load &load : loads) {
+    Task task;
+    task.name = "t";
+    task.wcet = task.bcet = load.wcet;
+    task.period = task.deadline = load.period;
+    Dag dag;
+    dag.name = "d" + std::to_string(workload.dags.size());
+    dag.tasks.push_back(task);
+    workload.dags.push_back(dag);
+  }
+  return compile(workload, platform_of(workload)).value();
+}
+
+bool accepts(const Method &method, const System &system) {
+  const Outcome outcome = method.apply(system);
+  const Bound *bound = std::get_if<Bound>(&outcome);
+  return bound != nullptr && bound->accepts == true;
+}
+
+// (1 + 1/3) (1 + 1/5) (1 + 1/4) = 2; no share but the last is a multiple of a power of two.
+TEST(ExactUtilization, HyperbolicAtTwo) {
+  constexpr Duration kTick = 1'000'000'007;  // so that one nanosecond is far below 2^-60 of what rounding could tell
+  const auto loads = [](Duration more) {
+    return std::vector<Load>{{kTick, 3 * kTick}, {kTick, 4 * kTick}, {kTick + more, 5 * kTick}};
+  };
+  for (const Method &method : {hyperbolic(), hyperbolic_blocking()}) {
+    EXPECT_TRUE(accepts(method, independent(loads(0)))) << method.name;
+    EXPECT_TRUE(accepts(method, independent(loads(-1)))) << method.name;
+    EXPECT_FALSE(accepts(method, independent(loads(1)))) << method.name;
+  }
+}
+
+// One nanosecond beside periods so long that it is a fraction of 2^-60.
+TEST(ExactUtilization, HyperbolicWithinTheLastBit) {
+  constexpr Duration kLong = 3 * (Duration{1} << 56);
+  // (1 + 1/3) (1 + 1/2) = 2.
+  const auto loads = [](Duration more) {
+    return std::vector<Load>{{kLong / 3 / 2, kLong / 2}, {kLong / 2 + more, kLong}};
+  };
+  EXPECT_TRUE(accepts(hyperbolic(), independent(loads(0))));
+  EXPECT_TRUE(accepts(hyperbolic(), independent(loads(-1))));
+  EXPECT_FALSE(accepts(hyperbolic(), independent(loads(1))));
+}
+
+TEST(ExactUtilization, OneWholeOfSharesThatHaveNoEnd) {
+  EXPECT_TRUE(accepts(harmonic_chains(), independent({{1, 3}, {2, 6}, {4, 12}})));
+  EXPECT_TRUE(accepts(harmonic_chains(), independent({{1, 3}, {2, 6}, {3, 12}})));
+  EXPECT_FALSE(accepts(harmonic_chains(), independent({{1, 3}, {2, 6}, {5, 12}})));
+  EXPECT_TRUE(accepts(liu_layland(), independent({{7, 7}})));
+  EXPECT_TRUE(accepts(liu_layland_blocking(), independent({{7, 7}})));
+}
+
+// The limit of two is 2 sqrt(2) - 2: the nearest fractions on both sides, of the continued fraction of sqrt(2).
+TEST(ExactUtilization, LiuLaylandBesideAnIrrationalLimit) {
+  // p / q below sqrt(2) and p' / q' above, with p^2 - 2 q^2 = -1 and 1.
+  Int128 p = 1;
+  Int128 q = 1;
+  int below = 0;
+  int above = 0;
+  for (; q < Int128{1} << 58; std::tie(p, q) = std::pair(p + 2 * q, p + q)) {
+    if (q < 1000) continue;
+    // U = 2 p / q - 2 as two equal shares of p / q - 1.
+    const auto wcet = static_cast<Duration>(p - q);
+    const auto period = static_cast<Duration>(q);
+    const bool is_below = p * p < 2 * q * q;
+    EXPECT_EQ(accepts(liu_layland(), independent({{wcet, period}, {wcet, period}})), is_below) << period;
+    ++(is_below ? below : above);
+  }
+  EXPECT_GT(below, 10);
+  EXPECT_GT(above, 10);
+}
+
+TEST(ExactUtilization, SeveralWorkers) {
+  // m = 2: U <= 1, max U_i <= 1/2.
+  EXPECT_TRUE(accepts(global_rm_light(), independent({{1, 3}, {2, 6}, {4, 12}}, 2)));
+  EXPECT_FALSE(accepts(global_rm_light(), independent({{1, 3}, {2, 6}, {5, 12}}, 2)));
+  EXPECT_TRUE(accepts(global_rm_light(), independent({{50, 100}, {51, 102}}, 2)));
+  EXPECT_FALSE(accepts(global_rm_light(), independent({{50, 100}, {52, 102}}, 2)));
+  // m = 2: U <= 1 whatever u is; m = 3: U <= 3/2 - u/2.
+  EXPECT_TRUE(accepts(global_rm_utilization(), independent({{1, 3}, {2, 6}, {4, 12}}, 2)));
+  EXPECT_FALSE(accepts(global_rm_utilization(), independent({{1, 3}, {2, 6}, {5, 12}}, 2)));
+  const std::vector<Load> three = {{1, 3}, {2, 6}, {3, 9}, {4, 12}};  // U = 4/3 = 3/2 - 1/6
+  EXPECT_TRUE(accepts(global_rm_utilization(), independent(three, 3)));
+  std::vector<Load> more = three;
+  more.back().wcet = 5;
+  EXPECT_FALSE(accepts(global_rm_utilization(), independent(more, 3)));
+}
+
+// Nothing but exact arithmetic on the one side, the bounds' own on the other.
+TEST(ExactUtilization, AsLongDivisionSays) {
+  Rng rng(7);
+  std::uint32_t equal = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    Shares shares;
+    Int128 numerator = 0;
+    constexpr Duration kAll = 2 * 2 * 3 * 3 * 5 * 7;
+    for (Duration left = rng.uniform(1, 4); left > 0; --left) {
+      const Duration periods[] = {3, 4, 5, 6, 7, 9, 10, 12, 14, 15, 20, 21};
+      const Duration period = periods[rng.uniform(0, 11)];
+      const Duration amount = rng.uniform(0, period);
+      shares.push({static_cast<Uint128>(amount), period});
+      numerator += Int128{amount} * (kAll / period);
+    }
+    const std::uint64_t of = static_cast<std::uint64_t>(rng.uniform(1, 12));
+    const std::uint64_t limit = static_cast<std::uint64_t>(rng.uniform(1, 20));
+    const Int128 left = numerator * static_cast<Int128>(of);
+    const Int128 right = static_cast<Int128>(limit) * kAll;
+    ASSERT_EQ(is_sum_within(shares, limit, of), left <= right);
+    equal += left == right ? 1U : 0U;
+  }
+  EXPECT_GT(equal, 100U);
 }
 
 }  // namespace

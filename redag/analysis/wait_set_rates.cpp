@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "redag/analysis/arithmetic.hpp"
+#include "redag/analysis/effort.hpp"
 #include "redag/analysis/fixed_point.hpp"
 #include "redag/analysis/global.hpp"
 #include "redag/analysis/rate_edges.hpp"
@@ -90,6 +91,7 @@ class Executor {
     Callback &callback = callbacks_[t];
     const Duration limit = limit_of(system_.units[system_.tasks[t].unit]) - callback.ready;
     if (limit < callback.wcet) return false;
+    Effort::spend(callbacks_.size());
     const auto found = respond_(callbacks_, t, limit);
     if (!found || found->response > limit) return false;
     callback.response = found->response;
@@ -114,6 +116,7 @@ class Executor {
                                          [&](std::uint32_t a, std::uint32_t b) { return end(a) < end(b); });
     ResponseBound bound;
     bound.response = end(at);
+    if (!Effort::itemises(static_cast<std::uint32_t>(&unit - system_.units.data()))) return bound;
     std::map<std::size_t, Duration> shares;
     Duration own = 0;
     Duration earlier = 0;
@@ -187,6 +190,7 @@ std::optional<FromReady> blass_response(const std::vector<Callback> &callbacks, 
   found.shares.resize(callbacks.size());
   Duration window = 1;
   const bool ends = global::least_fixed_point(limit, window, [&](Duration length) {
+    Effort::spend(callbacks.size());
     found.earlier = multiply(arrivals(own, length + own.response - 1) - 1, own.wcet);
     Duration sum = found.earlier;
     for (std::size_t j = 0; j < callbacks.size(); ++j) {
@@ -219,6 +223,7 @@ std::optional<FromReady> rates_response(const std::vector<Callback> &callbacks, 
   }
   Duration d = first.length();
   const bool found = global::least_fixed_point(limit - own.wcet + 1, d, [&](Duration waiting) {
+    Effort::spend(callbacks.size());
     global::Largest largest(threads - 1);
     Duration sum = 0;
     for (std::size_t j = 0; j < callbacks.size(); ++j) {

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <cstdint>
 
+#include "redag/base/log_buckets.hpp"
 #include "redag/base/time.hpp"
 
 namespace redag {
@@ -52,19 +52,14 @@ class HistogramCounts {
  private:
   friend class Histogram;
 
+  using Buckets = LogBuckets<kBits>;
+
   static std::size_t bucket_of(std::uint64_t value) noexcept {
-    const auto width = static_cast<unsigned>(std::bit_width(value));
-    if (width <= kBits + 1) return static_cast<std::size_t>(value);
-    const unsigned shift = width - kBits - 1;
-    const std::size_t index = (static_cast<std::size_t>(shift) << kBits) + static_cast<std::size_t>(value >> shift);
-    return std::min(index, kBuckets - 1);
+    return std::min(Buckets::bucket_of(value), kBuckets - 1);
   }
   static Duration upper_bound_of(std::size_t index) noexcept {
-    if (index == kBuckets - 1) return kNever;  // the last one takes all that is longer
-    if (index < (std::size_t{2} << kBits)) return static_cast<Duration>(index);
-    const std::size_t shift = (index >> kBits) - 1;
-    const std::size_t leading = index - (shift << kBits);
-    return static_cast<Duration>(((leading + 1) << shift) - 1);
+    // The last one takes all that is longer.
+    return index == kBuckets - 1 ? kNever : static_cast<Duration>(Buckets::highest_in(index));
   }
 
   std::array<std::uint32_t, kBuckets> buckets_{};

@@ -1,5 +1,7 @@
 #include "redag/base/result.hpp"
 
+#include "redag/base/text.hpp"
+
 namespace redag {
 
 std::string Diagnostic::to_string() const {
@@ -10,7 +12,7 @@ std::string Diagnostic::to_string() const {
   text += severity == Severity::Error ? "error: " : "warning: ";
   text += message;
   if (!hint.empty()) text += " (" + hint + ")";
-  return text;
+  return printable(text);  // whatever was quoted: a message must not steer the terminal that shows it
 }
 
 std::string to_string(const Diagnostics &diagnostics) {

@@ -18,6 +18,11 @@ TEST(Diagnostic, LeavesOutWhatIsNotKnown) {
             "a.yaml: error: is a directory");
 }
 
+TEST(Diagnostic, SteersNoTerminal) {
+  const Diagnostic mistake{Severity::Error, "\x1b[31m.yaml", 0, 0, "\x1b]0;title\x07", "\x1b[2J"};
+  EXPECT_EQ(mistake.to_string().find('\x1b'), std::string::npos) << mistake.to_string();
+}
+
 TEST(Diagnostics, OneALine) {
   const Result<int> bad = make_error("no", "yes");
   Diagnostics both = bad.error();

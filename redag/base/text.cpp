@@ -5,6 +5,87 @@
 #include <cmath>
 
 namespace redag {
+namespace {
+
+char32_t decode(std::string_view sequence) {
+  const auto lead = static_cast<unsigned char>(sequence.front());
+  if (sequence.size() == 1) return lead;
+  char32_t code = lead & (0x7FU >> sequence.size());
+  for (const char c : sequence.substr(1)) code = code << 6U | (static_cast<unsigned char>(c) & 0x3FU);
+  return code;
+}
+
+bool can_be_shown(char32_t code) {
+  const bool control = code < 0x20 || (code >= 0x7F && code < 0xA0);
+  const bool separator = code == 0x2028 || code == 0x2029 || code == 0xFEFF;
+  const bool direction =
+      code == 0x200E || code == 0x200F || (code >= 0x202A && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069);
+  return !control && !separator && !direction;
+}
+
+}  // namespace
+
+std::size_t utf8_length(std::string_view text, std::size_t at) {
+  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
+  const unsigned lead = byte(at);
+  if (lead < 0x80) return 1;
+  const std::size_t length = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
+  if (lead < 0xC2 || lead > 0xF4 || at + length > text.size()) return 0;
+  for (std::size_t k = 1; k < length; ++k) {
+    if ((byte(at + k) & 0xC0U) != 0x80) return 0;
+  }
+  const unsigned second = byte(at + 1);
+  if (lead == 0xE0 && second < 0xA0) return 0;
+  if (lead == 0xED && second > 0x9F) return 0;
+  if (lead == 0xF0 && second < 0x90) return 0;
+  if (lead == 0xF4 && second > 0x8F) return 0;
+  return length;
+}
+
+std::string find_unprintable(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t length = utf8_length(text, i);
+    if (length == 0) return fmt::format("byte 0x{:02X}", static_cast<unsigned char>(text[i]));
+    const char32_t code = decode(text.substr(i, length));
+    if (!can_be_shown(code)) return fmt::format("U+{:04X}", static_cast<std::uint32_t>(code));
+    i += length;
+  }
+  return {};
+}
+
+namespace {
+
+std::string written_out(std::string_view text, std::string_view kept) {
+  std::string shown;
+  shown.reserve(text.size());
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t length = utf8_length(text, i);
+    if (length == 0) {
+      shown += fmt::format("\\x{:02X}", static_cast<unsigned char>(text[i++]));
+      continue;
+    }
+    const char32_t code = decode(text.substr(i, length));
+    if (can_be_shown(code) || (length == 1 && kept.find(text[i]) != std::string_view::npos)) {
+      shown += text.substr(i, length);
+    } else {
+      shown += fmt::format("\\u{{{:X}}}", static_cast<std::uint32_t>(code));
+    }
+    i += length;
+  }
+  return shown;
+}
+
+}  // namespace
+
+std::string printable(std::string_view text) { return written_out(text, "\n\t"); }
+
+std::string in_quotes(std::string_view text) {
+  constexpr std::size_t kLongest = 60;
+  if (text.size() <= kLongest) return "'" + written_out(text, {}) + "'";
+  std::size_t cut = kLongest;
+  while (cut > 0 && (static_cast<unsigned char>(text[cut]) & 0xC0U) == 0x80) --cut;  // whole characters
+  return "'" + written_out(text.substr(0, cut), {}) + "...'";
+}
 
 std::string format_percent(double ratio) {
   if (!std::isfinite(ratio)) return "-";

@@ -15,6 +15,21 @@ namespace redag {
 /// 1234567 -> "1 234 567".
 [[nodiscard]] std::string format_count(std::uint64_t count);
 
+inline constexpr const char *kMaxDurationText = "1281023h (146 years)";  // kMaxDuration, for messages
+
+/// Length of the UTF-8 sequence at `at`, 0 if there is none (overlong forms, surrogates and beyond U+10FFFF included).
+[[nodiscard]] std::size_t utf8_length(std::string_view text, std::size_t at);
+
+/// The first character that a terminal would obey instead of showing, as "U+001B": controls (C0, DEL, C1), line
+/// separators, marks that reverse the direction of text. "byte 0xFF" for what is not UTF-8. Empty: all can be shown.
+[[nodiscard]] std::string find_unprintable(std::string_view text);
+
+/// `text` with each character that find_unprintable() finds written out: "\\u{1B}[2J". Line feeds and tabs stay.
+[[nodiscard]] std::string printable(std::string_view text);
+
+/// What somebody wrote, as a message quotes it: in quotes, printable, and of a long text the beginning.
+[[nodiscard]] std::string in_quotes(std::string_view text);
+
 /// No JSON that this project writes is nested as deep.
 inline constexpr std::size_t kMaxJsonDepth = 32;
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <string>
 
 namespace redag {
 namespace {
@@ -30,6 +31,33 @@ TEST(Text, TheDepthOfJson) {
   EXPECT_FALSE(json_nests_deeper(R"(["[[[\"[[", "\\"])", 1)) << "brackets in texts are text";
   EXPECT_TRUE(json_nests_deeper(std::string(1'000'000, '[')));
   EXPECT_FALSE(json_nests_deeper("]]]]"));
+}
+
+TEST(Text, WhatATerminalWouldObeyIsWrittenOut) {
+  EXPECT_EQ(printable("naïve \tλ\n"), "naïve \tλ\n");
+  EXPECT_EQ(printable("\x1b[2J"), "\\u{1B}[2J");
+  EXPECT_EQ(printable("\xC2\x9B"
+                      "2J"),
+            "\\u{9B}2J")
+      << "C1: the other way to begin a sequence";
+  EXPECT_EQ(printable("a\x7f\rb"), "a\\u{7F}\\u{D}b");
+  EXPECT_EQ(printable("\xE2\x80\xAE"
+                      "exe"),
+            "\\u{202E}exe")
+      << "text that runs backwards";
+  EXPECT_EQ(printable("\xff"), "\\xFF");
+  EXPECT_EQ(find_unprintable("imu_42 µ λ"), "");
+  EXPECT_EQ(find_unprintable("a\nb"), "U+000A");
+  EXPECT_EQ(find_unprintable("a\xC2\x85"), "U+0085");
+  EXPECT_EQ(find_unprintable("a\xff"), "byte 0xFF");
+}
+
+TEST(Text, QuotesAreShortAndPrintable) {
+  EXPECT_EQ(in_quotes("5"), "'5'");
+  EXPECT_EQ(in_quotes("a\nb\tc"), "'a\\u{A}b\\u{9}c'") << "on one line";
+  EXPECT_EQ(in_quotes("\x1b[2J"), "'\\u{1B}[2J'");
+  EXPECT_EQ(in_quotes(std::string(1'000'000, 'x')), "'" + std::string(60, 'x') + "...'");
+  EXPECT_EQ(in_quotes(std::string(59, 'x') + "λλ"), "'" + std::string(59, 'x') + "...'") << "whole characters";
 }
 
 }  // namespace

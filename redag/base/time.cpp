@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/int128.hpp"
+#include "redag/base/text.hpp"
 
 namespace redag {
 namespace {
@@ -36,7 +37,8 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 Result<Duration> parse_duration(std::string_view text) {
   const auto fail = [&](std::string_view why) {
-    return make_error(fmt::format("'{}' is not a duration: {}", text, why), "write a number and a unit, as in 5ms");
+    return make_error(fmt::format("{} is not a duration: {}", in_quotes(text), why),
+                      "write a number and a unit, as in 5ms");
   };
   std::string_view rest = text;
   const bool negative = rest.starts_with('-');
@@ -54,7 +56,7 @@ Result<Duration> parse_duration(std::string_view text) {
       after_point = true;
     } else if (is_digit(c)) {
       any_digit = true;
-      if (digits > Int128{kMaxDuration} * 10) return fail("it is too large");
+      if (digits > Int128{kMaxDuration} * 10) return fail(fmt::format("it is too large: at most {}", kMaxDurationText));
       digits = digits * 10 + (c - '0');
       if (after_point) scale *= 10;
       if (scale > Int128{kMaxDuration}) return fail("it has too many decimals");
@@ -71,12 +73,12 @@ Result<Duration> parse_duration(std::string_view text) {
     return fail("it has no unit (ns, us, ms, s, min, h)");
   }
   const Unit *unit = find_unit(unit_name);
-  if (unit == nullptr) return fail(fmt::format("unknown unit '{}' (ns, us, ms, s, min, h)", unit_name));
+  if (unit == nullptr) return fail(fmt::format("unknown unit {} (ns, us, ms, s, min, h)", in_quotes(unit_name)));
 
   const Int128 scaled = digits * unit->nanoseconds;
   if (scaled % scale != 0) return fail("it is not a whole number of nanoseconds");
   const Int128 value = scaled / scale;
-  if (value > Int128{kMaxDuration}) return fail("it is too large");
+  if (value > Int128{kMaxDuration}) return fail(fmt::format("it is too large: at most {}", kMaxDurationText));
   return static_cast<Duration>(negative ? -value : value);
 }
 

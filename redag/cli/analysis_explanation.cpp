@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "redag/base/rounded_time.hpp"
 #include "redag/cli/options.hpp"
 #include "redag/cli/table.hpp"
 
@@ -81,7 +82,7 @@ double share(Duration part, Duration whole) {
 
 std::string explain_bound(const Analysed &analysed, const Row &row, const StreamTraits &terminal) {
   const Duration response = *row.tightest.response;
-  std::vector<Term> terms = row.tightest.bound.terms;
+  std::vector<Term> terms = terms_of(analysed, row);
   std::stable_sort(terms.begin(), terms.end(), [](const Term &a, const Term &b) { return a.amount > b.amount; });
   Table table({{"what", false, 9}, {"of", false, 8}, {"jobs", true, 2}, {"time", true, 7}, {"share", true, 5}});
   for (const Term &term : terms) {
@@ -107,6 +108,7 @@ std::string explain_bound(const Analysed &analysed, const Row &row, const Stream
 std::string explain_absence(const Analysed &analysed, const Row &row) {
   std::string text = fmt::format("why there is no bound: {}\n", row.reason);
   if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return text;
+  text += describe_gave_up(analysed.report);
   const std::string reasons = methods_that_do_not_apply(analysed.report, false);
   if (!reasons.empty()) text += "what does not apply:\n" + reasons;
   std::vector<std::pair<double, std::string>> loads;
@@ -140,16 +142,16 @@ Result<Row> find_row(const Analysed &analysed, const std::string &name) {
   for (const std::string &candidate : names) {
     const std::size_t at = candidate.size() > name.size() ? candidate.size() - name.size() - 1 : std::string::npos;
     if (at != std::string::npos && candidate.compare(at, std::string::npos, "." + name) == 0) {
-      return make_error("there is no task or DAG '" + name + "'", "did you mean '" + candidate + "'?");
+      return make_error("there is no task or DAG " + in_quotes(name), "did you mean '" + candidate + "'?");
     }
   }
-  return make_error("there is no task or DAG '" + name + "'", suggestion(name, names));
+  return make_error("there is no task or DAG " + in_quotes(name), suggestion(name, names));
 }
 
 std::string explain(const Analysed &analysed, const Row &row, const StreamTraits &terminal) {
   std::string text = tinted(row.name, Tint::Strong, terminal.colour) + ": ";
   if (row.tightest.response) {
-    text += fmt::format("answers within {} of its release, ", humanize_duration(*row.tightest.response));
+    text += fmt::format("answers within {} of its release, ", humanize_up(*row.tightest.response));
   } else {
     text += "no bound on its response time, ";
   }
@@ -161,7 +163,14 @@ std::string explain(const Analysed &analysed, const Row &row, const StreamTraits
     text += fmt::format("held to {}: beyond, the next release would skip a job that has not started\n",
                         humanize_duration(*row.due));
   }
-  return text + (row.tightest.response ? explain_bound(analysed, row, terminal) : explain_absence(analysed, row));
+  text += row.tightest.response ? explain_bound(analysed, row, terminal) : explain_absence(analysed, row);
+  const bool is_open = row.standing == Standing::MayMiss || (row.standing == Standing::NoBound && row.due);
+  if (is_open && analysed.report.verdict != analysis::Verdict::Schedulable) {
+    text += "what to change in the file: " +
+            suggested_change(analysed, row).value_or("no single change was found that lets every deadline be shown") +
+            "\n";
+  }
+  return text;
 }
 
 }  // namespace redag::cli

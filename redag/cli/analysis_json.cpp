@@ -9,7 +9,9 @@ using analysis::MethodReport;
 
 Json duration_json(const std::optional<Duration> &duration) { return duration ? Json(*duration) : Json(); }
 
+// Null where they were left out: see kMostItemised.
 Json terms_json(const Analysed &analysed, const analysis::ResponseBound &bound) {
+  if (bound.response && bound.terms.empty()) return nullptr;
   Json terms = Json::array();
   for (const analysis::Term &term : bound.terms) {
     terms.push_back(Json{{"kind", to_string(term.kind)},
@@ -33,12 +35,23 @@ Json row_json(const Analysed &analysed, const Row &row) {
               {"terms", terms_json(analysed, row.tightest.bound)}};
 }
 
+Json bounds_json(const std::vector<analysis::ResponseBound> &bounds, const std::vector<Row> &rows) {
+  Json list = Json::array();
+  for (std::size_t i = 0; i < bounds.size() && i < rows.size(); ++i) {
+    list.push_back(Json{{"name", rows[i].name},
+                        {"bound_ns", duration_json(bounds[i].response)},
+                        {"reason", std::string(bounds[i].response ? "" : bounds[i].absent)}});
+  }
+  return list;
+}
+
 Json method_json(const MethodReport &report) {
   const Method &method = *report.method;
   const analysis::Bound *bound = report.bound();
   return Json{{"name", std::string(method.name)},
               {"subject", to_string(method.subject)},
               {"applies", bound != nullptr},
+              {"gave_up", report.gave_up()},
               {"reason", bound == nullptr ? std::get<analysis::NotApplicable>(report.outcome).reason : ""},
               {"sound", report.trusted},
               {"unsound_because", bound != nullptr ? bound->unsound : ""},
@@ -86,7 +99,7 @@ Json exploration_json(const Analysed &analysed) {
 
 }  // namespace
 
-Json to_json(const Analysed &analysed) {
+Json to_json(const Analysed &analysed, bool each) {
   const analysis::AnalysisPlatform &platform = analysed.system.platform;
   Json document = {
       {"format", "redag.analysis/1"},
@@ -100,19 +113,34 @@ Json to_json(const Analysed &analysed) {
       {"overheads_ns",
        {{"release", platform.release_overhead},
         {"dispatch", platform.dispatch_overhead},
-        {"preempt", platform.preempt_overhead}}},
+        {"preempt", platform.preempt_overhead},
+        {"timer", platform.timer_overhead},
+        {"lateness", platform.lateness},
+        {"stall", platform.stall.longest},
+        {"stall_per_second", platform.stall.per_second}}},
       {"utilization", analysed.system.utilization},
       {"schedulable", analysed.report.verdict == analysis::Verdict::Schedulable},
       {"verdict", verdict_in_words(analysed)},
   };
+  const std::optional<Row> weakest = weakest_row(analysed);
+  document["weakest"] = weakest ? Json(weakest->name) : Json();
   document["by"] = Json::array();
   for (const Method *method : analysed.report.by) document["by"].push_back(std::string(method->name));
+  const std::vector<Row> tasks = task_rows(analysed);
+  const std::vector<Row> dags = dag_rows(analysed);
   document["tasks"] = Json::array();
-  for (const Row &row : task_rows(analysed)) document["tasks"].push_back(row_json(analysed, row));
+  for (const Row &row : tasks) document["tasks"].push_back(row_json(analysed, row));
   document["dags"] = Json::array();
-  for (const Row &row : dag_rows(analysed)) document["dags"].push_back(row_json(analysed, row));
+  for (const Row &row : dags) document["dags"].push_back(row_json(analysed, row));
   document["methods"] = Json::array();
-  for (const MethodReport &report : analysed.report.methods) document["methods"].push_back(method_json(report));
+  for (const MethodReport &report : analysed.report.methods) {
+    document["methods"].push_back(method_json(report));
+    if (!each) continue;
+    const analysis::Bound *bound = report.bound();
+    Json &method = document["methods"].back();
+    method["tasks"] = bound != nullptr ? bounds_json(bound->tasks, tasks) : Json::array();
+    method["dags"] = bound != nullptr ? bounds_json(bound->dags, dags) : Json::array();
+  }
   if (analysed.exploration != nullptr) document["exploration"] = exploration_json(analysed);
   return document;
 }

@@ -3,9 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
+#include "redag/analysis/global.hpp"
+#include "redag/analysis/remedy.hpp"
+#include "redag/base/rounded_time.hpp"
+#include "redag/cli/options.hpp"
 #include "redag/cli/table.hpp"
+#include "redag/cli/variant.hpp"
 
 namespace redag::cli {
 namespace {
@@ -26,6 +32,17 @@ const Method *accepting_test(const Analysed &analysed) {
   return nullptr;
 }
 
+// Where something more urgent stands in the way: the most urgent task without a bound, and why that has none.
+std::string culprit_of(const Analysed &analysed, const analysis::Bound &bound, const analysis::ResponseBound &asked) {
+  if (asked.absent != analysis::global::kMoreUrgent && asked.absent != analysis::global::kPeer) return {};
+  for (const std::uint32_t t : analysed.system.by_rank) {
+    const std::string_view absent = bound.tasks[t].absent;
+    if (absent.empty() || absent == analysis::global::kMoreUrgent || absent == analysis::global::kPeer) continue;
+    return fmt::format(" ({}: {})", task_name(analysed, TaskId(t)), absent);
+  }
+  return {};
+}
+
 // Why the trusted methods that could have bounded this response did not: the first to say so.
 std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_dag) {
   if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return analysed.system.not_analysable;
@@ -34,8 +51,13 @@ std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_da
     if (!method.trusted || bound == nullptr) continue;
     const auto &bounds = is_dag ? bound->dags : bound->tasks;
     if (index < bounds.size() && !bounds[index].absent.empty()) {
-      return fmt::format("{}: {}", method.method->name, bounds[index].absent);
+      return fmt::format("{}: {}{}", method.method->name, bounds[index].absent,
+                         culprit_of(analysed, *bound, bounds[index]));
     }
+  }
+  for (const MethodReport &method : analysed.report.methods) {
+    if (!method.gave_up() || method.method->subject == analysis::Subject::System) continue;
+    return fmt::format("gave up on {}: {}", method.method->name, std::get<NotApplicable>(method.outcome).reason);
   }
   return "no method that bounds response times applies";
 }
@@ -72,11 +94,6 @@ Tint tint_of(Standing standing) {
   return Tint::Plain;
 }
 
-// A slack below 0 is written with its sign, which durations of people never have.
-std::string signed_duration(Duration duration) {
-  return duration < 0 ? "-" + humanize_duration(-duration) : humanize_duration(duration);
-}
-
 std::string table_of(const char *title, const std::vector<Row> &rows, const StreamTraits &terminal) {
   Table table({{title, false, 9},
                {"deadline", true, 4},
@@ -88,8 +105,8 @@ std::string table_of(const char *title, const std::vector<Row> &rows, const Stre
     const Tint tint = tint_of(row.standing);
     table.add({{row.name},
                {row.deadline > 0 ? humanize_duration(row.deadline) : "-"},
-               {row.tightest.response ? humanize_duration(*row.tightest.response) : "-"},
-               {row.slack ? signed_duration(*row.slack) : "-", row.slack.value_or(0) < 0 ? Tint::Bad : Tint::Plain},
+               {row.tightest.response ? humanize_up(*row.tightest.response) : "-"},
+               {row.slack ? humanize_down(*row.slack) : "-", row.slack.value_or(0) < 0 ? Tint::Bad : Tint::Plain},
                {to_string(row.standing), tint},
                {row.says != nullptr ? std::string(row.says->name) : "-", Tint::Faint}});
   }
@@ -106,6 +123,11 @@ std::vector<Row> shown_rows(std::vector<Row> rows, bool all) {
   std::stable_sort(rows.begin(), rows.end(), [&](const Row &a, const Row &b) { return urgency(a) < urgency(b); });
   rows.resize(kMostTasks);
   return rows;
+}
+
+// "2.0 %", down.
+std::string format_share(Duration part, Duration whole) {
+  return fmt::format("{:.1f} %", std::floor(1000 * static_cast<double>(part) / static_cast<double>(whole)) / 10);
 }
 
 // What a method says in a few words, and how good that is.
@@ -183,6 +205,13 @@ std::string headline(const Analysed &analysed) {
     text += fmt::format("overheads: release {}, dispatch {}, preempt {}\n", format_duration(platform.release_overhead),
                         format_duration(platform.dispatch_overhead), format_duration(platform.preempt_overhead));
   }
+  if (platform.lateness > 0 || platform.timer_overhead > 0 || platform.stall != Loss{}) {
+    text += fmt::format(
+        "machine: releases up to {} late, {} of processor time each; a processor stalls for up to {}"
+        " + {} a second\n",
+        humanize_duration(platform.lateness), humanize_duration(platform.timer_overhead),
+        humanize_duration(platform.stall.longest), humanize_duration(platform.stall.per_second));
+  }
   return text;
 }
 
@@ -198,6 +227,20 @@ std::string listed(const std::vector<const Method *> &methods) {
   return text;
 }
 
+// Error: a name that is none of theirs.
+std::optional<Diagnostics> keep_only(const std::vector<std::string> &only, std::vector<Method> &methods) {
+  if (only.empty()) return std::nullopt;
+  std::vector<std::string> names;
+  for (const Method &method : methods) names.emplace_back(method.name);
+  for (const std::string &name : only) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+    return make_error("--method: there is no method '" + name + "'", suggestion(name, names)).value();
+  }
+  std::erase_if(methods,
+                [&](const Method &method) { return std::find(only.begin(), only.end(), method.name) == only.end(); });
+  return std::nullopt;
+}
+
 }  // namespace
 
 const char *to_string(Standing standing) {
@@ -211,7 +254,8 @@ const char *to_string(Standing standing) {
 }
 
 Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                         const analysis::ExplorationOptions *explore, const std::string &executor) {
+                         const analysis::ExplorationOptions *explore, const std::string &executor,
+                         const analysis::AnalyzeOptions &limits, const std::vector<std::string> &only) {
   const sched::ExecutorKind *kind = sched::find_executor(executor);
   if (kind == nullptr) return make_error("there is no analysis of the executor '" + executor + "'");
   Result<analysis::System> system = analysis::compile_for(*kind, workload, platform);
@@ -227,8 +271,17 @@ Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatf
       return to_bound(asked, *exploration);
     };
   }
-  analysis::Report report = analysis::analyze(*system, std::move(methods));
+  if (auto missing = keep_only(only, methods)) return tl::unexpected<Diagnostics>(*std::move(missing));
+  analysis::AnalyzeOptions options = limits;
+  options.itemise = system->tasks.size() <= kMostItemised;
+  analysis::Report report = analysis::analyze(*system, std::move(methods), options);
   return Analysed{workload, kind, *std::move(system), std::move(report), std::move(exploration)};
+}
+
+std::vector<analysis::Term> terms_of(const Analysed &analysed, const Row &row) {
+  if (!row.tightest.bound.terms.empty()) return row.tightest.bound.terms;
+  if (row.task.valid()) return itemised(analysed.system, row.tightest, row.task).terms;
+  return itemised(analysed.system, row.tightest, row.dag).terms;
 }
 
 std::string task_name(const Analysed &analysed, TaskId task) {
@@ -243,6 +296,7 @@ std::vector<Row> task_rows(const Analysed &analysed) {
     const analysis::SystemTask &task = analysed.system.tasks[t];
     Row row;
     row.name = task_name(analysed, TaskId(t));
+    row.task = TaskId(t);
     row.deadline = task.deadline;
     row.due = std::min(task.deadline, task.limit);
     row.tightest = analysed.report.tasks[t];
@@ -257,6 +311,7 @@ std::vector<Row> dag_rows(const Analysed &analysed) {
   for (std::size_t d = 0; d < analysed.system.dags.size(); ++d) {
     Row row;
     row.name = analysed.system.dags[d].name;
+    row.dag = DagId(d);
     row.deadline = analysed.system.dags[d].deadline;
     if (row.deadline > 0) row.due = row.deadline;
     row.tightest = analysed.report.dags[d];
@@ -266,14 +321,7 @@ std::vector<Row> dag_rows(const Analysed &analysed) {
   return rows;
 }
 
-const char *mode_name(const Analysed &analysed) {
-  switch (analysed.system.platform.preemption) {
-    case sched::Preemption::None: return "none";
-    case sched::Preemption::Cooperative: return "cooperative";
-    case sched::Preemption::Full: return "full";
-  }
-  return "?";
-}
+const char *mode_name(const Analysed &analysed) { return mode_name(analysed.system.platform.preemption); }
 
 std::string mode_reason(const Analysed &analysed) {
   const analysis::System &system = analysed.system;
@@ -347,9 +395,96 @@ std::string describe(const Analysed &analysed, const StreamTraits &terminal, boo
   const std::string words = verdict_in_words(analysed);
   const std::size_t colon = words.find(':');
   text += "\n" + tinted(words.substr(0, colon), yes ? Tint::Good : Tint::Bad, terminal.colour) + words.substr(colon);
-  text += "\n\n" + method_table(analysed, terminal);
+  text += "\n\n" + describe_gave_up(analysed.report) + method_table(analysed, terminal);
   if (analysed.exploration != nullptr && analysed.exploration->end == analysis::Exploration::End::Complete) {
     text += "\n" + exploration_table(analysed, terminal, all);
+  }
+  return text;
+}
+
+// Least slack for its deadline; of those without a bound, which all come before, the most urgent.
+std::optional<Row> weakest_row(const Analysed &analysed) {
+  std::optional<Row> weakest;
+  std::pair<bool, double> least;  // has a bound, then the slack's share; or the rank
+  const auto consider = [&](Row row, double rank) {
+    if (!row.due || (row.standing == Standing::Ok && !row.slack)) return;
+    const std::pair<bool, double> key = {
+        row.slack.has_value(), row.slack ? static_cast<double>(*row.slack) / static_cast<double>(*row.due) : rank};
+    if (weakest && key >= least) return;
+    least = key;
+    weakest = std::move(row);
+  };
+  const std::vector<Row> tasks = task_rows(analysed);
+  for (std::size_t t = 0; t < tasks.size(); ++t) consider(tasks[t], analysed.system.tasks[t].rank);
+  for (Row &row : dag_rows(analysed)) consider(std::move(row), static_cast<double>(tasks.size()));
+  return weakest;
+}
+
+std::vector<TaskId> suspects_of(const Analysed &analysed, const Row &row) {
+  const analysis::System &system = analysed.system;
+  std::vector<TaskId> suspects;
+  const auto add = [&](std::uint32_t t) {
+    if (std::find(suspects.begin(), suspects.end(), TaskId(t)) == suspects.end()) suspects.emplace_back(t);
+  };
+  std::vector<analysis::Term> terms;
+  if (row.tightest.response) terms = terms_of(analysed, row);
+  std::stable_sort(terms.begin(), terms.end(), [](const auto &a, const auto &b) { return a.amount > b.amount; });
+  for (const analysis::Term &term : terms) {
+    if (term.task.valid()) add(term.task.value);
+  }
+  for (std::size_t d = 0; d < system.dags.size(); ++d) {
+    const std::string &dag = system.dags[d].name;
+    if (row.name != dag && row.name.rfind(dag + ".", 0) != 0) continue;
+    for (const std::uint32_t t : system.dags[d].tasks) add(t);
+  }
+  std::vector<std::uint32_t> others = system.by_rank;
+  const auto load = [&](std::uint32_t t) {
+    return static_cast<double>(system.tasks[t].wcet) / static_cast<double>(system.tasks[t].period);
+  };
+  std::stable_sort(others.begin(), others.end(), [&](auto a, auto b) { return load(a) > load(b); });
+  for (const std::uint32_t t : others) add(t);
+  return suspects;
+}
+
+std::optional<std::string> suggested_change(const Analysed &analysed, const Row &row) {
+  if (!analysed.executor->ours) return std::nullopt;
+  if (analysed.system.tasks.size() > analysis::kMostTasksForRemedy) return std::nullopt;
+  auto remedy = analysis::find_remedy(analysed.workload, analysed.system.platform, suspects_of(analysed, row));
+  if (!remedy) return std::nullopt;
+  return *remedy + ": then every deadline is shown to be met";
+}
+
+std::string summarise(const Analysed &analysed, const StreamTraits &terminal) {
+  const bool yes = analysed.report.verdict == Verdict::Schedulable;
+  const std::string words = verdict_in_words(analysed);
+  const std::size_t colon = words.find(':');
+  const std::string reason = mode_reason(analysed);
+  std::string text =
+      fmt::format("{}: {}{}\n", analysed.workload.name.empty() ? std::string("workload") : analysed.workload.name,
+                  tinted(words.substr(0, colon), yes ? Tint::Good : Tint::Bad, terminal.colour), words.substr(colon));
+  const std::optional<Row> weakest = weakest_row(analysed);
+  if (weakest) {
+    const bool is_task = weakest->name.find('.') != std::string::npos;
+    text += fmt::format("weakest: {}{}, deadline {}, ", is_task ? "" : "DAG ", weakest->name,
+                        humanize_duration(*weakest->due));
+    text += weakest->slack ? fmt::format("bound {}, slack {} ({}), by {}", humanize_up(*weakest->tightest.response),
+                                         humanize_down(*weakest->slack), format_share(*weakest->slack, *weakest->due),
+                                         weakest->says->name)
+                           : "no bound: " + weakest->reason;
+    text += "\n";
+    if (!yes) {
+      text += "suggested change: " +
+              suggested_change(analysed, *weakest)
+                  .value_or(fmt::format("no single one was found; see --explain {}", weakest->name)) +
+              "\n";
+    }
+  }
+  text += describe_gave_up(analysed.report);
+  text += fmt::format("preemption: {}{}; --all shows every task and method{}\n", mode_name(analysed),
+                      reason.empty() ? "" : " (" + reason + ")",
+                      weakest ? ", --explain " + weakest->name + " where its time goes" : "");
+  if (analysed.exploration != nullptr && analysed.exploration->end == analysis::Exploration::End::Complete) {
+    text += "\n" + exploration_table(analysed, terminal, false);
   }
   return text;
 }
@@ -358,7 +493,8 @@ std::string methods_that_do_not_apply(const analysis::Report &report, bool tests
   std::vector<std::pair<std::string, std::string>> reasons;  // and which methods say so
   for (const MethodReport &method : report.methods) {
     const auto *reason = std::get_if<NotApplicable>(&method.outcome);
-    if (reason == nullptr || (!tests && method.method->subject == analysis::Subject::System)) continue;
+    if (reason == nullptr || reason->gave_up || (!tests && method.method->subject == analysis::Subject::System))
+      continue;
     const auto same =
         std::find_if(reasons.begin(), reasons.end(), [&](const auto &known) { return known.first == reason->reason; });
     if (same == reasons.end()) {
@@ -369,6 +505,16 @@ std::string methods_that_do_not_apply(const analysis::Report &report, bool tests
   }
   std::string text;
   for (const auto &[reason, methods] : reasons) text += fmt::format("  {}\n    {}\n", reason, methods);
+  return text;
+}
+
+std::string describe_gave_up(const analysis::Report &report) {
+  std::string text;
+  for (const MethodReport &method : report.methods) {
+    if (!method.gave_up()) continue;
+    text += fmt::format("gave up on {}: {}\n", method.method->name, std::get<NotApplicable>(method.outcome).reason);
+  }
+  if (!text.empty()) text += "  --effort and --time-limit set these limits; what the other methods say holds\n";
   return text;
 }
 

@@ -27,11 +27,17 @@ struct Analysed {
   std::shared_ptr<const analysis::Exploration> exploration;  // null: not asked for, or nothing to explore
 };
 
-/// With `explore`, exploration() is one of the methods, of our executor only. Error: analysis::compile(), an executor
-/// that sched::executors() does not list.
+/// Up to so many tasks every bound comes with its terms; of more, terms_of() finds those of one.
+inline constexpr std::size_t kMostItemised = 128;
+
+/// With `explore`, exploration() is one of the methods, of our executor only. `limits`: its `itemise` is not looked at.
+/// `only`: these methods; none: all. Error: analysis::compile(), an executor that sched::executors() does not list, a
+/// method that is not one of the executor's.
 [[nodiscard]] Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
                                        const analysis::ExplorationOptions *explore = nullptr,
-                                       const std::string &executor = "redag");
+                                       const std::string &executor = "redag",
+                                       const analysis::AnalyzeOptions &limits = {},
+                                       const std::vector<std::string> &only = {});
 
 enum class Standing : std::uint8_t {
   Ok,          // a sound method shows that the deadline is met
@@ -45,6 +51,8 @@ enum class Standing : std::uint8_t {
 /// Where a task or a DAG stands.
 struct Row {
   std::string name;                        // "dag.task", or the DAG's
+  TaskId task;                             // which; of a DAG's row invalid
+  DagId dag;                               // which; of a task's row invalid
   Duration deadline = 0;                   // 0: none
   std::optional<Duration> due;             // what the bound is held to: the deadline, or sooner where jobs are skipped
   analysis::Tightest tightest;             // the bound, if any
@@ -58,18 +66,33 @@ struct Row {
 /// responses.
 [[nodiscard]] std::string methods_that_do_not_apply(const analysis::Report &report, bool tests);
 
+/// Methods that were ended at a limit or by the user: a line for each, with what to change. Empty if there are none.
+[[nodiscard]] std::string describe_gave_up(const analysis::Report &report);
+
+/// Where the row's bound comes from, also where analyse() left that out. Requires a bound.
+[[nodiscard]] std::vector<analysis::Term> terms_of(const Analysed &analysed, const Row &row);
+
 [[nodiscard]] std::vector<Row> task_rows(const Analysed &analysed);  // by TaskId
 [[nodiscard]] std::vector<Row> dag_rows(const Analysed &analysed);   // by DagId
 
 /// "dag.task".
 [[nodiscard]] std::string task_name(const Analysed &analysed, TaskId task);
 
-/// The mode that was analysed ("none", "cooperative", "full") and, where it is not what the workload names, why.
+/// The mode that was analysed ("none", "cooperative", "os") and, where it is not what the workload names, why.
 [[nodiscard]] const char *mode_name(const Analysed &analysed);
 [[nodiscard]] std::string mode_reason(const Analysed &analysed);
 
 /// Schedulable or not, by whom, or what is missing: one sentence.
 [[nodiscard]] std::string verdict_in_words(const Analysed &analysed);
+
+/// The row with the least slack for its deadline, or without a bound; nothing if a test accepts all without numbers.
+[[nodiscard]] std::optional<Row> weakest_row(const Analysed &analysed);
+/// One change with which every deadline is shown to be met, tried by the analysis (find_remedy()). Requires a workload
+/// that is not shown schedulable.
+[[nodiscard]] std::optional<std::string> suggested_change(const Analysed &analysed, const Row &weakest);
+/// The verdict, the weakest task or DAG, what to change where not all is shown; then where there is more. With an
+/// exploration its table.
+[[nodiscard]] std::string summarise(const Analysed &analysed, const StreamTraits &terminal);
 
 /// Headline, tables, verdict, and a line for each method. `all`: a row for every task, however many.
 [[nodiscard]] std::string describe(const Analysed &analysed, const StreamTraits &terminal, bool all);
@@ -77,7 +100,7 @@ struct Row {
 /// Every method with its assumptions, citation and complexity.
 [[nodiscard]] std::string describe_methods();
 
-/// `redag.analysis/1`.
-[[nodiscard]] Json to_json(const Analysed &analysed);
+/// `redag.analysis/1`. `each`: with every method's bound of every task and DAG.
+[[nodiscard]] Json to_json(const Analysed &analysed, bool each = false);
 
 }  // namespace redag::cli

@@ -25,7 +25,9 @@ struct Options {
   std::string executor = "redag";
   std::string explain;
   std::vector<std::string> chains;
+  std::vector<std::string> only;  // methods
   bool methods = false;
+  bool all = false;
   std::uint64_t explore = 0;  // states; 0: not asked for
 };
 
@@ -39,6 +41,7 @@ const Choices<std::string> &executor_choices() {
 }
 
 constexpr std::uint64_t kUsualStates = 1'000'000;
+constexpr std::uint64_t kMostEffort = 1'000'000'000;
 
 // Nothing if there is no such task; the console was told.
 std::optional<std::vector<ChainRow>> find_chains(const Analysed &analysed, const Options &options, Console &console) {
@@ -59,7 +62,7 @@ bool report(const Analysed &analysed, const Options &options, Console &console) 
   const std::optional<std::vector<ChainRow>> chains = find_chains(analysed, options, console);
   if (!chains) return false;
   Json document;
-  if (options.analysis.run.json) document = to_json(analysed);
+  if (options.analysis.run.json) document = to_json(analysed, options.methods);
   if (options.analysis.run.json && !chains->empty()) document["chains"] = to_json(analysed, *chains);
   if (!options.explain.empty()) {
     const Result<Row> row = find_row(analysed, options.explain);
@@ -73,7 +76,9 @@ bool report(const Analysed &analysed, const Options &options, Console &console) 
       console.print(explain(analysed, *row, console.out_traits()));
     }
   } else if (!options.analysis.run.json) {
-    console.print(describe(analysed, console.out_traits(), options.analysis.run.all_tasks));
+    const bool every_task = options.analysis.run.all_tasks;
+    console.print(options.all || every_task ? describe(analysed, console.out_traits(), every_task)
+                                            : summarise(analysed, console.out_traits()));
   }
   if (!options.analysis.run.json && !chains->empty()) {
     console.print("\n" + describe(analysed, *chains, console.out_traits()));
@@ -86,19 +91,27 @@ bool report(const Analysed &analysed, const Options &options, Console &console) 
   return true;
 }
 
-std::string is_positive_count(const std::string &text) {
+constexpr std::uint64_t kMostStates = 1'000'000'000;
+
+std::string is_states(const std::string &text) {
   std::uint64_t count = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
-  const bool is_count = error == std::errc{} && end == text.data() + text.size() && count > 0;
-  return is_count ? std::string() : "'" + text + "' is not a number of states, 1 or more";
+  const bool is_count = error == std::errc{} && end == text.data() + text.size() && count > 0 && count <= kMostStates;
+  return is_count ? std::string()
+                  : fmt::format("{} is not a number of states from 1 to {}", in_quotes(text), kMostStates);
 }
 
-// With --explore and Ctrl-C, what the other methods say remains.
+// With Ctrl-C, what the other methods say remains.
 Result<Analysed> analyse_configured(const Workload &workload, const Options &options, Console &console) {
-  const analysis::AnalysisPlatform platform = platform_for(workload, options.analysis);
-  if (options.explore == 0) return analyse(workload, platform, nullptr, options.executor);
+  const Result<analysis::AnalysisPlatform> configured = platform_for(workload, options.analysis, options.executor);
+  if (!configured) return tl::unexpected(configured.error());
+  const analysis::AnalysisPlatform &platform = *configured;
   const InterruptGuard guard;
-  Progress progress(console);
+  AnalysisWatch watch(options.analysis, console);
+  if (options.explore == 0) {
+    return analyse(workload, platform, nullptr, options.executor, watch.options(), options.only);
+  }
+  Progress &progress = watch.progress();
   progress.set_label("explore");
   analysis::ExplorationOptions explore;
   explore.max_states = options.explore;
@@ -107,9 +120,9 @@ Result<Analysed> analyse_configured(const Workload &workload, const Options &opt
       const double round = static_cast<double>(at.jobs) / static_cast<double>(at.jobs_in_a_round);
       progress.draw(std::min(1.0, round), fmt::format("{} states", format_count(at.states)));
     }
-    return !InterruptGuard::interrupted();
+    return watch.why_stop().empty();
   };
-  Result<Analysed> analysed = analyse(workload, platform, &explore);
+  Result<Analysed> analysed = analyse(workload, platform, &explore, options.executor, watch.options(), options.only);
   progress.clear();
   if (InterruptGuard::interrupted()) console.warn("interrupted: the exploration is not complete");
   return analysed;
@@ -117,11 +130,13 @@ Result<Analysed> analyse_configured(const Workload &workload, const Options &opt
 
 int analyze_file(const Options &options, Console &console) {
   if (options.analysis.run.file.empty()) {
-    if (options.methods && !options.analysis.run.json) {
+    const bool wants_file =
+        options.analysis.run.json || !options.explain.empty() || !options.chains.empty() || options.explore > 0;
+    if (options.methods && !wants_file) {
       console.print(describe_methods());
       return kExitOk;
     }
-    console.error("FILE is required", "only --methods does without, and not with --json");
+    console.error("FILE is required", "only --methods alone does without");
     return kExitBad;
   }
   if (options.explore > 0 && options.executor != "redag") {
@@ -133,7 +148,7 @@ int analyze_file(const Options &options, Console &console) {
     return kExitBad;
   }
   const std::optional<Workload> workload = load_configured(options.analysis.run, console);
-  if (!workload) return kExitBad;
+  if (!workload || !takes_arguments({*parse_variant(options.executor)}, options.analysis.run, console)) return kExitBad;
   const Result<Analysed> analysed = analyse_configured(*workload, options, console);
   if (!analysed) {
     console.note(analysed.error());
@@ -160,15 +175,28 @@ Action add_analyze(CLI::App &app) {
          "given several times")
       ->type_name("TASK,TASK...")
       ->expected(1)
-      ->take_all();
-  app.add_flag("--methods", options->methods,
-               "Every method's assumptions, citation and complexity; FILE may be missing");
+      ->take_all()
+      ->allow_extra_args(false);
+  app.add_flag(
+      "--methods", options->methods,
+      "Every method's assumptions, citation and complexity; FILE may be missing. With --json every method's bound "
+      "of every task");
+  app.add_option("--method", options->only, "Only this method; can be given several times")
+      ->type_name("NAME")
+      ->expected(1)
+      ->take_all()
+      ->allow_extra_args(false);
+  app.add_flag("--all", options->all, "A table of the tasks and DAGs, each method's answer, and what does not apply");
   app.add_flag(
          "--explore{" + std::to_string(kUsualStates) + "}", options->explore,
          "Try all schedules of strictly periodic jobs that run to completion, in at most STATES states (default " +
              format_count(kUsualStates) + "): best and worst responses, exact on one worker")
       ->type_name("[=STATES]")
-      ->check(is_positive_count);
+      ->disable_flag_override(false)
+      ->check(is_states);
+  add_count(app, "--effort", options->analysis.effort, {0, kMostEffort},
+            "Steps of one method at which it gives up, in millions; 0: no limit. The same on every machine")
+      ->group("Limits");
   add_analysis_arguments(app, options->analysis, "Exit with 1 if no sound method shows that every deadline is met");
   return [options](Console &console) { return analyze_file(*options, console); };
 }

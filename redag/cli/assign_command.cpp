@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "redag/base/provenance.hpp"
 #include "redag/cli/analysis_arguments.hpp"
 #include "redag/cli/assignment_report.hpp"
 #include "redag/cli/commands.hpp"
@@ -24,40 +25,55 @@ struct Options {
 };
 
 Result<analysis::Assignment> search(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                                    analysis::AssignmentOptions options, Console &console) {
-  Progress progress(console);
+                                    analysis::AssignmentOptions options, AnalysisWatch &watch) {
+  Progress &progress = watch.progress();
   std::uint64_t asked = 0;
   options.stop = [&] {
     ++asked;
     if (progress.due()) progress.draw(0, fmt::format("{} assignments", asked));
-    return InterruptGuard::interrupted();
+    return !watch.why_stop().empty();
   };
-  return analysis::assign(workload, platform, options);
+  Result<analysis::Assignment> found = analysis::assign(workload, platform, options);
+  progress.clear();
+  return found;
 }
 
 int assign_file(const Options &options, Console &console) {
   const std::optional<Workload> workload = load_configured(options.analysis.run, console);
   if (!workload) return kExitBad;
+  if (!options.output.empty()) {
+    if (const Result<void> writable = check_output(options.output); !writable) {
+      console.note(writable.error());
+      return kExitBad;
+    }
+  }
   Assigned assigned;
-  assigned.platform = platform_for(*workload, options.analysis);
+  const Result<analysis::AnalysisPlatform> platform = platform_for(*workload, options.analysis);
+  if (!platform) {
+    console.note(platform.error());
+    return kExitBad;
+  }
+  assigned.platform = *platform;
   assigned.options = options.assignment;
   assigned.options.priorities = options.keep != Keep::Priorities;
   assigned.options.caps = options.keep != Keep::MaxActive;
   const InterruptGuard guard;  // until the results are written
-  Result<analysis::Assignment> found = search(*workload, assigned.platform, assigned.options, console);
+  AnalysisWatch watch(options.analysis, console);
+  Result<analysis::Assignment> found = search(*workload, assigned.platform, assigned.options, watch);
   if (!found) {
     console.note(found.error());
     return kExitBad;
   }
   assigned.assignment = *std::move(found);
-  if (assigned.assignment.stopped) console.warn("interrupted: this is the best so far");
+  if (assigned.assignment.stopped) console.warn(watch.why_stop() + ": this is the best so far");
   if (options.analysis.run.json) {
     console.print(to_text(to_json(assigned)));
   } else {
     console.print(describe(assigned, console.out_traits(), options.analysis.run.all_tasks));
   }
   if (!options.output.empty()) {
-    const Result<void> written = write_text(options.output, to_yaml(assigned.assignment.best.workload));
+    const Result<void> written = write_text(
+        options.output, provenance_to_comment(current_provenance()) + to_yaml(assigned.assignment.best.workload));
     if (!written) {
       console.note(written.error());
       return kExitBad;
@@ -87,9 +103,11 @@ Action add_assign(CLI::App &app) {
       Choices<Keep>{{"nothing", Keep::Nothing}, {"priorities", Keep::Priorities}, {"max_active", Keep::MaxActive}},
       "What must stay as it is")
       ->default_str("nothing");
-  add_count(app, "--exhaustive", assignment.exhaustive, "Combinations of max_active up to which all are tried");
-  add_count(app, "--restarts", assignment.restarts, "Random places from which the local search starts besides");
-  add_count(app, "--seed", assignment.seed, "Of these places: the same seed gives the same answer");
+  add_count(app, "--exhaustive", assignment.exhaustive, {0, kMaxCombinations},
+            "Combinations of max_active up to which all are tried");
+  add_count(app, "--restarts", assignment.restarts, {0, kMaxRestarts},
+            "Random places from which the local search starts besides");
+  add_seed(app, assignment.seed, "Of these places: the same seed gives the same answer");
   add_analysis_arguments(app, options->analysis, "Exit with 1 if no assignment that was tried is shown schedulable");
   return [options](Console &console) { return assign_file(*options, console); };
 }

@@ -3,90 +3,118 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
 #include "redag/analysis/analyze.hpp"
 #include "redag/cli/analysis_report.hpp"
 #include "redag/cli/table.hpp"
-#include "redag/metrics/bound_watch.hpp"
 
 namespace redag::cli {
+namespace {
+
+using metrics::Broken;
+
+const char *name_of(Broken broken) {
+  switch (broken) {
+    case Broken::Wcet: return "wcet";
+    case Broken::Release: return "release";
+    case Broken::Platform: return "platform";
+    case Broken::Nothing: break;
+  }
+  return "unknown";
+}
+
+}  // namespace
 
 BoundCheck check_bounds(const Session &session) {
   BoundCheck check;
   const trace::RunInfo &info = session.info;
   Workload workload = info.workload;
   workload.policy = info.config.policy;
-  const Result<Analysed> analysed = analyse(workload, analysis::platform_of(info.config), nullptr, info.executor);
-  if (!analysed) {
-    check.absent = to_string(analysed.error());
-    return check;
+  analysis::AnalysisPlatform platform = analysis::platform_of(info.config);
+  if (const std::optional<Overheads> machine = parse_overheads(info.overheads)) {
+    platform = analysis::charge(platform, *machine);
   }
-  const std::vector<analysis::Tightest> &bounds = analysed->report.tasks;
-  metrics::BoundWatch watch;
-  watch.add(session.trace.events, [&](TaskId task) { return bounds[task.value].response.value_or(0); });
-
-  const std::vector<Row> analysed_rows = task_rows(*analysed);
+  const Result<Analysed> analysed = analyse(workload, platform, nullptr, info.executor);
+  std::vector<Duration> bounds(workload.task_count(), 0);
+  check.methods.resize(bounds.size());
+  if (!analysed) check.absent = to_string(analysed.error());
+  const std::vector<Row> rows = analysed ? task_rows(*analysed) : std::vector<Row>();
   for (const TaskRef &ref : flatten(workload)) {
-    const analysis::Tightest &bound = bounds[ref.id.value];
-    BoundCheck::Row row;
-    row.name = trace::task_name(workload, ref.id);
-    row.wcet = ref.task->wcet;
-    const metrics::Distribution &on_worker = session.summary.tasks[ref.id.value].jobs.on_worker;
-    if (on_worker.count > 0 && on_worker.max > row.wcet) row.on_worker = on_worker.max;
+    const std::size_t t = ref.id.value;
+    check.names.push_back(trace::task_name(workload, ref.id));
+    check.wcets.push_back(ref.task->wcet);
+    if (!analysed) continue;
+    const analysis::Tightest &bound = analysed->report.tasks[t];
     if (bound.response) {
       ++check.bounded;
-      row.bound = *bound.response;
-      row.method = std::string(bound.method->name);
+      bounds[t] = *bound.response;
+      check.methods[t] = std::string(bound.method->name);
     } else if (check.absent.empty()) {
-      check.absent = fmt::format("{}: {}", row.name, analysed_rows[ref.id.value].reason);
+      check.absent = fmt::format("{}: {}", check.names[t], rows[t].reason);
     }
-    if (const metrics::BoundCount *count = watch.of(ref.id)) {
-      row.exceeded = count->exceeded;
-      row.worst = count->worst;
-    }
-    if (row.bound > 0 || row.on_worker > 0) check.rows.push_back(std::move(row));
   }
+  check.assumptions =
+      metrics::check_assumptions(info, session.trace.events, [&](TaskId task) { return bounds[task.value]; });
+  check.remarks = metrics::remarks(check.assumptions, workload);
   return check;
 }
 
 std::string describe(const BoundCheck &check, std::size_t tasks, const StreamTraits &terminal) {
   std::string text = fmt::format("bounds: {} of {} tasks have one", check.bounded, tasks);
   text += check.absent.empty() ? "" : fmt::format(" ({})", check.absent);
-  const bool is_broken =
-      std::any_of(check.rows.begin(), check.rows.end(), [](const BoundCheck::Row &row) { return row.is_broken(); });
-  if (!is_broken) {
-    return text + fmt::format("{}, {}\n", check.bounded > 0 ? "; no response was above its bound" : "",
-                              tinted("no execution above its wcet", Tint::Good, terminal.colour));
+  text += check.assumptions.is_calibrated ? ", with the overheads of the machine" : "";
+  if (check.remarks.empty()) {
+    text += fmt::format("{}, {}", check.bounded > 0 ? "; no response was above its bound" : "",
+                        tinted("no execution above its wcet", Tint::Good, terminal.colour));
+  } else if (!check.assumptions.has_alarms()) {
+    text += "; " + tinted("no alarm", Tint::Good, terminal.colour);
   }
   text += "\n";
-  for (const BoundCheck::Row &row : check.rows) {
-    if (row.exceeded > 0) {
-      text += fmt::format("  {}: {} of its responses {} above the bound of {} ({}), the longest {}\n",
-                          tinted(row.name, Tint::Bad, terminal.colour), format_count(row.exceeded),
-                          row.exceeded == 1 ? "is" : "are", humanize_duration(row.bound), row.method,
-                          humanize_duration(row.worst));
-    }
-    if (row.on_worker > 0) {
-      text += fmt::format("  {}: held its worker for up to {}, its wcet is {}\n",
-                          tinted(row.name, Tint::Caution, terminal.colour), humanize_duration(row.on_worker),
-                          humanize_duration(row.wcet));
-    }
+  for (const metrics::Remark &remark : check.remarks) {
+    text += fmt::format(
+        "  {}: {}\n",
+        remark.is_alarm ? tinted("alarm", Tint::Bad, terminal.colour) : tinted("note", Tint::Faint, terminal.colour),
+        remark.text);
   }
-  return text + "bounds hold for executions within the wcet and no overheads: `redag analyze` takes overheads\n";
+  if (check.bounded > 0 && !check.assumptions.is_calibrated) {
+    text += fmt::format("  {}\n", metrics::not_calibrated_hint());
+  }
+  return text;
 }
 
 Json to_json(const BoundCheck &check) {
   Json tasks = Json::array();
-  for (const BoundCheck::Row &row : check.rows) {
-    tasks.push_back(Json{{"name", row.name},
-                         {"bound_ns", row.bound > 0 ? Json(row.bound) : Json()},
-                         {"method", row.bound > 0 ? Json(row.method) : Json()},
-                         {"exceeded", row.exceeded},
-                         {"worst_ns", row.exceeded > 0 ? Json(row.worst) : Json()},
-                         {"wcet_ns", row.wcet},
-                         {"on_worker_above_wcet_ns", row.on_worker > 0 ? Json(row.on_worker) : Json()}});
+  for (const metrics::TaskCheck &task : check.assumptions.tasks) {
+    const std::size_t t = task.task.value;
+    const metrics::ResponseCheck &response = task.response;
+    const metrics::ExecutionCheck &execution = task.execution;
+    const bool is_broken = response.exceeded > 0;
+    const bool has_amount = is_broken && response.broken != Broken::Nothing;
+    tasks.push_back(Json{{"name", check.names[t]},
+                         {"bound_ns", response.bound > 0 ? Json(response.bound) : Json()},
+                         {"method", response.bound > 0 ? Json(check.methods[t]) : Json()},
+                         {"exceeded", response.exceeded},
+                         {"worst_ns", is_broken ? Json(response.worst) : Json()},
+                         {"cause", is_broken ? Json(name_of(response.broken)) : Json()},
+                         {"cause_ns", has_amount ? Json(response.amount) : Json()},
+                         {"alarm", response.is_alarm},
+                         {"wcet_ns", check.wcets[t]},
+                         {"processor_max_ns", execution.jobs > 0 ? Json(execution.longest) : Json()},
+                         {"above_wcet", execution.above},
+                         {"wcet_exceeded", execution.is_exceeded}});
   }
-  return Json{{"bounded", check.bounded}, {"absent", check.absent}, {"tasks", tasks}};
+  Json remarks = Json::array();
+  for (const metrics::Remark &remark : check.remarks) {
+    remarks.push_back(Json{{"alarm", remark.is_alarm}, {"text", remark.text}});
+  }
+  return Json{{"bounded", check.bounded},
+              {"absent", check.absent},
+              {"calibrated", check.assumptions.is_calibrated},
+              {"alarms", std::count_if(check.remarks.begin(), check.remarks.end(),
+                                       [](const metrics::Remark &remark) { return remark.is_alarm; })},
+              {"remarks", std::move(remarks)},
+              {"tasks", std::move(tasks)}};
 }
 
 }  // namespace redag::cli

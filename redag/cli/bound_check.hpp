@@ -1,5 +1,5 @@
-// A run on threads against what was proven before it: responses above their bounds, executions above the wcet, by name.
-// Pure.
+// A run on threads against what was proven before it: responses above their bounds and executions above the wcet, by
+// name, with the assumption that broke (redag/metrics/assumptions.hpp). Pure.
 #pragma once
 
 #include <cstdint>
@@ -9,29 +9,22 @@
 #include "redag/cli/console.hpp"
 #include "redag/cli/json.hpp"
 #include "redag/cli/session.hpp"
+#include "redag/metrics/assumptions.hpp"
 
 namespace redag::cli {
 
 struct BoundCheck {
-  /// One a task with a bound, or whose execution was too long.
-  struct Row {
-    std::string name;
-    Duration bound = 0;  // 0: none
-    std::string method;  // that gave it
-    std::uint64_t exceeded = 0;
-    Duration worst = 0;  // longest response above the bound
-    Duration wcet = 0;
-    Duration on_worker = 0;  // longest time that a job held its worker, where that is above the wcet; or 0
-
-    [[nodiscard]] bool is_broken() const { return exceeded > 0 || on_worker > 0; }
-  };
-  std::vector<Row> rows;
-  std::size_t bounded = 0;  // tasks
-  std::string absent;       // why some task, or all, have no bound; empty: all have one
+  metrics::AssumptionCheck assumptions;  // its tasks by TaskId; empty if the workload could not be analysed
+  std::vector<std::string> names;        // by TaskId
+  std::vector<Duration> wcets;           // by TaskId
+  std::vector<std::string> methods;      // by TaskId: which gave the bound; empty: none
+  std::vector<metrics::Remark> remarks;  // alarms first
+  std::size_t bounded = 0;               // tasks
+  std::string absent;                    // why some task, or all, have no bound; empty: all have one
 };
 
-/// Analyses the workload as it ran, under the executor that ran it, without overheads. Responses are those of the whole
-/// trace, warm-up included.
+/// Analyses the workload as it ran, under the executor that ran it, with the overheads that the run notes. Responses
+/// are those of the whole trace, warm-up included.
 [[nodiscard]] BoundCheck check_bounds(const Session &session);
 
 [[nodiscard]] std::string describe(const BoundCheck &check, std::size_t tasks, const StreamTraits &terminal);

@@ -20,6 +20,7 @@ Action add_validate(CLI::App &app);
 Action add_generate(CLI::App &app);
 Action add_simulate(CLI::App &app);
 Action add_run(CLI::App &app);
+Action add_calibrate(CLI::App &app);
 Action add_compare(CLI::App &app);
 Action add_diff(CLI::App &app);
 Action add_analyze(CLI::App &app);
@@ -28,6 +29,7 @@ Action add_assign(CLI::App &app);
 Action add_tune(CLI::App &app);
 Action add_experiment(CLI::App &app);
 Action add_check_trace(CLI::App &app);
+Action add_recover(CLI::App &app);
 Action add_report(CLI::App &app);
 Action add_top(CLI::App &app);
 

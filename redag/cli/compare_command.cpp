@@ -184,18 +184,30 @@ int compare(const Options &options, Console &console) {
     console.note(variants.error());
     return kExitBad;
   }
+  if (variants->size() < 2) {
+    console.error(fmt::format("--executors: there is nothing to compare '{}' with", variants->front().name),
+                  "name two or more, such as redag,mte; 'redag run' runs one");
+    return kExitBad;
+  }
   for (const Variant &variant : *variants) {
     if (!options.simulate || !variant.realtime_threads) continue;
     console.error(fmt::format("the simulator has no threads: '{}' is '{}' there", variant.name, variant.executor));
     return kExitBad;
   }
   const std::uint32_t repetitions = options.repeat > 0 ? options.repeat : (options.simulate ? 1 : kThreadsRepetitions);
-  if (repetitions > kMostRepetitions) {
-    console.error(fmt::format("--repeat: {} is more than {}", repetitions, kMostRepetitions));
-    return kExitBad;
-  }
   const std::optional<Workload> workload = load_configured(options.run, console);
   if (!workload) return kExitBad;
+  if (!takes_arguments(*variants, options.run, console)) return kExitBad;
+  if (options.simulate && options.run.seed + (repetitions - 1) < options.run.seed) {
+    console.error("--seed and --repeat: the last seed is not below 2^64", "begin with a smaller seed");
+    return kExitBad;
+  }
+  for (const Variant &variant : *variants) {
+    if (const Result<Workload> configured = configure(*workload, variant); !configured) {
+      console.note(configured.error());
+      return kExitBad;
+    }
+  }
   const trace::Driver driver = options.simulate ? trace::Driver::Simulator : trace::Driver::Threads;
   const Duration usual = options.simulate ? sensible_duration(*workload) : kThreadsDuration;
   const std::optional<SessionOptions> session = session_options(options.run, driver, usual, console);
@@ -215,13 +227,19 @@ Action add_compare(CLI::App &app) {
       ->type_name("LIST")
       ->capture_default_str();
   add_count(
-      app, "--repeat", options->repeat,
+      app, "--repeat", options->repeat, {1, kMostRepetitions},
       "Repetitions, the executors taking turns; default 3, simulated 1. Simulated ones take seeds SEED, SEED+1, ...")
       ->default_str("");
-  app.add_flag("--simulate", options->simulate, "Virtual time instead of threads");
+  CLI::Option *simulate = app.add_flag("--simulate", options->simulate, "Virtual time instead of threads");
   add_result_arguments(app, options->run);
   add_simulator_arguments(app, options->run);
   add_thread_arguments(app, options->run);
+  for (const char *name : {"--overhead-release", "--overhead-dispatch", "--overhead-preempt", "--max-events"}) {
+    app.get_option(name)->needs(simulate);
+  }
+  for (const char *name : {"--affinity", "--mlockall", "--realtime", "--spin", "--watchdog"}) {
+    app.get_option(name)->excludes(simulate);
+  }
   return [options](Console &console) { return compare(*options, console); };
 }
 

@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "redag/base/text.hpp"
+
 namespace redag::cli {
 namespace {
 
@@ -36,6 +38,32 @@ const char *code_of(Tint tint) {
     case Tint::Strong: return "\033[1m";
   }
   return "";
+}
+
+// The length of one of our own sequences at `at`: a colour, or back to the start of the line and clear it. 0: none.
+std::size_t own_sequence(std::string_view text, std::size_t at) {
+  constexpr std::string_view kClearLine = "\r\033[K";
+  const std::string_view rest = text.substr(at);
+  if (rest.starts_with(kClearLine)) return kClearLine.size();
+  if (!rest.starts_with("\033[")) return 0;
+  const std::size_t end = rest.find_first_not_of("0123456789;", 2);
+  return end != std::string_view::npos && rest[end] == 'm' ? end + 1 : 0;
+}
+
+// What a terminal gets: names of files, and whatever else comes from outside, must not steer it.
+std::string for_terminal(std::string_view text) {
+  std::string shown;
+  for (std::size_t at = 0; at < text.size();) {
+    if (const std::size_t length = own_sequence(text, at); length > 0) {
+      shown += text.substr(at, length);
+      at += length;
+      continue;
+    }
+    const std::size_t end = std::min(text.find_first_of("\r\033", at + 1), text.size());
+    shown += printable(text.substr(at, end - at));
+    at = end;
+  }
+  return shown;
 }
 
 // All of `text`; the errno of what went wrong, or 0.
@@ -67,13 +95,23 @@ Console::Console(int out, StreamTraits out_traits, int err, StreamTraits err_tra
 Console::Console() : Console(STDOUT_FILENO, traits_of(STDOUT_FILENO), STDERR_FILENO, traits_of(STDERR_FILENO)) {}
 
 void Console::print(std::string_view text) {
-  buffer_.append(text);
+  if (out_traits_.terminal) {
+    buffer_ += for_terminal(text);
+  } else {
+    buffer_.append(text);
+  }
   if (buffer_.size() < kBufferSize) return;
   write_out(buffer_);
   buffer_.clear();
 }
 
-void Console::note(std::string_view text) { write_all(err_, text); }
+void Console::note(std::string_view text) {
+  if (err_traits_.terminal) {
+    write_all(err_, for_terminal(text));
+  } else {
+    write_all(err_, text);
+  }
+}
 
 void Console::note(const Diagnostic &diagnostic) {
   const bool is_error = diagnostic.severity == Severity::Error;

@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::uint32_t kFewestReplicates = 100;
 constexpr std::uint32_t kMostReplicates = 1'000'000;
+constexpr double kMostTolerance = 0.99;  // of 1: everything is equal
 constexpr std::size_t kMostShown = 10;
 
 struct Options {
@@ -137,20 +138,6 @@ class Diffing {
   Diffed diffed_;
 };
 
-int diff(const Options &options, Console &console) {
-  const metrics::BootstrapOptions &bootstrap = options.bootstrap;
-  if (bootstrap.replicates < kFewestReplicates || bootstrap.replicates > kMostReplicates) {
-    console.error(
-        fmt::format("--replicates: {} is not from {} to {}", bootstrap.replicates, kFewestReplicates, kMostReplicates));
-    return kExitBad;
-  }
-  if (bootstrap.tolerance < 0 || bootstrap.tolerance >= 1) {
-    console.error(fmt::format("--tolerance: {:g} is not a share from 0 to 1", bootstrap.tolerance), "0.05 is 5 %");
-    return kExitBad;
-  }
-  return Diffing(options, console).run();
-}
-
 }  // namespace
 
 Action add_diff(CLI::App &app) {
@@ -158,16 +145,17 @@ Action add_diff(CLI::App &app) {
   app.add_option("A", options->a, "Folder of a run, or of its repetitions (run, simulate, compare, ROS 2 run_workload)")
       ->required();
   app.add_option("B", options->b, "The same for what it is compared with")->required();
-  add_number(app, "--tolerance", options->bootstrap.tolerance,
+  add_number(app, "--tolerance", options->bootstrap.tolerance, {0, kMostTolerance},
              "Share by which response percentiles may differ and count as equal");
   app.add_flag("--different", options->different,
                "Compare runs of different workloads too, as far as tasks are in both");
-  add_count(app, "--replicates", options->bootstrap.replicates, "Of the bootstrap");
-  add_count(app, "--seed", options->bootstrap.seed, "Of the bootstrap: the same seed gives the same answer");
+  add_count(app, "--replicates", options->bootstrap.replicates, {kFewestReplicates, kMostReplicates},
+            "Of the bootstrap");
+  add_seed(app, options->bootstrap.seed, "Of the bootstrap: the same seed gives the same answer");
   app.add_flag("--all-tasks", options->all_tasks, "A row for every task, however many");
   app.add_flag("--json", options->json, "Write one JSON document to standard output, and nothing else");
   app.add_flag("--check", options->check, "Exit with 1 if B is worse in any figure by more than chance");
-  return [options](Console &console) { return diff(*options, console); };
+  return [options](Console &console) { return Diffing(*options, console).run(); };
 }
 
 }  // namespace redag::cli

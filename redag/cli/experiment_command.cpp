@@ -53,6 +53,7 @@ Result<MergedUnits> add_recorded(MergedUnits merged, const std::vector<std::stri
         {"event", "recorded"},
         {"file", run.file},
         {"machine", {{"cpus", machine.cpus}, {"kernel", machine.kernel}, {"model", machine.model}}},
+        {"provenance", Json::parse(provenance_to_json(run.info.provenance))},
         {"version", kVersion},
         {"jobs", 1}}.dump(-1, ' ', false, Json::error_handler_t::replace));
   }

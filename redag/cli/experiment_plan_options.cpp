@@ -6,12 +6,15 @@
 #include <fmt/format.h>
 
 #include "redag/cli/options.hpp"
+#include "redag/model/validate.hpp"
 
 namespace redag::cli {
 namespace {
 
 using experiment::AcceptancePlan;
 using experiment::DeadlineKind;
+
+constexpr std::uint32_t kMaxSets = 1'000'000;  // random workloads at a point, runs of one, periods of a run
 
 std::vector<std::string> split(const std::string &text) {
   std::vector<std::string> items(1);
@@ -25,14 +28,6 @@ std::vector<std::string> split(const std::string &text) {
   return items;
 }
 
-std::uint32_t count_of(const std::string &name, const std::string &text) {
-  std::uint32_t value = 0;
-  const char *end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, value);
-  if (error != std::errc() || stop != end || value == 0) reject(name, "'" + text + "' is not a whole number above 0");
-  return value;
-}
-
 template <class Value>
 Value choice_of(const std::string &name, const std::string &text, const Choices<Value> &choices) {
   std::vector<std::string> names;
@@ -40,7 +35,7 @@ Value choice_of(const std::string &name, const std::string &text, const Choices<
     if (known == text) return value;
     names.push_back(known);
   }
-  reject(name, "'" + text + "' is not a choice", suggestion(text, names));
+  reject(name, in_quotes(text) + " is not a choice", suggestion(text, names));
 }
 
 template <class Value>
@@ -48,6 +43,10 @@ Choices<Value> choices_of(std::initializer_list<Value> values) {
   Choices<Value> choices;
   for (const Value value : values) choices.emplace_back(to_string(value), value);
   return choices;
+}
+
+auto count_within(Range<std::uint32_t> range) {
+  return [range](const std::string &name, const std::string &item) { return parse_count(name, item, range); };
 }
 
 // "a,b,c", each read by `read(name, item)`.
@@ -78,9 +77,9 @@ void PlanOptions::add_points(CLI::App &app) {
   const std::string group = "Points";
   on(app.add_option("--name", given_.name, "Of the experiment")->type_name("NAME")->capture_default_str(), group,
      [this](AcceptancePlan &plan) { plan.name = given_.name; });
-  on(add_count(app, "--seed", given_.seed, "Of all random draws"), group,
+  on(add_seed(app, given_.seed, "Of all random draws"), group,
      [this](AcceptancePlan &plan) { plan.seed = given_.seed; });
-  on(add_count(app, "--sets", given_.sets, "Random workloads at each point"), group,
+  on(add_count(app, "--sets", given_.sets, {1, kMaxSets}, "Random workloads at each point"), group,
      [this](AcceptancePlan &plan) { plan.sets = given_.sets; });
   const auto set_utilization = [this](const std::string &text) {
     Result<std::vector<std::uint32_t>> values = experiment::parse_utilization(text);
@@ -92,9 +91,9 @@ void PlanOptions::add_points(CLI::App &app) {
          ->type_name("RANGE")
          ->default_str("0.05:1:0.05"),
      group, [this](AcceptancePlan &plan) { plan.utilization = given_.utilization; });
-  on(add_list(app, "--dags", given_.dags, "DAGs; by default each has one task", "10", count_of), group,
-     [this](AcceptancePlan &plan) { plan.dags = given_.dags; });
-  on(add_list(app, "--workers", given_.workers, "Workers", "4", count_of), group,
+  on(add_list(app, "--dags", given_.dags, "DAGs; by default each has one task", "10", count_within({1, kMaxTasks})),
+     group, [this](AcceptancePlan &plan) { plan.dags = given_.dags; });
+  on(add_list(app, "--workers", given_.workers, "Workers", "4", count_within({1, kMaxWorkers})), group,
      [this](AcceptancePlan &plan) { plan.workers = given_.workers; });
   on(add_list(app, "--deadlines", given_.deadlines, "implicit (D = T), constrained (D / T in 0.5 to 1)", "implicit",
               [](const std::string &name, const std::string &item) {
@@ -109,10 +108,10 @@ void PlanOptions::add_points(CLI::App &app) {
               "Names of 'redag analyze --methods'; any: all sound ones together; simulation: no miss seen",
               "any,simulation", [](const std::string & /*name*/, const std::string &item) { return item; }),
      group, [this](AcceptancePlan &plan) { plan.methods = given_.methods; });
-  on(add_count(app, "--simulation-offsets", given_.simulation.offsets,
+  on(add_count(app, "--simulation-offsets", given_.simulation.offsets, {0, kMaxSets},
                "Simulated runs with random offsets, beside the synchronous one"),
      group, [this](AcceptancePlan &plan) { plan.simulation.offsets = given_.simulation.offsets; });
-  on(add_count(app, "--simulation-periods", given_.simulation.periods,
+  on(add_count(app, "--simulation-periods", given_.simulation.periods, {1, kMaxSets},
                "Length of a run in periods of the slowest task"),
      group, [this](AcceptancePlan &plan) { plan.simulation.periods = given_.simulation.periods; });
 }
@@ -120,9 +119,9 @@ void PlanOptions::add_points(CLI::App &app) {
 void PlanOptions::add_workloads(CLI::App &app) {
   const std::string group = "Workloads";
   GenerateOptions &w = given_.workload;
-  on(add_count(app, "--min-tasks", w.min_tasks, "Fewest tasks of a DAG"), group,
+  on(add_count(app, "--min-tasks", w.min_tasks, {1, kMaxTasks}, "Fewest tasks of a DAG"), group,
      [&w](AcceptancePlan &plan) { plan.workload.min_tasks = w.min_tasks; });
-  on(add_count(app, "--max-tasks", w.max_tasks, "Most tasks of a DAG"), group,
+  on(add_count(app, "--max-tasks", w.max_tasks, {1, kMaxTasks}, "Most tasks of a DAG"), group,
      [&w](AcceptancePlan &plan) { plan.workload.max_tasks = w.max_tasks; });
   on(add_choice(app, "--shape", w.shape,
                 choices_of({DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain,
@@ -130,14 +129,15 @@ void PlanOptions::add_workloads(CLI::App &app) {
                 "Edges")
          ->default_str(to_string(w.shape)),
      group, [&w](AcceptancePlan &plan) { plan.workload.shape = w.shape; });
-  on(add_number(app, "--edge-probability", w.edge_probability, "Of each further edge (layered, erdos_renyi)"), group,
-     [&w](AcceptancePlan &plan) { plan.workload.edge_probability = w.edge_probability; });
+  on(add_number(app, "--edge-probability", w.edge_probability, {0, 1}, "Of each further edge (layered, erdos_renyi)"),
+     group, [&w](AcceptancePlan &plan) { plan.workload.edge_probability = w.edge_probability; });
   on(add_choice(app, "--policy", w.policy, policy_choices(), "Policy")->default_str(to_string(w.policy)), group,
      [&w](AcceptancePlan &plan) { plan.workload.policy = w.policy; });
-  on(add_count(app, "--max-active", w.max_active_max, "Of every DAG; 0: no bound"), group, [&w](AcceptancePlan &plan) {
-    plan.workload.max_active_min = w.max_active_max;
-    plan.workload.max_active_max = w.max_active_max;
-  });
+  on(add_count(app, "--max-active", w.max_active_max, {0, kMaxBound}, "Of every DAG; 0: no bound"), group,
+     [&w](AcceptancePlan &plan) {
+       plan.workload.max_active_min = w.max_active_max;
+       plan.workload.max_active_max = w.max_active_max;
+     });
   on(add_choice(
          app, "--periods", w.periods,
          choices_of({PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive, PeriodModel::Robot}),
@@ -150,9 +150,9 @@ void PlanOptions::add_workloads(CLI::App &app) {
      [&w](AcceptancePlan &plan) { plan.workload.period_max = w.period_max; });
   on(add_duration(app, "--period-granularity", w.period_granularity, "Periods are multiples of it (log_uniform)"),
      group, [&w](AcceptancePlan &plan) { plan.workload.period_granularity = w.period_granularity; });
-  on(add_number(app, "--jitter", w.jitter, "Release jitter / period of timer tasks"), group,
+  on(add_number(app, "--jitter", w.jitter, {0, 1}, "Release jitter / period of timer tasks"), group,
      [&w](AcceptancePlan &plan) { plan.workload.jitter = w.jitter; });
-  on(add_number(app, "--max-task-utilization", w.max_task_utilization, "Of one task"), group,
+  on(add_number(app, "--max-task-utilization", w.max_task_utilization, {1e-9, 1}, "Of one task"), group,
      [&w](AcceptancePlan &plan) { plan.workload.max_task_utilization = w.max_task_utilization; });
   on(add_choice(app, "--utilization-method", w.method,
                 choices_of({UtilizationMethod::Drs, UtilizationMethod::UUniFastDiscard}), "How it is shared")

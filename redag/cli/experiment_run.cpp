@@ -152,13 +152,14 @@ class StudyRun {
 
 CLI::Option *add_study_output(CLI::App &app, StudyOutput &output, const std::string &names, const std::string &help) {
   CLI::Option *folder = app.add_option(names, output.folder, help)->type_name("DIR");
-  app.add_flag("--force", output.force, "Write into a folder that holds other files");
+  app.add_flag("--force", output.force, "Write into a folder that holds other files")->needs(folder);
   app.add_flag("--json", output.json, "Write one JSON document to standard output, and nothing else");
   return folder;
 }
 
 void add_study_settings(CLI::App &app, StudySettings &settings) {
-  add_count(app, "-j,--jobs", settings.jobs, "Done at the same time; default: one a processor")->default_str("");
+  add_count(app, "-j,--jobs", settings.jobs, {1, kMaxJobs}, "Done at the same time; default: one a processor")
+      ->default_str("");
   const auto set_shard = [&settings](const std::string &text) {
     const Result<experiment::Shard> shard = experiment::parse_shard(text);
     if (!shard) reject("--shard", shard.error().front().message, shard.error().front().hint);

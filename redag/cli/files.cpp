@@ -45,6 +45,8 @@ Result<void> write_in_place(const std::string &path, std::string_view text) {
   return trace::file_error(path, 0, fmt::format("cannot write: {}", std::strerror(errno)));
 }
 
+constexpr const char *kFlightName = "flight";
+
 // "007" of "mte_007".
 bool is_number(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
@@ -56,7 +58,9 @@ Result<LoadedWorkload> load_input(const std::string &path, LoadOptions options) 
   if (path != "-") return load_workload(path, options);
   Result<std::string> text = read_standard_input();
   if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
-  return parse_workload(*text, "<stdin>", options);
+  Result<LoadedWorkload> loaded = parse_workload(*text, "<stdin>", options);
+  if (loaded && loaded->workload.name.empty()) loaded->workload.name = "stdin";
+  return loaded;
 }
 
 Result<void> write_text(const std::string &path, std::string_view text) {
@@ -69,8 +73,22 @@ Result<void> write_text(const std::string &path, std::string_view text) {
   return file->commit();
 }
 
+Result<void> check_output(const std::string &path) {
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored)) return trace::file_error(path, 0, "cannot write: this is a folder");
+  const fs::file_status status = fs::symlink_status(path, ignored);
+  const bool in_place = fs::exists(status) && !fs::is_regular_file(status);
+  const std::string folder = fs::path(path).parent_path().string();
+  // What is there is replaced by a rename, which only the folder has to permit.
+  const std::string place = in_place ? path : folder.empty() ? "." : folder;
+  if (::access(place.c_str(), in_place ? W_OK : W_OK | X_OK) == 0) return {};
+  return trace::file_error(path, 0, fmt::format("cannot write: {}", std::strerror(errno)),
+                           errno == ENOENT ? "does the directory exist?" : "");
+}
+
 Result<std::vector<std::string>> find_traces(const std::string &place) {
   std::error_code error;
+  if (!fs::exists(place, error)) return trace::file_error(place, 0, "no such file or folder");
   if (!fs::is_directory(place, error)) return std::vector<std::string>{place};
   std::vector<std::string> files;
   fs::recursive_directory_iterator entry(place, error);
@@ -78,6 +96,10 @@ Result<std::vector<std::string>> find_traces(const std::string &place) {
     if (entry->path().filename() == "events.jsonl") files.push_back(entry->path().string());
   }
   if (error) return trace::file_error(place, 0, fmt::format("cannot list the folder: {}", error.message()));
+  if (files.empty() && fs::exists(flight_folder(place), error)) {
+    return trace::file_error(place, 0, "no events.jsonl in this folder, but the record of a run that did not end",
+                             fmt::format("'redag recover {}' makes results of it", place));
+  }
   if (files.empty()) {
     return trace::file_error(place, 0, "no events.jsonl in this folder or below",
                              "'redag run', 'simulate' and 'compare' write one with --out");
@@ -86,7 +108,10 @@ Result<std::vector<std::string>> find_traces(const std::string &place) {
   return files;
 }
 
+std::string flight_folder(const std::string &folder) { return folder + "/" + kFlightName; }
+
 bool is_result_name(std::string_view name) {
+  if (name == kFlightName) return true;
   // What a killed command left behind ends in ".tmp.<pid>".
   if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
     name = name.substr(0, at);

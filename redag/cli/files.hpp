@@ -17,9 +17,15 @@ namespace redag::cli {
 /// Writes a whole file or nothing (trace::OutputFile); devices and pipes are written as they are.
 [[nodiscard]] Result<void> write_text(const std::string &path, std::string_view text);
 
+/// Can write_text() write there? For commands that compute for long before they do.
+[[nodiscard]] Result<void> check_output(const std::string &path);
+
 /// A folder that results can go to: made with its parents if missing. Error if it holds a file that this program does
 /// not write, by name (unless `force`), or cannot be made or written. Nothing is deleted.
 [[nodiscard]] Result<void> prepare_folder(const std::string &path, bool force);
+
+/// Where `redag run` records a run in its result folder while it goes on (trace/flight_recorder.hpp).
+[[nodiscard]] std::string flight_folder(const std::string &folder);
 
 /// The traces at a place, sorted: the file itself, or every events.jsonl in the folder and below. Error if there is
 /// none.

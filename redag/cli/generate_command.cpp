@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "redag/cli/commands.hpp"
 #include "redag/cli/files.hpp"
 #include "redag/cli/options.hpp"
 #include "redag/model/generate.hpp"
+#include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 
 namespace redag::cli {
@@ -21,6 +23,8 @@ struct Options {
 };
 
 constexpr std::uint32_t kMaxCount = 1'000'000;
+constexpr Range<double> kShare = {0, 1};
+constexpr double kLeastShare = 1e-9;  // what must be above 0
 
 template <class Value>
 Choices<Value> choices_of(std::initializer_list<Value> values) {
@@ -31,39 +35,35 @@ Choices<Value> choices_of(std::initializer_list<Value> values) {
 
 void add_structure(CLI::App &app, GenerateOptions &g) {
   const std::string group = "DAGs";
-  add_count(app, "--dags", g.dags, "DAGs")->group(group);
-  add_count(app, "--min-tasks", g.min_tasks, "Fewest tasks of a DAG")->group(group);
-  add_count(app, "--max-tasks", g.max_tasks, "Most tasks of a DAG")->group(group);
+  add_count(app, "--dags", g.dags, {1, kMaxTasks}, "DAGs")->group(group);
+  add_count(app, "--min-tasks", g.min_tasks, {1, kMaxTasks}, "Fewest tasks of a DAG")->group(group);
+  add_count(app, "--max-tasks", g.max_tasks, {1, kMaxTasks}, "Most tasks of a DAG")->group(group);
   add_choice(
       app, "--shape", g.shape,
       choices_of({DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain, DagShape::Independent}),
       "Edges")
       ->default_str(to_string(g.shape))
       ->group(group);
-  add_number(app, "--edge-probability", g.edge_probability, "Of each further edge (layered, erdos_renyi)")
-
+  add_number(app, "--edge-probability", g.edge_probability, kShare, "Of each further edge (layered, erdos_renyi)")
       ->group(group);
-  add_number(app, "--data-share", g.data_share, "Of the tasks with predecessors: released by data")
-
+  add_number(app, "--data-share", g.data_share, kShare, "Of the tasks with predecessors: released by data")
       ->group(group);
-  add_count(app, "--max-active-min", g.max_active_min, "Least max_active of a DAG; 0: no bound")
-
+  add_count(app, "--max-active-min", g.max_active_min, {0, kMaxBound}, "Least max_active of a DAG; 0: no bound")
       ->group(group);
-  add_count(app, "--max-active-max", g.max_active_max, "Largest max_active of a DAG; 0: no bound")
-
+  add_count(app, "--max-active-max", g.max_active_max, {0, kMaxBound}, "Largest max_active of a DAG; 0: no bound")
       ->group(group);
-  add_count(app, "--groups", g.groups, "Exclusive groups in the workload")->group(group);
-  add_number(app, "--group-share", g.group_share, "Of the tasks: in a group")->group(group);
-  add_number(app, "--queue-share", g.queue_share, "Of the tasks: overrun queue")->group(group);
-  add_count(app, "--queue-depth", g.queue_depth, "Largest queue_depth of those")->group(group);
-  add_number(app, "--high-share", g.high_share, "Of the DAGs: criticality high")->group(group);
-  add_number(app, "--low-share", g.low_share, "Of the DAGs: criticality low")->group(group);
+  add_count(app, "--groups", g.groups, {0, kMaxTasks}, "Exclusive groups in the workload")->group(group);
+  add_number(app, "--group-share", g.group_share, kShare, "Of the tasks: in a group")->group(group);
+  add_number(app, "--queue-share", g.queue_share, kShare, "Of the tasks: overrun queue")->group(group);
+  add_count(app, "--queue-depth", g.queue_depth, {1, kMaxQueueDepth}, "Largest queue_depth of those")->group(group);
+  add_number(app, "--high-share", g.high_share, kShare, "Of the DAGs: criticality high")->group(group);
+  add_number(app, "--low-share", g.low_share, kShare, "Of the DAGs: criticality low")->group(group);
 }
 
 void add_timing(CLI::App &app, GenerateOptions &g) {
   const std::string group = "Time";
-  add_number(app, "--utilization", g.utilization, "Of all tasks together")->group(group);
-  add_number(app, "--max-task-utilization", g.max_task_utilization, "Of one task")->group(group);
+  add_number(app, "--utilization", g.utilization, {kLeastShare, kMaxTasks}, "Of all tasks together")->group(group);
+  add_number(app, "--max-task-utilization", g.max_task_utilization, {kLeastShare, 1}, "Of one task")->group(group);
   add_choice(app, "--method", g.method, choices_of({UtilizationMethod::Drs, UtilizationMethod::UUniFastDiscard}),
              "How the utilization is shared")
       ->default_str(to_string(g.method))
@@ -80,17 +80,17 @@ void add_timing(CLI::App &app, GenerateOptions &g) {
   add_choice(app, "--rates", g.rates, choices_of({RateScope::PerDag, RateScope::PerTask}), "Who draws a period")
       ->default_str(to_string(g.rates))
       ->group(group);
-  add_number(app, "--deadline-min", g.deadline_min, "Smallest deadline / period")->group(group);
-  add_number(app, "--deadline-max", g.deadline_max, "Largest deadline / period")->group(group);
-  add_number(app, "--bcet-min", g.bcet_min, "Smallest bcet / wcet")->group(group);
-  add_number(app, "--bcet-max", g.bcet_max, "Largest bcet / wcet")->group(group);
-  add_number(app, "--jitter", g.jitter, "Release jitter / period of timer tasks")->group(group);
+  add_number(app, "--deadline-min", g.deadline_min, {kLeastShare, 4}, "Smallest deadline / period")->group(group);
+  add_number(app, "--deadline-max", g.deadline_max, {kLeastShare, 4}, "Largest deadline / period")->group(group);
+  add_number(app, "--bcet-min", g.bcet_min, kShare, "Smallest bcet / wcet")->group(group);
+  add_number(app, "--bcet-max", g.bcet_max, kShare, "Largest bcet / wcet")->group(group);
+  add_number(app, "--jitter", g.jitter, kShare, "Release jitter / period of timer tasks")->group(group);
   app.add_flag("--offsets", g.offsets, "Timer tasks start anywhere in their first period")->group(group);
 }
 
 void add_platform(CLI::App &app, GenerateOptions &g) {
   const std::string group = "Platform";
-  add_count(app, "--workers", g.workers, "Workers")->group(group);
+  add_count(app, "--workers", g.workers, {1, kMaxWorkers}, "Workers")->group(group);
   add_choice(app, "--preemption", g.preemption, preemption_choices(), "Preemption")
       ->default_str(to_string(g.preemption))
       ->group(group);
@@ -112,18 +112,38 @@ std::string provenance(const CLI::App &app, std::uint64_t seed) {
   return line + fmt::format(" --seed {}\n", seed);
 }
 
+// The options of GenerateOptions as they are called here: "period_min" is --period-min.
+std::string in_options(const CLI::App &app, const std::string &message) {
+  std::string text;
+  for (std::size_t at = 0; at < message.size();) {
+    const std::size_t end = std::min(message.find(' ', at), message.size());
+    std::string name = "--" + message.substr(at, end - at);
+    std::replace(name.begin(), name.end(), '_', '-');
+    text += app.get_option_no_throw(name) != nullptr ? name : message.substr(at, end - at);
+    if (end < message.size()) text += ' ';
+    at = end + 1;
+  }
+  return text;
+}
+
 int generate_workloads(const CLI::App &app, const Options &options, Console &console) {
   if (options.count > 1 && options.folder.empty()) {
     console.error("--count needs --out DIR: one file holds one workload");
     return kExitBad;
   }
-  if (options.count < 1 || options.count > kMaxCount) {
-    console.error(fmt::format("--count: {} is not within 1 and {}", options.count, kMaxCount));
+  if (options.seed + (options.count - 1) < options.seed) {
+    console.error("--seed and --count: the last seed is not below 2^64", "begin with a smaller seed");
     return kExitBad;
   }
   if (!options.folder.empty() && !options.file.empty()) {
     console.error("-o and --out exclude each other");
     return kExitBad;
+  }
+  if (!options.file.empty()) {
+    if (const Result<void> writable = check_output(options.file); !writable) {
+      console.note(writable.error());
+      return kExitBad;
+    }
   }
   if (!options.folder.empty()) {
     if (const Result<void> made = prepare_folder(options.folder, options.force); !made) {
@@ -135,7 +155,7 @@ int generate_workloads(const CLI::App &app, const Options &options, Console &con
     const std::uint64_t seed = options.seed + i;
     const Result<Workload> workload = generate(options.generate, seed);
     if (!workload) {
-      console.note(workload.error());
+      for (const Diagnostic &mistake : workload.error()) console.error(in_options(app, mistake.message), mistake.hint);
       return kExitBad;
     }
     const std::string text = provenance(app, seed) + to_yaml(*workload);
@@ -162,13 +182,13 @@ int generate_workloads(const CLI::App &app, const Options &options, Console &con
 
 Action add_generate(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  add_count(app, "--seed", options->seed, "The same options and seed give the same workload everywhere");
+  add_seed(app, options->seed, "The same options and seed give the same workload everywhere");
   app.add_option("-o,--output", options->file, "File to write; default: standard output")->type_name("FILE");
-  add_count(app, "--count", options->count, "Workloads to make, with seeds SEED, SEED+1, ...; needs --out")
-
-      ;
-  app.add_option("--out", options->folder, "Folder for workload-SEED.yaml files")->type_name("DIR");
-  app.add_flag("--force", options->force, "Write into a folder that holds other files");
+  add_count(app, "--count", options->count, {1, kMaxCount},
+            "Workloads to make, with seeds SEED, SEED+1, ...; needs --out");
+  CLI::Option *folder =
+      app.add_option("--out", options->folder, "Folder for workload-SEED.yaml files")->type_name("DIR");
+  app.add_flag("--force", options->force, "Write into a folder that holds other files")->needs(folder);
   add_structure(app, options->generate);
   add_timing(app, options->generate);
   add_platform(app, options->generate);

@@ -1,4 +1,4 @@
-// JSON as the commands write it. Pure functions.
+// JSON as the commands write it: every document says where it comes from (redag/base/provenance.hpp).
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,22 +10,10 @@ namespace redag::cli {
 
 using Json = nlohmann::ordered_json;
 
-/// Indented, with a newline at the end. Bytes that are not UTF-8 (file names can hold any) become U+FFFD.
-[[nodiscard]] inline std::string to_text(const Json &document) {
-  return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
+/// Indented, with a newline at the end. A document (it has a `format`) gets the provenance of this process, unless it
+/// has that of the run that it is about. Bytes that are not UTF-8 (file names can hold any) become U+FFFD.
+[[nodiscard]] std::string to_text(Json document);
 
-[[nodiscard]] inline Json diagnostics_json(const Diagnostics &diagnostics) {
-  Json list = Json::array();
-  for (const Diagnostic &diagnostic : diagnostics) {
-    list.push_back(Json{{"severity", diagnostic.severity == Severity::Error ? "error" : "warning"},
-                        {"file", diagnostic.file},
-                        {"line", diagnostic.line},
-                        {"column", diagnostic.column},
-                        {"message", diagnostic.message},
-                        {"hint", diagnostic.hint}});
-  }
-  return list;
-}
+[[nodiscard]] Json diagnostics_json(const Diagnostics &diagnostics);
 
 }  // namespace redag::cli

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
+#include <type_traits>
 
 #include "redag/model/workload_yaml_nearest.hpp"
 
@@ -23,16 +25,26 @@ std::optional<int> take_number(std::string_view &text) {
 }
 
 template <class Number>
-CLI::Option *add_number_to(CLI::App &app, const std::string &name, Number &target, const std::string &help,
-                           const char *type, const char *kind) {
-  const auto set = [&target, name, kind](const std::string &text) {
-    Number value{};
-    const char *end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(text.data(), end, value);
-    const bool fits = error == std::errc{} && stop == end && std::isfinite(static_cast<double>(value));
-    if (!fits) reject(name, "'" + text + "' is not " + kind);
-    target = value;
-  };
+Number parse_number(const std::string &name, const std::string &text, Range<Number> range) {
+  Number value{};
+  const char *end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  const bool fits = error == std::errc{} && stop == end && std::isfinite(static_cast<double>(value)) &&
+                    value >= range.least && value <= range.most;
+  if (!fits) {
+    const char *kind = std::is_floating_point_v<Number> ? "a number" : "a whole number";
+    const std::string words = static_cast<Number>(range.most) == std::numeric_limits<Number>::max()
+                                  ? fmt::format("{} below 2^{}", kind, std::numeric_limits<Number>::digits)
+                                  : fmt::format("{} from {} to {}", kind, range.least, range.most);
+    reject(name, fmt::format("{} is not {}", in_quotes(text), words));
+  }
+  return value;
+}
+
+template <class Number>
+CLI::Option *add_number_to(CLI::App &app, const std::string &name, Number &target, Range<Number> range,
+                           const std::string &help, const char *type) {
+  const auto set = [&target, name, range](const std::string &text) { target = parse_number(name, text, range); };
   return app.add_option_function<std::string>(name, set, help)->type_name(type)->default_str(fmt::format("{}", target));
 }
 
@@ -43,7 +55,7 @@ CLI::Option *add_duration_to(CLI::App &app, const std::string &name, Target &tar
     const Result<Duration> parsed = parse_duration(text);
     if (!parsed) reject(name, parsed.error().front().message, parsed.error().front().hint);
     if (*parsed < 0 || (*parsed == 0 && !zero_allowed)) {
-      reject(name, "'" + text + "' is not " + (zero_allowed ? "a duration that can be waited for" : "longer than 0"));
+      reject(name, in_quotes(text) + " is not " + (zero_allowed ? "a duration from 0s on" : "longer than 0"));
     }
     target = *parsed;
   };
@@ -67,16 +79,27 @@ CLI::Option *add_duration(CLI::App &app, const std::string &name, Duration &targ
   return add_duration_to(app, name, target, help, zero_allowed)->default_str(format_duration(target));
 }
 
-CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint32_t &target, const std::string &help) {
-  return add_number_to(app, name, target, help, "N", "a whole number below 2^32");
+CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint32_t &target, Range<std::uint32_t> range,
+                       const std::string &help) {
+  return add_number_to(app, name, target, range, help, "N");
 }
 
-CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint64_t &target, const std::string &help) {
-  return add_number_to(app, name, target, help, "N", "a whole number below 2^64");
+CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint64_t &target, Range<std::uint64_t> range,
+                       const std::string &help) {
+  return add_number_to(app, name, target, range, help, "N");
 }
 
-CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, const std::string &help) {
-  return add_number_to(app, name, target, help, "X", "a number");
+CLI::Option *add_seed(CLI::App &app, std::uint64_t &target, const std::string &help) {
+  return add_count(app, "--seed", target, {0, std::numeric_limits<std::uint64_t>::max()}, help);
+}
+
+CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, Range<double> range,
+                        const std::string &help) {
+  return add_number_to(app, name, target, range, help, "X");
+}
+
+std::uint32_t parse_count(const std::string &name, const std::string &text, Range<std::uint32_t> range) {
+  return parse_number(name, text, range);
 }
 
 std::optional<std::vector<int>> parse_cpu_list(std::string_view text) {
@@ -105,8 +128,12 @@ std::string suggestion(std::string_view given, const std::vector<std::string> &c
   const std::vector<std::string_view> views(candidates.begin(), candidates.end());
   const std::string_view best = yaml::nearest(given, views);
   if (!best.empty()) return "did you mean '" + std::string(best) + "'?";
+  constexpr std::size_t kMostNamed = 20;
   std::string all;
-  for (const std::string &candidate : candidates) all += (all.empty() ? "one of " : ", ") + candidate;
+  for (std::size_t i = 0; i < std::min(candidates.size(), kMostNamed); ++i) {
+    all += (i == 0 ? "one of " : ", ") + candidates[i];
+  }
+  if (candidates.size() > kMostNamed) all += fmt::format(" and {} more", candidates.size() - kMostNamed);
   return all;
 }
 

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "redag/base/text.hpp"
 #include "redag/base/time.hpp"
 #include "redag/model/workload.hpp"
 
@@ -28,11 +29,32 @@ CLI::Option *add_duration(CLI::App &app, const std::string &name, std::optional<
 CLI::Option *add_duration(CLI::App &app, const std::string &name, Duration &target, const std::string &help,
                           bool zero_allowed = false);
 
-/// A whole number, zero or more; shows its default.
-CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint32_t &target, const std::string &help);
-CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint64_t &target, const std::string &help);
+/// The values that a number can have, ends included; said in words where it has another one.
+template <class Number>
+struct Range {
+  Number least;
+  Number most;
+};
+
+/// Where nothing but the machine sets a limit: so many threads, combinations, restarts, recorded events.
+inline constexpr std::uint32_t kMaxJobs = 1024;
+inline constexpr std::uint32_t kMaxRestarts = 1'000'000;
+inline constexpr std::uint64_t kMaxCombinations = 1'000'000'000;
+inline constexpr std::uint64_t kMaxEvents = 1'000'000'000;
+
+/// A whole number; shows its default.
+CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint32_t &target, Range<std::uint32_t> range,
+                       const std::string &help);
+CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint64_t &target, Range<std::uint64_t> range,
+                       const std::string &help);
+/// Any whole number below 2^64.
+CLI::Option *add_seed(CLI::App &app, std::uint64_t &target, const std::string &help);
 /// A finite number; shows its default.
-CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, const std::string &help);
+CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, Range<double> range,
+                        const std::string &help);
+
+/// "3" within `range`; throws as reject() does.
+[[nodiscard]] std::uint32_t parse_count(const std::string &name, const std::string &text, Range<std::uint32_t> range);
 
 /// "0,2-5" -> {0, 2, 3, 4, 5}.
 [[nodiscard]] std::optional<std::vector<int>> parse_cpu_list(std::string_view text);
@@ -57,7 +79,7 @@ CLI::Option *add_choice(CLI::App &app, const std::string &name, Target &target, 
         return;
       }
     }
-    reject(name, "'" + given + "' is not a choice", suggestion(given, names));
+    reject(name, in_quotes(given) + " is not a choice", suggestion(given, names));
   };
   return app.add_option_function<std::string>(name, set, help + ": " + listed)->type_name("NAME");
 }

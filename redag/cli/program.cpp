@@ -8,6 +8,8 @@
 #include <exception>
 #include <new>
 
+#include "redag/base/provenance.hpp"
+#include "redag/base/text.hpp"
 #include "redag/cli/commands.hpp"
 #include "redag/cli/options.hpp"
 #include "redag/version.hpp"
@@ -38,6 +40,10 @@ constexpr std::array kCommands = {
           "  redag run cart.yaml --duration 10s\n"
           "  sudo redag run cart.yaml --preemption os --affinity 2,3 --mlockall --out results/os\n"
           "  redag run cart.yaml --executor ste --check || echo 'deadlines were missed'\n"},
+    Entry{"calibrate", "Measure what this machine adds to jobs: for bounds that hold on it", add_calibrate,
+          "  redag calibrate\n"
+          "  sudo redag calibrate --duration 5min --loaded --out overheads.yaml\n"
+          "  redag calibrate --duration 5s --json | jq .overheads\n"},
     Entry{"compare", "Run several executors on the same jobs and say how they differ", add_compare,
           "  redag compare cart.yaml\n"
           "  redag compare cart.yaml --executors redag-none,redag-os,mte,mte-fifo --repeat 5 --out results/cmp\n"
@@ -75,6 +81,9 @@ constexpr std::array kCommands = {
     Entry{"check-trace", "Hold recorded traces to the rules of the model", add_check_trace,
           "  redag check-trace results/demo\n"
           "  redag check-trace --json results/os/events.jsonl\n"},
+    Entry{"recover", "Make results of what a killed run had recorded", add_recover,
+          "  redag recover results/os\n"
+          "  redag recover results/os --out results/rescued --keep\n"},
     Entry{"report", "Make one HTML page of recorded runs: verdict, tables, figures, schedule", add_report,
           "  redag report results/demo\n"
           "  redag report results/none results/os -o report.html\n"
@@ -98,14 +107,36 @@ std::string unknown_argument(const CLI::App &command) {
   const std::vector<std::string> rest = command.remaining();
   if (rest.empty()) return "too many arguments";
   const std::string given = rest.front().substr(0, rest.front().find('='));
-  if (given.empty() || given.front() != '-') return fmt::format("unexpected argument '{}'", given);
+  if (given.empty() || given.front() != '-') return fmt::format("unexpected argument {}", in_quotes(rest.front()));
   std::vector<std::string> names;
   for (const CLI::Option *option : command.get_options()) {
     for (const std::string &name : option->get_lnames()) names.push_back("--" + name);
   }
   const std::string hint = suggestion(given, names);
   const bool is_near = hint.compare(0, 3, "did") == 0;  // otherwise it lists every option there is
-  return fmt::format("unknown option '{}'{}", given, is_near ? " (" + hint + ")" : "");
+  return fmt::format("unknown option {}{}", in_quotes(given), is_near ? " (" + hint + ")" : "");
+}
+
+// What CLI11 says of an option that was given too often, or with a value that it does not take, in our words.
+std::string mismatch(const CLI::ArgumentMismatch &error) {
+  const std::string said = error.what();
+  if (const std::size_t at = said.find(": At Most 1 required"); at != std::string::npos) {
+    return said.substr(0, at) + " is given more than once";
+  }
+  if (const std::size_t at = said.find(" was given a disallowed flag override"); at != std::string::npos) {
+    return "--" + said.substr(0, at) + " takes no value";
+  }
+  return said;
+}
+
+// An empty value is a variable that was not set, in a script: none of our options means anything by it.
+std::string find_empty(const CLI::App &command) {
+  for (const CLI::Option *option : command.get_options()) {
+    for (const std::string &value : option->results()) {
+      if (value.empty()) return option->get_name();
+    }
+  }
+  return {};
 }
 
 int usage_error(Console &console, const std::string &message, const std::string &command) {
@@ -138,8 +169,9 @@ std::string help_prefix(const CLI::App &command) {
 int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
   CLI::App app("Priority scheduling for many callback DAGs in one process: validate, simulate, run, compare, analyze.",
                "redag");
-  app.set_version_flag("--version", std::string("redag ") + kVersion);
+  app.set_version_flag("--version", fmt::format("redag {} (revision {})", kVersion, build_revision()));
   app.require_subcommand(0, 1);
+  app.option_defaults()->disable_flag_override();
   app.get_formatter()->column_width(34);
   app.footer(
       "'redag COMMAND --help' explains a command. Exit status: 0 fine, 1 the answer is no, 2 bad input or usage.");
@@ -150,6 +182,10 @@ int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
     actions.emplace_back(command, entry.add(*command));
   }
 
+  if (const auto epoch = source_date_epoch(); !epoch) {
+    console.note(epoch.error());
+    return kExitBad;
+  }
   if (arguments.empty()) {
     console.note(app.help());
     return kExitBad;
@@ -157,7 +193,7 @@ int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
   const std::vector<std::string> names = command_names();
   const std::string &first = arguments.front();
   if (first.empty() || (first.front() != '-' && std::find(names.begin(), names.end(), first) == names.end())) {
-    return usage_error(console, fmt::format("unknown command '{}' ({})", first, suggestion(first, names)), "");
+    return usage_error(console, fmt::format("unknown command {} ({})", in_quotes(first), suggestion(first, names)), "");
   }
 
   try {
@@ -172,9 +208,16 @@ int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
   } catch (const CLI::ExtrasError &) {
     CLI::App *command = chosen(app);
     return usage_error(console, unknown_argument(command != nullptr ? *command : app), name_of(command));
+  } catch (const CLI::ArgumentMismatch &error) {
+    return usage_error(console, mismatch(error), name_of(chosen(app)));
   } catch (const CLI::ParseError &error) {
     CLI::App *command = chosen(app);
     return usage_error(console, error.what(), name_of(command));
+  }
+  if (const CLI::App *command = chosen(app); command != nullptr) {
+    if (const std::string option = find_empty(*command); !option.empty()) {
+      return usage_error(console, option + ": the value is empty", name_of(command));
+    }
   }
   for (const auto &[command, action] : actions) {
     if (command->parsed()) return action(console);

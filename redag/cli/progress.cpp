@@ -11,7 +11,13 @@ namespace redag::cli {
 namespace {
 
 constexpr Duration kRedrawPeriod = 100 * kMillisecond;
+constexpr Duration kLinePeriod = 5 * kSecond;
 constexpr std::size_t kBarWidth = 20;
+
+// Beyond a day nobody cares for seconds, and a first guess can be far off.
+std::string rest_in_words(double rest) {
+  return (rest < 86'400e9 ? humanize_duration(static_cast<Duration>(rest)) : "more than a day") + " left";
+}
 
 Time now() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
@@ -38,20 +44,35 @@ std::string pace(std::uint64_t done, std::uint64_t total, Duration elapsed) {
   if (done == 0 || elapsed <= 0) return text;
   const double each = static_cast<double>(elapsed) / static_cast<double>(done);
   const double rest = each * static_cast<double>(total - std::min(done, total));
-  // Beyond a day nobody cares for seconds, and a first guess can be far off.
-  const std::string left = rest < 86'400e9 ? humanize_duration(static_cast<Duration>(rest)) : "more than a day";
-  return text + fmt::format(", {:.0f}/s, {} left", 1e9 / each, left);
+  return text + fmt::format(", {:.0f}/s, {}", 1e9 / each, rest_in_words(rest));
 }
 
-bool Progress::due() const { return console_.err_traits().terminal && now() - last_drawn_ >= kRedrawPeriod; }
+Progress::Progress(Console &console)
+    : console_(console), begin_(now()), last_drawn_(console.err_traits().terminal ? 0 : begin_) {}
+
+bool Progress::due() const {
+  return now() - last_drawn_ >= (console_.err_traits().terminal ? kRedrawPeriod : kLinePeriod);
+}
 
 void Progress::draw(double done, std::string_view detail) {
-  if (!console_.err_traits().terminal) return;
+  if (!console_.err_traits().terminal) {
+    if (!due()) return;
+    last_drawn_ = now();
+    console_.note(fmt::format("{}{}{:.0f} %, {}\n", label_, label_.empty() ? "" : ": ",
+                              100 * std::clamp(done, 0.0, 1.0), detail));
+    return;
+  }
   last_drawn_ = now();
   visible_ = true;
   // One column stays free: a full last column wraps on some terminals.
   const std::size_t width = console_.err_traits().width;
   console_.note("\r\033[K" + progress_line(label_, done, detail, width > 1 ? width - 1 : 79));
+}
+
+std::string Progress::left(double done) const {
+  const Duration elapsed = now() - begin_;
+  if (done < 0.01 || elapsed < kSecond) return {};
+  return ", " + rest_in_words(static_cast<double>(elapsed) * (1 - std::min(done, 1.0)) / done);
 }
 
 void Progress::clear() {

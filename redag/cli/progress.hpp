@@ -1,5 +1,5 @@
-// A line on standard error that tells how far a long command is. Only on a terminal; redrawn at most ten times a
-// second; erased when done. Not thread-safe.
+// A line on standard error that tells how far a long command is. On a terminal it is redrawn at most ten times a second
+// and erased when done; elsewhere a plain line comes every five seconds. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace redag::cli {
 
 class Progress {
  public:
-  explicit Progress(Console &console) : console_(console) {}
+  explicit Progress(Console &console);
   ~Progress() { clear(); }
   Progress(const Progress &) = delete;
   Progress &operator=(const Progress &) = delete;
@@ -27,13 +27,17 @@ class Progress {
   /// `done` in [0, 1]; `detail` stands after the bar, cut to the terminal.
   void draw(double done, std::string_view detail);
 
+  /// ", 12s left": how long it will take from here on if it goes on as it did; empty while that is a mere guess.
+  [[nodiscard]] std::string left(double done) const;
+
   /// Takes the line away, so that other text can be written.
   void clear();
 
  private:
   Console &console_;
   std::string label_;
-  Time last_drawn_ = 0;
+  Time begin_;
+  Time last_drawn_;
   bool visible_ = false;
 };
 

@@ -38,6 +38,11 @@ class Reporting {
       return kExitBad;
     }
     notes_ = std::move(found->notes);
+    const bool writes = !options_.json || !options_.output.empty();
+    if (const Result<void> writable = check_output(output()); writes && !writable) {
+      console_.note(writable.error());
+      return kExitBad;
+    }
     const InterruptGuard guard;
     if (!read(*found)) return kExitBad;
     progress_.clear();
@@ -92,6 +97,7 @@ class Reporting {
   int write() {
     report::DocumentOptions options;
     options.notes = notes_;
+    options.provenance = current_provenance();
     const std::string document = report::to_json(groups_, options);
     if (options_.json) {
       console_.print(document + "\n");
@@ -143,7 +149,8 @@ int report_experiment(const Options &options, const fs::path &file, Console &con
     console.note(text.error());
     return kExitBad;
   }
-  const Result<report::ExperimentDocument> document = report::experiment_document(*text, file.string());
+  const Result<report::ExperimentDocument> document =
+      report::experiment_document(*text, file.string(), current_provenance());
   if (!document) {
     console.note(document.error());
     return kExitBad;

@@ -2,10 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "redag/base/provenance.hpp"
+#include "redag/base/text.hpp"
 #include "redag/cli/files.hpp"
 #include "redag/cli/options.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag/runtime/threads.hpp"
+#include "redag/sched/executors.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::cli {
@@ -19,13 +25,31 @@ constexpr const char *kResultGroup = "Results";
 void add_platform_arguments(CLI::App &app, RunArguments &arguments) {
   add_choice(app, "--policy", arguments.policy, policy_choices(), "Priority order")->group(kWorkloadGroup);
   add_choice(app, "--preemption", arguments.preemption, preemption_choices(), "Of redag")->group(kWorkloadGroup);
-  add_count(app, "--workers", arguments.workers, "Workers")->default_str("")->group(kWorkloadGroup);
+  add_count(app, "--workers", arguments.workers, {1, kMaxWorkers}, "Workers")->default_str("")->group(kWorkloadGroup);
 }
 
-void add_overhead_arguments(CLI::App &app, sim::Overheads &overheads, const std::string &group) {
-  add_duration(app, "--overhead-release", overheads.release, "Processor time to handle a release", true)->group(group);
-  add_duration(app, "--overhead-dispatch", overheads.dispatch, "Processor time to start a job", true)->group(group);
-  add_duration(app, "--overhead-preempt", overheads.preempt, "Processor time to resume a job", true)->group(group);
+CLI::Option *add_calibration_argument(CLI::App &app, RunArguments &arguments, const std::string &group) {
+  const auto read = [&arguments](const std::string &file) {
+    Result<Calibration> loaded = load_calibration(file);
+    if (!loaded) reject("--overheads", to_string(loaded.error()));
+    set_calibration(file + ", " + loaded->provenance());
+    arguments.calibration = *std::move(loaded);
+  };
+  return app
+      .add_option_function<std::string>("--overheads", read,
+                                        "What the machine costs, measured by redag calibrate: charged to bounds")
+      ->type_name("FILE")
+      ->group(group);
+}
+
+void add_overhead_arguments(CLI::App &app, RunArguments &arguments, const std::string &group) {
+  CLI::Option *file = add_calibration_argument(app, arguments, group);
+  const auto add = [&](const char *name, Duration &part, const char *help) {
+    add_duration(app, name, part, help, true)->group(group)->excludes(file);
+  };
+  add("--overhead-release", arguments.overheads.release, "Processor time to handle a release");
+  add("--overhead-dispatch", arguments.overheads.dispatch, "Processor time to start a job");
+  add("--overhead-preempt", arguments.overheads.preempt, "Processor time to resume a job");
 }
 
 void add_workload_arguments(CLI::App &app, RunArguments &arguments) {
@@ -33,24 +57,27 @@ void add_workload_arguments(CLI::App &app, RunArguments &arguments) {
   add_duration(app, "--duration", arguments.duration, "Releases happen in this time; jobs may still be running then");
   add_duration(app, "--warm-up", arguments.warm_up, "Jobs released in this time at the start are not counted", true);
   add_duration(app, "--warmup", arguments.warm_up, "As it was called", true)->group("");  // not in --help
-  add_count(app, "--seed", arguments.seed, "Of execution times and jitter: every executor gets the same jobs");
+  add_seed(app, arguments.seed, "Of execution times and jitter: every executor gets the same jobs");
   add_platform_arguments(app, arguments);
 }
 
 void add_result_arguments(CLI::App &app, RunArguments &arguments) {
   app.add_flag("--json", arguments.json, "Write one JSON document to standard output, and nothing else")
       ->group(kResultGroup);
-  app.add_option("--out", arguments.folder, "Folder for result files; made if missing")
-      ->type_name("DIR")
+  CLI::Option *folder = app.add_option("--out", arguments.folder, "Folder for result files; made if missing")
+                            ->type_name("DIR")
+                            ->group(kResultGroup);
+  app.add_flag("--force", arguments.force, "Write into a folder that holds other files")
+      ->needs(folder)
       ->group(kResultGroup);
-  app.add_flag("--force", arguments.force, "Write into a folder that holds other files")->group(kResultGroup);
   app.add_flag("--check", arguments.check, "Exit with 1 if a deadline was missed")->group(kResultGroup);
 }
 
 void add_simulator_arguments(CLI::App &app, RunArguments &arguments) {
   const std::string group = "Simulator";
-  add_overhead_arguments(app, arguments.overheads, group);
-  add_count(app, "--max-events", arguments.max_events, "Events that are checked and written; later ones are summarized")
+  add_overhead_arguments(app, arguments, group);
+  add_count(app, "--max-events", arguments.max_events, {1, kMaxEvents},
+            "Events that are checked and written; later ones are summarized")
       ->group(group);
 }
 
@@ -90,6 +117,32 @@ std::optional<Workload> load_configured(const RunArguments &arguments, Console &
   return std::nullopt;
 }
 
+bool takes_arguments(const std::vector<Variant> &variants, const RunArguments &arguments, Console &console) {
+  const auto none = [&](const auto &takes) { return std::none_of(variants.begin(), variants.end(), takes); };
+  const Variant &first = variants.front();
+  if (arguments.preemption &&
+      none([&](const Variant &variant) { return !variant.preemption || variant.preemption == arguments.preemption; })) {
+    console.error(fmt::format("--preemption {}: '{}' always runs with preemption {}", to_string(*arguments.preemption),
+                              first.name, to_string(*first.preemption)),
+                  "leave --preemption out, or choose the executor 'redag'");
+    return false;
+  }
+  if (arguments.policy && none([](const Variant &variant) { return variant.is_redag(); })) {
+    console.error(fmt::format("--policy {}: '{}' has an order of its own", to_string(*arguments.policy), first.name),
+                  "leave --policy out, or choose the executor 'redag'");
+    return false;
+  }
+  const auto has_workers = [](const Variant &variant) {
+    return !sched::find_executor(variant.executor)->single_worker;
+  };
+  if (arguments.workers > 1 && none(has_workers)) {
+    console.error(fmt::format("--workers {}: '{}' has one worker", arguments.workers, first.name),
+                  "leave --workers out, or choose the executor 'mte'");
+    return false;
+  }
+  return true;
+}
+
 std::optional<SessionOptions> session_options(const RunArguments &arguments, trace::Driver driver,
                                               Duration default_duration, Console &console) {
   SessionOptions options;
@@ -99,6 +152,7 @@ std::optional<SessionOptions> session_options(const RunArguments &arguments, tra
   options.seed = arguments.seed;
   options.max_events = arguments.max_events;
   options.overheads = arguments.overheads;
+  options.calibration = arguments.calibration;
   options.lock_memory = arguments.lock_memory;
   options.realtime_threads = arguments.realtime_threads;
   options.spin = arguments.spin;
@@ -117,16 +171,31 @@ std::optional<SessionOptions> session_options(const RunArguments &arguments, tra
   if (!arguments.cpus.empty()) {
     const std::optional<std::vector<int>> cpus = parse_cpu_list(arguments.cpus);
     if (!cpus) {
-      console.error(fmt::format("--affinity: '{}' is not a list of processors", arguments.cpus),
+      console.error(fmt::format("--affinity: {} is not a list of processors", in_quotes(arguments.cpus)),
                     "numbers and ranges, as in 0,2-3");
       return std::nullopt;
     }
     options.cpus = *cpus;
+    const std::vector<int> usable = runtime::usable_cpus();
+    const auto is_usable = [&](int cpu) { return std::binary_search(usable.begin(), usable.end(), cpu); };
+    if (const auto bad = std::find_if_not(cpus->begin(), cpus->end(), is_usable); bad != cpus->end()) {
+      console.error(fmt::format("--affinity: this process may not use processor {}", *bad),
+                    fmt::format("it may use {}", fmt::join(usable, ", ")));
+      return std::nullopt;
+    }
   }
   if (!arguments.folder.empty()) {
+    if (arguments.flight) options.flight = flight_folder(arguments.folder);
+    options.flight_bytes = std::uint64_t{arguments.flight_mib} << 20U;
     if (const Result<void> made = prepare_folder(arguments.folder, arguments.force); !made) {
       console.note(made.error());
       return std::nullopt;
+    }
+    if (arguments.force && arguments.flight) {
+      if (const Result<void> removed = trace::remove_flight_record(options.flight); !removed) {
+        console.note(removed.error());
+        return std::nullopt;
+      }
     }
   }
   return options;
@@ -142,9 +211,9 @@ ProgressHook progress_hook(Progress &progress, const Workload &workload, Duratio
       if (misses[i] > 0) missed += fmt::format("{} {} {}", missed.empty() ? ", misses:" : ",", names[i], misses[i]);
     }
     const Time shown = std::min(now, duration);
-    progress.draw(static_cast<double>(shown) / static_cast<double>(duration),
-                  fmt::format("{:.1f} of {:.1f} s{}", static_cast<double>(shown) * 1e-9,
-                              static_cast<double>(duration) * 1e-9, missed.empty() ? ", no misses" : missed));
+    const double done = static_cast<double>(shown) / static_cast<double>(duration);
+    progress.draw(done, fmt::format("{} of {}{}{}", humanize_duration(shown), humanize_duration(duration),
+                                    progress.left(done), missed.empty() ? ", no misses" : missed));
   };
 }
 

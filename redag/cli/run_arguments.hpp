@@ -6,11 +6,14 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "redag/base/time.hpp"
 #include "redag/cli/console.hpp"
 #include "redag/cli/progress.hpp"
 #include "redag/cli/session.hpp"
+#include "redag/cli/variant.hpp"
+#include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 
 namespace redag::cli {
@@ -24,6 +27,7 @@ struct RunArguments {
   Duration warm_up = 0;
   std::uint64_t seed = 1;
   sim::Overheads overheads;
+  std::optional<Calibration> calibration;  // --overheads
   std::uint64_t max_events = std::uint64_t{1} << 22U;
   std::string cpus;
   bool lock_memory = false;
@@ -33,6 +37,8 @@ struct RunArguments {
   bool live = false;
   bool json = false;
   std::string folder;
+  bool flight = false;  // a record of the run in `folder`, while it goes on
+  std::uint32_t flight_mib = static_cast<std::uint32_t>(trace::FlightOptions{}.most_bytes >> 20U);
   bool force = false;
   bool check = false;
   bool all_tasks = false;
@@ -40,7 +46,10 @@ struct RunArguments {
 
 /// What replaces the platform and the policy of the workload.
 void add_platform_arguments(CLI::App &app, RunArguments &arguments);
-void add_overhead_arguments(CLI::App &app, sim::Overheads &overheads, const std::string &group);
+/// --overheads FILE, which is read at once.
+CLI::Option *add_calibration_argument(CLI::App &app, RunArguments &arguments, const std::string &group);
+/// The same, and its parts one by one.
+void add_overhead_arguments(CLI::App &app, RunArguments &arguments, const std::string &group);
 void add_workload_arguments(CLI::App &app, RunArguments &arguments);
 void add_result_arguments(CLI::App &app, RunArguments &arguments);
 void add_simulator_arguments(CLI::App &app, RunArguments &arguments);
@@ -49,6 +58,10 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments);
 /// The workload of `arguments.file` with what the command line changes; warnings and errors are printed. Nothing if it
 /// cannot be run.
 [[nodiscard]] std::optional<Workload> load_configured(const RunArguments &arguments, Console &console);
+
+/// False, with an error, if the command line asks for a mode, a policy or workers that none of the executors takes.
+[[nodiscard]] bool takes_arguments(const std::vector<Variant> &variants, const RunArguments &arguments,
+                                   Console &console);
 
 /// Everything but the driver, which is `driver`, and `stop`. `default_duration` where none is given. Errors are
 /// printed.

@@ -154,6 +154,9 @@ std::string describe(const Session &session, const StreamTraits &terminal, const
   std::string text = headline(session) + "\n";
   text += task_table(session, terminal, options.all_tasks) + "\n" + dag_table(session, terminal) + "\n";
   text += "missed: late, skipped or aborted; response: finish - release\n";
+  if (const double error = session.summary.total.response.percentile_error; error > 0) {
+    text += fmt::format("percentiles of tasks with many jobs: within {:.1f} %\n", 100 * error);
+  }
   if (!session.summary.worker_busy.empty()) {
     text += "workers busy:";
     for (const double share : session.summary.worker_busy) text += fmt::format(" {}", format_percent(share));

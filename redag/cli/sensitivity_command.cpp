@@ -11,6 +11,7 @@
 #include "redag/cli/sensitivity_report.hpp"
 #include "redag/cli/signals.hpp"
 #include "redag/cli/simulated_verdict.hpp"
+#include "redag/cli/table.hpp"
 
 namespace redag::cli {
 namespace {
@@ -64,47 +65,48 @@ Duration simulated_length(const Workload &workload) {
   return std::min(kMaxDuration / kPeriods, longest) * kPeriods;
 }
 
-// False if it was interrupted; what was found so far stays.
-bool search(Sensitivity &sensitivity, const std::vector<analysis::Knob> &knobs, const Options &options,
-            Console &console) {
+// Why it ended early, or empty; what was found so far stays.
+std::string search(Sensitivity &sensitivity, const std::vector<analysis::Knob> &knobs, const Options &options,
+                   AnalysisWatch &watch) {
   const analysis::AnalysisPlatform &platform = sensitivity.analysed.system.platform;
   const Workload &workload = sensitivity.analysed.workload;
   const analysis::Accepts simulated = [&](const Workload &candidate, const analysis::System &) {
     return misses_nothing(candidate, platform, sensitivity.simulated_for, &InterruptGuard::flag());
   };
-  Progress progress(console);
+  Progress &progress = watch.progress();
   analysis::SensitivityOptions searching;
   searching.probes = options.probes;
   searching.stop = [&] {
     if (progress.due()) {
       const std::size_t done = sensitivity.results.size();
-      progress.draw(static_cast<double>(done) / static_cast<double>(knobs.size()),
-                    knob_name(sensitivity.analysed, knobs[done]));
+      const double share = static_cast<double>(done) / static_cast<double>(knobs.size());
+      progress.draw(share, knob_name(sensitivity.analysed, knobs[done]) + progress.left(share));
     }
-    return InterruptGuard::interrupted();
+    return !watch.why_stop().empty();
   };
   for (const analysis::Knob &knob : knobs) {
     KnobResult result;
     const auto margin = analysis::margin_of(workload, platform, knob, analysis::accepted_by_analysis, searching);
-    if (!margin) return false;
+    if (!margin) return watch.why_stop();
     result.margin = *margin;
     if (options.simulate) {
       result.simulated = analysis::margin_of(workload, platform, knob, simulated, searching);
-      if (!result.simulated) return false;
+      if (!result.simulated) return watch.why_stop();
     }
     sensitivity.results.push_back(std::move(result));
   }
-  return true;
+  return {};
 }
 
 int sensitivity_of_file(const Options &options, Console &console) {
-  if (options.probes > kMostProbes) {
-    console.error(fmt::format("--probes: {} is above {}", options.probes, kMostProbes));
-    return kExitBad;
-  }
   const std::optional<Workload> workload = load_configured(options.analysis.run, console);
   if (!workload) return kExitBad;
-  Result<Analysed> analysed = analyse(*workload, platform_for(*workload, options.analysis));
+  const InterruptGuard guard;  // until the results are written
+  AnalysisWatch watch(options.analysis, console);
+  Result<Analysed> analysed =
+      platform_for(*workload, options.analysis).and_then([&](const analysis::AnalysisPlatform &platform) {
+        return analyse(*workload, platform, nullptr, "redag", watch.options());
+      });
   if (!analysed) {
     console.note(analysed.error());
     return kExitBad;
@@ -119,8 +121,13 @@ int sensitivity_of_file(const Options &options, Console &console) {
   if (options.simulate) {
     sensitivity.simulated_for = options.analysis.run.duration.value_or(simulated_length(*workload));
   }
-  const InterruptGuard guard;  // until the results are written
-  if (!search(sensitivity, *knobs, options, console)) console.warn("interrupted: these are the results so far");
+  if (const std::string why = search(sensitivity, *knobs, options, watch); !why.empty()) {
+    watch.progress().clear();
+    console.warn(fmt::format("{}: these are {} of {} results", why, format_count(sensitivity.results.size()),
+                             format_count(knobs->size())),
+                 "--task asks of one task or DAG alone; --time-limit sets the limit");
+  }
+  watch.progress().clear();
   if (options.analysis.run.json) {
     console.print(to_text(to_json(sensitivity)));
   } else {
@@ -137,9 +144,11 @@ Action add_sensitivity(CLI::App &app) {
   RunArguments &run = options->analysis.run;
   app.add_option("FILE", run.file, "Workload (YAML); - is standard input")->required();
   app.add_option("--task", options->task, "Only what concerns one task (dag.task) or DAG")->type_name("TASK");
-  add_count(app, "--probes", options->probes, "Positions tested besides, to see whether acceptance is monotone");
-  app.add_flag("--simulate", options->simulate, "How far the simulator would go, beside the bounds: no proof");
-  add_duration(app, "--duration", run.duration, "Of each simulation; default: 20 longest periods");
+  add_count(app, "--probes", options->probes, {0, kMostProbes},
+            "Positions tested besides, to see whether acceptance is monotone");
+  CLI::Option *simulate =
+      app.add_flag("--simulate", options->simulate, "How far the simulator would go, beside the bounds: no proof");
+  add_duration(app, "--duration", run.duration, "Of each simulation; default: 20 longest periods")->needs(simulate);
   add_analysis_arguments(app, options->analysis, "Exit with 1 if the workload is not shown schedulable as it is");
   return [options](Console &console) { return sensitivity_of_file(*options, console); };
 }

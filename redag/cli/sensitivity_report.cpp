@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "redag/base/rounded_time.hpp"
 #include "redag/cli/table.hpp"
 
 namespace redag::cli {
@@ -40,9 +41,20 @@ std::optional<Duration> value_at(const Knob &knob, std::int64_t position) {
   return std::nullopt;
 }
 
-std::string value_text(const Knob &knob, std::optional<std::int64_t> position) {
+// Rounded towards less load: a wcet down, a period up.
+std::string humanize_safely(const Knob &knob, Duration value) {
+  return is_of_rates(knob) ? humanize_up(value) : humanize_down(value);
+}
+
+std::string limit_text(const Knob &knob, std::optional<std::int64_t> position) {
   if (!position) return "none";
   const std::optional<Duration> value = value_at(knob, *position);
+  return value ? humanize_safely(knob, *value) : "-";
+}
+
+// As the file says it.
+std::string nominal_text(const Knob &knob, std::int64_t position) {
+  const std::optional<Duration> value = value_at(knob, position);
   return value ? format_duration(*value) : "-";
 }
 
@@ -54,7 +66,7 @@ std::string factor_text(const std::optional<Margin> &margin) {
 // Where the search of `margin` showed acceptance to come back.
 std::string again_text(const Analysed &analysed, const Margin &margin) {
   const std::optional<Duration> value = value_at(margin.knob, *margin.again);
-  return value ? format_duration(*value)
+  return value ? humanize_duration(*value)
                : "a factor of " + format_factor(load_factor(analysed.workload, margin.knob, *margin.again));
 }
 
@@ -69,8 +81,8 @@ std::string table_of(const Sensitivity &sensitivity, const std::vector<const Kno
     const Margin &margin = row->margin;
     const Tint tint = !margin.position ? Tint::Bad : margin.factor < 1 ? Tint::Caution : Tint::Plain;
     std::vector<Cell> cells = {{knob_name(sensitivity.analysed, margin.knob)},
-                               {value_text(margin.knob, margin.nominal)},
-                               {value_text(margin.knob, margin.position)},
+                               {nominal_text(margin.knob, margin.nominal)},
+                               {limit_text(margin.knob, margin.position)},
                                {factor_text(margin), tint}};
     if (simulated) cells.push_back({factor_text(row->simulated), Tint::Faint});
     cells.push_back({margin.obstacle + (margin.again ? " (not monotone)" : ""), Tint::Faint});
@@ -110,7 +122,7 @@ std::string change_of(const Analysed &analysed, const Margin &margin) {
   const std::optional<Duration> now = value_at(margin.knob, margin.nominal);
   if (!now) return fmt::format("{}, to {} of what it is", name, format_factor(margin.factor));
   return fmt::format("{}, from {} to {}", name, format_duration(*now),
-                     format_duration(*value_at(margin.knob, *margin.position)));
+                     humanize_safely(margin.knob, *value_at(margin.knob, *margin.position)));
 }
 
 std::string words_of_room(const Sensitivity &sensitivity) {
@@ -234,7 +246,8 @@ std::string describe(const Sensitivity &sensitivity, const StreamTraits &termina
   std::uint64_t tests = 0;
   for (const KnobResult &result : sensitivity.results) tests += result.margin.tested;
   text += fmt::format(
-      "\nlimit: shown schedulable there and in every test below; the next step (1ns, or a factor of 0.000001) is not\n"
+      "\nlimit: shown schedulable there and in every test below; the next step (1ns, or a factor of 0.000001) is not;\n"
+      "four digits, rounded towards less load: --json has every nanosecond\n"
       "factor: load at the limit over the load now, rounded down; {} analyses\n",
       format_count(tests));
   if (sensitivity.simulated_for > 0) {

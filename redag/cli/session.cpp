@@ -9,7 +9,6 @@
 
 #include "redag/analysis/analyze.hpp"
 #include "redag/analysis/executors.hpp"
-#include "redag/base/check.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/runtime/run_workload.hpp"
 #include "redag/runtime/threads.hpp"
@@ -33,16 +32,18 @@ trace::RunInfo describe_simulation(const Workload &workload, const Variant &vari
   info.workload = workload;
   info.executor = variant.executor;
   info.config = sched::effective_config(*sched::find_executor(variant.executor), sim::simulated_config(workload));
-  info.preemption = trace::preemption_name(info.config.preemption);
+  info.preemption = mode_name(info.config.preemption);
   const PreemptionMode wanted = workload.platform.preemption;
   if (wanted == PreemptionMode::Os || wanted == PreemptionMode::Auto) {
-    info.preemption_why = fmt::format("{} is full preemption in the simulator", to_string(wanted));
+    info.preemption_why = fmt::format("{}at any instant, at no cost but --overhead-preempt",
+                                      wanted == PreemptionMode::Auto ? "auto, simulated as os: " : "simulated: ");
   }
   info.driver = trace::Driver::Simulator;
   info.seed = options.seed;
   info.end = options.duration;
   info.warm_up = options.warm_up;
   info.overheads = describe(options.overheads);
+  info.provenance = current_provenance();
   return info;
 }
 
@@ -70,8 +71,14 @@ class Prefix {
   std::optional<Time> cut_;
 };
 
-Result<Session> simulate(const Workload &workload, const Variant &variant, const SessionOptions &options,
+Result<Session> simulate(const Workload &workload, const Variant &variant, SessionOptions options,
                          const ProgressHook &progress) {
+  if (options.calibration) {
+    const bool ours = sched::find_executor(variant.executor)->ours;
+    const Result<Overheads> machine = options.calibration->of(ours && is_realtime(workload.platform.preemption));
+    if (!machine) return tl::unexpected(machine.error());
+    options.overheads = sim::overheads_of(*machine);
+  }
   Session session;
   session.info = describe_simulation(workload, variant, options);
   metrics::Summarizer summarizer(session.info);
@@ -121,6 +128,20 @@ std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant
   return bounds;
 }
 
+// All but the verdict of the trace checker.
+Session evaluate(trace::Trace trace) {
+  Session session;
+  session.trace = std::move(trace);
+  session.info = session.trace.info;
+  session.summary = metrics::summarize(session.trace);
+  session.events = session.trace.events.size();
+  return session;
+}
+
+void check(Session &session) {
+  session.check = metrics::check_trace(session.trace, metrics::rules_for(session.trace.info));
+}
+
 Result<Session> run_on_threads(const Workload &workload, const Variant &variant, const SessionOptions &options,
                                const ProgressHook &progress) {
   runtime::RunOptions run;
@@ -135,6 +156,8 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   run.cpus = options.cpus;
   run.stop = options.stop;
   run.live = options.live;
+  run.flight = options.flight;
+  run.flight_options.most_bytes = options.flight_bytes;
   if (options.watchdog > 0) run.watchdog = runtime::WatchdogOptions{{options.watchdog, 0}, 10 * kMillisecond};
   run.on_overdue = options.on_overdue;
   run.bounds = [&](const sched::Config &config) { return bounds_of(workload, variant, config); };
@@ -153,13 +176,18 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   Result<runtime::RunResult> result = runtime::run_workload(workload, run);
   if (!result) return tl::unexpected<Diagnostics>(std::move(result.error()));
 
-  Session session;
-  session.trace = std::move(result->trace);
-  session.info = session.trace.info;
-  session.summary = metrics::summarize(session.trace);
-  session.events = session.trace.events.size();
+  const bool realtime_threads = run.realtime_threads || result->mode.mode == PreemptionMode::Os;
+  if (options.calibration) {
+    const Result<Overheads> machine = options.calibration->of(realtime_threads);
+    if (machine) {
+      result->trace.info.overheads = to_string(*machine);
+    } else {
+      result->warnings.push_back(machine.error().front().message + ": none were charged");
+    }
+  }
+  Session session = evaluate(std::move(result->trace));
+  session.realtime_threads = realtime_threads;
   session.stopped = result->stopped;
-  session.realtime_threads = run.realtime_threads || result->mode.mode == PreemptionMode::Os;
   session.warnings = std::move(result->warnings);
   if (!result->overdue.empty()) {
     session.warnings.push_back(fmt::format("{} job{} in progress for more than {}", result->overdue.size(),
@@ -198,17 +226,20 @@ void MissCounter::add(std::span<const JobEvent> events) {
 Result<Session> run_session(const Workload &workload, const Variant &variant, const SessionOptions &options,
                             const ProgressHook &progress) {
   const auto begin = std::chrono::steady_clock::now();
-  Workload configured = workload;
-  if (variant.preemption) configured.platform.preemption = *variant.preemption;
-  const sched::ExecutorKind *kind = sched::find_executor(variant.executor);
-  REDAG_CHECK(kind != nullptr, "an executor that variant_names() lists is unknown");
-  if (kind->single_worker) configured.platform.workers = 1;
+  const Result<Workload> configured = configure(workload, variant);
+  if (!configured) return tl::unexpected<Diagnostics>(configured.error());
   Result<Session> session = options.driver == trace::Driver::Simulator
-                                ? simulate(configured, variant, options, progress)
-                                : run_on_threads(configured, variant, options, progress);
+                                ? simulate(*configured, variant, options, progress)
+                                : run_on_threads(*configured, variant, options, progress);
   if (!session) return session;
-  session->check = metrics::check_trace(session->trace, metrics::rules_for(session->trace.info));
+  check(*session);
   session->elapsed = since(begin);
+  return session;
+}
+
+Session session_of(trace::Trace trace) {
+  Session session = evaluate(std::move(trace));
+  check(session);
   return session;
 }
 
@@ -221,10 +252,19 @@ std::optional<std::string> busy_machine_warning() {
 }
 
 Duration sensible_duration(const Workload &workload) {
-  constexpr Duration kLeast = 10 * kSecond;
-  const std::optional<Duration> hyperperiod = sim::hyperperiod(workload, 60 * kSecond);
-  if (!hyperperiod || *hyperperiod <= 0) return kLeast;
-  return (kLeast + *hyperperiod - 1) / *hyperperiod * *hyperperiod;
+  constexpr Duration kUsual = 10 * kSecond;
+  constexpr double kMostJobs = 4e6;  // some seconds of work
+  double jobs_a_second = 0;
+  for (const TaskRef &ref : flatten(workload)) {
+    if (ref.task->period > 0) jobs_a_second += static_cast<double>(kSecond) / static_cast<double>(ref.task->period);
+  }
+  const Duration least =
+      jobs_a_second * 10 <= kMostJobs
+          ? kUsual
+          : std::max<Duration>(1, static_cast<Duration>(kMostJobs / jobs_a_second * static_cast<double>(kSecond)));
+  const std::optional<Duration> hyperperiod = sim::hyperperiod(workload, 6 * least);
+  if (!hyperperiod || *hyperperiod <= 0) return least;
+  return (least + *hyperperiod - 1) / *hyperperiod * *hyperperiod;
 }
 
 }  // namespace redag::cli

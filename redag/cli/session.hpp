@@ -14,8 +14,10 @@
 #include "redag/cli/variant.hpp"
 #include "redag/metrics/check_report.hpp"
 #include "redag/metrics/summary.hpp"
+#include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sim/simulator.hpp"
+#include "redag/trace/flight_recorder.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::cli {
@@ -30,11 +32,14 @@ struct SessionOptions {
   std::size_t max_events = std::size_t{1} << 22U;
   const std::atomic<bool> *stop = nullptr;  // ends the run early, with the results so far
   sim::Overheads overheads;                 // simulator
+  std::optional<Calibration> calibration;   // the same, of a machine; on threads charged to bounds
   std::vector<int> cpus;                    // threads, as what follows
   bool lock_memory = false;
   bool realtime_threads = false;
   Duration spin = 0;
-  bool live = false;      // `redag top` sees the run
+  bool live = false;   // `redag top` sees the run
+  std::string flight;  // folder for a record of the run that outlives the process; empty: none
+  std::uint64_t flight_bytes = trace::FlightOptions{}.most_bytes;
   Duration watchdog = 0;  // jobs in progress for longer are named, at once to `on_overdue`; 0: none
   std::function<void(const std::string &text)> on_overdue;
 };
@@ -49,7 +54,8 @@ class MissCounter {
 
  private:
   std::vector<DagId> dag_of_;
-  std::vector<Time> deadline_;  // of the task's job that was dispatched last: jobs of a task do not overlap
+  std::vector<Time>
+      deadline_;  // of the task's job that was dispatched last; a guess where `concurrency` lets jobs overlap
   std::vector<std::uint64_t> misses_;
 };
 
@@ -73,11 +79,14 @@ struct Session {
 [[nodiscard]] Result<Session> run_session(const Workload &workload, const Variant &variant,
                                           const SessionOptions &options, const ProgressHook &progress = {});
 
+/// A recorded run, evaluated as if it had just ended.
+[[nodiscard]] Session session_of(trace::Trace trace);
+
 /// What to say of a machine that other programs keep busy before a run on threads; nothing if it is quiet.
 [[nodiscard]] std::optional<std::string> busy_machine_warning();
 
-/// A length for a run that nobody gave one: some hyperperiods of at least 10 s in all; 10 s where one takes more than
-/// a minute.
+/// A length for a simulation that nobody gave one: some hyperperiods of at least 10 s in all, or of about 4 million
+/// jobs where that is shorter; without hyperperiods where one is longer than six times that.
 [[nodiscard]] Duration sensible_duration(const Workload &workload);
 
 }  // namespace redag::cli

@@ -44,7 +44,7 @@ TEST(Session, TheVariantDecidesThePreemption) {
   const Session none = run("redag-none", simulated(kSecond));
   const Session full = run("redag-os", simulated(kSecond));
   EXPECT_EQ(none.info.preemption, "none");
-  EXPECT_EQ(full.info.preemption, "full");
+  EXPECT_EQ(full.info.preemption, "os");
   // Of each 100 ms: fast's job of 20 ms is replaced, that of 30 ms starts late at 31 ms, but is not late.
   EXPECT_GT(none.summary.dags[0].jobs.miss_ratio_with_lost(), 0.0);
   EXPECT_EQ(full.summary.total.miss_ratio_with_lost(), 0.0);
@@ -111,6 +111,18 @@ TEST(SensibleDuration, IsWholeHyperperiods) {
   EXPECT_EQ(sensible_duration(workload), Duration{15} * 700 * kMillisecond);
   workload.dags[0].tasks[0].period = 999'999'937;
   EXPECT_EQ(sensible_duration(workload), 10 * kSecond) << "nobody waits for that hyperperiod";
+}
+
+TEST(SensibleDuration, HoldsAFewMillionJobs) {
+  Workload workload;
+  workload.dags = {Dag{"fast", {timer("a", 1000, 1), timer("b", 1000, 1)}, 0, 0, 0, Criticality::Normal, {}}};
+  EXPECT_EQ(sensible_duration(workload), 2 * kSecond);
+  workload.dags[0].tasks[0].period = 1;
+  workload.dags[0].tasks[1].period = 7;
+  EXPECT_EQ(sensible_duration(workload) % 7, 0);
+  EXPECT_NEAR(static_cast<double>(sensible_duration(workload)), 3.5e6, 10);
+  workload.dags[0].tasks[1].period = 999'999'937;
+  EXPECT_NEAR(static_cast<double>(sensible_duration(workload)), 4e6, 10);
 }
 
 }  // namespace

@@ -18,7 +18,8 @@ bool misses_nothing(const Workload &workload, const analysis::AnalysisPlatform &
 
   sim::Options options;
   options.horizon = duration;
-  options.overheads = {platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead};
+  options.overheads = {platform.release_overhead + platform.timer_overhead, platform.dispatch_overhead,
+                       platform.preempt_overhead};
   options.demand = [](const Task &task, TaskId, std::uint32_t) { return task.wcet; };
   options.jitter = [](const Task &, TaskId, std::uint32_t) -> Duration { return 0; };
   metrics::DeadlineWatch watch(workload);

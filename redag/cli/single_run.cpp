@@ -38,6 +38,11 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   }
   const std::optional<Workload> workload = load_configured(arguments, console);
   if (!workload) return kExitBad;
+  if (!takes_arguments({*variant}, arguments, console)) return kExitBad;
+  if (const Result<Workload> configured = configure(*workload, *variant); !configured) {
+    console.note(configured.error());
+    return kExitBad;
+  }
   const Duration usual = simulated ? sensible_duration(*workload) : kThreadsDuration;
   const std::optional<SessionOptions> options = session_options(arguments, driver, usual, console);
   if (!options) return kExitBad;
@@ -57,7 +62,12 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   }
   bool written = true;
   if (!arguments.folder.empty()) {
-    const Diagnostics problems = write_session(*session, arguments.folder);
+    Diagnostics problems = write_session(*session, arguments.folder);
+    // As long as results are missing, the record is what there is.
+    if (problems.empty() && !options->flight.empty()) {
+      if (const Result<void> removed = trace::remove_flight_record(options->flight); !removed)
+        problems = removed.error();
+    }
     console.note(problems);
     written = problems.empty();
     const std::string message = fmt::format(

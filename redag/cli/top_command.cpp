@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
+#include "redag/base/text.hpp"
 #include "redag/cli/commands.hpp"
 #include "redag/cli/live_text.hpp"
 #include "redag/cli/options.hpp"
@@ -101,7 +103,8 @@ int top(const Options &options, Console &console) {
   if (!options.target.empty()) {
     target = parse_target(options.target);
     if (!target) {
-      console.error(fmt::format("'{}' is no process", options.target), "a process id, or PID.N as in redag top --list");
+      console.error(fmt::format("{} is no process", in_quotes(options.target)),
+                    "a process id, or PID.N as in redag top --list");
       return kExitBad;
     }
   }
@@ -125,15 +128,22 @@ int top(const Options &options, Console &console) {
 
 Action add_top(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option("PID", options->target,
-                 "Process to watch; without it, the one that there is, or a list to choose from");
-  app.add_flag("--list", options->list, "List the executors that run");
-  app.add_flag("--once", options->once, "Print one frame as text");
+  CLI::Option *target = app.add_option("PID", options->target,
+                                       "Process to watch; without it, the one that there is, or a list to choose from");
+  CLI::Option *list = app.add_flag("--list", options->list, "List the executors that run")->excludes(target);
+  app.add_flag("--once", options->once, "Print one frame as text")->excludes(list);
   app.add_flag("--json", options->json, "Print one frame, or the list, as a JSON document");
   add_duration(app, "--interval", options->interval, "Time from one look to the next");
   app.add_flag("--dags", options->dags_only, "DAGs without their tasks");
   app.add_flag("--since-start", options->since_start, "Rates, response times and processor time of the whole run");
-  app.add_option("--folder", options->folder, "Where the pages are")->type_name("DIR")->capture_default_str();
+  app.add_option("--folder", options->folder, "Where the pages are")
+      ->type_name("DIR")
+      ->capture_default_str()
+      ->check([](const std::string &folder) {
+        std::error_code ignored;
+        const bool there = folder == live::kFolder || std::filesystem::is_directory(folder, ignored);
+        return there ? std::string() : in_quotes(folder) + " is not a folder";
+      });
   return [options](Console &console) { return top(*options, console); };
 }
 

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <memory>
 
+#include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
 #include "redag/cli/commands.hpp"
 #include "redag/cli/files.hpp"
@@ -12,13 +13,13 @@
 #include "redag/cli/run_arguments.hpp"
 #include "redag/cli/signals.hpp"
 #include "redag/cli/tuning_report.hpp"
+#include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 
 namespace redag::cli {
 namespace {
 
 constexpr std::uint32_t kMostSeeds = 10'000;
-constexpr std::uint32_t kMostWorkers = 1024;
 
 struct Options {
   RunArguments run;
@@ -44,7 +45,7 @@ bool parse_vary(const std::string &list, tune::Freedom &freedom, Console &consol
     } else if (name == "order") {
       freedom.ties = true;
     } else {
-      console.error(fmt::format("--vary: '{}' is not a choice", name),
+      console.error(fmt::format("--vary: {} is not a choice", in_quotes(name)),
                     suggestion(name, {"workers", "max_active", "order"}));
       return false;
     }
@@ -62,25 +63,13 @@ bool parse_caps(const std::string &text, tune::Freedom &freedom, Console &consol
   const auto first = std::from_chars(text.data(), end, low);
   if (first.ec == std::errc() && first.ptr != end && *first.ptr == '-') {
     const auto second = std::from_chars(first.ptr + 1, end, high);
-    if (second.ec == std::errc() && second.ptr == end && low >= 1 && low <= high && high <= kMostWorkers) {
+    if (second.ec == std::errc() && second.ptr == end && low >= 1 && low <= high && high <= kMaxBound) {
       freedom.cap_range = {low, high};
       return true;
     }
   }
-  console.error(fmt::format("--caps: '{}' is not a range", text), "write it as 2-5");
+  console.error(fmt::format("--caps: {} is not a range within 1-{}", in_quotes(text), kMaxBound), "write it as 2-5");
   return false;
-}
-
-bool is_fine(const Options &options, Console &console) {
-  const auto bad = [&](const char *name, std::uint64_t value, std::uint64_t least, std::uint64_t most) {
-    if (value >= least && value <= most) return false;
-    console.error(fmt::format("{}: {} is not from {} to {}", name, value, least, most));
-    return true;
-  };
-  return !bad("--seeds", options.tune.seeds, 1, kMostSeeds) &&
-         !bad("--held-out", options.tune.held_out, 0, kMostSeeds) &&
-         !bad("--most-workers", options.tune.freedom.most_workers, 0, kMostWorkers) &&
-         !bad("--jobs", options.tune.jobs, 0, kMostWorkers);
 }
 
 std::optional<tune::Tuned> search(const Workload &workload, tune::Options options, Console &console) {
@@ -102,7 +91,8 @@ std::optional<tune::Tuned> search(const Workload &workload, tune::Options option
 
 int write(const std::string &path, const tune::Tuned &tuned, Console &console) {
   if (path.empty()) return kExitOk;
-  const Result<void> written = write_text(path, to_yaml(tuned.best.workload));
+  const Result<void> written =
+      write_text(path, provenance_to_comment(current_provenance()) + to_yaml(tuned.best.workload));
   if (!written) {
     console.note(written.error());
     return kExitBad;
@@ -117,13 +107,32 @@ int tune_file(const Options &options, Console &console) {
   tuning.options.bounds = !options.simulator_only;
   tuning.options.effort.seed = options.run.seed;
   tuning.options.seed = options.run.seed;
+  if (options.run.seed + options.tune.seeds + options.tune.held_out < options.run.seed) {
+    console.error("--seed, --seeds and --held-out: the last seed is not below 2^64", "begin with a smaller seed");
+    return kExitBad;
+  }
   tuning.options.simulation.overheads = options.run.overheads;
-  if (!is_fine(options, console) || !parse_vary(options.vary, tuning.options.freedom, console) ||
+  if (!parse_vary(options.vary, tuning.options.freedom, console) ||
       !parse_caps(options.caps, tuning.options.freedom, console)) {
     return kExitBad;
   }
   const std::optional<Workload> workload = load_configured(options.run, console);
   if (!workload) return kExitBad;
+  if (!options.output.empty()) {
+    if (const Result<void> writable = check_output(options.output); !writable) {
+      console.note(writable.error());
+      return kExitBad;
+    }
+  }
+  if (options.run.calibration) {
+    const Result<Overheads> machine = options.run.calibration->of(is_realtime(workload->platform.preemption));
+    if (!machine) {
+      console.note(machine.error());
+      return kExitBad;
+    }
+    tuning.options.machine = *machine;
+    tuning.options.simulation.overheads = sim::overheads_of(*machine);
+  }
   tuning.options.simulation.duration = options.run.duration.value_or(sensible_duration(*workload));
 
   const InterruptGuard guard;  // until the results are written
@@ -164,20 +173,22 @@ Action add_tune(CLI::App &app) {
                  "Values of max_active to try for every DAG; default: none, 1, 2, ... as far as "
                  "they can matter")
       ->type_name("LOW-HIGH");
-  add_count(app, "--most-workers", tune.freedom.most_workers, "Try up to so many workers; 0: as many as there are");
+  add_count(app, "--most-workers", tune.freedom.most_workers, {0, kMaxWorkers},
+            "Try up to so many workers; 0: as many as there are");
   add_duration(app, "--duration", options->run.duration, "Length of a simulation; default: some hyperperiods");
-  add_count(app, "--seeds", tune.seeds, "Simulations of each setting: seeds SEED, SEED+1, ...");
-  add_count(app, "--held-out", tune.held_out, "Seeds after these, on which the answer is judged");
-  add_count(app, "--seed", options->run.seed, "The first of them, and of the local search");
+  add_count(app, "--seeds", tune.seeds, {1, kMostSeeds}, "Simulations of each setting: seeds SEED, SEED+1, ...");
+  add_count(app, "--held-out", tune.held_out, {0, kMostSeeds}, "Seeds after these, on which the answer is judged");
+  add_seed(app, options->run.seed, "The first of them, and of the local search");
   app.add_flag("--simulator-only", options->simulator_only, "Do not ask the bounds what is proven");
-  add_count(app, "--exhaustive", tune.effort.exhaustive, "Settings up to which all are tried");
-  add_count(app, "--restarts", tune.effort.restarts, "Random places from which the local search starts besides");
-  add_count(app, "--jobs", tune.jobs, "Processors to use; 0: all. The answer is the same");
+  add_count(app, "--exhaustive", tune.effort.exhaustive, {0, kMaxCombinations}, "Settings up to which all are tried");
+  add_count(app, "--restarts", tune.effort.restarts, {0, kMaxRestarts},
+            "Random places from which the local search starts besides");
+  add_count(app, "--jobs", tune.jobs, {0, kMaxJobs}, "Processors to use; 0: all. The answer is the same");
   app.add_flag("--all-trials", options->all_trials, "Show every setting that was tried");
   app.add_flag("--json", options->run.json, "Write one JSON document to standard output, and nothing else");
   app.add_flag("--check", options->run.check, "Exit with 1 if the best setting misses a deadline in the simulator");
   add_platform_arguments(app, options->run);
-  add_overhead_arguments(app, options->run.overheads, "Platform");
+  add_overhead_arguments(app, options->run, "Platform");
   return [options](Console &console) { return tune_file(*options, console); };
 }
 

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 
+#include "redag/base/check.hpp"
+#include "redag/base/text.hpp"
 #include "redag/cli/options.hpp"
+#include "redag/model/validate.hpp"
 #include "redag/sched/executors.hpp"
 
 namespace redag::cli {
@@ -23,7 +26,7 @@ const std::vector<std::string> &variant_names() {
 Result<Variant> parse_variant(const std::string &name) {
   const std::vector<std::string> &names = variant_names();
   if (std::find(names.begin(), names.end(), name) == names.end()) {
-    return make_error("there is no executor '" + name + "'", suggestion(name, names));
+    return make_error("there is no executor " + in_quotes(name), suggestion(name, names));
   }
   const std::size_t dash = name.find('-');
   Variant variant{name, name.substr(0, dash), std::nullopt, false};
@@ -51,6 +54,28 @@ Result<std::vector<Variant>> parse_variants(std::string_view list) {
     if (comma == std::string_view::npos) return variants;
     list.remove_prefix(comma + 1);
   }
+}
+
+Result<Workload> configure(const Workload &workload, const Variant &variant) {
+  const sched::ExecutorKind *kind = sched::find_executor(variant.executor);
+  REDAG_CHECK(kind != nullptr, "an executor that variant_names() lists is unknown");
+  Workload configured = workload;
+  if (variant.preemption) configured.platform.preemption = *variant.preemption;
+  if (kind->single_worker) configured.platform.workers = 1;
+  Diagnostics mistakes = validate(configured);
+  std::erase_if(mistakes, [](const Diagnostic &mistake) { return mistake.severity != Severity::Error; });
+  if (mistakes.empty()) return configured;
+  for (Diagnostic &mistake : mistakes) mistake.message = variant.name + ": " + mistake.message;
+  return tl::unexpected<Diagnostics>(std::move(mistakes));
+}
+
+const char *mode_name(sched::Preemption preemption) {
+  switch (preemption) {
+    case sched::Preemption::None: return to_string(PreemptionMode::None);
+    case sched::Preemption::Cooperative: return to_string(PreemptionMode::Cooperative);
+    case sched::Preemption::Full: return to_string(PreemptionMode::Os);
+  }
+  return "?";
 }
 
 }  // namespace redag::cli

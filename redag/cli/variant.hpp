@@ -10,6 +10,7 @@
 
 #include "redag/base/result.hpp"
 #include "redag/model/workload.hpp"
+#include "redag/sched/scheduler.hpp"
 
 namespace redag::cli {
 
@@ -26,6 +27,12 @@ struct Variant {
 
 /// Error: an unknown name, with the nearest one.
 [[nodiscard]] Result<Variant> parse_variant(const std::string &name);
+
+/// The workload as the executor runs it: its own preemption mode and number of workers. Error: it cannot.
+[[nodiscard]] Result<Workload> configure(const Workload &workload, const Variant &variant);
+
+/// As workloads and the command line name it: full preemption is "os".
+[[nodiscard]] const char *mode_name(sched::Preemption preemption);
 
 /// "redag,mte": at least one, none twice.
 [[nodiscard]] Result<std::vector<Variant>> parse_variants(std::string_view list);

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "redag/base/provenance.hpp"
 #include "redag/experiment/folder.hpp"
 #include "redag/experiment/line_plot.hpp"
 #include "redag/trace/output_file.hpp"
@@ -120,6 +121,7 @@ std::string to_json(const Acceptance &acceptance, const AcceptanceResults &resul
                               {"methods", violation.methods}});
   }
   Json document = {{"format", "redag.experiment.acceptance/1"},
+                   {"provenance", Json::parse(provenance_to_json(current_provenance()))},
                    {"name", acceptance.plan().name},
                    {"version", kVersion},
                    {"plan", to_yaml(acceptance.plan())},

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "redag/base/provenance.hpp"
 #include "redag/experiment/factorial_results.hpp"
 #include "redag/experiment/folder.hpp"
 #include "redag/trace/output_file.hpp"
@@ -83,6 +84,7 @@ Json effects_json(const Factorial &factorial, const FactorialEffects &one) {
 std::string to_json(const Factorial &factorial, const FactorialResults &results, const std::vector<std::string> &runs) {
   const FactorialPlan &plan = factorial.plan();
   Json document = {{"format", "redag.experiment.factorial/1"},
+                   {"provenance", Json::parse(provenance_to_json(current_provenance()))},
                    {"name", plan.name},
                    {"version", kVersion},
                    {"plan", to_yaml(plan)},

@@ -8,6 +8,7 @@
 
 #include "redag/experiment/factorial_plan.hpp"
 #include "redag/experiment/plan_yaml.hpp"
+#include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
 
@@ -102,9 +103,11 @@ class Reader : private PlanReader {
   }
 
   std::optional<WorkloadSource> parse(const Node &node, std::string name) {
-    const std::optional<std::string> given = text(node, "text");
-    if (!given) return std::nullopt;
-    Result<LoadedWorkload> parsed = parse_workload(*given, fmt::format("{} (text of line {})", file_, node.line));
+    if (node.kind != Node::Kind::Scalar || node.text.empty()) {
+      wrong_type(node, "text", "a workload");
+      return std::nullopt;
+    }
+    Result<LoadedWorkload> parsed = parse_workload(node.text, fmt::format("{} (text of line {})", file_, node.line));
     if (!parsed) {
       std::copy(parsed.error().begin(), parsed.error().end(), std::back_inserter(diagnostics_));
       return std::nullopt;
@@ -141,12 +144,12 @@ class Reader : private PlanReader {
       } else if (item.kind == Node::Kind::Sequence) {
         std::vector<std::uint32_t> bounds;
         for (const Node &part : item.children) {
-          if (const auto bound = integer<std::uint32_t>(part, "max_active", 0)) bounds.push_back(*bound);
+          if (const auto bound = integer<std::uint32_t>(part, "max_active", 0, kMaxBound)) bounds.push_back(*bound);
         }
         plan_.max_active.push_back(std::move(bounds));
       } else if (item.text == "unbounded") {
         plan_.max_active.push_back({0});
-      } else if (const auto bound = integer<std::uint32_t>(item, "max_active", 1)) {
+      } else if (const auto bound = integer<std::uint32_t>(item, "max_active", 1, kMaxBound)) {
         plan_.max_active.push_back({*bound});
       }
     }

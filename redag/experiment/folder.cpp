@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/trace/trace.hpp"
@@ -120,6 +121,7 @@ Result<std::vector<FinishedUnit>> read_folders(const std::vector<std::string> &f
 Result<void> log_run(const std::string &folder, const RunBegin &run) {
   const trace::Machine machine = trace::this_machine();
   Json json = stamp("begin");
+  json["provenance"] = Json::parse(provenance_to_json(current_provenance()));
   json["version"] = kVersion;
   json["machine"] = {{"cpus", machine.cpus}, {"kernel", machine.kernel}, {"model", machine.model}};
   json["shard"] = to_string(run.shard);

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "redag/model/validate.hpp"
+
 namespace redag::experiment {
 namespace {
 
@@ -90,16 +92,18 @@ void PlanReader::take_duration(const Node &map, const char *key, Duration &out) 
   take(map, key, out, [this](const Node &node, std::string_view name) { return positive_duration(node, name); });
 }
 void PlanReader::take_count(const Node &map, const char *key, std::uint32_t &out, std::uint32_t smallest) {
-  take(map, key, out,
-       [&](const Node &node, std::string_view name) { return integer<std::uint32_t>(node, name, smallest); });
+  take(map, key, out, [&](const Node &node, std::string_view name) {
+    return integer<std::uint32_t>(node, name, smallest, kMaxBound);
+  });
 }
 void PlanReader::take_seed(const Node &map, std::uint64_t &out) {
   take(map, "seed", out,
        [this](const Node &node, std::string_view name) { return integer<std::uint64_t>(node, name, 0); });
 }
 void PlanReader::take_counts(const Node &map, const char *key, std::vector<std::uint32_t> &out) {
-  take_list(map, key, out,
-            [this](const Node &node, std::string_view name) { return integer<std::uint32_t>(node, name, 1); });
+  take_list(map, key, out, [this](const Node &node, std::string_view name) {
+    return integer<std::uint32_t>(node, name, 1, kMaxBound);
+  });
 }
 
 void PlanReader::take_range(const Node &map, const char *key, std::vector<std::uint32_t> &out) {

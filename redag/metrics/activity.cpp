@@ -16,7 +16,7 @@ void Activity::add(std::span<const JobEvent> events) {
 }
 
 void Activity::add(const JobEvent &event) {
-  if (event.task.value >= replay_.task_count() || event.kind == JobEventKind::Started) return;
+  if (event.task.value >= replay_.task_count() || is_of_body(event.kind)) return;
   if (any_ && event.time > time_) end_of_instant();
   any_ = true;
   time_ = std::max(time_, event.time);

@@ -7,12 +7,15 @@
 
 namespace redag::metrics {
 
-Duration percentile(const std::vector<Duration> &sorted, double percent) {
-  REDAG_CHECK(!sorted.empty() && percent > 0 && percent <= 100, "a percentile needs values and a rank");
+std::uint64_t nearest_rank(double percent, std::uint64_t count) {
+  REDAG_CHECK(count > 0 && percent > 0 && percent <= 100, "a percentile needs values and a rank");
   // 1e-9: 95 % of 20 is 19, although 95.0 / 100.0 * 20 may come out a little above.
-  const double rank = std::ceil(percent * static_cast<double>(sorted.size()) / 100.0 - 1e-9);
-  const auto index = static_cast<std::size_t>(std::max(1.0, rank)) - 1;
-  return sorted[std::min(index, sorted.size() - 1)];
+  const double rank = std::ceil(percent * static_cast<double>(count) / 100.0 - 1e-9);
+  return std::min(static_cast<std::uint64_t>(std::max(1.0, rank)), count);
+}
+
+Duration percentile(const std::vector<Duration> &sorted, double percent) {
+  return sorted[static_cast<std::size_t>(nearest_rank(percent, sorted.size())) - 1];
 }
 
 Distribution distribution_of(std::vector<Duration> values) {

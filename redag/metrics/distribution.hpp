@@ -1,5 +1,6 @@
-// A set of durations in few numbers. Percentiles are exact: nearest rank, i.e. the p-th percentile of n sorted values
-// is the ceil(p n / 100)-th, always one of the values. Pure functions.
+// A set of durations in few numbers. Percentiles are nearest rank, i.e. the p-th percentile of n sorted values is the
+// ceil(p n / 100)-th, always one of the values; exact here (duration_sketch.hpp: of more values than memory should
+// hold). Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +20,13 @@ struct Distribution {
   Duration p95 = 0;
   Duration p99 = 0;
   Duration max = 0;
+  double percentile_error = 0;  // relative, of the percentiles alone; 0: exact
 
   friend bool operator==(const Distribution &, const Distribution &) = default;
 };
+
+/// The rank of a percentile among `count` values, from 1 on. Requires a value and 0 < percent <= 100.
+[[nodiscard]] std::uint64_t nearest_rank(double percent, std::uint64_t count);
 
 /// The nearest-rank percentile of sorted values, 0 < percent <= 100. Requires a value.
 [[nodiscard]] Duration percentile(const std::vector<Duration> &sorted, double percent);

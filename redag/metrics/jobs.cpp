@@ -44,6 +44,7 @@ void JobFolder::add(const JobEvent &event) {
     job.record.task = event.task;
     job.record.number = event.job;
     job.record.release = event.value;
+    job.record.seen = event.time;
     job.record.deadline = event.value + task.deadline;
     task.live.push_back(job);
     return;
@@ -77,6 +78,7 @@ void JobFolder::add(const JobEvent &event) {
       found->on_worker_since = kNever;
       break;
     case JobEventKind::Resumed: found->on_worker_since = event.time; break;
+    case JobEventKind::Executed: record.processor = event.value; break;
     case JobEventKind::Exceeded: record.exceeded = true; break;
     case JobEventKind::HighMode:
     case JobEventKind::LowMode: break;

@@ -29,6 +29,8 @@ struct JobRecord {
   Time deadline = kNever;  // absolute, r + D
   Time origin = kNever;    // earliest source release whose data it carries
   Duration on_worker = 0;  // time it held a worker; its execution time where the driver is exact
+  Duration processor = kNever;  // processor time that its body used; not in jobs.csv
+  Time seen = kNever;           // when the scheduler was told of the release; not in jobs.csv
   std::uint32_t preemptions = 0;
   bool deferred = false;
   bool exceeded = false;  // used its budget and went on; not in jobs.csv

@@ -59,7 +59,8 @@ class PerfettoWriter::Impl {
       case JobEventKind::Exceeded: instant(event.task, event.time, "budget used", event.job); break;
       case JobEventKind::HighMode: instant(event.task, event.time, "HI mode begins", event.job); break;
       case JobEventKind::LowMode: instant(event.task, event.time, "HI mode ends", event.job); break;
-      case JobEventKind::Started: break;
+      case JobEventKind::Started:
+      case JobEventKind::Executed: break;
       case JobEventKind::Finished:
       case JobEventKind::Aborted:
       case JobEventKind::Skipped:
@@ -119,8 +120,14 @@ class PerfettoWriter::Impl {
     return kFirstDagProcess + static_cast<int>(refs_[task.value].dag.value);
   }
 
+  [[nodiscard]] std::string opening() const {
+    std::string text = R"({"displayTimeUnit":"ms",)";
+    if (run_.provenance.is_known()) text += "\"otherData\":" + provenance_to_json(run_.provenance) + ",";
+    return text + "\"traceEvents\":[\n";
+  }
+
   void write(const std::string &event) {
-    file_.write(first_ ? "{\"displayTimeUnit\":\"ms\",\"traceEvents\":[\n" : ",\n");
+    file_.write(first_ ? opening() : ",\n");
     first_ = false;
     file_.write(event);
   }

@@ -102,6 +102,11 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
       if (job.body_began) return "its body began twice";
       job.body_began = true;
       return nullptr;
+    case JobEventKind::Executed:
+      if (!job.started()) return "its body ended, and it was not dispatched";
+      if (job.executed_seen) return "its body ended twice";
+      job.executed_seen = true;
+      return event.value >= 0 ? nullptr : "it used less than no processor time";
     case JobEventKind::Exceeded:
       if (!job.started()) return "only a job that has started can use its budget";
       if (job.exceeded) return "it used its budget before";

@@ -34,9 +34,10 @@ struct LiveJob {
   std::uint32_t number = 0;
   State state = State::Waiting;
   bool deferred = false;
-  bool body_began = false;  // a Started event was seen
-  bool exceeded = false;    // an Exceeded event was seen
-  bool demoted = false;     // below everything else, save for what it inherits
+  bool body_began = false;     // a Started event was seen
+  bool executed_seen = false;  // an Executed event was seen
+  bool exceeded = false;       // an Exceeded event was seen
+  bool demoted = false;        // below everything else, save for what it inherits
   std::uint32_t worker = WorkerId::kNoneValue;
   Time release = 0;
   Time deadline = 0;

@@ -10,8 +10,9 @@ double ratio(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-void append(std::vector<Duration> &to, const std::vector<Duration> &from) {
-  to.insert(to.end(), from.begin(), from.end());
+std::size_t exact_jobs_of(std::size_t tasks) {
+  constexpr std::size_t kLeast = 16;  // cheaper than a sketch
+  return std::max(kLeast, kExactJobs / std::max<std::size_t>(1, tasks));
 }
 
 }  // namespace
@@ -35,21 +36,23 @@ double JobStats::miss_ratio() const { return ratio(late, released); }
 
 double JobStats::miss_ratio_with_lost() const { return ratio(late + skipped + aborted - no_data(), released); }
 
-void Summarizer::Samples::append(const Samples &other) {
-  metrics::append(response, other.response);
-  metrics::append(response_from_ready, other.response_from_ready);
-  metrics::append(start_latency, other.start_latency);
-  metrics::append(on_worker, other.on_worker);
+void Summarizer::Samples::merge(const Samples &other) {
+  response.merge(other.response);
+  response_from_ready.merge(other.response_from_ready);
+  start_latency.merge(other.start_latency);
+  on_worker.merge(other.on_worker);
 }
 
 Summarizer::Summarizer(const trace::RunInfo &run)
     : run_(run),
       begin_(run.start + run.warm_up),
       refs_(flatten(run.workload)),
+      exact_(exact_jobs_of(refs_.size())),
       is_sink_(refs_.size(), true),
       stats_(refs_.size()),
-      samples_(refs_.size()),
-      end_to_end_(run.workload.dags.size()),
+      samples_(refs_.size(), Samples(exact_)),
+      end_to_end_(run.workload.dags.size(), DurationSketch(exact_)),
+      end_to_end_late_(run.workload.dags.size()),
       folder_(run.workload),
       activity_(run.workload, run.config, begin_) {
   for (std::size_t t = 0; t < refs_.size(); ++t) {
@@ -71,7 +74,7 @@ void Summarizer::count(const JobRecord &job) {
   if (job.exceeded) ++stats.exceeded;
   stats.preemptions += job.preemptions;
   Samples &samples = samples_[job.task.value];
-  if (job.has_started() && job.reason != Reason::NoData) samples.start_latency.push_back(job.start - job.ready);
+  if (job.has_started() && job.reason != Reason::NoData) samples.start_latency.add(job.start - job.ready);
   switch (job.outcome) {
     case JobOutcome::InFlight: ++stats.in_flight; return;
     case JobOutcome::Skipped:
@@ -84,10 +87,14 @@ void Summarizer::count(const JobRecord &job) {
   ++stats.finished;
   if (job.lateness() > 0) ++stats.late;
   stats.max_lateness = std::max(stats.max_lateness.value_or(job.lateness()), job.lateness());
-  samples.response.push_back(job.response());
-  samples.response_from_ready.push_back(job.response_from_ready());
-  samples.on_worker.push_back(job.on_worker);
-  if (is_sink_[job.task.value]) end_to_end_[refs_[job.task.value].dag.value].push_back(job.finish - job.origin);
+  samples.response.add(job.response());
+  samples.response_from_ready.add(job.response_from_ready());
+  samples.on_worker.add(job.on_worker);
+  if (!is_sink_[job.task.value]) return;
+  const std::size_t dag = refs_[job.task.value].dag.value;
+  const Duration deadline = run_.workload.dags[dag].deadline;
+  end_to_end_[dag].add(job.finish - job.origin);
+  if (deadline > 0 && job.finish - job.origin > deadline) ++end_to_end_late_[dag];
 }
 
 void Summarizer::count_overdue(Time end) {
@@ -99,11 +106,11 @@ void Summarizer::count_overdue(Time end) {
   }
 }
 
-void Summarizer::fill(JobStats &stats, Samples samples) {
-  stats.response = distribution_of(std::move(samples.response));
-  stats.response_from_ready = distribution_of(std::move(samples.response_from_ready));
-  stats.start_latency = distribution_of(std::move(samples.start_latency));
-  stats.on_worker = distribution_of(std::move(samples.on_worker));
+void Summarizer::fill(JobStats &stats, const Samples &samples) {
+  stats.response = samples.response.distribution();
+  stats.response_from_ready = samples.response_from_ready.distribution();
+  stats.start_latency = samples.start_latency.distribution();
+  stats.on_worker = samples.on_worker.distribution();
 }
 
 Summary Summarizer::finish(Time end) {
@@ -113,8 +120,8 @@ Summary Summarizer::finish(Time end) {
   Summary summary;
   summary.begin = begin_;
   summary.end = end;
-  Samples all;
-  std::vector<Samples> of_dag(run_.workload.dags.size());
+  Samples all(exact_);
+  std::vector<Samples> of_dag(run_.workload.dags.size(), Samples(exact_));
   for (const Dag &dag : run_.workload.dags) {
     DagSummary row;
     row.name = dag.name;
@@ -126,22 +133,21 @@ Summary Summarizer::finish(Time end) {
     const std::size_t d = refs_[t].dag.value;
     summary.dags[d].jobs.add_counts(stats_[t]);
     summary.total.add_counts(stats_[t]);
-    of_dag[d].append(samples_[t]);
-    all.append(samples_[t]);
-    fill(stats_[t], std::move(samples_[t]));
+    of_dag[d].merge(samples_[t]);
+    all.merge(samples_[t]);
+    fill(stats_[t], samples_[t]);
+    samples_[t] = Samples(exact_);
     summary.tasks.push_back(TaskSummary{TaskId(t), summary.dags[d].name, refs_[t].task->name, stats_[t]});
   }
   for (std::size_t d = 0; d < summary.dags.size(); ++d) {
     DagSummary &dag = summary.dags[d];
-    fill(dag.jobs, std::move(of_dag[d]));
-    for (const Duration response : end_to_end_[d]) {
-      if (dag.end_to_end.deadline > 0 && response > dag.end_to_end.deadline) ++dag.end_to_end.late;
-    }
-    dag.end_to_end.response = distribution_of(std::move(end_to_end_[d]));
+    fill(dag.jobs, of_dag[d]);
+    dag.end_to_end.late = end_to_end_late_[d];
+    dag.end_to_end.response = end_to_end_[d].distribution();
     dag.peak_active = activity_.peak_active(DagId(d));
     if (dag.max_active > 0 && dag.peak_active > dag.max_active) summary.all_enforced = false;
   }
-  fill(summary.total, std::move(all));
+  fill(summary.total, all);
   summary.inversions = activity_.inversions();
   summary.high_mode = activity_.high_mode();
   summary.group_overlaps = activity_.group_overlaps();

@@ -1,5 +1,6 @@
 // A run in numbers: per task, per DAG and in total (docs/model.md, "What is measured"). Incremental: Summarizer takes
-// events as they come and keeps 32 bytes per finished job for exact percentiles. Not thread-safe.
+// events as they come. Memory does not grow with the length of a run: percentiles are exact for the first
+// kExactJobs / (number of tasks) jobs of each task, then of a sketch (duration_sketch.hpp). Not thread-safe.
 #pragma once
 
 #include <array>
@@ -11,10 +12,14 @@
 
 #include "redag/metrics/activity.hpp"
 #include "redag/metrics/distribution.hpp"
+#include "redag/metrics/duration_sketch.hpp"
 #include "redag/metrics/jobs.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::metrics {
+
+/// Jobs of all tasks together whose times are kept for exact percentiles, 32 bytes each.
+inline constexpr std::size_t kExactJobs = std::size_t{1} << 20U;
 
 inline constexpr std::size_t kReasonCount = static_cast<std::size_t>(kLastReason) + 1;
 
@@ -96,25 +101,30 @@ class Summarizer {
 
  private:
   struct Samples {
-    std::vector<Duration> response;
-    std::vector<Duration> response_from_ready;
-    std::vector<Duration> start_latency;
-    std::vector<Duration> on_worker;
+    explicit Samples(std::size_t exact)
+        : response(exact), response_from_ready(exact), start_latency(exact), on_worker(exact) {}
 
-    void append(const Samples &other);
+    DurationSketch response;
+    DurationSketch response_from_ready;
+    DurationSketch start_latency;
+    DurationSketch on_worker;
+
+    void merge(const Samples &other);
   };
 
   void count(const JobRecord &job);
   void count_overdue(Time end);
-  static void fill(JobStats &stats, Samples samples);
+  static void fill(JobStats &stats, const Samples &samples);
 
   const trace::RunInfo &run_;
   Time begin_;
   std::vector<TaskRef> refs_;
+  std::size_t exact_;  // jobs of a task
   std::vector<bool> is_sink_;
   std::vector<JobStats> stats_;
   std::vector<Samples> samples_;
-  std::vector<std::vector<Duration>> end_to_end_;
+  std::vector<DurationSketch> end_to_end_;
+  std::vector<std::uint64_t> end_to_end_late_;
   JobFolder folder_;
   Activity activity_;
 };

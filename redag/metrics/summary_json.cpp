@@ -12,9 +12,11 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json to_json(const Distribution &distribution) {
-  return {{"count", distribution.count}, {"mean_ns", distribution.mean}, {"min_ns", distribution.min},
-          {"p50_ns", distribution.p50},  {"p90_ns", distribution.p90},   {"p95_ns", distribution.p95},
-          {"p99_ns", distribution.p99},  {"max_ns", distribution.max}};
+  Json json = {{"count", distribution.count}, {"mean_ns", distribution.mean}, {"min_ns", distribution.min},
+               {"p50_ns", distribution.p50},  {"p90_ns", distribution.p90},   {"p95_ns", distribution.p95},
+               {"p99_ns", distribution.p99},  {"max_ns", distribution.max}};
+  if (distribution.percentile_error > 0) json["percentile_error"] = distribution.percentile_error;
+  return json;
 }
 
 // Lost jobs by reason; reasons that did not occur are left out.
@@ -72,23 +74,24 @@ Json rows_to_json(const std::vector<Row> &rows) {
 }  // namespace
 
 std::string summary_to_json(const Summary &summary, const trace::RunInfo &run) {
-  const Json json = {{"format", "redag.summary/1"},
-                     {"run", Json::parse(trace::run_info_to_json(run))},
-                     {"begin_ns", summary.begin},
-                     {"end_ns", summary.end},
-                     {"total", to_json(summary.total)},
-                     {"dags", rows_to_json(summary.dags)},
-                     {"tasks", rows_to_json(summary.tasks)},
-                     {"all_enforced", summary.all_enforced},
-                     {"group_overlaps", summary.group_overlaps},
-                     {"inversions",
-                      {{"count", summary.inversions.count},
-                       {"total_ns", summary.inversions.total},
-                       {"longest_ns", summary.inversions.longest}}},
-                     {"high_mode", {{"count", summary.high_mode.count}, {"total_ns", summary.high_mode.total}}},
-                     {"worker_busy", summary.worker_busy},
-                     {"lost_events", summary.lost_events},
-                     {"ignored_events", summary.ignored_events}};
+  Json json = {{"format", "redag.summary/1"}};
+  if (run.provenance.is_known()) json["provenance"] = Json::parse(provenance_to_json(run.provenance));
+  json.update(Json{{"run", Json::parse(trace::run_info_to_json(run))},
+                   {"begin_ns", summary.begin},
+                   {"end_ns", summary.end},
+                   {"total", to_json(summary.total)},
+                   {"dags", rows_to_json(summary.dags)},
+                   {"tasks", rows_to_json(summary.tasks)},
+                   {"all_enforced", summary.all_enforced},
+                   {"group_overlaps", summary.group_overlaps},
+                   {"inversions",
+                    {{"count", summary.inversions.count},
+                     {"total_ns", summary.inversions.total},
+                     {"longest_ns", summary.inversions.longest}}},
+                   {"high_mode", {{"count", summary.high_mode.count}, {"total_ns", summary.high_mode.total}}},
+                   {"worker_busy", summary.worker_busy},
+                   {"lost_events", summary.lost_events},
+                   {"ignored_events", summary.ignored_events}});
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

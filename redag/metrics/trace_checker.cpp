@@ -44,8 +44,7 @@ class Checker {
 
   void step(std::size_t index, const JobEvent &event) {
     const bool known = event.task.value < counts_.size();
-    if (event.kind != JobEventKind::Started) {
-      // Started comes from the workers and is stamped there; it is no decision.
+    if (!is_of_body(event.kind)) {
       if (event.time > time_) end_of_instant();
       context_.at(index, event.time);
       context_.expect(Rule::Stream, event.time >= time_, event.task, event.job,

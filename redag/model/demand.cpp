@@ -41,4 +41,21 @@ Duration release_jitter(const Task &task, TaskId id, std::uint32_t number, std::
   return task.jitter == 0 ? 0 : job_rng(seed, id, number, 1).uniform(0, task.jitter);
 }
 
+bool demand_varies(const Task &task) {
+  using Kind = ExecutionTime::Kind;
+  if (task.jitter > 0) return true;
+  const ExecutionTime &model = task.execution;
+  const bool has_range = std::max<Duration>(1, task.bcet) < task.wcet;
+  switch (model.kind) {
+    case Kind::Constant: return false;
+    case Kind::Uniform: return has_range;
+    case Kind::Normal: return has_range && model.stddev > 0;
+    case Kind::Empirical: {
+      const auto [least, most] = std::minmax_element(model.samples.begin(), model.samples.end());
+      return std::max<Duration>(1, *least) < *most;
+    }
+  }
+  return false;
+}
+
 }  // namespace redag

@@ -14,4 +14,7 @@ namespace redag {
 /// Delay of the release of job `number` after its point on the grid, uniform in [0, jitter].
 [[nodiscard]] Duration release_jitter(const Task &task, TaskId id, std::uint32_t number, std::uint64_t seed);
 
+/// Whether jobs of the task, or those of other seeds, can differ in execution time or release.
+[[nodiscard]] bool demand_varies(const Task &task);
+
 }  // namespace redag

@@ -76,5 +76,24 @@ TEST(Demand, DependsOnSeedTaskAndNumber) {
   EXPECT_NE(execution_time(task, TaskId(0), 0, 1), base);
 }
 
+TEST(Demand, VariesWhereTwoJobsCanDiffer) {
+  EXPECT_FALSE(demand_varies(task_of(Kind::Constant, 1, 500)));
+  EXPECT_TRUE(demand_varies(task_of(Kind::Uniform, 1, 500)));
+  EXPECT_FALSE(demand_varies(task_of(Kind::Uniform, 500, 500)));
+  EXPECT_FALSE(demand_varies(task_of(Kind::Uniform, 0, 1)));  // never below 1ns
+  Task normal = task_of(Kind::Normal, 1, 500);
+  EXPECT_FALSE(demand_varies(normal));
+  normal.execution.stddev = 10;
+  EXPECT_TRUE(demand_varies(normal));
+  Task empirical = task_of(Kind::Empirical, 1, 500);
+  empirical.execution.samples = {7, 7, 7};
+  EXPECT_FALSE(demand_varies(empirical));
+  empirical.execution.samples = {7, 7, 8};
+  EXPECT_TRUE(demand_varies(empirical));
+  Task late = task_of(Kind::Constant, 1, 500);
+  late.jitter = 1;
+  EXPECT_TRUE(demand_varies(late));
+}
+
 }  // namespace
 }  // namespace redag

@@ -279,10 +279,10 @@ Diagnostics find_mistakes(const GenerateOptions &o) {
   const auto require_share = [&](const char *name, double value) {
     require(value >= 0 && value <= 1, fmt::format("{} must be from 0 to 1, not {}", name, value));
   };
-  constexpr std::uint32_t kMostTasks = 10'000'000;
   require(o.dags >= 1, "dags must be at least 1");
-  require(o.min_tasks >= 1 && o.min_tasks <= o.max_tasks, "tasks per DAG must be a range from at least 1");
-  require(std::uint64_t{o.dags} * o.max_tasks <= kMostTasks, fmt::format("more than {} tasks", kMostTasks));
+  require(o.min_tasks >= 1 && o.min_tasks <= o.max_tasks, "min_tasks to max_tasks must be a range from at least 1");
+  require(std::uint64_t{o.dags} * o.max_tasks <= kMaxTasks,
+          fmt::format("dags * max_tasks must be at most {}", kMaxTasks));
   require(o.workers >= 1 && o.workers <= kMaxWorkers, fmt::format("workers must be from 1 to {}", kMaxWorkers));
   require(o.preemption != PreemptionMode::Os || (o.policy != PolicyKind::Edf && o.policy != PolicyKind::Fifo),
           "preemption 'os' needs a static policy");

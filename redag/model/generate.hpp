@@ -37,6 +37,8 @@ enum class RateScope : std::uint8_t {
   PerTask,  // each timer task draws its own
 };
 
+inline constexpr std::uint32_t kMaxTasks = 10'000'000;  // of a generated workload
+
 /// Shares and ratios are in [0, 1]; ranges include both ends.
 struct GenerateOptions {
   std::uint32_t dags = 2;

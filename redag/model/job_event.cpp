@@ -17,6 +17,7 @@ const char *to_string(JobEventKind kind) {
     case JobEventKind::Exceeded: return "exceeded";
     case JobEventKind::HighMode: return "high_mode";
     case JobEventKind::LowMode: return "low_mode";
+    case JobEventKind::Executed: return "executed";
   }
   return "?";
 }

@@ -30,6 +30,7 @@ enum class JobEventKind : std::uint8_t {
   Exceeded,    // used its budget, and was not cut off there; what follows is its task's `on_budget`
   HighMode,    // HI mode begins: this job of a high-criticality DAG used its `wcet_low`
   LowMode,     // HI mode ends: nothing is ready or started; the job is that of HighMode, value: when HI mode began
+  Executed,    // the body ended (reported by the driver, before what ends the job); value: processor time that it used
 };
 
 enum class Reason : std::uint8_t {
@@ -45,8 +46,13 @@ enum class Reason : std::uint8_t {
   Degraded,    // Skipped: in HI mode its DAG is degraded
 };
 
-inline constexpr auto kLastJobEventKind = JobEventKind::LowMode;
+inline constexpr auto kLastJobEventKind = JobEventKind::Executed;
 inline constexpr auto kLastReason = Reason::Degraded;
+
+/// Reported and stamped by the thread that runs the job: no decisions, and not in their order.
+[[nodiscard]] constexpr bool is_of_body(JobEventKind kind) {
+  return kind == JobEventKind::Started || kind == JobEventKind::Executed;
+}
 
 /// Events of the whole run and not of the job that they name, which may have ended.
 [[nodiscard]] constexpr bool is_mode_change(JobEventKind kind) {

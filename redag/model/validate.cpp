@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/base/text.hpp"
 #include "redag/model/callback_match.hpp"
 
 namespace redag {
@@ -39,6 +40,7 @@ class Checker {
   Checker(const Workload &workload, ValidateOptions options) : workload_(workload), options_(options) {}
 
   std::vector<Finding> run() {
+    if (!workload_.name.empty()) check_name(workload_.name, "workload");
     check_platform();
     if (workload_.dags.empty()) error(Field::Dags, Field::Dags, "the workload has no DAGs", "add one under 'dags:'");
     check_dag_names();
@@ -82,13 +84,19 @@ class Checker {
     }
   }
 
-  // Names are printed in one-line messages and tables.
   void check_name(const std::string &name, std::string_view what) {
     if (name.empty()) {
       error(Field::Name, {}, fmt::format("a {} has no name", what), "add 'name:'");
-    } else if (std::any_of(name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; })) {
-      error(Field::Name, {}, fmt::format("the name of a {} contains a control character", what));
+    } else if (const std::string why = name_mistake(name); !why.empty()) {
+      error(Field::Name, {}, fmt::format("the name {} of a {} {}", in_quotes(name), what, why));
     }
+  }
+
+  void check_bound(const Dag &dag, Field field, std::uint32_t value) {
+    if (value <= kMaxBound) return;
+    error(field, {},
+          fmt::format("{} of DAG '{}' must be from 1 to {}, not {}", to_string(field), dag.name, kMaxBound, value),
+          "leave it out for no bound");
   }
 
   void check_dag_names() {
@@ -108,8 +116,12 @@ class Checker {
     dag_ = id;
     const Dag &dag = workload_.dags[id.value];
     if (dag.deadline < 0 || dag.deadline > kMaxDuration) {
-      error(Field::Deadline, {}, fmt::format("deadline of DAG '{}' is negative or too large", dag.name));
+      error(Field::Deadline, {},
+            fmt::format("deadline of DAG '{}' must be from 0 to {}, not {}", dag.name, kMaxDurationText,
+                        format_duration(dag.deadline)));
     }
+    check_bound(dag, Field::MaxActive, dag.max_active);
+    check_bound(dag, Field::MaxPending, dag.max_pending);
     check_degrade(dag);
     if (dag.tasks.empty()) error(Field::Tasks, {}, fmt::format("DAG '{}' has no tasks", dag.name));
     std::unordered_map<std::string_view, std::size_t> seen;
@@ -153,7 +165,8 @@ class Checker {
               fmt::format("{} of task '{}' must {}, not {}", name, task.name,
                           rule.smallest == 0 ? "not be negative" : "be greater than zero", format_duration(value)));
       } else if (value > kMaxDuration) {
-        error(rule.field, {}, fmt::format("{} of task '{}' is too large", name, task.name));
+        error(rule.field, {},
+              fmt::format("{} of task '{}' is too large: at most {}", name, task.name, kMaxDurationText));
       }
     }
     check_against_wcet(task);
@@ -237,7 +250,9 @@ class Checker {
                           task.name));
       }
       if (model.stddev < 0 || model.stddev > kMaxDuration) {
-        error(Field::Execution, {}, fmt::format("stddev of task '{}' is negative or too large", task.name));
+        error(Field::Execution, {},
+              fmt::format("stddev of task '{}' must be from 0 to {}, not {}", task.name, kMaxDurationText,
+                          format_duration(model.stddev)));
       }
     }
     if (model.kind != Kind::Empirical) return;
@@ -267,6 +282,9 @@ class Checker {
   }
 
   void check_options(const Task &task) {
+    if (const std::string why = name_mistake(task.group); !task.group.empty() && !why.empty()) {
+      error(Field::Group, {}, fmt::format("group {} of task '{}' {}", in_quotes(task.group), task.name, why));
+    }
     if (task.overrun == Overrun::Queue && (task.queue_depth < 1 || task.queue_depth > kMaxQueueDepth)) {
       error(Field::Overrun, {},
             fmt::format("queue depth of task '{}' must be from 1 to {}, not {}", task.name, kMaxQueueDepth,
@@ -465,6 +483,14 @@ class Checker {
 };
 
 }  // namespace
+
+std::string name_mistake(std::string_view name) {
+  if (name.empty()) return "is empty";
+  if (name.size() > kMaxNameBytes) return fmt::format("has {} bytes: at most {}", name.size(), kMaxNameBytes);
+  if (name.front() == ' ' || name.back() == ' ') return "begins or ends with a space";
+  const std::string character = find_unprintable(name);
+  return character.empty() ? std::string() : fmt::format("contains {}, which cannot be shown", character);
+}
 
 const char *to_string(Field field) { return kFieldNames[static_cast<std::size_t>(field)]; }
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "redag/base/ids.hpp"
@@ -16,6 +17,12 @@ inline constexpr std::uint32_t kMaxWorkers = 4096;
 inline constexpr std::uint32_t kMaxQueueDepth = 65536;
 inline constexpr std::uint32_t kMaxConcurrency = 1024;
 inline constexpr std::uint32_t kMaxDegrade = 1'000'000;  // releases skipped, or periods stretched
+inline constexpr std::uint32_t kMaxBound = 1'000'000;    // max_active, max_pending
+inline constexpr std::size_t kMaxNameBytes = 1000;
+
+/// Why `name` cannot stand in one-line messages and tables, after it: "is empty", "contains U+001B, ...". Empty: it
+/// can.
+[[nodiscard]] std::string name_mistake(std::string_view name);
 
 /// What a workload is made of; the text is the key of the file format.
 enum class Field : std::uint8_t {

@@ -35,7 +35,32 @@ TEST(Validate, RefusesWhatOnlyCppCanBuild) {
   EXPECT_NE(found.find("workers must be from 1 to 4096, not 0"), std::string::npos) << found;
   EXPECT_NE(found.find("predecessor 7 of task 'a' does not exist"), std::string::npos) << found;
   EXPECT_NE(found.find("wcet of task 'a' is too large"), std::string::npos) << found;
-  EXPECT_NE(found.find("deadline of DAG 'd' is negative"), std::string::npos) << found;
+  EXPECT_NE(found.find("deadline of DAG 'd' must be from 0 to 1281023h (146 years), not -1ns"), std::string::npos)
+      << found;
+}
+
+TEST(Validate, RefusesNamesThatCannotBeShown) {
+  const auto mistake = [](auto change) {
+    Workload workload = valid();
+    change(workload);
+    return to_string(validate(workload));
+  };
+  const auto has = [](const std::string &text, const char *words) { return text.find(words) != std::string::npos; };
+  const std::string escape = "\x1b[2J";
+  EXPECT_TRUE(has(mistake([&](Workload &w) { w.name = escape; }), "of a workload contains U+001B"));
+  EXPECT_TRUE(has(mistake([&](Workload &w) { w.dags[0].name = "a\xC2\x9B"; }), "of a DAG contains U+009B"));
+  EXPECT_TRUE(has(mistake([&](Workload &w) { w.dags[0].tasks[0].name = " a"; }), "begins or ends with a space"));
+  EXPECT_TRUE(has(mistake([&](Workload &w) { w.dags[0].tasks[0].group = escape; }), "group '\\u{1B}[2J'"));
+  const std::string huge = mistake([&](Workload &w) { w.dags[0].name = std::string(1'000'000, 'x'); });
+  EXPECT_TRUE(has(huge, "has 1000000 bytes: at most 1000"));
+  EXPECT_LT(huge.size(), 1000U);
+  EXPECT_EQ(name_mistake("µ-arm 2.λ"), "");
+}
+
+TEST(Validate, RefusesBoundsBeyondTheLimit) {
+  Workload workload = valid();
+  workload.dags[0].max_active = kMaxBound + 1;
+  EXPECT_NE(to_string(validate(workload)).find("max_active of DAG 'd' must be from 1 to 1000000"), std::string::npos);
 }
 
 TEST(Validate, RefusesCallbacksThatTheFormatCannotHold) {

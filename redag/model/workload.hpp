@@ -1,5 +1,5 @@
-// The model of section 3 of docs/model.md: a workload is a platform, a policy and DAGs of tasks. Plain values: no
-// behaviour, no validation (see validate.hpp), no text form (see workload_yaml.hpp).
+// The model that docs/model.md defines ("Workload"): a workload is a platform, a policy and DAGs of tasks. Plain
+// values: no behaviour, no validation (see validate.hpp), no text form (see workload_yaml.hpp).
 #pragma once
 
 #include <cstdint>

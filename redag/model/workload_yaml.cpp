@@ -13,6 +13,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/model/text_file.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml_tree.hpp"
 #include "redag/model/workload_yaml_values.hpp"
@@ -106,9 +107,9 @@ class Reader : private yaml::ValueReader {
   void take_positive_duration(Part &part, Field field, Duration &out) {
     take(part, field, out, [this](const Node &node, std::string_view key) { return positive_duration(node, key); });
   }
-  void take_count(Part &part, Field field, std::uint32_t &out) {
+  void take_count(Part &part, Field field, std::uint32_t &out, std::uint32_t most) {
     take(part, field, out,
-         [this](const Node &node, std::string_view key) { return integer<std::uint32_t>(node, key, 1); });
+         [&](const Node &node, std::string_view key) { return integer<std::uint32_t>(node, key, 1, most); });
   }
   template <class Enum, std::size_t N>
   void take_enum(Part &part, Field field, Enum &out, const std::array<Enum, N> &values) {
@@ -152,7 +153,7 @@ class Reader : private yaml::ValueReader {
       root_.broken |= Field::Workers | Field::Preemption;
       return;
     }
-    take_count(platform_, Field::Workers, workload_.platform.workers);
+    take_count(platform_, Field::Workers, workload_.platform.workers, kMaxWorkers);
     take_enum(platform_, Field::Preemption, workload_.platform.preemption, kPreemptionModes);
     root_.broken |= platform_.broken;
   }
@@ -167,8 +168,8 @@ class Reader : private yaml::ValueReader {
     Duration period = 0;
     take_positive_duration(part, Field::Period, period);
     take_positive_duration(part, Field::Deadline, dag.deadline);
-    take_count(part, Field::MaxActive, dag.max_active);
-    take_count(part, Field::MaxPending, dag.max_pending);
+    take_count(part, Field::MaxActive, dag.max_active, kMaxBound);
+    take_count(part, Field::MaxPending, dag.max_pending, kMaxBound);
     take_enum(part, Field::Criticality, dag.criticality, kCriticalities);
     take_degrade(dag.degrade, part);
     const std::vector<Node> *tasks = take_list(part, Field::Tasks);
@@ -195,13 +196,13 @@ class Reader : private yaml::ValueReader {
     take_positive_duration(part, Field::Deadline, task.deadline);
     take_duration(part, Field::Offset, task.offset);
     take_duration(part, Field::Jitter, task.jitter);
-    take_duration(part, Field::Region, task.region);
-    take_duration(part, Field::Budget, task.budget);
+    take_positive_duration(part, Field::Region, task.region);
+    take_positive_duration(part, Field::Budget, task.budget);
     take_enum(part, Field::OnBudget, task.on_budget, kOnBudgets);
     take_positive_duration(part, Field::WcetLow, task.wcet_low);
-    take_count(part, Field::Concurrency, task.concurrency);
+    take_count(part, Field::Concurrency, task.concurrency, kMaxConcurrency);
     take_text(part, Field::Group, task.group);
-    take_enum(part, Field::Criticality, task.criticality, kCriticalities);
+    take_criticality(task, part);
     take_enum(part, Field::Activation, task.activation, kActivations);
     take(part, Field::Priority, task.priority, [this](const Node &value, std::string_view key) {
       return integer<int>(value, key, std::numeric_limits<int>::min());
@@ -211,6 +212,18 @@ class Reader : private yaml::ValueReader {
     take(part, Field::Execution, task.execution,
          [this](const Node &value, std::string_view) { return execution(value); });
     take(part, Field::Callback, task.callback, [this](const Node &value, std::string_view) { return callback(value); });
+  }
+
+  /// The scheduler knows the DAG's alone: another one would be without effect.
+  void take_criticality(Task &task, TaskPart &part) {
+    const Criticality of_dag = task.criticality;
+    take_enum(part, Field::Criticality, task.criticality, kCriticalities);
+    if (task.criticality == of_dag) return;
+    const Node &at = *find(part, Field::Criticality);
+    diagnostics_.push_back(Diagnostic{Severity::Warning, file_, at.line, at.column,
+                                      fmt::format("criticality {} of task '{}' has no effect: its DAG's counts, {}",
+                                                  to_string(task.criticality), task.name, to_string(of_dag)),
+                                      "state it for the DAG, or move the task to a DAG of its own"});
   }
 
   void take_wcet(Task &task, TaskPart &part) {
@@ -236,7 +249,7 @@ class Reader : private yaml::ValueReader {
             "it inherits the largest of its predecessors': remove it, or use 'activation: timer'");
       part.broken |= Field::Period;
     } else if (given != nullptr) {
-      take_duration(part, Field::Period, task.period);
+      take_positive_duration(part, Field::Period, task.period);
     } else if (part.broken.intersects(Field::Callback)) {
       part.broken |= Field::Period;  // its timer may have one
     } else if (task.callback && task.callback->period != 0) {
@@ -258,7 +271,7 @@ class Reader : private yaml::ValueReader {
       const Node *depth = yaml::find(*node, "queue");
       if (depth == nullptr) {
         error(*node, "overrun has no queue depth", "write {queue: 3}");
-      } else if (const auto value = integer<std::uint32_t>(*depth, "queue", 1)) {
+      } else if (const auto value = integer<std::uint32_t>(*depth, "queue", 1, kMaxQueueDepth)) {
         task.queue_depth = *value;
         return;
       }
@@ -279,7 +292,7 @@ class Reader : private yaml::ValueReader {
         error(*node, "degrade is one of skip and stretch", "write {skip: 3} or {stretch: 2.5}");
       } else if (skip != nullptr) {
         degrade.kind = Degrade::Kind::Skip;
-        if (const auto value = integer<std::uint32_t>(*skip, "skip", 1)) {
+        if (const auto value = integer<std::uint32_t>(*skip, "skip", 1, kMaxDegrade)) {
           degrade.skip = *value;
           return;
         }
@@ -422,26 +435,6 @@ class Reader : private yaml::ValueReader {
   bool structure_known_ = false;
 };
 
-Result<std::string> read_file(const std::filesystem::path &path) {
-  const auto fail = [&](std::string why) {
-    return tl::unexpected<Diagnostics>(
-        Diagnostics{Diagnostic{Severity::Error, path.string(), 0, 0, std::move(why), {}}});
-  };
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) return fail("is a directory, not a workload file");
-  errno = 0;
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) return fail(fmt::format("cannot open: {}", std::strerror(errno)));
-  std::string text;
-  std::array<char, 65536> buffer{};
-  while (stream.read(buffer.data(), buffer.size()), stream.gcount() > 0) {
-    text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > kMaxWorkloadBytes) break;
-  }
-  if (stream.bad()) return fail(fmt::format("cannot read: {}", std::strerror(errno)));
-  return text;
-}
-
 }  // namespace
 
 Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_name, LoadOptions options) {
@@ -455,9 +448,13 @@ Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_na
 }
 
 Result<LoadedWorkload> load_workload(const std::filesystem::path &path, LoadOptions options) {
-  const Result<std::string> text = read_file(path);
+  const Result<std::string> text = read_text_file(path, "a workload file", kMaxWorkloadBytes);
   if (!text) return tl::unexpected<Diagnostics>(text.error());
-  return parse_workload(*text, path.string(), options);
+  Result<LoadedWorkload> loaded = parse_workload(*text, path.string(), options);
+  if (loaded && loaded->workload.name.empty() && name_mistake(path.stem().string()).empty()) {
+    loaded->workload.name = path.stem().string();
+  }
+  return loaded;
 }
 
 }  // namespace redag

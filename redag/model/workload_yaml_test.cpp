@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+#include <unistd.h>
 #include <nlohmann/json.hpp>
 
 #include "redag/model/generate.hpp"
@@ -57,6 +58,24 @@ dags:
   EXPECT_EQ(workload.dags.at(3).degrade, (Degrade{Degrade::Kind::Stretch, 1, 2.5}));
 }
 
+TEST(ParseWorkload, WarnsOfACriticalityWithoutEffect) {
+  const auto loaded =
+      parse_workload("dags:\n- {name: d, tasks: [{name: t, wcet: 5ms, period: 50ms, criticality: high}]}\n", "w.yaml");
+  ASSERT_TRUE(loaded.has_value());
+  EXPECT_NE(to_string(loaded->warnings).find("w.yaml:2:69: warning: criticality high of task 't' has no effect"),
+            std::string::npos)
+      << to_string(loaded->warnings);
+}
+
+TEST(LoadWorkload, ANamelessOneHasTheNameOfItsFile) {
+  const auto path = std::filesystem::temp_directory_path() / fmt::format("robot arm {}.yaml", ::getpid());
+  std::ofstream(path) << "dags: [{name: d, tasks: [{name: t, wcet: 5ms, period: 50ms}]}]\n";
+  const auto loaded = load_workload(path);
+  std::filesystem::remove(path);
+  ASSERT_TRUE(loaded.has_value());
+  EXPECT_EQ(loaded->workload.name, path.stem().string());
+}
+
 TEST(ParseWorkload, ExplainsMistakesInBudgetsAndCriticality) {
   const auto mistakes = [](std::string_view dag, std::string_view task) {
     const std::string text =
@@ -75,7 +94,7 @@ TEST(ParseWorkload, ExplainsMistakesInBudgetsAndCriticality) {
   says("", ", budget: 5ms, on_budget: kill", "on_budget must be one of abort, log, demote, skip_next");
   says("criticality: high, degrade: {skip: 2}, ", "", "of high criticality is never degraded");
   says("degrade: {skip: 0}, ", "", "skip must be a whole number from 1");
-  says("degrade: {skip: 1000001}, ", "", "skip of DAG 'd' must be from 1 to 1000000, not 1000001");
+  says("degrade: {skip: 1000001}, ", "", "skip must be a whole number from 1 to 1000000, not '1000001'");
   says("degrade: {stretch: 0.5}, ", "", "stretch of DAG 'd' must be from 1 to 1000000, not 0.5");
   says("degrade: {stretch: nan}, ", "", "stretch must be a number such as 2.5");
   says("degrade: {skip: 2, stretch: 2}, ", "", "degrade is one of skip and stretch");
@@ -102,7 +121,7 @@ dags:
         bcet: 1ms
         execution: {normal: {mean: 1.5ms, stddev: 100us}}
         deadline: 8ms
-        criticality: low
+        criticality: high
       - {name: first, wcet: 1ms, offset: 2ms, jitter: 1ms, region: 100us, budget: 3ms, group: g, priority: -4}
       - {name: second, wcet: 1ms, period: 20ms, after: first, overrun: {queue: 3}, execution: {empirical: [1ms, 500us]}}
 )");
@@ -118,7 +137,7 @@ dags:
   EXPECT_EQ(late.predecessors, (std::vector<std::uint32_t>{1, 2}));
   EXPECT_EQ(late.period, 20 * kMillisecond);
   EXPECT_EQ(late.deadline, 8 * kMillisecond);
-  EXPECT_EQ(late.criticality, Criticality::Low);
+  EXPECT_EQ(late.criticality, Criticality::High);
   EXPECT_EQ(late.execution, (ExecutionTime{ExecutionTime::Kind::Normal, 1'500'000, 100'000, {}}));
 
   const Task &first = dag.tasks.at(1);
@@ -295,7 +314,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{tasks({"{name: '', wcet: 1ms, period: 1s}"}), {"w.yaml:4:14: error: name must be a name, not ''"}},
         Mistake{tasks({"{name: [x], wcet: 1ms, period: 1s}"}), {"w.yaml:4:14: error: name must be a name, not a list"}},
         Mistake{tasks({"{name: \"a\\nb\", wcet: 1ms, period: 1s}"}),
-                {"w.yaml:4:14: error: the name of a task contains a control character"}},
+                {"w.yaml:4:14: error: name 'a\\u{A}b' contains U+000A, which cannot be shown"}},
         Mistake{tasks({"5"}), {"w.yaml:4:7: error: a task must be a map of name, wcet"}},
         Mistake{tasks({"{name: t, wect: 1ms, period: 1s}"}),
                 {"w.yaml:4:7: error: task 't' has no wcet",
@@ -326,11 +345,11 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{with("wcet: 0, period: 1s"),
                 {"w.yaml:4:23: error: wcet of task 't' must be greater than zero, not 0s"}},
         Mistake{with("wcet: -1ms, period: 1s"), {"4:23: error: wcet of task 't' must be greater than zero, not -1ms"}},
-        Mistake{with("wcet: 1ms, period: 0"), {"w.yaml:4:36: error: timer task 't' has no period"}},
-        Mistake{with("wcet: 1ms, period: -5ms"),
-                {"4:36: error: period of task 't' must be greater than zero, not -5ms"}},
-        Mistake{with("wcet: 1ms, period: 999999999999h"),
-                {"4:36: error: period: '999999999999h' is not a duration: it is too large"}},
+        Mistake{with("wcet: 1ms, period: 0"), {"w.yaml:4:36: error: period must be greater than zero, not '0'"}},
+        Mistake{with("wcet: 1ms, period: -5ms"), {"4:36: error: period must be greater than zero, not '-5ms'"}},
+        Mistake{
+            with("wcet: 1ms, period: 999999999999h"),
+            {"4:36: error: period: '999999999999h' is not a duration: it is too large: at most 1281023h (146 years)"}},
         Mistake{with("wcet: 0.5ns, period: 1s"), {"4:23: error: wcet: '0.5ns' is not a duration: it is not a whole"}},
         Mistake{with("wcet: 1ms"), {"w.yaml:4:7: error: timer task 't' has no period"}},
         Mistake{with("wcet: 1ms, bcet: 2ms, period: 1s"),
@@ -349,9 +368,14 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{with("wcet: 1ms, period: 1s, overrun: drop"),
                 {"4:49: error: overrun must be one of skip, queue, {queue: N}, not 'drop'"}},
         Mistake{with("wcet: 1ms, period: 1s, overrun: {queue: 0}"),
-                {"4:57: error: queue must be a whole number from 1 to 4294967295, not '0'"}},
+                {"4:57: error: queue must be a whole number from 1 to 65536, not '0'"}},
         Mistake{with("wcet: 1ms, period: 1s, overrun: {queue: 70000}"),
-                {"4:49: error: queue depth of task 't' must be from 1 to 65536"}},
+                {"4:57: error: queue must be a whole number from 1 to 65536, not '70000'"}},
+        Mistake{with("wcet: 1ms, period: 1s, budget: 0"), {"4:48: error: budget must be greater than zero"}},
+        Mistake{with("wcet: 1ms, period: 1s, region: 0"), {"4:48: error: region must be greater than zero"}},
+        Mistake{with("wcet: 1ms, period: 1s, group: \"\\e[31m\""),
+                {"4:47: error: group '\\u{1B}[31m' contains U+001B"}},
+        Mistake{with("wcet: 1ms, period: 1s, concurrency: 0"), {"concurrency must be a whole number from 1 to 1024"}},
         Mistake{with("wcet: 1ms, period: 1s, overrun: {}"), {"4:49: error: overrun has no queue depth"}},
         Mistake{with("wcet: 1ms, period: 1s, priority: high"),
                 {"4:50: error: priority must be a whole number from -2147483648"}},
@@ -373,7 +397,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"platform: {workers: 0}\n" + with("wcet: 1ms, period: 1s"),
                 {"w.yaml:1:21: error: workers must be a whole number from 1"}},
         Mistake{"platform: {workers: 5000}\n" + with("wcet: 1ms, period: 1s"),
-                {"w.yaml:1:21: error: workers must be from 1 to 4096, not 5000"}},
+                {"w.yaml:1:21: error: workers must be a whole number from 1 to 4096, not '5000'"}},
         Mistake{"platform: {workers: -1}\n" + with("wcet: 1ms, period: 1s"),
                 {"w.yaml:1:21: error: workers must be a whole number from 1"}},
         Mistake{"policy: rm\n" + with("wcet: 1ms, period: 1s"),
@@ -436,7 +460,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{with("wcet: 1ms, period: 1s, concurrency: 0"),
                 {"4:53: error: concurrency must be a whole number from 1"}},
         Mistake{with("wcet: 1ms, period: 1s, concurrency: 1025"),
-                {"4:53: error: concurrency of task 't' must be from 1 to 1024, not 1025"}},
+                {"4:53: error: concurrency must be a whole number from 1 to 1024, not '1025'"}},
         Mistake{with("wcet: 1ms, period: 1s, concurrency: 2, group: g"),
                 {"4:53: error: task 't' has concurrency 2 and is in group 'g' (jobs of one group never overlap"}}));
 
@@ -591,7 +615,7 @@ Workload arbitrary_workload() {
   options.low_share = 0.3;
   Workload workload = generate(options, *rc::gen::arbitrary<std::uint64_t>()).value();
   workload.platform.preemption = *rc::gen::element(PreemptionMode::None, PreemptionMode::Cooperative);
-  workload.name = *rc::gen::element<std::string>("", "plain", "null", "~", "yes", "- a", "a: b", "#x", "'", "\"", " x ",
+  workload.name = *rc::gen::element<std::string>("", "plain", "null", "~", "yes", "- a", "a: b", "#x", "'", "\"", "x y",
                                                  "{", "*a", "5ms", "caf\xC3\xA9", "a,b]", "\xF0\x9F\xA4\x96", "!t");
   for (Dag &dag : workload.dags) {
     dag.max_pending = *rc::gen::inRange(0U, 3U);
@@ -601,8 +625,8 @@ Workload arbitrary_workload() {
                                       Degrade{Degrade::Kind::Stretch, 1, 1.0 / 3 + 1});
     }
     for (Task &task : dag.tasks) {
-      task.name += *rc::gen::element<std::string>("", ": ", "#", " \"", "'", ",", "]", "\\", "\xC3\xA9");
-      task.criticality = *rc::gen::element(Criticality::Low, Criticality::Normal, Criticality::High);
+      task.name += *rc::gen::element<std::string>("", ": x", "#", " \"", "'", ",", "]", "\\", "\xC3\xA9");
+      task.criticality = dag.criticality;
       task.region = *rc::gen::element<Duration>(0, 1, 50 * kMicrosecond);
       task.budget = *rc::gen::element<Duration>(0, task.wcet);
       if (task.budget > 0) {

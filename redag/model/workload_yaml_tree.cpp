@@ -11,6 +11,7 @@
 #include <yaml-cpp/parser.h>
 
 #include "redag/base/check.hpp"
+#include "redag/base/text.hpp"
 
 namespace redag::yaml {
 namespace {
@@ -106,24 +107,6 @@ class TreeBuilder : public YAML::EventHandler {
   YAML::Mark last_scalar_ = YAML::Mark::null_mark();
 };
 
-/// Length of the UTF-8 sequence at `i`, 0 if there is none (overlong forms, surrogates and beyond U+10FFFF included).
-std::size_t utf8_length(std::string_view text, std::size_t i) {
-  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
-  const unsigned lead = byte(i);
-  if (lead < 0x80) return 1;
-  const std::size_t length = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
-  if (lead < 0xC2 || lead > 0xF4 || i + length > text.size()) return 0;
-  for (std::size_t k = 1; k < length; ++k) {
-    if ((byte(i + k) & 0xC0U) != 0x80) return 0;
-  }
-  const unsigned second = byte(i + 1);
-  if (lead == 0xE0 && second < 0xA0) return 0;
-  if (lead == 0xED && second > 0x9F) return 0;
-  if (lead == 0xF0 && second < 0x90) return 0;
-  if (lead == 0xF4 && second > 0x8F) return 0;
-  return length;
-}
-
 struct BadCharacter {
   int line;
   int column;
@@ -209,17 +192,13 @@ Result<Node> parse(std::string_view text, const std::string &file) {
 }
 
 std::string describe(const Node &node) {
-  constexpr std::size_t kLongest = 60;
   switch (node.kind) {
     case Node::Kind::Null: return "nothing";
     case Node::Kind::Sequence: return "a list";
     case Node::Kind::Map: return "a map";
     case Node::Kind::Scalar: break;
   }
-  if (node.text.size() <= kLongest) return "'" + node.text + "'";
-  std::size_t cut = kLongest;
-  while (cut > 0 && (static_cast<unsigned char>(node.text[cut]) & 0xC0U) == 0x80) --cut;  // whole characters
-  return "'" + node.text.substr(0, cut) + "...'";
+  return in_quotes(node.text);
 }
 
 }  // namespace redag::yaml

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml_nearest.hpp"
 
 namespace redag::yaml {
@@ -95,9 +96,15 @@ std::optional<Duration> ValueReader::positive_duration(const Node &node, std::st
 }
 
 std::optional<std::string> ValueReader::text(const Node &node, std::string_view key) {
-  if (node.kind == Node::Kind::Scalar && !node.text.empty()) return node.text;
-  wrong_type(node, key, "a name");
-  return std::nullopt;
+  if (node.kind != Node::Kind::Scalar || node.text.empty()) {
+    wrong_type(node, key, "a name");
+    return std::nullopt;
+  }
+  if (const std::string why = name_mistake(node.text); !why.empty()) {
+    error(node, fmt::format("{} {} {}", key, describe(node), why));
+    return std::nullopt;
+  }
+  return node.text;
 }
 
 std::optional<double> ValueReader::real(const Node &node, std::string_view key) {

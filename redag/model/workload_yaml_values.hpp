@@ -43,21 +43,21 @@ class ValueReader {
 
   std::optional<Duration> duration(const Node &node, std::string_view key);
   std::optional<Duration> positive_duration(const Node &node, std::string_view key);
+  /// A name: see name_mistake().
   std::optional<std::string> text(const Node &node, std::string_view key);
   std::optional<ExecutionTime> execution(const Node &node);
   std::optional<Callback> callback(const Node &node);
 
   template <class Integer>
-  std::optional<Integer> integer(const Node &node, std::string_view key, Integer smallest) {
+  std::optional<Integer> integer(const Node &node, std::string_view key, Integer smallest,
+                                 Integer largest = std::numeric_limits<Integer>::max()) {
     Integer value = 0;
     if (node.kind == Node::Kind::Scalar && !node.quoted) {
       const char *end = node.text.data() + node.text.size();
       const auto [used, code] = std::from_chars(node.text.data(), end, value);
-      if (code == std::errc() && used == end && value >= smallest) return value;
+      if (code == std::errc() && used == end && value >= smallest && value <= largest) return value;
     }
-    wrong_type(node, key,
-               "a whole number from " + std::to_string(smallest) + " to " +
-                   std::to_string(std::numeric_limits<Integer>::max()));
+    wrong_type(node, key, "a whole number from " + std::to_string(smallest) + " to " + std::to_string(largest));
     return std::nullopt;
   }
 

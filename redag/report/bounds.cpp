@@ -7,6 +7,7 @@
 
 #include "redag/analysis/analyze.hpp"
 #include "redag/analysis/executors.hpp"
+#include "redag/metrics/assumptions.hpp"
 
 namespace redag::report {
 namespace {
@@ -14,8 +15,12 @@ namespace {
 // Beyond, the dearest methods take longer than reading a report should.
 constexpr std::size_t kMostTasks = 1000;
 
-// "release 2us, dispatch 1us, preempt 0", as the simulator notes it. False: something else.
+// "release 2us, dispatch 1us, preempt 0", as the simulator notes it, or those of a machine. False: something else.
 bool read_overheads(std::string_view text, analysis::AnalysisPlatform &platform) {
+  if (const std::optional<Overheads> machine = parse_overheads(text)) {
+    platform = analysis::charge(platform, *machine);
+    return true;
+  }
   while (!text.empty()) {
     const std::size_t comma = std::min(text.find(", "), text.size());
     const std::string_view part = text.substr(0, comma);
@@ -34,10 +39,14 @@ bool read_overheads(std::string_view text, analysis::AnalysisPlatform &platform)
   return true;
 }
 
-std::string describe(const analysis::AnalysisPlatform &platform, const std::string &overheads) {
+std::string describe(const analysis::AnalysisPlatform &platform, const trace::RunInfo &run) {
+  const bool is_real = run.driver != trace::Driver::Simulator;
+  const std::string none = is_real ? metrics::not_calibrated_hint() : "no overheads";
   return fmt::format("{} worker{}, {} preemption, {}", platform.workers, platform.workers == 1 ? "" : "s",
                      trace::preemption_name(platform.preemption),
-                     overheads.empty() ? "no overheads" : "overheads " + overheads);
+                     run.overheads.empty() ? none
+                     : is_real             ? "with the overheads of the machine"
+                                           : "overheads " + run.overheads);
 }
 
 RunBounds none(std::string why) {
@@ -72,7 +81,7 @@ RunBounds bounds_of(const trace::RunInfo &run) {
 
   const analysis::Report report = analysis::analyze(*system, analysis::methods_of(*executor));
   RunBounds bounds;
-  bounds.assumes = describe(platform, run.overheads);
+  bounds.assumes = describe(platform, run);
   bounds.tasks = by_id(report.tasks);
   bounds.dags = by_id(report.dags);
   bounds.schedulable = report.verdict == analysis::Verdict::Schedulable;

@@ -39,7 +39,17 @@ bool Group::fits(const trace::RunInfo &run) const {
 void Group::add(const std::string &path, const trace::Trace &trace) {
   REDAG_CHECK(fits(trace.info), "jobs of different runs counted together");
   const std::vector<JobRecord> jobs = metrics::fold_jobs(trace.info.workload, trace.events);
-  if (runs_.empty()) take_first(trace, jobs);
+  const bool is_first = runs_.empty();
+  if (is_first) take_first(trace, jobs);
+  const auto bound_of = [this](TaskId task) {
+    return task.value < bounds_.tasks.size() ? bounds_.tasks[task.value].response.value_or(0) : Duration{0};
+  };
+  metrics::AssumptionCheck check = metrics::check_assumptions(trace.info, trace.events, bound_of);
+  if (is_first) {
+    assumptions_ = std::move(check);
+  } else {
+    assumptions_.add(check);
+  }
   take(path, trace.info, jobs);
   runs_.push_back(RunDigest{path, trace.info, metrics::summarize(trace),
                             metrics::check_trace(trace, metrics::rules_for(trace.info))});
@@ -65,7 +75,7 @@ void Group::take(const std::string &path, const trace::RunInfo &info, const std:
     Samples &samples = samples_[job.task.value];
     samples.response.push_back(job.response());
     samples.lateness.add(job.lateness(), std::max<Duration>(1, job.deadline - job.release));
-    samples.execution_max = std::max(samples.execution_max, job.on_worker);
+    samples.execution_max = std::max(samples.execution_max, job.processor == kNever ? job.on_worker : job.processor);
     if (is_sink_[job.task.value]) end_to_end_[dag_of_[job.task.value].value].push_back(job.finish - job.origin);
     if (!latest_ || relative_lateness(job) > relative_lateness(latest_->record)) {
       latest_ = LatestJob{job, path, job.release - info.start};

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "redag/metrics/assumptions.hpp"
 #include "redag/metrics/check_report.hpp"
 #include "redag/metrics/jobs.hpp"
 #include "redag/metrics/summary.hpp"
@@ -30,7 +31,7 @@ struct DigestOptions {
 struct Samples {
   std::vector<Duration> response;  // f - r of finished jobs; sorted once the group is finished
   LatenessHistogram lateness;      // the same jobs
-  Duration execution_max = 0;      // longest time on a worker
+  Duration execution_max = 0;      // most processor time; time on a worker where the run did not note the other
 };
 
 struct RunDigest {
@@ -76,6 +77,8 @@ class Group {
   [[nodiscard]] const metrics::EndToEnd &end_to_end(DagId dag) const { return end_to_end_stats_[dag.value]; }
   [[nodiscard]] const Samples &samples(TaskId task) const { return samples_[task.value]; }
   [[nodiscard]] std::uint32_t peak_active(DagId dag) const;
+  /// Of runs on threads: bounds and wcets against what was measured, all runs together.
+  [[nodiscard]] const metrics::AssumptionCheck &assumptions() const { return assumptions_; }
 
  private:
   void take_first(const trace::Trace &trace, const std::vector<metrics::JobRecord> &jobs);
@@ -95,6 +98,7 @@ class Group {
   std::vector<metrics::JobStats> task_stats_;
   std::vector<metrics::JobStats> dag_stats_;
   metrics::JobStats total_;
+  metrics::AssumptionCheck assumptions_;
   std::vector<metrics::EndToEnd> end_to_end_stats_;
 };
 

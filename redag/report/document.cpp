@@ -48,6 +48,10 @@ Json to_json(const JobStats &jobs) {
               {"response", to_json(jobs.response)}};
 }
 
+Json to_json(const Provenance &provenance) {
+  return provenance.is_known() ? Json::parse(provenance_to_json(provenance)) : Json();
+}
+
 Json to_json(const Sentence &sentence) { return Json{{"tone", to_string(sentence.tone)}, {"text", sentence.text}}; }
 
 Json to_json(const Spread &spread) { return Json{{"median", spread.median}, {"min", spread.min}, {"max", spread.max}}; }
@@ -123,6 +127,7 @@ Json to_json(const RunDigest &run) {
     violations.push_back(run.check.violations[i].to_string());
   }
   return Json{{"path", run.path},
+              {"provenance", to_json(run.info.provenance)},
               {"seed", run.info.seed},
               {"released", run.summary.total.released},
               {"miss_ratio", run.summary.total.miss_ratio_with_lost()},
@@ -237,6 +242,10 @@ class GroupWriter {
         row["deadline_ns"] = ref.task->deadline;
         row["wcet_ns"] = ref.task->wcet;
         row["execution_max_ns"] = group_.samples(ref.id).execution_max;
+        row["wcet_exceeded"] = group_.assumptions().tasks[ref.id.value].execution.is_exceeded;
+        const metrics::ResponseCheck &response = group_.assumptions().tasks[ref.id.value].response;
+        const bool is_exact = group_.info().driver == trace::Driver::Simulator;
+        row["bound_alarm"] = is_exact ? response.exceeded > 0 : response.is_alarm;
         add_bound(row, group_.bounds().tasks, ref.id.value);
         row["jobs"] = to_json(group_.task(ref.id));
       }
@@ -330,6 +339,7 @@ std::string to_json(std::span<const Group> groups, const DocumentOptions &option
   for (const std::string &note : options.notes) words.push_back(to_json(Sentence{Tone::Caution, note}));
   const Json document{
       {"format", "redag.report/1"},
+      {"provenance", to_json(options.provenance)},
       {"version", kVersion},
       {"title", title_of(groups)},
       {"comparison", {{"words", std::move(words)}, {"dags", groups.size() > 1 ? comparison(groups) : Json::array()}}},

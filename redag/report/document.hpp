@@ -12,6 +12,7 @@ namespace redag::report {
 
 struct DocumentOptions {
   std::vector<std::string> notes;  // what a reader should know that the runs do not say
+  Provenance provenance;           // of the report; that of each run stands beside the run
   std::size_t most_tasks = 2000;   // rows of tables, all groups together; those closest to a miss stay
   std::size_t most_curves = 600;   // tasks with a distribution, all groups together
 };

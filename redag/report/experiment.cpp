@@ -65,7 +65,8 @@ Json point_json(const Json &point) {
 
 }  // namespace
 
-Result<ExperimentDocument> experiment_document(std::string_view text, const std::string &file) {
+Result<ExperimentDocument> experiment_document(std::string_view text, const std::string &file,
+                                               const Provenance &provenance) {
   const auto mistake = [&](const std::string &message) {
     return tl::unexpected<Diagnostics>(Diagnostics{
         Diagnostic{Severity::Error, file, 0, 0, message, "'redag experiment factorial ... --out DIR' writes it"}});
@@ -74,6 +75,8 @@ Result<ExperimentDocument> experiment_document(std::string_view text, const std:
     const Json from = Json::parse(text);
     if (from.value("format", "") != kFormat) return mistake(fmt::format("is no {} document", kFormat));
     Json to = {{"kind", "factorial"}};
+    to["provenance"] = provenance.is_known() ? Json::parse(provenance_to_json(provenance)) : Json();
+    to["results_provenance"] = from.value("provenance", Json());
     for (const char *key :
          {"name", "version", "plan", "world", "duration_ns", "repetitions", "units", "done", "complete", "checks",
           "violations", "runs_beyond_max_active", "factors", "effects", "runs"}) {

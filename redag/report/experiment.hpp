@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "redag/base/provenance.hpp"
 #include "redag/base/result.hpp"
 
 namespace redag::report {
@@ -14,7 +15,8 @@ struct ExperimentDocument {
   std::string summary;  // one line for the terminal
 };
 
-/// `text`: of a factorial.json, which `file` names in messages. Errors: not such a document.
-[[nodiscard]] Result<ExperimentDocument> experiment_document(std::string_view text, const std::string &file);
+/// `text`: of a factorial.json, which `file` names in messages; `provenance`: of the page. Errors: not such a document.
+[[nodiscard]] Result<ExperimentDocument> experiment_document(std::string_view text, const std::string &file,
+                                                             const Provenance &provenance = {});
 
 }  // namespace redag::report

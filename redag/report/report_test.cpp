@@ -112,17 +112,40 @@ TEST(Verdict, MissesAreCountedNamedAndNotProvenAway) {
   EXPECT_NE(sentences[1].text.find("not shown"), std::string::npos) << sentences[1].text;
 }
 
-TEST(Verdict, AResponseAboveItsBoundIsSaid) {
+// One job of `hi.h`, whose wcet and bound are 2 ms, took 5 ms; `used_ms` of processor time.
+trace::Trace late_run(Time used_ms) {
   TraceBuilder run(hi_and_lo(PreemptionMode::Os));
-  run.at(0).arrives("h", 0).dispatched("h", 0, 0, 10);
-  run.at(5).finished("h", 0, 0);  // wcet and bound are 2 ms
+  run.at(0).arrives("h", 0).dispatched("h", 0, 0, 10).started("h", 0, 0);
+  run.at(5).executed("h", 0, 0, used_ms).finished("h", 0, 0);
   trace::Trace trace = run.until(10);
   trace.info.driver = trace::Driver::Threads;
-  const std::vector<Sentence> sentences = verdict_of(group_of("late", {trace}));
-  EXPECT_EQ(sentences[1].tone, Tone::Bad);
-  EXPECT_NE(sentences[1].text.find("Above its bound: hi.h (5ms, bound 2ms)"), std::string::npos) << sentences[1].text;
-  EXPECT_NE(sentences[2].text.find("longer than the stated wcet: hi.h (5ms, wcet 2ms)"), std::string::npos)
+  return trace;
+}
+
+TEST(Verdict, AWcetThatWasExceededIsAnAlarm) {
+  const std::vector<Sentence> sentences = verdict_of(group_of("late", {late_run(5)}));
+  EXPECT_NE(sentences[1].text.find("platform overheads not charged"), std::string::npos) << sentences[1].text;
+  EXPECT_EQ(sentences[1].text.find("within its bound"), std::string::npos) << sentences[1].text;
+  EXPECT_EQ(sentences[2].tone, Tone::Bad);
+  EXPECT_NE(sentences[2].text.find("hi.h: wcet exceeded: 5ms of processor time, 1 of 1 execution above"),
+            std::string::npos)
       << sentences[2].text;
+  EXPECT_EQ(sentences[3].tone, Tone::Bad);
+  EXPECT_NE(sentences[3].text.find("hi.h: 1 response above the bound of 2ms"), std::string::npos) << sentences[3].text;
+}
+
+TEST(Verdict, WhatAMachineMayTakeIsNoAlarmUnlessItWasCalibrated) {
+  trace::Trace trace = late_run(2);
+  const std::vector<Sentence> noted = verdict_of(group_of("late", {trace}));
+  EXPECT_EQ(noted[2].tone, Tone::Plain);
+  EXPECT_NE(noted[2].text.find("No alarm, and within what a machine may take: hi.h: 1 response above"),
+            std::string::npos)
+      << noted[2].text;
+  trace.info.overheads = to_string(Overheads());
+  const std::vector<Sentence> alarmed = verdict_of(group_of("late", {trace}));
+  EXPECT_EQ(alarmed[2].tone, Tone::Bad);
+  EXPECT_NE(alarmed[2].text.find("platform: jobs that held their workers got no processor for 3ms"), std::string::npos)
+      << alarmed[2].text;
 }
 
 TEST(Verdict, RankingTellsOnlyWhatTheRangesTell) {

@@ -72,19 +72,6 @@ Sentence on_deadlines(const Group &group) {
                                  how_missed(total), join(where), others, closest(group))};
 }
 
-// Tasks whose jobs took longer than their stated wcet: "control.pid (3.2ms, wcet 3ms)".
-std::vector<std::string> over_wcet(const Group &group) {
-  std::vector<std::string> names;
-  if (group.info().driver == trace::Driver::Simulator) return names;  // never; its overheads are not execution
-  for (const TaskRef &ref : flatten(group.workload())) {
-    const Duration longest = group.samples(ref.id).execution_max;
-    if (ref.task->wcet == 0 || longest <= ref.task->wcet) continue;
-    names.push_back(fmt::format("{} ({}, wcet {})", trace::task_name(group.workload(), ref.id),
-                                humanize_duration(longest), humanize_duration(ref.task->wcet)));
-  }
-  return names;
-}
-
 std::string first_of(std::vector<std::string> names, std::size_t most) {
   const std::size_t more = names.size() > most ? names.size() - most : 0;
   names.resize(names.size() - more);
@@ -97,31 +84,36 @@ Sentence on_bounds(const Group &group) {
   if (!bounds.absent.empty())
     return {Tone::Plain, fmt::format("There are no bounds to compare with: {}.", bounds.absent)};
   std::vector<std::string> above;
+  const bool simulated = group.info().driver == trace::Driver::Simulator;
   std::size_t bounded = 0;
+  bool is_within = true;
   for (std::size_t t = 0; t < bounds.tasks.size(); ++t) {
     if (!bounds.tasks[t].response) continue;
     ++bounded;
     const Duration longest = group.task(TaskId(t)).response.max;
     if (longest <= *bounds.tasks[t].response) continue;
+    is_within = false;
+    if (!simulated) continue;  // named with the assumption that broke
     above.push_back(fmt::format("{} ({}, bound {})", trace::task_name(group.workload(), TaskId(t)),
                                 humanize_duration(longest), humanize_duration(*bounds.tasks[t].response)));
   }
   for (std::size_t d = 0; d < bounds.dags.size(); ++d) {
     const Duration longest = group.end_to_end(DagId(d)).response.max;
     if (!bounds.dags[d].response || longest <= *bounds.dags[d].response) continue;
+    is_within = false;
+    if (!simulated && longest <= *bounds.dags[d].response + group.assumptions().unalarming(longest)) continue;
     above.push_back(fmt::format("DAG {} ({}, bound {})", group.workload().dags[d].name, humanize_duration(longest),
                                 humanize_duration(*bounds.dags[d].response)));
   }
   if (!above.empty()) {
-    const bool simulated = group.info().driver == trace::Driver::Simulator;
     return {Tone::Bad, fmt::format("Above its bound: {}. {}", first_of(above, 3),
                                    simulated ? "A bound was broken in virtual time: one of the two is wrong."
-                                             : "A bound holds for the stated execution times and no overheads of the "
-                                               "machine: one of these was exceeded.")};
+                                             : "An assumption of the bound was broken.")};
   }
-  const std::string within = bounded == 0 ? ""
-                                          : fmt::format(" Every response was within its bound ({} of {} have one).",
-                                                        bounded, plural(bounds.tasks.size(), "task"));
+  const std::string within = bounded == 0 || !is_within
+                                 ? ""
+                                 : fmt::format(" Every response was within its bound ({} of {} have one).", bounded,
+                                               plural(bounds.tasks.size(), "task"));
   if (bounds.schedulable) {
     return {Tone::Good, fmt::format("Analysis, {}: every deadline is met, by {}.{}", bounds.assumes,
                                     first_of(bounds.by, 2), within)};
@@ -130,13 +122,26 @@ Sentence on_bounds(const Group &group) {
                                    bounds.assumes, within)};
 }
 
-void add_remarks(const Group &group, std::vector<Sentence> &sentences) {
-  if (const std::vector<std::string> names = over_wcet(group); !names.empty()) {
-    sentences.push_back(
-        {Tone::Caution, fmt::format("On a worker for longer than the stated wcet: {}. On threads this is "
-                                    "wall time, with what else the machine did.",
-                                    first_of(names, 3))});
+// Alarms one by one, what may be the machine's noise together.
+void add_assumptions(const Group &group, std::vector<Sentence> &sentences) {
+  constexpr std::size_t kMost = 5;
+  std::vector<std::string> alarms;
+  std::vector<std::string> notes;
+  for (metrics::Remark &remark : metrics::remarks(group.assumptions(), group.workload())) {
+    (remark.is_alarm ? alarms : notes).push_back(std::move(remark.text));
   }
+  for (std::size_t i = 0; i < std::min(kMost, alarms.size()); ++i) sentences.push_back({Tone::Bad, alarms[i] + "."});
+  if (alarms.size() > kMost) {
+    sentences.push_back({Tone::Bad, plural(alarms.size() - kMost, "other alarm") + " of this kind."});
+  }
+  if (!notes.empty()) {
+    sentences.push_back(
+        {Tone::Plain, fmt::format("No alarm, and within what a machine may take: {}.", first_of(notes, 3))});
+  }
+}
+
+void add_remarks(const Group &group, std::vector<Sentence> &sentences) {
+  if (group.info().driver != trace::Driver::Simulator) add_assumptions(group, sentences);
   std::uint64_t violations = 0;
   std::uint64_t checks = 0;
   std::uint64_t lost = 0;

@@ -1,7 +1,10 @@
 #include "redag/runtime/dag_builder.hpp"
 
+#include <atomic>
 #include <stdexcept>
 #include <utility>
+
+#include "redag/runtime/dag_mistakes.hpp"
 
 namespace redag::runtime {
 
@@ -13,24 +16,36 @@ DagBuilder::DagBuilder(std::string name, const DagOptions &options) {
 }
 
 TaskHandle DagBuilder::timer(std::string name, nanoseconds period, Function body, const TaskOptions &options) {
-  Task &task = append(std::move(name), std::move(body), options);
+  Task task;
+  task.name = std::move(name);
   task.period = period.count();
-  for (const TaskHandle handle : options.after) task.predecessors.push_back(handle.index_);
-  return TaskHandle(static_cast<std::uint32_t>(dag_.tasks.size() - 1));
+  return append(std::move(task), options.after, std::move(body), options);
 }
 
 TaskHandle DagBuilder::data(std::string name, const std::vector<TaskHandle> &predecessors, Function body,
                             const TaskOptions &options) {
-  Task &task = append(std::move(name), std::move(body), options);
-  task.activation = Activation::Data;
-  for (const TaskHandle handle : predecessors) task.predecessors.push_back(handle.index_);
-  return TaskHandle(static_cast<std::uint32_t>(dag_.tasks.size() - 1));
-}
-
-Task &DagBuilder::append(std::string name, Function body, const TaskOptions &options) {
-  if (!body) throw std::invalid_argument("task '" + name + "' has no body");
   Task task;
   task.name = std::move(name);
+  task.activation = Activation::Data;
+  if (!options.after.empty()) {
+    throw std::invalid_argument(place_of(dag_.name, task.activation, task.name) +
+                                ": TaskOptions::after is for timer() (name all predecessors in the second argument)");
+  }
+  return append(std::move(task), predecessors, std::move(body), options);
+}
+
+TaskHandle DagBuilder::append(Task task, const std::vector<TaskHandle> &predecessors, Function body,
+                              const TaskOptions &options) {
+  const auto refuse = [&](const char *why) {
+    throw std::invalid_argument(place_of(dag_.name, task.activation, task.name) + ": " + why);
+  };
+  if (!body) refuse("the task has no body (the function is empty)");
+  for (const TaskHandle handle : predecessors) {
+    if (handle.index_ >= serials_.size() || serials_[handle.index_] != handle.serial_) {
+      refuse("a predecessor is a task of another DagBuilder (edges stay within a DAG: use handles that this one gave)");
+    }
+    task.predecessors.push_back(handle.index_);
+  }
   task.wcet = options.wcet.count();
   task.deadline = options.deadline.count();
   task.offset = options.offset.count();
@@ -39,8 +54,14 @@ Task &DagBuilder::append(std::string name, Function body, const TaskOptions &opt
   task.queue_depth = options.queue_depth;
   task.priority = options.priority;
   task.group = options.group;
+  task.criticality = dag_.criticality;
+  static std::atomic<std::uint64_t> next_serial{0};  // tells tasks apart, and orders nothing
+  const TaskHandle handle(static_cast<std::uint32_t>(dag_.tasks.size()),
+                          next_serial.fetch_add(1, std::memory_order_relaxed));
   bodies_.push_back(std::move(body));
-  return dag_.tasks.emplace_back(std::move(task));
+  serials_.push_back(handle.serial_);
+  dag_.tasks.push_back(std::move(task));
+  return handle;
 }
 
 }  // namespace redag::runtime

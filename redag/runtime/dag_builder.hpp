@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -13,12 +14,12 @@ namespace redag::runtime {
 
 using std::chrono::nanoseconds;
 
-/// A task of a DagBuilder, to name it as a predecessor.
+/// A task of a DagBuilder, to name it as a predecessor of later tasks of the same DagBuilder.
 class TaskHandle {
   friend class DagBuilder;
-  friend class Executor;
-  explicit TaskHandle(std::uint32_t index) : index_(index) {}
+  TaskHandle(std::uint32_t index, std::uint64_t serial) : index_(index), serial_(serial) {}
   std::uint32_t index_;
+  std::uint64_t serial_;  // of all tasks of all builders: the index alone would fit a task of another one
 };
 
 struct DagOptions {
@@ -39,6 +40,8 @@ struct TaskOptions {
   std::vector<TaskHandle> after{};  // predecessors of a timer
 };
 
+/// timer() and data() throw std::invalid_argument for a task without a body and for a predecessor that is no task of
+/// this DagBuilder. Every other mistake is found by Executor::add(), which knows the policy and tells all of them.
 class DagBuilder {
  public:
   using Function = std::function<void()>;
@@ -54,10 +57,11 @@ class DagBuilder {
 
  private:
   friend class Executor;
-  Task &append(std::string name, Function body, const TaskOptions &options);
+  TaskHandle append(Task task, const std::vector<TaskHandle> &predecessors, Function body, const TaskOptions &options);
 
   Dag dag_;
   std::vector<Function> bodies_;
+  std::vector<std::uint64_t> serials_;  // of the tasks
 };
 
 }  // namespace redag::runtime

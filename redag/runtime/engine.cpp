@@ -63,7 +63,7 @@ Result<void> Engine::start() {
   }
   for (auto &thread : threads_) {
     const ThreadSetup setup{options_.name + "-" + std::to_string(thread->index), realtime() ? options_.band.top_job : 0,
-                            cpus};
+                            cpus, options_.touched_stack};
     Result<ThreadHandle> started = start_thread(setup, [this, &self = *thread] { main(self); });
     if (!started) {
       halt();
@@ -178,6 +178,10 @@ Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot bel
   RunningJob::set_current(running.below);
   at = now();
   const Duration used = charge(self, *assignment.entry, running, at);
+  if (options_.trace_capacity > 0) {
+    self.events.push(
+        JobEvent{at, used, job.task, job.number, job.worker.value, JobEventKind::Executed, Reason::None, 0});
+  }
   return finish(self, assignment, running, outcome, at, used, below);
 }
 

@@ -76,6 +76,7 @@ struct EngineOptions {
   bool measure = false;            // figures() has responses, misses and preemptions
   // none, cooperative: how often a thread without a job looks for one before it sleeps; looks_in().
   std::uint32_t looks = 0;
+  std::size_t touched_stack = 0;  // of each worker thread; ThreadSetup
 };
 
 /// Processor time of a task's jobs that ended.

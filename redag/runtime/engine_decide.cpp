@@ -65,8 +65,8 @@ Engine::Next Engine::place(Locked &locked, const sched::Step &step, Thread *self
   }
   for (const Dispatch &dispatch : step.dispatches) {
     if (&dispatch == own) continue;
-    if (dispatch.resume) {
-      if (dispatch.job == below) next.kind = Next::Kind::Resume;
+    if (dispatch.kind != sched::DispatchKind::Start) {
+      if (dispatch.kind == sched::DispatchKind::Resume && dispatch.job == below) next.kind = Next::Kind::Resume;
       if (os()) change_level(dispatch);
       continue;
     }
@@ -84,7 +84,7 @@ Engine::Next Engine::place(Locked &locked, const sched::Step &step, Thread *self
 const Dispatch *Engine::choose_own(const sched::Step &step, JobSlot below) {
   const Dispatch *own = nullptr;
   for (const Dispatch &dispatch : step.dispatches) {
-    if (dispatch.resume || (below.valid() && dispatch.over != below)) continue;
+    if (dispatch.kind != sched::DispatchKind::Start || (below.valid() && dispatch.over != below)) continue;
     if (own == nullptr || dispatch.level < own->level) own = &dispatch;
   }
   return own;
@@ -116,7 +116,7 @@ Engine::Assignment Engine::move_job(Thread &from, Thread &to) {
   to.stack.push_back(from.stack.back());
   from.stack.pop_back();
   to.level = from.level;
-  to.own_level = from.own_level;
+  to.inherits = from.inherits;
   if (os()) priorities_.end(from.index);
   set_priority_for_job(to, assignment);
   idle_.push_back(&from);
@@ -133,7 +133,7 @@ void Engine::set_priority_for_job(Thread &thread, const Assignment &assignment) 
 // Its job is an ordinary thread's, so that it does not count as real-time where that is throttled: not that of a DAG of
 // high criticality, and nothing that is more urgent waits for it.
 bool Engine::gives_way(const Thread &thread) const {
-  return giving_way_ && thread.level >= thread.own_level && !tasks_[thread.stack.back().task.value].is_high;
+  return giving_way_ && !thread.inherits && !tasks_[thread.stack.back().task.value].is_high;
 }
 
 int Engine::priority_of(const Thread &thread) const {
@@ -164,6 +164,7 @@ void Engine::change_level(const Dispatch &dispatch) {
   const auto thread = std::find_if(threads_.begin(), threads_.end(), runs_it);
   REDAG_CHECK(thread != threads_.end(), "a job goes on that no thread has");
   (*thread)->level = dispatch.level;
+  (*thread)->inherits = dispatch.inherits;
   apply(priorities_.change((*thread)->index, priority_of(**thread)));
 }
 
@@ -174,7 +175,8 @@ Engine::Assignment Engine::assign(Thread &thread, const Dispatch &dispatch) {
   ++unfinished_;
   const Job job{dispatch.task, dispatch.number, dispatch.release, dispatch.job, dispatch.worker};
   thread.stack.push_back(job);
-  thread.level = thread.own_level = dispatch.level;
+  thread.level = dispatch.level;
+  thread.inherits = dispatch.inherits;
   return Assignment{job, &entry, entry.expected_short()};
 }
 

@@ -98,7 +98,7 @@ struct alignas(64) Engine::Thread {
   Atomic<bool> has_mail{false};
   bool is_handed = false;         // lock: is among Engine::handed_
   std::uint32_t level = 0;        // lock: of the job it was given last; inherited only with `os`
-  std::uint32_t own_level = 0;    // lock: the same, as it was when it was given
+  bool inherits = false;          // lock: that level is of a more urgent job, which waits for this thread's
   Atomic<bool> outranked{false};  // written under the lock
   std::vector<Job> stack;         // lock: the jobs started here, the running one last
   trace::Ring events;             // Started; written by the thread

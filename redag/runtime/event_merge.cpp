@@ -14,19 +14,18 @@ bool same_job(const JobEvent &a, const JobEvent &b) { return a.task == b.task &&
 
 void EventMerge::merge(std::vector<JobEvent> &out, bool last) {
   std::sort(started_.begin(), started_.end(), [](const JobEvent &x, const JobEvent &y) {
-    return std::tie(x.time, x.task.value, x.job) < std::tie(y.time, y.task.value, y.job);
+    return std::tie(x.time, x.task.value, x.job, x.kind) < std::tie(y.time, y.task.value, y.job, y.kind);
   });
   auto next = started_.begin();
   for (const JobEvent &decision : decisions_) {
     for (; next != started_.end() && next->time < decision.time; ++next) append(out, *next);
-    // Of equal times a decision comes first, except that a job begins before it ends.
-    if (ends(decision)) {
-      const auto begun = std::find_if(
+    // Of equal times a decision comes first, except that a job's body begins and ends before the job ends.
+    while (ends(decision)) {
+      const auto of_job = std::find_if(
           next, started_.end(), [&](const JobEvent &e) { return e.time > decision.time || same_job(e, decision); });
-      if (begun != started_.end() && same_job(*begun, decision)) {
-        std::rotate(next, begun, begun + 1);
-        append(out, *next++);
-      }
+      if (of_job == started_.end() || !same_job(*of_job, decision)) break;
+      std::rotate(next, of_job, of_job + 1);
+      append(out, *next++);
     }
     append(out, decision);
   }

@@ -54,6 +54,19 @@ TEST(EventMerge, AtEqualTimesAJobIsDispatchedThenBeginsThenEnds) {
   EXPECT_EQ(out[4].task, TaskId(0));
 }
 
+TEST(EventMerge, AtEqualTimesABodyEndsBeforeItsJob) {
+  EventMerge merge;
+  merge.decisions() = {event(4, Kind::Dispatched, 1), event(7, Kind::Finished, 1)};
+  merge.started() = {event(7, Kind::Executed, 1), event(7, Kind::Executed, 0), event(7, Kind::Started, 1)};
+  std::vector<JobEvent> out;
+  merge.merge(out, false);
+  ASSERT_EQ(out.size(), 4U);  // job 0's may have to wait
+  EXPECT_EQ(out[1].kind, Kind::Started);
+  EXPECT_EQ(out[2].kind, Kind::Executed);
+  EXPECT_EQ(out[2].task, TaskId(1));
+  EXPECT_EQ(out[3].kind, Kind::Finished);
+}
+
 TEST(EventMerge, ALateStartedKeepsItsExactTimeInValue) {
   EventMerge merge;
   std::vector<JobEvent> out;

@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 
 #include "redag/base/lock_guard.hpp"
+#include "redag/base/text.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag/runtime/dag_mistakes.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/looks.hpp"
 #include "redag/runtime/threads.hpp"
@@ -19,21 +22,50 @@ namespace redag::runtime {
 namespace {
 
 constexpr Duration kStartMargin = kMillisecond;  // from the threads being ready to the first release
+constexpr std::size_t kMaxTraceCapacity = std::size_t{1} << 28U;
+constexpr double kMaxWatchedDeadlines = 1e6;
 
-void throw_if_bad(const Dag &dag, std::uint32_t workers, PolicyKind policy) {
-  Workload alone;
-  alone.name = dag.name;
-  alone.platform = Platform{workers, PreemptionMode::None};
-  alone.policy = policy;
-  alone.dags = {dag};
-  for (Task &task : alone.dags[0].tasks) task.wcet = std::max<Duration>(task.wcet, 1);  // may be unknown here
-  const Diagnostics findings = validate(alone);
-  if (has_errors(findings)) throw std::invalid_argument(to_string(findings));
+[[noreturn]] void refuse(const std::string &what) { throw std::invalid_argument(what); }
+
+template <class Number>
+void check_range(const char *option, Number value, std::type_identity_t<Number> least,
+                 std::type_identity_t<Number> most) {
+  if (value >= least && value <= most) return;
+  refuse(fmt::format("ExecutorOptions::{} must be from {} to {}, not {}", option, least, most, value));
+}
+
+void check_duration(const char *option, nanoseconds value) {
+  if (value.count() >= 0 && value.count() <= kMaxDuration) return;
+  refuse(fmt::format("ExecutorOptions::{} must be from 0s to {}, not {}", option, kMaxDurationText,
+                     format_duration(value.count())));
+}
+
+void check(const ExecutorOptions &options) {
+  if (const std::string why = name_mistake(options.name); !why.empty()) {
+    refuse(fmt::format("ExecutorOptions::name {} {}", in_quotes(options.name), why));
+  }
+  check_range("workers", options.workers, 0U, kMaxWorkers);
+  check_range("threads", options.threads, 0U, 2 * kMaxWorkers);
+  if (options.threads > 0 && options.threads < options.workers) {
+    refuse(fmt::format("ExecutorOptions::threads is {}, fewer than the {} workers", options.threads, options.workers));
+  }
+  check_range("trace_capacity", options.trace_capacity, std::size_t{0}, kMaxTraceCapacity);
+  check_duration("spin", options.spin);
+  check_duration("stop_timeout", options.stop_timeout);
+  if (!options.watchdog) return;
+  const WatchLimits &limits = options.watchdog->limits;
+  check_duration("watchdog: limits.longest", nanoseconds(limits.longest));
+  check_duration("watchdog: interval", nanoseconds(options.watchdog->interval));
+  check_range("watchdog: limits.deadlines", limits.deadlines, 0.0, kMaxWatchedDeadlines);
+  if (limits.longest == 0 && limits.deadlines == 0) {
+    refuse("ExecutorOptions::watchdog: limits.longest or limits.deadlines must be above 0, or no job is ever overdue");
+  }
 }
 
 }  // namespace
 
 Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
+  check(options_);
   Result<Setup> setup = set_up(options_.preemption, options_.policy, options_.workers, options_.threads, options_.cpus);
   if (!setup) throw std::runtime_error(to_string(setup.error()));
   setup_ = *std::move(setup);
@@ -54,6 +86,7 @@ Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
   engine.trace_capacity = options_.trace_capacity;
   engine.measure = options_.live;
   engine.looks = looks_before_sleep(setup_, options_.spin.count());
+  if (options_.lock_memory) engine.touched_stack = kTouchedStack;
   engine.on_exception = [this](const Job &job, std::exception_ptr e) { on_exception(job, std::move(e)); };
   auto scheduler = std::make_unique<sched::PriorityScheduler>(Workload{}, engine.config);
   engine_ = std::make_unique<Engine>(std::move(scheduler), std::move(engine));
@@ -79,13 +112,10 @@ Executor::~Executor() {
 
 DagId Executor::add(DagBuilder builder) {
   Dag &dag = builder.dag_;
-  for (const Task &task : dag.tasks) {
-    for (const std::uint32_t predecessor : task.predecessors) {
-      if (predecessor >= dag.tasks.size()) throw std::invalid_argument("a predecessor is of another DAG");
-    }
-  }
   inherit_periods(dag);
-  throw_if_bad(dag, options_.workers, options_.policy);
+  if (const std::string mistakes = mistakes_of(dag, options_.policy); !mistakes.empty()) {
+    refuse("Executor::add(): " + mistakes);
+  }
 
   std::vector<Body> bodies;
   for (DagBuilder::Function &body : builder.bodies_) {
@@ -95,6 +125,11 @@ DagId Executor::add(DagBuilder builder) {
     });
   }
   const LockGuard guard(lock_);
+  const auto has_name = [&](const auto &added) { return !added.second.removed && added.second.name == dag.name; };
+  if (std::any_of(dags_.begin(), dags_.end(), has_name)) {
+    refuse("Executor::add(): " + place_of(dag.name) +
+           ": there is another DAG of that name in the executor (remove() that one first, or choose another name)");
+  }
   if (options_.admission) admit(dag);
   const DagId id(next_dag_);
   Added added{dag.name, dag.tasks, dag.max_active, engine_->add_dag(dag, std::move(bodies)), 0, false, {}};
@@ -139,7 +174,8 @@ void Executor::remove(DagId dag) {
   DagId removed;
   {
     const LockGuard guard(lock_);
-    if (dag.value >= next_dag_) throw std::out_of_range("there is no such DAG");
+    if (dag.value >= next_dag_)
+      throw std::out_of_range(fmt::format("Executor::remove(): there is no DAG {}", dag.value));
     const auto found = dags_.find(dag.value);
     if (found == dags_.end() || found->second.removed) return;
     Added &gone = found->second;
@@ -158,6 +194,9 @@ void Executor::run() {
 }
 
 void Executor::run_for(nanoseconds duration) {
+  if (duration.count() < 0) {
+    refuse(fmt::format("Executor::run_for(): {} is negative", format_duration(duration.count())));
+  }
   start();
   stop_.wait_until(monotonic_now() + std::min<Duration>(duration.count(), kMaxDuration / 2));
   request_stop();
@@ -166,7 +205,7 @@ void Executor::run_for(nanoseconds duration) {
 
 void Executor::start() {
   const LockGuard starting(finishing_);  // a stop() meanwhile waits for what it is going to end
-  if (started_.exchange(true)) throw std::logic_error("an Executor runs once");
+  if (started_.exchange(true)) throw std::logic_error("Executor::start(): an Executor runs once");
   if (const Result<void> ready = engine_->start(); !ready) throw std::runtime_error(to_string(ready.error()));
   if (const Result<void> watching = start_watchdog(); !watching) {
     request_stop();
@@ -213,8 +252,10 @@ void Executor::request_stop() noexcept {
 }
 
 void Executor::wait() {
-  if (engine_->in_body()) throw std::logic_error("a body cannot wait for the end of its own executor");
-  if (!started_) throw std::logic_error("wait() before start()");
+  if (engine_->in_body()) {
+    throw std::logic_error("Executor::wait(): a body cannot wait for the end of its own executor");
+  }
+  if (!started_) throw std::logic_error("Executor::wait() before start()");
   stop_.wait();
   finish();
   std::exception_ptr failure;
@@ -265,9 +306,12 @@ void Executor::drain(std::vector<JobEvent> &events) { engine_->drain(events, fin
 std::vector<TaskStats> Executor::stats(DagId dag) const {
   const LockGuard guard(lock_);
   const auto found = dags_.find(dag.value);
-  if (found == dags_.end()) throw std::out_of_range("there is no such DAG");
+  if (found == dags_.end()) throw std::out_of_range(fmt::format("Executor::stats(): there is no DAG {}", dag.value));
   const Added &of = found->second;
-  if (of.left < of.tasks.size()) throw std::out_of_range("the DAG was removed, and another one has its place");
+  if (of.left < of.tasks.size()) {
+    throw std::out_of_range(
+        fmt::format("Executor::stats(): DAG {} was removed, and another one has its place", dag.value));
+  }
   std::vector<TaskStats> result;
   for (std::size_t i = 0; i < of.tasks.size(); ++i) {
     const TaskId task = of.ids.tasks[i];

@@ -55,10 +55,10 @@ enum class OnException : std::uint8_t {
 
 struct ExecutorOptions {
   std::string name = "redag";
-  std::uint32_t workers = 0;  // jobs that execute at the same time; 0: one a usable processor
+  std::uint32_t workers = 0;  // jobs that execute at the same time, at most 4096; 0: one a usable processor
   PreemptionMode preemption = PreemptionMode::Auto;
   PolicyKind policy = PolicyKind::RateMonotonic;
-  std::uint32_t threads = 0;       // os: jobs that can be started and unfinished at once; 0: workers + 16
+  std::uint32_t threads = 0;       // os: jobs that can be started and unfinished at once; 0: workers + 16; at most 8192
   std::vector<int> cpus{};         // processors for the workers; empty: os takes `workers` of the usable ones
   nanoseconds spin{};              // none, cooperative: how long a worker looks for a job before it sleeps
   bool lock_memory = false;        // if it cannot be had, warnings() says so
@@ -87,7 +87,8 @@ struct TaskStats {
 
 class Executor {
  public:
-  /// Throws std::runtime_error if preemption `os` is asked for and cannot be had; the text says how to get it.
+  /// Throws std::invalid_argument for an option out of its range; std::runtime_error if preemption `os` is asked for
+  /// and cannot be had; the text says how to get it.
   explicit Executor(ExecutorOptions options = {});
   /// Stops, and waits for the bodies that run, however long they take.
   ~Executor();
@@ -95,8 +96,8 @@ class Executor {
   Executor &operator=(const Executor &) = delete;
 
   /// Adds a DAG, before or while running; its release grid begins at the start, or now. Throws std::invalid_argument
-  /// with all mistakes if it is not valid, AdmissionRefused with the reason if `admission` says no; nothing is changed
-  /// then. Ids of DAGs are not used again.
+  /// with all mistakes if it is not valid or another DAG here has its name, AdmissionRefused with the reason if
+  /// `admission` says no; nothing is changed then. Ids of DAGs are not used again.
   DagId add(DagBuilder dag);
   /// What has not started is skipped, what has started ends as usual; a body is destroyed once it no longer runs. Does
   /// nothing the second time. Throws std::out_of_range if there has been no such DAG.
@@ -104,7 +105,7 @@ class Executor {
 
   /// start(), and wait(). Throws what start() and wait() throw.
   void run();
-  /// As run(), for at most `duration`.
+  /// As run(), for at most `duration`. Throws std::invalid_argument if that is negative.
   void run_for(nanoseconds duration);
 
   /// Returns when all threads are ready. Throws std::runtime_error if the system refuses a thread, std::logic_error the

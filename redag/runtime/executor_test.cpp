@@ -118,21 +118,6 @@ TEST(Executor, AHandlerCanLetItGoOn) {
   EXPECT_EQ(executor.stats(dag)[0].jobs.aborted, 4U);
 }
 
-TEST(Executor, RefusesABadDagWithEveryMistake) {
-  Executor executor(one_worker());
-  DagBuilder dag("dag");
-  dag.timer("a", 0ms, [] {});
-  dag.timer("a", -1ms, [] {});
-  try {
-    executor.add(std::move(dag));
-    FAIL() << "a DAG without periods was accepted";
-  } catch (const std::invalid_argument &error) {
-    EXPECT_NE(std::string(error.what()).find("period"), std::string::npos) << error.what();
-  }
-  DagBuilder empty("empty");
-  EXPECT_THROW(empty.timer("a", 1ms, nullptr), std::invalid_argument);
-}
-
 TEST(Executor, DagsComeAndGoWhileItRunsAlsoFromBodies) {
   for (const PreemptionMode mode : {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Auto}) {
     ExecutorOptions options;

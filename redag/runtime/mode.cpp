@@ -39,7 +39,7 @@ Result<Mode> resolve_mode(PreemptionMode wanted, PolicyKind policy, const Priori
     case PreemptionMode::Os:
       if (obstacle.empty()) return Mode{wanted, {}};
       return make_error("preemption 'os' cannot be had: " + obstacle,
-                        is_static(policy) ? realtime_hint() : "use a static policy, or preemption: cooperative");
+                        is_static(policy) ? realtime_hint() : "use a static policy, or preemption cooperative");
     case PreemptionMode::Auto: break;
   }
   if (obstacle.empty()) return Mode{PreemptionMode::Os, "auto: this process may use SCHED_FIFO"};

@@ -1,4 +1,5 @@
 #include "redag/runtime/run_workload.hpp"
+#include "redag/model/validate.hpp"
 
 #include <fmt/format.h>
 
@@ -35,11 +36,15 @@ class Run {
   Run(const Workload &workload, const RunOptions &options) : workload_(workload), options_(options) {}
 
   Result<RunResult> execute() {
-    return prepare().and_then([&] { return start(); }).map([&] {
-      collect_until_horizon();
-      finish();
-      return std::move(result_);
-    });
+    const Result<void> started = prepare().and_then([&] { return record(); }).and_then([&] { return start(); });
+    if (!started) {
+      // Of a run that never was, there is nothing to keep.
+      if (flight_) static_cast<void>(trace::remove_flight_record(options_.flight));
+      return tl::unexpected<Diagnostics>(started.error());
+    }
+    collect_until_horizon();
+    finish();
+    return std::move(result_);
   }
 
  private:
@@ -48,6 +53,9 @@ class Run {
     if (kind == nullptr && !options_.scheduler) {
       return make_error(fmt::format("there is no executor '{}'", options_.executor));
     }
+    Diagnostics mistakes = validate(workload_);
+    std::erase_if(mistakes, [](const Diagnostic &mistake) { return mistake.severity != Severity::Error; });
+    if (!mistakes.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes));
     const bool preemptive = kind == nullptr || kind->ours;
     const auto wanted = options_.preemption.value_or(workload_.platform.preemption);
     Result<Setup> setup = set_up(preemptive ? wanted : PreemptionMode::None, workload_.policy,
@@ -78,6 +86,7 @@ class Run {
     engine.trace_capacity = options_.trace_capacity;
     engine.measure = options_.live;
     engine.looks = looks;
+    if (options_.lock_memory) engine.touched_stack = kTouchedStack;
     if (kind != nullptr) engine.config = sched::effective_config(*kind, engine.config);
     auto scheduler = options_.scheduler ? options_.scheduler(workload_, engine.config)
                                         : sched::make_scheduler(options_.executor, workload_, engine.config);
@@ -140,6 +149,26 @@ class Run {
     return timer_->start(origin_, options_.duration, {"redag-timer", priority, {}});
   }
 
+  Result<void> record() {
+    describe();
+    if (options_.flight.empty()) return {};
+    Result<trace::FlightRecorder> recorder =
+        trace::FlightRecorder::create(options_.flight, result_.trace.info, options_.flight_options);
+    if (!recorder) return tl::unexpected(recorder.error());
+    flight_.emplace(std::move(*recorder));
+    return {};
+  }
+
+  // All events so far: what is new goes to the record.
+  void drain(bool finally) {
+    auto &events = result_.trace.events;
+    const std::size_t before = events.size();
+    engine_->drain(events, finally);
+    if (!flight_) return;
+    const Result<void> kept = flight_->append(std::span(events).subspan(before), engine_->lost_events());
+    if (!kept) result_.warnings.push_back(fmt::format("no flight record from here on: {}", to_string(kept.error())));
+  }
+
   void note(const OverdueJob &job) {
     std::string text = fmt::format("{} #{} is overdue: {}", trace::task_name(workload_, job.job.task), job.job.number,
                                    runtime::describe(job));
@@ -178,7 +207,7 @@ class Run {
         break;
       }
       never.wait_until(std::min(now + kCollectEvery, end));
-      engine_->drain(result_.trace.events);
+      drain(false);
       report_overdue();
       if (options_.progress) options_.progress(engine_->now(), result_.trace.events);
     }
@@ -200,7 +229,7 @@ class Run {
     engine_->join();
     report_overdue();
     live_.reset();
-    describe();
+    warn();
     cut();
     for (std::size_t t = 0; t < workload_.task_count(); ++t) result_.usage.push_back(engine_->usage(TaskId(t)));
   }
@@ -214,9 +243,13 @@ class Run {
     info.preemption_why = result_.mode.reason;
     info.driver = trace::Driver::Threads;
     info.seed = options_.seed;
-    info.end = end_;
+    info.end = options_.duration;
     info.warm_up = options_.warm_up;
     info.machine = trace::this_machine();
+    info.provenance = current_provenance();
+  }
+
+  void warn() {
     if (const Duration gave_way = engine_->gave_way(); gave_way > 0) {
       result_.warnings.push_back(fmt::format(
           "jobs of lower criticality were ordinary threads for {}, so that the kernel did not stop those of "
@@ -236,10 +269,11 @@ class Run {
   // The trace ends where the scheduler stopped deciding: what was started then is in flight, as in the simulator.
   void cut() {
     auto &events = result_.trace.events;
-    engine_->drain(events, true);
+    drain(true);
     const Time end = engine_->halted_at();
     const auto after = std::find_if(events.begin(), events.end(), [&](const JobEvent &e) { return e.time >= end; });
     events.erase(after, events.end());
+    result_.trace.info.end = end_;
     result_.trace.info.lost_events = engine_->lost_events();
     if (result_.trace.info.lost_events > 0) {
       result_.warnings.push_back(
@@ -253,6 +287,7 @@ class Run {
   Mutex notes_lock_;
   std::vector<std::string> notes_ REDAG_GUARDED_BY(notes_lock_);  // of the watchdog, not yet reported
   std::atomic<bool> give_up_{false};
+  std::optional<trace::FlightRecorder> flight_;
   std::unique_ptr<Engine> engine_;
   std::unique_ptr<ReleaseTimer> timer_;    // after the engine: it ends first
   std::unique_ptr<Watchdog> watchdog_;     // the same

@@ -17,6 +17,7 @@
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/watchdog.hpp"
 #include "redag/sched/scheduler.hpp"
+#include "redag/trace/flight_recorder.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::runtime {
@@ -50,6 +51,10 @@ struct RunOptions {
   bool live = false;  // `redag top` sees the run
   /// For it: proven bounds on response times by task, 0 where there is none. Asked once, before the start.
   std::function<std::vector<Duration>(const sched::Config &)> bounds;
+  /// Folder for a record of the run that outlives the process (trace/flight_recorder.hpp); empty: none. It stays when
+  /// the run has ended: remove_flight_record() once the trace is kept elsewhere.
+  std::string flight;
+  trace::FlightOptions flight_options;
   const std::atomic<bool> *stop = nullptr;  // ends the run early when set (Ctrl-C)
   /// About ten times a second, with all events so far. On the calling thread.
   std::function<void(Time now, std::span<const JobEvent> events)> progress;

@@ -1,6 +1,7 @@
 #include "redag/runtime/run_workload.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -215,6 +216,28 @@ TEST(RunWorkload, BodiesOfOnesOwn) {
   EXPECT_GE(sensed, static_cast<std::uint64_t>(finished));
   EXPECT_GE(last, 0);  // from the origin of the run, not of the clock
   EXPECT_LT(last, 10 * kSecond);
+}
+
+// What the record has is the trace up to the last collection, and the folder is the caller's to delete.
+TEST(RunWorkload, RecordsWhatHappens) {
+  const std::string folder = ::testing::TempDir() + "redag_run_flight." + std::to_string(::getpid());
+  RunOptions options;
+  options.duration = 300 * kMillisecond;
+  options.flight = folder;
+  const Result<RunResult> result = run_workload(two_rates(1, PreemptionMode::None), options);
+  ASSERT_TRUE(result) << to_string(result.error());
+  const Result<trace::Recovered> recorded = trace::recover(folder);
+  ASSERT_TRUE(recorded) << to_string(recorded.error());
+  const std::vector<JobEvent> &events = recorded->trace.events;
+  ASSERT_GT(events.size(), 100U);
+  ASSERT_LE(events.size(), result->trace.events.size() + 16) << "the trace ends at the halt";
+  const std::size_t common = std::min(events.size(), result->trace.events.size());
+  EXPECT_TRUE(
+      std::equal(events.begin(), events.begin() + static_cast<std::ptrdiff_t>(common), result->trace.events.begin()));
+  EXPECT_EQ(recorded->trace.info.executor, "redag");
+  const Result<RunResult> second = run_workload(two_rates(1, PreemptionMode::None), options);
+  EXPECT_FALSE(second) << "nobody writes over a record";
+  EXPECT_TRUE(trace::remove_flight_record(folder));
 }
 
 }  // namespace

@@ -2,32 +2,54 @@
 
 #include <algorithm>
 
+#include "redag/base/relax.hpp"
 #include "redag/model/demand.hpp"
+#include "redag/runtime/clock.hpp"
 #include "redag/runtime/preemption_point.hpp"
 
 namespace redag::runtime {
 namespace {
 
-// About a microsecond between two looks at the clock, which is a system call.
-void spin_briefly() {
-  for (int i = 0; i < 400; ++i) asm volatile("" ::: "memory");
+// What a reading of the thread's clock costs, which is a system call: the least of some.
+Duration reading_cost() {
+  static const Duration kCost = [] {
+    Duration least = kMicrosecond;
+    Duration before = thread_cpu_now();
+    for (int i = 0; i < 32; ++i) {
+      const Duration now = thread_cpu_now();
+      least = std::min(least, now - before);
+      before = now;
+    }
+    return std::max<Duration>(least, 1);
+  }();
+  return kCost;
+}
+
+// Spins for `time` on a clock that costs no system call. Being preempted meanwhile ends it early, never late.
+void spin_for(Duration time, const std::atomic<bool> &give_up) {
+  const Time end = monotonic_now() + time;
+  while (monotonic_now() < end && !give_up.load(std::memory_order_relaxed)) relax();
 }
 
 }  // namespace
 
 void burn(Duration demand, Duration region, const std::atomic<bool> &give_up) {
+  // The reading that tells the end, and the engine's own after it, are work of the job as well.
+  const Duration enough = demand - 2 * reading_cost();
   Duration next_point = region > 0 ? region : kNever;
-  for (Duration used = job_cpu_time(); used < demand; used = job_cpu_time()) {
+  for (Duration used = job_cpu_time(); used < enough; used = job_cpu_time()) {
     if (give_up.load(std::memory_order_relaxed)) return;
     if (used >= next_point) {
       preemption_point();
       next_point += region;
+      continue;
     }
-    spin_briefly();
+    spin_for(std::min(enough, next_point) - used, give_up);
   }
 }
 
 std::vector<Body> synthetic_bodies(const Workload &workload, std::uint64_t seed, const std::atomic<bool> &give_up) {
+  (void)reading_cost();  // measured here, and not in a job
   std::vector<Body> bodies;
   for (const TaskRef &ref : flatten(workload)) {
     bodies.emplace_back([task = ref.task, seed, &give_up](const Job &job) {

@@ -11,7 +11,8 @@
 
 namespace redag::runtime {
 
-/// Uses `demand` of the calling job's own processor time, so that being preempted does not shorten its work; calls
+/// Uses `demand` of the calling job's own processor time, so that being preempted does not shorten its work: not more,
+/// unless the machine stalls at the end, and less by the cost of two readings of the thread's clock at most. Calls
 /// preemption_point() every `region` (0: never). Ends early once `give_up` is set.
 void burn(Duration demand, Duration region, const std::atomic<bool> &give_up);
 

@@ -4,6 +4,7 @@
 
 #include <pthread.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <ctime>
 #include <functional>
@@ -24,7 +25,12 @@ struct ThreadSetup {
   std::string name;       // shown by top -H and ps; cut to 15 characters
   int fifo_priority = 0;  // SCHED_FIFO, 1 to 99; 0: stays as it is created
   std::vector<int> cpus;  // may run only there; empty: wherever the process may
+  // Bytes of its stack that it touches first, so that bodies meet no page fault there; with lock_memory() for good.
+  std::size_t touched_stack = 0;
 };
+
+/// Enough for a callback that keeps its large objects elsewhere.
+inline constexpr std::size_t kTouchedStack = std::size_t{256} << 10;
 
 /// Applies it to the calling thread, with a timer slack of 1 ns (the default of 50 us is most of an idle timer's
 /// lateness). Error: the first thing that the system refused.

@@ -1,9 +1,14 @@
 #include "redag/runtime/threads.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <thread>
+#include <vector>
 
 #include "redag/runtime/mode.hpp"
 
@@ -61,6 +66,30 @@ TEST(Threads, AThreadIsNoLongerUrgentWhenItsWorkIsDone) {
   thread->join();
   EXPECT_EQ(at_work, 7);
   EXPECT_EQ(at_its_end, 0);
+}
+
+/// How many of the pages that lie below the caller's frame on its stack are in memory.
+std::size_t resident_pages_below(std::size_t bytes) {
+  const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+  const auto here = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0)) / page * page;
+  std::vector<unsigned char> resident(bytes / page);
+  EXPECT_EQ(mincore(reinterpret_cast<void *>(here - bytes), bytes, resident.data()), 0);
+  return static_cast<std::size_t>(std::count_if(resident.begin(), resident.end(), [](auto r) { return (r & 1) != 0; }));
+}
+
+TEST(Threads, TouchTheirStackWhereThatIsAskedFor) {
+  constexpr std::size_t kLooked = std::size_t{192} << 10;
+  const std::size_t all = kLooked / static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  const auto resident_with = [&](std::size_t touched) {
+    std::size_t resident = 0;
+    Result<ThreadHandle> thread =
+        start_thread({"stack", 0, {}, touched}, [&] { resident = resident_pages_below(kLooked); });
+    EXPECT_TRUE(thread) << to_string(thread.error());
+    thread->join();
+    return resident;
+  };
+  EXPECT_EQ(resident_with(kTouchedStack), all);
+  EXPECT_EQ(resident_with(std::size_t{1} << 40), all) << "more than there is";
 }
 
 TEST(ResolveMode, AutoTakesOsWhereItCanAndSaysWhy) {

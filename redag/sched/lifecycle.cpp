@@ -229,7 +229,8 @@ TaskId Lifecycle::append_task(DagId dag, std::uint32_t rank, const Task &task) {
 // preemption; HI mode, that skips and demotes all there is.
 void Lifecycle::reserve_step() {
   events_.reserve(3 * jobs_.size() + 64);
-  dispatches_.reserve(3 * std::size_t{config_.workers} + 16);
+  // Any started job can change its level.
+  dispatches_.reserve(3 * std::size_t{config_.workers} + jobs_.size() + 16);
 }
 
 // Removed tasks of which nothing is left leave the order of priority, and with reuse_ids also their places.
@@ -346,8 +347,7 @@ void Lifecycle::start(std::uint32_t slot, WorkerId worker, std::uint32_t over, s
   job.state = JobState::Running;
   job.worker = worker;
   emit(job, JobEventKind::Dispatched, job.deadline);
-  dispatches_.push_back(Dispatch{JobSlot(slot), job.task, job.number, job.release, worker,
-                                 over == kNil ? JobSlot() : JobSlot(over), false, level});
+  tell(slot, DispatchKind::Start, over, level);
 }
 
 void Lifecycle::suspend(std::uint32_t slot) {
@@ -361,13 +361,27 @@ void Lifecycle::resume(std::uint32_t slot, WorkerId worker, std::uint32_t over, 
   job.state = JobState::Running;
   job.worker = worker;
   emit(job, JobEventKind::Resumed, 0);
-  dispatches_.push_back(Dispatch{JobSlot(slot), job.task, job.number, job.release, worker,
-                                 over == kNil ? JobSlot() : JobSlot(over), true, level});
+  tell(slot, DispatchKind::Resume, over, level);
 }
 
 void Lifecycle::change_level(std::uint32_t slot, std::uint32_t level) {
+  // What an earlier change of this step said no longer counts, and leaves its place: so no step outgrows its storage.
+  std::erase_if(dispatches_,
+                [slot](const Dispatch &d) { return d.kind == DispatchKind::Level && d.job == JobSlot(slot); });
+  tell(slot, DispatchKind::Level, kNil, level);
+}
+
+void Lifecycle::tell(std::uint32_t slot, DispatchKind kind, std::uint32_t over, std::uint32_t level) {
   const Job &job = jobs_[slot];
-  dispatches_.push_back(Dispatch{JobSlot(slot), job.task, job.number, job.release, job.worker, JobSlot(), true, level});
+  dispatches_.push_back(Dispatch{.job = JobSlot(slot),
+                                 .task = job.task,
+                                 .number = job.number,
+                                 .release = job.release,
+                                 .worker = job.worker,
+                                 .over = over == kNil ? JobSlot() : JobSlot(over),
+                                 .kind = kind,
+                                 .inherits = job.priority_of != job.task,
+                                 .level = level});
 }
 
 void Lifecycle::defer(std::uint32_t slot) {

@@ -127,7 +127,7 @@ class Lifecycle : public Scheduler {
   void start(std::uint32_t slot, WorkerId worker, std::uint32_t over, std::uint32_t level);
   void suspend(std::uint32_t slot);
   void resume(std::uint32_t slot, WorkerId worker, std::uint32_t over, std::uint32_t level);
-  /// Tells the driver that a running job now has another level.
+  /// Tells the driver that a started job, running or suspended, now has another level.
   void change_level(std::uint32_t slot, std::uint32_t level);
   void defer(std::uint32_t slot);
 
@@ -180,6 +180,7 @@ class Lifecycle : public Scheduler {
   std::uint32_t take_slot(TaskState &task);
   void free_slot(std::uint32_t slot);
   void emit(const Job &job, JobEventKind kind, std::int64_t value, Reason reason = Reason::None);
+  void tell(std::uint32_t slot, DispatchKind kind, std::uint32_t over, std::uint32_t level);
 
   struct Group {
     std::map<std::string, std::uint32_t>::iterator name;

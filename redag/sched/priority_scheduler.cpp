@@ -201,7 +201,15 @@ void PriorityScheduler::inherit(std::uint32_t holder_slot, const Job &waiter) {
   holder.priority_of = waiter.priority_of;
   holder.sequence = waiter.sequence;
   if (is_queued) push(holder_slot);
-  if (holder.state == JobState::Running && level_of(holder) != old_level) change_level(holder_slot, level_of(holder));
+  tell_level(holder_slot, old_level);
+}
+
+// Full: the operating system schedules suspended jobs too, by the level that it was told last. Cooperative: a suspended
+// job is under others on its worker until the scheduler resumes it.
+void PriorityScheduler::tell_level(std::uint32_t slot, std::uint32_t old_level) {
+  const Job &job = jobs_[slot];
+  const bool is_scheduled = job.state == JobState::Running || config_.preemption == Preemption::Full;
+  if (is_scheduled && level_of(job) != old_level) change_level(slot, level_of(job));
 }
 
 void PriorityScheduler::on_lowered(std::uint32_t slot) {
@@ -213,7 +221,7 @@ void PriorityScheduler::on_lowered(std::uint32_t slot) {
   job.rank = task_of(job).rank;
   job.priority_of = job.task;
   if (is_queued) push(slot);
-  if (job.state == JobState::Running && level_of(job) != old_level) change_level(slot, level_of(job));
+  tell_level(slot, old_level);
   // Jobs that wait for its group are looked at again, and it inherits from those that are left. Among them are jobs
   // that wait for a thread: the group comes first when they are looked at.
   if (task_of(job).group == kNil) return;
@@ -332,7 +340,7 @@ void PriorityScheduler::on_reconfigured() {
     job.parked_at = kNil;
     if (job.state == JobState::Ready) push(slot);
     if (!job.started()) continue;
-    if (job.state == JobState::Running) change_level(slot, level_of(job));
+    tell_level(slot, kNil);
     if (job.state == JobState::Suspended && config_.preemption == Preemption::Full) push(slot);
     hold_gates(slot);
   }

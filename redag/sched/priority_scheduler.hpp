@@ -63,6 +63,7 @@ class PriorityScheduler final : public Lifecycle {
   [[nodiscard]] std::uint32_t least_urgent_running() const;
   [[nodiscard]] bool outranks(const Job &a, const Job &b) const;
   [[nodiscard]] std::uint32_t level_of(const Job &job) const;
+  void tell_level(std::uint32_t slot, std::uint32_t old_level);
   void run(std::uint32_t slot, const Place &place);
   void make_way(const Place &place);
   bool park_if_not_eligible(std::uint32_t slot);

@@ -306,8 +306,9 @@ TEST(PriorityScheduler, AllocatesNothingInSteadyState) {
         } else if (some.valid() && preemption == Preemption::Cooperative) {
           scheduler.preemption_point(some, now);
         }
-        for (const Dispatch &dispatch : scheduler.dispatch(now).dispatches)
-          running[dispatch.worker.value] = dispatch.job;
+        for (const Dispatch &dispatch : scheduler.dispatch(now).dispatches) {
+          if (dispatch.kind != DispatchKind::Level) running[dispatch.worker.value] = dispatch.job;
+        }
       }
       EXPECT_EQ(redag::testing::allocation_count(), before_run);
     }
@@ -360,7 +361,7 @@ TEST(PriorityScheduler, ReusedIdsKeepMemoryFlat) {
       running.pop_back();
     }
     for (const Dispatch &dispatch : scheduler.dispatch(now).dispatches) {
-      if (!dispatch.resume) running.push_back(dispatch.job);
+      if (dispatch.kind == DispatchKind::Start) running.push_back(dispatch.job);
     }
   }
   EXPECT_GT(group_number, 2'000U);
@@ -380,6 +381,27 @@ TEST(PriorityScheduler, WithoutReuseAnIdNamesOneTaskForEver) {
     scheduler.remove_task(id, 0);
     scheduler.release(id, 1, 1);  // ignored
     EXPECT_EQ(scheduler.accounting(id), (Accounting{1, 0, 1, 0, 0}));
+  }
+}
+
+// The operating system schedules suspended jobs too: a driver that does not hear of their levels inverts priorities.
+TEST(PriorityScheduler, TheLevelOfASuspendedJobIsTold) {
+  const Workload workload = make_workload({make_dag("a", {{"slow", 100}, {"fast", 50}})}, 1);
+  PriorityScheduler scheduler(workload, {1, Preemption::Full, PolicyKind::RateMonotonic, 0, 0});
+  scheduler.release(TaskId(0), 0, 0);
+  const JobSlot slow = scheduler.dispatch(0).dispatches[0].job;
+  scheduler.release(TaskId(1), 1, 1);
+  EXPECT_EQ(scheduler.dispatch(1).dispatches[0].over, slow);
+  scheduler.add_dag(make_dag("b", {{"x", 1}, {"y", 1}}), 2);
+  scheduler.set_timing(TaskId(1), 40 * kMillisecond, 40 * kMillisecond,
+                       2);  // what is told twice in one step counts once
+  const Step step = scheduler.dispatch(2);
+  ASSERT_EQ(step.dispatches.size(), 2U);
+  EXPECT_TRUE(step.events.empty());
+  for (const Dispatch &dispatch : step.dispatches) {
+    EXPECT_EQ(dispatch.kind, DispatchKind::Level);
+    EXPECT_EQ(dispatch.level, dispatch.job == slow ? 3U : 2U);
+    EXPECT_FALSE(dispatch.inherits);
   }
 }
 

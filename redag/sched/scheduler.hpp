@@ -50,17 +50,23 @@ enum class Outcome : std::uint8_t {
 /// Of dispatch(): as many jobs as there are places.
 inline constexpr std::uint32_t kNoLimit = 0xffffffff;
 
-/// One decision: run `job` on `worker` from now. With `resume`, for a job that runs there already: only its level
-/// changed.
+enum class DispatchKind : std::uint8_t {
+  Start,   // the job begins on `worker`
+  Resume,  // the job, suspended until now, goes on, on `worker`
+  Level,   // the started job keeps its state, running or suspended; only its level changed
+};
+
+/// One decision, effective now. Of several for one job in a step, the last one holds.
 struct Dispatch {
   JobSlot job;
   TaskId task;
   std::uint32_t number = 0;  // of the job within its task
   Time release = 0;          // nominal
   WorkerId worker;
-  JobSlot over;         // the job that loses the worker (Full), or is suspended under this one (Cooperative); or none
-  bool resume = false;  // the job had started before
-  std::uint32_t level = 0;  // priority level at which it runs, 0 the most urgent; inherited priority included
+  JobSlot over;  // the job that loses the worker (Full), or is suspended under this one (Cooperative); or none
+  DispatchKind kind = DispatchKind::Start;
+  bool inherits = false;    // its level is that of a more urgent job, which waits for it
+  std::uint32_t level = 0;  // its priority level, 0 the most urgent; inherited priority included
 };
 
 /// Valid until the next call.

@@ -184,12 +184,12 @@ class Simulation {
   }
 
   void give_processor(const sched::Dispatch &dispatch) {
+    if (dispatch.kind == sched::DispatchKind::Level) return;  // who runs is told apart
     Processor &processor = processors_[dispatch.worker.value];
-    if (dispatch.resume && processor.job == dispatch.job) return;  // it runs already; only its level changed
     REDAG_CHECK(!processor.job.valid(), "the scheduler gave a processor to two jobs");
     if (dispatch.job.value >= progress_.size()) progress_.resize(dispatch.job.value + 1);
     Progress &progress = progress_[dispatch.job.value];
-    if (dispatch.resume) {
+    if (dispatch.kind == sched::DispatchKind::Resume) {
       progress.left += options_.overheads.preempt;
       progress.lead += options_.overheads.preempt;
     } else {
@@ -254,6 +254,10 @@ class Simulation {
 Result simulate(const Workload &workload, sched::Scheduler &scheduler, std::uint32_t workers, const Options &options,
                 const EventSink &sink) {
   return Simulation(workload, scheduler, workers, options, sink).run();
+}
+
+Overheads overheads_of(const redag::Overheads &machine) {
+  return Overheads{.release = machine.timer, .dispatch = machine.dispatch, .preempt = machine.preempt};
 }
 
 sched::Config simulated_config(const Workload &workload) {

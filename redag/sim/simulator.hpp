@@ -8,6 +8,7 @@
 #include <span>
 
 #include "redag/model/job_event.hpp"
+#include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/scheduler.hpp"
 
@@ -19,6 +20,9 @@ struct Overheads {
   Duration dispatch = 0;  // starting a job: spent on its worker before the body
   Duration preempt = 0;   // each resumption after a preemption: spent on the worker before going on
 };
+
+/// Those of a machine, as far as the simulator has them: it knows no stalls and no late releases.
+[[nodiscard]] Overheads overheads_of(const redag::Overheads &machine);
 
 struct Options {
   Duration horizon = kSecond;  // releases happen in [0, horizon); jobs unfinished at the horizon are in flight

@@ -78,11 +78,29 @@ struct Observed {
 
 void observe(const metrics::JudgedJob &job, const analysis::System &system, Observed &observed) {
   const TaskId task = job.record.task;
+  if (task.value >= system.tasks.size()) return;  // a stall
   if (job.miss == metrics::Miss::Lost) ++observed.lost[task.value];
   if (job.record.outcome == metrics::JobOutcome::Finished) ++observed.finished[task.value];
   if (job.response) observed.tasks[task.value] = std::max(observed.tasks[task.value], *job.response);
   Duration &dag = observed.dags[system.tasks[task.value].dag.value];
   if (job.end_to_end) dag = std::max(dag, *job.end_to_end);
+}
+
+// Stalls as the analysis means them: on each worker a job above all others, `stall.longest` long, as often as
+// `stall.per_second` allows. Requires a policy and a preemption mode with which they are above all others.
+Duration add_stalls(Workload &workload, const analysis::AnalysisPlatform &platform, const Run &run) {
+  if (platform.stall.longest == 0) return 0;
+  for (std::uint32_t w = 0; w < platform.workers; ++w) {
+    Task task;
+    task.name = fmt::format("stall{}", w);
+    task.wcet = task.bcet = task.period = task.deadline = platform.stall.longest;
+    task.offset = Rng::stream(run.seed + 3, w, 0).uniform(0, 40);
+    workload.dags.push_back(Dag{});
+    workload.dags.back().name = task.name;
+    workload.dags.back().tasks.push_back(std::move(task));
+  }
+  if (platform.stall.per_second == 0) return kMaxDuration / 4;  // one alone
+  return (platform.stall.longest * kSecond + platform.stall.per_second - 1) / platform.stall.per_second;
 }
 
 void simulate_run(const BoundCase &bound_case, const analysis::System &system, const Run &run,
@@ -112,23 +130,32 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
   const analysis::AnalysisPlatform &platform = bound_case.platform;
   options.horizon = (property.periods + 1) * longest + 1;
   options.overheads = {platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead};
+  const std::size_t tasks = unit_of.size();
+  const Duration between_stalls = add_stalls(workload, platform, run);
   options.demand = [&](const Task &task, TaskId id, std::uint32_t number) {
+    if (id.value >= tasks) return task.wcet - platform.release_overhead - platform.dispatch_overhead;
     Rng rng = Rng::stream(run.seed, id.value, number);
     return rng.uniform01() < run.full_demand ? task.wcet : rng.uniform(1, task.wcet);
   };
   options.gap = [&](const Task &task, TaskId id, std::uint32_t number) -> Duration {
+    if (id.value >= tasks) {
+      Rng rng = Rng::stream(run.seed + 3, id.value, number + 1);
+      return between_stalls - task.period + (run.gap > 0 ? rng.uniform(0, 20) : 0);
+    }
     if (!can_pause[id.value]) return 0;
     Rng rng = Rng::stream(run.seed + 1, unit_of[id.value], number);
     return rng.uniform01() < run.gap ? rng.uniform(1, task.period) : 0;
   };
   options.jitter = [&](const Task &task, TaskId id, std::uint32_t number) -> Duration {
+    if (id.value >= tasks) return 0;
+    const Duration latest = task.jitter + platform.lateness;
     switch (run.jitter) {
       case Run::Jitter::None: return 0;
-      case Run::Jitter::First: return number == 0 ? task.jitter : 0;
-      case Run::Jitter::Largest: return task.jitter;
+      case Run::Jitter::First: return number == 0 ? latest : 0;
+      case Run::Jitter::Largest: return latest;
       case Run::Jitter::Random: break;
     }
-    return Rng::stream(run.seed + 2, id.value, number).uniform(0, task.jitter);
+    return Rng::stream(run.seed + 2, id.value, number).uniform(0, latest);
   };
 
   sched::Config config;

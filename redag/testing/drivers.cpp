@@ -62,7 +62,8 @@ class RandomJobs {
       for (Started &job : started_) {
         if (dispatch.over.valid() && job.slot == dispatch.over) job.runs = false;
       }
-      if (!dispatch.resume) {
+      if (dispatch.kind == sched::DispatchKind::Level) continue;
+      if (dispatch.kind == sched::DispatchKind::Start) {
         started_.push_back({dispatch.job, dispatch.task, true, false, false});
         continue;
       }

@@ -40,11 +40,12 @@ ManualWorkers &ManualWorkers::decide() {
     }
     const auto known =
         std::find_if(started_.begin(), started_.end(), [&](const Started &s) { return s.job == dispatch.job; });
-    REDAG_CHECK((known != started_.end()) == dispatch.resume, "a job is started once and then resumed");
-    if (dispatch.resume) {
-      known->worker = dispatch.worker;
-    } else {
+    const bool starts = dispatch.kind == sched::DispatchKind::Start;
+    REDAG_CHECK((known == started_.end()) == starts, "a job is started once and then resumed");
+    if (starts) {
       started_.push_back({dispatch.job, dispatch.task, dispatch.worker});
+    } else if (dispatch.kind == sched::DispatchKind::Resume) {
+      known->worker = dispatch.worker;
     }
   }
   events_.insert(events_.end(), step.events.begin(), step.events.end());

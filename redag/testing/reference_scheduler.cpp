@@ -524,8 +524,8 @@ bool ReferenceScheduler::can_start(std::size_t job, Time now) {
 
 void ReferenceScheduler::place(std::size_t job, std::uint32_t worker, Time now) {
   Job &j = jobs_[job];
-  Dispatch decision{JobSlot(job),     TaskId(j.task),  j.number, j.release,
-                    WorkerId(worker), JobSlot::none(), false,    level_of(job)};
+  j.worker = worker;
+  Dispatch decision = decision_of(job);
   Stack &stack = workers_[worker];
   if (!stack.empty()) {
     Job &under = jobs_[stack.back()];
@@ -534,13 +534,12 @@ void ReferenceScheduler::place(std::size_t job, std::uint32_t worker, Time now) 
     under.state = State::Suspended;
     if (config_.preemption == Preemption::Full) stack.pop_back();
   }
-  decision.resume = j.state == State::Suspended;
+  const bool resumes = j.state == State::Suspended;
+  if (resumes) decision.kind = sched::DispatchKind::Resume;
   j.state = State::Running;
-  j.worker = worker;
   j.told_level = decision.level;
   stack.push_back(job);
-  emit(decision.resume ? JobEventKind::Resumed : JobEventKind::Dispatched, job, now, decision.resume ? 0 : j.deadline,
-       worker);
+  emit(resumes ? JobEventKind::Resumed : JobEventKind::Dispatched, job, now, resumes ? 0 : j.deadline, worker);
   dispatches_.push_back(decision);
 }
 
@@ -553,19 +552,32 @@ void ReferenceScheduler::resume_uncovered(Time now) {
     jobs_[top].state = State::Running;
     jobs_[top].told_level = level_of(top);
     emit(JobEventKind::Resumed, top, now, 0, w);
-    dispatches_.push_back(Dispatch{JobSlot(top), TaskId(jobs_[top].task), jobs_[top].number, jobs_[top].release,
-                                   WorkerId(w), JobSlot::none(), true, level_of(top)});
+    dispatches_.push_back(decision_of(top));
+    dispatches_.back().kind = sched::DispatchKind::Resume;
   }
 }
 
-/// The driver has to know when a running job inherits a level.
+Dispatch ReferenceScheduler::decision_of(std::size_t job) const {
+  const Job &j = jobs_[job];
+  return Dispatch{.job = JobSlot(job),
+                  .task = TaskId(j.task),
+                  .number = j.number,
+                  .release = j.release,
+                  .worker = WorkerId(j.worker),
+                  .over = JobSlot::none(),
+                  .level = level_of(job)};
+}
+
+/// The driver has to know when a job that it schedules gets another level: with full preemption also a suspended one.
 void ReferenceScheduler::tell_levels() {
   for (std::size_t i = 0; i < jobs_.size(); ++i) {
     Job &j = jobs_[i];
-    if (j.state != State::Running || j.told_level == level_of(i)) continue;
+    const bool is_scheduled =
+        j.state == State::Running || (j.state == State::Suspended && config_.preemption == Preemption::Full);
+    if (!is_scheduled || j.told_level == level_of(i)) continue;
     j.told_level = level_of(i);
-    dispatches_.push_back(Dispatch{JobSlot(i), TaskId(j.task), j.number, j.release, WorkerId(j.worker), JobSlot::none(),
-                                   true, j.told_level});
+    dispatches_.push_back(decision_of(i));
+    dispatches_.back().kind = sched::DispatchKind::Level;
   }
 }
 

@@ -135,6 +135,7 @@ class ReferenceScheduler final : public sched::Scheduler {
   [[nodiscard]] bool can_start(std::size_t job, Time now);
   void place(std::size_t job, std::uint32_t worker, Time now);
   void resume_uncovered(Time now);
+  [[nodiscard]] sched::Dispatch decision_of(std::size_t job) const;
   void tell_levels();
   void emit(JobEventKind kind, std::size_t job, Time now, std::int64_t value, std::uint32_t worker,
             Reason reason = Reason::None);

@@ -44,9 +44,9 @@ using Script = std::vector<ScriptStep>;
 [[nodiscard]] std::string describe(const Script &script);
 
 /// The first difference between the decisions of `tested` and of `expected`, in words; nothing where they are equal.
-/// After every dispatch the events, the accounting of all tasks and the levels of the running jobs are compared. Free
-/// to choose are the order of neighbouring Resumed events and of the Skipped ones of a removed DAG, and whether a job
-/// that waits for its group or a thread is found to be deferred as well.
+/// After every dispatch the events, the accounting of all tasks and the levels of the jobs in progress are compared.
+/// Free to choose are the order of neighbouring Resumed events and of the Skipped ones of a removed DAG, and whether a
+/// job that waits for its group or a thread is found to be deferred as well.
 [[nodiscard]] std::optional<std::string> find_difference(sched::Scheduler &tested, sched::Scheduler &expected,
                                                          const Workload &workload, const sched::Config &config,
                                                          const Script &script);

@@ -43,6 +43,9 @@ class TraceBuilder {
   TraceBuilder &started(const char *task, std::uint32_t job, std::uint32_t worker) {
     return add(JobEventKind::Started, task, job, now_, worker);
   }
+  TraceBuilder &executed(const char *task, std::uint32_t job, std::uint32_t worker, Time used_ms) {
+    return add(JobEventKind::Executed, task, job, used_ms * kMillisecond, worker);
+  }
   TraceBuilder &preempted(const char *task, std::uint32_t job, std::uint32_t worker) {
     return add(JobEventKind::Preempted, task, job, 0, worker);
   }

@@ -74,11 +74,6 @@ bool read_event(std::string_view line, JobEvent &event) {
 
 bool is_a_time(std::int64_t time) { return time >= -kMaxTraceTime && time <= kMaxTraceTime; }
 
-// A deadline lies behind the end of the longest run at most by the longest deadline there is.
-bool is_a_value(std::int64_t value) {
-  return value >= -kMaxTraceTime - kMaxDuration && value <= kMaxTraceTime + kMaxDuration;
-}
-
 struct Footer {
   std::uint64_t events = 0;
   Time end = 0;
@@ -99,17 +94,6 @@ std::optional<Footer> read_footer(std::string_view line) {
   return Footer{events->get<std::uint64_t>(), end->get<std::int64_t>(), lost->get<std::uint64_t>()};
 }
 
-Result<RunInfo> read_header(std::string_view line, const std::string &file) {
-  if (json_nests_deeper(line)) return file_error(file, 1, "not an event trace: nested too deep");
-  const nlohmann::ordered_json json = nlohmann::ordered_json::parse(line, nullptr, false);
-  const auto format = json.is_object() ? json.find("format") : json.end();
-  if (!json.is_object() || format == json.end() || *format != kFormat || !json.contains("run")) {
-    return file_error(file, 1, "not an event trace: the first line must have \"format\": \"redag.events/1\"",
-                      "traces are written by 'redag simulate' and 'redag run' with --out");
-  }
-  return run_info_from_json(json["run"].dump(), file, 1);
-}
-
 }  // namespace
 
 Result<EventsWriter> EventsWriter::create(const std::string &path, const RunInfo &info) {
@@ -117,7 +101,7 @@ Result<EventsWriter> EventsWriter::create(const std::string &path, const RunInfo
   if (has_errors(mistakes)) return tl::unexpected<Diagnostics>(std::move(mistakes));
   Result<OutputFile> file = OutputFile::create(path);
   if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));
-  file->write(fmt::format("{{\"format\":\"{}\",\"run\":{}}}\n", kFormat, run_info_to_json(info)));
+  file->write(run_header_to_json(kFormat, info) + "\n");
   return EventsWriter(std::move(*file));
 }
 
@@ -162,7 +146,7 @@ Result<Trace> parse_trace(std::string_view text, const std::string &file) {
     text.remove_prefix(length == std::string_view::npos ? text.size() : length + 1);
     ++number;
     if (number == 1) {
-      Result<RunInfo> info = read_header(line, file);
+      Result<RunInfo> info = run_header_from_json(line, kFormat, "an event trace", file);
       if (!info) return tl::unexpected<Diagnostics>(std::move(info.error()));
       trace.info = std::move(*info);
       task_count = trace.info.workload.task_count();
@@ -174,7 +158,7 @@ Result<Trace> parse_trace(std::string_view text, const std::string &file) {
     if (!line.empty() && line.front() == '{') {
       footer = read_footer(line);
       if (!footer) return file_error(file, number, "the last line must have events, end_ns and lost_events");
-    } else if (!read_event(line, event) || !is_a_time(event.time) || !is_a_value(event.value)) {
+    } else if (!read_event(line, event) || !has_valid_times(event)) {
       return file_error(file, number, "not an event", "an event is [time,\"kind\",task,job,worker,value,\"reason\"]");
     } else if (event.task.value >= task_count) {
       return file_error(file, number, "task " + std::to_string(event.task.value) + " is not in the workload");

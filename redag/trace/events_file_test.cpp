@@ -30,6 +30,7 @@ Trace example() {
   trace.info.warm_up = 5;
   trace.info.overheads = "dispatch 3us";
   trace.info.machine = Machine{8, "Linux 6.1", "a processor"};
+  trace.info.provenance = {"2026-01-31T12:00:00Z", "0.1.0", "0123abc", "robot", "Linux 6.1", "redag run 'a b'", "none"};
   Rng rng(1);
   for (int i = 0; i < 300; ++i) {
     JobEvent event;
@@ -69,7 +70,18 @@ TEST_F(EventsFile, ReadsBackEverything) {
   EXPECT_EQ(after->info.seed, before.info.seed);
   EXPECT_EQ(after->info.end, before.info.end);
   EXPECT_EQ(after->info.machine, before.info.machine);
+  EXPECT_EQ(after->info.provenance, before.info.provenance);
   EXPECT_EQ(after->info.preemption_why, before.info.preemption_why);
+}
+
+TEST_F(EventsFile, OfBeforeThereWasProvenanceIsRead) {
+  Trace before = example();
+  before.info.provenance = {};
+  EXPECT_EQ(written(before).rfind("{\"format\":\"redag.events/1\",\"run\":{", 0), 0U);
+  const Result<Trace> after = read_trace(path_);
+  ASSERT_TRUE(after) << to_string(after.error());
+  EXPECT_FALSE(after->info.provenance.is_known());
+  EXPECT_FALSE(parse_trace("{\"format\":\"redag.events/1\",\"provenance\":7,\"run\":{}}\n", "file"));
 }
 
 TEST_F(EventsFile, EveryDriverIsReadBack) {

@@ -84,7 +84,12 @@ Result<std::string> read_file(const std::string &path, std::size_t most) {
   if (descriptor < 0) return file_error(path, 0, std::string("cannot open: ") + std::strerror(errno));
   std::string text;
   struct stat status {};
-  if (::fstat(descriptor, &status) == 0 && status.st_size > 0) {
+  const bool known = ::fstat(descriptor, &status) == 0;
+  if (known && S_ISCHR(status.st_mode)) {  // /dev/zero has no end
+    ::close(descriptor);
+    return file_error(path, 0, "is a device, not a file");
+  }
+  if (known && status.st_size > 0) {
     text.reserve(std::min(static_cast<std::size_t>(status.st_size), most));
   }
   std::string block(kBufferSize, '\0');

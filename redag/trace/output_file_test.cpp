@@ -92,11 +92,14 @@ TEST(OutputFile, FullDiskIsReported) {
   fs::remove_all(directory);
 }
 
-// Whatever it says its size is.
-TEST(ReadFile, WhatHasNoEndIsAnError) {
-  const auto text = read_file("/dev/zero", std::size_t{3} << 20U);
-  ASSERT_FALSE(text);
-  EXPECT_EQ(text.error().front().message, "longer than 3 MiB");
+TEST(ReadFile, DevicesAndLongFilesAreErrors) {
+  const auto device = read_file("/dev/zero");
+  ASSERT_FALSE(device);
+  EXPECT_EQ(device.error().front().message, "is a device, not a file");
+  // Whatever it says its size is.
+  const auto kernel = read_file("/proc/self/maps", 16);
+  ASSERT_FALSE(kernel);
+  EXPECT_EQ(kernel.error().front().message, "longer than 0 MiB");
 }
 
 TEST(ReadFile, MissingFileIsAnError) {

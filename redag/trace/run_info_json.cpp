@@ -154,4 +154,28 @@ Result<RunInfo> run_info_from_json(std::string_view text, const std::string &fil
   }
 }
 
+std::string run_header_to_json(std::string_view format, const RunInfo &info) {
+  std::string text = "{\"format\":\"" + std::string(format) + "\",";
+  if (info.provenance.is_known()) text += "\"provenance\":" + provenance_to_json(info.provenance) + ",";
+  return text + "\"run\":" + run_info_to_json(info) + "}";
+}
+
+Result<RunInfo> run_header_from_json(std::string_view text, std::string_view format, const char *what,
+                                     const std::string &file) {
+  const std::string wrong = std::string("not ") + what + ": ";
+  if (json_nests_deeper(text)) return file_error(file, 1, wrong + "nested too deep");
+  const Json json = Json::parse(text, nullptr, false);
+  const auto given = json.is_object() ? json.find("format") : json.end();
+  if (!json.is_object() || given == json.end() || *given != format || !json.contains("run")) {
+    return file_error(file, 1, wrong + "the first line must have \"format\": \"" + std::string(format) + "\"",
+                      "it is written by 'redag run' with --out, and traces by 'redag simulate', too");
+  }
+  Result<RunInfo> info = run_info_from_json(json["run"].dump(), file, 1);
+  if (!info || !json.contains("provenance")) return info;
+  Result<Provenance> provenance = provenance_from_json(json["provenance"].dump());
+  if (!provenance) return file_error(file, 1, provenance.error().front().message);
+  info->provenance = *std::move(provenance);
+  return info;
+}
+
 }  // namespace redag::trace

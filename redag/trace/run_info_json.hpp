@@ -1,5 +1,5 @@
-// RunInfo as a JSON object: the "run" of events.jsonl and of summary.json. The workload stands in it as its YAML text.
-// Pure functions.
+// RunInfo as a JSON object: the "run" of events.jsonl, summary.json and flight records. The workload stands in it as
+// its YAML text. Pure functions.
 #pragma once
 
 #include <string>
@@ -16,5 +16,12 @@ namespace redag::trace {
 
 /// The reverse. Errors (missing or ill-typed keys, an invalid workload) name `file` and `line`.
 [[nodiscard]] Result<RunInfo> run_info_from_json(std::string_view text, const std::string &file, int line);
+
+/// What a file of a run begins with: its format, where it comes from, the run. The same requirements.
+[[nodiscard]] std::string run_header_to_json(std::string_view format, const RunInfo &info);
+
+/// The reverse, for line 1 of a file; `what` says what it should be ("an event trace").
+[[nodiscard]] Result<RunInfo> run_header_from_json(std::string_view text, std::string_view format, const char *what,
+                                                   const std::string &file);
 
 }  // namespace redag::trace

@@ -1,7 +1,6 @@
 #include "redag/trace/trace.hpp"
 
 #include <sched.h>
-#include <sys/utsname.h>
 
 #include <fstream>
 
@@ -21,6 +20,13 @@ std::string processor_name() {
 }
 
 }  // namespace
+
+bool has_valid_times(const JobEvent &event) {
+  // A deadline lies behind the end of the longest run at most by the longest deadline there is.
+  constexpr Time kMaxValue = kMaxTraceTime + kMaxDuration;
+  return event.time >= -kMaxTraceTime && event.time <= kMaxTraceTime && event.value >= -kMaxValue &&
+         event.value <= kMaxValue;
+}
 
 const char *to_string(Driver driver) {
   switch (driver) {
@@ -46,8 +52,7 @@ Machine this_machine() {
   cpu_set_t set;
   CPU_ZERO(&set);
   if (sched_getaffinity(0, sizeof set, &set) == 0) machine.cpus = static_cast<std::uint32_t>(CPU_COUNT(&set));
-  utsname name{};
-  if (uname(&name) == 0) machine.kernel = std::string(name.sysname) + " " + name.release + " " + name.machine;
+  machine.kernel = kernel_name();
   machine.model = processor_name();
   return machine;
 }

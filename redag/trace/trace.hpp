@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "redag/base/provenance.hpp"
 #include "redag/base/time.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/model/workload.hpp"
@@ -50,12 +51,16 @@ struct RunInfo {
   std::uint64_t lost_events = 0;  // dropped by full rings: the stream has holes if > 0
   std::string overheads;          // what the driver added to execution; empty: nothing (the model's ideal machine)
   Machine machine;
+  Provenance provenance;  // of the program that ran it; unknown in files of before there was such a block
 };
 
 struct Trace {
   RunInfo info;
   std::vector<JobEvent> events;
 };
+
+/// Can differences of its times be taken? What a reader has to ask of an event.
+[[nodiscard]] bool has_valid_times(const JobEvent &event);
 
 [[nodiscard]] const char *to_string(Driver driver);
 [[nodiscard]] const char *preemption_name(sched::Preemption mode);

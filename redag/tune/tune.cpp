@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "redag/analysis/analyze.hpp"
+#include "redag/model/demand.hpp"
 
 namespace redag::tune {
 namespace {
@@ -39,13 +40,18 @@ class Tuner {
     tuned.exhaustive = found.exhaustive;
     tuned.stopped = found.stopped;
     tuned.trials = std::move(found.trials);
-    tuned.varies = varies_;
+    tuned.varies = varies(tuned.present.workload);
     hold_out(tuned);
     return tuned;
   }
 
  private:
   using Run = std::array<ClassScore, kCriticalities>;
+
+  static bool varies(const Workload &workload) {
+    return std::any_of(workload.dags.begin(), workload.dags.end(),
+                       [](const Dag &dag) { return std::any_of(dag.tasks.begin(), dag.tasks.end(), demand_varies); });
+  }
 
   Candidate candidate(const Point &point, const std::map<Point, Score> &trials) const {
     return Candidate{point, settings_.apply(point), trials.at(point), {}, {}};
@@ -89,6 +95,9 @@ class Tuner {
     platform.release_overhead = options_.simulation.overheads.release;
     platform.dispatch_overhead = options_.simulation.overheads.dispatch;
     platform.preempt_overhead = options_.simulation.overheads.preempt;
+    if (options_.machine) {
+      platform = analysis::charge(analysis::platform_of(workload), *options_.machine);
+    }
     const Result<analysis::System> system = analysis::compile(workload, platform);
     return system && analysis::analyze(*system).verdict == analysis::Verdict::Schedulable;
   }
@@ -100,8 +109,6 @@ class Tuner {
     for (const std::vector<Run> &runs : simulate(workloads, options_.seed, options_.seeds, options_.stop)) {
       scores.push_back(sum(runs));
       scores.back().changes = static_cast<std::uint32_t>(settings_.changes(points[scores.size() - 1]));
-      const bool same = std::all_of(runs.begin(), runs.end(), [&](const Run &run) { return run == runs.front(); });
-      if (tried_ + scores.size() == 1) varies_ = runs.size() < 2 || !same;
     }
     if (options_.bounds) {
       arena_.execute([&] {
@@ -147,7 +154,6 @@ class Tuner {
   tbb::global_control allow_;
   tbb::task_arena arena_;
   std::uint64_t tried_ = 0;
-  bool varies_ = true;
 };
 
 }  // namespace

@@ -7,10 +7,12 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "redag/base/result.hpp"
+#include "redag/model/overheads.hpp"
 #include "redag/tune/score.hpp"
 #include "redag/tune/setting.hpp"
 
@@ -20,9 +22,10 @@ struct Options {
   Goal goal;
   Freedom freedom;
   Simulation simulation;
-  bool bounds = true;           // a workload that is proven to keep its deadlines comes before one that is not
-  std::uint32_t seeds = 5;      // simulated for each candidate: seed, seed + 1, ...
-  std::uint32_t held_out = 10;  // the seeds after these, for the verdict
+  std::optional<Overheads> machine;  // charged to the bounds instead of those that are simulated
+  bool bounds = true;                // a workload that is proven to keep its deadlines comes before one that is not
+  std::uint32_t seeds = 5;           // simulated for each candidate: seed, seed + 1, ...
+  std::uint32_t held_out = 10;       // the seeds after these, for the verdict
   analysis::SearchEffort effort = {1024, 4, 1};
   std::uint64_t seed = 1;
   std::uint32_t jobs = 0;                             // processors; 0: all
@@ -45,7 +48,7 @@ struct Tuned {
   std::map<analysis::Point, Score> trials;
   bool exhaustive = true;
   bool stopped = false;
-  bool varies = true;  // runs of different seeds differ at all
+  bool varies = true;  // execution times or jitter do, so that runs of different seeds differ
 
   [[nodiscard]] bool changed() const { return best.point != present.point; }
   /// The search found something better that was no better on the seeds held out.

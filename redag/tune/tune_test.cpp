@@ -168,6 +168,24 @@ TEST(Tune, TieOrder) {
   EXPECT_FALSE(tune(tie(), options)->changed());
 }
 
+// Times vary, and yet no job is late with any seed, so that all seeds score the same.
+TEST(Tune, WhatVariesIsDecidedByTheWorkload) {
+  Workload workload =
+      make_workload({make_dag("a", {{"t", 20, 4}}), make_dag("b", {{"t", 40, 4}})}, 2, PreemptionMode::Os);
+  EXPECT_FALSE(tune(workload, quick())->varies);
+  Task &task = workload.dags[1].tasks[0];
+  task.execution.kind = ExecutionTime::Kind::Uniform;
+  task.bcet = task.wcet;
+  EXPECT_FALSE(tune(workload, quick())->varies);
+  task.bcet = task.wcet / 2;
+  const auto tuned = tune(workload, quick());
+  EXPECT_TRUE(tuned->varies);
+  EXPECT_EQ(tuned->best.score.all().missed, 0U);
+  task.execution = {};
+  task.jitter = kMillisecond;
+  EXPECT_TRUE(tune(workload, quick())->varies);
+}
+
 TEST(Tune, WorkersWithinTheLimit) {
   const Workload workload = tie();
   Options options = quick();

@@ -18,7 +18,7 @@ from launch_ros.descriptions import ComposableNode
 
 PACKAGE = 'redag_rclcpp'
 
-# Name, default, description. All but the last two are parameters of the container, by the same name.
+# Name, default, description. All but the last three are parameters of the container, by the same name.
 ARGUMENTS = [
     ('config', '', 'Workload file; by default that of the example, and none where `components` is given'),
     ('workers', '0', 'Callbacks at the same time; 0: what the workload says, or else one a processor'),
@@ -28,6 +28,9 @@ ARGUMENTS = [
     ('metrics_period', '1.0', 'Seconds between /diagnostics and ~/metrics'),
     ('trace', '', 'Folder for results, written at the end'),
     ('save_path', 'redag_workload.yaml', 'Where ~/save writes what was learned'),
+    ('lock_memory', 'false', 'Lock the memory of the process: no page faults'),
+    ('watchdog', '0.0', 'Seconds; callbacks in progress for longer are named; 0: none'),
+    ('inherit', 'true', 'Locks of the middleware inherit priority, where there are real-time priorities'),
     ('name', 'redag_container', 'Name of the container'),
     ('components', 'example', 'Components to load: PACKAGE/PLUGIN, separated by blanks'),
 ]
@@ -62,6 +65,12 @@ def named_components(text):
     return components
 
 
+def is_true(text):
+    if text.lower() not in ('true', 'false'):
+        raise ValueError(f"'{text}' is neither true nor false")
+    return text.lower() == 'true'
+
+
 def container(context):
     values = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
     is_example = values['components'] == 'example'
@@ -74,12 +83,16 @@ def container(context):
             name=values['name'],
             namespace='',
             output='screen',
+            # The container is linked against libredag_pi.so, which reads this.
+            additional_env={'REDAG_PI': '1' if is_true(values['inherit']) else '0'},
             parameters=[{
                 'config': values['config'],
                 'workers': int(values['workers']),
                 'preemption': values['preemption'],
                 'policy': values['policy'],
                 'learn': float(values['learn']),
+                'lock_memory': is_true(values['lock_memory']),
+                'watchdog': float(values['watchdog']),
                 'metrics_period': float(values['metrics_period']),
                 'trace': values['trace'],
                 'save_path': values['save_path'],

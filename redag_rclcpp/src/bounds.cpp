@@ -88,8 +88,19 @@ bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload
 void Bounds::analyse(const Workload &workload, const redag::sched::Config &config) {
   Workload analysed = workload;
   analysed.policy = config.policy;
-  const redag::Result<redag::analysis::System> system =
-      redag::analysis::compile(analysed, redag::analysis::platform_of(config));
+  redag::analysis::AnalysisPlatform platform = redag::analysis::platform_of(config);
+  machine_.reset();
+  if (calibration_) {
+    const redag::Result<redag::Overheads> machine =
+        calibration_->of(config.preemption == redag::sched::Preemption::Full);
+    if (!machine) {
+      absent_ = machine.error().front().message;
+      return;
+    }
+    machine_ = *machine;
+    platform = redag::analysis::charge(platform, *machine);
+  }
+  const redag::Result<redag::analysis::System> system = redag::analysis::compile(analysed, platform);
   if (!system) {
     absent_ = to_string(system.error());
     return;

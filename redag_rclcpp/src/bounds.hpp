@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "redag/metrics/bound_watch.hpp"
 #include "redag/model/job_event.hpp"
+#include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/scheduler.hpp"
 #include "redag_rclcpp/executor.hpp"
@@ -26,8 +28,9 @@ struct TaskBound {
 
 class Bounds {
  public:
-  /// `workload`: as its file has it.
-  explicit Bounds(redag::Workload workload) : workload_(std::move(workload)) {}
+  /// `workload`: as its file has it. `calibration`: what is charged of this machine, if anything.
+  explicit Bounds(redag::Workload workload, std::optional<redag::Calibration> calibration = std::nullopt)
+      : workload_(std::move(workload)), calibration_(std::move(calibration)) {}
 
   /// Analyses anew if the callbacks behind the tasks are not those of the last call. `learned` is asked only then. A
   /// task that is one callback has the exclusive group that ROS gave this callback. Takes as long as the analysis. True
@@ -44,6 +47,8 @@ class Bounds {
   [[nodiscard]] const std::map<std::string, TaskBound> &tasks() const { return bounds_; }
   /// What stands in the way of bounds for all tasks; empty: nothing.
   [[nodiscard]] const std::string &absent() const { return absent_; }
+  /// What the bounds charge of this machine; none: nothing.
+  [[nodiscard]] const std::optional<redag::Overheads> &machine() const { return machine_; }
 
  private:
   /// `workload_` as the executor runs it. False, and `absent_` says why: it cannot be compared.
@@ -52,7 +57,9 @@ class Bounds {
   void analyse(const redag::Workload &workload, const redag::sched::Config &config);
 
   redag::Workload workload_;
-  std::vector<std::string> analysed_;  // what the last analysis was for
+  std::optional<redag::Calibration> calibration_;
+  std::optional<redag::Overheads> machine_;  // of it, what the bounds charge
+  std::vector<std::string> analysed_;        // what the last analysis was for
   std::map<std::string, TaskBound> bounds_;
   std::string absent_ = "no callback was seen yet";
 

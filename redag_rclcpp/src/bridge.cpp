@@ -3,6 +3,7 @@
 #include <rcl/wait.h>
 
 #include <algorithm>
+#include <climits>
 #include <utility>
 
 #include "compat.hpp"
@@ -51,8 +52,14 @@ void Bridge::remove(const Callback &callback) {
     begun = waits_;
   }
   wake();
-  const redag::LockGuard guard(lock_);
-  while (waiter_ != std::thread::id() && waiter_ != std::this_thread::get_id() && waits_ == begun) left_.wait(lock_);
+  for (;;) {
+    const std::uint32_t left = left_.load();
+    {
+      const redag::LockGuard guard(lock_);
+      if (waiter_ == std::thread::id() || waiter_ == std::this_thread::get_id() || waits_ != begun) return;
+    }
+    redag::futex_wait(left_, left);
+  }
 }
 
 bool Bridge::empty() const {
@@ -80,9 +87,12 @@ void Bridge::wait(std::chrono::nanoseconds timeout) {
   {
     const struct Leave {
       ~Leave() {
-        const redag::LockGuard guard(bridge.lock_);
-        bridge.waiter_ = {};
-        bridge.left_.notify_all();
+        {
+          const redag::LockGuard guard(bridge.lock_);
+          bridge.waiter_ = {};
+        }
+        bridge.left_.fetch_add(1);
+        redag::futex_wake(bridge.left_, INT_MAX);
       }
       Bridge &bridge;
     } leave{*this};

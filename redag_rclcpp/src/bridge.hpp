@@ -3,7 +3,6 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
 #include <thread>
@@ -12,8 +11,9 @@
 #include "callback.hpp"
 #include "rclcpp/context.hpp"
 #include "rclcpp/guard_condition.hpp"
+#include "redag/base/futex.hpp"
 #include "redag/base/lock_guard.hpp"
-#include "redag/base/mutex.hpp"
+#include "redag/base/pi_mutex.hpp"
 
 namespace redag_rclcpp {
 
@@ -54,11 +54,11 @@ class Bridge {
   std::vector<const rclcpp::GuardCondition *> conditions_;
   rcl_wait_set_t set_;
 
-  mutable redag::Mutex lock_;
+  mutable redag::PiMutex lock_;  // threads of all priorities add and remove
   std::vector<std::shared_ptr<Callback>> callbacks_ REDAG_GUARDED_BY(lock_);
   std::thread::id waiter_ REDAG_GUARDED_BY(lock_);   // of the thread in rcl_wait(), if there is one
   std::uint64_t waits_ REDAG_GUARDED_BY(lock_) = 0;  // begun
-  std::condition_variable_any left_;
+  redag::FutexWord left_{0};                         // waits that have ended
 };
 
 /// What arrived before these callbacks were attached and was not executed by who had them before: hooks do not tell of

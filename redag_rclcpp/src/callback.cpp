@@ -5,6 +5,7 @@
 #include <rcl/subscription.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "compat.hpp"
@@ -38,6 +39,7 @@ Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id,
     : Callback(std::move(intake), std::move(id)) {
   subscription_ = subscription;
   intra_process_ = intra_process;
+  has_intra_process_ = intra_process != nullptr;
   depth_ = depth_of(subscription->get_actual_qos());
 }
 
@@ -74,6 +76,7 @@ bool Callback::attach(TaskId task) {
     }
   }
   if (const auto timer = timer_.lock()) {
+    watch_clock(*timer);
     compat::set_on_reset(*timer, [self = shared_from_this()] { self->look_at_timer(); });
     return has_waited_timer();
   }
@@ -125,6 +128,7 @@ void Callback::unhook() {
     }
   };
   hook_.clear();
+  clock_watch_.reset();
   if (const auto timer = timer_.lock()) clear([&] { compat::clear_on_reset(*timer); });
   if (const auto waitable = intra_process_.lock()) clear([&] { waitable->clear_on_ready_callback(); });
   if (const auto waitable = waitable_.lock()) clear([&] { waitable->clear_on_ready_callback(); });
@@ -161,7 +165,7 @@ void Callback::arrived(std::size_t count, Source source, int part, bool seen_onl
       const redag::LockGuard guard(lock_);
       if (!intake_) return;  // and perhaps there is no engine any more
       now = engine_.now();
-      if (intake_->learning()) learn_from_arrival(now, count);
+      if (intake_->learning()) learn_from_arrival(now, count, source);
       const bool direct = intake_->direct();
       if (depth_ > 0) count = std::min(count, depth_);
       bool replaces = false;
@@ -304,10 +308,10 @@ bool Callback::take_token(Token &token) {
   return true;
 }
 
-void Callback::learn_from_arrival(Time now, std::size_t count) {
-  if (arrivals_ == 0) first_arrival_ = now;
+void Callback::learn_from_arrival(Time now, std::size_t count, Source source) {
+  if (arrivals_[0] + arrivals_[1] == 0) first_arrival_ = now;
   last_arrival_ = now;
-  arrivals_ += count;
+  arrivals_[index_of(source)] += count;
   // Messages of this process arrive on the thread that publishes them: in the job that is the task's predecessor.
   const auto publisher = engine_.current_task();
   if (publisher && std::find(publishers_.begin(), publishers_.end(), *publisher) == publishers_.end()) {
@@ -322,8 +326,14 @@ std::vector<TaskId> Callback::publishers() const {
 
 Duration Callback::mean_interval() const {
   const redag::LockGuard guard(lock_);
-  if (arrivals_ < 3) return 0;
-  return (last_arrival_ - first_arrival_) / static_cast<Duration>(arrivals_ - 1);
+  // Where another process subscribes, too, the middleware brings every message of this process a second time, and
+  // rclcpp does not take it. The share that was taken holds for what was overwritten before as well.
+  auto arrivals = static_cast<double>(arrivals_[index_of(Source::Middleware)]);
+  if (takes_ > 0) arrivals *= static_cast<double>(taken_) / static_cast<double>(takes_);
+  arrivals += static_cast<double>(arrivals_[index_of(Source::IntraProcess)]);
+  const auto handled = static_cast<Duration>(std::llround(arrivals));
+  if (handled < 3) return 0;
+  return (last_arrival_ - first_arrival_) / (handled - 1);
 }
 
 // ---- what the wait set does for us ----

@@ -18,6 +18,7 @@
 
 #include "hook.hpp"
 #include "rclcpp/client.hpp"
+#include "rclcpp/clock.hpp"
 #include "rclcpp/service.hpp"
 #include "rclcpp/subscription_base.hpp"
 #include "rclcpp/timer.hpp"
@@ -115,8 +116,8 @@ class Callback final : public TimerQueue::Timer,
   [[nodiscard]] const redag::Histogram &execution() const { return execution_; }
   [[nodiscard]] std::uint64_t late() const { return late_.load(std::memory_order_relaxed); }
 
-  /// What was learned: tasks that published what arrived here, each once; and the mean time between arrivals (0: fewer
-  /// than three).
+  /// What was learned: tasks that published what arrived here, each once; and the mean time between arrivals that are
+  /// handled (0: fewer than three).
   [[nodiscard]] std::vector<TaskId> publishers() const;
   [[nodiscard]] Duration mean_interval() const;
 
@@ -145,7 +146,7 @@ class Callback final : public TimerQueue::Timer,
     Started,   // that of a job that has started and not yet taken it: it takes the one that came instead
   };
   [[nodiscard]] Overwritten drop_oldest(Source source) REDAG_REQUIRES(lock_);
-  void learn_from_arrival(Time now, std::size_t count) REDAG_REQUIRES(lock_);
+  void learn_from_arrival(Time now, std::size_t count, Source source) REDAG_REQUIRES(lock_);
   [[nodiscard]] bool take_token(Token &token);
   [[nodiscard]] bool begin_release(Time &arrival) REDAG_REQUIRES(lock_);
   void release(Time arrival);
@@ -153,6 +154,7 @@ class Callback final : public TimerQueue::Timer,
 
   /// Does only the timer's guard condition tell of resets, or of jumps of time?
   [[nodiscard]] bool has_waited_timer() const;
+  void watch_clock(rclcpp::TimerBase &timer);
   void reschedule();
 
   // False: there was nothing to do.
@@ -175,6 +177,7 @@ class Callback final : public TimerQueue::Timer,
   std::shared_ptr<const rcl_timer_t> timer_handle_;  // not the timer: that cancels it when it is destroyed
   std::weak_ptr<rclcpp::SubscriptionBase> subscription_;
   std::weak_ptr<rclcpp::Waitable> intra_process_;
+  bool has_intra_process_ = false;
   std::weak_ptr<rclcpp::ServiceBase> service_;
   std::weak_ptr<rclcpp::ClientBase> client_;
   std::weak_ptr<rclcpp::Waitable> waitable_;
@@ -200,14 +203,18 @@ class Callback final : public TimerQueue::Timer,
   bool noted_ REDAG_GUARDED_BY(lock_) = false;           // note()d, and not admitted since
   bool seen_ REDAG_GUARDED_BY(lock_) = false;            // by the wait set, and not dealt with
   std::vector<TaskId> publishers_ REDAG_GUARDED_BY(lock_);
-  std::uint64_t arrivals_ REDAG_GUARDED_BY(lock_) = 0;
+  std::uint64_t arrivals_[2] REDAG_GUARDED_BY(lock_) = {0, 0};
+  // From the middleware, where intra-process communication delivers messages, too.
+  std::uint64_t takes_ REDAG_GUARDED_BY(lock_) = 0;  // that were tried
+  std::uint64_t taken_ REDAG_GUARDED_BY(lock_) = 0;  // that found a message for the callback
   Time first_arrival_ REDAG_GUARDED_BY(lock_) = 0;
   Time last_arrival_ REDAG_GUARDED_BY(lock_) = 0;
 
   // Timers.
-  Time last_release_ = redag::kNever;   // the timer queue's lock
-  std::atomic<bool> uncalled_{false};   // released, and not called since
-  std::atomic<bool> restarted_{false};  // its grid begins anew
+  rclcpp::JumpHandler::SharedPtr clock_watch_;  // of ROS time: simulation begins or ends
+  Time last_release_ = redag::kNever;           // the timer queue's lock
+  std::atomic<bool> uncalled_{false};           // released, and not called since
+  std::atomic<bool> restarted_{false};          // its grid begins anew
 
   std::atomic<Duration> deadline_{redag::kNever};
   std::atomic<std::uint64_t> late_{0};

@@ -55,6 +55,12 @@ class Callback::Taking {
     --callback_.kept_[index_of(source_)];
   }
 
+  void count(bool taken) {
+    const redag::LockGuard guard(callback_.lock_);
+    ++callback_.takes_;
+    if (taken) ++callback_.taken_;
+  }
+
  private:
   Callback &callback_;
   const Source source_;
@@ -187,6 +193,7 @@ bool Callback::execute_subscription(rclcpp::SubscriptionBase &subscription, Taki
       "a message of topic", subscription.get_topic_name(),
       [&] { return subscription.take_type_erased(message.get(), info); },
       [&] { subscription.handle_message(message, info); });
+  if (has_intra_process_) taking.count(taken);
   subscription.return_message(message);
   return taken;
 }

@@ -61,6 +61,19 @@ bool Callback::has_waited_timer() const {
   return is_timer() && (!compat::kTimersTellOfResets || ros_clock_of(*timer_handle_) != nullptr);
 }
 
+// When simulated time is switched on or off, rcl sets the timer anew and triggers nothing.
+void Callback::watch_clock(rclcpp::TimerBase &timer) {
+  if (ros_clock_of(*timer_handle_) == nullptr) return;
+  rcl_jump_threshold_t changes{};
+  changes.on_clock_change = true;
+  clock_watch_ = compat::clock_of(timer)->create_jump_callback(
+      nullptr,
+      [weak = weak_from_this()](const rcl_time_jump_t &) {
+        if (const auto self = weak.lock()) self->look_at_timer();
+      },
+      changes);
+}
+
 void Callback::look_at_timer() {
   restarted_ = true;
   reschedule();

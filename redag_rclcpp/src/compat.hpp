@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "rclcpp/callback_group.hpp"
+#include "rclcpp/clock.hpp"
 #include "rclcpp/context.hpp"
 #include "rclcpp/guard_condition.hpp"
 #include "rclcpp/timer.hpp"
@@ -83,6 +84,14 @@ inline constexpr bool kTimersTellOfResets = false;
 inline void set_on_reset(rclcpp::TimerBase &, const std::function<void()> &) {}
 inline void clear_on_reset(rclcpp::TimerBase &) {}
 #endif
+
+/// The clock of a timer, which rclcpp keeps to itself.
+inline rclcpp::Clock::SharedPtr clock_of(rclcpp::TimerBase &timer) {
+  struct Opened : rclcpp::TimerBase {
+    using rclcpp::TimerBase::clock_;
+  };
+  return timer.*(&Opened::clock_);
+}
 
 /// Is the on-ready hook of this waitable one not to rely on?
 /// - Action servers, up to Jazzy at least, tell only wait sets that goals expire (rclcpp issue 2661). Newer ones have

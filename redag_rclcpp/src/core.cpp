@@ -1,19 +1,21 @@
 #include "core.hpp"
 
+#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
 #include "compat.hpp"
 #include "middleware_threads.hpp"
-#include "raised_thread.hpp"
 #include "rclcpp/logging.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
+#include "redag/runtime/looks.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
@@ -40,6 +42,8 @@ ReDAGOptions prepare(ReDAGOptions options) {
   if (options.default_period <= nanoseconds(0)) {
     throw std::invalid_argument("default_period must be greater than 0: the shortest period goes first");
   }
+  if (options.spin < nanoseconds(0)) throw std::invalid_argument("spin must not be negative");
+  if (options.watchdog < nanoseconds(0)) throw std::invalid_argument("watchdog must not be negative");
   if (!options.workload) return options;
   const auto findings = redag::validate(*options.workload, redag::ValidateOptions{.wcet_optional = true});
   if (has_errors(findings)) throw std::runtime_error(to_string(findings));
@@ -54,6 +58,12 @@ redag::runtime::Setup set_up(const ReDAGOptions &options) {
   return *std::move(setup);
 }
 
+/// Is libredag_pi.so in the process, and on?
+bool locks_inherit() {
+  void *const enabled = dlsym(RTLD_DEFAULT, "redag_pi_enabled");
+  return enabled != nullptr && reinterpret_cast<int (*)()>(enabled)() != 0;
+}
+
 }  // namespace
 
 ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOptions options)
@@ -62,9 +72,11 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
       setup_(set_up(options_)),
       bridge_(context),
       tasks_(redag::Platform{setup_.config.workers, setup_.mode.mode}, options_.policy,
-             options_.workload ? &*options_.workload : nullptr),
-      warnings_(std::move(setup_.warnings)) {
+             options_.workload ? &*options_.workload : nullptr) {
   redag::runtime::EngineOptions engine;
+  engine.looks = redag::runtime::looks_before_sleep(setup_, options_.spin.count());
+  warnings_ = std::exchange(setup_.warnings, {});
+  if (options_.lock_memory) engine.touched_stack = redag::runtime::kTouchedStack;
   engine.config = setup_.config;
   engine.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id means one task
   engine.band = setup_.band;
@@ -121,6 +133,8 @@ void ReDAGExecutor::Core::close() {
   timer_parker_.unpark();
   if (timer_thread_.joinable()) timer_thread_.join();
   engine_->halt();
+  if (watchdog_) (void)engine_->wait_idle(kNever);  // a job that keeps us waiting is still named
+  watchdog_.reset();
   engine_->join();
   const redag::LockGuard guard(collect_lock_);
   closed_ = true;
@@ -206,19 +220,30 @@ void ReDAGExecutor::Core::admit(bool look_around) {
 
 void ReDAGExecutor::Core::start() {
   begin_learning();
-  if (setup_.timer_priority() > 0 && options_.raise_middleware) raise_middleware();
   if (started_) return;
-  if (const redag::Result<void> ready = engine_->start(); !ready) throw std::runtime_error(to_string(ready.error()));
-  redag::Result<std::thread> timer_thread =
-      redag::runtime::start_thread({"redag-timer", setup_.timer_priority(), {}}, [this] { time_releases(); });
-  if (!timer_thread) throw std::runtime_error(to_string(timer_thread.error()));
-  timer_thread_ = *std::move(timer_thread);
+  if (!start_error_.empty()) throw std::runtime_error(start_error_);  // an engine can be started once
+  if (options_.lock_memory) lock_memory();
+  // Before the engine's threads, which can be started once only: who catches the exception may spin again.
+  if (!timer_thread_.joinable()) {
+    redag::Result<std::thread> timer_thread =
+        redag::runtime::start_thread({"redag-timer", setup_.timer_priority(), {}}, [this] { time_releases(); });
+    if (!timer_thread) throw std::runtime_error(to_string(timer_thread.error()));
+    timer_thread_ = *std::move(timer_thread);
+  }
+  if (const redag::Result<void> ready = engine_->start(); !ready) {
+    start_error_ = to_string(ready.error());
+    throw std::runtime_error(start_error_);
+  }
   started_ = true;
+  if (options_.watchdog.count() > 0) watch_jobs();
   RCLCPP_INFO(logger(), "%u workers, preemption %s%s%s", setup_.config.workers, to_string(setup_.mode.mode),
               setup_.mode.reason.empty() ? "" : ", ", setup_.mode.reason.c_str());
   {
     const redag::LockGuard guard(notes_lock_);
     for (const std::string &warning : warnings_) RCLCPP_WARN(logger(), "%s", warning.c_str());
+  }
+  if (setup_.mode.mode == redag::PreemptionMode::Os && !locks_inherit()) {
+    RCLCPP_INFO(logger(), "the middleware's locks do not inherit priority: preload libredag_pi.so (docs/ros2.md)");
   }
   if (matcher_) report_unmatched_at_ = engine_->now() + kNodesAppear;
 }
@@ -230,48 +255,111 @@ void ReDAGExecutor::Core::report_unmatched() {
   for (const std::string &line : matcher_->unmatched()) RCLCPP_WARN(logger(), "%s", line.c_str());
 }
 
-void ReDAGExecutor::Core::raise_middleware() {
-  const auto refused = raise_middleware_threads(setup_.timer_priority());
+void ReDAGExecutor::Core::note_middleware(const RaisedMiddleware &raised) {
   std::string warning;
-  if (find_middleware_threads().empty()) {
+  if (raised.found() == 0) {
     warning = "the middleware's threads are not known by name: give its receive threads SCHED_FIFO priority " +
               std::to_string(setup_.timer_priority()) + " yourself, or busy workers delay messages (docs/ros2.md)";
-  } else if (!refused.empty()) {
-    warning = fmt::format("{} threads of the middleware could not be raised above the workers", refused.size());
+  } else if (raised.refused() > 0) {
+    warning = fmt::format("{} threads of the middleware could not be raised above the workers", raised.refused());
   }
+  if (!warning.empty()) note_warning(warning);
+}
+
+void ReDAGExecutor::Core::note_warning(const std::string &warning) {
   const redag::LockGuard guard(notes_lock_);
-  if (!warning.empty() && std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) {
-    warnings_.push_back(warning);
+  if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) warnings_.push_back(warning);
+}
+
+void ReDAGExecutor::Core::lock_memory() {
+  if (const redag::Result<void> locked = redag::runtime::lock_memory(); !locked) {
+    note_warning(to_string(locked.error()));
+  }
+}
+
+void ReDAGExecutor::Core::watch_jobs() {
+  const redag::runtime::WatchdogOptions limits{.limits = {.longest = options_.watchdog.count(), .deadlines = 0}};
+  watchdog_ =
+      std::make_unique<redag::runtime::Watchdog>(*engine_, limits, [this](const redag::runtime::OverdueJob &overdue) {
+        RCLCPP_WARN(logger(), "%s: %s", tasks_.name_of(overdue.job.task).c_str(), describe(overdue).c_str());
+      });
+  if (const redag::Result<void> started = watchdog_->start({"redag-watch", setup_.timer_priority(), {}}); !started) {
+    watchdog_.reset();
+    throw std::runtime_error(to_string(started.error()));
   }
 }
 
 void ReDAGExecutor::Core::spin() {
+  std::optional<RaisedMiddleware> raised;
+  if (setup_.timer_priority() > 0 && options_.raise_middleware) {
+    raised.emplace(setup_.timer_priority());
+    note_middleware(*raised);
+  }
   start();
-  const RaisedThread raised(setup_.timer_priority());
   collect();
   direct_ = true;
   timing_ = true;
   timer_parker_.unpark();
+  wait_set_done_ = false;
+  wait_set_failure_ = nullptr;
   engine_->resume();
   try {
-    while (host_.may_spin()) {
-      if (dirty_) collect();
-      admit_noted();
-      const redag::Time now = engine_->now();
-      if (learning_ && now >= learn_until_) stop_learning();
-      if (now >= report_unmatched_at_) report_unmatched();
-      const redag::Time next = std::min(report_unmatched_at_, learning_ ? learn_until_ : kNever);
-      bridge_.wait(nanoseconds(next == kNever ? -1 : next - now));
-    }
+    redag::Result<std::thread> watcher =
+        redag::runtime::start_thread({"redag-wait", setup_.timer_priority(), {}}, [this] { watch_wait_set(); });
+    if (!watcher) throw std::runtime_error(to_string(watcher.error()));
+    const struct Join {
+      ~Join() {
+        core.wait_set_done_ = true;
+        core.bridge_.wake();
+        thread.join();
+      }
+      Core &core;
+      std::thread thread;
+    } join{*this, *std::move(watcher)};
+    keep_house();
   } catch (...) {
-    // The wait set failed, for instance because the context was shut down while it was filled.
+    // For instance because the context was shut down while entities were collected.
     stop_workers();
     if (rclcpp::ok(context_)) throw;
     throw_failure();
     return;
   }
   stop_workers();
+  if (wait_set_failure_ && rclcpp::ok(context_)) std::rethrow_exception(wait_set_failure_);
   throw_failure();
+}
+
+// What spin() does on the calling thread, at that thread's own priority: all that takes long and is not urgent.
+void ReDAGExecutor::Core::keep_house() {
+  while (host_.may_spin() && !wait_set_done_) {
+    if (dirty_) collect();
+    const redag::Time now = engine_->now();
+    if (learning_ && now >= learn_until_) stop_learning();
+    if (now >= report_unmatched_at_) report_unmatched();
+    const redag::Time next = std::min(report_unmatched_at_, learning_ ? learn_until_ : kNever);
+    if (next == kNever) {
+      keeper_parker_.park();
+    } else if (next > now) {
+      keeper_parker_.park_until(origin_ + next);
+    }
+  }
+}
+
+// Above all jobs, so that a cancel() takes effect and arrivals that only a wait set sees are released while jobs use
+// all processors.
+void ReDAGExecutor::Core::watch_wait_set() noexcept {
+  try {
+    while (host_.may_spin() && !wait_set_done_) {
+      admit_noted();
+      bridge_.wait(nanoseconds(-1));
+    }
+  } catch (...) {
+    wait_set_failure_ = std::current_exception();  // for instance: the context was shut down while the set was filled
+  }
+  timing_ = false;
+  engine_->pause();
+  wait_set_done_ = true;
+  keeper_parker_.unpark();
 }
 
 void ReDAGExecutor::Core::stop_workers() {
@@ -364,9 +452,9 @@ std::vector<std::string> ReDAGExecutor::Core::warnings() const {
   return all;
 }
 
-redag::trace::Trace ReDAGExecutor::Core::as_trace(std::vector<JobEvent> events) const {
+redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &positions) const {
   redag::trace::RunInfo info;
-  info.workload = tasks_.describe(events);
+  info.workload = tasks_.describe(positions);
   info.executor = "redag";
   info.config = engine_->options().config;
   info.preemption = to_string(setup_.mode.mode);
@@ -376,7 +464,8 @@ redag::trace::Trace ReDAGExecutor::Core::as_trace(std::vector<JobEvent> events) 
   info.end = engine_->now();
   info.lost_events = engine_->lost_events();
   info.machine = redag::trace::this_machine();
-  return {std::move(info), std::move(events)};
+  info.provenance = redag::current_provenance();
+  return info;
 }
 
 }  // namespace redag_rclcpp

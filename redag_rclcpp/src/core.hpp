@@ -2,8 +2,9 @@
 // when they have something to do. Knows rclcpp's entities, not its Executor (see Host).
 //
 // Threads: collect() and the spin functions are serialised by their callers' rules (one spinner; collect_lock_).
-// Callbacks' hooks come from anywhere. Lock order: collect_lock_, rclcpp's, callbacks', the timer queue's, the
-// engine's.
+// While spin() runs, a thread above all jobs waits for the wait set; the calling thread, at its own priority, collects
+// entities and ends learning. Hooks are called by any thread. Lock order: collect_lock_, rclcpp's, callbacks', the
+// timer queue's, the engine's.
 #pragma once
 
 #include <atomic>
@@ -16,13 +17,15 @@
 
 #include "bridge.hpp"
 #include "callback.hpp"
+#include "middleware_threads.hpp"
 #include "rclcpp/callback_group.hpp"
 #include "recursive_mutex.hpp"
 #include "redag/base/lock_guard.hpp"
-#include "redag/base/mutex.hpp"
+#include "redag/base/pi_mutex.hpp"
 #include "redag/live/publisher.hpp"
 #include "redag/runtime/mode.hpp"
 #include "redag/runtime/parker.hpp"
+#include "redag/runtime/watchdog.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "task_table.hpp"
 #include "timer_queue.hpp"
@@ -74,7 +77,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   [[nodiscard]] std::vector<std::string> warnings() const;
   [[nodiscard]] bool learning_done() const { return !learning_; }
   void set_live_bounds(std::map<std::string, redag::Duration> bounds);
-  [[nodiscard]] redag::trace::Trace as_trace(std::vector<redag::JobEvent> events) const;
+  [[nodiscard]] redag::trace::RunInfo run_info(std::vector<std::uint32_t> &positions) const;
 
   // Intake
   redag::runtime::Engine &engine() override { return *engine_; }
@@ -99,8 +102,13 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
 
   void go_live();
   void start();
-  void raise_middleware();
+  void note_middleware(const RaisedMiddleware &raised);
+  void note_warning(const std::string &warning);
+  void lock_memory();
+  void watch_jobs();
   void report_unmatched();
+  void keep_house();
+  void watch_wait_set() noexcept;
   void stop_workers();
   void time_releases() noexcept;
   redag::Time expire_timers();
@@ -137,7 +145,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   std::map<std::pair<std::string, int>, std::uint32_t> next_index_ REDAG_GUARDED_BY(collect_lock_);
   std::uint64_t next_group_ REDAG_GUARDED_BY(collect_lock_) = 0;
 
-  mutable redag::Mutex notes_lock_;  // innermost
+  mutable redag::PiMutex notes_lock_;  // innermost
   std::vector<std::string> warnings_ REDAG_GUARDED_BY(notes_lock_);
   std::exception_ptr failure_ REDAG_GUARDED_BY(notes_lock_);
   std::map<std::string, redag::Duration> live_bounds_ REDAG_GUARDED_BY(notes_lock_);
@@ -151,11 +159,16 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   redag::Time learn_until_ = redag::kNever;
   redag::Time report_unmatched_at_ = redag::kNever;
   bool started_ = false;
+  std::string start_error_;  // of the engine, for good
   bool closed_ REDAG_GUARDED_BY(collect_lock_) = false;
 
-  redag::Mutex noted_lock_;
+  redag::PiMutex noted_lock_;
   std::vector<std::shared_ptr<Callback>> noted_ REDAG_GUARDED_BY(noted_lock_);
   std::atomic<bool> waiting_{false};  // a spin function that pulls waits for work
+
+  redag::runtime::Parker keeper_parker_;    // of the thread in spin()
+  std::atomic<bool> wait_set_done_{false};  // watch_wait_set() has ended, or is to end
+  std::exception_ptr wait_set_failure_;     // of watch_wait_set(), for after it
 
   std::thread timer_thread_;
   redag::runtime::Parker timer_parker_;
@@ -164,6 +177,8 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   redag::PiMutex expire_lock_;  // of the timer thread, or of who pulls
   std::vector<redag::runtime::Release> due_ REDAG_GUARDED_BY(expire_lock_);
   std::vector<redag::runtime::Release> missed_ REDAG_GUARDED_BY(expire_lock_);
+
+  std::unique_ptr<redag::runtime::Watchdog> watchdog_;  // while the engine has threads
 
   std::unique_ptr<redag::live::Publisher> live_;  // last: it asks for figures until it is gone
 };

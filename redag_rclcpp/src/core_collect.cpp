@@ -76,7 +76,9 @@ void ReDAGExecutor::Core::forget_gone_nodes() {
 }
 
 void ReDAGExecutor::Core::mark_dirty() {
-  if (!dirty_.exchange(true)) bridge_.wake();
+  if (dirty_.exchange(true)) return;
+  keeper_parker_.unpark();
+  if (waiting_) bridge_.wake();
 }
 
 void ReDAGExecutor::Core::collect() {

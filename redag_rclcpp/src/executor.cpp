@@ -211,10 +211,19 @@ void ReDAGExecutor::set_live_bounds(std::map<std::string, redag::Duration> bound
 }
 redag::Workload ReDAGExecutor::learned() const { return core_->tasks().learned(); }
 bool ReDAGExecutor::learning_done() const { return core_->learning_done(); }
+std::uint64_t ReDAGExecutor::lost_events() const { return core_->engine().lost_events(); }
+
 void ReDAGExecutor::drain_trace(std::vector<redag::JobEvent> &events) { core_->engine().drain(events); }
 std::string ReDAGExecutor::task_name(redag::TaskId task) const { return core_->tasks().name_of(task); }
 redag::trace::Trace ReDAGExecutor::as_trace(std::vector<redag::JobEvent> events) const {
-  return core_->as_trace(std::move(events));
+  std::vector<std::uint32_t> positions;
+  redag::trace::RunInfo info = core_->run_info(positions);
+  for (redag::JobEvent &event : events) event.task = redag::TaskId(positions.at(event.task.value));
+  return {std::move(info), std::move(events)};
+}
+
+redag::trace::RunInfo ReDAGExecutor::run_info(std::vector<std::uint32_t> &positions) const {
+  return core_->run_info(positions);
 }
 
 }  // namespace redag_rclcpp

@@ -1,7 +1,10 @@
-// The middleware's own threads in this process: found by the names that it gives them.
+// The middleware's own threads in this process, found by the names and the signal mask that it gives them, and raised
+// above the workers while an executor spins. Any thread.
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace redag_rclcpp {
@@ -11,10 +14,32 @@ struct MiddlewareThread {
   std::string name;  // "recv"
 };
 
-/// Threads that receive and deliver data: Cyclone DDS' (recv, recvMC, recvUC, tev, dq.*), Fast DDS' since 2.11 (dds.*).
+/// Is this the name of a thread that receives or delivers data? Cyclone DDS: recv, recvMC, recvUC, dq.builtins,
+/// dq.user, tev. Fast DDS since 2.11: dds.udp.7400, dds.tcp.1, dds.tcp_accept, dds.shm.7400, dds.ev.1, dds.asyn.1.1.
+[[nodiscard]] bool is_middleware_thread_name(std::string_view name);
+
+/// Threads with such a name. Cyclone DDS creates its own with all signals blocked, which tells them from users' threads
+/// of the same name.
 [[nodiscard]] std::vector<MiddlewareThread> find_middleware_threads();
 
-/// Gives them SCHED_FIFO `priority`, unless they have a higher one. Returns those the system refused to change.
-[[nodiscard]] std::vector<MiddlewareThread> raise_middleware_threads(int priority);
+/// Gives these threads SCHED_FIFO `priority`, unless they have a higher one, and restores what they had when it goes.
+/// Executors of one process may overlap: the last one restores.
+class RaisedMiddleware {
+ public:
+  explicit RaisedMiddleware(int priority);
+  ~RaisedMiddleware();
+  RaisedMiddleware(const RaisedMiddleware &) = delete;
+  RaisedMiddleware &operator=(const RaisedMiddleware &) = delete;
+
+  /// Threads that were found.
+  [[nodiscard]] std::size_t found() const { return found_; }
+  /// Those that the system refused to change.
+  [[nodiscard]] std::size_t refused() const { return refused_; }
+
+ private:
+  std::vector<int> raised_;
+  std::size_t found_ = 0;
+  std::size_t refused_ = 0;
+};
 
 }  // namespace redag_rclcpp

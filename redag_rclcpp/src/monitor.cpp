@@ -67,11 +67,16 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
         options_(std::move(options)),
         has_bounds_(options_.workload.has_value()),
         keeper_(options_.trace_events) {
-    if (has_bounds_) bounds_.emplace(*options_.workload);
+    if (has_bounds_) bounds_.emplace(*options_.workload, options_.calibration);
     config_ = executor_.as_trace({}).info.config;
     if (options_.trace.empty()) return;
     const redag::Result<void> ready = prepare_folder(options_.trace);
     if (!ready) throw std::runtime_error(to_string(ready.error()));
+    if (const auto aside = flight_.prepare(options_.trace)) {
+      RCLCPP_WARN(node_->get_logger(),
+                  "an earlier process was killed; 'redag recover %s --out DIR' makes results of its trace",
+                  aside->c_str());
+    }
   }
 
   void start();
@@ -106,6 +111,7 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
   // The thread's, and after it finish()'s.
   Diagnoser diagnoser_;
   TraceKeeper keeper_;
+  FlightLog flight_;
   std::vector<JobEvent> events_;
 
   std::thread thread_;
@@ -162,7 +168,10 @@ Snapshot Monitor::Impl::snapshot() {
   const std::vector<CallbackStats> stats = executor_.stats();
   const redag::LockGuard guard(bounds_lock_);
   result.has_bounds = has_bounds_;
-  if (bounds_) result.bounds_absent = bounds_->absent();
+  if (bounds_) {
+    result.bounds_absent = bounds_->absent();
+    result.machine = bounds_->machine();
+  }
   for (const CallbackStats &callback : stats) {
     TaskFigures task;
     task.stats = callback;
@@ -258,6 +267,10 @@ void Monitor::Impl::drain() {
   executor_.drain_trace(events_);
   if (events_.empty()) return;
   if (!options_.trace.empty()) {
+    if (const redag::Result<void> recorded = flight_.add(events_, executor_); !recorded) {
+      RCLCPP_WARN(node_->get_logger(), "should this process be killed, its trace is lost: %s",
+                  to_string(recorded.error()).c_str());
+    }
     const bool was_cut = keeper_.is_cut();
     keeper_.add(events_);
     if (keeper_.is_cut() && !was_cut) {
@@ -315,6 +328,10 @@ redag::Result<void> Monitor::Impl::finish() {
     write_metrics(options_.trace + "/metrics.json");
     const redag::Diagnostics more = keeper_.write(options_.trace, executor_);
     problems.insert(problems.end(), more.begin(), more.end());
+    // As long as results are missing, the record is what there is.
+    if (problems.empty()) {
+      if (const redag::Result<void> removed = flight_.remove(); !removed) problems = removed.error();
+    }
     if (problems.empty()) {
       RCLCPP_INFO(node_->get_logger(),
                   "wrote %s: metrics.json, summary.json, jobs.csv, events.jsonl, trace.json (open it in "

@@ -177,6 +177,21 @@ std::string read_trace(Reader &reader) {
                      "");
 }
 
+std::optional<redag::Calibration> read_overheads(Reader &reader) {
+  const std::string path = reader.text({"overheads",
+                                        "File that `redag calibrate` wrote: what this machine adds to jobs, charged to "
+                                        "the bounds; empty: none",
+                                        "the path of an overheads file (docs/calibration.md)"},
+                                       "");
+  if (path.empty()) return std::nullopt;
+  redag::Result<redag::Calibration> loaded = redag::load_calibration(path);
+  if (!loaded) {
+    throw rclcpp::exceptions::InvalidParameterValueException(
+        fmt::format("parameter 'overheads' is {}:\n{}", path, to_string(loaded.error())));
+  }
+  return *std::move(loaded);
+}
+
 bool read_bounds(Reader &reader) {
   return reader.flag({"bounds", "Compare response times with their bounds, where `config` states all execution times",
                       "allowed are true, false"},
@@ -225,6 +240,21 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
                    "than the workers",
                    "allowed are true, false"},
                   true);
+  options.lock_memory = reader.flag({"lock_memory",
+                                     "Lock the memory of the process as it is used, and touch the stacks of the "
+                                     "threads beforehand: no page faults there in callbacks",
+                                     "allowed are true, false"},
+                                    false);
+  options.spin = reader.seconds({"spin",
+                                 "Seconds that an idle worker looks for a callback before it sleeps; not with "
+                                 "preemption os",
+                                 "a number of seconds, or 0, is allowed"},
+                                0.0, true);
+  options.watchdog = reader.seconds({"watchdog",
+                                     "Seconds: callbacks in progress for longer are named by a warning while they "
+                                     "are; 0: none",
+                                     "a number of seconds, or 0, is allowed"},
+                                    0.0, true);
   options.live = reader.flag(
       {"live", "Let `redag top` see the executor: a page of memory, two updates a second", "allowed are true, false"},
       true);
@@ -252,6 +282,7 @@ MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &e
                      static_cast<std::int64_t>(options.trace_events), 1, kMostTraceEvents));
   options.default_period = executor.default_period;
   if (read_bounds(reader)) options.workload = executor.workload;
+  options.calibration = read_overheads(reader);
   return options;
 }
 

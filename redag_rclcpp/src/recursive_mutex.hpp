@@ -1,21 +1,37 @@
-// std::recursive_mutex that clang's -Wthread-safety understands.
+// A recursive mutex whose owner inherits the priority of the threads that wait for it, and that clang's -Wthread-safety
+// understands. std::recursive_mutex does not inherit.
 #pragma once
 
-#include <mutex>
+#include <pthread.h>
 
+#include "redag/base/check.hpp"
 #include "redag/base/thread_annotations.hpp"
 
 namespace redag_rclcpp {
 
 class REDAG_CAPABILITY("mutex") RecursiveMutex {
  public:
-  void lock() REDAG_ACQUIRE() { mutex_.lock(); }
-  void unlock() REDAG_RELEASE() { mutex_.unlock(); }
+  RecursiveMutex() {
+    pthread_mutexattr_t attributes;
+    REDAG_CHECK(pthread_mutexattr_init(&attributes) == 0, "no mutex attributes");
+    REDAG_CHECK(pthread_mutexattr_settype(&attributes, PTHREAD_MUTEX_RECURSIVE) == 0, "no recursive mutexes");
+    REDAG_CHECK(pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT) == 0, "no priority inheritance");
+    REDAG_CHECK(pthread_mutex_init(&mutex_, &attributes) == 0, "the kernel has no priority-inheriting futexes");
+    pthread_mutexattr_destroy(&attributes);
+  }
+  ~RecursiveMutex() { pthread_mutex_destroy(&mutex_); }
+  RecursiveMutex(const RecursiveMutex &) = delete;
+  RecursiveMutex &operator=(const RecursiveMutex &) = delete;
+
+  void lock() REDAG_ACQUIRE() { REDAG_CHECK(pthread_mutex_lock(&mutex_) == 0, "a mutex cannot be locked"); }
+  void unlock() REDAG_RELEASE() {
+    REDAG_CHECK(pthread_mutex_unlock(&mutex_) == 0, "a mutex is unlocked by a thread that does not own it");
+  }
   /// Tells the analysis, where it cannot see the caller, that the caller has the mutex.
   void assert_held() const REDAG_ASSERT_CAPABILITY(this) {}
 
  private:
-  std::recursive_mutex mutex_;
+  pthread_mutex_t mutex_{};
 };
 
 }  // namespace redag_rclcpp

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "redag/base/time.hpp"
+#include "redag/metrics/assumptions.hpp"
 
 namespace redag_rclcpp {
 
@@ -165,7 +166,7 @@ std::vector<DiagnosticStatus> Diagnoser::diagnose(const Snapshot &snapshot) {
       result.back().name = name;
       result.back().level = DiagnosticStatus::OK;
     }
-    add(result[entry->second], task);
+    add(result[entry->second], task, snapshot.machine);
   }
   for (DiagnosticStatus &status : result) {
     if (status.message.empty()) status.message = "no new misses";
@@ -176,7 +177,7 @@ std::vector<DiagnosticStatus> Diagnoser::diagnose(const Snapshot &snapshot) {
   return result;
 }
 
-void Diagnoser::add(DiagnosticStatus &status, const TaskFigures &task) {
+void Diagnoser::add(DiagnosticStatus &status, const TaskFigures &task, const std::optional<redag::Overheads> &machine) {
   const CallbackStats &stats = task.stats;
   const std::string name = short_name(stats);
   const auto value = [&](const char *key, std::string text) {
@@ -197,7 +198,7 @@ void Diagnoser::add(DiagnosticStatus &status, const TaskFigures &task) {
   const std::uint64_t before = last == misses_.end() ? 0 : last->second;
   const std::uint64_t missed = stats.misses > before ? stats.misses - before : 0;
   if (missed > 0 && task.has_deadline) warn(status, fmt::format("{} missed {} more deadlines", name, missed));
-  if (stats.wcet > 0 && stats.execution_max > stats.wcet) {
+  if (stats.wcet > 0 && stats.execution_max > redag::metrics::longest_unalarming(stats.wcet, machine)) {
     warn(status, fmt::format("{} executed for {}, its wcet is {}", name, humanize_duration(stats.execution_max),
                              format_duration(stats.wcet)));
   }

@@ -32,7 +32,8 @@ struct Snapshot {
   bool learning = false;
   std::vector<std::string> warnings;
   bool has_bounds = false;
-  std::string bounds_absent;  // what stands in the way of bounds; empty: nothing
+  std::string bounds_absent;                // what stands in the way of bounds; empty: nothing
+  std::optional<redag::Overheads> machine;  // what the bounds charge of the machine
   std::vector<TaskFigures> tasks;
 };
 
@@ -53,7 +54,8 @@ class Diagnoser {
   [[nodiscard]] std::vector<diagnostic_msgs::msg::DiagnosticStatus> diagnose(const Snapshot &snapshot);
 
  private:
-  void add(diagnostic_msgs::msg::DiagnosticStatus &status, const TaskFigures &task);
+  void add(diagnostic_msgs::msg::DiagnosticStatus &status, const TaskFigures &task,
+           const std::optional<redag::Overheads> &machine);
 
   std::map<std::string, std::uint64_t> misses_;  // by callback
 };

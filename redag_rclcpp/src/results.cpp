@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <system_error>
+#include <utility>
 
 #include "redag/metrics/jobs.hpp"
 #include "redag/metrics/jobs_csv.hpp"
@@ -48,6 +49,46 @@ redag::Diagnostics TraceKeeper::write(const std::string &folder, const ReDAGExec
   keep(redag::metrics::write_perfetto(folder + "/trace.json", trace));
   keep(redag::trace::write_trace(folder + "/events.jsonl", trace));
   return problems;
+}
+
+std::optional<std::string> FlightLog::prepare(const std::string &folder) {
+  folder_ = folder + "/flight";
+  if (!redag::trace::has_flight_record(folder_)) return std::nullopt;
+  // A robot that starts again after a crash must start, and somebody will want the record.
+  std::string aside;
+  std::error_code error;
+  for (int number = 1; aside.empty() || std::filesystem::exists(aside, error); ++number)
+    aside = fmt::format("{}.{}", folder_, number);
+  std::filesystem::rename(folder_, aside, error);
+  return aside;
+}
+
+redag::Result<void> FlightLog::add(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor) {
+  if (broken_ || events.empty()) return {};
+  redag::Result<void> kept =
+      describe(events, executor).and_then([&] { return recorder_->append(events, executor.lost_events()); });
+  broken_ = !kept;
+  return kept;
+}
+
+// Tasks come while the executor spins, and rates are learned.
+redag::Result<void> FlightLog::describe(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor) {
+  const bool is_known = std::all_of(events.begin(), events.end(),
+                                    [this](const auto &event) { return event.task.value < positions_.size(); });
+  const bool was_learning = std::exchange(learning_, !executor.learning_done());
+  if (is_known && was_learning == learning_) return {};
+  const redag::trace::RunInfo info = executor.run_info(positions_);
+  if (recorder_) return recorder_->describe(info, positions_);
+  auto created = redag::trace::FlightRecorder::create(folder_, info, {}, positions_);
+  if (!created) return tl::unexpected<redag::Diagnostics>(created.error());
+  recorder_.emplace(std::move(*created));
+  return {};
+}
+
+redag::Result<void> FlightLog::remove() {
+  if (!recorder_) return {};
+  recorder_.reset();
+  return redag::trace::remove_flight_record(folder_);
 }
 
 }  // namespace redag_rclcpp

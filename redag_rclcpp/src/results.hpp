@@ -3,11 +3,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "redag/base/result.hpp"
 #include "redag/model/job_event.hpp"
+#include "redag/trace/flight_recorder.hpp"
 #include "redag_rclcpp/executor.hpp"
 
 namespace redag_rclcpp {
@@ -34,6 +36,26 @@ class TraceKeeper {
   std::size_t most_;
   bool is_cut_ = false;
   std::vector<redag::JobEvent> events_;
+};
+
+/// A record of the run that outlives the process, in `folder`/flight: `redag recover` makes results of it.
+class FlightLog {
+ public:
+  /// What an earlier process left there is moved aside, to flight.1 and so on; returns where to.
+  [[nodiscard]] std::optional<std::string> prepare(const std::string &folder);
+  /// Error, once: from here on nothing is recorded.
+  [[nodiscard]] redag::Result<void> add(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor);
+  /// The results are written.
+  [[nodiscard]] redag::Result<void> remove();
+
+ private:
+  [[nodiscard]] redag::Result<void> describe(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor);
+
+  std::string folder_;
+  std::optional<redag::trace::FlightRecorder> recorder_;
+  std::vector<std::uint32_t> positions_;  // of the tasks that the record describes
+  bool learning_ = true;
+  bool broken_ = false;
 };
 
 }  // namespace redag_rclcpp

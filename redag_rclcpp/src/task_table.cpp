@@ -287,20 +287,18 @@ void TaskTable::add_configured_edges(redag::Dag &dag, std::size_t task, const En
   if (!dag.tasks[task].predecessors.empty()) dag.tasks[task].activation = same->activation;
 }
 
-Workload TaskTable::describe(std::vector<redag::JobEvent> &events) const {
+Workload TaskTable::describe(std::vector<std::uint32_t> &positions) const {
   Ids ids;
-  std::vector<std::uint32_t> position;
   Workload workload;
   {
     const redag::LockGuard guard(lock_);
     workload = as_workload(ids, false);
-    position.assign(entries_.size(), 0);
+    positions.assign(entries_.size(), 0);
   }
   std::uint32_t next = 0;
   for (const auto &members : ids) {
-    for (const std::uint32_t id : members) position[id] = next++;
+    for (const std::uint32_t id : members) positions[id] = next++;
   }
-  for (redag::JobEvent &event : events) event.task = TaskId(position.at(event.task.value));
   return workload;
 }
 

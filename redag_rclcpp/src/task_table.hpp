@@ -11,7 +11,7 @@
 
 #include "callback.hpp"
 #include "redag/base/lock_guard.hpp"
-#include "redag/base/mutex.hpp"
+#include "redag/base/pi_mutex.hpp"
 #include "redag/live/frame_builder.hpp"
 #include "redag/model/callback_match.hpp"
 #include "redag/model/workload.hpp"
@@ -60,8 +60,8 @@ class TaskTable {
   /// What there is now, with the edges that were seen (see ReDAGExecutor::learned).
   [[nodiscard]] redag::Workload learned() const;
 
-  /// All that there ever was, and `events` with the ids that it gives them.
-  [[nodiscard]] redag::Workload describe(std::vector<redag::JobEvent> &events) const;
+  /// All that there ever was; task i of the engine is at positions[i] of the workload.
+  [[nodiscard]] redag::Workload describe(std::vector<std::uint32_t> &positions) const;
 
  private:
   /// The ids of a workload's tasks, DAG by DAG.
@@ -78,7 +78,7 @@ class TaskTable {
   const redag::Workload *const configured_;
   std::vector<redag::Dag> dags_;
 
-  mutable redag::Mutex lock_;
+  mutable redag::PiMutex lock_;
   std::vector<Entry> entries_ REDAG_GUARDED_BY(lock_);  // by TaskId
 };
 

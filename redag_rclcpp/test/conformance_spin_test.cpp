@@ -149,6 +149,37 @@ TYPED_TEST(Conformance, SimulatedTimeMovesTimers) {
   EXPECT_LE(count, before + 6);
 }
 
+TYPED_TEST(Conformance, TimersGoOnWhenSimulatedTimeEnds) {
+  if (kEvents<TypeParam>) GTEST_SKIP() << "the EventsExecutor does not support simulated time (rclcpp issue 2457)";
+  rclcpp::NodeOptions options;
+  options.parameter_overrides({{"use_sim_time", true}});
+  auto simulated = std::make_shared<rclcpp::Node>("simulated", options);
+  std::atomic<int> count{0};
+  auto timer = rclcpp::create_timer(simulated, simulated->get_clock(), 20ms, [&] { ++count; });
+  auto clock = this->node->template create_publisher<rosgraph_msgs::msg::Clock>("/clock", rclcpp::ClockQoS());
+  this->executor->add_node(simulated);
+  Spinner spinner(*this->executor);
+  rosgraph_msgs::msg::Clock message;
+  message.clock.sec = 100;
+  const auto moves = [&] {
+    const int before = count;
+    return eventually([&] {
+      message.clock.nanosec = (message.clock.nanosec + 10'000'000) % 1'000'000'000;
+      if (message.clock.nanosec == 0) ++message.clock.sec;
+      clock->publish(message);
+      return count >= before + 3;
+    });
+  };
+  ASSERT_TRUE(moves());
+  for (int round = 0; round < 2; ++round) {
+    ASSERT_TRUE(simulated->set_parameter({"use_sim_time", false}).successful);
+    const int before = count;
+    EXPECT_TRUE(eventually([&] { return count >= before + 5; })) << "on the system's time";
+    ASSERT_TRUE(simulated->set_parameter({"use_sim_time", true}).successful);
+    ASSERT_TRUE(moves()) << "on simulated time again";
+  }
+}
+
 TYPED_TEST(Conformance, AFutureOfAnotherThreadEndsTheSpin) {
   if (kCbg<TypeParam>) GTEST_SKIP() << "here the EventsCBGExecutor does not see a timer made after its node was added";
   this->executor->add_node(this->node);

@@ -364,6 +364,36 @@ TEST_P(ExecutorTest, LearnsRatesAndEdges) {
   EXPECT_THAT(again.warnings(), ::testing::Not(::testing::Contains(HasSubstr("no callback matches"))));
 }
 
+// Where another process subscribes, too (a recorder, rviz), the middleware brings every message a second time, which
+// rclcpp ignores: it is no second arrival.
+TEST_P(ExecutorTest, LearnsARateOnceWhereOthersSubscribeToo) {
+  options.learn = 1s;
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::atomic<int> called{0};
+  auto subscription = subscribe("/image", [&] { ++called; });
+  auto out = publisher("/image");
+  auto recorder = std::make_shared<rclcpp::Node>("recorder");
+  auto recorded = recorder->create_subscription<Empty>("/image", rclcpp::QoS(10), [](Empty::ConstSharedPtr) {});
+  executor.add_node(node);
+  const Spinner spinner(executor);
+  ASSERT_TRUE(eventually([&] { return out->get_subscription_count() == 2; }));
+  constexpr int kSent = 20;
+  for (int sent = 0; sent < kSent; ++sent) {
+    out->publish(Empty());
+    std::this_thread::sleep_for(20ms);
+  }
+  CallbackStats image;
+  const auto is_learned = [&] {
+    for (const CallbackStats &stats : executor.stats()) {
+      if (stats.id.name == "/image") image = stats;
+    }
+    return image.jobs.finished == kSent && image.period != options.default_period.count();
+  };
+  EXPECT_TRUE(eventually(is_learned)) << "finished " << image.jobs.finished;
+  EXPECT_EQ(called, kSent);
+  EXPECT_GE(image.period, 19'000'000) << "no two messages are closer than 20 ms";
+}
+
 TEST_P(ExecutorTest, ItsTraceHoldsToTheModel) {
   options.workers = 2;
   options.trace_capacity = 1 << 16;

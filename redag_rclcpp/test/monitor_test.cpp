@@ -20,6 +20,7 @@
 #include "redag/model/workload_yaml.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/trace/events_file.hpp"
+#include "redag/trace/flight_recorder.hpp"
 #include "spinning.hpp"
 #include "std_msgs/msg/string.hpp"
 #include "std_srvs/srv/trigger.hpp"
@@ -297,6 +298,32 @@ TEST_F(MonitorTest, ResultsAreWrittenWhenSpinningHasEnded) {
   EXPECT_GE(task_of(Json::parse(std::ifstream(results / "metrics.json")), "control.loop")["finished"], 5);
   EXPECT_GE(task_of(Json::parse(std::ifstream(folder_ / "last.json")), "control.loop")["finished"], 5);
   EXPECT_TRUE(monitor_->finish()) << "once more does nothing";
+}
+
+// What a killed process would leave: the record, while the executor spins.
+TEST_F(MonitorTest, ARecordIsThereWhileItSpins) {
+  options_.trace_capacity = 1 << 14;
+  monitor_options_.trace = folder_ / "results";
+  const std::filesystem::path record = folder_ / "results" / "flight";
+  std::filesystem::create_directories(record);
+  std::ofstream(record / "run.json") << "of an earlier process";
+  add_timer(10ms, [] {});
+  start();
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "results" / "flight.1" / "run.json")) << "it is moved aside";
+  ASSERT_TRUE(eventually([&] {
+    std::error_code ignored;
+    return std::filesystem::file_size(record / "events.bin", ignored) > 4096 && !ignored;
+  }));
+  // A copy: the record is locked as long as it is written.
+  std::filesystem::copy(record, folder_ / "copy");
+  const auto recovered = redag::trace::recover(folder_ / "copy");
+  ASSERT_TRUE(recovered) << to_string(recovered.error());
+  EXPECT_GT(recovered->trace.events.size(), 5U);
+  EXPECT_EQ(recovered->trace.info.driver, redag::trace::Driver::Ros);
+  EXPECT_EQ(recovered->damaged, 0U);
+  stop();
+  ASSERT_TRUE(monitor_->finish());
+  EXPECT_FALSE(std::filesystem::exists(record)) << "the results are written";
 }
 
 TEST_F(MonitorTest, ATraceThatIsTooLongEndsEarlier) {

@@ -81,6 +81,9 @@ TEST_F(OptionsTest, Defaults) {
   EXPECT_EQ(options.default_period, 100ms);
   EXPECT_EQ(options.learn, 10s);
   EXPECT_TRUE(options.raise_middleware);
+  EXPECT_FALSE(options.lock_memory);
+  EXPECT_EQ(options.spin, 0ns);
+  EXPECT_EQ(options.watchdog, 0ns);
   EXPECT_TRUE(options.live);
   EXPECT_EQ(options.trace_capacity, 0U);
 
@@ -101,6 +104,9 @@ TEST_F(OptionsTest, ValuesAreRead) {
                                {"default_period", 0.02},
                                {"learn", 1.5},
                                {"raise_middleware", false},
+                               {"lock_memory", true},
+                               {"spin", 0.00005},
+                               {"watchdog", 2},
                                {"live", false},
                                {"trace", "results"},
                                {"metrics_period", 0.25},
@@ -116,6 +122,9 @@ TEST_F(OptionsTest, ValuesAreRead) {
   EXPECT_EQ(options.default_period, 20ms);
   EXPECT_EQ(options.learn, 1500ms);
   EXPECT_FALSE(options.raise_middleware);
+  EXPECT_TRUE(options.lock_memory);
+  EXPECT_EQ(options.spin, 50us);
+  EXPECT_EQ(options.watchdog, 2s);
   EXPECT_FALSE(options.live);
   EXPECT_GT(options.trace_capacity, 0U);
 
@@ -256,10 +265,10 @@ rclcpp::ParameterValue any_value(std::mt19937_64 &random, const std::string &wor
 
 // REDAG_SEED chooses the values, REDAG_OPTION_ROUNDS how many.
 TEST_F(OptionsTest, AnyValuesAreReadOrRefused) {
-  const std::vector<std::string> names{"workers",          "preemption",   "policy",         "threads",
-                                       "cpu_affinity",     "config",       "default_period", "learn",
-                                       "raise_middleware", "live",         "metrics_period", "trace",
-                                       "bounds",           "trace_events", "metrics_file",   "save_path"};
+  const std::vector<std::string> names{"workers",        "preemption",     "policy", "threads",          "cpu_affinity",
+                                       "config",         "default_period", "learn",  "raise_middleware", "live",
+                                       "metrics_period", "trace",          "bounds", "trace_events",     "metrics_file",
+                                       "save_path",      "overheads"};
   const std::string workload = file_with(kWorkload);
   const std::uint64_t seed = from_environment("REDAG_SEED", 1);
   const std::uint64_t rounds = from_environment("REDAG_OPTION_ROUNDS", 400);
@@ -307,9 +316,9 @@ TEST_F(OptionsTest, ParametersSayWhatTheyAreAndStay) {
   const auto node = node_with({});
   const ReDAGOptions options = declare_options(*node);
   (void)declare_monitor_options(*node, options);
-  for (const char *name :
-       {"workers", "preemption", "policy", "threads", "cpu_affinity", "config", "default_period", "learn",
-        "raise_middleware", "metrics_period", "trace", "bounds", "trace_events", "metrics_file", "save_path"}) {
+  for (const char *name : {"workers", "preemption", "policy", "threads", "cpu_affinity", "config", "default_period",
+                           "learn", "raise_middleware", "lock_memory", "spin", "watchdog", "metrics_period", "trace",
+                           "bounds", "trace_events", "metrics_file", "save_path"}) {
     const auto descriptor = node->describe_parameter(name);
     EXPECT_FALSE(descriptor.description.empty()) << name;
     EXPECT_FALSE(descriptor.additional_constraints.empty()) << name;

@@ -162,7 +162,7 @@ class Acceptance(Case):
         bad = self.write("bad.yaml", "experiment: acceptance\nworkers: two\nmethods: [gaun]\n")
         self.expect(redag("experiment", "acceptance", bad), 2, "bad.yaml:2:10: error: workers must be a whole number")
         for arguments, words in [(["--methods", "gaun"], "did you mean 'guan'?"), (["--shard", "3/2"], "--shard: '3/2'"),
-                                 (["--utilization", "1:0:1"], "--utilization: '1:0:1'"), (["--sets", "0"], "at least 1"),
+                                 (["--utilization", "1:0:1"], "--utilization: '1:0:1'"), (["--sets", "0"], "--sets: '0' is not a whole number from 1"),
                                  (["--workers", "0"], "--workers: '0'"), (["--dags", "2"], "2 DAGs, 4 workers"),
                                  (["--preemption", "auto"], "choose none or os"), (["--set", "1"], "--sets"),
                                  (["/no/such.yaml"], "/no/such.yaml")]:

@@ -64,7 +64,7 @@ class Top(Case):
         later = self.frame_of(process, lambda f: f["sequence"] > frame["sequence"])
         self.assertGreater(later["up_ns"], frame["up_ns"])
         self.assertEqual(self.page(process).stat().st_mode & 0o7777, 0o600)
-        self.expect(redag("top", process.pid, "--list"), 0)
+        self.expect(redag("top", "--list"), 0)
         listed = {e["pid"]: e for e in json.loads(redag("top", "--list", "--json").stdout)["executors"]}
         self.assertEqual(listed[process.pid]["name"], "cart")
 

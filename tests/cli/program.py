@@ -48,6 +48,13 @@ def redag(*arguments, text=None, **options):
                           check=False, **options)
 
 
+def body(text):
+    """A JSON document without where it comes from: what has to be the same for the same input."""
+    document = json.loads(text)
+    del document["provenance"]
+    return json.dumps(document)
+
+
 def interrupt(process, after=0.0, by=signal.SIGINT):
     """Waits until the process listens to the signal, which would just kill it while it starts, and for `after` s more."""
     listens = 0

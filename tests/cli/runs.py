@@ -8,11 +8,82 @@ import json
 import os
 import re
 import resource
+import shlex
 import signal
 import subprocess
 import time
 
-from program import CART, PROGRAM, SOURCE, Case, in_terminal, interrupt, main, redag
+from program import CART, PROGRAM, SOURCE, Case, body, in_terminal, interrupt, main, redag
+
+
+class Calibrate(Case):
+    def calibrated(self, *arguments):
+        path = self.folder / "overheads.yaml"
+        result = redag("calibrate", "--duration", "1s", "--out", path, "--json", *arguments)
+        return path, self.document(result, "redag.calibration/1")
+
+    def test_a_file_that_the_others_charge(self):
+        path, document = self.calibrated()
+        self.assertTrue(document["complete"])
+        self.assertGreater(document["overheads"]["normal"]["dispatch_ns"], 0)
+        measured = {row["what"] for row in document["measured"]}
+        self.assertLessEqual({"thread_clock", "steady_clock", "lateness", "dispatch", "preempt", "timer", "stall"}, measured)
+        for row in document["measured"]:
+            self.assertGreater(row["samples"], 0)
+            self.assertTrue(row["p50_ns"] <= row["p99_ns"] <= row["p999_ns"] <= row["max_ns"], row)
+        self.assertIn("provenance:", path.read_text())
+        plain = json.loads(redag("analyze", self.cart, "--json").stdout)
+        charged = json.loads(redag("analyze", self.cart, "--json", "--overheads", path).stdout)
+        self.assertGreater(charged["utilization"], plain["utilization"])
+        self.assertEqual(charged["overheads_ns"]["dispatch"], document["overheads"]["normal"]["dispatch_ns"])
+        self.assertIn(str(path), charged["provenance"]["calibration"])
+        self.assertIn("overheads: release", redag("simulate", self.cart, "--duration", "1s", "--overheads", path).stdout)
+
+    def test_runs_and_their_reports_charge_it(self):
+        # As a quiet machine has them: a busy one leaves nothing that could be bounded.
+        path = self.write("overheads.yaml", "overheads: {normal: {timer: 5us, dispatch: 50us, preempt: 5us, lateness: 1ms, stall: 2ms, "
+                          "stall_per_second: 5ms, noise: 50us, noise_per_second: 5ms, clock: 1us}}\n")
+        out = self.folder / "out"
+        light = self.write("light.yaml", "name: light\ndags: [{name: d, tasks: [{name: t, wcet: 1ms, period: 100ms}]}]\n")
+        arguments = ["run", light, "--preemption", "none", "--duration", "300ms", "--out", out]
+        plain = json.loads(redag(*arguments, "--json").stdout)
+        self.assertFalse(plain["bounds"]["calibrated"])
+        document = json.loads(redag(*arguments, "--json", "--overheads", path).stdout)
+        self.assertTrue(document["bounds"]["calibrated"])
+        self.assertGreater(document["bounds"]["tasks"][0]["bound_ns"], plain["bounds"]["tasks"][0]["bound_ns"])
+        report = json.loads(redag("report", out, "--json").stdout)
+        self.assertIn("with the overheads of the machine", report["groups"][0]["bounds"]["assumes"])
+        self.assertEqual(report["groups"][0]["tasks"][0]["bound_ns"], document["bounds"]["tasks"][0]["bound_ns"])
+
+    def test_without_one_the_run_says_so(self):
+        result = self.expect(redag("run", self.cart, "--duration", "200ms", "--preemption", "none"), 0)
+        self.assertIn("platform overheads not charged; run 'redag calibrate'", result.stdout)
+
+    def test_bad_files(self):
+        self.expect(redag("run", self.cart, "--overheads", self.folder / "none.yaml"), 2, "cannot open")
+        wrong = self.write("wrong.yaml", "overheads:\n  normal: {timer: 1us, dispach: 2us}\n")
+        self.expect(redag("analyze", self.cart, "--overheads", wrong), 2, "wrong.yaml:2:", "did you mean 'dispatch'")
+        path, _ = self.calibrated()
+        self.expect(redag("analyze", self.cart, "--overheads", path, "--overhead-dispatch", "1us"), 2, "excludes")
+        normal = self.write("normal.yaml", re.sub(r"  realtime:\n(    .*\n)+", "", path.read_text()))
+        self.expect(redag("analyze", self.cart, "--preemption", "os", "--overheads", normal), 2, "SCHED_FIFO")
+
+    def test_bad_arguments(self):
+        self.expect(redag("calibrate", "--duration", "0"), 2, "--duration")
+        self.expect(redag("calibrate", "--duration", "200h"), 2, "more than a day")
+        self.expect(redag("calibrate", "--duration", "1s", "--out", self.folder / "no" / "folder.yaml"), 2, "folder.yaml")
+
+    def test_interrupted_it_writes_what_it_has(self):
+        path = self.folder / "partial.yaml"
+        with subprocess.Popen([PROGRAM, "calibrate", "--duration", "10min", "--loaded", "--out", path], text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            interrupt(process, after=5)
+            out, error = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 0, error)
+        self.assertIn("the calibration is partial", error)
+        self.assertIn("partial: ended early", out)
+        self.assertIn("complete: false", path.read_text())
+        self.expect(redag("analyze", self.cart, "--overheads", path), 0)
 
 
 class Simulate(Case):
@@ -36,8 +107,32 @@ class Simulate(Case):
 
     def test_same_seed_same_bytes(self):
         arguments = ["simulate", SOURCE / "workloads" / "contention.yaml", "--duration", "1s", "--json"]
-        self.assertEqual(redag(*arguments).stdout, redag(*arguments).stdout)
-        self.assertNotEqual(redag(*arguments).stdout, redag(*arguments, "--seed", "2").stdout)
+        first = redag(*arguments).stdout
+        self.assertEqual(body(first), body(redag(*arguments).stdout))
+        self.assertNotEqual(body(first), body(redag(*arguments, "--seed", "2").stdout))
+        dated = {**os.environ, "SOURCE_DATE_EPOCH": "1700000000"}
+        self.assertEqual(redag(*arguments, env=dated).stdout, redag(*arguments, env=dated).stdout)
+        self.assertEqual(json.loads(redag(*arguments, env=dated).stdout)["provenance"]["created"], "2023-11-14T22:13:20Z")
+
+    def test_every_file_says_where_it_comes_from(self):
+        out = self.folder / "it's out"
+        secret = {**os.environ, "SOME_TOKEN": "s3cr3t-value"}
+        self.expect(redag("simulate", self.cart, "--duration", "1s", "--out", out, env=secret), 0)
+        summary = json.loads((out / "summary.json").read_text())["provenance"]
+        self.assertEqual(list(summary), ["created", "version", "revision", "host", "kernel", "command", "calibration"])
+        self.assertRegex(summary["created"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$")
+        self.assertEqual(shlex.split(summary["command"]),
+                         [str(PROGRAM), "simulate", str(self.cart), "--duration", "1s", "--out", str(out)])
+        self.assertEqual(summary["host"], os.uname().nodename)
+        self.assertIn(os.uname().release, summary["kernel"])
+        self.assertEqual(summary["calibration"], "none")
+        self.assertEqual(json.loads((out / "trace.json").read_text())["otherData"], summary)
+        self.assertEqual(json.loads((out / "events.jsonl").read_text().splitlines()[0])["provenance"], summary)
+        for file in out.iterdir():
+            self.assertNotIn("s3cr3t", file.read_text())
+
+    def test_a_bad_source_date_epoch_is_an_error(self):
+        self.expect(redag("simulate", self.cart, env={**os.environ, "SOURCE_DATE_EPOCH": "today"}), 2, "SOURCE_DATE_EPOCH 'today'")
 
     def test_the_command_line_overrides(self):
         document = self.document(redag("simulate", self.cart, "--duration", "1s", "--preemption", "cooperative",
@@ -202,6 +297,54 @@ class Interrupts(Case):
         self.assertEqual(len(counts), 1)
 
 
+class Killed(Case):
+    def killed_run(self, out, *arguments):
+        process = subprocess.Popen([PROGRAM, "run", self.cart, "--duration", "1h", "--preemption", "none", "--out", out,
+                                    *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        record = out / "flight" / "events.bin"
+        for _ in range(2000):  # until several collections have been recorded
+            if "--no-flight" in arguments and out.exists() or record.exists() and record.stat().st_size > 4 * 4096:
+                break
+            time.sleep(0.02)
+        process.kill()
+        process.wait()
+
+    def test_its_record_becomes_results(self):
+        out = self.folder / "out"
+        self.killed_run(out)
+        self.assertEqual([path.name for path in out.iterdir()], ["flight"])
+        self.expect(redag("check-trace", out), 2, f"redag recover {out}")
+        self.expect(redag("run", self.cart, "--duration", "100ms", "--out", out), 2, "redag recover")
+        self.expect(redag("recover", out / "flight"), 2, "--out")
+        elsewhere = self.folder / "rescued"
+        document = self.document(redag("recover", out, "--keep", "--json", "--out", elsewhere), "redag.summary/1")
+        self.assertGreater(document["total"]["finished"], 10)
+        self.assertTrue(document["check"]["ok"])
+        result = self.expect(redag("recover", out), 0)
+        self.assertIn("trace check: ok", result.stdout)
+        names = ["events.jsonl", "jobs.csv", "summary.json", "trace.json"]
+        for folder in out, elsewhere:
+            self.assertEqual(sorted(path.name for path in folder.iterdir()), names)
+        self.expect(redag("check-trace", out), 0)
+        self.assertEqual((out / "events.jsonl").read_text().splitlines()[1:],
+                         (elsewhere / "events.jsonl").read_text().splitlines()[1:])
+        self.expect(redag("recover", out), 2, "no record of a run")
+
+    def test_a_record_is_given_up_by_force(self):
+        out = self.folder / "out"
+        self.killed_run(out)
+        self.expect(redag("run", self.cart, "--duration", "100ms", "--out", out, "--force"), 0)
+        self.assertFalse((out / "flight").exists())
+
+    def test_without_a_record(self):
+        out = self.folder / "out"
+        self.killed_run(out, "--no-flight")
+        self.assertEqual(list(out.iterdir()), [])
+
+    def test_a_small_record_keeps_the_newest(self):
+        self.expect(redag("run", self.cart, "--flight-size", "0", "--out", self.folder / "out"), 2, "--flight-size")
+
+
 class Compare(Case):
     def test_simulated(self):
         out = self.folder / "out"
@@ -222,7 +365,7 @@ class Compare(Case):
         self.assertRegex(result.stdout, r"fast: redag misses .* %, mte .* %, ste .* %: ")
 
     def test_bad_values(self):
-        self.expect(redag("compare", self.cart, "--repeat", "20000"), 2, "--repeat: 20000 is more than 10000")
+        self.expect(redag("compare", self.cart, "--repeat", "20000"), 2, "--repeat: '20000' is not a whole number from 1 to 10000")
         self.expect(redag("compare", self.cart, "--simulate", "--executors", "redag,mte-fifo"), 2,
                     "the simulator has no threads: 'mte-fifo' is 'mte' there")
 

@@ -10,14 +10,14 @@ import subprocess
 
 from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, main, redag
 
-COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["compare"], ["diff"], ["analyze"], ["sensitivity"], ["assign"], ["tune"],
+COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["calibrate"], ["compare"], ["diff"], ["analyze"], ["sensitivity"], ["assign"], ["tune"],
             ["check-trace"], ["top"], ["report"], ["experiment"], ["experiment", "acceptance"],
             ["experiment", "factorial"], ["experiment", "merge"]]
 
 
 class Usage(Case):
     def test_version(self):
-        self.assertRegex(self.expect(redag("--version"), 0).stdout, r"^redag \d+\.\d+\.\d+\n$")
+        self.assertRegex(self.expect(redag("--version"), 0).stdout, r"^redag \d+\.\d+\.\d+ \(revision \S+\)\n$")
 
     def test_no_arguments(self):
         self.expect(redag(), 2, "Subcommands:", "check-trace")

@@ -21,6 +21,8 @@ void comparison_target(std::string_view input);
 void units_target(std::string_view input);
 /// The page of shared memory that `redag top` reads.
 void live_page_target(std::string_view input);
+/// The record of a run that was killed; what is recovered makes results.
+void flight_target(std::string_view input);
 /// Values of the command line and of files: durations, processors, utilizations, patterns of ROS names.
 void values_target(std::string_view input);
 /// A workload that the loader accepts, and every subcommand.
@@ -36,7 +38,7 @@ inline constexpr std::array kTargets = {
     Target{"trace", trace_target},           Target{"jobs_csv", jobs_csv_target},
     Target{"comparison", comparison_target}, Target{"units", units_target},
     Target{"live_page", live_page_target},   Target{"values", values_target},
-    Target{"commands", commands_target},
+    Target{"commands", commands_target},     Target{"flight", flight_target},
 };
 
 }  // namespace redag::fuzz

@@ -304,9 +304,10 @@ function howItWasRun() {
     element('h2', {id: 'how'}, 'How it was run'),
     element('dl', {}, ...[...worldRows, ['Length of a run', formatTime(report.duration_ns)],
       ['Runs of a combination', String(report.repetitions)], ['Combinations', formatCount(points.length)], ['Machine', machines.join('; ') || 'not recorded'],
+      ...provenanceRows(report.results_provenance),
     ].flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])),
     element('details', {}, element('summary', {}, 'The plan'), element('pre', {}, report.plan)),
-    pageFooter(report.version),
+    pageFooter(report),
   ];
 }
 

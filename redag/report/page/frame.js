@@ -27,8 +27,21 @@ function themeChoice() {
   });
 }
 
-function pageFooter(version) {
-  return element('footer', {}, `Made by redag ${version}. Figures: Apache ECharts ${echarts.version} (Apache License 2.0). `
+/** "redag 0.1.0 (revision 0123abc)". */
+const programOf = ({version, revision}) => `redag ${version} (revision ${revision})`;
+
+/** Where results come from, as rows of a description list; `provenance` is null in results of older versions. */
+function provenanceRows(provenance) {
+  if (!provenance) return [['Recorded', 'by a version of redag that did not note when, where and how']];
+  const {created, host, kernel, command, calibration} = provenance;
+  return [['Recorded', `${created}, by ${programOf(provenance)}`], ['Host', `${host}, ${kernel}`], ['Command line', element('code', {}, command)],
+    ['Calibration', calibration]];
+}
+
+function pageFooter({version, provenance}) {
+  const made = provenance ? [`Page made ${provenance.created} by ${programOf(provenance)} on ${provenance.host}: `, element('code', {}, provenance.command), '. ']
+    : [`Page made by redag ${version}. `];
+  return element('footer', {}, ...made, `Figures: Apache ECharts ${echarts.version} (Apache License 2.0). `
     + 'This file uses no network. Each figure can be saved as PNG or SVG with the buttons above it.');
 }
 

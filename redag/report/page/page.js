@@ -120,7 +120,7 @@ function cuts() {
 
 function howItWasRun() {
   const facts = () => {
-    const {run} = groups[state.executor];
+    const {run, runs} = groups[state.executor];
     const {config, machine} = run;
     const rows = [
       ['Executor', run.executor], ['World', DRIVERS[run.driver]],
@@ -130,6 +130,7 @@ function howItWasRun() {
       ['Overheads', run.overheads || 'none added'],
       ['Machine', [machine.model, machine.cpus ? `${machine.cpus} processors` : '', machine.kernel].filter(Boolean).join(', ') || 'not recorded'],
     ];
+    rows.push(...provenanceRows(runs[0].provenance));
     if (run.lost_events > 0) rows.push(['Lost events', formatCount(run.lost_events)]);
     return [element('dl', {}, ...rows.flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])),
       element('details', {}, element('summary', {}, 'The workload'), element('pre', {}, run.workload))];
@@ -137,7 +138,7 @@ function howItWasRun() {
   return [
     element('h2', {id: 'how'}, 'How it was run'), filled(facts), runTable(groups),
     ...(report.cuts.length === 0 ? [] : [element('h3', {}, 'What is not shown'), element('ul.soft', {}, ...cuts().map((cut) => element('li', {}, cut)))]),
-    pageFooter(report.version),
+    pageFooter(report),
   ];
 }
 

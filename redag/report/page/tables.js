@@ -33,9 +33,9 @@ function meter(t, response, deadline, bound, colour) {
 
 const meterHelp = 'Solid: median; lighter: p99 and max; grey: the time until the deadline. Red tick: deadline, green tick: bound';
 
-function boundCell(bound, measured, method) {
+function boundCell(bound, measured, method, alarm = measured > bound) {
   if (bound === null || bound === undefined) return '\u2013';
-  return {text: formatTime(bound), kind: measured > bound ? 'bad' : '', title: `by ${method}${measured > bound ? '; exceeded' : ''}`};
+  return {text: formatTime(bound), kind: alarm ? 'bad' : '', title: `by ${method}${measured > bound ? '; exceeded' : ''}`};
 }
 
 function taskTable(group, unfolded, unfold) {
@@ -44,7 +44,7 @@ function taskTable(group, unfolded, unfold) {
     column('task'), column('period'), column('deadline'), column('jobs', 'Released'), column('missed', 'Late, skipped or aborted, of all released'),
     column('p50', 'Response f \u2212 r, median'), column('p99'), column('max'), column('bound', 'Tightest sound bound on the response'),
     column('measured, bound, deadline', meterHelp, true), column('L max', 'Largest lateness; negative: how close a job came'),
-    column('ran / wcet', 'Longest time of a job on a worker, and what it was stated to take at most'), column('preempted', 'How often jobs lost their worker'),
+    column('ran / wcet', 'Most processor time that a job used, and what it was stated to take at most'), column('preempted', 'How often jobs lost their worker'),
   ];
   // Of many, first only those that came closest to a miss.
   const all = group.tasks.filter((task) => task.jobs !== undefined);
@@ -61,11 +61,11 @@ function taskTable(group, unfolded, unfold) {
       {text: element('span', {title: name}, swatch(t, task.dag), name)}, formatTime(task.period_ns), formatTime(task.deadline_ns), formatCount(task.jobs.released),
       missCell(task.jobs), formatTime(r && r.p50_ns), formatTime(r && r.p99_ns),
       {text: formatTime(r && r.max_ns), kind: r && r.max_ns > task.deadline_ns ? 'bad' : ''},
-      boundCell(task.bound_ns, r ? r.max_ns : 0, task.method),
+      boundCell(task.bound_ns, r ? r.max_ns : 0, task.method, task.bound_alarm),
       {text: meter(t, r, task.deadline_ns, task.bound_ns, colourOf(t, task.dag))},
       {text: formatTime(task.jobs.max_lateness_ns), kind: task.jobs.max_lateness_ns > 0 ? 'bad' : ''},
       {text: `${formatTime(task.execution_max_ns)} / ${task.wcet_ns > 0 ? formatTime(task.wcet_ns) : '\u2013'}`,
-        kind: task.wcet_ns > 0 && task.execution_max_ns > task.wcet_ns && group.run.driver !== 'simulator' ? 'bad' : ''},
+        kind: task.wcet_exceeded ? 'bad' : ''},
       formatCount(task.jobs.preemptions),
     ]};
   });
@@ -109,11 +109,13 @@ function comparisonTable(groups, rows) {
 
 function runTable(groups) {
   const columns = [
-    column('run'), column('seed'), column('jobs'), column('missed'), column('workers busy'), column('rules checked'), column('violations'),
+    column('run'), column('recorded', 'UTC', true), column('seed'), column('jobs'), column('missed'), column('workers busy'), column('rules checked'), column('violations'),
     column('priority inversions', 'Stretches in which a more urgent job waited while a less urgent one ran'), column('longest'),
   ];
   return table(columns, groups.flatMap((group) => group.runs.map((run) => ({cells: [
-    {text: element('span', {title: run.path}, run.path.split('/').slice(-2).join('/'))}, String(run.seed), formatCount(run.released), formatPercent(run.miss_ratio),
+    {text: element('span', {title: run.path}, run.path.split('/').slice(-2).join('/'))},
+    {text: run.provenance ? run.provenance.created : '\u2013', title: run.provenance ? Object.entries(run.provenance).map(([key, value]) => `${key}: ${value}`).join('\n') : undefined},
+    String(run.seed), formatCount(run.released), formatPercent(run.miss_ratio),
     run.worker_busy.map((share) => `${(100 * share).toFixed(0)}\u00a0%`).join(', '), formatCount(run.checks),
     {text: formatCount(run.violation_count), kind: run.violation_count > 0 ? 'bad' : 'good', title: run.violations.join('\n')},
     formatCount(run.inversions.count), formatTime(run.inversions.longest_ns),

@@ -55,6 +55,14 @@ struct ReDAGOptions {
   /// os: threads of the middleware that deliver messages are given a higher priority than the workers, where they are
   /// known (Cyclone DDS, Fast DDS). Otherwise busy workers could delay the very messages they wait for.
   bool raise_middleware = true;
+  /// Locks the memory of the process as it is used, and touches the stacks of the threads beforehand, so that callbacks
+  /// meet no page fault there. If it cannot be had, warnings() says so.
+  bool lock_memory = false;
+  /// none, cooperative: how long an idle worker looks for a job before it sleeps.
+  std::chrono::nanoseconds spin{};
+  /// Callbacks that are in progress for longer are named by a warning while they are; 0: none. With it, `on_budget` and
+  /// HI mode also take effect in callbacks without preemption points.
+  std::chrono::nanoseconds watchdog{};
   std::size_t trace_capacity = 0;  // events kept between two drain_trace(); 0: none are recorded
   bool live = false;               // `redag top` sees it: a page of shared memory, and a thread that updates it
   /// Called on the worker's thread; must not throw. Empty: Stop.
@@ -134,9 +142,14 @@ class ReDAGExecutor : public rclcpp::Executor {
 
   /// Appends the events since the last call; one thread at a time.
   void drain_trace(std::vector<redag::JobEvent> &events);
+  /// Events that were not recorded since the start, because nobody drained them in time.
+  [[nodiscard]] std::uint64_t lost_events() const;
   /// A trace as files and checks want it: all callbacks that there ever were as tasks of its workload, and the events
   /// with the ids that it gives them.
   [[nodiscard]] redag::trace::Trace as_trace(std::vector<redag::JobEvent> events) const;
+  /// What such a trace says of the run until now, without events: task i of drained events is at positions[i] of the
+  /// workload.
+  [[nodiscard]] redag::trace::RunInfo run_info(std::vector<std::uint32_t> &positions) const;
   /// Of a drained event: "control.ekf", or to_string() of the callback's id.
   [[nodiscard]] std::string task_name(redag::TaskId task) const;
 

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "rclcpp/node.hpp"
+#include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 #include "redag_rclcpp/executor.hpp"
 
@@ -36,6 +37,9 @@ struct MonitorOptions {
   /// What the executor was given, for bounds on response times. None: no bounds. Responses are counted against them
   /// where there is ReDAGOptions::trace_capacity.
   std::optional<redag::Workload> workload{};
+
+  /// What `redag calibrate` measured of this machine, charged to these bounds; none: nothing is charged.
+  std::optional<redag::Calibration> calibration{};
 };
 
 class Monitor {

@@ -8,7 +8,11 @@
 
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp_components/component_manager.hpp"
+#include "redag/runtime/mode.hpp"
 #include "redag_rclcpp/executor.hpp"
+#ifdef REDAG_INHERITS
+#include "redag_rclcpp/inherit.h"
+#endif
 #include "redag_rclcpp/monitor.hpp"
 #include "redag_rclcpp/options.hpp"
 
@@ -32,6 +36,9 @@ constexpr const char *kHelp = R"(A component container that executes callbacks b
   default_period    seconds, where nobody says                                    0.1
   learn             seconds in which rates and edges are learned                  10.0
   raise_middleware  os: the middleware's threads above the workers                true
+  lock_memory       lock the memory, touch the stacks: no page faults there       false
+  spin              seconds that an idle worker looks for work; not with os       0.0
+  watchdog          seconds; callbacks in progress for longer are named; 0: none  0.0
   live              let redag top see it (a page of memory that only its owner   true
                     can read)
   metrics_period    seconds between /diagnostics and ~/metrics; 0: none           1.0
@@ -40,6 +47,9 @@ constexpr const char *kHelp = R"(A component container that executes callbacks b
   trace_events      events kept for it                                            10000000
   metrics_file      file for the last metrics, written at the end                 ""
   save_path         where ~/save writes what was learned                          redag_workload.yaml
+
+The locks of the process inherit priority where real-time priorities are to be had; REDAG_PI=0 in the environment
+turns that off.
 
 Services: ~/_container/load_node and its kin (ros2 component ...), ~/metrics and ~/save (std_srvs/srv/Trigger).
 Ends with SIGINT or SIGTERM: 0; 1 if a callback threw or results could not be written; 2 for bad parameters.
@@ -87,6 +97,10 @@ int main(int argc, char **argv) {
       return kExitOk;
     }
   }
+#ifdef REDAG_INHERITS
+  // Where no thread can be at real-time priority there is nothing to inherit.
+  if (redag::runtime::probe_priority_band().top_job == 0) redag_pi_disable();
+#endif
   try {
     rclcpp::init(argc, argv);
   } catch (const std::exception &error) {

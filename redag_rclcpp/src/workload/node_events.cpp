@@ -73,7 +73,8 @@ int phase_of(JobEventKind kind) {
     case JobEventKind::Started: return 7;
     case JobEventKind::Exceeded:
     case JobEventKind::HighMode:
-    case JobEventKind::LowMode: break;  // nodes know nothing of these
+    case JobEventKind::LowMode:
+    case JobEventKind::Executed: break;  // nodes know nothing of these
   }
   return 8;
 }

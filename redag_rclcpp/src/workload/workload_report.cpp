@@ -34,7 +34,9 @@ nlohmann::ordered_json to_json(const CheckReport &check) {
 }
 
 redag::Result<void> write_check(const std::string &path, const WorkloadRun &run) {
-  nlohmann::ordered_json document = {{"format", "redag.check/1"}, {"nodes", to_json(run.check)}};
+  nlohmann::ordered_json document = {{"format", "redag.check/1"}};
+  document["provenance"] = nlohmann::ordered_json::parse(redag::provenance_to_json(run.trace.info.provenance));
+  document["nodes"] = to_json(run.check);
   if (run.scheduler) document["scheduler"] = to_json(run.scheduler->check);
   document["stopped"] = run.stopped;
   document["warnings"] = run.warnings;

@@ -215,6 +215,7 @@ class Run {
                                  options_.intra_process ? "intra-process" : "middleware", redag::format_duration(cost),
                                  redag::format_duration(nodes_->phase_error()));
     info.machine = redag::trace::this_machine();
+    info.provenance = redag::current_provenance();
     info.lost_events = nodes_->lost_events();
     if (info.lost_events > 0) {
       result_.warnings.push_back(fmt::format("{} events were lost: the figures are incomplete", info.lost_events));

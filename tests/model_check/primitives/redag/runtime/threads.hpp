@@ -2,6 +2,7 @@
 // thread_that_fails is refused.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <ctime>
 #include <functional>
@@ -44,7 +45,10 @@ struct ThreadSetup {
   std::string name;
   int fifo_priority = 0;
   std::vector<int> cpus;
+  std::size_t touched_stack = 0;
 };
+
+inline constexpr std::size_t kTouchedStack = 0;
 
 inline std::optional<std::string> thread_that_fails;  // by name
 

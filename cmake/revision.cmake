@@ -1,0 +1,29 @@
+# Writes build_revision.cpp, which holds the git revision of the sources. Run at every build, in script mode; the file
+# changes only when the revision does, so that a commit compiles this one file again and nothing else:
+#   cmake -DOUTPUT=build_revision.cpp -DSOURCE=. [-DREVISION=given] -P revision.cmake
+cmake_minimum_required(VERSION 3.22)
+
+if(NOT REVISION)
+  find_program(GIT git)
+  if(GIT)
+    # Always the hash, whatever tags there are.
+    execute_process(COMMAND ${GIT} -C ${SOURCE} describe --always --dirty --abbrev=12 --exclude *
+      OUTPUT_VARIABLE REVISION OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE failed)
+    if(failed)
+      set(REVISION "")
+    endif()
+  endif()
+endif()
+if(NOT REVISION)
+  set(REVISION unknown)
+endif()
+if(NOT REVISION MATCHES "^[A-Za-z0-9._+~-]+$")
+  message(FATAL_ERROR "REDAG_REVISION '${REVISION}' has other characters than letters, digits and . _ + ~ -")
+endif()
+
+file(WRITE ${OUTPUT}.new "// Made by cmake/revision.cmake.
+#include \"redag/base/provenance.hpp\"
+
+const char *redag::build_revision() { return \"${REVISION}\"; }
+")
+file(COPY_FILE ${OUTPUT}.new ${OUTPUT} ONLY_IF_DIFFERENT)

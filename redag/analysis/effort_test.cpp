@@ -1,0 +1,165 @@
+#include "redag/analysis/effort.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+#include "redag/analysis/analyze.hpp"
+#include "redag/analysis/global_sequential.hpp"
+#include "redag/analysis/response_time.hpp"
+#include "redag/analysis/utilization.hpp"
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using testing::BoundCase;
+using testing::BoundCaseLimits;
+
+// Independent tasks of three periods; half of the workers are used.
+System many_tasks(std::size_t count, std::uint32_t workers) {
+  Workload workload;
+  workload.platform = Platform{workers, PreemptionMode::Os};
+  for (std::size_t i = 0; i < count; ++i) {
+    Task task;
+    task.name = "t";
+    task.period = task.deadline = Duration{10} * static_cast<Duration>(i % 3 + 1) * kMillisecond;
+    task.wcet = task.bcet = task.period * workers / 2 / static_cast<Duration>(count);
+    Dag dag;
+    dag.name = "d" + std::to_string(i);
+    dag.tasks = {task};
+    workload.dags.push_back(dag);
+  }
+  return compile(workload, platform_of(workload)).value();
+}
+
+AnalyzeOptions itemising() {
+  AnalyzeOptions options;
+  options.itemise = true;
+  return options;
+}
+
+std::size_t terms_in(const Report &report) {
+  std::size_t count = 0;
+  for (const MethodReport &method : report.methods) {
+    if (method.bound() == nullptr) continue;
+    for (const ResponseBound &bound : method.bound()->tasks) count += bound.terms.size();
+    for (const ResponseBound &bound : method.bound()->dags) count += bound.terms.size();
+  }
+  return count;
+}
+
+const MethodReport &report_of(const Report &report, std::string_view name) {
+  return *std::find_if(report.methods.begin(), report.methods.end(),
+                       [&](const MethodReport &method) { return method.method->name == name; });
+}
+
+std::uint64_t steps_of(const Method &method, const System &system) {
+  Effort::Limits limits;
+  limits.itemised.which = Itemised::Which::None;
+  const Effort effort(limits);
+  EXPECT_TRUE(std::holds_alternative<Bound>(method.apply(system)));
+  return effort.steps();
+}
+
+TEST(Effort, AMethodGivesUpAtItsLimitAndTheOthersAnswer) {
+  const System system = many_tasks(3000, 2);
+  AnalyzeOptions options;
+  options.effort = 1'000'000;
+  const Report report = analyze(system, options);
+  const MethodReport &dear = report_of(report, "bertogna_cirinei");
+  EXPECT_TRUE(dear.gave_up());
+  EXPECT_EQ(std::get<NotApplicable>(dear.outcome).reason, "more than 1 million steps");
+  EXPECT_EQ(dear.verdict, Verdict::NotShown);
+  EXPECT_TRUE(report_of(report, "global_rm_light").bound()->accepts.value());
+  EXPECT_FALSE(report_of(report, "dag_groups").gave_up()) << "does not apply";
+  EXPECT_EQ(report.verdict, Verdict::Schedulable);
+  EXPECT_FALSE(report_of(analyze(system), "bertogna_cirinei").gave_up()) << "the usual effort is enough";
+}
+
+TEST(Effort, TheCallerEndsAMethodForAReason) {
+  const System system = many_tasks(3000, 2);
+  std::map<std::string, int> asked;
+  AnalyzeOptions options;
+  options.stop = [&](const AnalysisProgress &progress) {
+    ++asked[std::string(progress.method.name)];
+    EXPECT_GT(progress.at.steps, 0U);
+    EXPECT_GE(progress.at.done, 0.0);
+    EXPECT_LT(progress.at.done, 1.0);
+    EXPECT_LT(progress.index, progress.count);
+    return std::string(progress.method.name == "guan" ? "enough" : "");
+  };
+  const Report report = analyze(system, options);
+  EXPECT_EQ(std::get<NotApplicable>(report_of(report, "guan").outcome).reason, "enough");
+  EXPECT_EQ(asked["guan"], 1);
+  EXPECT_GT(asked["bertogna_cirinei"], 1);
+  EXPECT_FALSE(report_of(report, "bertogna_cirinei").gave_up());
+}
+
+TEST(Effort, AScopeOfTheCallerEndsWhatIsInside) {
+  const System system = many_tasks(3000, 2);
+  Effort::Limits limits;
+  limits.steps = 1'000'000;
+  const Effort effort(limits);
+  try {
+    (void)analyze(system);
+    FAIL() << "nothing was thrown";
+  } catch (const Effort::GaveUp &gave_up) {
+    EXPECT_EQ(gave_up.scope, &effort);
+  }
+}
+
+// What an analysis holds grows with the tasks, not with their pairs.
+TEST(Effort, TermsAreMadeOnDemandAlone) {
+  for (const std::uint32_t workers : {1U, 2U}) {
+    const System system = many_tasks(150, workers);
+    EXPECT_EQ(terms_in(analyze(system)), 0U);
+    EXPECT_GT(terms_in(analyze(system, itemising())), std::size_t{150} * 150 / 2);
+  }
+}
+
+TEST(Effort, ABoundItemisedAloneIsTheSameAsAmongAll) {
+  std::size_t compared = 0;
+  BoundCaseLimits limits;
+  limits.max_workers = 3;
+  limits.edges = limits.jitter = limits.caps = true;
+  Rng rng(5);
+  for (int i = 0; i < 300; ++i) {
+    const BoundCase one = random_bound_case(rng, limits);
+    const Result<System> system = compile(one.workload, one.platform);
+    if (!system || !system->not_analysable.empty()) continue;
+    const Report all = analyze(*system, itemising());
+    const Report none = analyze(*system);
+    for (std::size_t t = 0; t < all.tasks.size(); ++t) {
+      EXPECT_EQ(none.tasks[t].response, all.tasks[t].response);
+      if (all.tasks[t].method == nullptr) continue;
+      EXPECT_EQ(itemised(*system, none.tasks[t], TaskId(t)).terms, all.tasks[t].bound.terms);
+      ++compared;
+    }
+    for (std::size_t d = 0; d < all.dags.size(); ++d) {
+      if (all.dags[d].method == nullptr) continue;
+      EXPECT_EQ(itemised(*system, none.dags[d], DagId(d)).terms, all.dags[d].bound.terms);
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 300U);
+}
+
+// On one worker the tasks of one period count together: with few periods the steps are linear in the tasks.
+TEST(Effort, OneWorkerTakesLinearStepsInTasksOfFewPeriods) {
+  const std::uint64_t few = steps_of(rta_preemptive(), many_tasks(300, 1));
+  const std::uint64_t many = steps_of(rta_preemptive(), many_tasks(3000, 1));
+  EXPECT_GT(few, 300U);
+  EXPECT_LE(many, 20 * few);
+}
+
+// Of several, each task looks at all that are more urgent in each of a few evaluations.
+TEST(Effort, SeveralWorkersTakeQuadraticStepsAtMost) {
+  const std::uint64_t few = steps_of(bertogna_cirinei(), many_tasks(300, 2));
+  const std::uint64_t many = steps_of(bertogna_cirinei(), many_tasks(3000, 2));
+  EXPECT_LE(many, 200 * few);
+}
+
+}  // namespace
+}  // namespace redag::analysis

@@ -1,0 +1,63 @@
+// Comparisons of utilizations with the limits of the tests, as rational numbers: nothing is accepted or refused by
+// rounding. Decided by intervals of 2^-60, and where these do not tell, by whole numbers of any length. Pure functions.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "redag/base/int128.hpp"
+#include "redag/base/time.hpp"
+
+namespace redag::analysis {
+
+/// amount / period.
+struct Share {
+  Uint128 amount = 0;  // below 2^80
+  Duration period = 1;
+};
+
+/// Between two multiples of 2^-60, as numerators.
+struct ShareRange {
+  Uint128 low = 0;
+  Uint128 high = 0;
+};
+
+/// Shares, with what they come to.
+class Shares {
+ public:
+  void push(const Share &share);
+  void pop();
+  [[nodiscard]] std::span<const Share> all() const { return all_; }
+  [[nodiscard]] std::size_t size() const { return all_.size(); }
+  [[nodiscard]] ShareRange sum() const { return sums_.back(); }
+  [[nodiscard]] ShareRange product() const { return products_.back(); }  // of (1 + share)
+
+ private:
+  static constexpr ShareRange kOnes = {Uint128{1} << 60U, Uint128{1} << 60U};
+
+  std::vector<Share> all_;
+  std::vector<ShareRange> sums_ = {ShareRange{}};  // of the first 0, 1, ...
+  std::vector<ShareRange> products_ = {kOnes};
+};
+
+// Where intervals do not tell and the numbers have more than 2^18 bits (thousands of different, unrelated periods), the
+// answer is no.
+
+/// sum <= limit / of.
+[[nodiscard]] bool is_sum_within(const Shares &shares, std::uint64_t limit, std::uint64_t of);
+
+/// sum <= n (2^(1/n) - 1), that is (1 + sum / n)^n <= 2. n = 0: as n = 1.
+[[nodiscard]] bool is_within_liu_layland(const Shares &shares, std::size_t n);
+
+/// prod (1 + share) <= 2.
+[[nodiscard]] bool is_within_hyperbolic(const Shares &shares);
+
+/// a < b.
+[[nodiscard]] bool is_smaller(const Share &a, const Share &b);
+
+/// n (2^(1/n) - 1) in units of 2^-60, rounded down by at most 2^-50.
+[[nodiscard]] Int128 liu_layland_limit(std::size_t n);
+
+}  // namespace redag::analysis

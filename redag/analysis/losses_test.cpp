@@ -1,0 +1,136 @@
+// What a machine takes from jobs (AnalysisPlatform::stall, lateness, preempt_overhead on several workers), charged by
+// compile() as jitter: no simulated response with such losses exceeds a bound that counts them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "redag/analysis/analyze.hpp"
+#include "redag/analysis/dag_shapes.hpp"
+#include "redag/analysis/global_dag.hpp"
+#include "redag/analysis/global_groups.hpp"
+#include "redag/analysis/global_sequential.hpp"
+#include "redag/analysis/response_time.hpp"
+#include "redag/testing/bound_property.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using testing::BoundCase;
+using testing::BoundCaseLimits;
+using testing::BoundGenerator;
+using ::testing::HasSubstr;
+
+BoundCaseLimits limits_for(std::uint32_t workers) {
+  BoundCaseLimits limits;
+  limits.min_workers = limits.max_workers = workers;
+  limits.policies = {PolicyKind::RateMonotonic};  // stalls have the shortest period of all
+  limits.min_period = 12;
+  limits.max_period = 120;
+  limits.min_utilization = 0.1;
+  limits.max_utilization = 0.5;
+  limits.jitter = true;
+  return limits;
+}
+
+// Stalls, late releases and preemptions that cost something, on top of random cases.
+BoundGenerator with_losses(const BoundCaseLimits &limits) {
+  return [limits](Rng &rng) {
+    BoundCase bound_case = testing::random_bound_case(rng, limits);
+    AnalysisPlatform &platform = bound_case.platform;
+    platform.stall.longest = rng.uniform(0, 3);
+    if (rng.uniform(0, 1) == 1) platform.stall.per_second = rng.uniform(1, 40) * kMillisecond;
+    platform.lateness = rng.uniform(0, 2);
+    platform.preempt_overhead = rng.uniform(0, 1);
+    return bound_case;
+  };
+}
+
+TEST(Losses, OneWorker) { testing::expect_bound_holds(rta_preemptive(), with_losses(limits_for(1))); }
+
+TEST(Losses, OneWorkerDags) {
+  BoundCaseLimits limits = limits_for(1);
+  limits.edges = true;
+  testing::expect_bound_holds(dag_one_worker_preemptive(), with_losses(limits));
+}
+
+TEST(Losses, OneWorkerRateEdges) {
+  BoundCaseLimits limits = limits_for(1);
+  limits.edges = limits.rates = true;
+  testing::expect_bound_holds(dag_one_worker_preemptive(), with_losses(limits));
+}
+
+TEST(Losses, SeveralWorkers) { testing::expect_bound_holds(bertogna_cirinei(), with_losses(limits_for(2))); }
+
+TEST(Losses, SeveralWorkersDags) {
+  BoundCaseLimits limits = limits_for(3);
+  limits.edges = true;
+  testing::expect_bound_holds(melani(), with_losses(limits));
+}
+
+TEST(Losses, SeveralWorkersRateEdges) {
+  BoundCaseLimits limits = limits_for(2);
+  limits.edges = limits.rates = true;
+  testing::expect_bound_holds(dag_shapes(), with_losses(limits));
+}
+
+// A job that waits for its group can make the holder preempt, and preempt when it starts itself.
+TEST(Losses, SeveralWorkersGroups) {
+  BoundCaseLimits limits = limits_for(3);
+  limits.min_workers = 2;
+  limits.groups = true;
+  testing::expect_bound_holds(dag_groups(), with_losses(limits));
+  limits.edges = true;
+  limits.max_deadline = 4;
+  testing::expect_bound_holds(dag_groups(), with_losses(limits));
+}
+
+Workload one_task() {
+  Workload workload;
+  Task task;
+  task.name = "t";
+  task.period = task.deadline = 10 * kMillisecond;
+  task.wcet = 2 * kMillisecond;
+  task.jitter = 5;
+  workload.dags.push_back(Dag{});
+  workload.dags.back().name = "d";
+  workload.dags.back().tasks.push_back(task);
+  return workload;
+}
+
+TEST(Losses, WhatIsCharged) {
+  AnalysisPlatform platform;
+  platform.workers = 2;
+  platform.lateness = 100;
+  platform.timer_overhead = 7;
+  platform.preempt_overhead = 1000;
+  platform.stall = {.longest = 20'000, .per_second = 0};
+  const Result<System> system = compile(one_task(), platform);
+  ASSERT_TRUE(system);
+  EXPECT_EQ(system->not_analysable, "");
+  // 2 stalls; 2 releases: that of its period and the one that jitter brings; 4 preemptions: one before, one waiting
+  // more. Of 1 s the timer takes 700 ns, preemptions 100 us.
+  EXPECT_EQ(system->frozen, 44'019) << "ceil((2 * 20'000 + 2 * 7 + 4 * 1000) / (1 - 100'700 / 1e9))";
+  EXPECT_EQ(system->tasks[0].jitter, 5 + 100 + system->frozen);
+  EXPECT_EQ(system->tasks[0].wcet, 2'000'202) << "ceil(2 ms / (1 - 100'700 / 1e9))";
+  EXPECT_EQ(system->tasks[0].overhead, 202);
+}
+
+TEST(Losses, OnOneWorkerWhoPreemptsPays) {
+  AnalysisPlatform platform;
+  platform.preempt_overhead = 1000;
+  const Result<System> system = compile(one_task(), platform);
+  ASSERT_TRUE(system);
+  EXPECT_EQ(system->frozen, 0);
+  EXPECT_EQ(system->tasks[0].wcet, 2'001'000);
+}
+
+TEST(Losses, NothingIsLeft) {
+  AnalysisPlatform platform;
+  platform.workers = 4;
+  platform.stall.per_second = 250 * kMillisecond;
+  EXPECT_THAT(compile(one_task(), platform)->not_analysable, HasSubstr("no processor time"));
+  platform.stall.per_second = -1;
+  EXPECT_FALSE(compile(one_task(), platform));
+}
+
+}  // namespace
+}  // namespace redag::analysis

@@ -1,0 +1,119 @@
+#include "redag/analysis/remedy.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "redag/analysis/analyze.hpp"
+#include "redag/analysis/sensitivity.hpp"
+#include "redag/base/rounded_time.hpp"
+#include "redag/sched/policy.hpp"
+
+namespace redag::analysis {
+namespace {
+
+constexpr std::size_t kMostSuspects = 6;
+constexpr double kLittle = 0.9;  // an execution time that shrinks to this share has changed little
+
+class Search {
+ public:
+  Search(const Workload &workload, const AnalysisPlatform &platform) : workload_(workload), platform_(platform) {}
+
+  std::optional<std::string> run(const std::vector<TaskId> &suspects) {
+    const std::optional<Shorter> shorter = shorten(suspects);
+    if (shorter && shorter->factor >= kLittle) return shorter->words;
+    if (auto words = lift_max_active()) return words;
+    if (auto words = preempt()) return words;
+    if (auto words = leave_group()) return words;
+    if (auto words = add_worker()) return words;
+    return shorter ? std::optional(shorter->words) : std::nullopt;
+  }
+
+ private:
+  struct Shorter {
+    double factor = 0;
+    std::string words;
+  };
+
+  [[nodiscard]] bool suffices(const Workload &changed, const AnalysisPlatform &platform) const {
+    const Result<System> system = compile(changed, platform);
+    return system && is_shown_schedulable(*system);
+  }
+
+  [[nodiscard]] std::string name_of(TaskId id) const {
+    std::size_t first = 0;
+    for (const Dag &dag : workload_.dags) {
+      if (id.value < first + dag.tasks.size()) return dag.name + "." + dag.tasks[id.value - first].name;
+      first += dag.tasks.size();
+    }
+    return "?";
+  }
+
+  // The one that has to shrink least.
+  [[nodiscard]] std::optional<Shorter> shorten(const std::vector<TaskId> &suspects) const {
+    SensitivityOptions options;
+    options.probes = 2;
+    std::optional<Shorter> best;
+    for (std::size_t i = 0; i < std::min(suspects.size(), kMostSuspects); ++i) {
+      const Knob knob{Knob::Kind::Wcet, {suspects[i].value}};
+      const std::optional<Margin> margin = margin_of(workload_, platform_, knob, accepted_by_analysis, options);
+      if (!margin || !margin->position || (best && best->factor >= margin->factor)) continue;
+      best = Shorter{margin->factor, fmt::format("wcet of {}: {} instead of {}", name_of(suspects[i]),
+                                                 humanize_down(*margin->position), format_duration(margin->nominal))};
+    }
+    return best;
+  }
+
+  [[nodiscard]] std::optional<std::string> lift_max_active() const {
+    for (std::size_t d = 0; d < workload_.dags.size(); ++d) {
+      if (workload_.dags[d].max_active == 0) continue;
+      Workload changed = workload_;
+      changed.dags[d].max_active = 0;
+      if (suffices(changed, platform_)) return fmt::format("DAG {} without max_active", workload_.dags[d].name);
+    }
+    return std::nullopt;
+  }
+
+  [[nodiscard]] std::optional<std::string> preempt() const {
+    if (platform_.preemption == sched::Preemption::Full || !sched::is_static(workload_.policy)) return std::nullopt;
+    AnalysisPlatform platform = platform_;
+    platform.preemption = sched::Preemption::Full;
+    if (!suffices(workload_, platform)) return std::nullopt;
+    return "preemption: os, so that urgent jobs do not wait for others to end";
+  }
+
+  [[nodiscard]] std::optional<std::string> leave_group() const {
+    for (std::size_t d = 0; d < workload_.dags.size(); ++d) {
+      for (std::size_t t = 0; t < workload_.dags[d].tasks.size(); ++t) {
+        const Task &task = workload_.dags[d].tasks[t];
+        if (task.group.empty()) continue;
+        Workload changed = workload_;
+        changed.dags[d].tasks[t].group.clear();
+        if (!suffices(changed, platform_)) continue;
+        return fmt::format("{}.{} outside of group '{}'", workload_.dags[d].name, task.name, task.group);
+      }
+    }
+    return std::nullopt;
+  }
+
+  [[nodiscard]] std::optional<std::string> add_worker() const {
+    Workload changed = workload_;
+    AnalysisPlatform platform = platform_;
+    changed.platform.workers = ++platform.workers;
+    if (!suffices(changed, platform)) return std::nullopt;
+    return fmt::format("workers: {} instead of {}", platform.workers, platform_.workers);
+  }
+
+  const Workload &workload_;
+  const AnalysisPlatform &platform_;
+};
+
+}  // namespace
+
+std::optional<std::string> find_remedy(const Workload &workload, const AnalysisPlatform &platform,
+                                       const std::vector<TaskId> &suspects) {
+  if (workload.task_count() > kMostTasksForRemedy) return std::nullopt;
+  return Search(workload, platform).run(suspects);
+}
+
+}  // namespace redag::analysis

@@ -1,0 +1,28 @@
+#include "redag/base/rounded_time.hpp"
+
+namespace redag {
+namespace {
+
+// What four significant digits leave out.
+Duration step_of(Duration duration) {
+  Duration step = 1;
+  while (duration / step >= 10'000 || duration / step <= -10'000) step *= 10;
+  return step;
+}
+
+}  // namespace
+
+std::string humanize_down(Duration duration) {
+  const Duration step = step_of(duration);
+  const Duration rest = duration % step;
+  const Duration down = duration - (rest < 0 ? rest + step : rest);
+  return down < 0 ? "-" + humanize_duration(-down) : humanize_duration(down);
+}
+
+std::string humanize_up(Duration duration) {
+  if (duration < 0) return "-" + humanize_down(-duration);
+  const Duration step = step_of(duration);
+  return humanize_duration(duration + (duration % step != 0 ? step - duration % step : 0));
+}
+
+}  // namespace redag

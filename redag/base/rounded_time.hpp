@@ -1,0 +1,16 @@
+// Durations for people that must not promise more than they are: four significant digits, rounded to the safe side.
+#pragma once
+
+#include <string>
+
+#include "redag/base/time.hpp"
+
+namespace redag {
+
+/// As humanize_duration(), never more than the duration: room that is left, a largest execution time.
+[[nodiscard]] std::string humanize_down(Duration duration);
+
+/// Never less than the duration: a bound, a shortest period.
+[[nodiscard]] std::string humanize_up(Duration duration);
+
+}  // namespace redag

@@ -1,0 +1,154 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+
+#include "redag/base/provenance.hpp"
+#include "redag/base/text.hpp"
+#include "redag/cli/commands.hpp"
+#include "redag/cli/files.hpp"
+#include "redag/cli/json.hpp"
+#include "redag/cli/options.hpp"
+#include "redag/cli/progress.hpp"
+#include "redag/cli/session.hpp"
+#include "redag/cli/signals.hpp"
+#include "redag/cli/table.hpp"
+#include "redag/runtime/calibrate.hpp"
+
+namespace redag::cli {
+namespace {
+
+constexpr Duration kLongest = 24 * 3600 * kSecond;
+
+struct Options {
+  Duration duration = 30 * kSecond;
+  bool loaded = false;
+  bool json = false;
+  std::string out = "overheads.yaml";
+};
+
+Json to_json(const std::optional<Overheads> &overheads) {
+  if (!overheads) return nullptr;
+  Overheads copy = *overheads;
+  Json parts = Json::object();
+  for (const std::string_view name : overhead_names()) {
+    parts[std::string(name) + "_ns"] = *overhead_named(copy, name);
+  }
+  return parts;
+}
+
+Json to_json(const Calibration &calibration) {
+  Json rows = Json::array();
+  for (const Measured &row : calibration.measured) {
+    rows.push_back(Json{{"what", row.what},
+                        {"threads", row.threads},
+                        {"load", row.load},
+                        {"samples", row.samples},
+                        {"p50_ns", row.p50},
+                        {"p99_ns", row.p99},
+                        {"p999_ns", row.p999},
+                        {"max_ns", row.max}});
+  }
+  return Json{{"format", "redag.calibration/1"},
+              {"complete", calibration.complete},
+              {"duration_ns", calibration.duration},
+              {"load", calibration.load},
+              {"rights", calibration.rights},
+              {"processors", calibration.processors},
+              {"overheads", {{"realtime", to_json(calibration.realtime)}, {"normal", to_json(calibration.normal)}}},
+              {"measured", std::move(rows)}};
+}
+
+std::string describe(const Calibration &calibration, const StreamTraits &terminal) {
+  Table table({{"measured", false, 9},
+               {"threads", false, 8},
+               {"load", false, 7},
+               {"samples", true, 6},
+               {"p50", true, 3},
+               {"p99", true, 4},
+               {"p99.9", true, 2},
+               {"max", true, 9}});
+  for (const Measured &row : calibration.measured) {
+    table.add({{row.what},
+               {row.threads},
+               {row.load},
+               {format_count(row.samples)},
+               {humanize_duration(row.p50)},
+               {humanize_duration(row.p99)},
+               {humanize_duration(row.p999)},
+               {humanize_duration(row.max)}});
+  }
+  std::string text = table.render(terminal.width, terminal.colour) + "\n";
+  const auto charged = [&](const char *threads, const std::optional<Overheads> &overheads) {
+    if (overheads) text += fmt::format("charged on {} threads: {}\n", threads, to_string(*overheads));
+  };
+  charged("SCHED_FIFO", calibration.realtime);
+  charged("ordinary", calibration.normal);
+  if (!calibration.complete) text += "partial: ended early, these are the figures until then\n";
+  return text + "a measured maximum is evidence and no proof: a longer calibration can find a larger one\n";
+}
+
+Result<Calibration> measure(const Options &options, Console &console) {
+  Progress progress(console);
+  progress.set_label("calibrate");
+  const Stopwatch watch;
+  runtime::CalibrateOptions run;
+  run.duration = options.duration;
+  run.loaded = options.loaded;
+  run.stop = &InterruptGuard::flag();
+  run.progress = [&](double done, const char *next) {
+    const Duration left = std::max<Duration>(0, options.duration - watch.elapsed());
+    progress.draw(done, fmt::format("{:.0f} s left: {}", static_cast<double>(left) * 1e-9, next));
+  };
+  return runtime::calibrate(run);
+}
+
+int calibrate(const Options &options, Console &console) {
+  if (options.duration > kLongest) {
+    console.error(fmt::format("--duration: {} is more than a day", format_duration(options.duration)));
+    return kExitBad;
+  }
+  if (const auto busy = busy_machine_warning()) console.warn(*busy);
+  const InterruptGuard guard;  // until the file is written
+  Result<Calibration> measured = measure(options, console);
+  if (!measured) {
+    console.note(measured.error());
+    return kExitBad;
+  }
+  Calibration &calibration = *measured;
+  const Provenance now = current_provenance();
+  calibration.date = now.created;
+  calibration.host = now.host;
+  calibration.kernel = now.kernel;
+  calibration.version = now.version;
+  if (!calibration.complete) console.warn("interrupted: the calibration is partial");
+  if (!calibration.realtime) {
+    console.warn(
+        "this process may not use SCHED_FIFO: only ordinary threads were measured, as for cooperative and none");
+  }
+  console.print(options.json ? to_text(to_json(calibration)) : describe(calibration, console.out_traits()));
+  if (const Result<void> written = write_text(options.out, to_yaml(calibration)); !written) {
+    console.note(written.error());
+    return kExitBad;
+  }
+  const std::string message = fmt::format("wrote {}: charge it with --overheads {}\n", options.out, options.out);
+  if (options.json) {
+    console.note(message);
+  } else {
+    console.print(message);
+  }
+  return kExitOk;
+}
+
+}  // namespace
+
+Action add_calibrate(CLI::App &app) {
+  auto options = std::make_shared<Options>();
+  add_duration(app, "--duration", options->duration, "How long to measure, in all")->default_str("30s");
+  app.add_flag("--loaded", options->loaded, "Half of the time with own threads that keep the machine busy");
+  app.add_option("--out", options->out, "The overheads file")->type_name("FILE")->capture_default_str();
+  app.add_flag("--json", options->json, "Write one JSON document to standard output, and nothing else");
+  return [options](Console &console) { return calibrate(*options, console); };
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,94 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "redag/cli/commands.hpp"
+#include "redag/cli/files.hpp"
+#include "redag/cli/run_report.hpp"
+#include "redag/cli/table.hpp"
+#include "redag/trace/flight_recorder.hpp"
+
+namespace redag::cli {
+namespace {
+
+struct Options {
+  std::string place;
+  std::string folder;
+  bool force = false;
+  bool keep = false;
+  bool json = false;
+};
+
+// The record itself, or the result folder that it lies in.
+std::string record_in(const std::string &place) {
+  const std::string below = flight_folder(place);
+  std::error_code ignored;
+  return std::filesystem::is_directory(below, ignored) ? below : place;
+}
+
+Diagnostics warnings_of(const trace::Recovered &recovered) {
+  Diagnostics warnings;
+  const auto warn = [&](std::string text) {
+    warnings.push_back(Diagnostic{Severity::Warning, {}, 0, 0, std::move(text), {}});
+  };
+  if (recovered.overwritten > 0) {
+    warn(fmt::format("the record was full: its first {} events were replaced by newer ones", recovered.overwritten));
+  }
+  if (recovered.damaged > 0) {
+    warn(fmt::format("the record has a hole: {} of its blocks were not written whole, and what follows is left out",
+                     recovered.damaged));
+  }
+  return warnings;
+}
+
+int recover(const Options &options, Console &console) {
+  const std::string record = record_in(options.place);
+  Result<trace::Recovered> recovered = trace::recover(record);
+  if (!recovered) {
+    console.note(recovered.error());
+    return kExitBad;
+  }
+  if (options.folder.empty() && record == options.place) {
+    console.error(fmt::format("'{}' is a record and not a folder of results", record), "say with --out where they go");
+    return kExitBad;
+  }
+  const std::string &folder = options.folder.empty() ? options.place : options.folder;
+  if (const Result<void> made = prepare_folder(folder, options.force); !made) {
+    console.note(made.error());
+    return kExitBad;
+  }
+  console.note(warnings_of(*recovered));
+  const Session session = session_of(std::move(recovered->trace));
+  if (options.json) {
+    console.print(to_text(to_json(session)));
+  } else {
+    console.print(describe(session, console.out_traits()));
+  }
+  Diagnostics problems = write_session(session, folder);
+  if (problems.empty() && !options.keep) {
+    if (const Result<void> removed = trace::remove_flight_record(record); !removed) problems = removed.error();
+  }
+  console.note(problems);
+  if (!problems.empty()) return kExitBad;
+  const std::string message =
+      fmt::format("recovered {} events into {}/: summary.json, jobs.csv, events.jsonl, trace.json\n",
+                  format_count(session.events), folder);
+  options.json ? console.note(message) : console.print(message);
+  return kExitOk;
+}
+
+}  // namespace
+
+Action add_recover(CLI::App &app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("DIR", options->place, "The --out folder of a run that was killed, or a flight folder (with --out)")
+      ->required();
+  app.add_option("--out", options->folder, "Folder for the results, instead of DIR; made if missing")->type_name("DIR");
+  app.add_flag("--force", options->force, "Write into a folder that holds other files");
+  app.add_flag("--keep", options->keep, "Keep the record once its results are written");
+  app.add_flag("--json", options->json, "Write one JSON document to standard output, and nothing else");
+  return [options](Console &console) { return recover(*options, console); };
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,77 @@
+#include "redag/cli/run_arguments.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace redag::cli {
+namespace {
+
+class RunArgumentsTest : public ::testing::Test {
+ protected:
+  ~RunArgumentsTest() override { ::close(nowhere_); }
+
+  bool takes(const std::string &executors, const RunArguments &arguments) {
+    Console console(nowhere_, {}, nowhere_, {});
+    const auto variants = parse_variants(executors);
+    return variants.has_value() && takes_arguments(*variants, arguments, console);
+  }
+
+ private:
+  int nowhere_ = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+};
+
+TEST_F(RunArgumentsTest, PreemptionIsForExecutorsWithoutAModeOfTheirOwn) {
+  RunArguments arguments;
+  EXPECT_TRUE(takes("mte", arguments));
+  arguments.preemption = PreemptionMode::Os;
+  EXPECT_TRUE(takes("redag", arguments));
+  EXPECT_TRUE(takes("redag-os", arguments)) << "it says the same";
+  EXPECT_TRUE(takes("mte,redag", arguments)) << "one of them takes it";
+  EXPECT_FALSE(takes("redag-none", arguments));
+  EXPECT_FALSE(takes("mte", arguments));
+  EXPECT_FALSE(takes("mte,redag-cooperative", arguments));
+}
+
+TEST_F(RunArgumentsTest, PolicyIsForOurs) {
+  RunArguments arguments;
+  arguments.policy = PolicyKind::Edf;
+  EXPECT_TRUE(takes("redag-none", arguments));
+  EXPECT_TRUE(takes("ste,redag", arguments));
+  EXPECT_FALSE(takes("ste,mte-fifo", arguments));
+}
+
+TEST_F(RunArgumentsTest, WorkersAreForExecutorsThatHaveSome) {
+  RunArguments arguments;
+  arguments.workers = 2;
+  EXPECT_TRUE(takes("mte", arguments));
+  EXPECT_TRUE(takes("ste,redag", arguments));
+  EXPECT_FALSE(takes("ste", arguments));
+  arguments.workers = 1;
+  EXPECT_TRUE(takes("ste", arguments));
+}
+
+TEST(Configure, IsTheWorkloadAsTheExecutorRunsIt) {
+  Workload workload;
+  workload.platform = Platform{4, PreemptionMode::Auto};
+  Task task;
+  task.name = "t";
+  task.wcet = 1;
+  task.period = task.deadline = kMillisecond;
+  Dag dag;
+  dag.name = "d";
+  dag.tasks = {task};
+  workload.dags.push_back(dag);
+  const auto as = [&](const char *name) { return configure(workload, *parse_variant(name)); };
+  EXPECT_EQ(as("redag")->platform, workload.platform);
+  EXPECT_EQ(as("redag-os")->platform, (Platform{4, PreemptionMode::Os}));
+  EXPECT_EQ(as("ste")->platform, (Platform{1, PreemptionMode::None}));
+  workload.policy = PolicyKind::Edf;
+  EXPECT_TRUE(as("redag").has_value());
+  const auto impossible = as("redag-os");
+  ASSERT_FALSE(impossible.has_value());
+  EXPECT_EQ(impossible.error().front().message.find("redag-os: preemption 'os' needs a static policy"), 0U);
+}
+
+}  // namespace
+}  // namespace redag::cli

@@ -1,0 +1,262 @@
+#include "redag/metrics/assumptions.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "redag/testing/timeline.hpp"
+
+namespace redag::metrics {
+namespace {
+
+using redag::testing::make_dag;
+using redag::testing::make_workload;
+using ::testing::HasSubstr;
+
+constexpr Duration kUs = kMicrosecond;
+constexpr Duration kMs = kMillisecond;
+constexpr Duration kBound = 3 * kMs;
+
+Workload two_tasks() {
+  return make_workload({make_dag("fast", {{.name = "imu", .period_ms = 10, .wcet_ms = 1}}),
+                        make_dag("slow", {{.name = "plan", .period_ms = 50, .wcet_ms = 20}})},
+                       1, PreemptionMode::Os);
+}
+
+// What a quiet machine was measured to cost.
+Overheads quiet() {
+  return {.timer = 5 * kUs,
+          .dispatch = 50 * kUs,
+          .preempt = 10 * kUs,
+          .lateness = 100 * kUs,
+          .stall = {.longest = 300 * kUs, .per_second = 2 * kMs},
+          .noise = {.longest = 60 * kUs, .per_second = 1 * kMs},
+          .clock = kUs};
+}
+
+struct Times {
+  Duration seen = 0;   // after the release
+  Duration start = 0;  // after the release
+  Duration on_worker = kMs;
+  Duration processor = kMs;
+  Duration response = kMs;
+};
+
+class Jobs {
+ public:
+  Jobs &add(std::uint32_t task, const Times &times) {
+    JobRecord job;
+    job.task = TaskId(task);
+    job.number = static_cast<std::uint32_t>(jobs_.size());
+    job.release = static_cast<Time>(jobs_.size()) * 10 * kMs;
+    job.seen = job.release + times.seen;
+    job.start = job.release + times.start;
+    job.finish = job.release + times.response;
+    job.on_worker = times.on_worker;
+    job.processor = times.processor;
+    job.outcome = JobOutcome::Finished;
+    jobs_.push_back(job);
+    return *this;
+  }
+  Jobs &add(std::size_t count, std::uint32_t task, const Times &times) {
+    for (std::size_t i = 0; i < count; ++i) add(task, times);
+    return *this;
+  }
+  Jobs &at_once_with_the_last() {
+    JobRecord &job = jobs_.back();
+    const Duration back = 10 * kMs;
+    for (Time *time : {&job.release, &job.seen, &job.start, &job.finish}) *time -= back;
+    return *this;
+  }
+
+  [[nodiscard]] AssumptionCheck check(const std::optional<Overheads> &calibrated) const {
+    return check_assumptions(two_tasks(), 1, calibrated, jobs_,
+                             [](TaskId task) { return task == TaskId(0) ? kBound : Duration{0}; });
+  }
+
+ private:
+  std::vector<JobRecord> jobs_;
+};
+
+ExecutionCheck execution(const Jobs &jobs, const std::optional<Overheads> &calibrated = quiet()) {
+  return jobs.check(calibrated).tasks.at(0).execution;
+}
+
+ResponseCheck response(const Jobs &jobs, const std::optional<Overheads> &calibrated = quiet()) {
+  return jobs.check(calibrated).tasks.at(0).response;
+}
+
+std::string text(const Jobs &jobs, const std::optional<Overheads> &calibrated = quiet()) {
+  const std::vector<Remark> all = remarks(jobs.check(calibrated), two_tasks());
+  return all.empty() ? "" : (all.front().is_alarm ? "alarm " : "note ") + all.front().text;
+}
+
+// ---- executions ----
+
+TEST(Execution, IsProcessorTime) {
+  const Jobs preempted = Jobs().add(100, 0, {.on_worker = 2 * kMs, .processor = kMs, .response = 2 * kMs});
+  EXPECT_EQ(execution(preempted).above, 0U) << "it held its worker for longer, and did not execute for longer";
+  EXPECT_EQ(text(preempted), "");
+}
+
+TEST(Execution, WhatTheClockExplainsIsNotAbove) {
+  EXPECT_EQ(execution(Jobs().add(100, 0, {.processor = kMs + 11 * kUs})).above, 0U);
+  EXPECT_EQ(execution(Jobs().add(100, 0, {.processor = kMs + 12 * kUs})).above, 100U);
+}
+
+TEST(Execution, AnOverrunOfATwentiethInEveryJobIsAnAlarm) {
+  const Jobs jobs = Jobs().add(100, 0, {.processor = kMs + 50 * kUs});
+  EXPECT_TRUE(execution(jobs).is_exceeded);
+  EXPECT_EQ(text(jobs),
+            "alarm fast.imu: wcet exceeded: 1.05ms of processor time, 100 of 100 executions above its wcet of 1ms");
+}
+
+TEST(Execution, OneBeyondAnyStallIsAnAlarm) {
+  Jobs jobs;
+  jobs.add(1000, 0, {});
+  EXPECT_FALSE(execution(Jobs(jobs).add(0, {.processor = kMs + 130 * kUs})).is_exceeded) << "twice 60 us, and 1 us";
+  EXPECT_TRUE(execution(Jobs(jobs).add(0, {.processor = kMs + 140 * kUs})).is_exceeded);
+}
+
+TEST(Execution, AFewThatStallsExplainAreANote) {
+  const Jobs jobs = Jobs().add(1000, 0, {}).add(5, 0, {.processor = kMs + 60 * kUs});
+  EXPECT_FALSE(execution(jobs).is_exceeded);
+  EXPECT_EQ(text(jobs),
+            "note fast.imu: 5 of 1 005 executions above its wcet of 1ms, up to 1.06ms of processor time: no "
+            "more than stalls of the machine explain");
+}
+
+// The hypervisor stopped the machine, and the kernel charged the job for it: the release timer was late as well.
+TEST(Execution, WhileTheTimerStoodStillIsThePlatform) {
+  Jobs stopped;
+  stopped.add(100, 0, {}).add(0, {.on_worker = 90 * kMs, .processor = 89 * kMs, .response = 90 * kMs});
+  EXPECT_TRUE(execution(stopped).is_exceeded);
+  stopped.add(0, {.seen = 78 * kMs, .start = 78 * kMs, .response = 80 * kMs});
+  EXPECT_FALSE(execution(stopped).is_exceeded);
+  EXPECT_EQ(execution(stopped).above, 1U);
+}
+
+TEST(Execution, WithoutACalibrationMoreIsNoise) {
+  const Jobs jobs = Jobs().add(1000, 0, {}).add(0, {.processor = kMs + 900 * kUs});
+  EXPECT_TRUE(execution(jobs).is_exceeded);
+  EXPECT_FALSE(execution(jobs, std::nullopt).is_exceeded);
+  EXPECT_TRUE(execution(Jobs().add(100, 0, {.processor = kMs + 200 * kUs}), std::nullopt).is_exceeded) << "every job";
+}
+
+TEST(Execution, ShortJobsAreChargedTheirDispatch) {
+  Workload workload = two_tasks();
+  workload.dags[0].tasks[0].wcet = 2 * kUs;
+  JobRecord job;
+  job.task = TaskId(0);
+  job.outcome = JobOutcome::Finished;
+  job.release = job.seen = job.start = 0;
+  job.finish = job.processor = 9 * kUs;
+  const std::vector<JobRecord> jobs(50, job);
+  const auto none = [](TaskId) { return Duration{0}; };
+  EXPECT_EQ(check_assumptions(workload, 1, quiet(), jobs, none).tasks[0].execution.above, 0U);
+}
+
+TEST(Noise, IsHeldToMarkov) {
+  const Loss noise{.longest = 100, .per_second = 10 * kMs};  // in an execution of 1 us: 10 ns
+  EXPECT_FALSE(is_beyond_noise({}, 10, 1000, noise));
+  EXPECT_FALSE(is_beyond_noise(std::vector<Duration>(4, 20), 4, 1000, noise)) << "too few to tell";
+  EXPECT_FALSE(is_beyond_noise(std::vector<Duration>(50, 20), 100, 1000, noise)) << "half of them can meet that much";
+  EXPECT_TRUE(is_beyond_noise(std::vector<Duration>(95, 20), 100, 1000, noise));
+  EXPECT_TRUE(is_beyond_noise(std::vector<Duration>(50, 60), 100, 1000, noise)) << "a sixth of them can";
+  EXPECT_TRUE(is_beyond_noise({211}, 100, 1000, noise));
+  EXPECT_FALSE(is_beyond_noise({210}, 100, 1000, noise));
+}
+
+// ---- responses ----
+
+TEST(Response, WithinTheBoundIsNothing) { EXPECT_EQ(response(Jobs().add(10, 0, {.response = kBound})).exceeded, 0U); }
+
+TEST(Response, NamesTheTaskWhoseWcetBroke) {
+  const Jobs jobs = Jobs()
+                        .add(0, {.start = kMs, .response = 4 * kMs})
+                        .add(1, {.on_worker = 25 * kMs, .processor = 25 * kMs, .response = 26 * kMs})
+                        .at_once_with_the_last();
+  const ResponseCheck broken = response(jobs);
+  EXPECT_EQ(broken.broken, Broken::Wcet);
+  EXPECT_EQ(broken.task, TaskId(1));
+  EXPECT_TRUE(broken.is_alarm);
+  EXPECT_TRUE(response(jobs, std::nullopt).is_alarm) << "calibrated or not";
+  const std::vector<Remark> all = remarks(jobs.check(quiet()), two_tasks());
+  EXPECT_THAT(all.at(0).text, HasSubstr("wcet exceeded: slow.plan used 25ms of processor time"));
+}
+
+TEST(Response, NamesALateRelease) {
+  const Jobs jobs = Jobs().add(0, {.seen = 2500 * kUs, .start = 2500 * kUs, .response = 3500 * kUs});
+  EXPECT_EQ(response(jobs).broken, Broken::Release);
+  EXPECT_EQ(text(jobs),
+            "alarm fast.imu: 1 response above the bound of 3ms, the longest 3.5ms; release late: by 2.5ms "
+            "(calibrated: 100us)");
+}
+
+TEST(Response, NamesThePlatform) {
+  const Jobs jobs = Jobs().add(0, {.on_worker = 3500 * kUs, .response = 3500 * kUs});
+  EXPECT_EQ(response(jobs).broken, Broken::Platform);
+  EXPECT_EQ(text(jobs),
+            "alarm fast.imu: 1 response above the bound of 3ms, the longest 3.5ms; platform: jobs that held "
+            "their workers got no processor for 2.5ms (calibrated: 300us)");
+}
+
+TEST(Response, OfThePlatformOnlyWhatWasNotCharged) {
+  const Jobs jobs = Jobs().add(0, {.seen = 90 * kUs, .on_worker = kMs + 300 * kUs, .response = 3500 * kUs});
+  EXPECT_EQ(response(jobs).broken, Broken::Nothing);
+  EXPECT_THAT(text(jobs), HasSubstr("no assumption of the bound was seen broken"));
+  EXPECT_TRUE(response(jobs).is_alarm);
+}
+
+TEST(Response, WithoutACalibrationANoteUpToPlausibleNoise) {
+  const Jobs jobs = Jobs().add(0, {.on_worker = 3500 * kUs, .response = 3500 * kUs});
+  EXPECT_FALSE(response(jobs, std::nullopt).is_alarm);
+  EXPECT_EQ(
+      text(jobs, std::nullopt),
+      "note fast.imu: 1 response above the bound of 3ms, the longest 3.5ms; platform: jobs that held their workers "
+      "got no processor for 2.5ms (none was charged)");
+  const Jobs more = Jobs().add(0, {.on_worker = 30 * kMs, .response = 30 * kMs});
+  EXPECT_TRUE(response(more, std::nullopt).is_alarm);
+}
+
+TEST(Assumptions, OfSeveralRunsAreAddedUp) {
+  AssumptionCheck sum = Jobs().add(0, {.response = 4 * kMs}).check(quiet());
+  sum.add(Jobs().add(0, {.seen = 4 * kMs, .start = 4 * kMs, .response = 5 * kMs}).check(quiet()));
+  EXPECT_EQ(sum.tasks[0].response.exceeded, 2U);
+  EXPECT_EQ(sum.tasks[0].response.worst, 5 * kMs);
+  EXPECT_EQ(sum.tasks[0].response.broken, Broken::Release);
+  EXPECT_EQ(sum.tasks[0].execution.jobs, 2U);
+  EXPECT_TRUE(sum.has_alarms());
+}
+
+TEST(Assumptions, ProcessorTimeComesFromTheTrace) {
+  trace::RunInfo run;
+  run.workload = two_tasks();
+  run.config.workers = 1;
+  run.driver = trace::Driver::Threads;
+  std::vector<JobEvent> events;
+  const auto add = [&](JobEventKind kind, Time time, std::int64_t value) {
+    JobEvent event;
+    event.time = time;
+    event.value = value;
+    event.task = TaskId(0);
+    event.worker = 0;
+    event.kind = kind;
+    events.push_back(event);
+  };
+  add(JobEventKind::Released, 10, 0);
+  add(JobEventKind::Ready, 10, 0);
+  add(JobEventKind::Dispatched, 10, 10 * kMs);
+  add(JobEventKind::Started, 12, 12);
+  add(JobEventKind::Executed, 2 * kMs, 1300 * kUs);
+  add(JobEventKind::Finished, 2 * kMs, 2 * kMs);
+  const AssumptionCheck check = check_assumptions(run, events, [](TaskId) { return kMs; });
+  EXPECT_FALSE(check.is_calibrated);
+  EXPECT_EQ(check.tasks[0].execution.jobs, 1U);
+  EXPECT_EQ(check.tasks[0].execution.longest, 1300 * kUs);
+  EXPECT_EQ(check.tasks[0].response.exceeded, 1U);
+  run.overheads = to_string(quiet());
+  EXPECT_TRUE(check_assumptions(run, events, [](TaskId) { return kMs; }).is_calibrated);
+}
+
+}  // namespace
+}  // namespace redag::metrics

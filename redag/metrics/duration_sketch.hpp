@@ -1,0 +1,61 @@
+// Any number of durations in bounded memory: exact up to a given number of values, then counts in buckets that are at
+// most 1/128 of their values wide (redag/base/log_buckets.hpp). Percentiles are then wrong by at most kRelativeError;
+// count, minimum, mean and maximum stay exact. Sketches of parts merge to that of the whole. Not thread-safe.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "redag/base/int128.hpp"
+#include "redag/base/log_buckets.hpp"
+#include "redag/metrics/distribution.hpp"
+
+namespace redag::metrics {
+
+class DurationSketch {
+ public:
+  using Buckets = LogBuckets<7>;
+  /// Half a bucket: a percentile is the middle of its bucket.
+  static constexpr double kRelativeError = 1.0 / 256;
+
+  /// `most_exact`: values that are kept as they are, 8 bytes each. Beyond, a page of 16 buckets takes 136 bytes, and
+  /// those of an octave are 8 pages.
+  explicit DurationSketch(std::size_t most_exact) : most_exact_(most_exact) {}
+
+  /// A value below 0 counts as 0 in the percentiles.
+  void add(Duration value);
+  /// Exact if both are, however many values that makes; so a whole is exact where all its parts are.
+  void merge(const DurationSketch &other);
+
+  [[nodiscard]] Distribution distribution() const;
+  [[nodiscard]] bool is_exact() const { return pages_.empty(); }
+  /// Heap memory in bytes.
+  [[nodiscard]] std::size_t memory() const;
+
+ private:
+  static constexpr std::size_t kPageSize = 16;
+  struct Page {
+    std::size_t first = 0;  // bucket
+    std::array<std::uint64_t, kPageSize> counts{};
+  };
+
+  void count(Duration value);
+  void count_exact_values();
+  Page &page_of(std::size_t bucket);
+  [[nodiscard]] Duration percentile(double percent) const;
+
+  std::size_t most_exact_;
+  std::vector<Duration> values_;  // while exact
+  std::vector<Page> pages_;       // by `first`; not empty once not exact
+  std::size_t last_page_ = 0;     // values come in clusters
+  // Of the values in `pages_`.
+  std::uint64_t count_ = 0;
+  Int128 sum_ = 0;
+  Duration min_ = kNever;
+  Duration max_ = std::numeric_limits<Duration>::min();
+};
+
+}  // namespace redag::metrics

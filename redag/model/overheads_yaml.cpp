@@ -1,0 +1,178 @@
+// The text form of a calibration: docs/calibration.md.
+#include <fmt/format.h>
+#include <yaml-cpp/emitter.h>
+#include <yaml-cpp/emittermanip.h>
+
+#include "redag/model/overheads.hpp"
+#include "redag/model/text_file.hpp"
+#include "redag/model/workload_yaml_values.hpp"
+
+namespace redag {
+namespace {
+
+using yaml::find;
+using yaml::Node;
+
+constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
+
+class Reader : private yaml::ValueReader {
+ public:
+  Reader(const Node &root, std::string file) : ValueReader(std::move(file)), root_(root) {}
+
+  Result<Calibration> run() {
+    // `measured` is for people: it is not read.
+    if (check_map(root_, "an overheads file", {"overheads", "provenance", "measured"})) {
+      read_overheads();
+      read_provenance();
+    }
+    Diagnostics mistakes = take_diagnostics();
+    if (!mistakes.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes));
+    return std::move(calibration_);
+  }
+
+ private:
+  void read_overheads() {
+    const Node *node = find(root_, "overheads");
+    if (node == nullptr) {
+      error(root_, "there are no 'overheads'", "'redag calibrate --out FILE' writes them");
+      return;
+    }
+    if (!check_map(*node, "overheads", {"realtime", "normal"})) return;
+    if (const Node *one = find(*node, "realtime")) calibration_.realtime = read_class(*one, "realtime");
+    if (const Node *one = find(*node, "normal")) calibration_.normal = read_class(*one, "normal");
+    if (find(*node, "realtime") == nullptr && find(*node, "normal") == nullptr) {
+      error(*node, "overheads are of realtime threads, of normal ones, or of both");
+    }
+  }
+
+  Overheads read_class(const Node &node, std::string_view what) {
+    Overheads overheads;
+    if (!check_map(node, what, overhead_names())) return overheads;
+    for (const std::string_view name : overhead_names()) {
+      const Node *value = find(node, name);
+      if (value == nullptr) {
+        error(node, fmt::format("{} has no '{}'", what, name), "what a machine does not cost is 0");
+        continue;
+      }
+      const std::optional<Duration> read = duration(*value, name);
+      if (!read) continue;
+      if (*read < 0) error(*value, fmt::format("{} is negative", name));
+      *overhead_named(overheads, name) = *read;
+    }
+    for (const std::string_view name : {"stall_per_second", "noise_per_second"}) {
+      if (*overhead_named(overheads, name) >= kSecond) error(node, fmt::format("{} takes the whole processor", name));
+    }
+    return overheads;
+  }
+
+  void read_provenance() {
+    const Node *node = find(root_, "provenance");
+    if (node == nullptr) return;
+    if (!check_map(*node, "provenance",
+                   {"date", "host", "kernel", "processor", "processors", "rights", "load", "duration", "complete",
+                    "version"})) {
+      return;
+    }
+    const auto take_text = [&](const char *key, std::string &out) {
+      const Node *value = find(*node, key);
+      if (value == nullptr) return;
+      if (const std::optional<std::string> read = text(*value, key)) out = *read;
+    };
+    take_text("date", calibration_.date);
+    take_text("host", calibration_.host);
+    take_text("kernel", calibration_.kernel);
+    take_text("processor", calibration_.processor);
+    take_text("rights", calibration_.rights);
+    take_text("load", calibration_.load);
+    take_text("version", calibration_.version);
+    if (const Node *value = find(*node, "processors")) {
+      if (const auto read = integer<std::uint32_t>(*value, "processors", 0)) calibration_.processors = *read;
+    }
+    if (const Node *value = find(*node, "duration")) {
+      if (const auto read = duration(*value, "duration")) calibration_.duration = *read;
+    }
+    if (const Node *value = find(*node, "complete")) {
+      if (value->text == "true" || value->text == "false") {
+        calibration_.complete = value->text == "true";
+      } else {
+        wrong_type(*value, "complete", "true or false");
+      }
+    }
+  }
+
+  const Node &root_;
+  Calibration calibration_;
+};
+
+void write(YAML::Emitter &out, const char *key, const std::string &value) {
+  out << YAML::Key << key << YAML::Value << YAML::DoubleQuoted << value;
+}
+
+void write(YAML::Emitter &out, const char *key, const std::optional<Overheads> &overheads) {
+  if (!overheads) return;
+  Overheads copy = *overheads;
+  out << YAML::Key << key << YAML::Value << YAML::BeginMap;
+  for (const std::string_view name : overhead_names()) {
+    out << YAML::Key << std::string(name) << YAML::Value << format_duration(*overhead_named(copy, name));
+  }
+  out << YAML::EndMap;
+}
+
+}  // namespace
+
+std::string to_yaml(const Calibration &calibration) {
+  YAML::Emitter out;
+  out << YAML::BeginMap;
+  out << YAML::Key << "overheads" << YAML::Value << YAML::BeginMap;
+  write(out, "realtime", calibration.realtime);
+  write(out, "normal", calibration.normal);
+  out << YAML::EndMap;
+  out << YAML::Key << "provenance" << YAML::Value << YAML::BeginMap;
+  write(out, "date", calibration.date);
+  write(out, "host", calibration.host);
+  write(out, "kernel", calibration.kernel);
+  write(out, "processor", calibration.processor);
+  out << YAML::Key << "processors" << YAML::Value << calibration.processors;
+  write(out, "rights", calibration.rights);
+  write(out, "load", calibration.load);
+  out << YAML::Key << "duration" << YAML::Value << format_duration(calibration.duration);
+  out << YAML::Key << "complete" << YAML::Value << (calibration.complete ? "true" : "false");
+  write(out, "version", calibration.version);
+  out << YAML::EndMap;
+  if (!calibration.measured.empty()) {
+    out << YAML::Key << "measured" << YAML::Value << YAML::BeginSeq;
+    for (const Measured &row : calibration.measured) {
+      out << YAML::Flow << YAML::BeginMap << YAML::Key << "what" << YAML::Value << row.what;
+      out << YAML::Key << "threads" << YAML::Value << row.threads << YAML::Key << "load" << YAML::Value << row.load;
+      out << YAML::Key << "samples" << YAML::Value << row.samples;
+      out << YAML::Key << "p50" << YAML::Value << format_duration(row.p50);
+      out << YAML::Key << "p99" << YAML::Value << format_duration(row.p99);
+      out << YAML::Key << "p999" << YAML::Value << format_duration(row.p999);
+      out << YAML::Key << "max" << YAML::Value << format_duration(row.max) << YAML::EndMap;
+    }
+    out << YAML::EndSeq;
+  }
+  out << YAML::EndMap;
+  return std::string(
+             "# What this machine adds to the jobs of a workload: docs/calibration.md. Charged with --overheads "
+             "FILE.\n") +
+         out.c_str() + "\n";
+}
+
+Result<Calibration> parse_calibration(std::string_view text, std::string file_name) {
+  if (text.size() > kMaxBytes) {
+    return tl::unexpected<Diagnostics>(
+        Diagnostics{Diagnostic{Severity::Error, file_name, 0, 0, "too large for an overheads file", {}}});
+  }
+  const Result<Node> root = yaml::parse(text, file_name);
+  if (!root) return tl::unexpected<Diagnostics>(root.error());
+  return Reader(*root, std::move(file_name)).run();
+}
+
+Result<Calibration> load_calibration(const std::filesystem::path &path) {
+  const Result<std::string> text = read_text_file(path, "an overheads file", kMaxBytes);
+  if (!text) return tl::unexpected<Diagnostics>(text.error());
+  return parse_calibration(*text, path.string());
+}
+
+}  // namespace redag

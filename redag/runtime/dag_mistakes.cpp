@@ -1,0 +1,99 @@
+#include "redag/runtime/dag_mistakes.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "redag/base/text.hpp"
+#include "redag/model/validate.hpp"
+
+namespace redag::runtime {
+namespace {
+
+/// What to change for a mistake in a field.
+struct Remedy {
+  Field field;
+  const char *text;
+};
+
+constexpr std::array kDagRemedies = {
+    Remedy{Field::Name, "the argument of DagBuilder"},
+    Remedy{Field::Tasks, "add tasks with timer() and data()"},
+    Remedy{Field::MaxActive, "DagOptions::max_active; 0: no bound"},
+    Remedy{Field::MaxPending, "DagOptions::max_pending; 0: no bound"},
+    Remedy{Field::Criticality, "DagOptions::criticality"},
+};
+
+constexpr std::array kTaskRemedies = {
+    Remedy{Field::Name, "the first argument"},
+    Remedy{Field::Wcet, "TaskOptions::wcet; 0: unknown"},
+    Remedy{Field::Period, "the second argument of timer()"},
+    Remedy{Field::Deadline, "TaskOptions::deadline; 0: the period"},
+    Remedy{Field::Offset, "TaskOptions::offset; only timer() takes one"},
+    Remedy{Field::Budget, "TaskOptions::budget; 0: none"},
+    Remedy{Field::Activation, "name predecessors in the second argument of data(), or use timer()"},
+    Remedy{Field::Overrun, "TaskOptions::queue_depth"},
+    Remedy{Field::Priority, "TaskOptions::priority"},
+    Remedy{Field::Group, "TaskOptions::group; empty: none"},
+};
+
+std::string text_in_quotes(std::string_view text) {
+  std::string name = in_quotes(text);
+  name.front() = name.back() = '"';
+  return name;
+}
+
+std::string remedy_for(const Finding &finding, const Task *task) {
+  if (task != nullptr && finding.field == Field::After) {
+    return task->activation == Activation::Data ? "the second argument of data()" : "TaskOptions::after";
+  }
+  const auto find = [&](const auto &remedies) -> std::string {
+    const auto *const found = std::find_if(remedies.begin(), remedies.end(),
+                                           [&](const Remedy &remedy) { return remedy.field == finding.field; });
+    return found == remedies.end() ? finding.hint : found->text;
+  };
+  return task != nullptr ? find(kTaskRemedies) : find(kDagRemedies);
+}
+
+std::string describe(const Finding &finding, const Dag &dag) {
+  const Task *task = finding.task == Finding::kNone ? nullptr : &dag.tasks[finding.task];
+  std::string message = finding.message;
+  // In a file it is absent; here it was said.
+  if (task != nullptr && finding.field == Field::Period && task->period == 0) message = "the period must be above 0";
+  const std::string place = task == nullptr ? place_of(dag.name) : place_of(dag.name, task->activation, task->name);
+  const std::string remedy = remedy_for(finding, task);
+  return printable(fmt::format("{}: {}{}", place, message, remedy.empty() ? "" : " (" + remedy + ")"));
+}
+
+}  // namespace
+
+std::string place_of(std::string_view dag) { return fmt::format("DagBuilder({})", text_in_quotes(dag)); }
+
+std::string place_of(std::string_view dag, Activation activation, std::string_view task) {
+  return fmt::format("{}.{}({})", place_of(dag), to_string(activation), text_in_quotes(task));
+}
+
+std::string mistakes_of(const Dag &dag, PolicyKind policy) {
+  Workload alone;
+  alone.platform = Platform{1, PreemptionMode::None};
+  alone.policy = policy;
+  alone.dags = {dag};
+  for (Task &task : alone.dags[0].tasks) {
+    if (task.wcet == 0) task.wcet = 1;  // may be unknown here
+  }
+  std::string text;
+  const auto add = [&](const std::string &mistake) { text += (text.empty() ? "" : "\n") + mistake; };
+  for (const Finding &finding : find_mistakes(alone)) {
+    if (finding.severity == Severity::Error) add(describe(finding, dag));
+  }
+  for (const Task &task : dag.tasks) {
+    if (task.overrun == Overrun::Queue || task.queue_depth == 1) continue;
+    add(place_of(dag.name, task.activation, task.name) +
+        ": TaskOptions::queue_depth without a queue (set TaskOptions::overrun to Overrun::Queue)");
+  }
+  return text;
+}
+
+}  // namespace redag::runtime

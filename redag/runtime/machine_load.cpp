@@ -1,0 +1,39 @@
+#include "redag/runtime/machine_load.hpp"
+
+#include <sched.h>
+#include <unistd.h>
+
+#include <cstdint>
+
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/parker.hpp"
+
+namespace redag::runtime {
+
+MachineLoad::~MachineLoad() {
+  stop_.store(true);
+  for (ThreadHandle &thread : threads_) thread.join();
+}
+
+Result<void> MachineLoad::start(std::size_t threads) {
+  for (std::size_t i = 0; i < threads; ++i) {
+    Result<ThreadHandle> started = start_thread({"redag-load", 0, {}}, [this] { main(); });
+    if (!started) return tl::unexpected(started.error());
+    threads_.push_back(*std::move(started));
+  }
+  return {};
+}
+
+void MachineLoad::main() noexcept {
+  // Beyond the caches of a processor, so that jobs find theirs emptied.
+  std::vector<std::uint64_t> memory(std::size_t{1} << 20U);
+  Event never;
+  for (std::uint64_t round = 0; !stop_.load(); ++round) {
+    for (std::uint64_t &word : memory) word = word * 3 + round;
+    for (int i = 0; i < 100; ++i) (void)getppid();
+    sched_yield();
+    if (round % 16 == 0) never.wait_until(monotonic_now() + 100 * kMicrosecond);
+  }
+}
+
+}  // namespace redag::runtime

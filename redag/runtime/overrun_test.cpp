@@ -1,0 +1,54 @@
+// Alarms of real runs: a body that overruns its wcet is found by its processor time, whatever else the machine does.
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "redag/metrics/assumptions.hpp"
+#include "redag/runtime/run_workload.hpp"
+#include "redag/runtime/synthetic.hpp"
+#include "redag/testing/timeline.hpp"
+
+namespace redag::runtime {
+namespace {
+
+using redag::testing::make_dag;
+using redag::testing::make_workload;
+
+metrics::AssumptionCheck run(Duration extra_of_first) {
+  const Workload workload = make_workload({make_dag("a", {{.name = "a", .period_ms = 10, .wcet_ms = 2}}),
+                                           make_dag("b", {{.name = "b", .period_ms = 20, .wcet_ms = 2}})},
+                                          1);
+  std::atomic<bool> give_up{false};
+  RunOptions options;
+  options.duration = 600 * kMillisecond;
+  options.preemption = PreemptionMode::None;
+  options.bodies = [&](std::vector<Body> bodies, const Now &) {
+    bodies[0] = [&give_up, extra_of_first](const Job &) {
+      burn(2 * kMillisecond + extra_of_first, 0, give_up);
+      return sched::Outcome::Finished;
+    };
+    return bodies;
+  };
+  const Result<RunResult> result = run_workload(workload, options);
+  EXPECT_TRUE(result);
+  return metrics::check_assumptions(result->trace.info, result->trace.events, [](TaskId) { return Duration{0}; });
+}
+
+TEST(Overrun, AFifthInEveryJobIsAnAlarm) {
+  const metrics::AssumptionCheck check = run(400 * kMicrosecond);
+  EXPECT_GE(check.tasks[0].execution.jobs, 10U);
+  EXPECT_TRUE(check.tasks[0].execution.is_exceeded);
+}
+
+// A machine that stalls can charge some jobs more than they used; most are never above.
+TEST(Overrun, SyntheticBodiesKeepTheirWcet) {
+  const metrics::AssumptionCheck check = run(0);
+  for (const metrics::TaskCheck &task : check.tasks) {
+    EXPECT_GE(task.execution.jobs, 5U);
+    EXPECT_LT(task.execution.above, task.execution.jobs / 2) << task.task.value;
+    EXPECT_GT(task.execution.longest, 1900 * kMicrosecond);
+  }
+}
+
+}  // namespace
+}  // namespace redag::runtime

@@ -1,0 +1,434 @@
+// What the executor asks of Linux: priorities of its own threads and of the middleware's, locked memory, threads that
+// cannot be had, jobs that do not end.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rcutils/logging.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <cstdarg>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "middleware_threads.hpp"
+#include "mode_test.hpp"
+#include "rclcpp/waitable.hpp"
+#include "redag/base/lock_guard.hpp"
+#include "redag/runtime/parker.hpp"
+#include "redag/runtime/threads.hpp"
+#include "spinning.hpp"
+
+namespace redag_rclcpp {
+namespace {
+
+using namespace std::chrono_literals;
+using redag::runtime::Event;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+// ---- threads of the middleware ----
+
+TEST(MiddlewareThreads, AreKnownByTheirWholeNames) {
+  for (const char *name : {"recv", "recvMC", "recvUC", "dq.builtins", "dq.user", "tev", "dds.udp.7411", "dds.shm.7410",
+                           "dds.ev.12", "dds.asyn.1.1", "dds.tcp_accept"}) {
+    EXPECT_TRUE(is_middleware_thread_name(name)) << name;
+  }
+  for (const char *name : {"recv_camera", "recvLidar", "receiver", "dq.", "dq.control", "tevent", "tev.mine", "dds.",
+                           "dds.logger", "dds.udp.", "dds.shm.wdog", "dds.udp.lidar", "redag-timer", ""}) {
+    EXPECT_FALSE(is_middleware_thread_name(name)) << name;
+  }
+}
+
+/// A thread of a user's with this name.
+class NamedThread {
+ public:
+  NamedThread(const char *name, bool blocks_signals)
+      : thread_([this, name, blocks_signals] {
+          pthread_setname_np(pthread_self(), name);
+          sigset_t all;
+          sigfillset(&all);
+          if (blocks_signals) pthread_sigmask(SIG_BLOCK, &all, nullptr);
+          id_ = static_cast<int>(syscall(SYS_gettid));
+          ready_.set();
+          end_.wait();
+        }) {
+    ready_.wait();
+  }
+  ~NamedThread() {
+    end_.set();
+    thread_.join();
+  }
+  NamedThread(const NamedThread &) = delete;
+  NamedThread &operator=(const NamedThread &) = delete;
+
+  [[nodiscard]] int id() const { return id_; }
+  [[nodiscard]] int policy() const { return sched_getscheduler(id_); }
+  [[nodiscard]] int priority() const {
+    sched_param parameters{};
+    return sched_getparam(id_, &parameters) == 0 ? parameters.sched_priority : -1;
+  }
+  void set(int policy, int priority) const {
+    const sched_param parameters{priority};
+    EXPECT_EQ(sched_setscheduler(id_, policy, &parameters), 0);
+  }
+
+ private:
+  Event ready_;
+  Event end_;
+  int id_ = 0;
+  std::thread thread_;
+};
+
+TEST(MiddlewareThreads, AUsersThreadOfTheSameNameIsNotOne) {
+  const NamedThread user("recv", false);
+  const NamedThread middleware("recv", true);
+  std::vector<int> found;
+  for (const MiddlewareThread &thread : find_middleware_threads()) found.push_back(thread.id);
+  EXPECT_THAT(found, Contains(middleware.id()));
+  EXPECT_THAT(found, ::testing::Not(Contains(user.id())));
+}
+
+class RaisedThreads : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (redag::runtime::available_fifo_priority(90) < 90) GTEST_SKIP() << "SCHED_FIFO is not to be had here";
+  }
+};
+
+TEST_F(RaisedThreads, GetBackWhatTheyHad) {
+  const NamedThread ordinary("recv", true);
+  const NamedThread batch("tev", true);
+  batch.set(SCHED_BATCH, 0);
+  const NamedThread low("dq.user", true);
+  low.set(SCHED_RR, 10);
+  const NamedThread high("recvUC", true);
+  high.set(SCHED_FIFO, 95);
+  {
+    const RaisedMiddleware raised(90);
+    EXPECT_GE(raised.found(), 4U);
+    EXPECT_EQ(raised.refused(), 0U);
+    for (const NamedThread *thread : {&ordinary, &batch, &low}) {
+      EXPECT_EQ(thread->policy(), SCHED_FIFO);
+      EXPECT_EQ(thread->priority(), 90);
+    }
+    EXPECT_EQ(high.priority(), 95);
+  }
+  EXPECT_EQ(ordinary.policy(), SCHED_OTHER);
+  EXPECT_EQ(batch.policy(), SCHED_BATCH);
+  EXPECT_EQ(low.policy(), SCHED_RR);
+  EXPECT_EQ(low.priority(), 10);
+  EXPECT_EQ(high.priority(), 95);
+}
+
+TEST_F(RaisedThreads, StayRaisedUntilTheLastExecutorIsDone) {
+  const NamedThread thread("recv", true);
+  auto first = std::make_unique<RaisedMiddleware>(40);
+  auto second = std::make_unique<RaisedMiddleware>(90);
+  EXPECT_EQ(thread.priority(), 90);
+  first.reset();
+  EXPECT_EQ(thread.priority(), 90);
+  second.reset();
+  EXPECT_EQ(thread.policy(), SCHED_OTHER);
+}
+
+TEST_F(RaisedThreads, KeepAPriorityThatSomebodyElseGaveThem) {
+  const NamedThread thread("recv", true);
+  {
+    const RaisedMiddleware raised(90);
+    thread.set(SCHED_FIFO, 33);
+  }
+  EXPECT_EQ(thread.policy(), SCHED_FIFO);
+  EXPECT_EQ(thread.priority(), 33);
+}
+
+// ---- the executor's threads ----
+
+/// Names and SCHED_FIFO priorities (0: none) of the threads of this process.
+std::vector<std::pair<std::string, int>> thread_priorities() {
+  std::vector<std::pair<std::string, int>> result;
+  std::error_code ignored;
+  for (const auto &entry : std::filesystem::directory_iterator("/proc/self/task", ignored)) {
+    std::string name;
+    std::ifstream file(entry.path() / "comm");
+    if (!std::getline(file, name)) continue;
+    sched_param parameters{};
+    const int id = std::stoi(entry.path().filename());
+    const bool fifo = sched_getscheduler(id) == SCHED_FIFO && sched_getparam(id, &parameters) == 0;
+    result.emplace_back(name, fifo ? parameters.sched_priority : 0);
+  }
+  return result;
+}
+
+class RealtimeTest : public ModeTest {
+ protected:
+  [[nodiscard]] int above_jobs() const {
+    return GetParam() == redag::PreemptionMode::Os ? redag::runtime::probe_priority_band().timer : 0;
+  }
+};
+
+/// A waitable that notes the priority of the thread that attaches it.
+class NotingWaitable final : public rclcpp::Waitable {
+ public:
+#if RCLCPP_VERSION_MAJOR >= 28
+  void add_to_wait_set(rcl_wait_set_t &) override {}
+  bool is_ready(const rcl_wait_set_t &) override { return false; }
+  void execute(const std::shared_ptr<void> &) override {}
+#else
+  void add_to_wait_set(rcl_wait_set_t *) override {}
+  bool is_ready(rcl_wait_set_t *) override { return false; }
+  void execute(std::shared_ptr<void> &) override {}
+#endif
+  std::shared_ptr<void> take_data() override { return nullptr; }
+  std::shared_ptr<void> take_data_by_entity_id(std::size_t) override { return nullptr; }
+  void set_on_ready_callback(std::function<void(std::size_t, int)>) override {
+    priority = redag::runtime::fifo_priority(pthread_self());
+  }
+  void clear_on_ready_callback() override {}
+
+  std::atomic<int> priority{-1};
+};
+
+// It takes time that grows with the number of entities.
+TEST_P(RealtimeTest, CollectingEntitiesIsNoneOfTheUrgentWork) {
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  executor.add_node(node);
+  const Spinner spinner(executor);
+  auto waitable = std::make_shared<NotingWaitable>();
+  node->get_node_waitables_interface()->add_waitable(waitable, nullptr);
+  EXPECT_TRUE(eventually([&] { return waitable->priority >= 0; }));
+  EXPECT_EQ(waitable->priority, 0);
+  // What tells of arrivals stays above all jobs.
+  const auto threads = thread_priorities();
+  EXPECT_THAT(threads, Contains(std::pair<std::string, int>("redag-wait", above_jobs())));
+  EXPECT_THAT(threads, Contains(std::pair<std::string, int>("redag-timer", above_jobs())));
+}
+
+// The thread that called spin() is an ordinary one, and gets no processor while jobs use them all.
+TEST_P(RealtimeTest, CancelTakesEffectWhileJobsUseTheProcessor) {
+  if (GetParam() != redag::PreemptionMode::Os) GTEST_SKIP() << "without real-time jobs all threads get their share";
+  const int processor = redag::runtime::usable_cpus().back();
+  options.cpus = {processor};
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::atomic<int> calls{0};
+  constexpr int kBefore = 20;
+  constexpr int kMost = 5000;  // several times what fits between two pauses by real-time throttling
+  const auto topic = publisher("/again");
+  auto subscription = subscribe("/again", [&] {
+    if (calls < kMost) topic->publish(Empty());
+    use_processor(1ms);
+    if (++calls == kBefore) executor.cancel();
+  });
+  executor.add_node(node);
+  topic->publish(Empty());
+  std::thread spinning([&] {
+    ASSERT_TRUE(redag::runtime::set_up_this_thread({"spinning", 0, {processor}}));
+    executor.spin();
+  });
+  spinning.join();
+  EXPECT_GE(calls, kBefore);
+  EXPECT_LT(calls, 10 * kBefore) << "the cancel() waited for jobs to leave the processor";
+}
+
+TEST_P(RealtimeTest, ThreadsOfTheMiddlewareAreRaisedWhileItSpins) {
+  if (GetParam() != redag::PreemptionMode::Os) GTEST_SKIP() << "workers have no priority";
+  const NamedThread user("recv_camera", true);
+  const NamedThread middleware("recv", true);
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  executor.add_node(node);
+  {
+    const Spinner spinner(executor);
+    EXPECT_TRUE(eventually([&] { return middleware.priority() == above_jobs(); }));
+    EXPECT_EQ(user.policy(), SCHED_OTHER);
+  }
+  EXPECT_EQ(middleware.policy(), SCHED_OTHER);
+  EXPECT_EQ(user.policy(), SCHED_OTHER);
+}
+
+TEST_P(RealtimeTest, ASpinAfterOneThatHadNoThreadsWorks) {
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::atomic<int> ticks{0};
+  auto timer = node->create_wall_timer(
+      5ms, [&] { ++ticks; }, new_group());
+  executor.add_node(node);
+  // Not one more thread: their stacks are what there is no memory for.
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_AS, &before), 0);
+  std::string first;
+  {
+    std::ifstream statm("/proc/self/statm");
+    rlim_t pages = 0;
+    statm >> pages;
+    std::vector<std::thread> others;
+    Event end;
+    const rlimit tight{pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + (rlim_t{1} << 20), before.rlim_max};
+    ASSERT_EQ(setrlimit(RLIMIT_AS, &tight), 0);
+    try {
+      for (;;) others.emplace_back([&end] { end.wait(); });  // stacks of threads that ended are used again
+    } catch (const std::system_error &) {
+    }
+    try {
+      executor.spin();
+    } catch (const std::runtime_error &error) {
+      first = error.what();
+    }
+    ASSERT_EQ(setrlimit(RLIMIT_AS, &before), 0);
+    end.set();
+    for (std::thread &thread : others) thread.join();
+  }
+  EXPECT_THAT(first, HasSubstr("cannot be created"));
+  const Spinner spinner(executor);
+  EXPECT_TRUE(eventually([&] { return ticks >= 3; }));
+}
+
+// ---- memory ----
+
+std::size_t locked_kilobytes() {
+  std::ifstream file("/proc/self/status");
+  std::string key;
+  std::size_t amount = 0;
+  while (file >> key && key != "VmLck:") {
+  }
+  file >> amount;
+  return amount;
+}
+
+/// Of the pages below the caller's frame on its stack, those that are not in memory.
+std::size_t absent_pages_below(std::size_t bytes) {
+  const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+  const auto here = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0)) / page * page;
+  std::vector<unsigned char> resident(bytes / page);
+  EXPECT_EQ(mincore(reinterpret_cast<void *>(here - bytes), bytes, resident.data()), 0);
+  return static_cast<std::size_t>(std::count_if(resident.begin(), resident.end(), [](auto r) { return (r & 1) == 0; }));
+}
+
+TEST_P(RealtimeTest, LockedMemoryIsThereBeforeCallbacksNeedIt) {
+  options.lock_memory = true;
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::atomic<bool> ran{false};
+  std::size_t absent = 0;
+  auto timer = node->create_wall_timer(
+      1ms,
+      [&] {
+        if (ran) return;
+        absent = absent_pages_below(redag::runtime::kTouchedStack / 2);
+        ran = true;
+      },
+      new_group());
+  executor.add_node(node);
+  {
+    const Spinner spinner(executor);
+    EXPECT_TRUE(eventually([&] { return ran.load(); }));
+    if (locked_kilobytes() == 0) {
+      EXPECT_THAT(executor.warnings(), Contains(AllOf(HasSubstr("locked"), HasSubstr("memlock"))));
+    }
+  }
+  EXPECT_EQ(absent, 0U);
+  munlockall();
+}
+
+// ---- jobs that do not end ----
+
+/// Keeps what is logged while it lives.
+class LogCapture {
+ public:
+  LogCapture() : before_(rcutils_logging_get_output_handler()) {
+    const redag::LockGuard guard(lock());
+    lines().clear();
+    rcutils_logging_set_output_handler(&keep);
+  }
+  ~LogCapture() { rcutils_logging_set_output_handler(before_); }
+  LogCapture(const LogCapture &) = delete;
+  LogCapture &operator=(const LogCapture &) = delete;
+
+  [[nodiscard]] static bool has(const std::string &text) {
+    const redag::LockGuard guard(lock());
+    return std::any_of(lines().begin(), lines().end(),
+                       [&](const std::string &line) { return line.find(text) != std::string::npos; });
+  }
+
+ private:
+  static redag::PiMutex &lock() {
+    static redag::PiMutex lock;
+    return lock;
+  }
+  static std::vector<std::string> &lines() {
+    static std::vector<std::string> lines;
+    return lines;
+  }
+  static void keep(const rcutils_log_location_t *, int, const char *, rcutils_time_point_value_t, const char *format,
+                   va_list *arguments) {
+    char text[1024];
+    va_list copy;
+    va_copy(copy, *arguments);
+    std::vsnprintf(text, sizeof text, format, copy);
+    va_end(copy);
+    const redag::LockGuard guard(lock());
+    lines().emplace_back(text);
+  }
+
+  rcutils_logging_output_handler_t before_;
+};
+
+TEST_P(RealtimeTest, TheWatchdogNamesACallbackThatDoesNotEnd) {
+  options.watchdog = 30ms;
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  Event end;
+  auto subscription = subscribe("/stuck", [&] { end.wait(); });
+  executor.add_node(node);
+  const LogCapture log;
+  const Spinner spinner(executor);
+  publisher("/stuck")->publish(Empty());
+  EXPECT_TRUE(eventually([&] { return log.has("/stuck: in progress for"); }));
+  end.set();
+}
+
+TEST_P(RealtimeTest, AnIdleWorkerThatLooksForWorkFindsIt) {
+  options.spin = 100us;
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  const auto warning = Contains(HasSubstr("do not look for jobs"));
+  if (GetParam() == redag::PreemptionMode::Os) {
+    EXPECT_THAT(executor.warnings(), warning);
+  } else {
+    EXPECT_THAT(executor.warnings(), ::testing::Not(warning));
+  }
+  std::atomic<int> calls{0};
+  auto subscription = subscribe("/topic", [&] { ++calls; });
+  executor.add_node(node);
+  const Spinner spinner(executor);
+  const auto topic = publisher("/topic");
+  for (int sent = 1; sent <= 20; ++sent) {
+    topic->publish(Empty());
+    ASSERT_TRUE(eventually([&] { return calls == sent; }));
+  }
+}
+
+TEST_P(RealtimeTest, NegativeTimesAreRefused) {
+  options.spin = -1ns;
+  EXPECT_THROW(ReDAGExecutor(rclcpp::ExecutorOptions(), options), std::invalid_argument);
+  options.spin = 0ns;
+  options.watchdog = -1ns;
+  EXPECT_THROW(ReDAGExecutor(rclcpp::ExecutorOptions(), options), std::invalid_argument);
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, RealtimeTest,
+                         ::testing::Values(redag::PreemptionMode::None, redag::PreemptionMode::Cooperative,
+                                           redag::PreemptionMode::Os),
+                         [](const auto &mode) { return std::string(to_string(mode.param)); });
+
+}  // namespace
+}  // namespace redag_rclcpp

@@ -1,0 +1,70 @@
+#!/usr/bin/env python3
+"""What `rosdep install --from-paths` has to resolve: the dependencies in our package.xml files.
+
+Usage: rosdep_test.py SOURCE_DIR. Uses the standard library only. A key that rosdep does not know stops the installation
+of everything, so a new dependency gets its line here, copied from ros/rosdistro (rosdep/base.yaml).
+"""
+import pathlib
+import re
+import sys
+import unittest
+import xml.etree.ElementTree
+
+# rosdep key -> Debian and Ubuntu package, from rosdep/base.yaml.
+SYSTEM_KEYS = {
+    "cli11": "libcli11-dev",
+    "cmake": "cmake",
+    "fmt": "libfmt-dev",
+    "libexpected-dev": "libexpected-dev",
+    "libgmock-dev": "libgmock-dev",
+    "libgtest-dev": "libgtest-dev",
+    "nlohmann-json-dev": "nlohmann-json3-dev",
+    "tbb": "libtbb-dev",
+    "yaml-cpp": "libyaml-cpp-dev",
+    "zlib": "zlib1g-dev",
+}
+# Packages of the distributions themselves: ros-<distribution>-<name>.
+ROS_KEYS = {"ament_cmake", "diagnostic_msgs", "launch_ros", "rclcpp", "rclcpp_action", "rclcpp_components",
+            "rclcpp_lifecycle", "std_msgs", "std_srvs", "test_msgs"}
+# What find_package() looks for, by the key that brings it.
+CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "yaml-cpp": "yaml-cpp", "tl-expected": "libexpected-dev",
+                  "CLI11": "cli11", "TBB": "tbb", "GTest": "libgtest-dev"}
+PACKAGES = ("redag", "redag_rclcpp")
+
+
+def keys_of(package):
+    root = xml.etree.ElementTree.parse(SOURCE / package / "package.xml").getroot()
+    return {element.text.strip() for element in root if element.tag.endswith("depend")}
+
+
+class Rosdep(unittest.TestCase):
+    def test_every_key_is_known(self):
+        for package in PACKAGES:
+            unknown = keys_of(package) - set(SYSTEM_KEYS) - ROS_KEYS - set(PACKAGES)
+            self.assertEqual(unknown, set(), f"{package}/package.xml: no key of rosdep, or not listed in this test")
+
+    def test_every_key_is_installed_by_bootstrap(self):
+        """The Debian names are right: the same list that builds without ROS."""
+        words = set(re.findall(r"[\w.+-]+", (SOURCE / "tools/bootstrap").read_text()))
+        for package in PACKAGES:
+            for key in keys_of(package) & set(SYSTEM_KEYS):
+                self.assertIn(SYSTEM_KEYS[key], words, f"{package}/package.xml: {key}")
+
+    def test_what_is_found_is_declared(self):
+        """What redag_rclcpp's CMakeLists.txt needs is in its own package.xml, whatever redag brings along."""
+        found = re.findall(r"^ *find_package\((\S+)[^)]*REQUIRED\)",
+                           (SOURCE / "redag_rclcpp/CMakeLists.txt").read_text(), re.MULTILINE)
+        keys = keys_of("redag_rclcpp")
+        for name in found:
+            if "$" not in name and not name.startswith("reference_"):  # those come with Autoware's, where somebody has it
+                self.assertIn(CMAKE_PACKAGES.get(name, name), keys, f"find_package({name})")
+
+    def test_redag_needs_no_test_library(self):
+        """colcon builds the library and the program; their tests belong to the repository's own build."""
+        self.assertFalse({"librapidcheck-dev", "rapidcheck"} & keys_of("redag"))
+        self.assertNotIn("BUILD_TESTING", (SOURCE / "redag/CMakeLists.txt").read_text())
+
+
+if __name__ == "__main__":
+    SOURCE = pathlib.Path(sys.argv.pop(1)).resolve()
+    unittest.main()
