@@ -7,12 +7,12 @@
 
 namespace redag::analysis {
 
-thread_local Effort *Effort::current_ = nullptr;
+thread_local Effort *Effort::current = nullptr;
 
 void Effort::look() {
-  const std::uint64_t steps = std::exchange(current_->unseen_, 0);
-  const double done = current_->at_.done;
-  for (Effort *scope = current_; scope != nullptr; scope = scope->outer_) scope->count(steps, done);
+  const std::uint64_t steps = std::exchange(current->unseen_, 0);
+  const double done = current->at_.done;
+  for (Effort *scope = current; scope != nullptr; scope = scope->outer_) scope->count(steps, done);
 }
 
 void Effort::count(std::uint64_t steps, double done) {
@@ -26,14 +26,14 @@ void Effort::count(std::uint64_t steps, double done) {
 }
 
 void Effort::reached(std::size_t part, std::size_t whole) {
-  if (current_ == nullptr || whole == 0) return;
+  if (current == nullptr || whole == 0) return;
   const double share = static_cast<double>(part) / static_cast<double>(whole);
-  current_->at_.done = share * share;
+  current->at_.done = share * share;
 }
 
 bool Effort::itemises(std::uint32_t unit) {
-  if (current_ == nullptr) return true;
-  const Itemised &wanted = current_->limits_.itemised;
+  if (current == nullptr) return true;
+  const Itemised &wanted = current->limits_.itemised;
   if (wanted.which != Itemised::Which::Units) return wanted.which == Itemised::Which::All;
   return std::find(wanted.units.begin(), wanted.units.end(), unit) != wanted.units.end();
 }

@@ -42,8 +42,8 @@ class Effort {
   };
 
   /// Until it is destroyed: on this thread, inside the scope that is there already. `limits` must outlive it.
-  explicit Effort(const Limits &limits) : limits_(limits), outer_(current_) { current_ = this; }
-  ~Effort() { current_ = outer_; }
+  explicit Effort(const Limits &limits) : limits_(limits), outer_(current) { current = this; }
+  ~Effort() { current = outer_; }
   Effort(const Effort &) = delete;
   Effort &operator=(const Effort &) = delete;
 
@@ -52,9 +52,9 @@ class Effort {
 
   /// Counts steps; throws GaveUp at a limit of any scope. Cheap.
   static void spend(std::uint64_t steps) {
-    if (current_ == nullptr) return;
-    current_->unseen_ += steps;
-    if (current_->unseen_ >= kLookEvery) look();
+    if (current == nullptr) return;
+    current->unseen_ += steps;
+    if (current->unseen_ >= kLookEvery) look();
   }
   /// `part` of `whole` units are done, each dearer than the one before by the same amount.
   static void reached(std::size_t part, std::size_t whole);
@@ -67,7 +67,7 @@ class Effort {
   static void look();
   void count(std::uint64_t steps, double done);
 
-  static thread_local Effort *current_;
+  static thread_local Effort *current;
 
   const Limits &limits_;
   Effort *outer_;

@@ -59,6 +59,7 @@ std::vector<Rate> rates_of(const System &system) {
   std::map<Duration, Duration> wcets;
   for (const SystemTask &task : system.tasks) wcets[task.period] = add(wcets[task.period], task.wcet);
   std::vector<Rate> rates;
+  rates.reserve(wcets.size());
   for (const auto &[period, wcet] : wcets) rates.push_back({period, wcet});
   return rates;
 }

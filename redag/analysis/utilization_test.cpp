@@ -196,7 +196,7 @@ TEST(ExactUtilization, AsLongDivisionSays) {
   for (int i = 0; i < 20'000; ++i) {
     Shares shares;
     Int128 numerator = 0;
-    constexpr Duration kAll = 2 * 2 * 3 * 3 * 5 * 7;
+    constexpr Duration kAll = Duration{4} * 9 * 5 * 7;
     for (Duration left = rng.uniform(1, 4); left > 0; --left) {
       const Duration periods[] = {3, 4, 5, 6, 7, 9, 10, 12, 14, 15, 20, 21};
       const Duration period = periods[rng.uniform(0, 11)];
@@ -204,8 +204,8 @@ TEST(ExactUtilization, AsLongDivisionSays) {
       shares.push({static_cast<Uint128>(amount), period});
       numerator += Int128{amount} * (kAll / period);
     }
-    const std::uint64_t of = static_cast<std::uint64_t>(rng.uniform(1, 12));
-    const std::uint64_t limit = static_cast<std::uint64_t>(rng.uniform(1, 20));
+    const auto of = static_cast<std::uint64_t>(rng.uniform(1, 12));
+    const auto limit = static_cast<std::uint64_t>(rng.uniform(1, 20));
     const Int128 left = numerator * static_cast<Int128>(of);
     const Int128 right = static_cast<Int128>(limit) * kAll;
     ASSERT_EQ(is_sum_within(shares, limit, of), left <= right);

@@ -235,10 +235,10 @@ Action add_compare(CLI::App &app) {
   add_simulator_arguments(app, options->run);
   add_thread_arguments(app, options->run);
   for (const char *name : {"--overhead-release", "--overhead-dispatch", "--overhead-preempt", "--max-events"}) {
-    app.get_option(name)->needs(simulate);
+    option_named(app, name).needs(simulate);
   }
   for (const char *name : {"--affinity", "--mlockall", "--realtime", "--spin", "--watchdog"}) {
-    app.get_option(name)->excludes(simulate);
+    option_named(app, name).excludes(simulate);
   }
   return [options](Console &console) { return compare(*options, console); };
 }

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <type_traits>
 
 #include "redag/model/workload_yaml_nearest.hpp"
@@ -77,6 +78,15 @@ CLI::Option *add_duration(CLI::App &app, const std::string &name, std::optional<
 CLI::Option *add_duration(CLI::App &app, const std::string &name, Duration &target, const std::string &help,
                           bool zero_allowed) {
   return add_duration_to(app, name, target, help, zero_allowed)->default_str(format_duration(target));
+}
+
+CLI::Option &option_named(CLI::App &app, std::string_view name) {
+  for (CLI::Option *option : app.get_options()) {
+    for (const std::string &own : option->get_lnames()) {
+      if (name.substr(2) == own) return *option;
+    }
+  }
+  throw std::logic_error(fmt::format("no option {}", name));
 }
 
 CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint32_t &target, Range<std::uint32_t> range,

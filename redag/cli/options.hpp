@@ -42,6 +42,10 @@ inline constexpr std::uint32_t kMaxRestarts = 1'000'000;
 inline constexpr std::uint64_t kMaxCombinations = 1'000'000'000;
 inline constexpr std::uint64_t kMaxEvents = 1'000'000'000;
 
+/// The option of `app` that is called `name` ("--out"), which must exist. CLI::App::get_option() ends the process where
+/// memory is short: it compares names in a function that must not throw.
+CLI::Option &option_named(CLI::App &app, std::string_view name);
+
 /// A whole number; shows its default.
 CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint32_t &target, Range<std::uint32_t> range,
                        const std::string &help);

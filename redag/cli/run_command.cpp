@@ -32,7 +32,7 @@ Action add_run(CLI::App &app) {
       ->group("Results");
   add_count(app, "--flight-size", arguments->flight_mib, {1, kMaxFlightMib},
             "MiB of that record; then new events replace the oldest")
-      ->needs(app.get_option("--out"))
+      ->needs(&option_named(app, "--out"))
       ->group("Results");
   return [arguments, executor](Console &console) {
     return run_once(*arguments, *executor, trace::Driver::Threads, console);
