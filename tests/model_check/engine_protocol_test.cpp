@@ -371,8 +371,8 @@ TEST_P(EngineProtocol, EventsAreDrainedInOrder) {
           kinds.push_back(event.kind);
         }
       }
-      const std::vector<JobEventKind> expected{JobEventKind::Released, JobEventKind::Ready, JobEventKind::Dispatched,
-                                               JobEventKind::Started, JobEventKind::Executed, JobEventKind::Finished};
+      const std::vector<JobEventKind> expected{JobEventKind::Released, JobEventKind::Ready,    JobEventKind::Dispatched,
+                                               JobEventKind::Started,  JobEventKind::Executed, JobEventKind::Finished};
       explored::check(kinds == expected, "the events of a job are not in their order");
     }
     explored::check(machine.engine->lost_events() == 0, "an event was lost");
