@@ -32,7 +32,7 @@ analysis::AnalyzeOptions AnalysisWatch::options() {
   options.stop = [this](const analysis::AnalysisProgress &at) {
     if (progress_.due()) {
       const double done = (static_cast<double>(at.index) + at.at.done) / static_cast<double>(at.count);
-      const double effort = static_cast<double>(arguments_.effort * AnalysisArguments::kEffortUnit);
+      const auto effort = static_cast<double>(arguments_.effort * AnalysisArguments::kEffortUnit);
       const std::string limit =
           effort > 0 ? fmt::format(", {:.0f} % of its effort", 100 * static_cast<double>(at.at.steps) / effort) : "";
       progress_.draw(done, fmt::format("{}{}{}", at.method.name, limit, progress_.left(done)));

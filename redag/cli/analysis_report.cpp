@@ -231,6 +231,7 @@ std::string listed(const std::vector<const Method *> &methods) {
 std::optional<Diagnostics> keep_only(const std::vector<std::string> &only, std::vector<Method> &methods) {
   if (only.empty()) return std::nullopt;
   std::vector<std::string> names;
+  names.reserve(methods.size());
   for (const Method &method : methods) names.emplace_back(method.name);
   for (const std::string &name : only) {
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
@@ -432,10 +433,9 @@ std::vector<TaskId> suspects_of(const Analysed &analysed, const Row &row) {
   for (const analysis::Term &term : terms) {
     if (term.task.valid()) add(term.task.value);
   }
-  for (std::size_t d = 0; d < system.dags.size(); ++d) {
-    const std::string &dag = system.dags[d].name;
-    if (row.name != dag && row.name.rfind(dag + ".", 0) != 0) continue;
-    for (const std::uint32_t t : system.dags[d].tasks) add(t);
+  for (const analysis::SystemDag &dag : system.dags) {
+    if (row.name != dag.name && row.name.rfind(dag.name + ".", 0) != 0) continue;
+    for (const std::uint32_t t : dag.tasks) add(t);
   }
   std::vector<std::uint32_t> others = system.by_rank;
   const auto load = [&](std::uint32_t t) {

@@ -18,7 +18,7 @@
 namespace redag::cli {
 namespace {
 
-constexpr Duration kLongest = 24 * 3600 * kSecond;
+constexpr Duration kLongest = kSecond * 3600 * 24;
 
 struct Options {
   Duration duration = 30 * kSecond;

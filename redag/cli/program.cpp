@@ -119,7 +119,7 @@ std::string unknown_argument(const CLI::App &command) {
 
 // What CLI11 says of an option that was given too often, or with a value that it does not take, in our words.
 std::string mismatch(const CLI::ArgumentMismatch &error) {
-  const std::string said = error.what();
+  std::string said = error.what();
   if (const std::size_t at = said.find(": At Most 1 required"); at != std::string::npos) {
     return said.substr(0, at) + " is given more than once";
   }

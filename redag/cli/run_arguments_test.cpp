@@ -8,7 +8,7 @@ namespace redag::cli {
 namespace {
 
 class RunArgumentsTest : public ::testing::Test {
- protected:
+ public:
   ~RunArgumentsTest() override { ::close(nowhere_); }
 
   bool takes(const std::string &executors, const RunArguments &arguments) {

@@ -46,6 +46,7 @@ Duration *overhead_named(Overheads &overheads, std::string_view name) {
 const std::vector<std::string_view> &overhead_names() {
   static const std::vector<std::string_view> kAll = [] {
     std::vector<std::string_view> names;
+    names.reserve(kNames.size());
     for (const Name &one : kNames) names.push_back(one.name);
     return names;
   }();
