@@ -8,6 +8,8 @@
 #include <system_error>
 #include <utility>
 
+#include "redag/base/blocked_signals.hpp"
+
 namespace redag::live {
 namespace {
 
@@ -24,6 +26,7 @@ Result<std::unique_ptr<Publisher>> Publisher::start(const PublisherOptions &opti
   if (!writer) return tl::unexpected<Diagnostics>(std::move(writer.error()));
   std::unique_ptr<Publisher> publisher(new Publisher(options, std::move(sampler), *std::move(writer)));
   try {
+    const BlockedSignals inherited;
     publisher->thread_ = std::thread([self = publisher.get()] { self->main(); });
   } catch (const std::system_error &error) {
     return make_error(std::string("no live page: its thread was refused: ") + error.what());

@@ -16,6 +16,18 @@ namespace redag::runtime {
 
 using sched::Outcome;
 
+namespace {
+
+// Any thread can run most of the jobs, but not all threads can: large pools share what 64 threads have.
+std::size_t events_of_thread(std::size_t trace_capacity, std::uint32_t threads) {
+  constexpr std::size_t kWhole = 64;
+  constexpr std::size_t kLeast = 4096;
+  if (threads <= kWhole) return trace_capacity;
+  return std::max(std::min(trace_capacity, kLeast), trace_capacity * kWhole / threads);
+}
+
+}  // namespace
+
 Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options)
     : options_(std::move(options)),
       lock_(realtime()),
@@ -30,7 +42,7 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
   idle_.reserve(count);
   handed_.reserve(count);
   for (std::uint32_t i = 0; i < count; ++i) {
-    threads_.push_back(std::make_unique<Thread>(i, options_.trace_capacity));
+    threads_.push_back(std::make_unique<Thread>(i, events_of_thread(options_.trace_capacity, count)));
   }
   caller_ = std::make_unique<Thread>(count, options_.trace_capacity);
   caller_->stack.reserve(1);
@@ -61,36 +73,56 @@ Result<void> Engine::start() {
     const std::size_t workers = options_.config.workers;
     if (workers <= usable.size()) cpus.assign(usable.end() - static_cast<std::ptrdiff_t>(workers), usable.end());
   }
-  for (auto &thread : threads_) {
-    const ThreadSetup setup{options_.name + "-" + std::to_string(thread->index), realtime() ? options_.band.top_job : 0,
-                            cpus, options_.touched_stack};
-    Result<ThreadHandle> started = start_thread(setup, [this, &self = *thread] { main(self); });
-    if (!started) {
-      halt();
-      join();
-      return tl::unexpected(started.error());
-    }
-    thread->handle = *std::move(started);
-    thread->cpu_clock = cpu_clock_of(thread->handle);
-  }
-  if (share_keeper_) {
-    Result<ThreadHandle> started =
-        start_thread({options_.name + "-share", options_.band.timer, {}}, [this] { keep_share(); });
-    if (!started) {
-      halt();
-      join();
-      return tl::unexpected(started.error());
-    }
-    share_keeper_->handle = *std::move(started);
+  if (Result<void> started = start_threads(cpus); !started) {
+    end_threads();
+    return started;
   }
   const Time at = now();
   Locked locked(*this);
   withdraw_if_halting();
-  priorities_.set_processors(std::min(cpus.empty() ? usable.size() : cpus.size(), usable.size()));
+  if (cpus.empty()) cpus = usable;
+  priorities_.set_processors(std::min(cpus.size(), usable.size()));
+  if (share_) {
+    share_.emplace(*options_.throttling, cpus.size());
+    realtime_on_.resize(cpus.size());
+    for (std::size_t i = 0; i < cpus.size(); ++i) {
+      const auto cpu = static_cast<std::size_t>(cpus[i]);
+      if (cpu >= share_places_.size()) share_places_.resize(cpu + 1, kNowhere);
+      share_places_[cpu] = i;
+    }
+  }
   for (auto thread = threads_.rbegin(); thread != threads_.rend(); ++thread) idle_.push_back(thread->get());
   running_ = true;
   decide(locked, at, nullptr, JobSlot());
   return {};
+}
+
+Result<void> Engine::start_threads(const std::vector<int> &cpus) {
+  for (auto &thread : threads_) {
+    const ThreadSetup setup{options_.name + "-" + std::to_string(thread->index), realtime() ? options_.band.top_job : 0,
+                            cpus, options_.touched_stack, &thread->processor};
+    Result<ThreadHandle> started = start_thread(setup, [this, &self = *thread] { main(self); });
+    if (!started) return tl::unexpected(started.error());
+    thread->handle = *std::move(started);
+    thread->cpu_clock = cpu_clock_of(thread->handle);
+  }
+  if (!share_keeper_) return {};
+  Result<ThreadHandle> started =
+      start_thread({options_.name + "-share", options_.band.timer, {}}, [this] { keep_share(); });
+  if (!started) return tl::unexpected(started.error());
+  share_keeper_->handle = *std::move(started);
+  return {};
+}
+
+// None of them has a job: before running_ none starts.
+void Engine::end_threads() {
+  exit_.store(true, std::memory_order_release);
+  for (auto &thread : threads_) {
+    thread->parker.unpark();
+    if (thread->handle.joinable()) thread->handle.join();
+    thread->processor = nullptr;
+  }
+  exit_.store(false, std::memory_order_release);
 }
 
 void Engine::main(Thread &self) noexcept {
@@ -117,6 +149,7 @@ void Engine::join() {
     // A decision that was under way has handed out its jobs; no other starts one.
     Locked locked(*this);
     withdraw_if_halting();
+    for (auto &thread : threads_) thread->processor = nullptr;  // it ends with the thread
   }
   exit_.store(true, std::memory_order_release);
   for (auto &thread : threads_) thread->parker.unpark();
@@ -336,11 +369,15 @@ void Engine::preemption_point(RunningJob &job) {
 
 void Engine::release(std::span<const Release> releases) {
   const Time at = now();
-  Locked locked(*this);
+  Locked locked(*this, releases.size());
   withdraw_if_halting();
   if (halted_at_ != kNever) return;
-  for (const Release &release : releases) scheduler_->release(release.task, release.nominal, at);
-  decide(locked, at, nullptr, JobSlot());
+  do {
+    const auto lot = releases.first(std::min(releases.size(), sched::kMostReleasesAtOnce));
+    for (const Release &release : lot) scheduler_->release(release.task, release.nominal, at);
+    decide(locked, at, nullptr, JobSlot());
+    releases = releases.subspan(lot.size());
+  } while (!releases.empty());
 }
 
 void Engine::release(TaskId task, Time nominal) {
@@ -445,6 +482,11 @@ Duration Engine::gave_way() const {
   const Time at = now();
   const LockGuard guard(lock_);
   return gave_way_ + (giving_way_ ? std::max<Duration>(0, at - giving_way_since_) : 0);
+}
+
+std::uint64_t Engine::thread_waits() const {
+  const LockGuard guard(lock_);
+  return scheduler_->thread_waits();
 }
 
 Time Engine::halted_at() const {

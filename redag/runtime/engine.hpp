@@ -6,6 +6,7 @@
 // drain(); drain() is for one thread at a time; halt() is async-signal-safe. No lock is held while a body runs.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <exception>
@@ -130,14 +131,15 @@ class Engine {
   void bind(const Workload &workload, std::vector<Body> bodies);
 
   /// Creates the threads; until then no job starts on them, and what is released waits. Error: what the system refused,
-  /// with a hint. Once, or never: run_one() needs no threads.
+  /// with a hint; no thread is left then, and it may be called again. Once, or never: run_one() needs no threads.
   [[nodiscard]] Result<void> start();
 
   /// Sets the origin of all times that the scheduler sees (CLOCK_MONOTONIC). Until then now() is 0. Before any release.
   void set_origin(Time monotonic) noexcept { origin_.store(monotonic, std::memory_order_relaxed); }
   [[nodiscard]] Time now() const noexcept;
 
-  /// Jobs of timer tasks are released, all at this instant; decisions are carried out before it returns.
+  /// Jobs of timer tasks are released, all at this instant (more than sched::kMostReleasesAtOnce: one such lot after
+  /// the other); decisions are carried out before it returns. Nothing allocates under the lock.
   void release(std::span<const Release> releases);
   void release(TaskId task, Time nominal);
   /// A release that is skipped at once, as `reason` (sched::Scheduler::miss).
@@ -194,6 +196,8 @@ class Engine {
   [[nodiscard]] TaskFigures figures(TaskId task) const;
   /// For how long jobs that are not of high criticality had to be ordinary threads, because of throttling.
   [[nodiscard]] Duration gave_way() const;
+  /// How often a job could have had a processor, and waited for a thread: all had jobs in progress.
+  [[nodiscard]] std::uint64_t thread_waits() const;
   /// Priority changes that the system refused while running (rights were taken away).
   [[nodiscard]] std::uint64_t refused_priorities() const noexcept { return refused_priorities_.load(); }
   /// Is the calling thread inside one of this engine's bodies?
@@ -212,6 +216,8 @@ class Engine {
   struct Next;
   class Locked;
 
+  Result<void> start_threads(const std::vector<int> &cpus);
+  void end_threads();
   void main(Thread &self) noexcept;
   void keep_share() noexcept;
   Next run(Thread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;
@@ -230,6 +236,9 @@ class Engine {
   Thread *rob(std::uint32_t level) REDAG_REQUIRES(lock_);
   Assignment move_job(Thread &from, Thread &to) REDAG_REQUIRES(lock_);
   Duration look_at_share() REDAG_EXCLUDES(lock_);
+  void note_where_realtime_ran() REDAG_REQUIRES(lock_);
+  void set_realtime_busy(Time now) REDAG_REQUIRES(lock_);
+  [[nodiscard]] std::size_t place_of(const Thread &thread) const REDAG_REQUIRES(lock_);
   void set_priority_for_job(Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
   [[nodiscard]] bool gives_way(const Thread &thread) const REDAG_REQUIRES(lock_);
   [[nodiscard]] int priority_of(const Thread &thread) const REDAG_REQUIRES(lock_);
@@ -254,22 +263,23 @@ class Engine {
   mutable PiMutex lock_;
   std::unique_ptr<sched::Scheduler> scheduler_ REDAG_PT_GUARDED_BY(lock_);
   std::vector<std::unique_ptr<Thread>> threads_;
-  std::unique_ptr<Thread> caller_;                              // whoever is in run_one()
-  std::vector<Thread *> idle_ REDAG_GUARDED_BY(lock_);          // threads without a job, the last one first
-  std::vector<Thread *> handed_ REDAG_GUARDED_BY(lock_);        // threads that may have mail; each once
-  std::deque<TaskEntry> tasks_ REDAG_GUARDED_BY(lock_);         // by TaskId; entries stay where they are
-  std::size_t most_started_ REDAG_GUARDED_BY(lock_) = 0;        // jobs that all tasks together can have in progress
-  std::uint32_t unfinished_ REDAG_GUARDED_BY(lock_) = 0;        // jobs dispatched and not ended
-  ThreadPriorities priorities_ REDAG_GUARDED_BY(lock_);         // os
-  std::optional<RealtimeShare> share_ REDAG_GUARDED_BY(lock_);  // os, throttled
-  bool share_is_kept_ REDAG_GUARDED_BY(lock_) = false;          // somebody looks at it again, without being woken
+  std::unique_ptr<Thread> caller_;                                 // whoever is in run_one()
+  std::vector<Thread *> idle_ REDAG_GUARDED_BY(lock_);             // threads without a job, the last one first
+  std::vector<Thread *> handed_ REDAG_GUARDED_BY(lock_);           // threads that may have mail; each once
+  std::deque<TaskEntry> tasks_ REDAG_GUARDED_BY(lock_);            // by TaskId; entries stay where they are
+  std::size_t most_started_ REDAG_GUARDED_BY(lock_) = 0;           // jobs that all tasks together can have in progress
+  std::uint32_t unfinished_ REDAG_GUARDED_BY(lock_) = 0;           // jobs dispatched and not ended
+  ThreadPriorities priorities_ REDAG_GUARDED_BY(lock_);            // os
+  std::optional<RealtimeShare> share_ REDAG_GUARDED_BY(lock_);     // os, throttled
+  std::vector<std::size_t> share_places_ REDAG_GUARDED_BY(lock_);  // by processor: its place in `share_`
+  std::vector<bool> realtime_on_ REDAG_GUARDED_BY(lock_);          // by place
+  bool share_is_kept_ REDAG_GUARDED_BY(lock_) = false;             // somebody looks at it again, without being woken
   bool giving_way_ REDAG_GUARDED_BY(lock_) = false;
   Time giving_way_since_ REDAG_GUARDED_BY(lock_) = 0;
   Duration gave_way_ REDAG_GUARDED_BY(lock_) = 0;       // before that
   std::size_t high_tasks_ REDAG_GUARDED_BY(lock_) = 0;  // of DAGs of high criticality, not removed
   std::size_t other_tasks_ REDAG_GUARDED_BY(lock_) = 0;
-  bool running_ REDAG_GUARDED_BY(lock_) = false;        // the threads are there
-  bool has_listeners_ REDAG_GUARDED_BY(lock_) = false;  // some task has or had one
+  bool running_ REDAG_GUARDED_BY(lock_) = false;  // the threads are there
   bool paused_ REDAG_GUARDED_BY(lock_);
   std::uint32_t pause_waiters_ REDAG_GUARDED_BY(lock_) = 0;
   FutexWord pause_changes_{0};  // counts what wait_paused() waits for; written under the lock
@@ -281,6 +291,7 @@ class Engine {
   Atomic<Time> origin_{kNever};
   Atomic<bool> halting_{false};
   Atomic<bool> exit_{false};
+  std::atomic<bool> has_listeners_{false};  // some task has or had one; written under the lock
   Atomic<std::uint64_t> refused_priorities_{0};
 };
 

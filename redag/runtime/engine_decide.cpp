@@ -22,7 +22,7 @@ Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot belo
       if (event.kind == JobEventKind::Preempted) ++tasks_[event.task.value].preemptions;
     }
   }
-  if (has_listeners_) {
+  if (has_listeners_.load(std::memory_order_relaxed)) {
     for (const JobEvent &event : step.events) {
       const auto &listener = tasks_[event.task.value].listener;
       if (event.kind == JobEventKind::Skipped && listener) locked.tell(listener, event.reason);
@@ -37,7 +37,10 @@ Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot belo
   }
   const Next next = place(locked, step, self, below);
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
-  if (shares) share_->set_busy(priorities_.any_realtime(), now);
+  if (shares) {
+    note_where_realtime_ran();
+    set_realtime_busy(now);
+  }
   return next;
 }
 
@@ -140,10 +143,50 @@ int Engine::priority_of(const Thread &thread) const {
   return gives_way(thread) ? 0 : options_.band.of_level(thread.level);
 }
 
+// Where the thread runs, or ran last; kNowhere: nobody says.
+std::size_t Engine::place_of(const Thread &thread) const {
+  const int cpu = processor_of(thread.processor);
+  return cpu < 0 || static_cast<std::size_t>(cpu) >= share_places_.size()
+             ? kNowhere
+             : share_places_[static_cast<std::size_t>(cpu)];
+}
+
+// The kernel chooses where threads run, and moves them only when one begins to run or stops: so a thread is charged
+// where it is found at two looks in a row, of which each decision is one.
+void Engine::note_where_realtime_ran() {
+  for (const auto &thread : threads_) {
+    if (!thread->is_realtime) continue;
+    const std::size_t place = place_of(*thread);
+    if (place == kNowhere) {
+      share_->ran_everywhere();
+      return;
+    }
+    share_->ran_on(place);
+  }
+}
+
+void Engine::set_realtime_busy(Time now) {
+  bool anywhere = false;
+  std::fill(realtime_on_.begin(), realtime_on_.end(), false);
+  for (const auto &thread : threads_) {
+    thread->is_realtime = priorities_.any_realtime() && !thread->stack.empty() && !gives_way(*thread);
+    if (!thread->is_realtime || thread->has_mail.load(std::memory_order_relaxed)) continue;  // it is not awake yet
+    const std::size_t place = place_of(*thread);
+    anywhere = anywhere || place == kNowhere;
+    if (place != kNowhere) realtime_on_[place] = true;
+  }
+  if (anywhere || realtime_on_.empty()) {
+    share_->set_busy(anywhere, now);
+  } else {
+    share_->set_busy(realtime_on_, now);
+  }
+}
+
 // Returns when to look again; kNever: not before somebody is woken for it.
 Duration Engine::look_at_share() {
   const Time at = now();
   Locked locked(*this);
+  note_where_realtime_ran();
   const bool give_way = share_->used_up(at) && can_give_way();
   if (give_way != giving_way_) {
     if (giving_way_) gave_way_ += std::max<Duration>(0, at - giving_way_since_);
@@ -152,8 +195,8 @@ Duration Engine::look_at_share() {
     for (const auto &thread : threads_) {
       if (!thread->stack.empty()) apply(priorities_.change(thread->index, priority_of(*thread)));
     }
-    share_->set_busy(priorities_.any_realtime(), at);
   }
+  set_realtime_busy(at);
   share_is_kept_ = giving_way_ || (unfinished_ > 0 && can_give_way());
   return share_is_kept_ ? share_->until_change() : kNever;
 }

@@ -11,6 +11,8 @@
 
 namespace redag::runtime {
 
+inline constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
+
 struct Engine::TaskEntry {
   static constexpr std::uint32_t kStreak = 8;
 
@@ -98,6 +100,7 @@ struct alignas(64) Engine::Thread {
   Atomic<bool> has_mail{false};
   bool is_handed = false;         // lock: is among Engine::handed_
   std::uint32_t level = 0;        // lock: of the job it was given last; inherited only with `os`
+  bool is_realtime = false;       // lock, throttled: had a job at real-time priority when that was last looked at
   bool inherits = false;          // lock: that level is of a more urgent job, which waits for this thread's
   Atomic<bool> outranked{false};  // written under the lock
   std::vector<Job> stack;         // lock: the jobs started here, the running one last
@@ -108,7 +111,8 @@ struct alignas(64) Engine::Thread {
   Atomic<RunningJob *> top{nullptr};
 
   ThreadHandle handle;
-  clockid_t cpu_clock = 0;  // of `handle`; set before the engine runs
+  clockid_t cpu_clock = 0;            // of `handle`; set before the engine runs
+  ProcessorWord processor = nullptr;  // lock: of `handle`, while the engine runs
 };
 
 /// The thread that looks at what the kernel leaves real-time threads.
@@ -123,6 +127,14 @@ struct Engine::ShareKeeper {
 class REDAG_SCOPED_CAPABILITY Engine::Locked {
  public:
   explicit Locked(Engine &engine) REDAG_ACQUIRE(engine.lock_) : engine_(engine) { engine_.lock_.lock(); }
+  /// For so many releases: each can skip a job that is ready, and one that waits for its predecessors. What that takes
+  /// is allocated before the lock is taken.
+  Locked(Engine &engine, std::size_t releases) REDAG_ACQUIRE(engine.lock_) : engine_(engine) {
+    if (2 * releases > kFewSkips && engine_.has_listeners_.load(std::memory_order_relaxed)) {
+      more_skips_.reserve(2 * releases - kFewSkips);
+    }
+    engine_.lock_.lock();
+  }
   ~Locked() REDAG_RELEASE() {
     engine_.lock_.unlock();
     for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();

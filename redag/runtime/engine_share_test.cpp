@@ -12,6 +12,7 @@
 
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/engine.hpp"
+#include "redag/runtime/parker.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
@@ -30,7 +31,7 @@ class EngineShare : public ::testing::Test {
   }
 
   void start(const Throttling &throttling, Criticality first, Criticality second, std::vector<Body> bodies,
-             const std::string &group = "") {
+             const std::string &group = "", std::uint32_t workers = 1) {
     Workload workload;
     workload.policy = PolicyKind::Fixed;
     for (const Criticality criticality : {first, second}) {
@@ -42,7 +43,7 @@ class EngineShare : public ::testing::Test {
       task.group = group;
     }
     EngineOptions options;
-    options.config = make_config(Mode{PreemptionMode::Os, {}}, 1, workload.policy, band_, 4);
+    options.config = make_config(Mode{PreemptionMode::Os, {}}, workers, workload.policy, band_, 4);
     options.band = band_;
     options.throttling = throttling;
     engine_ = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
@@ -72,6 +73,48 @@ class EngineShare : public ::testing::Test {
   const PriorityBand band_ = probe_priority_band();
   std::unique_ptr<Engine> engine_;
 };
+
+// Jobs of lower criticality run one after the other on one thread, which moves to the other processor in between: some
+// processor is busy all the time, and each for half of it. One run in which the machine takes nothing from them is
+// enough.
+TEST_F(EngineShare, EachProcessorCountsByItself) {
+  const std::vector<int> cpus = usable_cpus();
+  if (cpus.size() < 2) GTEST_SKIP() << "one processor is all of them";
+  if (this_threads_processor() == nullptr) GTEST_SKIP() << "this system does not say where threads run";
+  const auto move_to = [&](int job) {
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(static_cast<std::size_t>(cpus[cpus.size() - 1 - static_cast<std::size_t>(job % 2)]), &one);
+    EXPECT_EQ(sched_setaffinity(0, sizeof(one), &one), 0);
+  };
+  bool kept = false;
+  for (int attempt = 0; attempt < 50 && !kept; ++attempt) {
+    constexpr int kJobs = 40;
+    int ran = 0;
+    Event done;
+    // A credit of 20 ms, and 670 ms in a second come back.
+    start(Throttling{700'000, 1'000'000}, Criticality::Low, Criticality::High,
+          {[&](const Job &) {
+             const Time begin = monotonic_now();
+             while (monotonic_now() - begin < 5 * kMillisecond) {
+             }
+             if (++ran < kJobs) {
+               release(0);
+             } else {
+               done.set();
+             }
+             move_to(ran);
+             return Outcome::Finished;
+           },
+           [](const Job &) { return Outcome::Finished; }},
+          "", 2);
+    release(0);
+    done.wait();
+    finish();
+    kept = engine_->gave_way() == 0;
+  }
+  EXPECT_TRUE(kept);
+}
 
 // The calling thread, and threads that it starts, for as long as this lives.
 class OnOneProcessor {

@@ -78,7 +78,7 @@ void Engine::register_task(TaskId id, const Task &task, DagId dag, Body &body, s
   most_started_ -= entry.concurrency;
   entry = TaskEntry{};
   entry.body.swap(body);
-  has_listeners_ = has_listeners_ || listener != nullptr;
+  if (listener != nullptr) has_listeners_.store(true, std::memory_order_relaxed);
   entry.listener = std::move(listener);
   entry.wcet = task.wcet;
   entry.wcet_low = task.wcet_low;

@@ -206,27 +206,32 @@ void Executor::run_for(nanoseconds duration) {
 void Executor::start() {
   const LockGuard starting(finishing_);  // a stop() meanwhile waits for what it is going to end
   if (started_.exchange(true)) throw std::logic_error("Executor::start(): an Executor runs once");
-  if (const Result<void> ready = engine_->start(); !ready) throw std::runtime_error(to_string(ready.error()));
-  if (const Result<void> watching = start_watchdog(); !watching) {
-    request_stop();
-    throw std::runtime_error(to_string(watching.error()));
+  if (const Result<void> ready = start_threads(); !ready) {
+    started_ = false;
+    throw std::runtime_error(to_string(ready.error()));
   }
   const LockGuard guard(lock_);
   const Time origin = monotonic_now() + kStartMargin;
   engine_->set_origin(origin);
   running_ = true;
-  const ThreadSetup setup{options_.name + "-timer", setup_.timer_priority(), {}};
-  if (const Result<void> ready = timer_->start(origin, kNever, setup); !ready) {
-    request_stop();
-    throw std::runtime_error(to_string(ready.error()));
-  }
+  timer_->begin(origin, kNever);
+}
+
+// Those that work comes from wait until all others are there: who catches the exception may start again.
+Result<void> Executor::start_threads() {
+  const Result<void> timing = timer_->start(ThreadSetup{options_.name + "-timer", setup_.timer_priority(), {}});
+  if (!timing) return timing;
+  if (const Result<void> watching = start_watchdog(); !watching) return watching;
+  return engine_->start();
 }
 
 Result<void> Executor::start_watchdog() {
-  if (!options_.watchdog) return {};
-  watchdog_ =
+  if (!options_.watchdog || watchdog_) return {};
+  auto watchdog =
       std::make_unique<Watchdog>(*engine_, *options_.watchdog, [this](const OverdueJob &job) { on_overdue(job); });
-  return watchdog_->start({options_.name + "-watch", setup_.timer_priority(), {}});
+  Result<void> watching = watchdog->start({options_.name + "-watch", setup_.timer_priority(), {}});
+  if (watching) watchdog_ = std::move(watchdog);
+  return watching;
 }
 
 void Executor::on_overdue(const OverdueJob &job) {

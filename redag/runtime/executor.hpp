@@ -108,8 +108,8 @@ class Executor {
   /// As run(), for at most `duration`. Throws std::invalid_argument if that is negative.
   void run_for(nanoseconds duration);
 
-  /// Returns when all threads are ready. Throws std::runtime_error if the system refuses a thread, std::logic_error the
-  /// second time.
+  /// Returns when all threads are ready. Throws std::runtime_error if the system refuses a thread, and can be called
+  /// again then; std::logic_error if it has been started.
   void start();
   /// Waits until somebody stops the executor and all bodies have returned; then throws the exception that stopped it,
   /// if one did. Throws std::runtime_error that names the bodies which run on after stop_timeout. Not from a body.
@@ -132,6 +132,9 @@ class Executor {
   /// to started jobs afterwards follows no rules.
   [[nodiscard]] Time stopped_at() const { return engine_->halted_at(); }
   [[nodiscard]] std::uint64_t lost_events() const { return engine_->lost_events(); }
+  /// os: how often a job could have had a processor and waited for a thread, since all had jobs in progress. Above 0, a
+  /// less urgent job may have gone first: raise ExecutorOptions::threads.
+  [[nodiscard]] std::uint64_t thread_waits() const { return engine_->thread_waits(); }
   /// Of a DAG that was removed as long as no later one has its place; with a trace always. Throws std::out_of_range.
   [[nodiscard]] std::vector<TaskStats> stats(DagId dag) const;
   /// "control.ekf"; of a task that was removed as long as none has its id, which is as long as a job of it runs.
@@ -155,6 +158,7 @@ class Executor {
   void finish();
   void admit(const Dag &dag) const REDAG_REQUIRES(lock_);
   void on_overdue(const OverdueJob &job);
+  [[nodiscard]] Result<void> start_threads();
   [[nodiscard]] Result<void> start_watchdog();
   void sample(live::Sample &sample) const;
   void on_exception(const Job &job, std::exception_ptr exception);

@@ -1,6 +1,8 @@
 #include "redag/runtime/executor.hpp"
 
 #include <gtest/gtest.h>
+#include <pthread.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -270,6 +272,51 @@ TEST(Executor, ABodyThatDoesNotReturnIsNamed) {
   go.set();
 }
 
+// Threads that cannot be created: stacks of a size that no machine has.
+class NoRoomForThreads {
+ public:
+  NoRoomForThreads() {
+    pthread_getattr_default_np(&before_);
+    pthread_attr_t huge;
+    pthread_attr_init(&huge);
+    EXPECT_EQ(pthread_attr_setstacksize(&huge, std::size_t{1} << 50U), 0);
+    EXPECT_EQ(pthread_setattr_default_np(&huge), 0);
+    pthread_attr_destroy(&huge);
+  }
+  ~NoRoomForThreads() {
+    pthread_setattr_default_np(&before_);
+    pthread_attr_destroy(&before_);
+  }
+  NoRoomForThreads(const NoRoomForThreads &) = delete;
+  NoRoomForThreads &operator=(const NoRoomForThreads &) = delete;
+
+ private:
+  pthread_attr_t before_{};
+};
+
+TEST(Executor, StartsOnceThreadsCanBeHad) {
+  ExecutorOptions options = one_worker();
+  options.watchdog = WatchdogOptions{{kSecond, 0}, 10 * kMillisecond};
+  Executor executor(options);
+  DagBuilder dag("dag");
+  dag.timer("stop", 1ms, [&] { executor.request_stop(); });
+  executor.add(std::move(dag));
+  {
+    const NoRoomForThreads none;
+    EXPECT_THROW(executor.start(), std::runtime_error);
+    EXPECT_THROW(executor.run(), std::runtime_error);
+  }
+  EXPECT_FALSE(executor.stopping());
+  executor.run();
+  EXPECT_THROW(executor.start(), std::logic_error);
+}
+
+TEST(Executor, CanBeDestroyedAfterItCouldNotStart) {
+  Executor executor(one_worker());
+  const NoRoomForThreads none;
+  EXPECT_THROW(executor.run(), std::runtime_error);
+}
+
 Executor *interrupted = nullptr;
 
 TEST(Executor, RequestStopWorksFromASignalHandler) {
@@ -277,7 +324,7 @@ TEST(Executor, RequestStopWorksFromASignalHandler) {
   interrupted = &executor;
   auto *const old = std::signal(SIGUSR1, [](int) { interrupted->request_stop(); });
   DagBuilder dag("dag");
-  dag.timer("raise", 1ms, [] { std::raise(SIGUSR1); });
+  dag.timer("raise", 1ms, [] { kill(getpid(), SIGUSR1); });  // to the process: runtime threads block it
   executor.add(std::move(dag));
   executor.run();
   std::signal(SIGUSR1, old);

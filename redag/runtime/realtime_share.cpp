@@ -6,34 +6,57 @@ namespace redag::runtime {
 
 // Of the time that the kernel keeps from real-time threads (50 ms by default) two fifths may be used in one piece, and
 // a fifth is for the timer's own work, threads of others, and wake-ups that come late.
-RealtimeShare::RealtimeShare(const Throttling &throttling) : period_(throttling.period_us * kMicrosecond) {
+RealtimeShare::RealtimeShare(const Throttling &throttling, std::size_t processors)
+    : period_(throttling.period_us * kMicrosecond) {
   const Duration runtime = throttling.runtime_us * kMicrosecond;
   const Duration kept = period_ - runtime;
   const Duration room = std::min(10 * kMillisecond, kept / 5);
   burst_ = std::min({20 * kMillisecond, kept * 2 / 5, runtime / 2});
   share_ = static_cast<double>(std::max<Duration>(0, runtime - burst_ - room)) / static_cast<double>(period_);
-  credit_ = burst_;
+  accounts_.resize(std::max<std::size_t>(processors, 1), Account{burst_, false, false});
+}
+
+void RealtimeShare::ran_everywhere() {
+  for (Account &account : accounts_) account.busy = true;
+}
+
+void RealtimeShare::set_busy(const std::vector<bool> &busy, Time now) {
+  settle(now);
+  for (std::size_t i = 0; i < accounts_.size(); ++i) accounts_[i].busy = busy[i];
 }
 
 void RealtimeShare::set_busy(bool busy, Time now) {
   settle(now);
-  busy_ = busy;
+  for (Account &account : accounts_) account.busy = busy;
 }
 
 bool RealtimeShare::used_up(Time now) {
   settle(now);
-  if (credit_ <= 0) {
-    used_up_ = true;
-  } else if (credit_ >= burst_ / 2) {
-    used_up_ = false;
+  used_up_ = false;
+  for (Account &account : accounts_) {
+    if (account.credit <= 0) {
+      account.used_up = true;
+    } else if (account.credit >= burst_ / 2) {
+      account.used_up = false;
+    }
+    used_up_ = used_up_ || account.used_up;
   }
   return used_up_;
 }
 
 Duration RealtimeShare::until_change() const {
-  const auto needed = static_cast<double>(used_up_ ? burst_ / 2 - credit_ : credit_);
-  const double rate = used_up_ ? share_ : 1.0 - share_;
-  // Where nothing comes back: as long as the kernel itself looks at.
+  Duration first = kNever;
+  Duration last = 0;
+  for (const Account &account : accounts_) {
+    if (account.used_up) last = std::max(last, time_for(burst_ / 2 - account.credit, share_));
+    first = std::min(first, time_for(account.credit, 1.0 - share_));
+  }
+  return used_up_ ? last : first;
+}
+
+// Where nothing comes back: as long as the kernel itself looks at.
+Duration RealtimeShare::time_for(Duration credit, double rate) const {
+  const auto needed = static_cast<double>(credit);
   return rate * static_cast<double>(period_) <= needed ? period_
                                                        : std::max(kMillisecond, static_cast<Duration>(needed / rate));
 }
@@ -43,7 +66,9 @@ void RealtimeShare::settle(Time now) {
   const Duration passed = std::max<Duration>(0, now - settled_);
   settled_ = std::max(settled_, now);
   const auto back = static_cast<Duration>(static_cast<double>(passed) * share_);
-  credit_ = std::clamp(credit_ + back - (busy_ ? passed : 0), burst_ - period_, burst_);
+  for (Account &account : accounts_) {
+    account.credit = std::clamp(account.credit + back - (account.busy ? passed : 0), burst_ - period_, burst_);
+  }
 }
 
 }  // namespace redag::runtime

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <deque>
 #include <utility>
+#include <vector>
 
 #include "redag/base/rng.hpp"
 
@@ -103,6 +104,41 @@ TEST(RealtimeShare, IsUsedUpUntilHalfOfItIsThereAgain) {
   EXPECT_TRUE(share.used_up(260 * kMillisecond));
   EXPECT_NEAR(static_cast<double>(share.until_change()), 2e6, 1e6);
   EXPECT_FALSE(share.used_up(263 * kMillisecond));
+}
+
+// Some processor is busy all the time, and none for long: the kernel takes none of them.
+TEST(RealtimeShare, EachProcessorCountsByItself) {
+  RealtimeShare share(kDefault, 2);
+  for (Time now = 0; now < 20 * kSecond; now += 20 * kMillisecond) {
+    share.set_busy(std::vector<bool>{true, false}, now);
+    EXPECT_FALSE(share.used_up(now + 10 * kMillisecond));
+    share.set_busy(std::vector<bool>{false, true}, now + 10 * kMillisecond);
+    EXPECT_FALSE(share.used_up(now + 20 * kMillisecond));
+  }
+}
+
+TEST(RealtimeShare, OneProcessorIsEnoughToUseItUp) {
+  RealtimeShare share(kDefault, 3);  // 20 ms; 920 of 1000 come back
+  share.set_busy(std::vector<bool>{false, true, false}, 0);
+  EXPECT_EQ(share.until_change(), 250 * kMillisecond);
+  EXPECT_FALSE(share.used_up(249 * kMillisecond));
+  EXPECT_TRUE(share.used_up(251 * kMillisecond));
+  share.set_busy(std::vector<bool>{false, false, false}, 251 * kMillisecond);
+  EXPECT_TRUE(share.used_up(255 * kMillisecond));
+  EXPECT_FALSE(share.used_up(263 * kMillisecond));
+}
+
+// A thread was seen to run elsewhere in between: there it counts, too.
+TEST(RealtimeShare, WhereAThreadMovedToIsCharged) {
+  RealtimeShare share(kDefault, 2);
+  share.set_busy(std::vector<bool>{true, false}, 0);
+  share.ran_on(1);
+  share.set_busy(std::vector<bool>{false, true}, 200 * kMillisecond);
+  EXPECT_FALSE(share.used_up(240 * kMillisecond));
+  EXPECT_TRUE(share.used_up(260 * kMillisecond));
+  RealtimeShare unknown(kDefault, 2);
+  unknown.ran_everywhere();
+  EXPECT_TRUE(unknown.used_up(260 * kMillisecond));
 }
 
 TEST(RealtimeShare, NothingIsOwedForLongerThanAPeriod) {

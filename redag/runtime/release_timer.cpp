@@ -9,7 +9,7 @@
 namespace redag::runtime {
 namespace {
 
-constexpr std::size_t kBatch = 256;  // releases reported at once; more follow at once
+constexpr std::size_t kBatch = sched::kMostReleasesAtOnce;  // releases reported at once; more follow at once
 
 }  // namespace
 
@@ -35,10 +35,23 @@ void ReleaseTimer::remove(std::span<const TaskId> tasks) {
   heap_.remove(tasks);
 }
 
-Result<void> ReleaseTimer::start(Time origin, Time horizon, ThreadSetup setup) {
-  origin_ = origin;
-  horizon_ = horizon;
+Result<void> ReleaseTimer::start(Time origin, Time horizon, const ThreadSetup &setup) {
+  begin(origin, horizon);
+  return start(setup);
+}
+
+Result<void> ReleaseTimer::start(const ThreadSetup &setup) {
+  if (thread_.joinable()) return {};
   return start_thread(setup, [this] { main(); }).map([this](ThreadHandle &&thread) { thread_ = std::move(thread); });
+}
+
+void ReleaseTimer::begin(Time origin, Time horizon) {
+  {
+    const LockGuard guard(lock_);
+    origin_ = origin;
+    horizon_ = horizon;
+  }
+  parker_.unpark();
 }
 
 void ReleaseTimer::stop() noexcept {
@@ -54,24 +67,25 @@ void ReleaseTimer::main() noexcept {
   for (;;) {
     // Read before the clock: a stop that was seen here lies before `now`, so all that was due by then is reported.
     const bool stopping = stopping_.load(std::memory_order_acquire);
-    const Time now = monotonic_now() - origin_;
-    Time next = kNever;
+    Time wake_up = kNever;
     {
       // Kept while it reports: whoever removes a task then knows that no release of it is on its way.
       const LockGuard guard(lock_);
-      due_.clear();
-      heap_.pop_due(std::min(now, horizon_ - 1), due_);
-      next = heap_.next();
-      if (!due_.empty()) {
-        sink_(due_);
-        continue;
+      if (origin_ != kNever) {
+        due_.clear();
+        heap_.pop_due(std::min(monotonic_now() - origin_, horizon_ - 1), due_);
+        if (!due_.empty()) {
+          sink_(due_);
+          continue;
+        }
+        if (heap_.next() < horizon_) wake_up = origin_ + heap_.next();
       }
     }
     if (stopping) return;
-    if (next >= horizon_) {
+    if (wake_up == kNever) {
       parker_.park();
     } else {
-      parker_.park_until(origin_ + next);
+      parker_.park_until(wake_up);
     }
   }
 }

@@ -34,7 +34,11 @@ class ReleaseTimer {
   void remove(std::span<const TaskId> tasks);
 
   /// Nothing is released at or after `horizon` (kNever: for ever). Error: the thread cannot be set up as asked.
-  [[nodiscard]] Result<void> start(Time origin, Time horizon, ThreadSetup setup);
+  [[nodiscard]] Result<void> start(Time origin, Time horizon, const ThreadSetup &setup);
+  /// The same in two steps: the thread, which waits, and what cannot fail. Where there is a thread already, start()
+  /// does nothing.
+  [[nodiscard]] Result<void> start(const ThreadSetup &setup);
+  void begin(Time origin, Time horizon);
 
   /// No releases after this moment; what was due before is still reported.
   void stop() noexcept;
@@ -50,8 +54,8 @@ class ReleaseTimer {
   std::vector<Release> due_ REDAG_GUARDED_BY(lock_);
   Parker parker_;
   Atomic<bool> stopping_{false};
-  Time origin_ = 0;
-  Time horizon_ = kNever;
+  Time origin_ REDAG_GUARDED_BY(lock_) = kNever;  // before begin()
+  Time horizon_ REDAG_GUARDED_BY(lock_) = kNever;
   ThreadHandle thread_;
 };
 

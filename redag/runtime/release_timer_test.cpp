@@ -67,6 +67,24 @@ TEST(ReleaseTimer, WhatIsDueAtTheStopIsReported) {
   EXPECT_EQ(collector.releases.size(), 10'000U);
 }
 
+// The thread comes first, and waits for what cannot fail.
+TEST(ReleaseTimer, ReleasesNothingBeforeItBegins) {
+  Collector collector;
+  collector.wanted = 1;
+  ReleaseTimer timer(collector.sink(), 1);
+  timer.add(one_timer(kMillisecond), std::array{TaskId(0)}, 0);
+  ASSERT_TRUE(timer.start(ThreadSetup{}));
+  ASSERT_TRUE(timer.start(ThreadSetup{})) << "there is one already";
+  EXPECT_FALSE(collector.enough.wait_until(monotonic_now() + 20 * kMillisecond));
+  const Time origin = monotonic_now();
+  timer.begin(origin, kNever);
+  collector.enough.wait();
+  EXPECT_GE(monotonic_now(), origin);
+  timer.stop();
+  timer.join();
+  EXPECT_EQ(collector.releases[0].nominal, 0);
+}
+
 TEST(ReleaseTimer, AThreadThatCannotBeSetUpIsAnError) {
   ReleaseTimer timer([](auto) {}, 1);
   EXPECT_FALSE(timer.start(0, kNever, ThreadSetup{"t", 0, {1023}}));

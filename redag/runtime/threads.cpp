@@ -6,6 +6,10 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 
+#if __has_include(<sys/rseq.h>)
+#include <sys/rseq.h>
+#endif
+
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
@@ -15,6 +19,7 @@
 #include <thread>
 #include <utility>
 
+#include "redag/base/blocked_signals.hpp"
 #include "redag/base/check.hpp"
 #include "redag/runtime/parker.hpp"
 
@@ -66,6 +71,7 @@ Result<void> set_up_this_thread(const ThreadSetup &setup) {
   pthread_setname_np(pthread_self(), setup.name.substr(0, 15).c_str());
   prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
   if (setup.touched_stack > 0) touch_stack(setup.touched_stack);
+  if (setup.processor != nullptr) *setup.processor = this_threads_processor();
   if (!setup.cpus.empty()) {
     if (Result<void> pinned = pin(setup); !pinned) return pinned;
   }
@@ -81,6 +87,21 @@ clockid_t cpu_clock_of(ThreadHandle &thread) noexcept {
   const int error = ::pthread_getcpuclockid(thread.native_handle(), &clock);
   REDAG_CHECK(error == 0, "a thread that runs has a clock");
   return clock;
+}
+
+// The kernel writes it whenever it puts the thread on a processor (restartable sequences, which glibc registers).
+ProcessorWord this_threads_processor() noexcept {
+#if __has_include(<sys/rseq.h>) && defined(__GLIBC__)
+  if (__rseq_size > 0) {
+    const char *const area = static_cast<const char *>(__builtin_thread_pointer()) + __rseq_offset;
+    return reinterpret_cast<ProcessorWord>(area + offsetof(rseq, cpu_id));
+  }
+#endif
+  return nullptr;
+}
+
+int processor_of(ProcessorWord word) noexcept {
+  return word == nullptr ? -1 : static_cast<int>(__atomic_load_n(word, __ATOMIC_RELAXED));
 }
 
 bool set_fifo_priority(pthread_t thread, int priority) noexcept {
@@ -104,6 +125,7 @@ Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()
   Event ready;
   std::thread thread;
   try {
+    const BlockedSignals inherited;
     thread = std::thread([&setup, &result, &ready, main = std::move(main)] {
       result = set_up_this_thread(setup);
       const bool usable = result.has_value();
@@ -141,6 +163,7 @@ std::vector<int> usable_cpus() {
 
 int available_fifo_priority(int wanted) {
   int found = 0;
+  const BlockedSignals inherited;
   std::thread([&] {
     if (set_fifo_priority(pthread_self(), wanted)) {
       found = wanted;

@@ -20,6 +20,9 @@ namespace redag::runtime {
 
 using ThreadHandle = std::thread;
 
+/// Says where a thread runs, until it ends; null: this system does not say.
+using ProcessorWord = const volatile std::uint32_t *;
+
 /// How a thread of the runtime is set up.
 struct ThreadSetup {
   std::string name;       // shown by top -H and ps; cut to 15 characters
@@ -27,6 +30,7 @@ struct ThreadSetup {
   std::vector<int> cpus;  // may run only there; empty: wherever the process may
   // Bytes of its stack that it touches first, so that bodies meet no page fault there; with lock_memory() for good.
   std::size_t touched_stack = 0;
+  ProcessorWord *processor = nullptr;  // where it is noted, if anywhere
 };
 
 /// Enough for a callback that keeps its large objects elsewhere.
@@ -36,12 +40,16 @@ inline constexpr std::size_t kTouchedStack = std::size_t{256} << 10;
 /// lateness). Error: the first thing that the system refused.
 [[nodiscard]] Result<void> set_up_this_thread(const ThreadSetup &setup);
 
-/// A thread that is set up so and then runs `main`; returns once it is set up. Error: as set_up_this_thread(), and
-/// `main` does not run.
+/// A thread that is set up so and then runs `main`; returns once it is set up. It takes no signals but those of its own
+/// mistakes (BlockedSignals). Error: as set_up_this_thread(), and `main` does not run.
 [[nodiscard]] Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()> main);
 
 /// The clock of a running thread's processor time.
 [[nodiscard]] clockid_t cpu_clock_of(ThreadHandle &thread) noexcept;
+
+[[nodiscard]] ProcessorWord this_threads_processor() noexcept;
+/// The processor on which that thread runs, or ran last; negative: unknown. Any thread.
+[[nodiscard]] int processor_of(ProcessorWord word) noexcept;
 
 /// 0: an ordinary thread (SCHED_OTHER). False if the system refused.
 [[nodiscard]] bool set_fifo_priority(pthread_t thread, int priority) noexcept;

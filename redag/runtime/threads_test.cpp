@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdint>
 #include <thread>
 #include <vector>
@@ -46,6 +47,36 @@ TEST(Threads, FifoPriorityIsSetWhereItIsAvailable) {
     ASSERT_TRUE(set_up_this_thread(ThreadSetup{"t", priority, {}}));
     EXPECT_EQ(fifo_priority(pthread_self()), priority);
   }).join();
+}
+
+TEST(Threads, TakeNoSignalsButThoseOfTheirOwnMistakes) {
+  sigset_t of_thread;
+  Result<ThreadHandle> thread =
+      start_thread(ThreadSetup{"t", 0, {}}, [&] { pthread_sigmask(SIG_SETMASK, nullptr, &of_thread); });
+  ASSERT_TRUE(thread);
+  thread->join();
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGALRM, SIGUSR1, SIGCHLD, SIGPROF, SIGRTMIN, SIGRTMAX}) {
+    EXPECT_EQ(sigismember(&of_thread, number), 1) << number;
+  }
+  for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS, SIGABRT}) {
+    EXPECT_EQ(sigismember(&of_thread, number), 0) << number;
+  }
+  sigset_t of_caller;
+  pthread_sigmask(SIG_SETMASK, nullptr, &of_caller);
+  EXPECT_EQ(sigismember(&of_caller, SIGUSR1), 0) << "the caller's own are as before";
+}
+
+TEST(Threads, SayWhereTheyRun) {
+  const int cpu = usable_cpus().front();
+  ProcessorWord word = nullptr;
+  Result<ThreadHandle> thread = start_thread(ThreadSetup{"t", 0, {cpu}, 0, &word}, [&] {
+    if (word != nullptr) {
+      EXPECT_EQ(processor_of(word), cpu);
+    }
+  });
+  ASSERT_TRUE(thread);
+  thread->join();
+  EXPECT_LT(processor_of(nullptr), 0);
 }
 
 constexpr PriorityBand kBand{80, 90};

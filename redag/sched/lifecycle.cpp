@@ -226,9 +226,9 @@ TaskId Lifecycle::append_task(DagId dag, std::uint32_t rank, const Task &task) {
 }
 
 // Room for what one instant can bring: each task's release, the skip of its last job, readiness, deferral, start,
-// preemption; HI mode, that skips and demotes all there is.
+// preemption; HI mode, that skips and demotes all there is; and the releases that a late timer reports at once.
 void Lifecycle::reserve_step() {
-  events_.reserve(3 * jobs_.size() + 64);
+  events_.reserve(3 * (jobs_.size() + kMostReleasesAtOnce) + 64);
   // Any started job can change its level.
   dispatches_.reserve(3 * std::size_t{config_.workers} + jobs_.size() + 16);
 }

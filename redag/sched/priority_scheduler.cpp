@@ -182,6 +182,7 @@ bool PriorityScheduler::park_if_not_eligible(std::uint32_t slot) {
   gate.parked.push(jobs_, slot);
   job.parked_at = position;
   if (kind == GateKind::Dag) defer(slot);
+  if (kind == GateKind::Threads) ++thread_waits_;
   if (kind == GateKind::Group) inherit(gate.holder, job);
   // Others may now use what this job would have used elsewhere.
   for_gates_of(job, [this](Gate &other) { promote_one(other); });

@@ -23,6 +23,7 @@ class PriorityScheduler final : public Lifecycle {
   void preemption_point(JobSlot job, Time now) override;
   Step dispatch(Time now, std::uint32_t most = kNoLimit) override;
   [[nodiscard]] bool outranked(JobSlot job) const override;
+  [[nodiscard]] std::uint64_t thread_waits() const override { return thread_waits_; }
 
  private:
   // What a job must pass to start, and holds until it ends: its task, its DAG, its group, and the platform's threads. A
@@ -106,6 +107,7 @@ class PriorityScheduler final : public Lifecycle {
   std::vector<Worker> workers_;
   LevelBitmap free_workers_;
   std::vector<std::uint32_t> open_workers_;
+  std::uint64_t thread_waits_ = 0;
   std::uint32_t aside_ = kNil;  // during dispatch(): jobs that may not start, out of the queue; linked by Job::next
 };
 

@@ -315,6 +315,35 @@ TEST(PriorityScheduler, AllocatesNothingInSteadyState) {
   }
 }
 
+// A timer that woke late reports the releases of a task which it missed, all at once.
+TEST(PriorityScheduler, ManyReleasesOfATaskAtOnceAllocateNothing) {
+  PriorityScheduler scheduler(make_workload({make_dag("d", {{"a", 1}})}, 1), {1, Preemption::None});
+  for (Time now = 0; now < 3; ++now) {
+    const std::uint64_t before = redag::testing::allocation_count();
+    for (std::size_t i = 0; i < kMostReleasesAtOnce; ++i) scheduler.release(TaskId(0), now, now);
+    EXPECT_GE(scheduler.dispatch(now).events.size(), 2 * kMostReleasesAtOnce);
+    EXPECT_EQ(redag::testing::allocation_count(), before);
+  }
+}
+
+// One worker and one thread: the urgent job could have the worker, and waits for the thread.
+TEST(PriorityScheduler, CountsJobsThatWaitForAThread) {
+  Config config{1, Preemption::Full};
+  config.max_started = 1;
+  PriorityScheduler scheduler(make_workload({make_dag("d", {{"hi", 10}}), make_dag("e", {{"lo", 20}})}, 1), config);
+  scheduler.release(TaskId(1), 0, 0);
+  const JobSlot low = scheduler.dispatch(0).dispatches[0].job;
+  EXPECT_EQ(scheduler.thread_waits(), 0U);
+  scheduler.release(TaskId(0), 1, 1);
+  EXPECT_TRUE(scheduler.dispatch(1).dispatches.empty());
+  EXPECT_EQ(scheduler.thread_waits(), 1U);
+  scheduler.complete(low, 2, Outcome::Finished);
+  scheduler.dispatch(2);
+  scheduler.release(TaskId(1), 3, 3);  // less urgent: it waits for the worker, and not for the thread
+  scheduler.dispatch(3);
+  EXPECT_EQ(scheduler.thread_waits(), 1U);
+}
+
 Task lone_task(Duration period) {
   Task task;
   task.wcet = 1;

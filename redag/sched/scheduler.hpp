@@ -47,6 +47,9 @@ enum class Outcome : std::uint8_t {
   NoData,  // found nothing to do: its message was overwritten, its timer cancelled
 };
 
+/// Between two calls of dispatch(), so many releases never allocate, whichever tasks they are of.
+inline constexpr std::size_t kMostReleasesAtOnce = 256;
+
 /// Of dispatch(): as many jobs as there are places.
 inline constexpr std::uint32_t kNoLimit = 0xffffffff;
 
@@ -148,6 +151,8 @@ class Scheduler {
   [[nodiscard]] virtual Accounting accounting(TaskId task) const = 0;
   /// Jobs that are ready and have not started; of the others in flight that have not, predecessors are incomplete.
   [[nodiscard]] virtual std::uint32_t ready(TaskId task) const = 0;
+  /// How often a job found a worker and only Config::max_started kept it from starting.
+  [[nodiscard]] virtual std::uint64_t thread_waits() const { return 0; }
 };
 
 }  // namespace redag::sched

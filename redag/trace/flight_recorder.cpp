@@ -20,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "redag/base/blocked_signals.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
 #include "redag/base/text.hpp"
@@ -113,7 +114,7 @@ class FlightRecorder::Impl {
         file_(std::move(file)),
         capacity_(std::max<std::uint64_t>(2, options.most_bytes / kBlockBytes)),
         sync_every_(options.sync_every),
-        syncer_([this] { keep_in_sync(); }) {}
+        syncer_(start_syncer()) {}
   Impl(const Impl &) = delete;
   Impl &operator=(const Impl &) = delete;
   ~Impl() {
@@ -184,6 +185,11 @@ class FlightRecorder::Impl {
       info_news_ = info_news_ || of_info;
     }
     changed_.notify_all();
+  }
+
+  std::thread start_syncer() {
+    const BlockedSignals inherited;
+    return std::thread([this] { keep_in_sync(); });
   }
 
   // The disk can take long: whoever appends must not wait for it.

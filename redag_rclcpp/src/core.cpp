@@ -449,6 +449,12 @@ std::vector<std::string> ReDAGExecutor::Core::warnings() const {
   if (matcher_) {
     for (const std::string &line : matcher_->unmatched()) all.push_back(line);
   }
+  if (const std::uint64_t waits = engine_->thread_waits(); waits > 0) {
+    all.push_back(
+        fmt::format("{} times a callback waited for a thread, because all {} had callbacks in progress: "
+                    "raise the parameter 'threads'",
+                    waits, engine_->thread_count()));
+  }
   return all;
 }
 

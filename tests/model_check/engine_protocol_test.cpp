@@ -380,16 +380,19 @@ TEST_P(EngineProtocol, EventsAreDrainedInOrder) {
 }
 
 TEST(EngineStart, AThreadThatCannotBeHadEndsTheOthers) {
-  runtime::thread_that_fails = "redag-1";
   expect_holds([] {
-    Machine machine(ladder(1), Platform{Preemption::None, 3, 0, false, 0}, {nullptr});
+    runtime::thread_that_fails = "redag-1";
+    Machine machine(ladder(1), Platform{Preemption::None, 2, 0, false, 0}, {nullptr});
     const std::uint32_t source = thread([&] { machine.release(0); });
     explored::check(!machine.engine->start().has_value(), "a thread failed, and nobody says so");
     explored::join(source);
-    explored::check(machine.engine->halting(), "not halted");
+    explored::check(!machine.engine->halting(), "halted");
     explored::check(machine.ran(0) == 0, "a job ran");
+    runtime::thread_that_fails.reset();
+    explored::check(machine.engine->start().has_value(), "it cannot be started again");
+    machine.finish_calmly();
+    explored::check(machine.ran(0) == 1, "what was released did not run");
   });
-  runtime::thread_that_fails.reset();
 }
 
 // Nothing is left for real-time threads, from when the keeper of their share first looks: at any moment of a run.

@@ -41,11 +41,14 @@ class ThreadHandle {
   std::optional<std::uint32_t> thread_;
 };
 
+using ProcessorWord = const volatile std::uint32_t *;
+
 struct ThreadSetup {
   std::string name;
   int fifo_priority = 0;
   std::vector<int> cpus;
   std::size_t touched_stack = 0;
+  ProcessorWord *processor = nullptr;
 };
 
 inline constexpr std::size_t kTouchedStack = 0;
@@ -57,6 +60,7 @@ inline std::optional<std::string> thread_that_fails;  // by name
   return ThreadHandle(testing::explored::spawn(std::move(main)));
 }
 [[nodiscard]] inline clockid_t cpu_clock_of(ThreadHandle &) noexcept { return 0; }
+[[nodiscard]] inline int processor_of(ProcessorWord) noexcept { return -1; }
 inline std::function<void(std::uint32_t thread, int priority)> on_set_priority;
 [[nodiscard]] inline bool set_fifo_priority(std::uint32_t thread, int priority) noexcept {
   if (on_set_priority) on_set_priority(thread, priority);

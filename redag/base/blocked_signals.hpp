@@ -1,0 +1,27 @@
+// Signals that are to run their handlers elsewhere. Any thread.
+#pragma once
+
+#include <csignal>
+
+namespace redag {
+
+/// While it lives, the calling thread and threads that it creates take no signals but those of their own mistakes
+/// (SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS, SIGABRT): a handler of the process then interrupts a thread of
+/// the program, never a job or what is above all jobs.
+class BlockedSignals {
+ public:
+  BlockedSignals() noexcept {
+    sigset_t blocked;
+    sigfillset(&blocked);
+    for (const int own : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS, SIGABRT}) sigdelset(&blocked, own);
+    pthread_sigmask(SIG_BLOCK, &blocked, &before_);
+  }
+  ~BlockedSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  BlockedSignals(const BlockedSignals &) = delete;
+  BlockedSignals &operator=(const BlockedSignals &) = delete;
+
+ private:
+  sigset_t before_{};
+};
+
+}  // namespace redag
