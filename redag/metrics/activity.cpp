@@ -54,7 +54,9 @@ bool Activity::is_inverted() const {
     if (job != nullptr && (least == nullptr || *least < job->own)) least = &job->own;
   }
   if (least == nullptr) return false;
-  if (!replay_.eligible().empty() && replay_.eligible().begin()->urgency < *least) return true;
+  // A job that only lacks a thread waits for a less urgent one, too.
+  const auto &waiting = replay_.eligible_but_for_threads();
+  if (!waiting.empty() && waiting.begin()->urgency < *least) return true;
   return std::any_of(replay_.suspended().begin(), replay_.suspended().end(),
                      [&](const Replay::JobRef &ref) { return replay_.find(ref.task, ref.number)->own < *least; });
 }

@@ -11,7 +11,8 @@
 namespace redag::metrics {
 
 /// Times at which an eligible (or preempted) job waited while a job behind it in the policy's total order ran, each by
-/// its own priority: inherited priority does not hide an inversion. Overlapping ones are one.
+/// its own priority: inherited priority does not hide an inversion, nor does a lack of threads. Overlapping ones are
+/// one.
 struct Inversions {
   std::uint64_t count = 0;
   Duration total = 0;

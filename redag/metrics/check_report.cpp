@@ -23,6 +23,7 @@ const char *to_string(Rule rule) {
     case Rule::Deferral: return "deferral";
     case Rule::Budget: return "budget";
     case Rule::Execution: return "execution";
+    case Rule::Start: return "start";
   }
   return "?";
 }

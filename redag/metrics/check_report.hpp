@@ -32,8 +32,9 @@ enum class Rule : std::uint8_t {
   Deferral,          // deferred exactly when max_active alone kept the job from a worker that it could have had
   Budget,            // jobs are told to have used their budget when they did; HI mode begins and ends by its rules
   Execution,         // simulator: a job held a worker for exactly its execution time
+  Start,             // threads, full: a dispatched job's body begins before less urgent bodies go on for long
 };
-inline constexpr std::size_t kRuleCount = 17;
+inline constexpr std::size_t kRuleCount = 18;
 
 [[nodiscard]] const char *to_string(Rule rule);
 

@@ -104,6 +104,8 @@ class Replay {
 
   /// Eligible jobs, most urgent first; of each task its first ready one. Empty while `max_started` jobs have started.
   [[nodiscard]] const std::set<Waiter> &eligible() const { return at_thread_limit() ? none_ : eligible_; }
+  /// The same, also while `max_started` jobs have started: jobs that may then wait for a thread alone.
+  [[nodiscard]] const std::set<Waiter> &eligible_but_for_threads() const { return eligible_; }
   /// Tasks whose first ready job waits for its DAG's max_active alone and has not been counted as deferred.
   [[nodiscard]] const std::set<TaskId> &owed_deferral() const { return owed_deferral_; }
 

@@ -122,6 +122,17 @@ TEST(Summary, BusyWorkersPeaksAndInversions) {
   EXPECT_EQ(s.inversions, (Inversions{1, 1 * kMs, 1 * kMs}));
 }
 
+// hi waits for the only thread, which lo holds: no decision of the scheduler is wrong, and yet.
+TEST(Summary, AJobThatLacksAThreadIsInverted) {
+  TraceBuilder t(make_workload({make_dag("a", {{"hi", 10, 1, {}, "", 2}}), make_dag("b", {{"lo", 20, 5}})}, 1,
+                               PreemptionMode::Os));
+  t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 20).at(2).arrives("hi", 0);
+  t.at(5).finished("lo", 0, 0).dispatched("hi", 0, 0, 12).at(6).finished("hi", 0, 0);
+  trace::Trace trace = t.until(7);
+  trace.info.config.max_started = 1;
+  EXPECT_EQ(summarize(trace).inversions, (Inversions{1, 3 * kMs, 3 * kMs}));
+}
+
 TEST(Summary, WarmUpIsNotCounted) {
   trace::Trace trace = example();
   trace.info.warm_up = 10 * kMs;

@@ -6,6 +6,7 @@
 #include "redag/metrics/check_dispatch.hpp"
 #include "redag/metrics/check_overload.hpp"
 #include "redag/metrics/check_release.hpp"
+#include "redag/metrics/check_start.hpp"
 #include "redag/metrics/replay.hpp"
 #include "redag/sched/executors.hpp"
 
@@ -21,6 +22,7 @@ class Checker {
         releases_(context_),
         decisions_(context_),
         overload_(context_),
+        starts_(context_),
         counts_(trace.info.workload.task_count()) {}
 
   CheckReport run() {
@@ -32,6 +34,7 @@ class Checker {
     end_of_instant();
     releases_.end_of_trace();
     decisions_.end_of_trace();
+    starts_.end_of_trace();
     check_conservation();
     return std::move(report_);
   }
@@ -59,6 +62,7 @@ class Checker {
     releases_.before(event);
     decisions_.before(event);
     overload_.before(event);
+    starts_.before(event);
     Counts &counts = counts_[event.task.value];
     if (event.kind == JobEventKind::Released) ++counts.released;
     if (event.kind == JobEventKind::Finished || event.kind == JobEventKind::Skipped ||
@@ -94,6 +98,7 @@ class Checker {
   ReleaseRules releases_;
   DispatchRules decisions_;
   OverloadRules overload_;
+  StartRules starts_;
   std::vector<Counts> counts_;
   Time time_ = std::numeric_limits<Time>::min();
 };

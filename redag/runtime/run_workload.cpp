@@ -1,5 +1,4 @@
 #include "redag/runtime/run_workload.hpp"
-#include "redag/model/validate.hpp"
 
 #include <fmt/format.h>
 
@@ -9,6 +8,8 @@
 
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
+#include "redag/model/concurrency.hpp"
+#include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/looks.hpp"
@@ -22,13 +23,12 @@ namespace {
 
 constexpr Duration kStartMargin = 20 * kMillisecond;  // from the threads being ready to time 0
 constexpr Duration kCollectEvery = 100 * kMillisecond;
-constexpr std::size_t kMostThreads = 64;
+// Each has a stack and a ring of events, and a decision looks at all of them.
+constexpr std::uint64_t kMostThreads = 1024;
 
 std::uint32_t pool_size(const Workload &workload, const RunOptions &options) {
-  const std::uint32_t workers = workload.platform.workers;
-  if (options.threads > 0) return std::max(options.threads, workers);
-  // Jobs of one task do not overlap: more threads than tasks would never be used.
-  return std::max(workers, static_cast<std::uint32_t>(std::min(workload.task_count(), kMostThreads)));
+  const std::uint64_t wanted = options.threads > 0 ? options.threads : std::min(most_started(workload), kMostThreads);
+  return std::max(workload.platform.workers, static_cast<std::uint32_t>(wanted));
 }
 
 class Run {
@@ -70,6 +70,13 @@ class Run {
     }
     const std::uint32_t looks = looks_before_sleep(*setup, options_.spin);
     result_.warnings = std::move(setup->warnings);
+    const std::uint64_t most = most_started(workload_);
+    if (preemptive && result_.mode.mode == PreemptionMode::Os && setup->config.max_started < most) {
+      result_.warnings.push_back(
+          fmt::format("{} threads for up to {} jobs in progress at once: a job can wait for a thread that a less "
+                      "urgent one holds, which counts as a priority inversion",
+                      setup->config.max_started, most));
+    }
     if (options_.lock_memory) {
       if (const Result<void> locked = redag::runtime::lock_memory(); !locked) {
         const Diagnostic &why = locked.error().front();
@@ -255,6 +262,10 @@ class Run {
           "jobs of lower criticality were ordinary threads for {}, so that the kernel did not stop those of "
           "high criticality (real-time throttling)",
           humanize_duration(gave_way)));
+    }
+    if (const std::uint64_t waits = engine_->thread_waits(); waits > 0) {
+      result_.warnings.push_back(fmt::format("{} time{} a job waited for a thread: all {} had jobs in progress", waits,
+                                             waits == 1 ? "" : "s", engine_->thread_count()));
     }
     if (engine_->refused_priorities() > 0) {
       result_.warnings.push_back(fmt::format("{} priority changes were refused", engine_->refused_priorities()));

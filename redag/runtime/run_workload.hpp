@@ -35,7 +35,9 @@ struct RunOptions {
   std::string executor = "redag";            // as in redag/sched/executors.hpp
   SchedulerFactory scheduler;                // instead of the one that `executor` names
   std::optional<PreemptionMode> preemption;  // instead of the workload's
-  std::uint32_t threads = 0;      // os: jobs that can be started at once; 0: as many as there are tasks, at most 64
+  // os: jobs that can be started at once; 0: as many as the workload can have (most_started()), at most 1,024. Where
+  // that is too few, a warning says so.
+  std::uint32_t threads = 0;
   bool realtime_threads = false;  // none, cooperative: workers and release timer at SCHED_FIFO too
   Duration spin = 0;              // none, cooperative: how long a worker looks for a job before it sleeps
   bool lock_memory = false;       // if it cannot be had, a warning says so

@@ -174,6 +174,30 @@ TEST(RunWorkload, ABudgetCutsAJobOff) {
   EXPECT_EQ(cut->task, TaskId(2));
 }
 
+// Each of two long jobs of one task keeps its thread while it is preempted: a third job needs another.
+TEST(RunWorkload, ThereIsAThreadForEveryJobThatCanBeInProgress) {
+  if (probe_priority_band().top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+  Workload workload = two_rates(2, PreemptionMode::Os);
+  workload.dags[1].tasks = {timer("long", 100 * kMillisecond, 30 * kMillisecond)};
+  workload.dags[1].tasks[0].concurrency = 2;
+  RunOptions options;
+  options.duration = 150 * kMillisecond;
+  const auto too_few = [](const RunResult &result) {
+    return std::count_if(result.warnings.begin(), result.warnings.end(), [](const std::string &warning) {
+      return warning.find("2 threads for up to 3 jobs in progress at once") != std::string::npos;
+    });
+  };
+  const RunResult enough = run(workload, options);
+  EXPECT_EQ(enough.trace.info.config.max_started, 3U);
+  EXPECT_EQ(too_few(enough), 0);
+  options.threads = 2;
+  const RunResult few = run(workload, options);
+  EXPECT_EQ(few.trace.info.config.max_started, 2U);
+  EXPECT_EQ(too_few(few), 1);
+  options.preemption = PreemptionMode::None;
+  EXPECT_EQ(too_few(run(workload, options)), 0) << "nothing is preempted";
+}
+
 TEST(RunWorkload, EveryExecutorRunsOnThreads) {
   for (const sched::ExecutorKind &kind : sched::executors()) {
     RunOptions options;
