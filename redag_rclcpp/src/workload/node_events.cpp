@@ -34,7 +34,7 @@ struct Body {
   Time end = kNever;
   bool aborted = false;
   Reason reason = Reason::None;
-  std::vector<Absence> absences;
+  std::vector<Absence> absences{};
 };
 
 struct Job {
@@ -96,7 +96,7 @@ class Assembly {
     for (const JobEvent &event : sorted) {
       std::vector<Body> &bodies = tasks_[event.task.value].bodies;
       if (event.kind == JobEventKind::Started) {
-        bodies.push_back(Body{event.job, event.worker, event.value, event.time});
+        bodies.push_back({.job = event.job, .worker = event.worker, .trigger = event.value, .start = event.time});
       } else if (bodies.empty()) {
         continue;
       } else if (event.kind == JobEventKind::Preempted) {
