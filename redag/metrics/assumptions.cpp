@@ -149,6 +149,14 @@ class Checker {
   AssumptionCheck check_;
 };
 
+// Do `count` of `jobs` executions meet more noise than an execution can be expected to meet?
+bool is_too_often(std::uint64_t count, std::uint64_t jobs, Duration excess, Duration wcet, const Loss &noise) {
+  const auto expected = static_cast<double>(noise.in(wcet)-noise.longest);
+  const double mean = static_cast<double>(jobs) * std::min(1.0, expected / static_cast<double>(excess));
+  // Five standard deviations, and four that any run may have.
+  return static_cast<double>(count) > mean + 5 * std::sqrt(mean) + 4;
+}
+
 std::string plural(std::uint64_t count, const char *noun) {
   return fmt::format("{} {}{}", format_count(count), noun, count == 1 ? "" : "s");
 }
@@ -223,20 +231,23 @@ bool is_beyond_noise(std::vector<Duration> excess, std::uint64_t jobs, Duration 
   if (excess.empty()) return false;
   std::sort(excess.begin(), excess.end(), std::greater<>());
   if (excess.front() > most_noise(wcet, noise)) return true;
-  const Duration all = noise.in(wcet);
-  const auto expected = static_cast<double>(all - noise.longest);
   for (std::size_t i = 0; i < excess.size(); ++i) {
-    const double mean = static_cast<double>(jobs) * std::min(1.0, expected / static_cast<double>(excess[i]));
-    // Five standard deviations, and four that any run may have.
-    if (static_cast<double>(i + 1) > mean + 5 * std::sqrt(mean) + 4) return true;
+    if (is_too_often(i + 1, jobs, excess[i], wcet, noise)) return true;
   }
   return false;
 }
 
-Duration longest_unalarming(Duration wcet, const std::optional<Overheads> &calibrated) {
+bool is_beyond_noise(const ExecutionPercentiles &executions, Duration wcet,
+                     const std::optional<Overheads> &calibrated) {
   const Overheads &allowed = calibrated ? *calibrated : plausible_overheads();
-  const Duration used = wcet + allowed.clock + kDecision + most_noise(wcet, allowed.noise);
-  return wcet <= kShort ? used + allowed.dispatch : used;
+  const Duration slack = allowed.clock + kDecision + (wcet <= kShort ? allowed.dispatch : 0);
+  if (executions.longest - wcet - slack > most_noise(wcet, allowed.noise)) return true;
+  const auto has_excess = [&](Duration percentile, std::uint64_t executions_from_it) {
+    // A histogram's percentile is at most 1/8 above the true one.
+    const Duration excess = percentile - percentile / 9 - wcet - slack;
+    return excess > 0 && is_too_often(executions_from_it, executions.jobs, excess, wcet, allowed.noise);
+  };
+  return has_excess(executions.p50, executions.jobs / 2) || has_excess(executions.p99, executions.jobs / 100);
 }
 
 AssumptionCheck check_assumptions(const Workload &workload, std::uint32_t workers,

@@ -77,8 +77,17 @@ using BoundOf = std::function<Duration(TaskId)>;
 /// all executions at most a share E/x meets noise of x or more, where E is the noise expected in one.
 [[nodiscard]] bool is_beyond_noise(std::vector<Duration> excess, std::uint64_t jobs, Duration wcet, const Loss &noise);
 
-/// The most processor time that one execution can use without an alarm. `calibrated`: nothing is plausible_overheads().
-[[nodiscard]] Duration longest_unalarming(Duration wcet, const std::optional<Overheads> &calibrated);
+/// What a Histogram knows of a task's executions, as processor time.
+struct ExecutionPercentiles {
+  std::uint64_t jobs = 0;
+  Duration p50 = 0;
+  Duration p99 = 0;
+  Duration longest = 0;
+};
+
+/// The same where the single executions are not kept. `calibrated`: nothing is plausible_overheads().
+[[nodiscard]] bool is_beyond_noise(const ExecutionPercentiles &executions, Duration wcet,
+                                   const std::optional<Overheads> &calibrated);
 
 struct Remark {
   bool is_alarm = false;

@@ -166,6 +166,26 @@ TEST(Noise, IsHeldToMarkov) {
   EXPECT_FALSE(is_beyond_noise({210}, 100, 1000, noise));
 }
 
+TEST(Noise, IsSeenInPercentiles) {
+  const auto is_alarm = [](const ExecutionPercentiles &executions,
+                           const std::optional<Overheads> &calibrated = std::nullopt) {
+    return is_beyond_noise(executions, 2 * kMs, calibrated);
+  };
+  EXPECT_FALSE(is_alarm({}));
+  EXPECT_FALSE(is_alarm({.jobs = 1000, .p50 = 2 * kMs, .p99 = 2 * kMs, .longest = 2 * kMs}));
+  EXPECT_FALSE(is_alarm({.jobs = 1000, .p50 = 2 * kMs, .p99 = 2 * kMs, .longest = 4 * kMs})) << "one stall";
+  EXPECT_TRUE(is_alarm({.jobs = 1000, .p50 = 2 * kMs, .p99 = 2 * kMs, .longest = 5 * kMs})) << "longer than a stall";
+  EXPECT_TRUE(is_alarm({.jobs = 1000, .p50 = 3 * kMs, .p99 = 3 * kMs, .longest = 3 * kMs})) << "every job";
+  EXPECT_FALSE(is_alarm({.jobs = 8, .p50 = 3 * kMs, .p99 = 3 * kMs, .longest = 3 * kMs})) << "too few to tell";
+  EXPECT_FALSE(is_alarm({.jobs = 1000, .p50 = 2 * kMs, .p99 = 3 * kMs, .longest = 3 * kMs})) << "one of 32 can";
+  EXPECT_FALSE(is_alarm({.jobs = 1000, .p50 = 2200 * kUs, .p99 = 2200 * kUs, .longest = 2200 * kUs}))
+      << "the histogram is no more exact";
+  Overheads exact = quiet();
+  exact.noise = {.longest = kMs, .per_second = 0};
+  EXPECT_FALSE(is_alarm({.jobs = 400, .p50 = 2 * kMs, .p99 = 3 * kMs, .longest = 3 * kMs}, exact)) << "too few to tell";
+  EXPECT_TRUE(is_alarm({.jobs = 1000, .p50 = 2 * kMs, .p99 = 3 * kMs, .longest = 3 * kMs}, exact)) << "ten and more";
+}
+
 // ---- responses ----
 
 TEST(Response, WithinTheBoundIsNothing) { EXPECT_EQ(response(Jobs().add(10, 0, {.response = kBound})).exceeded, 0U); }

@@ -198,7 +198,11 @@ void Diagnoser::add(DiagnosticStatus &status, const TaskFigures &task, const std
   const std::uint64_t before = last == misses_.end() ? 0 : last->second;
   const std::uint64_t missed = stats.misses > before ? stats.misses - before : 0;
   if (missed > 0 && task.has_deadline) warn(status, fmt::format("{} missed {} more deadlines", name, missed));
-  if (stats.wcet > 0 && stats.execution_max > redag::metrics::longest_unalarming(stats.wcet, machine)) {
+  const redag::metrics::ExecutionPercentiles executions{.jobs = stats.jobs.finished,
+                                                        .p50 = stats.execution_p50,
+                                                        .p99 = stats.execution_p99,
+                                                        .longest = stats.execution_max};
+  if (stats.wcet > 0 && redag::metrics::is_beyond_noise(executions, stats.wcet, machine)) {
     warn(status, fmt::format("{} executed for {}, its wcet is {}", name, humanize_duration(stats.execution_max),
                              format_duration(stats.wcet)));
   }

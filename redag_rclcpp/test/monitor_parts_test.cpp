@@ -200,6 +200,20 @@ TEST(Diagnoser, MissesAreNewOnce) {
   EXPECT_EQ(level_with(7), DiagnosticStatus::OK) << "nobody stated that deadline";
 }
 
+TEST(Diagnoser, WarnsOfExecutionsThatAreAllSomewhatLongerThanTheWcet) {
+  TaskFigures task;
+  task.stats = stats_of("control.loop", 10 * kMillisecond);
+  task.stats.wcet = 2 * kMillisecond;
+  task.stats.jobs.finished = 100;
+  task.stats.execution_p50 = task.stats.execution_p99 = 2 * kMillisecond;
+  task.stats.execution_max = 3 * kMillisecond;
+  Diagnoser diagnoser;
+  const auto level = [&] { return find_status(diagnoser.diagnose(snapshot_of({task})), "ReDAG: DAG control")->level; };
+  EXPECT_EQ(level(), DiagnosticStatus::OK) << "a stall of the machine can do that";
+  task.stats.execution_p50 = task.stats.execution_p99 = task.stats.execution_max;
+  EXPECT_EQ(level(), DiagnosticStatus::WARN);
+}
+
 TEST(Diagnoser, SaysWhatWasWrong) {
   TaskFigures task;
   task.stats = stats_of("control.loop", 10 * kMillisecond);
