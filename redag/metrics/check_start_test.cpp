@@ -22,11 +22,11 @@ Workload two_rates(PreemptionMode mode = PreemptionMode::Os) {
   return make_workload({make_dag("a", {{"hi", 1000, 1}}), make_dag("b", {{"lo", 2000, 400}})}, 2, mode);
 }
 
-// Both have a worker from 0; lo's body begins at once.
+// Both have a worker from 0; lo's body begins soon.
 TraceBuilder both(const Workload &workload) {
   TraceBuilder t(workload);
   t.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("hi", 0, 0, 1000).dispatched("lo", 0, 1, 2000);
-  t.started("lo", 0, 1);
+  t.at(1).started("lo", 0, 1);
   return t;
 }
 
