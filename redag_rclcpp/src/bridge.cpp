@@ -76,6 +76,17 @@ void Bridge::wake() {
 }
 
 void Bridge::wait(std::chrono::nanoseconds timeout) {
+  const struct Leave {
+    ~Leave() {
+      {
+        const redag::LockGuard guard(bridge.lock_);
+        bridge.waiter_ = {};
+      }
+      bridge.left_.fetch_add(1);
+      redag::futex_wake(bridge.left_, INT_MAX);
+    }
+    Bridge &bridge;
+  } leave{*this};  // last: what is removed then is not destroyed by this thread, which is more urgent than all jobs
   std::vector<Entry> entries;
   {
     const redag::LockGuard guard(lock_);
@@ -83,22 +94,8 @@ void Bridge::wait(std::chrono::nanoseconds timeout) {
     waiter_ = std::this_thread::get_id();
     ++waits_;
   }
-  rcl_ret_t result = RCL_RET_ERROR;
-  {
-    const struct Leave {
-      ~Leave() {
-        {
-          const redag::LockGuard guard(bridge.lock_);
-          bridge.waiter_ = {};
-        }
-        bridge.left_.fetch_add(1);
-        redag::futex_wake(bridge.left_, INT_MAX);
-      }
-      Bridge &bridge;
-    } leave{*this};
-    fill(set_, conditions_, entries);
-    result = rcl_wait(&set_, timeout.count() < 0 ? -1 : timeout.count());
-  }
+  fill(set_, conditions_, entries);
+  const rcl_ret_t result = rcl_wait(&set_, timeout.count() < 0 ? -1 : timeout.count());
   if (result == RCL_RET_TIMEOUT) return;
   check(result, "waiting failed");
 

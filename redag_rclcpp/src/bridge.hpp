@@ -28,7 +28,8 @@ class Bridge {
   void watch(const rclcpp::GuardCondition &condition) { conditions_.push_back(&condition); }
 
   void add(std::shared_ptr<Callback> callback);
-  /// When this returns no other thread waits for it. Not with locks of ours held but Core's for collecting.
+  /// When this returns no other thread waits for it or holds it from a wait. Not with locks of ours held but Core's for
+  /// collecting.
   void remove(const Callback &callback);
   [[nodiscard]] bool empty() const;
 

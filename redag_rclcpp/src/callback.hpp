@@ -113,6 +113,9 @@ class Callback final : public TimerQueue::Timer,
 
   void set_deadline(Duration deadline) { deadline_.store(deadline, std::memory_order_relaxed); }
   [[nodiscard]] const redag::Histogram &response() const { return response_; }
+  /// Destroys `object` with this callback: after detach(), when its jobs in progress have ended.
+  void keep_until_done(std::shared_ptr<void> object) { kept_until_done_ = std::move(object); }
+
   [[nodiscard]] const redag::Histogram &execution() const { return execution_; }
   [[nodiscard]] std::uint64_t late() const { return late_.load(std::memory_order_relaxed); }
 
@@ -172,6 +175,8 @@ class Callback final : public TimerQueue::Timer,
   const redag::CallbackId id_;
   redag::runtime::Engine &engine_;  // not after detach(), except by a job
   TaskId task_;
+
+  std::shared_ptr<void> kept_until_done_;  // Core's collect_lock_
 
   std::weak_ptr<rclcpp::TimerBase> timer_;
   std::shared_ptr<const rcl_timer_t> timer_handle_;  // not the timer: that cancels it when it is destroyed

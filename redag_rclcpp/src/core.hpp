@@ -55,6 +55,8 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   void change(const std::function<void()> &change);
   void add_node(const NodeBase::SharedPtr &node);
   void remove_node(const NodeBase::SharedPtr &node);
+  /// Before remove_node(): `instance` lives until the callbacks of the node are gone and have ended.
+  void keep_until_done(NodeBase &node, const std::shared_ptr<void> &instance);
   void add_group(const rclcpp::CallbackGroup::SharedPtr &group, const NodeBase::SharedPtr &node);
   void remove_group(const rclcpp::CallbackGroup::SharedPtr &group);
 

@@ -51,6 +51,19 @@ void ReDAGExecutor::Core::remove_node(const NodeBase::SharedPtr &node) {
   node->get_notify_guard_condition().set_on_trigger_callback(nullptr);
 }
 
+void ReDAGExecutor::Core::keep_until_done(NodeBase &node, const std::shared_ptr<void> &instance) {
+  const redag::LockGuard guard(collect_lock_);
+  const auto keep = [&](const auto &entity) {
+    collect_lock_.assert_held();
+    const auto callback = callbacks_.find(entity.get());
+    if (callback != callbacks_.end()) callback->second->keep_until_done(instance);
+  };
+  node.for_each_callback_group([&](const rclcpp::CallbackGroup::SharedPtr &group) {
+    // Others were given to an executor by themselves, and stay there.
+    if (group->automatically_add_to_executor_with_node()) group->collect_all_ptrs(keep, keep, keep, keep, keep);
+  });
+}
+
 void ReDAGExecutor::Core::add_group(const rclcpp::CallbackGroup::SharedPtr &group, const NodeBase::SharedPtr &node) {
   collect_lock_.assert_held();  // see change()
   forget_gone_nodes();

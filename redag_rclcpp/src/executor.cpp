@@ -90,6 +90,13 @@ void ReDAGExecutor::remove_node(rclcpp::node_interfaces::NodeBaseInterface::Shar
   });
 }
 
+// By value: where no callback is in progress `instance` is destroyed here, without locks of ours.
+void ReDAGExecutor::retire_node(const rclcpp::node_interfaces::NodeBaseInterface::SharedPtr &node,
+                                std::shared_ptr<void> instance) {
+  core_->keep_until_done(*node, instance);
+  remove_node(node);
+}
+
 void ReDAGExecutor::add_callback_group(rclcpp::CallbackGroup::SharedPtr group,
                                        rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
   core_->change([&] {

@@ -20,6 +20,7 @@
 #include "redag/live/writer.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/model/validate.hpp"
+#include "redag/runtime/parker.hpp"
 #include "redag/runtime/preemption_point.hpp"
 #include "spinning.hpp"
 
@@ -304,6 +305,42 @@ TEST_P(ExecutorTest, AMessageForADestroyedSubscriptionIsNoCallOfWhatIsGone) {
   }
   const auto stats = executor.stats();
   EXPECT_TRUE(std::none_of(stats.begin(), stats.end(), [](const auto &s) { return s.id.name == "/gone"; }));
+}
+
+// The callbacks of a node use the object that has it as a base or member.
+TEST_P(ExecutorTest, ARetiredNodeIsDestroyedWhenItsCallbacksHaveEnded) {
+  std::atomic<bool> started{false};
+  redag::runtime::Event end;
+  std::atomic<int> destroyed{0};
+  const auto make_node = [&](const char *name) {
+    auto *const made = new rclcpp::Node(name, rclcpp::NodeOptions().start_parameter_event_publisher(false));
+    return std::shared_ptr<rclcpp::Node>(made, [&](rclcpp::Node *gone) {
+      delete gone;
+      ++destroyed;
+    });
+  };
+  auto idle = make_node("idle");
+  auto busy = make_node("busy");
+  const auto unused = idle->create_wall_timer(1h, [] {});
+  const auto timer = busy->create_wall_timer(1ms, [&] {
+    started = true;
+    end.wait();
+  });
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  executor.add_node(idle);
+  executor.add_node(busy);
+  const Spinner spinner(executor);
+  ASSERT_TRUE(eventually([&] { return started.load(); }));
+  const auto retire = [&](std::shared_ptr<rclcpp::Node> &retired) {
+    const auto base = retired->get_node_base_interface();
+    executor.retire_node(base, std::move(retired));
+  };
+  retire(idle);
+  EXPECT_EQ(destroyed, 1);
+  retire(busy);
+  EXPECT_EQ(destroyed, 1) << "its callback is in progress";
+  end.set();
+  EXPECT_TRUE(eventually([&] { return destroyed == 2; }));
 }
 
 TEST_P(ExecutorTest, WhatIsCreatedInAnEmptyGroupIsServed) {

@@ -117,6 +117,9 @@ class ReDAGExecutor : public rclcpp::Executor {
   using rclcpp::Executor::remove_node;
   void add_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify = true) override;
   void remove_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify = true) override;
+  /// Removes the node and holds `instance`, the object whose members its callbacks use, until those in progress have
+  /// ended; then destroys it, unless others hold it, too. remove_node() waits for no callback.
+  void retire_node(const rclcpp::node_interfaces::NodeBaseInterface::SharedPtr &node, std::shared_ptr<void> instance);
   void add_callback_group(rclcpp::CallbackGroup::SharedPtr group,
                           rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify = true) override;
   void remove_callback_group(rclcpp::CallbackGroup::SharedPtr group, bool notify = true) override;

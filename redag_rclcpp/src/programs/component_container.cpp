@@ -2,6 +2,7 @@
 // ordered, measured and reported (docs/ros2.md).
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <memory>
@@ -55,10 +56,22 @@ Services: ~/_container/load_node and its kin (ros2 component ...), ~/metrics and
 Ends with SIGINT or SIGTERM: 0; 1 if a callback threw or results could not be written; 2 for bad parameters.
 )";
 
+/// A component can be unloaded by one worker while another one executes a callback of it.
+class Manager : public rclcpp_components::ComponentManager {
+ public:
+  using ComponentManager::ComponentManager;
+
+ protected:
+  void remove_node_from_executor(std::uint64_t id) override {
+    const auto executor = std::dynamic_pointer_cast<redag_rclcpp::ReDAGExecutor>(executor_.lock());
+    rclcpp_components::NodeInstanceWrapper &component = node_wrappers_.at(id);
+    if (executor) executor->retire_node(component.get_node_base_interface(), component.get_node_instance());
+  }
+};
+
 int run() {
-  const auto manager = std::make_shared<rclcpp_components::ComponentManager>(
-      std::weak_ptr<rclcpp::Executor>(), "ComponentManager",
-      rclcpp::NodeOptions().start_parameter_event_publisher(false));
+  const auto manager = std::make_shared<Manager>(std::weak_ptr<rclcpp::Executor>(), "ComponentManager",
+                                                 rclcpp::NodeOptions().start_parameter_event_publisher(false));
   const rclcpp::Logger logger = manager->get_logger();
   std::shared_ptr<redag_rclcpp::ReDAGExecutor> executor;
   std::unique_ptr<redag_rclcpp::Monitor> monitor;
