@@ -92,6 +92,10 @@ std::string format_percent(double ratio) {
   // Never let a miss read as none: 3 of 100 000 is 0.003 %.
   const double percent = 100 * ratio;
   if (percent > 0 && percent < 0.05) return fmt::format("{:.2g} %", percent);
+  if (percent < 100 && percent >= 99.95) {
+    const int digits = std::min(12, static_cast<int>(std::ceil(-std::log10(100 - percent))) + 1);
+    return fmt::format("{:.{}f} %", percent, digits);
+  }
   return fmt::format("{:.1f} %", percent);
 }
 
@@ -99,6 +103,21 @@ std::string format_count(std::uint64_t count) {
   std::string text = fmt::format("{}", count);
   for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, " ");
   return text;
+}
+
+std::string format_share(std::uint64_t part, std::uint64_t whole) {
+  if (whole == 0) return "-";
+  if (part == 0) return "none";
+  constexpr double kSmall = 0.01;
+  const double share = static_cast<double>(part) / static_cast<double>(whole);
+  const std::string percent = format_percent(share);
+  return share < kSmall ? fmt::format("{} ({} of {})", percent, format_count(part), format_count(whole)) : percent;
+}
+
+std::string format_count_and_share(std::uint64_t part, std::uint64_t whole) {
+  if (whole == 0) return "-";
+  if (part == 0) return "0";
+  return fmt::format("{} ({})", format_count(part), format_percent(static_cast<double>(part) / static_cast<double>(whole)));
 }
 
 bool json_nests_deeper(std::string_view json, std::size_t levels) {

@@ -60,5 +60,26 @@ TEST(Text, QuotesAreShortAndPrintable) {
   EXPECT_EQ(in_quotes(std::string(59, 'x') + "λλ"), "'" + std::string(59, 'x') + "...'") << "whole characters";
 }
 
+TEST(Text, WhatIsNotAllNeverReadsAsAll) {
+  EXPECT_EQ(format_percent(1), "100.0 %");
+  EXPECT_EQ(format_percent(0.9994), "99.9 %");
+  EXPECT_EQ(format_percent(23325.0 / 23326.0), "99.9957 %");
+}
+
+TEST(Text, ASmallShareSaysWhatWasCounted) {
+  EXPECT_EQ(format_share(1, 23326), "0.0043 % (1 of 23 326)");
+  EXPECT_EQ(format_share(93, 10000), "0.9 % (93 of 10 000)");
+  EXPECT_EQ(format_share(1421, 10000), "14.2 %");
+  EXPECT_EQ(format_share(0, 23326), "none");
+  EXPECT_EQ(format_share(0, 0), "-");
+}
+
+TEST(Text, ACellHasTheCountBeforeTheShare) {
+  EXPECT_EQ(format_count_and_share(1, 23326), "1 (0.0043 %)");
+  EXPECT_EQ(format_count_and_share(3319, 23326), "3 319 (14.2 %)");
+  EXPECT_EQ(format_count_and_share(0, 23326), "0");
+  EXPECT_EQ(format_count_and_share(0, 0), "-");
+}
+
 }  // namespace
 }  // namespace redag

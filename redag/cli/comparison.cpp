@@ -9,20 +9,6 @@
 namespace redag::cli {
 namespace {
 
-Observation observe(const metrics::JobStats &jobs, const metrics::Distribution &end_to_end) {
-  Observation seen;
-  seen.jobs = jobs.released;
-  seen.finished = jobs.finished;
-  seen.late = jobs.late;
-  seen.skipped = jobs.skipped;
-  seen.aborted = jobs.aborted;
-  seen.miss_ratio = jobs.miss_ratio();
-  seen.miss_ratio_with_lost = jobs.miss_ratio_with_lost();
-  seen.response = jobs.response;
-  seen.end_to_end = end_to_end;
-  return seen;
-}
-
 template <class Value>
 Spread spread_over(const ExecutorResults &results, std::size_t dag, Value value) {
   std::vector<double> values;
@@ -30,23 +16,11 @@ Spread spread_over(const ExecutorResults &results, std::size_t dag, Value value)
   return report::spread_of(std::move(values));
 }
 
-// Who misses fewest, and who cannot be told from that.
-std::string conclusion(const Comparison &comparison, std::size_t dag) {
-  std::vector<report::Contender> contenders;
-  for (const ExecutorResults &results : comparison.executors) {
-    contenders.push_back({results.variant.name, results.miss(dag)});
-  }
-  return report::ranking(contenders);
-}
-
-std::string time_text(const Spread &spread) { return humanize_duration(static_cast<Duration>(spread.median)); }
-
-// "14.2 %", and the range where repetitions differ: "14.2 % (13.9..14.8)".
-std::string miss_text(const Spread &miss) {
-  const std::string median = format_percent(miss.median);
-  const std::string low = fmt::format("{:.1f}", 100 * miss.min);
-  const std::string high = fmt::format("{:.1f}", 100 * miss.max);
-  return low == high ? median : fmt::format("{} ({}..{})", median, low, high);
+// "13.9..14.8", where repetitions differ.
+std::string range_text(const Spread &miss) {
+  const std::string low = format_percent(miss.min);
+  const std::string high = format_percent(miss.max);
+  return low == high ? std::string() : fmt::format("{} to {}", low, high);
 }
 
 Json to_json(const Spread &spread) { return Json{{"median", spread.median}, {"min", spread.min}, {"max", spread.max}}; }
@@ -56,29 +30,39 @@ Json to_json(const metrics::Distribution &d) {
               {"p90_ns", d.p90},  {"p95_ns", d.p95},   {"p99_ns", d.p99}, {"max_ns", d.max}};
 }
 
-Json to_json(const Observation &seen) {
-  return Json{{"released", seen.jobs},
-              {"finished", seen.finished},
-              {"late", seen.late},
-              {"skipped", seen.skipped},
-              {"aborted", seen.aborted},
-              {"miss_ratio", seen.miss_ratio},
-              {"miss_ratio_with_lost", seen.miss_ratio_with_lost},
-              {"response", to_json(seen.response)},
-              {"end_to_end", to_json(seen.end_to_end)}};
+Json counts_json(const metrics::JobCounts &jobs) {
+  return Json{{"released", jobs.released}, {"finished", jobs.finished}, {"late", jobs.late},
+              {"skipped", jobs.skipped},   {"aborted", jobs.aborted},   {"missed", jobs.missed()}};
 }
 
-Json dag_json(const ExecutorResults &results, const std::string &name, std::size_t dag) {
-  Json repetitions = Json::array();
-  for (const auto &repetition : results.repetitions) repetitions.push_back(to_json(repetition[dag]));
-  return Json{{"name", name},
-              {"miss_ratio", to_json(results.late(dag))},
-              {"miss_ratio_with_lost", to_json(results.miss(dag))},
-              {"response_p50_ns", to_json(results.response(dag, &metrics::Distribution::p50))},
-              {"response_p95_ns", to_json(results.response(dag, &metrics::Distribution::p95))},
-              {"response_p99_ns", to_json(results.response(dag, &metrics::Distribution::p99))},
-              {"response_max_ns", to_json(results.response(dag, &metrics::Distribution::max))},
-              {"repetitions", repetitions}};
+Json to_json(const Observation &seen, bool is_dag) {
+  Json json = counts_json(seen.jobs);
+  json["miss_ratio"] = seen.jobs.miss_ratio();
+  json["miss_ratio_with_lost"] = seen.jobs.miss_ratio_with_lost();
+  if (!is_dag) return json;
+  json["end_to_end_late"] = seen.end_to_end.late;
+  json["end_to_end"] = to_json(seen.end_to_end.response);
+  return json;
+}
+
+Json optional_spread(const std::optional<Spread> &spread) { return spread ? to_json(*spread) : Json(); }
+
+Json row_json(const ExecutorResults &results, const std::string &name, std::size_t dag, bool is_dag) {
+  Json json{{"name", name}};
+  json.update(counts_json(results.jobs(dag)));
+  json["miss_ratio"] = to_json(results.late(dag));
+  json["miss_ratio_with_lost"] = to_json(results.miss(dag));
+  if (is_dag) {
+    json["end_to_end_late"] = results.late_end_to_end(dag);
+    json["end_to_end_p50_ns"] = optional_spread(results.end_to_end(dag, &metrics::Distribution::p50));
+    json["end_to_end_p95_ns"] = optional_spread(results.end_to_end(dag, &metrics::Distribution::p95));
+    json["end_to_end_p99_ns"] = optional_spread(results.end_to_end(dag, &metrics::Distribution::p99));
+    const std::optional<Duration> longest = results.longest_end_to_end(dag);
+    json["end_to_end_max_ns"] = longest ? Json(*longest) : Json();
+  }
+  json["repetitions"] = Json::array();
+  for (const auto &repetition : results.repetitions) json["repetitions"].push_back(to_json(repetition[dag], is_dag));
+  return json;
 }
 
 // RFC 4180.
@@ -92,40 +76,57 @@ std::string quoted(const std::string &text) {
 std::string comparison_table(const Comparison &comparison, const StreamTraits &terminal) {
   Table table({{"DAG", false, 9},
                {"executor", false, 9, true},
-               {"jobs", true, 2},
-               {"late", true, 5},
+               {"jobs", true, 7},
+               {"late", true, 2},
                {"missed", true, 8},
-               {"p50", true, 3},
+               {"missed, by repetition", true, 3},
+               {"p50", true, 4},
                {"p95", true, 1},
                {"p99", true, 6},
-               {"max", true, 4}});
+               {"max", true, 5}});
   for (std::size_t dag = 0; dag < comparison.dags.size(); ++dag) {
     for (const ExecutorResults &results : comparison.executors) {
-      const Spread miss = results.miss(dag);
-      const auto time = [&](Duration metrics::Distribution::*value) {
-        return Cell{time_text(results.response(dag, value))};
+      const metrics::JobCounts jobs = results.jobs(dag);
+      const auto time = [&](Duration metrics::Distribution::*percentile) {
+        const std::optional<Spread> spread = results.end_to_end(dag, percentile);
+        return Cell{spread ? humanize_duration(static_cast<Duration>(spread->median)) : "-"};
       };
+      const std::optional<Duration> longest = results.longest_end_to_end(dag);
       table.add({{&results == &comparison.executors.front() ? comparison.dags[dag] : ""},
                  {results.variant.name},
-                 {format_count(results.jobs(dag))},
-                 {format_percent(results.late(dag).median)},
-                 {miss_text(miss), miss.median > 0 ? Tint::Bad : Tint::Good},
+                 {format_count(jobs.released)},
+                 {format_count(jobs.late)},
+                 {format_count_and_share(jobs.missed(), jobs.released), jobs.missed() > 0 ? Tint::Bad : Tint::Good},
+                 {range_text(results.miss(dag))},
                  time(&metrics::Distribution::p50),
                  time(&metrics::Distribution::p95),
                  time(&metrics::Distribution::p99),
-                 time(&metrics::Distribution::max)});
+                 {longest ? humanize_duration(*longest) : "-",
+                  results.late_end_to_end(dag) > 0 ? Tint::Bad : Tint::Plain}});
     }
   }
   return table.render(terminal.width, terminal.colour);
+}
+
+// What the columns of the table are, in words.
+std::string legend(const Comparison &comparison, std::size_t repetitions) {
+  std::string text = "missed: late, skipped or aborted, of all jobs";
+  if (repetitions > 1) text += " of all repetitions";
+  text += "\nmax, p50 to p99: end to end, from the release of a source to the finish of a sink";
+  const bool several = std::any_of(
+      comparison.executors.front().repetitions.front().begin(), comparison.executors.front().repetitions.front().end(),
+      [](const Observation &seen) { return seen.end_to_end.sinks.size() > 1; });
+  if (several) text += ";\nof several sinks, each figure is that of the worst one";
+  if (repetitions > 1) text += ";\nmax is of all repetitions, p50 to p99 are medians over the repetitions";
+  return text + "\n\n";
 }
 
 }  // namespace
 
 void ExecutorResults::add(const Session &session) {
   std::vector<Observation> seen;
-  for (const metrics::DagSummary &dag : session.summary.dags)
-    seen.push_back(observe(dag.jobs, dag.end_to_end.response));
-  seen.push_back(observe(session.summary.total, {}));
+  for (const metrics::DagSummary &dag : session.summary.dags) seen.push_back({dag.jobs, dag.end_to_end});
+  seen.push_back({session.summary.total, {}});
   repetitions.push_back(std::move(seen));
   preemption = session.info.preemption;
   preemption_why = session.info.preemption_why;
@@ -137,36 +138,65 @@ void ExecutorResults::add(const Session &session) {
 }
 
 Spread ExecutorResults::miss(std::size_t dag) const {
-  return spread_over(*this, dag, [](const Observation &seen) { return seen.miss_ratio_with_lost; });
+  return spread_over(*this, dag, [](const Observation &seen) { return seen.jobs.miss_ratio_with_lost(); });
 }
 
 Spread ExecutorResults::late(std::size_t dag) const {
-  return spread_over(*this, dag, [](const Observation &seen) { return seen.miss_ratio; });
+  return spread_over(*this, dag, [](const Observation &seen) { return seen.jobs.miss_ratio(); });
 }
 
-Spread ExecutorResults::response(std::size_t dag, Duration metrics::Distribution::*value) const {
-  return spread_over(*this, dag, [value](const Observation &seen) { return seen.response.*value; });
+std::optional<Spread> ExecutorResults::end_to_end(std::size_t dag, Duration metrics::Distribution::*percentile) const {
+  std::vector<double> values;
+  for (const auto &repetition : repetitions) {
+    const metrics::Distribution &response = repetition[dag].end_to_end.response;
+    if (response.count > 0) values.push_back(static_cast<double>(response.*percentile));
+  }
+  if (values.empty()) return std::nullopt;
+  return report::spread_of(std::move(values));
 }
 
-std::uint64_t ExecutorResults::jobs(std::size_t dag) const {
-  std::uint64_t all = 0;
-  for (const auto &repetition : repetitions) all += repetition[dag].jobs;
+std::optional<Duration> ExecutorResults::longest_end_to_end(std::size_t dag) const {
+  std::optional<Duration> longest;
+  for (const auto &repetition : repetitions) {
+    const metrics::Distribution &response = repetition[dag].end_to_end.response;
+    if (response.count > 0) longest = std::max(longest.value_or(response.max), response.max);
+  }
+  return longest;
+}
+
+std::uint64_t ExecutorResults::late_end_to_end(std::size_t dag) const {
+  std::uint64_t late = 0;
+  for (const auto &repetition : repetitions) late += repetition[dag].end_to_end.late;
+  return late;
+}
+
+metrics::JobCounts ExecutorResults::jobs(std::size_t dag) const {
+  metrics::JobCounts all;
+  for (const auto &repetition : repetitions) all.add_counts(repetition[dag].jobs);
   return all;
+}
+
+bool ExecutorResults::has_misses() const {
+  const std::size_t total = repetitions.front().size() - 1;
+  if (jobs(total).missed() > 0) return true;
+  for (std::size_t dag = 0; dag < total; ++dag) {
+    if (late_end_to_end(dag) > 0) return true;
+  }
+  return false;
 }
 
 std::vector<std::string> verdicts(const Comparison &comparison) {
   std::vector<std::string> lines;
   for (std::size_t dag = 0; dag + 1 < comparison.dags.size(); ++dag) {
-    std::string line = comparison.dags[dag] + ": ";
-    bool any = false;
+    std::vector<report::Contender> contenders;
     for (const ExecutorResults &results : comparison.executors) {
-      const Spread miss = results.miss(dag);
-      any = any || miss.max > 0;
-      const bool first = &results == &comparison.executors.front();
-      line += fmt::format("{}{} {}{}", first ? "" : ", ", results.variant.name, first ? "misses " : "",
-                          format_percent(miss.median));
+      const metrics::JobCounts jobs = results.jobs(dag);
+      contenders.push_back({.name = results.variant.name,
+                            .missed = jobs.missed(),
+                            .released = jobs.released,
+                            .misses = results.miss(dag)});
     }
-    lines.push_back(line + ": " + (any ? conclusion(comparison, dag) : "nobody misses"));
+    lines.push_back(report::comparison_line(comparison.dags[dag], contenders));
   }
   return lines;
 }
@@ -196,9 +226,7 @@ std::string describe(const Comparison &comparison, const StreamTraits &terminal)
                         results.preemption_why.empty() ? "" : " (" + results.preemption_why + ")");
   }
   text += "\n" + comparison_table(comparison, terminal);
-  text += fmt::format("late: late jobs / released; missed: late, skipped or aborted / released{}\n",
-                      repetitions > 1 ? "; medians, and (lowest..highest) repetition" : "");
-  text += "response times p50 to max: finish - release of all jobs of the DAG\n\n";
+  text += legend(comparison, repetitions);
   for (const std::string &line : verdicts(comparison)) text += line + "\n";
   if (const std::string unfair = caveat(comparison); !unfair.empty()) text += "note: " + unfair + "\n";
   std::string violated;
@@ -218,9 +246,8 @@ Json to_json(const Comparison &comparison) {
   Json executors = Json::array();
   for (const ExecutorResults &results : comparison.executors) {
     Json dags = Json::array();
-    for (std::size_t dag = 0; dag < comparison.dags.size(); ++dag) {
-      Json row = dag_json(results, comparison.dags[dag], dag);
-      if (dag + 1 < comparison.dags.size()) dags.push_back(std::move(row));
+    for (std::size_t dag = 0; dag + 1 < comparison.dags.size(); ++dag) {
+      dags.push_back(row_json(results, comparison.dags[dag], dag, true));
     }
     const std::size_t total = comparison.dags.size() - 1;
     executors.push_back(Json{{"name", results.variant.name},
@@ -232,9 +259,9 @@ Json to_json(const Comparison &comparison) {
                              {"check_violations", results.check_violations},
                              {"warnings", results.warnings},
                              {"dags", dags},
-                             {"total", dag_json(results, "total", total)}});
+                             {"total", row_json(results, "total", total, false)}});
   }
-  return Json{{"format", "redag.comparison/1"},
+  return Json{{"format", "redag.comparison/2"},
               {"workload", comparison.workload},
               {"driver", trace::to_string(comparison.driver)},
               {"workers", comparison.workers},
@@ -248,18 +275,21 @@ Json to_json(const Comparison &comparison) {
 
 std::string to_csv(const Comparison &comparison) {
   std::string text =
-      "executor,dag,repetition,released,finished,late,skipped,aborted,miss_ratio,miss_ratio_with_lost,"
-      "response_p50_ns,response_p95_ns,response_p99_ns,response_max_ns,"
-      "end_to_end_p50_ns,end_to_end_p95_ns,end_to_end_p99_ns,end_to_end_max_ns\n";
+      "executor,dag,repetition,released,finished,late,skipped,aborted,missed,miss_ratio,miss_ratio_with_lost,"
+      "end_to_end_late,end_to_end_p50_ns,end_to_end_p95_ns,end_to_end_p99_ns,end_to_end_max_ns\n";
   for (const ExecutorResults &results : comparison.executors) {
     for (std::size_t r = 0; r < results.repetitions.size(); ++r) {
       for (std::size_t dag = 0; dag + 1 < comparison.dags.size(); ++dag) {
         const Observation &seen = results.repetitions[r][dag];
-        text += fmt::format("{},{},{},{},{},{},{},{},{:.9g},{:.9g},{},{},{},{},{},{},{},{}\n", results.variant.name,
-                            quoted(comparison.dags[dag]), r + 1, seen.jobs, seen.finished, seen.late, seen.skipped,
-                            seen.aborted, seen.miss_ratio, seen.miss_ratio_with_lost, seen.response.p50,
-                            seen.response.p95, seen.response.p99, seen.response.max, seen.end_to_end.p50,
-                            seen.end_to_end.p95, seen.end_to_end.p99, seen.end_to_end.max);
+        const metrics::JobCounts &jobs = seen.jobs;
+        text += fmt::format("{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{}", results.variant.name,
+                            quoted(comparison.dags[dag]), r + 1, jobs.released, jobs.finished, jobs.late, jobs.skipped,
+                            jobs.aborted, jobs.missed(), jobs.miss_ratio(), jobs.miss_ratio_with_lost(),
+                            seen.end_to_end.late);
+        const metrics::Distribution &response = seen.end_to_end.response;
+        text += response.count == 0
+                    ? std::string(",,,,\n")
+                    : fmt::format(",{},{},{},{}\n", response.p50, response.p95, response.p99, response.max);
       }
     }
   }

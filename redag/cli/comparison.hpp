@@ -1,8 +1,9 @@
-// Sessions of several executors on the same jobs, put side by side: medians over repetitions with their spread, and a
-// verdict in words. Pure values and functions.
+// Sessions of several executors on the same jobs, put side by side: counts and maxima of all repetitions together,
+// percentiles as medians over repetitions with their spread, and a verdict in words. Pure values and functions.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,15 +17,8 @@ namespace redag::cli {
 
 /// One DAG in one session; times in ns. "total" is all DAGs together.
 struct Observation {
-  std::uint64_t jobs = 0;
-  std::uint64_t finished = 0;
-  std::uint64_t late = 0;
-  std::uint64_t skipped = 0;
-  std::uint64_t aborted = 0;
-  double miss_ratio = 0;            // late / released
-  double miss_ratio_with_lost = 0;  // (late, skipped or aborted) / released
-  metrics::Distribution response;   // f - r of every finished job of the DAG
-  metrics::Distribution end_to_end;
+  metrics::JobCounts jobs;
+  metrics::EndToEnd end_to_end;  // nothing of the total
 };
 
 using report::Spread;
@@ -39,10 +33,19 @@ struct ExecutorResults {
   std::vector<std::string> warnings;  // each once
 
   void add(const Session &session);
+  /// Share of a repetition's jobs that missed, over the repetitions.
   [[nodiscard]] Spread miss(std::size_t dag) const;
+  /// The same of those that were late.
   [[nodiscard]] Spread late(std::size_t dag) const;
-  [[nodiscard]] Spread response(std::size_t dag, Duration metrics::Distribution::*value) const;
-  [[nodiscard]] std::uint64_t jobs(std::size_t dag) const;
+  /// A percentile of the end-to-end response over the repetitions in which the DAG answered; nothing if in none.
+  [[nodiscard]] std::optional<Spread> end_to_end(std::size_t dag, Duration metrics::Distribution::*percentile) const;
+  /// The largest end-to-end response of all repetitions; nothing if there was none.
+  [[nodiscard]] std::optional<Duration> longest_end_to_end(std::size_t dag) const;
+  [[nodiscard]] std::uint64_t late_end_to_end(std::size_t dag) const;
+  /// Of all repetitions.
+  [[nodiscard]] metrics::JobCounts jobs(std::size_t dag) const;
+  /// Was a deadline missed in any repetition, end-to-end deadlines included?
+  [[nodiscard]] bool has_misses() const;
 };
 
 struct Comparison {
@@ -56,7 +59,7 @@ struct Comparison {
   std::vector<std::string> warnings;       // about all of it
 };
 
-/// "control: redag misses 0.0 %, mte 14.2 %, ste 30.1 %: redag misses fewest"
+/// "control: redag misses none, mte 14.2 %, ste 30.1 %: redag misses fewest"
 [[nodiscard]] std::vector<std::string> verdicts(const Comparison &comparison);
 
 /// What makes the comparison less than fair: some executors had real-time threads and others had not. Empty if nothing.

@@ -33,8 +33,10 @@ constexpr std::array<Figure, 4> kFigures = {{{"missed", &metrics::RowDifference:
 
 bool is_miss(const Figure &figure) { return figure.value == &metrics::RowDifference::miss_ratio; }
 
-std::string value_text(const Figure &figure, double value) {
-  return is_miss(figure) ? format_percent(value) : humanize_duration(static_cast<Duration>(value));
+// A figure of one side: a time of what answered, misses with their count.
+std::string value_text(const Figure &figure, const DifferenceSide::Row &side, double value) {
+  if (is_miss(figure)) return format_count_and_share(side.missed(), side.released);
+  return side.has_responses() ? humanize_duration(static_cast<Duration>(value)) : "-";
 }
 
 std::string row_name(const DifferenceRow &row) {
@@ -58,7 +60,7 @@ Cell figure_cell(const DifferenceRow &row, const Figure &figure) {
   const FigureDifference &value = row.figures.*figure.value;
   const Verdict verdict = row.*figure.verdict;
   const bool differs = verdict == Verdict::Better || verdict == Verdict::Worse;
-  return Cell{arrow(value_text(figure, value.a), value_text(figure, value.b)) + (differs ? " *" : ""),
+  return Cell{arrow(value_text(figure, *row.a, value.a), value_text(figure, *row.b, value.b)) + (differs ? " *" : ""),
               tint_of(verdict)};
 }
 
@@ -78,6 +80,10 @@ std::string run_words(const DiffSide &side) {
                      trace::worker_count(first), trace::worker_count(first) == 1 ? "" : "s",
                      trace::to_string(first.driver), runs.size(), runs.size() == 1 ? "" : "s",
                      humanize_duration(first.end - first.start));
+}
+
+std::string longest_text(const DifferenceSide::Row &side) {
+  return side.has_responses() ? humanize_duration(side.max) : "-";
 }
 
 std::string differences_table(const Diffed &diffed, const StreamTraits &terminal, bool all) {
@@ -105,7 +111,7 @@ std::string differences_table(const Diffed &diffed, const StreamTraits &terminal
                figure_cell(row, kFigures[1]),
                figure_cell(row, kFigures[2]),
                figure_cell(row, kFigures[3]),
-               {arrow(humanize_duration(row.a->max), humanize_duration(row.b->max)), Tint::Faint}});
+               {arrow(longest_text(*row.a), longest_text(*row.b)), Tint::Faint}});
   }
   std::string text = table.render(terminal.width, terminal.colour);
   if (left_out > 0) text += fmt::format("({} tasks without a difference; --all-tasks shows them)\n", left_out);
@@ -121,7 +127,8 @@ std::string findings(const Diffed &diffed, const StreamTraits &terminal) {
         if (row.*figure.verdict != wanted) continue;
         const FigureDifference &value = row.figures.*figure.value;
         text += fmt::format("{} {}: {} {} -> {} ({})\n", tinted(to_string(wanted), tint_of(wanted), terminal.colour),
-                            row_name(row), figure.name, value_text(figure, value.a), value_text(figure, value.b),
+                            row_name(row), figure.name, value_text(figure, *row.a, value.a),
+                            value_text(figure, *row.b, value.b),
                             change_text(figure, value));
       }
     }
@@ -129,12 +136,20 @@ std::string findings(const Diffed &diffed, const StreamTraits &terminal) {
   return text;
 }
 
+// What has no response of its own has none to test.
+bool is_untested(const DifferenceRow &row) {
+  const bool has_times = row.a->has_responses() || row.b->has_responses();
+  return std::any_of(kFigures.begin(), kFigures.end(), [&](const Figure &figure) {
+    return (is_miss(figure) || has_times) && row.*figure.verdict == Verdict::NotTested;
+  });
+}
+
 std::vector<std::string> cautions(const Diffed &diffed) {
   std::vector<std::string> list = diffed.warnings;
   std::size_t untested = 0;
   std::vector<std::string> correlated;
   for (const DifferenceRow &row : diffed.difference.rows) {
-    if (row.is_any(Verdict::NotTested)) ++untested;
+    if (is_untested(row)) ++untested;
     if (row.is_correlated()) correlated.push_back(row_name(row));
   }
   if (untested > 0) {
@@ -154,8 +169,11 @@ std::vector<std::string> cautions(const Diffed &diffed) {
 Json figure_json(const DifferenceRow &row, const Figure &figure) {
   const FigureDifference &value = row.figures.*figure.value;
   const bool tested = value.tested;
-  return Json{{"a", value.a},
-              {"b", value.b},
+  const auto of_side = [&](const DifferenceSide::Row &side, double number) {
+    return is_miss(figure) || side.has_responses() ? Json(number) : Json();
+  };
+  return Json{{"a", of_side(*row.a, value.a)},
+              {"b", of_side(*row.b, value.b)},
               {"difference_low", tested ? Json(value.low) : Json()},
               {"difference_high", tested ? Json(value.high) : Json()},
               {"p", tested ? Json(value.p()) : Json()},
@@ -166,7 +184,9 @@ Json counts_json(const DifferenceSide::Row &row) {
   std::size_t blocks = 0;
   for (const auto &run : row.runs) blocks += run.size();
   return Json{
-      {"released", row.released}, {"late", row.late}, {"lost", row.lost}, {"max_ns", row.max}, {"blocks", blocks}};
+      {"released", row.released}, {"late", row.late},   {"lost", row.lost},
+      {"missed", row.missed()},   {"max_ns", row.has_responses() ? Json(row.max) : Json()},
+      {"blocks", blocks}};
 }
 
 Json side_json(const DiffSide &side) {
@@ -229,7 +249,7 @@ std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool al
                         : found;
   text += fmt::format(
       "* more than chance{}; {} tests, false discovery rate 5 %; intervals 95 %, from blocks of time; max is not "
-      "tested\n",
+      "tested\ntimes of a task: finish - release; of a DAG with one sink: end to end; percentages: of all jobs of a side\n",
       diffed.options.tolerance > 0 ? fmt::format(", response times by more than {:g} %", 100 * diffed.options.tolerance)
                                    : "",
       diffed.difference.tests);
@@ -261,7 +281,7 @@ Json to_json(const Diffed &diffed) {
                         {"block_correlation", row.figures.block_correlation},
                         {"is_correlated", row.is_correlated()}});
   }
-  return Json{{"format", "redag.difference/1"},
+  return Json{{"format", "redag.difference/2"},
               {"a", side_json(diffed.a)},
               {"b", side_json(diffed.b)},
               {"changes", changes},

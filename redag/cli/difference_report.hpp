@@ -32,7 +32,7 @@ struct Diffed {
 /// `all`: a row for every task, not only for those with a difference.
 [[nodiscard]] std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool all);
 
-/// `redag.difference/1`.
+/// `redag.difference/2`.
 [[nodiscard]] Json to_json(const Diffed &diffed);
 
 }  // namespace redag::cli

@@ -47,6 +47,9 @@ std::vector<std::string> labels_of(const std::vector<fs::path> &subjects) {
   return labels;
 }
 
+// Of this version or the one before: what is read here is the same in both.
+bool is_comparison(const Json &format) { return format == "redag.comparison/1" || format == "redag.comparison/2"; }
+
 // What a comparison says of the runs below it: their order, and what to beware of.
 Result<void> read_comparison(const fs::path &file, std::vector<std::string> &order, std::vector<std::string> &notes) {
   std::error_code error;
@@ -56,7 +59,7 @@ Result<void> read_comparison(const fs::path &file, std::vector<std::string> &ord
   const auto bad = [&] { return trace::file_error(file.string(), 1, "not a comparison of 'redag compare'"); };
   if (json_nests_deeper(*text)) return bad();
   const Json json = Json::parse(*text, nullptr, false);
-  if (!json.is_object() || json.value("format", Json()) != "redag.comparison/1") return bad();
+  if (!json.is_object() || !is_comparison(json.value("format", Json()))) return bad();
   for (const Json &executor : json.value("executors", Json::array())) {
     if (!executor.is_object() || !executor.contains("name") || !executor["name"].is_string()) return bad();
     order.push_back(executor["name"]);

@@ -11,14 +11,13 @@
 #include "redag/metrics/jobs_csv.hpp"
 #include "redag/metrics/perfetto.hpp"
 #include "redag/metrics/summary_json.hpp"
+#include "redag/metrics/verdict.hpp"
 #include "redag/trace/events_file.hpp"
 
 namespace redag::cli {
 namespace {
 
 constexpr std::size_t kMostTasks = 50;  // rows before the table is cut to the worst
-
-Tint tint_of(double ratio) { return ratio > 0 ? Tint::Bad : Tint::Good; }
 
 // A duration of something that may not have happened.
 Cell time_cell(const metrics::Distribution &distribution, Duration metrics::Distribution::*value) {
@@ -29,8 +28,8 @@ Cell count_cell(std::uint64_t count, Tint tint = Tint::Plain) {
   return {format_count(count), count > 0 ? tint : Tint::Faint};
 }
 
-Cell ratio_cell(const metrics::JobStats &jobs, double ratio) {
-  return {jobs.released > 0 ? format_percent(ratio) : "-", tint_of(ratio)};
+Cell missed_cell(const metrics::JobCounts &jobs) {
+  return {format_count_and_share(jobs.missed(), jobs.released), jobs.missed() > 0 ? Tint::Bad : Tint::Good};
 }
 
 // Tasks to show: all, in the workload's order, or the worst.
@@ -72,7 +71,7 @@ std::string task_table(const Session &session, const StreamTraits &terminal, boo
                count_cell(jobs.late, Tint::Bad),
                count_cell(jobs.skipped, Tint::Bad),
                count_cell(jobs.aborted, Tint::Bad),
-               ratio_cell(jobs, jobs.miss_ratio_with_lost()),
+               missed_cell(jobs),
                time_cell(jobs.response, &metrics::Distribution::p50),
                time_cell(jobs.response, &metrics::Distribution::p95),
                time_cell(jobs.response, &metrics::Distribution::p99),
@@ -90,7 +89,6 @@ std::string task_table(const Session &session, const StreamTraits &terminal, boo
 std::string dag_table(const Session &session, const StreamTraits &terminal) {
   Table table({{"DAG", false, 9},
                {"jobs", true, 5},
-               {"late", true, 7},
                {"missed", true, 8},
                {"end-to-end p50", true, 3},
                {"p99", true, 4},
@@ -103,8 +101,7 @@ std::string dag_table(const Session &session, const StreamTraits &terminal) {
     table.add(
         {{dag.name},
          count_cell(dag.jobs.released),
-         ratio_cell(dag.jobs, dag.jobs.miss_ratio()),
-         ratio_cell(dag.jobs, dag.jobs.miss_ratio_with_lost()),
+         missed_cell(dag.jobs),
          time_cell(end_to_end, &metrics::Distribution::p50),
          time_cell(end_to_end, &metrics::Distribution::p99),
          {time_cell(end_to_end, &metrics::Distribution::max).text, dag.end_to_end.late > 0 ? Tint::Bad : Tint::Plain},
@@ -112,6 +109,22 @@ std::string dag_table(const Session &session, const StreamTraits &terminal) {
          {fmt::format("{}/{}", dag.peak_active, bound)}});
   }
   return table.render(terminal.width, terminal.colour);
+}
+
+std::string legend(const Session &session) {
+  std::string text =
+      "missed: late, skipped or aborted; times of a task: finish - release; of a DAG, end to end:\nfinish of a sink - "
+      "release of its source";
+  const auto &dags = session.summary.dags;
+  const bool several =
+      std::any_of(dags.begin(), dags.end(), [](const auto &dag) { return dag.end_to_end.sinks.size() > 1; });
+  return text + (several ? ", each figure that of the worst sink\n" : "\n");
+}
+
+std::string verdict_line(const Session &session, const StreamTraits &terminal) {
+  const metrics::DeadlineVerdict verdict = metrics::deadline_verdict(session.summary.total, session.summary.dags);
+  const Tint tint = !verdict.is_judged ? Tint::Caution : verdict.is_met ? Tint::Good : Tint::Bad;
+  return tinted(verdict.text, tint, terminal.colour) + "\n";
 }
 
 // A simulation is held to them by the property tests.
@@ -134,8 +147,6 @@ std::string headline(const Session &session) {
 
 }  // namespace
 
-bool has_misses(const metrics::Summary &summary) { return summary.total.miss_ratio_with_lost() > 0; }
-
 std::string describe_check(const metrics::CheckReport &check, const StreamTraits &terminal) {
   const std::uint64_t checks =
       std::accumulate(check.checks_by_rule.begin(), check.checks_by_rule.end(), std::uint64_t{0});
@@ -153,8 +164,12 @@ std::string describe_check(const metrics::CheckReport &check, const StreamTraits
 std::string describe(const Session &session, const StreamTraits &terminal, const ReportOptions &options) {
   std::string text = headline(session) + "\n";
   text += task_table(session, terminal, options.all_tasks) + "\n" + dag_table(session, terminal) + "\n";
-  text += "missed: late, skipped or aborted; response: finish - release\n";
-  if (const double error = session.summary.total.response.percentile_error; error > 0) {
+  text += legend(session) + verdict_line(session, terminal);
+  double error = 0;
+  for (const metrics::TaskSummary &task : session.summary.tasks) {
+    error = std::max(error, task.jobs.response.percentile_error);
+  }
+  if (error > 0) {
     text += fmt::format("percentiles of tasks with many jobs: within {:.1f} %\n", 100 * error);
   }
   if (!session.summary.worker_busy.empty()) {

@@ -29,7 +29,4 @@ struct ReportOptions {
 /// Returns what went wrong.
 [[nodiscard]] Diagnostics write_session(const Session &session, const std::string &folder);
 
-/// Anything missed, lost ones included?
-[[nodiscard]] bool has_misses(const metrics::Summary &summary);
-
 }  // namespace redag::cli

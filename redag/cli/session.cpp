@@ -9,6 +9,7 @@
 
 #include "redag/analysis/analyze.hpp"
 #include "redag/analysis/executors.hpp"
+#include "redag/metrics/miss.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/runtime/run_workload.hpp"
 #include "redag/runtime/threads.hpp"
@@ -82,7 +83,6 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, Sessi
   Session session;
   session.info = describe_simulation(workload, variant, options);
   metrics::Summarizer summarizer(session.info);
-  MissCounter misses(workload);
   Prefix kept(session.trace.events, std::max<std::size_t>(options.max_events, 1));
   std::uint64_t batches = 0;
   const auto sink = [&](std::span<const JobEvent> events) {
@@ -90,9 +90,8 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, Sessi
     summarizer.add(events);
     kept.add(events);
     if (progress) {
-      misses.add(events);
       constexpr std::uint64_t kLookEvery = 256;  // asking the clock each instant would be most of the work
-      if (++batches % kLookEvery == 0 && !events.empty()) progress(events.back().time, misses.misses());
+      if (++batches % kLookEvery == 0 && !events.empty()) progress(events.back().time, summarizer.missed());
     }
     return options.stop == nullptr || !options.stop->load(std::memory_order_relaxed);
   };
@@ -199,28 +198,15 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
 
 }  // namespace
 
-MissCounter::MissCounter(const Workload &workload) : misses_(workload.dags.size()) {
+MissCounter::MissCounter(const Workload &workload) : folder_(workload), misses_(workload.dags.size()) {
   for (const TaskRef &ref : flatten(workload)) dag_of_.push_back(ref.dag);
-  deadline_.resize(dag_of_.size(), kNever);
 }
 
 void MissCounter::add(std::span<const JobEvent> events) {
-  for (const JobEvent &event : events) {
-    const std::size_t task = event.task.value;
-    if (task >= dag_of_.size()) continue;
-    switch (event.kind) {
-      case JobEventKind::Dispatched: deadline_[task] = event.value; break;
-      case JobEventKind::Finished:
-        if (event.value > deadline_[task]) ++misses_[dag_of_[task].value];
-        break;
-      case JobEventKind::Aborted:
-        if (event.reason == Reason::NoData) break;
-        ++misses_[dag_of_[task].value];
-        break;
-      case JobEventKind::Skipped: ++misses_[dag_of_[task].value]; break;
-      default: break;
-    }
-  }
+  folder_.add(events);
+  folder_.drain_ended([this](const metrics::JobRecord &job) {
+    if (metrics::miss_of(job, job.finish) != metrics::Miss::None) ++misses_[dag_of_[job.task.value].value];
+  });
 }
 
 Result<Session> run_session(const Workload &workload, const Variant &variant, const SessionOptions &options,

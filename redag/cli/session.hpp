@@ -13,6 +13,7 @@
 #include "redag/base/result.hpp"
 #include "redag/cli/variant.hpp"
 #include "redag/metrics/check_report.hpp"
+#include "redag/metrics/jobs.hpp"
 #include "redag/metrics/summary.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
@@ -44,8 +45,7 @@ struct SessionOptions {
   std::function<void(const std::string &text)> on_overdue;
 };
 
-/// Deadline misses while a run goes on, by DAG: jobs that finished late, were skipped or aborted. An estimate for the
-/// eye; the summary is exact.
+/// Deadline misses while a run goes on, by DAG: jobs that ended late or were lost, as the summary is going to count them.
 class MissCounter {
  public:
   explicit MissCounter(const Workload &workload);
@@ -54,8 +54,7 @@ class MissCounter {
 
  private:
   std::vector<DagId> dag_of_;
-  std::vector<Time>
-      deadline_;  // of the task's job that was dispatched last; a guess where `concurrency` lets jobs overlap
+  metrics::JobFolder folder_;
   std::vector<std::uint64_t> misses_;
 };
 

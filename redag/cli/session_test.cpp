@@ -98,8 +98,8 @@ TEST(MissCounter, CountsWhatTheSummaryCounts) {
   MissCounter counter(session.info.workload);
   counter.add(session.trace.events);
   for (std::size_t dag = 0; dag < counter.misses().size(); ++dag) {
-    const metrics::JobStats &jobs = session.summary.dags[dag].jobs;
-    EXPECT_EQ(counter.misses()[dag], jobs.late - jobs.overdue + jobs.skipped + jobs.aborted);
+    const metrics::JobCounts &jobs = session.summary.dags[dag].jobs;
+    EXPECT_EQ(counter.misses()[dag], jobs.missed() - jobs.overdue);
   }
   EXPECT_GT(counter.misses()[0], 0U);
 }

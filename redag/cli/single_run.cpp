@@ -5,6 +5,7 @@
 #include "redag/cli/commands.hpp"
 #include "redag/cli/run_report.hpp"
 #include "redag/cli/signals.hpp"
+#include "redag/metrics/verdict.hpp"
 
 namespace redag::cli {
 namespace {
@@ -77,7 +78,7 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
     if (written && !arguments.json) console.print(message);
   }
   if (!written) return kExitBad;
-  const bool no = !session->check.ok() || (arguments.check && has_misses(session->summary));
+  const bool no = !session->check.ok() || (arguments.check && metrics::has_misses(session->summary.total, session->summary.dags));
   return no ? kExitNo : kExitOk;
 }
 

@@ -48,7 +48,7 @@ Json row_json(const Factorial &factorial, const FactorialResults &results, const
     Json metrics = {{"dag", row.runs.front().dags[dag].dag}};
     for (std::size_t m = 0; m < kMetricCount; ++m) {
       const auto metric = static_cast<Metric>(m);
-      const std::optional<Median> median = median_of(factorial, results, row, dag, metric);
+      const std::optional<Median> median = over_runs(factorial, results, row, dag, metric);
       if (!median) continue;
       metrics["confidence"] = median->confidence;
       metrics[std::string(to_string(metric)) + (is_duration(metric) ? "_ns" : "")] = {median->median, median->low,

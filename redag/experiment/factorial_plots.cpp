@@ -62,7 +62,7 @@ LinePlot::Panel panel_of(const Factorial &factorial, const FactorialResults &res
         const std::uint32_t here = point.of(factor.kind);
         // Where the factor means nothing to the executor its line is flat.
         if (point.of(FactorKind::Executor) != e || (here != level && here != kNoLevel) || row.runs.empty()) continue;
-        medians.push_back(*median_of(factorial, results, row, row.runs.front().dags.size() - 1, Metric::MissRatio));
+        medians.push_back(*over_runs(factorial, results, row, row.runs.front().dags.size() - 1, Metric::MissRatio));
       }
       if (medians.empty()) continue;
       LinePlot::Value value = mean_at(medians);
@@ -86,7 +86,8 @@ LinePlot::Panel *panel_named(LinePlot &plot, const std::string &title) {
   return &plot.panels.back();
 }
 
-// Share of the released jobs of a DAG that had answered by each time: what was dropped never does. Medians of the runs.
+// Share of the answers that a DAG owed which had come by each time: what was dropped on the way never does. Medians of
+// the runs.
 std::vector<LinePlot::Value> answered(const FactorialRow &row, std::size_t dag) {
   std::vector<LinePlot::Value> curve;
   for (std::size_t q = 0; q < kQuantiles.size(); ++q) {
@@ -96,8 +97,8 @@ std::vector<LinePlot::Value> answered(const FactorialRow &row, std::size_t dag) 
       const DagObservation &seen = run.dags[dag];
       if (seen.quantiles.empty()) continue;
       times.push_back(static_cast<double>(seen.quantiles[q]) / kMillisecond);
-      shares.push_back(kQuantiles[q] / 100 * static_cast<double>(seen.of(Measure::Finished)) /
-                       static_cast<double>(seen.of(Measure::Released)));
+      shares.push_back(kQuantiles[q] / 100 * static_cast<double>(seen.of(Measure::Answered)) /
+                       static_cast<double>(seen.of(Measure::AnswersDue)));
     }
     if (times.empty()) continue;
     const double share = experiment::median_of(std::move(shares)).median;
@@ -155,7 +156,7 @@ std::optional<std::string> distance_svg(const Factorial &factorial, const Factor
   for (const FactorialRow &row : results.rows) {
     if (row.runs.empty()) continue;
     const std::size_t total = row.runs.front().dags.size() - 1;
-    const std::optional<Median> distance = median_of(factorial, results, row, total, Metric::ExcessMissRatio);
+    const std::optional<Median> distance = over_runs(factorial, results, row, total, Metric::ExcessMissRatio);
     if (!distance) continue;
     const FactorialPoint &point = factorial.points()[row.point];
     const auto line = std::find(plot.lines.begin(), plot.lines.end(), plan.executors[point.of(FactorKind::Executor)]);
@@ -182,9 +183,9 @@ std::string responses_svg(const Factorial &factorial, const FactorialResults &re
   const FactorialPlan &plan = factorial.plan();
   LinePlot plot;
   plot.title = fmt::format("{}: response times", plan.name);
-  plot.subtitle = "median runs; the slowest percent is not shown; dropped jobs never answer";
-  plot.x_label = "response in ms";
-  plot.y_label = "answered, of all released jobs";
+  plot.subtitle = "medians of the runs; the slowest percent is not shown; what was dropped never answers";
+  plot.x_label = "end-to-end response in ms";
+  plot.y_label = "answered, of what was due";
   plot.lines = plan.executors;
   for (const FactorialRow &row : results.rows) {
     const FactorialPoint &point = factorial.points()[row.point];

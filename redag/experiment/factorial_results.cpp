@@ -23,9 +23,13 @@ double ratio(std::int64_t part, std::int64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-double value_of(const DagObservation &seen, Metric metric, Duration counted) {
+// Nothing: not measured.
+std::optional<double> value_of(const DagObservation &seen, Metric metric, Duration counted) {
   const auto per_release = [&](Measure measure) { return ratio(seen.of(measure), seen.of(Measure::Released)); };
-  const auto plain = [&](Measure measure) { return static_cast<double>(seen.of(measure)); };
+  const auto plain = [&](Measure measure) -> std::optional<double> {
+    if (seen.of(measure) == kNotMeasured) return std::nullopt;
+    return static_cast<double>(seen.of(measure));
+  };
   switch (metric) {
     case Metric::MissRatio:
     case Metric::ExcessMissRatio: return per_release(Measure::Missed);
@@ -43,8 +47,8 @@ double value_of(const DagObservation &seen, Metric metric, Duration counted) {
     case Metric::Deferred: return per_release(Measure::Deferred);
     case Metric::Preemptions: return per_release(Measure::Preemptions);
     case Metric::PeakActive: return plain(Measure::PeakActive);
-    case Metric::FinishedPerSecond: return plain(Measure::Finished) * kSecond / static_cast<double>(counted);
-    case Metric::Work: return plain(Measure::Work) / static_cast<double>(counted);
+    case Metric::FinishedPerSecond: return static_cast<double>(seen.of(Measure::Finished)) * kSecond / static_cast<double>(counted);
+    case Metric::Work: return static_cast<double>(seen.of(Measure::Work)) / static_cast<double>(counted);
   }
   return 0;
 }
@@ -75,6 +79,16 @@ bool is_duration(Metric metric) {
   }
 }
 
+bool is_maximum(Metric metric) {
+  switch (metric) {
+    case Metric::MaxLateness:
+    case Metric::PaperMaxLateness:
+    case Metric::ResponseMax:
+    case Metric::PeakActive: return true;
+    default: return false;
+  }
+}
+
 FactorialCounter::FactorialCounter(const Factorial &factorial) : factorial_(factorial) {
   for (std::size_t p = 0; p < factorial.points().size(); ++p) results_.rows.push_back(FactorialRow{p, {}, {}});
   results_.units = factorial.unit_count();
@@ -99,7 +113,7 @@ Result<void> FactorialCounter::add(std::uint64_t unit, const std::string &result
   return {};
 }
 
-std::optional<Median> median_of(const Factorial &factorial, const FactorialResults &results, const FactorialRow &row,
+std::optional<Median> over_runs(const Factorial &factorial, const FactorialResults &results, const FactorialRow &row,
                                 std::size_t dag, Metric metric) {
   std::vector<double> values;
   const std::optional<std::size_t> ideal =
@@ -107,16 +121,20 @@ std::optional<Median> median_of(const Factorial &factorial, const FactorialResul
   if (metric == Metric::ExcessMissRatio && !ideal) return std::nullopt;
   const Duration counted = counted_of(factorial);
   for (std::size_t r = 0; r < row.runs.size(); ++r) {
-    double value = value_of(row.runs[r].dags[dag], metric, counted);
+    const std::optional<double> value = value_of(row.runs[r].dags[dag], metric, counted);
+    if (!value) continue;
+    double above = 0;
     if (ideal) {
       const Observation *best = run_of(results.rows[*ideal], row.repetition[r]);
       if (best == nullptr || best->seed != row.runs[r].seed) continue;  // recorded runs can have other jobs
-      value -= value_of(best->dags[dag], metric, counted);
+      above = *value_of(best->dags[dag], metric, counted);
     }
-    values.push_back(value);
+    values.push_back(*value - above);
   }
   if (values.empty()) return std::nullopt;
-  return experiment::median_of(std::move(values));
+  if (!is_maximum(metric)) return median_of(std::move(values));
+  const auto [least, largest] = std::minmax_element(values.begin(), values.end());
+  return Median{.median = *largest, .low = *least, .high = *largest, .confidence = median_of(values).confidence};
 }
 
 std::vector<FactorialEffects> effects_of(const Factorial &factorial, const FactorialResults &results) {
@@ -149,7 +167,7 @@ std::vector<FactorialEffects> effects_of(const Factorial &factorial, const Facto
         EffectCell cell;
         for (const FactorKind kind : one.factors) cell.level.push_back(factorial.points()[row->point].of(kind));
         for (const Observation &run : row->runs)
-          cell.results.push_back(value_of(run.dags.back(), Metric::MissRatio, counted_of(factorial)));
+          cell.results.push_back(*value_of(run.dags.back(), Metric::MissRatio, counted_of(factorial)));
         cells.push_back(std::move(cell));
       }
       one.effects = experiment::effects_of(counts, cells);
@@ -197,11 +215,11 @@ std::string to_csv(const Factorial &factorial, const FactorialResults &results) 
     for (std::size_t dag = 0; dag < first.dags.size(); ++dag) {
       text += fmt::format("{}{},{},{},{}", factor_cells(factorial, row.point), first.world, first.preemption,
                           first.dags[dag].dag, row.runs.size());
-      const std::optional<Median> any = median_of(factorial, results, row, dag, Metric::MissRatio);
+      const std::optional<Median> any = over_runs(factorial, results, row, dag, Metric::MissRatio);
       text += fmt::format(",{:.4g}", any->confidence);
       for (std::size_t m = 0; m < kMetricCount; ++m) {
         const auto metric = static_cast<Metric>(m);
-        const std::optional<Median> median = median_of(factorial, results, row, dag, metric);
+        const std::optional<Median> median = over_runs(factorial, results, row, dag, metric);
         if (median) {
           text += fmt::format(",{},{},{}", number(median->median, metric), number(median->low, metric),
                               number(median->high, metric));
@@ -226,7 +244,9 @@ std::string observations_csv(const Factorial &factorial, const FactorialResults 
         text +=
             fmt::format("{}{},{},{},{},{},{},{},{}", factor_cells(factorial, row.point), row.repetition[r], run.seed,
                         run.world, run.preemption, run.workers, run.violations, run.enforced ? 1 : 0, dag.dag);
-        for (const std::int64_t value : dag.values) fmt::format_to(std::back_inserter(text), ",{}", value);
+        for (const std::int64_t value : dag.values) {
+          text += value == kNotMeasured ? std::string(",") : fmt::format(",{}", value);
+        }
         text += "\n";
       }
     }

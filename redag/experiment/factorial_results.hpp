@@ -40,6 +40,8 @@ inline constexpr std::size_t kMetricCount = 18;
 [[nodiscard]] const char *to_string(Metric metric);
 /// Durations are in ns.
 [[nodiscard]] bool is_duration(Metric metric);
+/// Of such a metric the largest of all repetitions is told, not their median.
+[[nodiscard]] bool is_maximum(Metric metric);
 
 struct FactorialRow {
   std::size_t point = 0;
@@ -79,8 +81,10 @@ class FactorialCounter {
   FactorialResults results_;
 };
 
-/// Of DAG number `dag` of the row; nothing where no run is finished, or there is no ideal to compare with.
-[[nodiscard]] std::optional<Median> median_of(const Factorial &factorial, const FactorialResults &results,
+/// Of DAG number `dag` of the row: the median over the runs and its confidence interval; of a maximum the largest of all
+/// runs, with the least and the largest. Nothing where no run is finished, nothing was measured (the response of all DAGs
+/// together, or of one that never answered), or there is no ideal to compare with.
+[[nodiscard]] std::optional<Median> over_runs(const Factorial &factorial, const FactorialResults &results,
                                               const FactorialRow &row, std::size_t dag, Metric metric);
 
 /// For every workload and executor with factors that vary; empty while runs are missing.

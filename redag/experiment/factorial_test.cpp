@@ -128,7 +128,7 @@ TEST(Factorial, IdealHasNoBoundsAndNoOverheads) {
 TEST(Factorial, ThroughputIsOfTheTimeThatCounts) {
   const Factorial factorial(plan_of("duration: 2s\nrepetitions: 1\nexecutors: [redag]"), simulate_run);
   const FactorialResults results = run_all(factorial);
-  const auto of_slow = [&](Metric metric) { return median_of(factorial, results, results.rows[0], 1, metric)->median; };
+  const auto of_slow = [&](Metric metric) { return over_runs(factorial, results, results.rows[0], 1, metric)->median; };
   EXPECT_DOUBLE_EQ(of_slow(Metric::FinishedPerSecond), 10);
   EXPECT_DOUBLE_EQ(of_slow(Metric::Work), 0.3);
 }
@@ -165,7 +165,7 @@ TEST(Factorial, ResultsAreMediansWithTheirDistanceToTheIdeal) {
       const FactorialPoint &point = factorial.points()[row.point];
       if (factorial.plan().executors[point.of(FactorKind::Executor)] != executor) continue;
       if (point.of(FactorKind::Workers) != kNoLevel && point.of(FactorKind::Workers) != workers) continue;
-      const std::optional<Median> median = median_of(factorial, results, row, 2, metric);
+      const std::optional<Median> median = over_runs(factorial, results, row, 2, metric);
       return median ? median->median : -1.0;
     }
     return -2.0;
@@ -215,9 +215,9 @@ TEST(Factorial, UnfinishedResultsSayWhatTheyCan) {
   EXPECT_TRUE(counter.add(1, *factorial.evaluate(1)));
   const FactorialResults &results = counter.results();
   EXPECT_FALSE(results.complete());
-  EXPECT_EQ(median_of(factorial, results, results.rows[1], 0, Metric::MissRatio)->confidence, 0);
-  EXPECT_EQ(median_of(factorial, results, results.rows[1], 0, Metric::ExcessMissRatio), std::nullopt);
-  EXPECT_EQ(median_of(factorial, results, results.rows[0], 0, Metric::MissRatio), std::nullopt);
+  EXPECT_EQ(over_runs(factorial, results, results.rows[1], 0, Metric::MissRatio)->confidence, 0);
+  EXPECT_EQ(over_runs(factorial, results, results.rows[1], 0, Metric::ExcessMissRatio), std::nullopt);
+  EXPECT_EQ(over_runs(factorial, results, results.rows[0], 0, Metric::MissRatio), std::nullopt);
   EXPECT_TRUE(effects_of(factorial, results).empty());
   EXPECT_THAT(to_svg(factorial, results), HasSubstr("1 of 4 runs done"));
   EXPECT_FALSE(counter.add(4, *factorial.evaluate(1)));
@@ -236,7 +236,35 @@ TEST(Observation, TextGivesItBack) {
   EXPECT_EQ(seen->dags.back().of(Measure::Released),
             seen->dags[0].of(Measure::Released) + seen->dags[1].of(Measure::Released));
   EXPECT_EQ(seen->dags[0].quantiles.back(), seen->dags[0].of(Measure::ResponseMax));
+  EXPECT_EQ(seen->dags.back().of(Measure::ResponseMax), kNotMeasured);
+  EXPECT_TRUE(seen->dags.back().quantiles.empty()) << "of several DAGs";
   EXPECT_EQ(seen->workers, 1U);
+}
+
+// Two runs of one combination whose DAG `slow` answers at most after 20 and 30 ms, and misses 0 and 10 of 100.
+TEST(Factorial, MaximaAreOfAllRunsAndAllDagsTogetherHaveNoResponse) {
+  const Factorial factorial(plan_of("duration: 1s\nrepetitions: 3\nexecutors: [redag]"), simulate_run);
+  FactorialCounter counter(factorial);
+  for (std::uint64_t unit = 0; unit < factorial.unit_count(); ++unit) {
+    Observation seen = *parse_observation(*factorial.evaluate(unit));
+    for (const Measure measure : {Measure::ResponseMax, Measure::MaxLateness, Measure::PeakActive}) {
+      seen.dags[1].values[static_cast<std::size_t>(measure)] = unit == 1 ? 30 : 20;
+    }
+    seen.dags[1].values[static_cast<std::size_t>(Measure::ResponseP99)] = unit == 1 ? 30 : 20;
+    if (unit == 2) seen.dags[1].values[static_cast<std::size_t>(Measure::ResponseMean)] = kNotMeasured;
+    ASSERT_TRUE(counter.add(unit, to_line(seen)));
+  }
+  const FactorialRow &row = counter.results().rows[0];
+  const auto of_slow = [&](Metric metric) { return *over_runs(factorial, counter.results(), row, 1, metric); };
+  for (const Metric metric : {Metric::ResponseMax, Metric::MaxLateness, Metric::PeakActive}) {
+    EXPECT_EQ(of_slow(metric).median, 30) << to_string(metric);
+    EXPECT_EQ(of_slow(metric).low, 20);
+    EXPECT_EQ(of_slow(metric).high, 30);
+  }
+  EXPECT_EQ(of_slow(Metric::ResponseP99).median, 20) << "of a percentile the median of the runs";
+  EXPECT_GT(of_slow(Metric::ResponseMean).low, 0) << "a run that did not answer is no answer after 0 ns";
+  EXPECT_EQ(over_runs(factorial, counter.results(), row, 2, Metric::ResponseP99), std::nullopt) << "of all DAGs";
+  EXPECT_THAT(observations_csv(factorial, counter.results()), testing::Not(HasSubstr("-9223372036854775808")));
 }
 
 TEST(Factorial, MistakesNameTheCombination) {

@@ -25,20 +25,36 @@ constexpr std::array<const char *, kMeasureCount> kNames = {
     "released",           "finished",     "late",         "dropped",       "aborted",      "missed",
     "deferred",           "preemptions",  "max_lateness", "response_mean", "response_p50", "response_p95",
     "response_p99",       "response_max", "peak_active",  "paper_jobs",    "paper_late",   "paper_max_lateness",
-    "paper_startup_late", "work"};
+    "paper_startup_late", "work",         "answered",     "answers_due",   "end_to_end_late"};
 
+// Of the end-to-end responses, sink by sink; of several sinks the largest, quantile by quantile.
 std::vector<Duration> quantiles_of(const trace::RunInfo &info, const std::vector<JobRecord> &jobs,
-                                   const std::vector<TaskRef> &refs, std::optional<DagId> dag) {
-  std::vector<Duration> responses;
-  for (const JobRecord &job : jobs) {
-    if (job.outcome != metrics::JobOutcome::Finished || job.release < info.start + info.warm_up) continue;
-    if (!dag || refs[job.task.value].dag == *dag) responses.push_back(job.response());
-  }
+                                   const metrics::EndToEnd &end_to_end) {
   std::vector<Duration> quantiles;
-  if (responses.empty()) return quantiles;
-  std::sort(responses.begin(), responses.end());
-  for (const double percent : kQuantiles) quantiles.push_back(metrics::percentile(responses, percent));
+  for (const metrics::SinkSummary &sink : end_to_end.sinks) {
+    std::vector<Duration> responses;
+    for (const JobRecord &job : jobs) {
+      if (job.task != sink.task || job.outcome != metrics::JobOutcome::Finished) continue;
+      if (job.release >= info.start + info.warm_up) responses.push_back(job.finish - job.origin);
+    }
+    if (responses.empty()) continue;
+    std::sort(responses.begin(), responses.end());
+    quantiles.resize(kQuantiles.size(), std::numeric_limits<Duration>::min());
+    for (std::size_t q = 0; q < kQuantiles.size(); ++q) {
+      quantiles[q] = std::max(quantiles[q], metrics::percentile(responses, kQuantiles[q]));
+    }
+  }
   return quantiles;
+}
+
+// The sink with the smallest share of answers; null if none was due.
+const metrics::SinkSummary *rarest(const metrics::EndToEnd &end_to_end) {
+  const metrics::SinkSummary *found = nullptr;
+  for (const metrics::SinkSummary &sink : end_to_end.sinks) {
+    if (sink.due == 0) continue;
+    if (found == nullptr || sink.response.count * found->due < found->response.count * sink.due) found = &sink;
+  }
+  return found;
 }
 
 // By task: the time that its jobs had a worker while the run counts. Also of jobs that were still running at its end:
@@ -82,8 +98,8 @@ Observation observe(const FinishedRun &run, const ObserveOptions &options) {
   const std::vector<TaskRef> refs = flatten(info.workload);
   const std::vector<Duration> work = work_of(run.trace, refs.size());
 
-  const auto describe = [&](const std::string &name, const metrics::JobStats &stats, std::uint32_t peak,
-                            std::optional<DagId> dag) {
+  const auto describe = [&](const std::string &name, const metrics::JobCounts &stats, std::uint32_t peak,
+                            std::optional<DagId> dag, const metrics::EndToEnd &end_to_end) {
     DagObservation row;
     row.dag = name;
     const auto set = [&row](Measure measure, auto value) {
@@ -94,25 +110,33 @@ Observation observe(const FinishedRun &run, const ObserveOptions &options) {
     set(Measure::Late, stats.late);
     set(Measure::Dropped, stats.skipped);
     set(Measure::Aborted, stats.aborted);
-    set(Measure::Missed, stats.late + stats.skipped + stats.aborted - stats.no_data());
+    set(Measure::Missed, stats.missed());
     set(Measure::Deferred, stats.deferred);
     set(Measure::Preemptions, stats.preemptions);
-    set(Measure::MaxLateness, stats.max_lateness.value_or(0));
-    set(Measure::ResponseMean, std::llround(stats.response.mean));
-    set(Measure::ResponseP50, stats.response.p50);
-    set(Measure::ResponseP95, stats.response.p95);
-    set(Measure::ResponseP99, stats.response.p99);
-    set(Measure::ResponseMax, stats.response.max);
+    set(Measure::MaxLateness, stats.max_lateness.value_or(kNotMeasured));
+    const metrics::Distribution &response = end_to_end.response;
+    const auto set_response = [&](Measure measure, std::int64_t value) {
+      set(measure, response.count > 0 ? value : kNotMeasured);
+    };
+    set_response(Measure::ResponseMean, std::llround(response.mean));
+    set_response(Measure::ResponseP50, response.p50);
+    set_response(Measure::ResponseP95, response.p95);
+    set_response(Measure::ResponseP99, response.p99);
+    set_response(Measure::ResponseMax, response.max);
+    const metrics::SinkSummary *sink = rarest(end_to_end);
+    set(Measure::Answered, sink == nullptr ? 0 : sink->response.count);
+    set(Measure::AnswersDue, sink == nullptr ? 0 : sink->due);
+    set(Measure::EndToEndLate, end_to_end.late);
     set(Measure::PeakActive, peak);
     const metrics::PaperCount paper = metrics::paper_count(info.workload, jobs, 0, dag);
     set(Measure::PaperJobs, paper.jobs);
     set(Measure::PaperLate, paper.late);
-    set(Measure::PaperMaxLateness, paper.max_lateness.value_or(0));
+    set(Measure::PaperMaxLateness, paper.max_lateness.value_or(kNotMeasured));
     set(Measure::PaperStartupLate, metrics::paper_count(info.workload, jobs, options.paper_startup, dag).late);
     Duration had_workers = 0;
     for (const TaskRef &ref : refs) had_workers += !dag || ref.dag == *dag ? work[ref.id.value] : 0;
     set(Measure::Work, had_workers);
-    if (options.quantiles) row.quantiles = quantiles_of(info, jobs, refs, dag);
+    if (options.quantiles) row.quantiles = quantiles_of(info, jobs, end_to_end);
     return row;
   };
 
@@ -128,10 +152,10 @@ Observation observe(const FinishedRun &run, const ObserveOptions &options) {
   std::uint32_t peak = 0;
   for (std::size_t d = 0; d < summary.dags.size(); ++d) {
     const metrics::DagSummary &dag = summary.dags[d];
-    seen.dags.push_back(describe(dag.name, dag.jobs, dag.peak_active, DagId(static_cast<std::uint32_t>(d))));
+    seen.dags.push_back(describe(dag.name, dag.jobs, dag.peak_active, DagId(d), dag.end_to_end));
     peak = std::max(peak, dag.peak_active);
   }
-  seen.dags.push_back(describe("total", summary.total, peak, std::nullopt));
+  seen.dags.push_back(describe("total", summary.total, peak, std::nullopt, {}));
   return seen;
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,14 +16,15 @@
 
 namespace redag::experiment {
 
-/// Counted or measured in one run; durations in ns. The names of docs/experiments.md.
+/// Counted or measured in one run; durations in ns. The names of docs/experiments.md. The response of a DAG is end to end,
+/// of several sinks figure by figure that of the worst one; all DAGs together have none.
 enum class Measure : std::uint8_t {
   Released,
   Finished,
   Late,
   Dropped,  // skipped releases
   Aborted,
-  Missed,  // late, dropped or aborted
+  Missed,  // late, dropped or aborted (metrics::JobCounts::missed)
   Deferred,
   Preemptions,
   MaxLateness,
@@ -38,11 +40,17 @@ enum class Measure : std::uint8_t {
   PaperMaxLateness,
   PaperStartupLate,
   Work,  // time that jobs had a worker, from the end of the warm-up to that of the run
+  // At the sink with the smallest share of answers: finishes, and how many its sources' releases asked for.
+  Answered,
+  AnswersDue,
+  EndToEndLate,  // beyond the DAG's end-to-end deadline, at all sinks
 };
-inline constexpr std::size_t kMeasureCount = 20;
+inline constexpr std::size_t kMeasureCount = 23;
+/// The value of what was not there to be measured: the response of a DAG that never answered, the lateness of no job.
+inline constexpr std::int64_t kNotMeasured = std::numeric_limits<std::int64_t>::min();
 [[nodiscard]] const char *to_string(Measure measure);
 
-/// Of the response times, where the plan asks for it.
+/// Of the end-to-end response times, where the plan asks for it.
 inline constexpr std::array<double, 25> kQuantiles = {0.5, 1,  2,  5,  10, 15, 20, 25, 30, 35, 40, 45, 50,
                                                       55,  60, 65, 70, 75, 80, 85, 90, 95, 98, 99, 100};
 

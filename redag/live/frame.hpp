@@ -13,7 +13,7 @@ namespace redag::live {
 struct DagFrame {
   std::string name;
   std::uint32_t max_active = 0;  // 0: no bound
-  page::Figures figures{};
+  page::Figures figures{};       // sums; response times only of a single task: those of several are not mixed
 };
 
 struct TaskFrame {

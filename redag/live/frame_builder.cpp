@@ -16,6 +16,15 @@ void set_response(page::Figures &figures, const HistogramCounts &all, const Hist
   figures.recent_max = recent.percentile(1.0);
 }
 
+void copy_response(const page::Figures &from, page::Figures &to) {
+  to.response_p50 = from.response_p50;
+  to.response_p99 = from.response_p99;
+  to.response_max = from.response_max;
+  to.recent_p50 = from.recent_p50;
+  to.recent_p99 = from.recent_p99;
+  to.recent_max = from.recent_max;
+}
+
 void add(page::Figures &sum, const page::Figures &task) {
   sum.released += task.released;
   sum.finished += task.finished;
@@ -40,10 +49,6 @@ FrameBuilder::FrameBuilder(Time began, Duration window)
     : began_(began), window_(window), base_at_(began), next_at_(began) {}
 
 void FrameBuilder::build(const Sample &sample, Time now, Frame &frame) {
-  struct DagResponse {
-    HistogramCounts all;
-    HistogramCounts recent;
-  };
   const bool turns = now - next_at_ >= window_;
   ++builds_;
   frame.began = began_;
@@ -52,7 +57,7 @@ void FrameBuilder::build(const Sample &sample, Time now, Frame &frame) {
   frame.dags.clear();
   frame.tasks.clear();
   for (const DagSample &dag : sample.dags) frame.dags.push_back(DagFrame{dag.name, dag.max_active, {}});
-  std::vector<DagResponse> responses(sample.dags.size());
+  std::vector<std::size_t> tasks_of(sample.dags.size());
 
   for (const TaskSample &task : sample.tasks) {
     REDAG_CHECK(task.dag < sample.dags.size(), "a task of a DAG that is not there");
@@ -69,16 +74,16 @@ void FrameBuilder::build(const Sample &sample, Time now, Frame &frame) {
     TaskFrame row{task.name,     task.dag,   task.period,
                   task.deadline, task.bound, figures_of(task, current, recent, history.base)};
     add(frame.dags[task.dag].figures, row.figures);
-    responses[task.dag].all += current.response;
-    responses[task.dag].recent += recent;
+    ++tasks_of[task.dag];
     frame.tasks.push_back(std::move(row));
     if (turns) {
       history.base = history.next;
       history.next = current;
     }
   }
-  for (std::size_t d = 0; d < frame.dags.size(); ++d) {
-    set_response(frame.dags[d].figures, responses[d].all, responses[d].recent);
+  // The response of a DAG is end to end, which its tasks do not tell: only that of a single task is the DAG's, too.
+  for (const TaskFrame &task : frame.tasks) {
+    if (tasks_of[task.dag] == 1) copy_response(task.figures, frame.dags[task.dag].figures);
   }
   std::stable_sort(frame.tasks.begin(), frame.tasks.end(),
                    [](const TaskFrame &a, const TaskFrame &b) { return a.dag < b.dag; });

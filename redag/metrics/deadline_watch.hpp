@@ -1,5 +1,5 @@
-// Follows the jobs of a stream of events and judges each against its deadlines when it ends, or when the run does: the
-// one place that says what a miss is to those who need no summary. Judges by the workload alone. Not thread-safe.
+// Follows the jobs of a stream of events and judges each (miss.hpp) when it ends, or when the run does: for callers that
+// need no summary. Not thread-safe.
 #pragma once
 
 #include <optional>
@@ -8,15 +8,9 @@
 #include <vector>
 
 #include "redag/metrics/jobs.hpp"
+#include "redag/metrics/miss.hpp"
 
 namespace redag::metrics {
-
-enum class Miss : std::uint8_t {
-  None,
-  Lost,      // skipped, or aborted though it had data
-  Deadline,  // f - r above the task's deadline
-  EndToEnd,  // in time itself, and f - origin above its DAG's end-to-end deadline
-};
 
 /// A job at its end; one that is still in flight when the run ends has answered after at least these.
 struct JudgedJob {
@@ -44,14 +38,9 @@ class DeadlineWatch {
   }
 
  private:
-  struct Limits {
-    Duration deadline = 0;
-    Duration end_to_end = 0;  // 0: none
-  };
-
   [[nodiscard]] JudgedJob judge(const JobRecord &record, Time until) const;
 
-  std::vector<Limits> limits_;  // by TaskId
+  std::vector<Duration> end_to_end_;  // by TaskId: the DAG's deadline; 0: none
   JobFolder folder_;
 };
 

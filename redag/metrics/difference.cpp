@@ -7,6 +7,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/rng.hpp"
+#include "redag/metrics/miss.hpp"
 
 namespace redag::metrics {
 namespace {
@@ -53,10 +54,19 @@ void DifferenceSide::make_rows(const Workload &workload) {
   rows_.push_back({});
   for (const Dag &dag : workload.dags) {
     const std::size_t dag_row = rows_.size();
-    rows_.push_back({dag.name, {}, 0, 0, 0, 0, {}});
+    rows_.emplace_back().dag = dag.name;
+    std::vector<bool> is_sink(dag.tasks.size(), true);
     for (const Task &task : dag.tasks) {
-      places_.push_back(Places{dag_row, rows_.size()});
-      rows_.push_back({dag.name, task.name, 0, 0, 0, 0, {}});
+      for (const std::uint32_t p : task.predecessors) is_sink[p] = false;
+    }
+    const bool one_sink = std::count(is_sink.begin(), is_sink.end(), true) == 1;
+    for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+      const bool ends_dag = one_sink && is_sink[i];
+      places_.push_back(
+          Places{dag_row, rows_.size(), ends_dag ? std::optional<std::size_t>(dag_row) : std::nullopt});
+      Row &row = rows_.emplace_back();
+      row.dag = dag.name;
+      row.task = dag.tasks[i].name;
     }
   }
 }
@@ -75,23 +85,31 @@ void DifferenceSide::add(const trace::Trace &trace) {
   for (const JobRecord &job : fold_jobs(run.workload, trace.events)) {
     if (job.release < begin) continue;
     const std::size_t at = std::min(blocks - 1, static_cast<std::size_t>((job.release - begin) / block));
-    const bool late = job.is_late(run.end);
-    const bool lost =
-        (job.outcome == JobOutcome::Skipped || job.outcome == JobOutcome::Aborted) && job.reason != Reason::NoData;
+    const Miss miss = miss_of(job, run.end);
     const Places &places = places_[job.task.value];
     for (const std::size_t index : {std::size_t{0}, places.dag, places.task}) {
       Row &row = rows_[index];
       ++row.released;
-      if (late) ++row.late;
-      if (lost) ++row.lost;
+      if (miss == Miss::Deadline) ++row.late;
+      if (miss == Miss::Lost) ++row.lost;
       Block &here = row.runs.back()[at];
       ++here.released;
-      if (late || lost) ++here.missed;
-      if (job.outcome != JobOutcome::Finished) continue;
-      row.max = std::max(row.max, job.response());
-      here.responses.push_back(job.response());
+      if (miss != Miss::None) ++here.missed;
     }
+    if (job.outcome != JobOutcome::Finished) continue;
+    const auto respond = [&](Row &row, Duration response) {
+      row.max = std::max(row.max, response);
+      row.runs.back()[at].responses.push_back(response);
+    };
+    respond(rows_[places.task], job.response());
+    if (places.end_to_end) respond(rows_[*places.end_to_end], job.finish - job.origin);
   }
+}
+
+bool DifferenceSide::Row::has_responses() const {
+  return std::any_of(runs.begin(), runs.end(), [](const std::vector<Block> &run) {
+    return std::any_of(run.begin(), run.end(), [](const Block &block) { return !block.responses.empty(); });
+  });
 }
 
 bool Difference::is_any(Verdict verdict) const {

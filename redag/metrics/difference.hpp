@@ -2,6 +2,7 @@
 // than chance (block_bootstrap.hpp). Rows are matched by name. Parallel, the same answer for any number of processors.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,8 +26,13 @@ class DifferenceSide {
     std::uint64_t released = 0;
     std::uint64_t late = 0;
     std::uint64_t lost = 0;  // skipped, or aborted though they had data
-    Duration max = 0;        // response; 0 if none finished
-    BlockedRuns runs;
+    /// Of a task f - r, of a DAG with one sink f - origin there: end to end. 0 if none finished, and always of what has no
+    /// response of its own: all DAGs together, a DAG with several sinks.
+    Duration max = 0;
+    BlockedRuns runs;  // with those responses
+
+    [[nodiscard]] std::uint64_t missed() const { return late + lost; }
+    [[nodiscard]] bool has_responses() const;
   };
   /// All jobs, then the DAGs, each followed by its tasks.
   [[nodiscard]] const std::vector<Row> &rows() const { return rows_; }
@@ -35,6 +41,7 @@ class DifferenceSide {
   struct Places {
     std::size_t dag = 0;
     std::size_t task = 0;
+    std::optional<std::size_t> end_to_end;  // the row of its DAG, if it is the only sink
   };
 
   void make_rows(const Workload &workload);

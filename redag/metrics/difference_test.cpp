@@ -81,6 +81,27 @@ TEST(Difference, CountsAsTheSummaryDoes) {
   EXPECT_GT(missed, 100U);  // 24 ms without preemption under a task of 10 ms
 }
 
+TEST(Difference, ADagAnswersEndToEndAndAllJobsTogetherDoNot) {
+  const DifferenceSide a = side(sched::Preemption::None, 1, 1);
+  const auto responses = [](const DifferenceSide::Row &row) {
+    std::size_t count = 0;
+    for (const Block &block : row.runs[0]) count += block.responses.size();
+    return count;
+  };
+  EXPECT_EQ(responses(a.rows()[0]), 0U);
+  EXPECT_FALSE(a.rows()[0].has_responses());
+  EXPECT_EQ(responses(a.rows()[3]), responses(a.rows()[5])) << "those of its sink alone";
+  EXPECT_GT(a.rows()[3].max, a.rows()[4].max + 3 * kMillisecond) << "`after` takes that long after `slow`";
+}
+
+TEST(Difference, ADagWithSeveralSinksHasNoResponse) {
+  Workload workload = make_workload({make_dag("fork", {{"src", 10, 1}, {"x", 0, 1, {0}}, {"y", 0, 1, {0}}})}, 1);
+  DifferenceSide a;
+  a.add(run_of(workload, sched::Preemption::None, 1, kSecond));
+  EXPECT_FALSE(a.rows()[1].has_responses());
+  EXPECT_TRUE(a.rows()[3].has_responses());
+}
+
 TEST(Difference, WarmUpIsNotCounted) {
   DifferenceSide a;
   a.add(run_of(contention(), sched::Preemption::None, 1, 20 * kSecond, 5 * kSecond));

@@ -18,6 +18,26 @@ Duration percentile(const std::vector<Duration> &sorted, double percent) {
   return sorted[static_cast<std::size_t>(nearest_rank(percent, sorted.size())) - 1];
 }
 
+Distribution worst_of(std::span<const Distribution> all) {
+  Distribution worst;
+  for (const Distribution &one : all) {
+    if (one.count == 0) continue;
+    worst.min = worst.count == 0 ? one.min : std::min(worst.min, one.min);
+    worst.mean = worst.count == 0 ? one.mean : std::max(worst.mean, one.mean);
+    const auto largest = [&](Duration Distribution::*figure) {
+      worst.*figure = worst.count == 0 ? one.*figure : std::max(worst.*figure, one.*figure);
+    };
+    largest(&Distribution::p50);
+    largest(&Distribution::p90);
+    largest(&Distribution::p95);
+    largest(&Distribution::p99);
+    largest(&Distribution::max);
+    worst.percentile_error = std::max(worst.percentile_error, one.percentile_error);
+    worst.count += one.count;
+  }
+  return worst;
+}
+
 Distribution distribution_of(std::vector<Duration> values) {
   Distribution result;
   result.count = values.size();

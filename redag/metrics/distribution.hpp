@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "redag/base/time.hpp"
@@ -30,6 +31,11 @@ struct Distribution {
 
 /// The nearest-rank percentile of sorted values, 0 < percent <= 100. Requires a value.
 [[nodiscard]] Duration percentile(const std::vector<Duration> &sorted, double percent);
+
+/// Of several distributions the worst, figure by figure: mean, percentiles and maximum are the largest among them, the
+/// minimum is the least, `count` is that of all. Mixes nothing: each figure is that of one of them. Those without values
+/// say nothing.
+[[nodiscard]] Distribution worst_of(std::span<const Distribution> all);
 
 /// O(n log n).
 [[nodiscard]] Distribution distribution_of(std::vector<Duration> values);

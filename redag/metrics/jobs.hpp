@@ -43,12 +43,6 @@ struct JobRecord {
   [[nodiscard]] Duration response_from_ready() const { return finish - ready; }
   /// L = f - (r + D). Requires a finished job.
   [[nodiscard]] Duration lateness() const { return finish - deadline; }
-  /// Finished late, or in flight at `end` with its deadline passed. Skipped and aborted jobs are not late: they are
-  /// misses of their own kind.
-  [[nodiscard]] bool is_late(Time end) const {
-    if (outcome == JobOutcome::Finished) return finish > deadline;
-    return outcome == JobOutcome::InFlight && end > deadline;
-  }
 
   friend bool operator==(const JobRecord &, const JobRecord &) = default;
 };

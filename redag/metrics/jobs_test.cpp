@@ -1,6 +1,8 @@
 #include "redag/metrics/jobs.hpp"
 
 #include <gtest/gtest.h>
+
+#include "redag/metrics/miss.hpp"
 #include <unistd.h>
 
 #include <filesystem>
@@ -45,19 +47,19 @@ TEST(FoldJobs, TakesEveryTimeFromItsEvent) {
   EXPECT_EQ(lo.on_worker, 4 * kMs);
   EXPECT_EQ(lo.preemptions, 1U);
   EXPECT_EQ(lo.lateness(), 2 * kMs);
-  EXPECT_TRUE(lo.is_late(30 * kMs));
+  EXPECT_EQ(miss_of(lo, 30 * kMs), Miss::Deadline);
   EXPECT_EQ(lo.outcome, JobOutcome::Finished);
 
   EXPECT_EQ(jobs[1].response(), 3 * kMs);  // hi#0
   EXPECT_EQ(jobs[1].start, 2 * kMs);       // no Started: Dispatched
-  EXPECT_FALSE(jobs[1].is_late(30 * kMs));
+  EXPECT_NE(miss_of(jobs[1], 30 * kMs), Miss::Deadline);
   EXPECT_EQ(jobs[2].outcome, JobOutcome::Skipped);
   EXPECT_EQ(jobs[2].reason, Reason::DagFull);
   EXPECT_FALSE(jobs[2].has_started());
   EXPECT_EQ(jobs[2].ready, kNever);
   EXPECT_EQ(jobs[3].outcome, JobOutcome::InFlight);  // lo#1, released before hi#2
-  EXPECT_TRUE(jobs[3].is_late(30 * kMs));
-  EXPECT_FALSE(jobs[3].is_late(25 * kMs));
+  EXPECT_EQ(miss_of(jobs[3], 30 * kMs), Miss::Deadline);
+  EXPECT_NE(miss_of(jobs[3], 25 * kMs), Miss::Deadline);
   EXPECT_EQ(jobs[4].outcome, JobOutcome::Aborted);
   EXPECT_EQ(jobs[4].reason, Reason::Exception);
   EXPECT_TRUE(jobs[4].deferred);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "redag/metrics/jobs.hpp"
+#include "redag/metrics/miss.hpp"
 #include "redag/trace/output_file.hpp"
 
 namespace redag::metrics {
@@ -223,7 +224,7 @@ class PerfettoWriter::Impl {
     write(fmt::format(R"({{"ph":"e","id":"{}","name":{},"cat":{},"pid":{},"tid":{},"ts":{}}})", id, task.label,
                       task.category, dag_process(record.task), refs_[record.task.value].index,
                       stamp(std::max(record.release, end))));
-    if (record.is_late(now)) instant(record.task, record.deadline, "deadline missed", record.number);
+    if (miss_of(record, now) == Miss::Deadline) instant(record.task, record.deadline, "deadline missed", record.number);
   }
 
   trace::OutputFile file_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "redag/metrics/miss.hpp"
+
 namespace redag::metrics {
 namespace {
 
@@ -15,9 +17,26 @@ std::size_t exact_jobs_of(std::size_t tasks) {
   return std::max(kLeast, kExactJobs / std::max<std::size_t>(1, tasks));
 }
 
+// By task of a DAG: how many of its jobs the releases of its sources ask for. A timer is released by itself, a data task
+// once all its predecessors have ended: as often as the rarest of them, at most.
+std::vector<std::uint64_t> answers_due(const Dag &dag, std::span<const JobStats> stats) {
+  const std::vector<std::uint32_t> ranks = topological_ranks(dag);
+  std::vector<std::size_t> order(ranks.size());
+  for (std::size_t i = 0; i < ranks.size(); ++i) order[ranks[i]] = i;
+  std::vector<std::uint64_t> due(ranks.size());
+  for (const std::size_t i : order) {
+    const Task &task = dag.tasks[i];
+    due[i] = stats[i].released;
+    if (task.activation != Activation::Data || task.predecessors.empty()) continue;
+    due[i] = due[task.predecessors.front()];
+    for (const std::uint32_t p : task.predecessors) due[i] = std::min(due[i], due[p]);
+  }
+  return due;
+}
+
 }  // namespace
 
-void JobStats::add_counts(const JobStats &other) {
+void JobCounts::add_counts(const JobCounts &other) {
   released += other.released;
   finished += other.finished;
   skipped += other.skipped;
@@ -32,15 +51,24 @@ void JobStats::add_counts(const JobStats &other) {
   if (other.max_lateness) max_lateness = std::max(max_lateness.value_or(*other.max_lateness), *other.max_lateness);
 }
 
-double JobStats::miss_ratio() const { return ratio(late, released); }
+double JobCounts::miss_ratio() const { return ratio(late, released); }
 
-double JobStats::miss_ratio_with_lost() const { return ratio(late + skipped + aborted - no_data(), released); }
+double JobCounts::miss_ratio_with_lost() const { return ratio(missed(), released); }
 
-void Summarizer::Samples::merge(const Samples &other) {
-  response.merge(other.response);
-  response_from_ready.merge(other.response_from_ready);
-  start_latency.merge(other.start_latency);
-  on_worker.merge(other.on_worker);
+void EndToEnd::conclude() {
+  late = 0;
+  std::vector<Distribution> responses;
+  for (const SinkSummary &sink : sinks) {
+    late += sink.late;
+    responses.push_back(sink.response);
+  }
+  response = worst_of(responses);
+}
+
+std::uint64_t EndToEnd::due() const {
+  std::uint64_t all = 0;
+  for (const SinkSummary &sink : sinks) all += sink.due;
+  return all;
 }
 
 Summarizer::Summarizer(const trace::RunInfo &run)
@@ -51,8 +79,9 @@ Summarizer::Summarizer(const trace::RunInfo &run)
       is_sink_(refs_.size(), true),
       stats_(refs_.size()),
       samples_(refs_.size(), Samples(exact_)),
-      end_to_end_(run.workload.dags.size(), DurationSketch(exact_)),
-      end_to_end_late_(run.workload.dags.size()),
+      end_to_end_(refs_.size(), DurationSketch(exact_)),
+      end_to_end_late_(refs_.size()),
+      missed_(run.workload.dags.size()),
       folder_(run.workload),
       activity_(run.workload, run.config, begin_) {
   for (std::size_t t = 0; t < refs_.size(); ++t) {
@@ -63,20 +92,29 @@ Summarizer::Summarizer(const trace::RunInfo &run)
 void Summarizer::add(std::span<const JobEvent> events) {
   activity_.add(events);
   folder_.add(events);
-  for (const JobRecord &job : folder_.take_ended()) count(job);
+  for (const JobRecord &job : folder_.take_ended()) count(job, job.finish);
 }
 
-void Summarizer::count(const JobRecord &job) {
+void Summarizer::count(const JobRecord &job, Time end) {
   if (job.release < begin_) return;
-  JobStats &stats = stats_[job.task.value];
+  const std::size_t task = job.task.value;
+  const std::size_t dag = refs_[task].dag.value;
+  JobStats &stats = stats_[task];
   ++stats.released;
   if (job.deferred) ++stats.deferred;
   if (job.exceeded) ++stats.exceeded;
   stats.preemptions += job.preemptions;
-  Samples &samples = samples_[job.task.value];
+  Samples &samples = samples_[task];
   if (job.has_started() && job.reason != Reason::NoData) samples.start_latency.add(job.start - job.ready);
+  const Miss miss = miss_of(job, end);
+  if (miss == Miss::Deadline) ++stats.late;
+  if (miss != Miss::None) ++missed_[dag];
+  if (is_sink_[task] && is_late_end_to_end(job, end, run_.workload.dags[dag].deadline)) ++end_to_end_late_[task];
   switch (job.outcome) {
-    case JobOutcome::InFlight: ++stats.in_flight; return;
+    case JobOutcome::InFlight:
+      ++stats.in_flight;
+      if (miss == Miss::Deadline) ++stats.overdue;
+      return;
     case JobOutcome::Skipped:
     case JobOutcome::Aborted:
       ++(job.outcome == JobOutcome::Skipped ? stats.skipped : stats.aborted);
@@ -85,25 +123,30 @@ void Summarizer::count(const JobRecord &job) {
     case JobOutcome::Finished: break;
   }
   ++stats.finished;
-  if (job.lateness() > 0) ++stats.late;
   stats.max_lateness = std::max(stats.max_lateness.value_or(job.lateness()), job.lateness());
   samples.response.add(job.response());
   samples.response_from_ready.add(job.response_from_ready());
   samples.on_worker.add(job.on_worker);
-  if (!is_sink_[job.task.value]) return;
-  const std::size_t dag = refs_[job.task.value].dag.value;
-  const Duration deadline = run_.workload.dags[dag].deadline;
-  end_to_end_[dag].add(job.finish - job.origin);
-  if (deadline > 0 && job.finish - job.origin > deadline) ++end_to_end_late_[dag];
+  if (is_sink_[task]) end_to_end_[task].add(job.finish - job.origin);
 }
 
-void Summarizer::count_overdue(Time end) {
-  for (const JobRecord &job : folder_.in_flight()) {
-    count(job);
-    if (job.release < begin_ || !job.is_late(end)) continue;
-    ++stats_[job.task.value].late;
-    ++stats_[job.task.value].overdue;
+void Summarizer::count_in_flight(Time end) {
+  for (const JobRecord &job : folder_.in_flight()) count(job, end);
+}
+
+EndToEnd Summarizer::end_to_end_of(DagId dag, std::size_t first_task) const {
+  const Dag &spec = run_.workload.dags[dag.value];
+  EndToEnd end_to_end;
+  end_to_end.deadline = spec.deadline;
+  const std::vector<std::uint64_t> due =
+      answers_due(spec, std::span(stats_).subspan(first_task, spec.tasks.size()));
+  for (std::size_t i = 0; i < spec.tasks.size(); ++i) {
+    const std::size_t t = first_task + i;
+    if (!is_sink_[t]) continue;
+    end_to_end.sinks.push_back({TaskId(t), due[i], end_to_end_late_[t], end_to_end_[t].distribution()});
   }
+  end_to_end.conclude();
+  return end_to_end;
 }
 
 void Summarizer::fill(JobStats &stats, const Samples &samples) {
@@ -115,39 +158,31 @@ void Summarizer::fill(JobStats &stats, const Samples &samples) {
 
 Summary Summarizer::finish(Time end) {
   activity_.finish(end);
-  count_overdue(end);
+  count_in_flight(end);
 
   Summary summary;
   summary.begin = begin_;
   summary.end = end;
-  Samples all(exact_);
-  std::vector<Samples> of_dag(run_.workload.dags.size(), Samples(exact_));
-  for (const Dag &dag : run_.workload.dags) {
+  std::size_t first_task = 0;
+  for (std::size_t d = 0; d < run_.workload.dags.size(); ++d) {
+    const Dag &dag = run_.workload.dags[d];
     DagSummary row;
     row.name = dag.name;
     row.max_active = dag.max_active;
-    row.end_to_end.deadline = dag.deadline;
+    row.peak_active = activity_.peak_active(DagId(d));
+    row.end_to_end = end_to_end_of(DagId(d), first_task);
+    first_task += dag.tasks.size();
+    if (row.max_active > 0 && row.peak_active > row.max_active) summary.all_enforced = false;
     summary.dags.push_back(std::move(row));
   }
   for (std::size_t t = 0; t < refs_.size(); ++t) {
     const std::size_t d = refs_[t].dag.value;
     summary.dags[d].jobs.add_counts(stats_[t]);
     summary.total.add_counts(stats_[t]);
-    of_dag[d].merge(samples_[t]);
-    all.merge(samples_[t]);
     fill(stats_[t], samples_[t]);
     samples_[t] = Samples(exact_);
     summary.tasks.push_back(TaskSummary{TaskId(t), summary.dags[d].name, refs_[t].task->name, stats_[t]});
   }
-  for (std::size_t d = 0; d < summary.dags.size(); ++d) {
-    DagSummary &dag = summary.dags[d];
-    fill(dag.jobs, of_dag[d]);
-    dag.end_to_end.late = end_to_end_late_[d];
-    dag.end_to_end.response = end_to_end_[d].distribution();
-    dag.peak_active = activity_.peak_active(DagId(d));
-    if (dag.max_active > 0 && dag.peak_active > dag.max_active) summary.all_enforced = false;
-  }
-  fill(summary.total, all);
   summary.inversions = activity_.inversions();
   summary.high_mode = activity_.high_mode();
   summary.group_overlaps = activity_.group_overlaps();

@@ -23,8 +23,9 @@ inline constexpr std::size_t kExactJobs = std::size_t{1} << 20U;
 
 inline constexpr std::size_t kReasonCount = static_cast<std::size_t>(kLastReason) + 1;
 
-/// Jobs of a task, of a DAG, or of all. Jobs released before the end of the warm-up are not in it.
-struct JobStats {
+/// Jobs of a task, of a DAG, or of all, counted. Jobs released before the end of the warm-up are not in it. There are no
+/// times in it but an extreme: those of several tasks' jobs mixed would say nothing of any.
+struct JobCounts {
   std::uint64_t released = 0;  // = finished + skipped + aborted + in_flight
   std::uint64_t finished = 0;
   std::uint64_t skipped = 0;
@@ -32,32 +33,54 @@ struct JobStats {
   std::uint64_t in_flight = 0;  // when the run ended
   std::uint64_t deferred = 0;
   std::uint64_t exceeded = 0;                           // used their budget and were not cut off there
-  std::uint64_t late = 0;                               // finished after the deadline, or overdue
+  std::uint64_t late = 0;                               // Miss::Deadline: finished after the deadline, or overdue
   std::uint64_t overdue = 0;                            // in flight with the deadline passed
   std::array<std::uint64_t, kReasonCount> by_reason{};  // skipped and aborted, by Reason
   std::uint64_t preemptions = 0;
   std::optional<Duration> max_lateness;  // L_max over finished jobs; negative: the closest a job came to its deadline
-  Distribution response;                 // f - r, finished jobs
-  Distribution response_from_ready;      // f - ready
-  Distribution start_latency;            // start - ready; not of jobs without data
-  Distribution on_worker;                // time on a worker; execution time where nothing else could run there
 
   /// MR = late / released (eq. miss_rate); 0 where nothing was released.
   [[nodiscard]] double miss_ratio() const;
   /// Aborted jobs that found nothing to do: nobody waited for them, so they are no misses.
   [[nodiscard]] std::uint64_t no_data() const { return by_reason[static_cast<std::size_t>(Reason::NoData)]; }
-  /// MR with skipped and aborted jobs counted as misses, save those without data.
+  /// Miss::Lost: skipped or aborted, save those without data.
+  [[nodiscard]] std::uint64_t lost() const { return skipped + aborted - no_data(); }
+  /// Late or lost.
+  [[nodiscard]] std::uint64_t missed() const { return late + lost(); }
+  /// missed / released; 0 where nothing was released.
   [[nodiscard]] double miss_ratio_with_lost() const;
 
-  /// Everything but the distributions, which cannot be added.
-  void add_counts(const JobStats &other);
+  void add_counts(const JobCounts &other);
 };
 
-/// From a source's release to a sink's finish, over the finished jobs of all sinks of a DAG.
+/// Jobs of one task.
+struct JobStats : JobCounts {
+  Distribution response;             // f - r, finished jobs
+  Distribution response_from_ready;  // f - ready
+  Distribution start_latency;        // start - ready; not of jobs without data
+  Distribution on_worker;            // time on a worker; execution time where nothing else could run there
+};
+
+/// From a source's release to the finish of one sink.
+struct SinkSummary {
+  TaskId task;
+  std::uint64_t due = 0;   // finishes that its sources' releases ask for: the fewest of any source it waits for
+  std::uint64_t late = 0;  // beyond the DAG's deadline, those in flight at the end included
+  Distribution response;   // f - origin, finished jobs
+};
+
+/// What a DAG answers. Its sinks are not mixed: of several, each figure of `response` is that of the sink with the worst
+/// one (worst_of).
 struct EndToEnd {
   Duration deadline = 0;   // of the DAG; 0: none
-  std::uint64_t late = 0;  // jobs beyond it
-  Distribution response;   // f - origin
+  std::uint64_t late = 0;  // at all sinks
+  Distribution response;
+  std::vector<SinkSummary> sinks;
+
+  /// Fills `late` and `response` from the sinks.
+  void conclude();
+  /// Of all sinks.
+  [[nodiscard]] std::uint64_t due() const;
 };
 
 struct TaskSummary {
@@ -69,7 +92,7 @@ struct TaskSummary {
 
 struct DagSummary {
   std::string name;
-  JobStats jobs;
+  JobCounts jobs;
   EndToEnd end_to_end;
   std::uint32_t max_active = 0;   // 0: no bound
   std::uint32_t peak_active = 0;  // most jobs started and unfinished at any time, warm-up included
@@ -78,7 +101,7 @@ struct DagSummary {
 struct Summary {
   std::vector<TaskSummary> tasks;
   std::vector<DagSummary> dags;
-  JobStats total;
+  JobCounts total;
   Time begin = 0;  // start + warm-up
   Time end = 0;
   Inversions inversions;
@@ -98,6 +121,8 @@ class Summarizer {
   void add(std::span<const JobEvent> events);
   /// The run ended at `end`. Call once.
   [[nodiscard]] Summary finish(Time end);
+  /// So far, by DAG: jobs that ended late or were lost.
+  [[nodiscard]] const std::vector<std::uint64_t> &missed() const { return missed_; }
 
  private:
   struct Samples {
@@ -108,12 +133,11 @@ class Summarizer {
     DurationSketch response_from_ready;
     DurationSketch start_latency;
     DurationSketch on_worker;
-
-    void merge(const Samples &other);
   };
 
-  void count(const JobRecord &job);
-  void count_overdue(Time end);
+  void count(const JobRecord &job, Time end);
+  void count_in_flight(Time end);
+  [[nodiscard]] EndToEnd end_to_end_of(DagId dag, std::size_t first_task) const;
   static void fill(JobStats &stats, const Samples &samples);
 
   const trace::RunInfo &run_;
@@ -123,8 +147,9 @@ class Summarizer {
   std::vector<bool> is_sink_;
   std::vector<JobStats> stats_;
   std::vector<Samples> samples_;
-  std::vector<DurationSketch> end_to_end_;
-  std::vector<std::uint64_t> end_to_end_late_;
+  std::vector<DurationSketch> end_to_end_;      // by TaskId; empty unless it is a sink
+  std::vector<std::uint64_t> end_to_end_late_;  // by TaskId
+  std::vector<std::uint64_t> missed_;           // by DagId
   JobFolder folder_;
   Activity activity_;
 };

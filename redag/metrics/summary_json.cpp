@@ -20,7 +20,7 @@ Json to_json(const Distribution &distribution) {
 }
 
 // Lost jobs by reason; reasons that did not occur are left out.
-Json reasons_to_json(const JobStats &stats) {
+Json reasons_to_json(const JobCounts &stats) {
   Json json = Json::object();
   for (std::size_t i = 0; i < kReasonCount; ++i) {
     if (stats.by_reason[i] > 0) json[to_string(static_cast<Reason>(i))] = stats.by_reason[i];
@@ -28,7 +28,7 @@ Json reasons_to_json(const JobStats &stats) {
   return json;
 }
 
-Json to_json(const JobStats &stats) {
+Json to_json(const JobCounts &stats) {
   return {{"released", stats.released},
           {"finished", stats.finished},
           {"skipped", stats.skipped},
@@ -39,14 +39,20 @@ Json to_json(const JobStats &stats) {
           {"exceeded", stats.exceeded},
           {"late", stats.late},
           {"overdue", stats.overdue},
+          {"missed", stats.missed()},
           {"miss_ratio", stats.miss_ratio()},
           {"miss_ratio_with_lost", stats.miss_ratio_with_lost()},
           {"max_lateness_ns", stats.max_lateness ? Json(*stats.max_lateness) : Json(nullptr)},
-          {"preemptions", stats.preemptions},
-          {"response", to_json(stats.response)},
-          {"response_from_ready", to_json(stats.response_from_ready)},
-          {"start_latency", to_json(stats.start_latency)},
-          {"on_worker", to_json(stats.on_worker)}};
+          {"preemptions", stats.preemptions}};
+}
+
+Json to_json(const JobStats &stats) {
+  Json json = to_json(static_cast<const JobCounts &>(stats));
+  json["response"] = to_json(stats.response);
+  json["response_from_ready"] = to_json(stats.response_from_ready);
+  json["start_latency"] = to_json(stats.start_latency);
+  json["on_worker"] = to_json(stats.on_worker);
+  return json;
 }
 
 Json to_json(const TaskSummary &task) {
@@ -55,12 +61,22 @@ Json to_json(const TaskSummary &task) {
   return json;
 }
 
+Json to_json(const EndToEnd &end_to_end) {
+  Json sinks = Json::array();
+  for (const SinkSummary &sink : end_to_end.sinks) {
+    sinks.push_back(Json{
+        {"id", sink.task.value}, {"due", sink.due}, {"late", sink.late}, {"response", to_json(sink.response)}});
+  }
+  return Json{{"deadline_ns", end_to_end.deadline},
+              {"late", end_to_end.late},
+              {"response", to_json(end_to_end.response)},
+              {"sinks", std::move(sinks)}};
+}
+
 Json to_json(const DagSummary &dag) {
   Json json = {{"name", dag.name}, {"max_active", dag.max_active}, {"peak_active", dag.peak_active}};
   json.update(to_json(dag.jobs));
-  json["end_to_end"] = {{"deadline_ns", dag.end_to_end.deadline},
-                        {"late", dag.end_to_end.late},
-                        {"response", to_json(dag.end_to_end.response)}};
+  json["end_to_end"] = to_json(dag.end_to_end);
   return json;
 }
 
@@ -74,7 +90,7 @@ Json rows_to_json(const std::vector<Row> &rows) {
 }  // namespace
 
 std::string summary_to_json(const Summary &summary, const trace::RunInfo &run) {
-  Json json = {{"format", "redag.summary/1"}};
+  Json json = {{"format", "redag.summary/2"}};
   if (run.provenance.is_known()) json["provenance"] = Json::parse(provenance_to_json(run.provenance));
   json.update(Json{{"run", Json::parse(trace::run_info_to_json(run))},
                    {"begin_ns", summary.begin},

@@ -1,4 +1,4 @@
-// summary.json ("redag.summary/1"): everything in a Summary and the description of its run. Keys:
+// summary.json ("redag.summary/2"): everything in a Summary and the description of its run. Keys:
 // docs/results_format.md. Pure but for the file.
 #pragma once
 

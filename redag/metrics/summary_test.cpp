@@ -32,6 +32,19 @@ TEST(Percentile, IsTheNearestRank) {
   EXPECT_EQ(percentile({7}, 50), 7);
 }
 
+TEST(Distribution, TheWorstOfSeveralIsSoFigureByFigure) {
+  const Distribution steady = distribution_of({20, 20, 20, 20});
+  const Distribution rare = distribution_of({1, 1, 1, 90});
+  const Distribution worst = worst_of(std::vector{Distribution(), steady, rare});
+  EXPECT_EQ(worst.count, 8U);
+  EXPECT_EQ(worst.p50, 20);
+  EXPECT_EQ(worst.max, 90);
+  EXPECT_EQ(worst.min, 1);
+  EXPECT_DOUBLE_EQ(worst.mean, 23.25);
+  EXPECT_EQ(worst_of(std::vector{rare}), rare);
+  EXPECT_EQ(worst_of({}), Distribution());
+}
+
 TEST(Distribution, OfFewValues) {
   const Distribution d = distribution_of({30, 10, 20});
   EXPECT_EQ(d.count, 3U);
@@ -83,7 +96,8 @@ TEST(Summary, CountsPerTaskDagAndTotal) {
   EXPECT_EQ(lo.on_worker.max, 8 * kMs);
 
   EXPECT_EQ(s.dags[0].jobs.released, 6U);
-  EXPECT_EQ(s.dags[0].jobs.response.count, 4U);
+  EXPECT_EQ(s.dags[0].jobs.lost(), 2U);
+  EXPECT_EQ(s.dags[0].jobs.missed(), 2U);
   EXPECT_EQ(s.total.released, 8U);
   EXPECT_EQ(s.total.released, s.total.finished + s.total.skipped + s.total.aborted + s.total.in_flight);
   EXPECT_DOUBLE_EQ(s.total.miss_ratio(), 2.0 / 8.0);
@@ -98,8 +112,8 @@ TEST(Summary, AJobWithoutDataIsNoMiss) {
   EXPECT_EQ(s.total.aborted, 2U);
   EXPECT_EQ(s.total.no_data(), 1U);
   EXPECT_DOUBLE_EQ(s.total.miss_ratio_with_lost(), 0.5);
-  EXPECT_EQ(s.total.start_latency.count, 1U);
-  EXPECT_EQ(s.total.response.count, 0U);
+  EXPECT_EQ(s.tasks[0].jobs.start_latency.count, 1U);
+  EXPECT_EQ(s.tasks[0].jobs.response.count, 0U);
 }
 
 TEST(Summary, EndToEndGoesBackToTheSource) {
@@ -110,6 +124,52 @@ TEST(Summary, EndToEndGoesBackToTheSource) {
   EXPECT_EQ(chain.response.max, 5 * kMs);  // released at 10, finished at 15
   EXPECT_EQ(chain.late, 1U);
   EXPECT_EQ(s.dags[1].end_to_end.late, 0U);  // no deadline
+  ASSERT_EQ(chain.sinks.size(), 1U);
+  EXPECT_EQ(chain.sinks[0].task, TaskId(std::size_t{1}));
+  EXPECT_EQ(chain.sinks[0].due, 4U);  // releases of the source, whatever became of them
+}
+
+// Two sinks: `near` answers after 1 ms or 4 ms, `far` after 2 ms both times.
+TEST(Summary, OfSeveralSinksEachFigureIsThatOfTheWorstOne) {
+  Dag fork = make_dag("fork", {{"src", 10, 1}, {"near", 0, 1, {0}}, {"far", 0, 1, {0}}});
+  TraceBuilder t(make_workload({fork}, 2));
+  const auto period = [&t](std::uint32_t k, Time near, Time far) {
+    const Time r = 10 * static_cast<Time>(k);
+    t.at(r).arrives("src", k).dispatched("src", k, 0, r + 10).finished("src", k, 0);
+    t.released("near", k).ready("near", k, r).dispatched("near", k, 0, r + 10);
+    t.released("far", k).ready("far", k, r).dispatched("far", k, 1, r + 10);
+    t.at(r + std::min(near, far)).finished(near < far ? "near" : "far", k, near < far ? 0 : 1);
+    t.at(r + std::max(near, far)).finished(near < far ? "far" : "near", k, near < far ? 1 : 0);
+  };
+  period(0, 1, 2);
+  period(1, 4, 2);
+  const Summary s = summarize(t.until(20));
+  const EndToEnd &end_to_end = s.dags[0].end_to_end;
+  ASSERT_EQ(end_to_end.sinks.size(), 2U);
+  EXPECT_EQ(end_to_end.sinks[0].response.max, 4 * kMs);
+  EXPECT_EQ(end_to_end.sinks[1].response.max, 2 * kMs);
+  EXPECT_EQ(end_to_end.response.p50, 2 * kMs) << "far's; the two mixed would have it, too";
+  EXPECT_EQ(end_to_end.response.max, 4 * kMs) << "near's";
+  EXPECT_EQ(end_to_end.response.mean, 2.5 * kMs) << "near's, not 2.25 of both";
+}
+
+TEST(Summary, MissesSoFarAreThoseOfTheEnd) {
+  const trace::Trace trace = example();
+  Summarizer summarizer(trace.info);
+  summarizer.add(trace.events);
+  EXPECT_EQ(summarizer.missed(), (std::vector<std::uint64_t>{2, 1})) << "lo#1 is in flight";
+  const Summary s = summarizer.finish(trace.info.end);
+  EXPECT_EQ(summarizer.missed(), (std::vector<std::uint64_t>{s.dags[0].jobs.missed(), s.dags[1].jobs.missed()}));
+}
+
+TEST(Summary, AJobInFlightBeyondTheEndToEndDeadlineIsLate) {
+  Dag chain = make_dag("chain", {{"src", 10, 1}, {"sink", 0, 2, {0}}}, 1);
+  chain.deadline = 4 * kMs;
+  TraceBuilder t(make_workload({chain}, 1));
+  t.at(0).arrives("src", 0).dispatched("src", 0, 0, 10);
+  t.at(1).finished("src", 0, 0).released("sink", 0).ready("sink", 0, 0).dispatched("sink", 0, 0, 11);
+  EXPECT_EQ(summarize(t.until(4)).dags[0].end_to_end.late, 0U);
+  EXPECT_EQ(summarize(t.until(5)).dags[0].end_to_end.late, 1U);
 }
 
 TEST(Summary, BusyWorkersPeaksAndInversions) {
@@ -161,7 +221,10 @@ TEST(SummaryJson, HasEverything) {
   const std::string text = summary_to_json(summarize(trace), trace.info);
   EXPECT_EQ(text, summary_to_json(summarize(trace), trace.info));
   const nlohmann::json json = nlohmann::json::parse(text);
-  EXPECT_EQ(json["format"], "redag.summary/1");
+  EXPECT_EQ(json["format"], "redag.summary/2");
+  EXPECT_EQ(json["total"]["missed"], 4);
+  EXPECT_FALSE(json["total"].contains("response")) << "of jobs of several tasks";
+  EXPECT_FALSE(json["dags"][0].contains("response"));
   EXPECT_EQ(json["run"]["executor"], "redag");
   EXPECT_EQ(json["total"]["released"], 8);
   EXPECT_EQ(json["tasks"][2]["name"], "lo");

@@ -24,10 +24,6 @@ bool same_tasks(const Workload &a, const Workload &b) {
   return std::equal(a.dags.begin(), a.dags.end(), b.dags.begin(), b.dags.end(), same_dag);
 }
 
-void append(std::vector<Duration> &to, const std::vector<Duration> &from) {
-  to.insert(to.end(), from.begin(), from.end());
-}
-
 }  // namespace
 
 bool Group::fits(const trace::RunInfo &run) const {
@@ -63,7 +59,7 @@ void Group::take_first(const trace::Trace &trace, const std::vector<JobRecord> &
     for (const std::uint32_t p : refs[t].task->predecessors) is_sink_[t - refs[t].index + p] = false;
   }
   samples_.resize(refs.size());
-  end_to_end_.resize(trace.info.workload.dags.size());
+  end_to_end_.resize(refs.size());
   bounds_ = bounds_of(trace.info);
   schedule_ = schedule_of(trace, jobs, options_.most_slices, options_.most_views);
   timeline_ = timeline_of(trace, slices_of(trace), jobs, options_.most_bins);
@@ -76,46 +72,48 @@ void Group::take(const std::string &path, const trace::RunInfo &info, const std:
     samples.response.push_back(job.response());
     samples.lateness.add(job.lateness(), std::max<Duration>(1, job.deadline - job.release));
     samples.execution_max = std::max(samples.execution_max, job.processor == kNever ? job.on_worker : job.processor);
-    if (is_sink_[job.task.value]) end_to_end_[dag_of_[job.task.value].value].push_back(job.finish - job.origin);
+    if (is_sink_[job.task.value]) end_to_end_[job.task.value].push_back(job.finish - job.origin);
     if (!latest_ || relative_lateness(job) > relative_lateness(latest_->record)) {
       latest_ = LatestJob{job, path, job.release - info.start};
     }
   }
 }
 
+metrics::DagSummary Group::pooled(DagId dag) {
+  metrics::DagSummary all;
+  all.name = workload().dags[dag.value].name;
+  all.max_active = workload().dags[dag.value].max_active;
+  all.end_to_end.deadline = workload().dags[dag.value].deadline;
+  for (const RunDigest &run : runs_) {
+    const metrics::DagSummary &one = run.summary.dags[dag.value];
+    all.jobs.add_counts(one.jobs);
+    all.peak_active = std::max(all.peak_active, one.peak_active);
+    std::vector<metrics::SinkSummary> &sinks = all.end_to_end.sinks;
+    sinks.resize(one.end_to_end.sinks.size());
+    for (std::size_t s = 0; s < sinks.size(); ++s) {
+      sinks[s].task = one.end_to_end.sinks[s].task;
+      sinks[s].due += one.end_to_end.sinks[s].due;
+      sinks[s].late += one.end_to_end.sinks[s].late;
+    }
+  }
+  for (metrics::SinkSummary &sink : all.end_to_end.sinks) {
+    sink.response = metrics::distribution_of(std::move(end_to_end_[sink.task.value]));
+  }
+  all.end_to_end.conclude();
+  return all;
+}
+
 void Group::finish() {
   REDAG_CHECK(!runs_.empty(), "a group without runs");
-  const std::size_t dags = workload().dags.size();
   task_stats_.assign(samples_.size(), {});
-  dag_stats_.assign(dags, {});
-  end_to_end_stats_.assign(dags, {});
-  std::vector<std::vector<Duration>> of_dag(dags);
-  std::vector<Duration> all;
   for (std::size_t t = 0; t < samples_.size(); ++t) {
-    const std::size_t d = dag_of_[t].value;
     for (const RunDigest &run : runs_) task_stats_[t].add_counts(run.summary.tasks[t].jobs);
-    dag_stats_[d].add_counts(task_stats_[t]);
     total_.add_counts(task_stats_[t]);
     std::vector<Duration> &response = samples_[t].response;
     std::sort(response.begin(), response.end());
     task_stats_[t].response = metrics::distribution_of(response);
-    append(of_dag[d], response);
-    append(all, response);
   }
-  for (std::size_t d = 0; d < dags; ++d) {
-    dag_stats_[d].response = metrics::distribution_of(std::move(of_dag[d]));
-    metrics::EndToEnd &end_to_end = end_to_end_stats_[d];
-    end_to_end.deadline = workload().dags[d].deadline;
-    for (const RunDigest &run : runs_) end_to_end.late += run.summary.dags[d].end_to_end.late;
-    end_to_end.response = metrics::distribution_of(std::move(end_to_end_[d]));
-  }
-  total_.response = metrics::distribution_of(std::move(all));
-}
-
-std::uint32_t Group::peak_active(DagId dag) const {
-  std::uint32_t peak = 0;
-  for (const RunDigest &run : runs_) peak = std::max(peak, run.summary.dags[dag.value].peak_active);
-  return peak;
+  for (std::size_t d = 0; d < workload().dags.size(); ++d) dags_.push_back(pooled(DagId(d)));
 }
 
 }  // namespace redag::report

@@ -70,17 +70,18 @@ class Group {
   [[nodiscard]] const Timeline &timeline() const { return timeline_; }
   [[nodiscard]] const std::optional<LatestJob> &latest() const { return latest_; }
 
-  // Of all runs together: counts, and of the distributions only `response`.
+  // Of all jobs of all runs together: counts, and of a task's distributions only `response`.
   [[nodiscard]] const metrics::JobStats &task(TaskId task) const { return task_stats_[task.value]; }
-  [[nodiscard]] const metrics::JobStats &dag(DagId dag) const { return dag_stats_[dag.value]; }
-  [[nodiscard]] const metrics::JobStats &total() const { return total_; }
-  [[nodiscard]] const metrics::EndToEnd &end_to_end(DagId dag) const { return end_to_end_stats_[dag.value]; }
+  [[nodiscard]] const std::vector<metrics::DagSummary> &dags() const { return dags_; }
+  [[nodiscard]] const metrics::JobCounts &dag(DagId dag) const { return dags_[dag.value].jobs; }
+  [[nodiscard]] const metrics::JobCounts &total() const { return total_; }
+  [[nodiscard]] const metrics::EndToEnd &end_to_end(DagId dag) const { return dags_[dag.value].end_to_end; }
   [[nodiscard]] const Samples &samples(TaskId task) const { return samples_[task.value]; }
-  [[nodiscard]] std::uint32_t peak_active(DagId dag) const;
   /// Of runs on threads: bounds and wcets against what was measured, all runs together.
   [[nodiscard]] const metrics::AssumptionCheck &assumptions() const { return assumptions_; }
 
  private:
+  [[nodiscard]] metrics::DagSummary pooled(DagId dag);
   void take_first(const trace::Trace &trace, const std::vector<metrics::JobRecord> &jobs);
   void take(const std::string &path, const trace::RunInfo &info, const std::vector<metrics::JobRecord> &jobs);
 
@@ -90,16 +91,15 @@ class Group {
   std::vector<bool> is_sink_;                      // by TaskId
   std::vector<DagId> dag_of_;                      // by TaskId
   std::vector<Samples> samples_;                   // by TaskId
-  std::vector<std::vector<Duration>> end_to_end_;  // by DagId: f - origin at the sinks
+  std::vector<std::vector<Duration>> end_to_end_;  // by TaskId: f - origin, of sinks
   std::optional<LatestJob> latest_;
   RunBounds bounds_;
   Schedule schedule_;
   Timeline timeline_;
   std::vector<metrics::JobStats> task_stats_;
-  std::vector<metrics::JobStats> dag_stats_;
-  metrics::JobStats total_;
+  std::vector<metrics::DagSummary> dags_;
+  metrics::JobCounts total_;
   metrics::AssumptionCheck assumptions_;
-  std::vector<metrics::EndToEnd> end_to_end_stats_;
 };
 
 }  // namespace redag::report

@@ -9,6 +9,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
+#include "redag/metrics/miss.hpp"
 #include "redag/report/verdict.hpp"
 #include "redag/trace/run_info_json.hpp"
 #include "redag/version.hpp"
@@ -18,6 +19,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using metrics::JobRecord;
+using metrics::JobCounts;
 using metrics::JobStats;
 
 Json optional_time(const std::optional<Duration> &time) { return time ? Json(*time) : Json(nullptr); }
@@ -28,7 +30,7 @@ Json to_json(const metrics::Distribution &d) {
               {"p90_ns", d.p90},  {"p95_ns", d.p95},   {"p99_ns", d.p99}, {"max_ns", d.max}};
 }
 
-Json to_json(const JobStats &jobs) {
+Json to_json(const JobCounts &jobs) {
   Json lost = Json::object();
   for (std::size_t i = 0; i < metrics::kReasonCount; ++i) {
     if (jobs.by_reason[i] > 0) lost[redag::to_string(static_cast<Reason>(i))] = jobs.by_reason[i];
@@ -39,13 +41,26 @@ Json to_json(const JobStats &jobs) {
               {"skipped", jobs.skipped},
               {"aborted", jobs.aborted},
               {"in_flight", jobs.in_flight},
-              {"missed", jobs.late + jobs.skipped + jobs.aborted - jobs.no_data()},
+              {"missed", jobs.missed()},
               {"miss_ratio", jobs.miss_ratio_with_lost()},
               {"lost_by_reason", std::move(lost)},
               {"deferred", jobs.deferred},
               {"preemptions", jobs.preemptions},
-              {"max_lateness_ns", optional_time(jobs.max_lateness)},
-              {"response", to_json(jobs.response)}};
+              {"max_lateness_ns", optional_time(jobs.max_lateness)}};
+}
+
+Json to_json(const JobStats &jobs) {
+  Json json = to_json(static_cast<const JobCounts &>(jobs));
+  json["response"] = to_json(jobs.response);
+  return json;
+}
+
+Json to_json(const metrics::EndToEnd &end_to_end) {
+  Json sinks = Json::array();
+  for (const metrics::SinkSummary &sink : end_to_end.sinks) {
+    sinks.push_back(Json{{"task", sink.task.value}, {"late", sink.late}, {"response", to_json(sink.response)}});
+  }
+  return Json{{"late", end_to_end.late}, {"response", to_json(end_to_end.response)}, {"sinks", std::move(sinks)}};
 }
 
 Json to_json(const Provenance &provenance) {
@@ -75,7 +90,7 @@ Json to_json(const Window &window, Time end) {
     jobs["finish"].push_back(job.finish == kNever ? Json(nullptr) : Json(job.finish - job.release));
     jobs["outcome"].push_back(static_cast<int>(job.outcome));
     jobs["reason"].push_back(static_cast<int>(job.reason));
-    jobs["missed"].push_back(is_missed(job, end) ? 1 : 0);
+    jobs["missed"].push_back(metrics::miss_of(job, end) == metrics::Miss::None ? 0 : 1);
   }
   Json slices = columns({"task", "job", "worker", "begin", "length", "how"});
   for (const Slice &slice : window.slices) {
@@ -130,6 +145,7 @@ Json to_json(const RunDigest &run) {
               {"provenance", to_json(run.info.provenance)},
               {"seed", run.info.seed},
               {"released", run.summary.total.released},
+              {"missed", run.summary.total.missed()},
               {"miss_ratio", run.summary.total.miss_ratio_with_lost()},
               {"worker_busy", run.summary.worker_busy},
               {"inversions", {{"count", run.summary.inversions.count}, {"longest_ns", run.summary.inversions.longest}}},
@@ -141,7 +157,7 @@ Json to_json(const RunDigest &run) {
 // Distance of the worst job from its deadline, as a share of it; jobs lost are worse than any.
 double closeness(const Group &group, const TaskRef &ref) {
   const JobStats &jobs = group.task(ref.id);
-  if (jobs.skipped + jobs.aborted > jobs.no_data()) return 1e9 * jobs.miss_ratio_with_lost();
+  if (jobs.lost() > 0) return 1e9 * jobs.miss_ratio_with_lost();
   const double lateness = jobs.max_lateness ? static_cast<double>(*jobs.max_lateness) : -1e18;
   return lateness / static_cast<double>(std::max<Duration>(1, ref.task->deadline));
 }
@@ -217,16 +233,16 @@ class GroupWriter {
       for (const Task &task : dag.tasks) {
         if (period == 0 || (task.period > 0 && task.period < period)) period = task.period;
       }
-      const metrics::EndToEnd &end_to_end = group_.end_to_end(DagId(d));
       Json row{{"name", dag.name},
                {"tasks", dag.tasks.size()},
                {"period_ns", period},
                {"deadline_ns", dag.deadline},
                {"max_active", dag.max_active},
-               {"peak_active", group_.peak_active(DagId(d))},
+               {"peak_active", group_.dags()[d].peak_active},
                {"jobs", to_json(group_.dag(DagId(d)))},
-               {"end_to_end", {{"late", end_to_end.late}, {"response", to_json(end_to_end.response)}}}};
+               {"end_to_end", to_json(group_.end_to_end(DagId(d)))}};
       add_bound(row, group_.bounds().dags, d);
+      row["bound_alarm"] = is_above_bound(group_, DagId(d));
       rows.push_back(std::move(row));
     }
     return rows;
@@ -272,7 +288,8 @@ class GroupWriter {
   std::vector<bool> curves_;
 };
 
-// DAGs that all groups have, and each group's figures over its repetitions.
+// DAGs that all groups have, and each group's figures over its repetitions: shares and percentiles of each repetition as
+// a spread, counts and the maximum of all of them.
 Json comparison(std::span<const Group> groups) {
   Json rows = Json::array();
   for (const Dag &dag : groups.front().workload().dags) {
@@ -282,21 +299,30 @@ Json comparison(std::span<const Group> groups) {
       const auto same = std::find_if(dags.begin(), dags.end(), [&](const Dag &d) { return d.name == dag.name; });
       if (same == dags.end()) break;
       const auto index = static_cast<std::size_t>(same - dags.begin());
-      const auto over_runs = [&](auto value) {
+      const metrics::DagSummary &all = group.dags()[index];
+      std::vector<double> misses;
+      for (const RunDigest &run : group.runs()) {
+        misses.push_back(run.summary.dags[index].jobs.miss_ratio_with_lost());
+      }
+      const auto over_runs = [&](Duration metrics::Distribution::*figure) {
         std::vector<double> values;
         for (const RunDigest &run : group.runs()) {
-          values.push_back(static_cast<double>(value(run.summary.dags[index].jobs)));
+          const metrics::Distribution &response = run.summary.dags[index].end_to_end.response;
+          if (response.count > 0) values.push_back(static_cast<double>(response.*figure));
         }
-        return to_json(spread_of(std::move(values)));
+        return values.empty() ? Json() : to_json(spread_of(std::move(values)));
       };
+      const metrics::Distribution &response = all.end_to_end.response;
       row["groups"].push_back(Json{
-          {"released", group.dag(DagId(index)).released},
-          {"missed", over_runs([](const JobStats &jobs) { return jobs.miss_ratio_with_lost(); })},
-          {"late", over_runs([](const JobStats &jobs) { return jobs.miss_ratio(); })},
-          {"p50_ns", over_runs([](const JobStats &jobs) { return jobs.response.p50; })},
-          {"p95_ns", over_runs([](const JobStats &jobs) { return jobs.response.p95; })},
-          {"p99_ns", over_runs([](const JobStats &jobs) { return jobs.response.p99; })},
-          {"max_ns", over_runs([](const JobStats &jobs) { return jobs.response.max; })},
+          {"released", all.jobs.released},
+          {"late", all.jobs.late},
+          {"missed", all.jobs.missed()},
+          {"miss_ratio", to_json(spread_of(std::move(misses)))},
+          {"end_to_end_late", all.end_to_end.late},
+          {"p50_ns", over_runs(&metrics::Distribution::p50)},
+          {"p95_ns", over_runs(&metrics::Distribution::p95)},
+          {"p99_ns", over_runs(&metrics::Distribution::p99)},
+          {"max_ns", response.count > 0 ? Json(response.max) : Json()},
       });
     }
     if (row["groups"].size() == groups.size()) rows.push_back(std::move(row));
@@ -338,7 +364,7 @@ std::string to_json(std::span<const Group> groups, const DocumentOptions &option
   for (const Sentence &sentence : compare(groups)) words.push_back(to_json(sentence));
   for (const std::string &note : options.notes) words.push_back(to_json(Sentence{Tone::Caution, note}));
   const Json document{
-      {"format", "redag.report/1"},
+      {"format", "redag.report/2"},
       {"provenance", to_json(options.provenance)},
       {"version", kVersion},
       {"title", title_of(groups)},

@@ -1,4 +1,4 @@
-// The report as data ("redag.report/1", docs/results_format.md): groups of runs as one JSON text of bounded size. The
+// The report as data ("redag.report/2", docs/results_format.md): groups of runs as one JSON text of bounded size. The
 // page shows it; other programs can read it. Pure function: equal runs give equal bytes.
 #pragma once
 

@@ -3,20 +3,14 @@
 #include <algorithm>
 
 #include "redag/base/check.hpp"
+#include "redag/metrics/miss.hpp"
 
 namespace redag::report {
 namespace {
 
-using metrics::JobOutcome;
 using metrics::JobRecord;
 
 }  // namespace
-
-bool is_missed(const JobRecord &job, Time end) {
-  if (job.outcome == JobOutcome::Skipped) return true;
-  if (job.outcome == JobOutcome::Aborted) return job.reason != Reason::NoData;
-  return job.is_late(end);
-}
 
 Timeline timeline_of(const trace::Trace &trace, std::span<const Slice> slices, std::span<const JobRecord> jobs,
                      std::size_t most_bins) {
@@ -54,7 +48,7 @@ Timeline timeline_of(const trace::Trace &trace, std::span<const Slice> slices, s
     const std::size_t dag = refs[job.task.value].dag.value;
     const std::size_t bin = bin_at(job.release);
     ++timeline.released[dag][bin];
-    if (is_missed(job, trace.info.end)) ++timeline.missed[dag][bin];
+    if (metrics::miss_of(job, trace.info.end) != metrics::Miss::None) ++timeline.missed[dag][bin];
   }
   return timeline;
 }

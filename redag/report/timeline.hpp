@@ -25,7 +25,4 @@ struct Timeline {
 [[nodiscard]] Timeline timeline_of(const trace::Trace &trace, std::span<const Slice> slices,
                                    std::span<const metrics::JobRecord> jobs, std::size_t most_bins);
 
-/// Late, overdue at `end`, skipped, or aborted for another reason than that there was nothing to do.
-[[nodiscard]] bool is_missed(const metrics::JobRecord &job, Time end);
-
 }  // namespace redag::report

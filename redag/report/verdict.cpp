@@ -10,21 +10,8 @@
 namespace redag::report {
 namespace {
 
-using metrics::JobStats;
-
-std::uint64_t missed(const JobStats &jobs) { return jobs.late + jobs.skipped + jobs.aborted - jobs.no_data(); }
-
 std::string plural(std::uint64_t count, const std::string &noun) {
   return fmt::format("{} {}{}", format_count(count), noun, count == 1 ? "" : "s");
-}
-
-// "3 late, 2 skipped": only what there was.
-std::string how_missed(const JobStats &jobs) {
-  std::vector<std::string> parts;
-  if (jobs.late > 0) parts.push_back(format_count(jobs.late) + " late");
-  if (jobs.skipped > 0) parts.push_back(format_count(jobs.skipped) + " skipped");
-  if (jobs.aborted > jobs.no_data()) parts.push_back(format_count(jobs.aborted - jobs.no_data()) + " aborted");
-  return join(parts);
 }
 
 std::string closest(const Group &group) {
@@ -40,36 +27,9 @@ std::string closest(const Group &group) {
 }
 
 Sentence on_deadlines(const Group &group) {
-  const JobStats &total = group.total();
-  if (total.released == 0) return {Tone::Caution, "No job was released: there is nothing to judge."};
-  const std::uint64_t misses = missed(total);
-  if (misses == 0) {
-    const std::string open = total.in_flight > 0 ? fmt::format(" ({} still in progress)", total.in_flight) : "";
-    return {Tone::Good, fmt::format("Every deadline was met: {}{}, none late, none lost.{}",
-                                    plural(total.released, "job"), open, closest(group))};
-  }
-  std::vector<std::string> where;
-  std::size_t clean = 0;
-  for (std::size_t d = 0; d < group.workload().dags.size(); ++d) {
-    const JobStats &jobs = group.dag(DagId(d));
-    if (missed(jobs) == 0) {
-      ++clean;
-      continue;
-    }
-    where.push_back(fmt::format("{} {}", group.workload().dags[d].name, format_percent(jobs.miss_ratio_with_lost())));
-  }
-  constexpr std::size_t kMostNamed = 4;
-  if (where.size() > kMostNamed) {
-    const std::size_t more = where.size() - kMostNamed;
-    where.resize(kMostNamed);
-    where.push_back(plural(more, "other DAG"));
-  }
-  const std::string others = clean == 0   ? ""
-                             : clean == 1 ? ", the other one none"
-                                          : fmt::format(", the other {} none", clean);
-  return {Tone::Bad, fmt::format("{} of {} missed their deadline ({}): {}. By DAG: {}{}.{}", format_count(misses),
-                                 plural(total.released, "job"), format_percent(total.miss_ratio_with_lost()),
-                                 how_missed(total), join(where), others, closest(group))};
+  const metrics::DeadlineVerdict verdict = metrics::deadline_verdict(group.total(), group.dags());
+  if (!verdict.is_judged) return {Tone::Caution, verdict.text};
+  return {verdict.is_met ? Tone::Good : Tone::Bad, verdict.text + closest(group)};
 }
 
 std::string first_of(std::vector<std::string> names, std::size_t most) {
@@ -101,7 +61,7 @@ Sentence on_bounds(const Group &group) {
     const Duration longest = group.end_to_end(DagId(d)).response.max;
     if (!bounds.dags[d].response || longest <= *bounds.dags[d].response) continue;
     is_within = false;
-    if (!simulated && longest <= *bounds.dags[d].response + group.assumptions().unalarming(longest)) continue;
+    if (!is_above_bound(group, DagId(d))) continue;
     above.push_back(fmt::format("DAG {} ({}, bound {})", group.workload().dags[d].name, humanize_duration(longest),
                                 humanize_duration(*bounds.dags[d].response)));
   }
@@ -114,6 +74,11 @@ Sentence on_bounds(const Group &group) {
                                  ? ""
                                  : fmt::format(" Every response was within its bound ({} of {} have one).", bounded,
                                                plural(bounds.tasks.size(), "task"));
+  if (bounds.schedulable && metrics::has_misses(group.total(), group.dags())) {
+    return {Tone::Caution, fmt::format("Analysis, {}: every deadline is met, by {}, if its assumptions hold. This run missed "
+                                       "deadlines: they did not.{}",
+                                       bounds.assumes, first_of(bounds.by, 2), within)};
+  }
   if (bounds.schedulable) {
     return {Tone::Good, fmt::format("Analysis, {}: every deadline is met, by {}.{}", bounds.assumes,
                                     first_of(bounds.by, 2), within)};
@@ -180,13 +145,12 @@ const char *to_string(Tone tone) {
   return "";
 }
 
-std::string join(const std::vector<std::string> &names) {
-  std::string text;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (i > 0) text += i + 1 == names.size() ? " and " : ", ";
-    text += names[i];
-  }
-  return text;
+bool is_above_bound(const Group &group, DagId dag) {
+  const std::vector<BoundOf> &bounds = group.bounds().dags;
+  if (dag.value >= bounds.size() || !bounds[dag.value].response) return false;
+  const Duration longest = group.end_to_end(dag).response.max;
+  const bool simulated = group.info().driver == trace::Driver::Simulator;
+  return longest > *bounds[dag.value].response + (simulated ? 0 : group.assumptions().unalarming(longest));
 }
 
 std::vector<Sentence> verdict_of(const Group &group) {
@@ -211,16 +175,31 @@ std::string ranking(std::span<const Contender> contenders) {
   const Spread least = best->misses;
   std::vector<std::string> alike = {best->name};
   std::vector<std::string> worse;
+  bool none = best->missed == 0;  // of those that are alike
   for (const Contender &contender : contenders) {
     if (&contender == &*best) continue;
     // Ranges that touch say nothing about the next repetition.
-    (contender.misses.min > least.max ? worse : alike).push_back(contender.name);
+    const bool is_worse = contender.misses.min > least.max;
+    (is_worse ? worse : alike).push_back(contender.name);
+    if (!is_worse) none = none && contender.missed == 0;
   }
   if (worse.empty()) return "no clear difference";
   const std::string rest = join(worse) + (worse.size() == 1 ? " misses more" : " miss more");
   if (alike.size() == 1) return alike.front() + " misses fewest";
-  if (least.max == 0) return fmt::format("{} miss none, {}", join(alike), rest);
+  if (none) return fmt::format("{} miss none, {}", join(alike), rest);
   return fmt::format("{} do not differ clearly, {}", join(alike), rest);
+}
+
+std::string comparison_line(const std::string &dag, std::span<const Contender> contenders) {
+  std::string line = dag + ": ";
+  bool any = false;
+  for (const Contender &contender : contenders) {
+    any = any || contender.missed > 0;
+    const bool first = &contender == &contenders.front();
+    line += fmt::format("{}{} {}{}", first ? "" : ", ", contender.name, first ? "misses " : "",
+                        format_share(contender.missed, contender.released));
+  }
+  return line + ": " + (any ? ranking(contenders) : "no deadline missed");
 }
 
 std::vector<Sentence> compare(std::span<const Group> groups) {
@@ -232,22 +211,18 @@ std::vector<Sentence> compare(std::span<const Group> groups) {
       const std::vector<Dag> &dags = group.workload().dags;
       const auto same = std::find_if(dags.begin(), dags.end(), [&](const Dag &d) { return d.name == dag.name; });
       if (same == dags.end()) break;
+      const DagId id(static_cast<std::size_t>(same - dags.begin()));
       std::vector<double> misses;
       for (const RunDigest &run : group.runs()) {
-        misses.push_back(run.summary.dags[static_cast<std::size_t>(same - dags.begin())].jobs.miss_ratio_with_lost());
+        misses.push_back(run.summary.dags[id.value].jobs.miss_ratio_with_lost());
       }
-      contenders.push_back({group.label(), spread_of(misses)});
+      contenders.push_back({.name = group.label(),
+                            .missed = group.dag(id).missed(),
+                            .released = group.dag(id).released,
+                            .misses = spread_of(misses)});
     }
     if (contenders.size() < groups.size()) continue;
-    std::string line = dag.name + ": ";
-    bool any = false;
-    for (const Contender &contender : contenders) {
-      any = any || contender.misses.max > 0;
-      const bool first = &contender == &contenders.front();
-      line += fmt::format("{}{} {}{}", first ? "" : ", ", contender.name, first ? "misses " : "",
-                          format_percent(contender.misses.median));
-    }
-    sentences.push_back({Tone::Plain, line + ": " + (any ? ranking(contenders) : "nobody misses") + "."});
+    sentences.push_back({Tone::Plain, comparison_line(dag.name, contenders) + "."});
   }
   return sentences;
 }

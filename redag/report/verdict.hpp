@@ -7,9 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "redag/metrics/verdict.hpp"
 #include "redag/report/digest.hpp"
 
 namespace redag::report {
+
+using metrics::join;
 
 enum class Tone : std::uint8_t { Good, Bad, Caution, Plain };
 
@@ -23,6 +26,9 @@ struct Sentence {
 /// Of one group: deadlines, bounds, the trace checker, execution times, what disturbs its figures.
 [[nodiscard]] std::vector<Sentence> verdict_of(const Group &group);
 
+/// Is the longest end-to-end response of the DAG above its bound, by more than a machine that was not calibrated may take?
+[[nodiscard]] bool is_above_bound(const Group &group, DagId dag);
+
 /// One number over repetitions.
 struct Spread {
   double median = 0;
@@ -35,17 +41,19 @@ struct Spread {
 
 struct Contender {
   std::string name;
-  Spread misses;  // share of its jobs
+  std::uint64_t missed = 0;  // in all repetitions
+  std::uint64_t released = 0;
+  Spread misses;  // share of a repetition's jobs
 };
 
 /// Who misses fewest, and who cannot be told from that: "redag misses fewest". Ranges that touch say nothing about the
 /// next repetition. Requires a contender.
 [[nodiscard]] std::string ranking(std::span<const Contender> contenders);
 
+/// "control: redag misses 0.0043 % (1 of 23 326), mte 14.2 %: redag misses fewest"; shares are of all repetitions together.
+[[nodiscard]] std::string comparison_line(const std::string &dag, std::span<const Contender> contenders);
+
 /// A sentence for each DAG that all groups have; none for a single group.
 [[nodiscard]] std::vector<Sentence> compare(std::span<const Group> groups);
-
-/// "a, b and c".
-[[nodiscard]] std::string join(const std::vector<std::string> &names);
 
 }  // namespace redag::report

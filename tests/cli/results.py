@@ -21,13 +21,13 @@ class Diff(Case):
         full = self.results("full", "--preemption", "os")
         result = self.expect(redag("diff", none, full), 0)
         self.assertIn("differs preemption: none -> os", result.stdout)
-        self.assertIn("better fast.sense: missed 10.0 % -> 0.0 %", result.stdout)
+        self.assertIn("better fast.sense: missed 20 (10.0 %) -> 0", result.stdout)
         self.assertIn("worse slow.plan: p50 27ms -> 33ms", result.stdout)
         self.assertNotIn("lasts longer than the blocks", result.stdout)
         self.expect(redag("diff", none, full, "--check"), 1)
         self.expect(redag("diff", none, none, "--check"), 0)
         self.assertIn("no figure differs", redag("diff", none, none).stdout)
-        document = self.document(redag("diff", none, full, "--json"), "redag.difference/1")
+        document = self.document(redag("diff", none, full, "--json"), "redag.difference/2")
         self.assertEqual(document["changes"], [{"kind": "setting", "what": "preemption", "a": "none", "b": "os"}])
         self.assertEqual([row["task"] for row in document["rows"]], [None, None, "sense", "act", None, "plan"])
         self.assertTrue(document["worse"] and document["better"])
@@ -39,12 +39,12 @@ class Diff(Case):
         self.expect(redag("compare", file, "--simulate", "--duration", "20s", "--repeat", "3", "--executors",
                           "redag,mte", "--out", folder), 0)
         result = redag("diff", folder / "mte", folder / "redag", "--json")
-        self.assertEqual(self.document(result, "redag.difference/1")["a"]["seeds"], [1, 2, 3])
+        self.assertEqual(self.document(result, "redag.difference/2")["a"]["seeds"], [1, 2, 3])
         self.expect(redag("diff", folder, folder / "mte"), 2, "holds runs of several kinds: redag, mte", "name one of them")
         # Repetitions by any other name, as run_workload of redag_rclcpp has them.
         for n in 1, 2, 3:
             (folder / "redag" / f"repetition-{n}").rename(folder / "redag" / str(n))
-        again = self.document(redag("diff", folder / "mte", folder / "redag", "--json"), "redag.difference/1")
+        again = self.document(redag("diff", folder / "mte", folder / "redag", "--json"), "redag.difference/2")
         self.assertEqual(again["b"]["seeds"], [1, 2, 3])
         self.assertEqual(again["rows"], json.loads(result.stdout)["rows"])
 
@@ -143,27 +143,37 @@ class Report(Case):
         self.results("out")
 
     def test_data(self):
-        document = self.document(redag("report", self.results("out"), "--json"), "redag.report/1")
+        document = self.document(redag("report", self.results("out"), "--json"), "redag.report/2")
         group = document["groups"][0]
         self.assertEqual(group["label"], "redag")
         summary = json.loads((self.folder / "out" / "summary.json").read_text())
-        for key in ["released", "finished", "late", "skipped", "in_flight", "max_lateness_ns"]:
+        for key in ["released", "finished", "late", "skipped", "missed", "in_flight", "max_lateness_ns"]:
             self.assertEqual(group["total"][key], summary["total"][key], key)
-        self.assertEqual(group["total"]["response"], group["total"]["response"] | summary["total"]["response"])
+        for dag, expected in zip(group["dags"], summary["dags"]):
+            self.assertEqual(dag["end_to_end"]["response"], dag["end_to_end"]["response"] | expected["end_to_end"]["response"])
+            self.assertNotIn("response", dag["jobs"], "of jobs of several tasks")
         self.assertFalse((self.folder / "out" / "report.html").exists(), "--json alone writes no page")
+
+    def test_run_and_report_give_the_same_verdict(self):
+        for executor in ["redag", "ste"]:
+            out = self.folder / executor
+            shown = self.expect(redag("simulate", self.cart, "--executor", executor, "--duration", "2s", "--out", out), 0).stdout
+            said = self.expect(redag("report", out), 0).stdout.splitlines()[0]
+            verdict = next(line for line in shown.splitlines() if "deadline was met" in line or "missed their deadline" in line)
+            self.assertTrue(said.startswith(verdict), f"{said}\n{verdict}")
 
     def test_comparison(self):
         out = self.folder / "cmp"
         self.expect(redag("compare", self.cart, "--simulate", "--executors", "ste,redag", "--repeat", "2", "--duration", "1s",
                           "--out", out), 0)
-        document = self.document(redag("report", out, "--json"), "redag.report/1")
+        document = self.document(redag("report", out, "--json"), "redag.report/2")
         self.assertEqual([group["label"] for group in document["groups"]], ["ste", "redag"], "as they were listed")
         self.assertEqual([len(group["runs"]) for group in document["groups"]], [2, 2])
         self.assertEqual([row["name"] for row in document["comparison"]["dags"]], ["fast", "slow"])
 
     def test_folders_are_told_apart_by_name(self):
         first, second = self.results("before/redag"), self.results("after/redag", "--executor", "mte")
-        document = self.document(redag("report", first, second, first, "--json"), "redag.report/1")
+        document = self.document(redag("report", first, second, first, "--json"), "redag.report/2")
         self.assertEqual([group["label"] for group in document["groups"]], ["before/redag", "after/redag"])
 
     def test_mistakes(self):

@@ -186,23 +186,23 @@ function timelineFigure(groups, state) {
   });
 }
 
-/** One number of every DAG under every executor; `value(row)` is a spread {median, min, max}. */
+/** One number of every DAG under every executor; `value(row, cell)` is {at, min, max}, or null where there is none. */
 function comparisonFigure({name, title, groups, rows, value, log, format, formatAxis, caption}) {
   return figure({
     name, height: 300, label: title, caption,
     build(t, width) {
-      const positive = rows.flatMap((row) => row.groups.map((cell) => value(row, cell).median)).filter((v) => v > 0);
+      const positive = rows.flatMap((row) => row.groups.map((cell) => value(row, cell))).filter((v) => v !== null && v.at > 0).map((v) => v.at);
       if (log && positive.length === 0) return 'No job finished.';
       const floor = log ? 10 ** Math.floor(Math.log10(Math.min(...positive) / 2)) : 0;
-      const spread = (row, g) => value(row, row.groups[g]);
+      const spread = (row, g) => value(row, row.groups[g]) || {at: null, min: null, max: null};
       return {
         grid: {left: 8, right: 16, top: 54, bottom: 8, containLabel: true},
         legend: {},
         tooltip: {
           trigger: 'item',
           formatter: (item) => {
-            const {median, min, max} = spread(rows[item.dataIndex], item.seriesIndex % groups.length);
-            return tip([`${rows[item.dataIndex].name}, ${groups[item.seriesIndex % groups.length].label}`, format(median),
+            const {at, min, max} = spread(rows[item.dataIndex], item.seriesIndex % groups.length);
+            return tip([`${rows[item.dataIndex].name}, ${groups[item.seriesIndex % groups.length].label}`, at === null ? 'no answer' : format(at),
               min === max ? null : `repetitions: ${format(min)} to ${format(max)}`]);
           },
         },
@@ -214,7 +214,7 @@ function comparisonFigure({name, title, groups, rows, value, log, format, format
         series: [
           ...groups.map((group, g) => ({
             type: 'bar', name: group.label, barGap: '12%', barMaxWidth: 46, itemStyle: {color: colourOf(t, g), borderRadius: [3, 3, 0, 0]},
-            data: rows.map((row) => spread(row, g).median),
+            data: rows.map((row) => spread(row, g).at),
             label: {show: groups.length * rows.length * (log ? 78 : 60) <= width, position: 'top', color: t.soft, fontSize: 11, distance: 6,
               formatter: (item) => format(item.value)},
           })),

@@ -22,11 +22,18 @@ function formatAxisTime(ns, step) {
 /** 1234567 -> "1 234 567". */
 const formatCount = (count) => String(count).replace(/\B(?=(\d{3})+$)/g, '\u202f');
 
-/** "14.2 %"; a miss never reads as none. */
+/** "14.2 %"; what is not none never reads as none, and what is not all never as all. */
 function formatPercent(ratio) {
   const percent = 100 * ratio;
   if (percent > 0 && percent < 0.05) return `${Number(percent.toPrecision(2))}\u00a0%`;
+  if (percent < 100 && percent >= 99.95) return `${percent.toFixed(Math.min(12, Math.ceil(-Math.log10(100 - percent)) + 1))}\u00a0%`;
   return `${percent.toFixed(1)}\u00a0%`;
+}
+
+/** "0", "1 (0.0043 %)": beside a column that says of how many. */
+function formatCountAndShare(part, whole) {
+  if (whole === 0) return '\u2013';
+  return part === 0 ? '0' : `${formatCount(part)} (${formatPercent(part / whole)})`;
 }
 
 const DRIVERS = {

@@ -28,14 +28,14 @@ function comparisonSection() {
   if (rows.length === 0) return [...parts, element('p', {}, 'The runs have no DAG in common.')];
   const figures = [
     comparisonFigure({
-      name: 'missed', title: 'missed', groups, rows, value: (row, cell) => cell.missed, log: false, format: formatPercent,
+      name: 'missed', title: 'missed', groups, rows, value: (row, cell) => ({...cell.miss_ratio, at: cell.missed / Math.max(1, cell.released)}), log: false, format: formatPercent,
       formatAxis: (share) => `${Number((100 * share).toPrecision(3))} %`,
-      caption: 'Share of the released jobs that were late, skipped or aborted: median over repetitions, lines from the lowest to the highest.',
+      caption: 'Share of the released jobs of all repetitions that were late, skipped or aborted; lines from the lowest to the highest repetition.',
     }),
     comparisonFigure({
-      name: 'p99', title: 'p99 response', groups, rows, value: (row, cell) => cell.p99_ns, log: true,
+      name: 'p99', title: 'p99 end to end', groups, rows, value: (row, cell) => cell.p99_ns && {...cell.p99_ns, at: cell.p99_ns.median}, log: true,
       format: (ns) => (ns > 0 ? formatTime(Number(ns.toPrecision(3))) : ''), formatAxis: (ns) => formatAxisTime(ns, ns),
-      caption: '99th percentile of the responses of all jobs of the DAG, logarithmic; lines from the lowest to the highest repetition.',
+      caption: '99th percentile of the end-to-end response, logarithmic: median over repetitions, lines from the lowest to the highest.',
     }),
   ];
   return [...parts, element('div.side-by-side', {}, ...figures.map((fig) => fig.box)), filled(() => comparisonTable(groups, rows))];

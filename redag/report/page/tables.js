@@ -8,7 +8,7 @@ const swatch = (t, index) => element('span.swatch', {style: `background:${colour
 function missCell(jobs) {
   const lost = Object.entries(jobs.lost_by_reason).map(([reason, count]) => `${formatCount(count)} ${reason}`);
   return {
-    text: formatPercent(jobs.miss_ratio), kind: jobs.missed > 0 ? 'bad' : 'good',
+    text: formatCountAndShare(jobs.missed, jobs.released), kind: jobs.missed > 0 ? 'bad' : 'good',
     title: `${formatCount(jobs.missed)} of ${formatCount(jobs.released)}: ${[`${formatCount(jobs.late)} late`, ...lost].join(', ')}`,
   };
 }
@@ -33,7 +33,7 @@ function meter(t, response, deadline, bound, colour) {
 
 const meterHelp = 'Solid: median; lighter: p99 and max; grey: the time until the deadline. Red tick: deadline, green tick: bound';
 
-function boundCell(bound, measured, method, alarm = measured > bound) {
+function boundCell(bound, measured, method, alarm) {
   if (bound === null || bound === undefined) return '\u2013';
   return {text: formatTime(bound), kind: alarm ? 'bad' : '', title: `by ${method}${measured > bound ? '; exceeded' : ''}`};
 }
@@ -74,20 +74,30 @@ function taskTable(group, unfolded, unfold) {
     element('button.controls', {type: 'button', onclick: unfold}, `all ${all.length} tasks`))];
 }
 
+/** Of a DAG with several sinks: each by itself. */
+function sinkTimes(group, dag) {
+  const {sinks} = dag.end_to_end;
+  if (sinks.length < 2) return undefined;
+  return sinks.map(({task, response}) => `${group.tasks[task].name}: p50 ${formatTime(response && response.p50_ns)}, `
+    + `p99 ${formatTime(response && response.p99_ns)}, max ${formatTime(response && response.max_ns)}`).join('\n');
+}
+
 function dagTable(group) {
   const t = theme();
   const columns = [
     column('DAG'), column('tasks'), column('rate', 'Of its fastest task'), column('jobs'), column('missed', 'Late, skipped or aborted, of all released'),
-    column('end to end p50', 'From a source\u2019s release to a sink\u2019s finish'), column('p99'), column('max'), column('bound'), column('deadline', 'End to end'),
+    column('end to end p50', 'From a source\u2019s release to a sink\u2019s finish; of several sinks, each figure is that of the worst one'), column('p99'), column('max'),
+    column('bound'), column('deadline', 'End to end'), column('late', 'Finishes of sinks beyond the end-to-end deadline'),
     column('active / bound', 'Most jobs in progress at any time, and max_active'),
   ];
   return table(columns, group.dags.map((dag, d) => {
     const r = dag.end_to_end.response;
     return {cells: [
       {text: element('span', {}, swatch(t, d), dag.name)}, String(dag.tasks), dag.period_ns > 0 ? `${Number((1e9 / dag.period_ns).toPrecision(3))} Hz` : '\u2013',
-      formatCount(dag.jobs.released), missCell(dag.jobs), formatTime(r && r.p50_ns), formatTime(r && r.p99_ns), formatTime(r && r.max_ns),
-      boundCell(dag.bound_ns, r ? r.max_ns : 0, dag.method),
-      dag.deadline_ns > 0 ? {text: formatTime(dag.deadline_ns), kind: r && r.max_ns > dag.deadline_ns ? 'bad' : ''} : '\u2013',
+      formatCount(dag.jobs.released), missCell(dag.jobs), formatTime(r && r.p50_ns), formatTime(r && r.p99_ns), {text: formatTime(r && r.max_ns), title: sinkTimes(group, dag)},
+      boundCell(dag.bound_ns, r ? r.max_ns : 0, dag.method, dag.bound_alarm),
+      dag.deadline_ns > 0 ? formatTime(dag.deadline_ns) : '\u2013',
+      dag.deadline_ns > 0 ? {text: formatCount(dag.end_to_end.late), kind: dag.end_to_end.late > 0 ? 'bad' : 'good'} : '\u2013',
       `${dag.peak_active} / ${dag.max_active > 0 ? dag.max_active : '\u221e'}`,
     ]};
   }));
@@ -95,15 +105,21 @@ function dagTable(group) {
 
 function comparisonTable(groups, rows) {
   const t = theme();
+  const help = 'End to end, from a source\u2019s release to a sink\u2019s finish; of several sinks, that of the worst one. ';
+  const several = groups.some((group) => group.runs.length > 1);
+  const median = several ? 'median of the repetitions' : '';
   const columns = [
-    column('DAG'), column('executor', '', true), column('jobs'), column('late', 'Late, of all released'), column('missed', 'Late, skipped or aborted, of all released'),
-    column('p50', 'Response of all jobs of the DAG'), column('p95'), column('p99'), column('max'),
+    column('DAG'), column('executor', '', true), column('jobs'), column('late', 'Finished after their deadline, or overdue'),
+    column('missed', 'Late, skipped or aborted, of all released'),
+    ...['p50', 'p95', 'p99'].map((name) => column(several ? `${name}, median` : name, `${help}${median}`)),
+    column(several ? 'max of all' : 'max', `${help}${several ? 'The largest of all repetitions' : ''}`),
   ];
   const range = ({min, max}) => (formatPercent(min) === formatPercent(max) ? undefined : `repetitions: ${formatPercent(min)} to ${formatPercent(max)}`);
   return table(columns, rows.flatMap((row) => row.groups.map((cell, g) => ({first: g === 0, cells: [
-    g === 0 ? row.name : '', {text: element('span', {}, swatch(t, g), groups[g].label)}, formatCount(cell.released), formatPercent(cell.late.median),
-    {text: formatPercent(cell.missed.median), kind: cell.missed.median > 0 ? 'bad' : 'good', title: range(cell.missed)},
-    ...['p50_ns', 'p95_ns', 'p99_ns', 'max_ns'].map((key) => formatTime(cell[key].median)),
+    g === 0 ? row.name : '', {text: element('span', {}, swatch(t, g), groups[g].label)}, formatCount(cell.released), formatCount(cell.late),
+    {text: formatCountAndShare(cell.missed, cell.released), kind: cell.missed > 0 ? 'bad' : 'good', title: range(cell.miss_ratio)},
+    ...['p50_ns', 'p95_ns', 'p99_ns'].map((key) => formatTime(cell[key] && cell[key].median)),
+    {text: formatTime(cell.max_ns), kind: cell.end_to_end_late > 0 ? 'bad' : ''},
   ]}))));
 }
 
@@ -115,7 +131,7 @@ function runTable(groups) {
   return table(columns, groups.flatMap((group) => group.runs.map((run) => ({cells: [
     {text: element('span', {title: run.path}, run.path.split('/').slice(-2).join('/'))},
     {text: run.provenance ? run.provenance.created : '\u2013', title: run.provenance ? Object.entries(run.provenance).map(([key, value]) => `${key}: ${value}`).join('\n') : undefined},
-    String(run.seed), formatCount(run.released), formatPercent(run.miss_ratio),
+    String(run.seed), formatCount(run.released), {text: formatCountAndShare(run.missed, run.released), kind: run.missed > 0 ? 'bad' : 'good'},
     run.worker_busy.map((share) => `${(100 * share).toFixed(0)}\u00a0%`).join(', '), formatCount(run.checks),
     {text: formatCount(run.violation_count), kind: run.violation_count > 0 ? 'bad' : 'good', title: run.violations.join('\n')},
     formatCount(run.inversions.count), formatTime(run.inversions.longest_ns),

@@ -12,10 +12,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <system_error>
 
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/check.hpp"
+#include "redag/base/text.hpp"
 #include "redag/metrics/summary.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/events_file.hpp"
@@ -45,7 +47,7 @@ usage: run_workload WORKLOAD.yaml [options]
   --seed N                   of execution times: every executor gets the same jobs (default 1)
   --transport intra|inter    messages within the process, or through the middleware (default intra)
   --threads N                of the executor (default: the workload's workers; ste, static, events have one)
-  --repeat N                 repetitions, the executors taking turns; the table shows medians (default 1)
+  --repeat N                 repetitions, the executors taking turns, and shown together (default 1)
   --out DIR                  result files as `redag run` writes them; of several runs DIR/EXECUTOR/REPETITION
   --force                    write into a folder that is not empty
   --help
@@ -249,12 +251,24 @@ double median(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
 }
 
-std::string comparison_row_text(const Repetitions &repetitions, std::size_t dag, redag::Duration Distribution::*value) {
+// A percentile of the end-to-end response: its median over the repetitions in which the DAG answered.
+std::string percentile_text(const Repetitions &repetitions, std::size_t dag, redag::Duration Distribution::*percentile) {
   std::vector<double> values;
   for (const auto &dags : repetitions) {
-    if (dags[dag].jobs.response.count > 0) values.push_back(static_cast<double>(dags[dag].jobs.response.*value));
+    const Distribution &response = dags[dag].end_to_end.response;
+    if (response.count > 0) values.push_back(static_cast<double>(response.*percentile));
   }
   return values.empty() ? "-" : redag::humanize_duration(static_cast<Duration>(median(values)));
+}
+
+// The largest end-to-end response of all repetitions.
+std::string longest_text(const Repetitions &repetitions, std::size_t dag) {
+  std::optional<Duration> longest;
+  for (const auto &dags : repetitions) {
+    const Distribution &response = dags[dag].end_to_end.response;
+    if (response.count > 0) longest = std::max(longest.value_or(response.max), response.max);
+  }
+  return longest ? redag::humanize_duration(*longest) : "-";
 }
 
 std::string comparison_table(const redag::Workload &workload, const std::vector<std::string> &executors,
@@ -264,19 +278,19 @@ std::string comparison_table(const redag::Workload &workload, const std::vector<
     for (const std::string &executor : executors) {
       const Repetitions &repetitions = results[executor];
       if (repetitions.empty()) continue;
-      std::uint64_t jobs = 0;
+      redag::metrics::JobCounts jobs;
       std::vector<double> missed;
       for (const auto &dags : repetitions) {
-        jobs += dags[dag].jobs.released;
-        missed.push_back(100 * dags[dag].jobs.miss_ratio_with_lost());
+        jobs.add_counts(dags[dag].jobs);
+        missed.push_back(dags[dag].jobs.miss_ratio_with_lost());
       }
       const auto [low, high] = std::minmax_element(missed.begin(), missed.end());
-      table.add({workload.dags[dag].name, executor, fmt::format("{}", repetitions.size()), fmt::format("{}", jobs),
-                 fmt::format("{:.2f} %", median(missed)), fmt::format("{:.2f} %", *low), fmt::format("{:.2f} %", *high),
-                 comparison_row_text(repetitions, dag, &Distribution::p50),
-                 comparison_row_text(repetitions, dag, &Distribution::p95),
-                 comparison_row_text(repetitions, dag, &Distribution::p99),
-                 comparison_row_text(repetitions, dag, &Distribution::max)});
+      table.add({workload.dags[dag].name, executor, fmt::format("{}", repetitions.size()),
+                 fmt::format("{}", jobs.released), redag::format_count_and_share(jobs.missed(), jobs.released),
+                 redag::format_percent(*low), redag::format_percent(*high),
+                 percentile_text(repetitions, dag, &Distribution::p50),
+                 percentile_text(repetitions, dag, &Distribution::p95),
+                 percentile_text(repetitions, dag, &Distribution::p99), longest_text(repetitions, dag)});
     }
   }
   return table.render();
@@ -347,8 +361,9 @@ int compare(const redag::Workload &workload, const Arguments &arguments, const s
                arguments.run.intra_process ? "intra-process" : "middleware", arguments.run.seed,
                comparison_table(workload, arguments.executors, results));
     fmt::print(
-        "missed: late, skipped or aborted of released jobs, median of the runs; response times: finish - release, "
-        "medians\n");
+        "missed: late, skipped or aborted of the released jobs of all runs; lowest, highest: of a run\n"
+        "p50 to max: end to end, from the release of a source to the finish of a sink (of several: the worst one); "
+        "max is of all runs, p50 to p99 are medians of the runs\n");
   }
   if (real_time && results.size() > 1) {
     fmt::print(

@@ -1,0 +1,89 @@
+#include "redag/metrics/verdict.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "redag/base/text.hpp"
+
+namespace redag::metrics {
+namespace {
+
+std::string jobs_text(std::uint64_t count) { return format_count(count) + (count == 1 ? " job" : " jobs"); }
+
+// "3 late, 2 skipped": only what there was.
+std::string how_missed(const JobCounts &jobs) {
+  std::vector<std::string> parts;
+  if (jobs.late > 0) parts.push_back(format_count(jobs.late) + " late");
+  if (jobs.skipped > 0) parts.push_back(format_count(jobs.skipped) + " skipped");
+  if (jobs.aborted > jobs.no_data()) parts.push_back(format_count(jobs.aborted - jobs.no_data()) + " aborted");
+  return join(parts);
+}
+
+// "control 12.0 %, b 0.0043 % (1 of 23 326) and 3 other DAGs, the other one none".
+std::string by_dag(std::span<const DagSummary> dags) {
+  std::vector<std::string> where;
+  std::size_t clean = 0;
+  for (const DagSummary &dag : dags) {
+    if (dag.jobs.missed() == 0) {
+      ++clean;
+    } else {
+      where.push_back(dag.name + " " + format_share(dag.jobs.missed(), dag.jobs.released));
+    }
+  }
+  constexpr std::size_t kMostNamed = 4;
+  if (where.size() > kMostNamed) {
+    const std::size_t more = where.size() - kMostNamed;
+    where.resize(kMostNamed);
+    where.push_back(fmt::format("{} other DAG{}", format_count(more), more == 1 ? "" : "s"));
+  }
+  if (clean == 0) return join(where);
+  return join(where) + (clean == 1 ? ", the other one none" : fmt::format(", the other {} none", clean));
+}
+
+// " End to end, control was late 5 times of 1 000 (2ms)."
+std::string late_end_to_end(std::span<const DagSummary> dags) {
+  std::vector<std::string> parts;
+  for (const DagSummary &dag : dags) {
+    const EndToEnd &end_to_end = dag.end_to_end;
+    if (end_to_end.late == 0) continue;
+    parts.push_back(fmt::format("{} came later than its {} {} of {} times", dag.name,
+                                humanize_duration(end_to_end.deadline), format_count(end_to_end.late),
+                                format_count(std::max(end_to_end.late, end_to_end.response.count))));
+  }
+  return parts.empty() ? std::string() : " End to end, " + join(parts) + ".";
+}
+
+}  // namespace
+
+std::string join(const std::vector<std::string> &names) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i > 0) text += i + 1 == names.size() ? " and " : ", ";
+    text += names[i];
+  }
+  return text;
+}
+
+bool has_misses(const JobCounts &total, std::span<const DagSummary> dags) {
+  return total.missed() > 0 ||
+         std::any_of(dags.begin(), dags.end(), [](const DagSummary &dag) { return dag.end_to_end.late > 0; });
+}
+
+DeadlineVerdict deadline_verdict(const JobCounts &total, std::span<const DagSummary> dags) {
+  if (total.released == 0) return {false, false, "No job was released: there is nothing to judge."};
+  const std::uint64_t missed = total.missed();
+  if (missed > 0) {
+    const double share = static_cast<double>(missed) / static_cast<double>(total.released);
+    return {true, false,
+            fmt::format("{} of {} missed their deadline ({}): {}. By DAG: {}.{}", format_count(missed),
+                        jobs_text(total.released), format_percent(share), how_missed(total), by_dag(dags),
+                        late_end_to_end(dags))};
+  }
+  const std::string open = total.in_flight > 0 ? fmt::format(" ({} still in progress)", total.in_flight) : "";
+  const std::string jobs = fmt::format("{}{}, none late, none lost.", jobs_text(total.released), open);
+  if (!has_misses(total, dags)) return {true, true, "Every deadline was met: " + jobs};
+  return {true, false, "Every job met its own deadline: " + jobs + late_end_to_end(dags)};
+}
+
+}  // namespace redag::metrics
