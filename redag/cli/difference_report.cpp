@@ -88,9 +88,9 @@ std::string longest_text(const DifferenceSide::Row &side) {
 
 std::string differences_table(const Diffed &diffed, const StreamTraits &terminal, bool all) {
   Table table({{"", false, 9},
-               {"jobs", true, 1},
+               {"jobs", true, 2},
                {"missed", true, 8},
-               {"dropped", true, 2},
+               {"dropped", true, 1},
                {"p50", true, 3},
                {"p95", true, 4},
                {"p99", true, 6},
@@ -249,7 +249,7 @@ std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool al
                         : found;
   text += fmt::format(
       "* more than chance{}; {} tests, false discovery rate 5 %; intervals 95 %, from blocks of time; max is not "
-      "tested\ntimes of a task: finish - release; of a DAG with one sink: end to end; percentages: of all jobs of a side\n",
+      "tested\ntimes of a task: finish - release; of a DAG with one sink: end to end; shares: of the jobs of that side\n",
       diffed.options.tolerance > 0 ? fmt::format(", response times by more than {:g} %", 100 * diffed.options.tolerance)
                                    : "",
       diffed.difference.tests);

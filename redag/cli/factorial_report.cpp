@@ -27,11 +27,22 @@ Median total(const Factorial &factorial, const FactorialResults &results, const 
   return *over_runs(factorial, results, row, row.runs.front().dags.size() - 1, metric);
 }
 
-std::string with_interval(const Median &median) {
+// The median and its interval; where most runs missed nothing, also what all of them missed.
+std::string with_interval(const Median &median, std::uint64_t missed, std::uint64_t released) {
+  if (median.median == 0 && missed > 0) {
+    return fmt::format("{} of {} in all runs", format_count(missed), format_count(released));
+  }
   const std::string middle = format_percent(median.median);
   const std::string low = format_percent(median.low);
   const std::string high = format_percent(median.high);
   return low == high ? middle : fmt::format("{} ({}..{})", middle, low, high);
+}
+
+// Of all jobs of all runs: a miss in one of them is not lost, as in a median.
+double missed_share(const FactorialRow &row) {
+  const std::size_t all = row.runs.front().dags.size() - 1;
+  const auto released = static_cast<double>(sum_over_runs(row, all, experiment::Measure::Released));
+  return static_cast<double>(sum_over_runs(row, all, experiment::Measure::Missed)) / std::max(1.0, released);
 }
 
 Duration rounded(double value) { return static_cast<Duration>(value); }
@@ -55,10 +66,11 @@ std::string combination_table(const Factorial &factorial, const FactorialResults
       cells.push_back({level == kNoLevel ? "-" : factorial.factors()[static_cast<std::size_t>(kind)].levels[level]});
     }
     const auto value = [&](Metric metric) { return total(factorial, results, row, metric); };
-    cells.push_back({with_interval(value(Metric::MissRatio))});
+    const std::size_t all = row.runs.front().dags.size() - 1;
+    cells.push_back({with_interval(value(Metric::MissRatio), sum_over_runs(row, all, experiment::Measure::Missed),
+                                   sum_over_runs(row, all, experiment::Measure::Released))});
     cells.push_back({format_percent(value(Metric::DropRatio).median)});
     cells.push_back({format_percent(value(Metric::PaperMissRatio).median)});
-    const std::size_t all = row.runs.front().dags.size() - 1;
     const std::optional<Median> lateness = over_runs(factorial, results, row, all, Metric::MaxLateness);
     cells.push_back({lateness ? humanize_duration(rounded(lateness->median)) : "-"});
     table.add(std::move(cells));
@@ -83,7 +95,7 @@ std::string range_table(const Factorial &factorial, const FactorialResults &resu
       for (const FactorialRow &row : results.rows) {
         const experiment::FactorialPoint &point = factorial.points()[row.point];
         if (point.of(FactorKind::Workload) != w || point.of(FactorKind::Executor) != e || row.runs.empty()) continue;
-        rows.emplace_back(total(factorial, results, row, Metric::MissRatio).median, &row);
+        rows.emplace_back(missed_share(row), &row);
         sum += rows.back().first;
       }
       if (rows.empty()) continue;

@@ -51,9 +51,9 @@ std::vector<std::size_t> shown_tasks(const metrics::Summary &summary, bool all) 
 
 std::string task_table(const Session &session, const StreamTraits &terminal, bool all) {
   Table table({{"task", false, 9},
-               {"jobs", true, 5},
-               {"late", true, 6},
-               {"skipped", true, 6},
+               {"jobs", true, 7},
+               {"late", true, 1},
+               {"skipped", true, 1},
                {"aborted", true, 0},
                {"missed", true, 8},
                {"p50", true, 3},
@@ -88,7 +88,7 @@ std::string task_table(const Session &session, const StreamTraits &terminal, boo
 
 std::string dag_table(const Session &session, const StreamTraits &terminal) {
   Table table({{"DAG", false, 9},
-               {"jobs", true, 5},
+               {"jobs", true, 7},
                {"missed", true, 8},
                {"end-to-end p50", true, 3},
                {"p99", true, 4},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <set>
 
 #include "redag/base/check.hpp"
 
@@ -12,6 +13,7 @@ namespace {
 
 constexpr std::size_t kGap = 2;          // between columns
 constexpr std::size_t kShortestCut = 8;  // a text column is not cut below this
+constexpr std::size_t kLongestCut = 24;  // nor below what tells its cells apart, if that is no more than this
 
 std::string padded(const std::string &text, std::size_t width, bool right) {
   const std::size_t used = display_width(text);
@@ -32,6 +34,18 @@ std::string cut(std::string_view text, std::size_t width) {
   return std::string(text.substr(0, bytes)) + "…";
 }
 
+std::size_t Table::shortest_cut(std::size_t column) const {
+  const auto different = [&](std::size_t width) {
+    std::set<std::string> texts;
+    for (const auto &row : rows_) texts.insert(cut(row[column].text, width));
+    return texts.size();
+  };
+  const std::size_t all = different(kLongestCut);
+  std::size_t width = kShortestCut;
+  while (width < kLongestCut && different(width) < all) ++width;
+  return width;
+}
+
 void Table::add(std::vector<Cell> row) {
   REDAG_CHECK(row.size() <= columns_.size(), "a row has more cells than the table has columns");
   row.resize(columns_.size());
@@ -50,10 +64,14 @@ std::vector<std::size_t> Table::fit(std::size_t width, std::vector<std::size_t> 
     for (const std::size_t i : shown) total += widths[i];
     return width > 0 && total > width ? total - width : 0;
   };
+  std::vector<std::size_t> least = widths;
+  if (excess() > 0) {
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      if (!columns_[i].number && !columns_[i].whole) least[i] = shortest_cut(i);
+    }
+  }
   const auto cut_widest_text = [&] {
-    const auto can_shrink = [&](std::size_t i) {
-      return !columns_[i].number && !columns_[i].whole && widths[i] > kShortestCut;
-    };
+    const auto can_shrink = [&](std::size_t i) { return widths[i] > least[i]; };
     std::size_t widest = columns_.size();
     for (const std::size_t i : shown) {
       if (can_shrink(i) && (widest == columns_.size() || widths[i] > widths[widest])) widest = i;

@@ -36,6 +36,9 @@ class Table {
  private:
   [[nodiscard]] std::vector<std::size_t> fit(std::size_t width, std::vector<std::size_t> &shown) const;
 
+  /// Least width at which cells that differ still do.
+  [[nodiscard]] std::size_t shortest_cut(std::size_t column) const;
+
   std::vector<Column> columns_;
   std::vector<std::vector<Cell>> rows_;
 };

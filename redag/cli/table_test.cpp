@@ -74,5 +74,15 @@ TEST(ProgressLine, FitsTheTerminal) {
   EXPECT_EQ(display_width(progress_line("mte 1/3", 2.0, std::string(200, 'x'), 60)), 60U);
 }
 
+TEST(Table, NamesAreNotCutUntilTheyAreTheSame) {
+  Table table({{"task", false, 9}, {"jobs", true, 5}, {"late", true, 1}});
+  table.add({{"perception.camera"}, {"1 000 000"}, {"1 000 000"}});
+  table.add({{"perception.lidar"}, {"1 000 000"}, {"1 000 000"}});
+  const std::string text = table.render(30, false);
+  EXPECT_NE(text.find("perception.c…"), std::string::npos) << text;
+  EXPECT_NE(text.find("perception.l…"), std::string::npos) << text;
+  EXPECT_NE(text.find("(no room for: late)"), std::string::npos) << text;
+}
+
 }  // namespace
 }  // namespace redag::cli

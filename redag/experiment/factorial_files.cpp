@@ -45,7 +45,9 @@ Json row_json(const Factorial &factorial, const FactorialResults &results, const
   json["all_enforced"] = enforced;
   json["dags"] = Json::array();
   for (std::size_t dag = 0; dag < row.runs.front().dags.size(); ++dag) {
-    Json metrics = {{"dag", row.runs.front().dags[dag].dag}};
+    Json metrics = {{"dag", row.runs.front().dags[dag].dag},
+                    {"released", sum_over_runs(row, dag, Measure::Released)},
+                    {"missed", sum_over_runs(row, dag, Measure::Missed)}};
     for (std::size_t m = 0; m < kMetricCount; ++m) {
       const auto metric = static_cast<Metric>(m);
       const std::optional<Median> median = over_runs(factorial, results, row, dag, metric);
@@ -83,7 +85,7 @@ Json effects_json(const Factorial &factorial, const FactorialEffects &one) {
 
 std::string to_json(const Factorial &factorial, const FactorialResults &results, const std::vector<std::string> &runs) {
   const FactorialPlan &plan = factorial.plan();
-  Json document = {{"format", "redag.experiment.factorial/1"},
+  Json document = {{"format", "redag.experiment.factorial/2"},
                    {"provenance", Json::parse(provenance_to_json(current_provenance()))},
                    {"name", plan.name},
                    {"version", kVersion},

@@ -137,6 +137,12 @@ std::optional<Median> over_runs(const Factorial &factorial, const FactorialResul
   return Median{.median = *largest, .low = *least, .high = *largest, .confidence = median_of(values).confidence};
 }
 
+std::uint64_t sum_over_runs(const FactorialRow &row, std::size_t dag, Measure measure) {
+  std::uint64_t sum = 0;
+  for (const Observation &run : row.runs) sum += static_cast<std::uint64_t>(run.dags[dag].of(measure));
+  return sum;
+}
+
 std::vector<FactorialEffects> effects_of(const Factorial &factorial, const FactorialResults &results) {
   std::vector<FactorialEffects> all;
   if (!results.complete()) return all;

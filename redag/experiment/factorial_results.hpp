@@ -87,6 +87,9 @@ class FactorialCounter {
 [[nodiscard]] std::optional<Median> over_runs(const Factorial &factorial, const FactorialResults &results,
                                               const FactorialRow &row, std::size_t dag, Metric metric);
 
+/// Jobs of DAG number `dag`, of all runs of the row. Requires a count.
+[[nodiscard]] std::uint64_t sum_over_runs(const FactorialRow &row, std::size_t dag, Measure measure);
+
 /// For every workload and executor with factors that vary; empty while runs are missing.
 [[nodiscard]] std::vector<FactorialEffects> effects_of(const Factorial &factorial, const FactorialResults &results);
 

@@ -185,7 +185,7 @@ TEST(Factorial, ResultsAreMediansWithTheirDistanceToTheIdeal) {
   EXPECT_THAT(observations_csv(factorial, results), HasSubstr("\ncart,,,,,,,ste,6,"));
   EXPECT_THAT(quantiles_csv(factorial, results), HasSubstr("cart,,2,,,,,ideal,slow,100,30000000\n"));
   const std::string json = to_json(factorial, results, {});
-  EXPECT_THAT(json, HasSubstr("\"format\":\"redag.experiment.factorial/1\""));
+  EXPECT_THAT(json, HasSubstr("\"format\":\"redag.experiment.factorial/2\""));
   EXPECT_THAT(json, HasSubstr("\"complete\":true"));
   EXPECT_THAT(to_svg(factorial, results), HasSubstr("workers"));
   EXPECT_THAT(responses_svg(factorial, results), HasSubstr(">cart, workers 2: slow<"));

@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char *kFormat = "redag.experiment.factorial/1";
+constexpr const char *kFormat = "redag.experiment.factorial/2";
 // What the page draws, in this order.
 constexpr std::array kMetrics = {"miss_ratio",
                                  "drop_ratio",
@@ -51,7 +51,11 @@ Json dag_json(const Json &dag) {
     }
     values.push_back(std::move(spread));
   }
-  return Json{{"name", dag.at("dag")}, {"confidence", dag.at("confidence")}, {"values", std::move(values)}};
+  return Json{{"name", dag.at("dag")},
+              {"released", dag.at("released")},
+              {"missed", dag.at("missed")},
+              {"confidence", dag.at("confidence")},
+              {"values", std::move(values)}};
 }
 
 Json point_json(const Json &point) {

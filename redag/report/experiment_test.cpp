@@ -13,10 +13,12 @@ using ::testing::HasSubstr;
 nlohmann::json small_document() {
   const nlohmann::json dag = {{"dag", "total"},
                               {"confidence", 0.96875},
+                              {"released", 23326},
+                              {"missed", 1},
                               {"miss_ratio", {0.12345678, 0.1, 0.2}},
                               {"response_p99_ns", {1234567.0, 1000000.0, 2000000.0}},
                               {"max_lateness_ns", {-1234567.0, -2.0, 0.0}}};
-  return {{"format", "redag.experiment.factorial/1"},
+  return {{"format", "redag.experiment.factorial/2"},
           {"name", "cart"},
           {"version", "1.2.3"},
           {"plan", "experiment: factorial\n"},
@@ -54,6 +56,8 @@ TEST(ExperimentDocument, HoldsWhatThePageDraws) {
   EXPECT_EQ(at("response_p99_ns"), nlohmann::json({1235000, 1000000, 2000000}));
   EXPECT_EQ(at("max_lateness_ns"), nlohmann::json({-1235000, -2, 0}));
   EXPECT_TRUE(at("excess_miss_ratio").is_null()) << "there was no ideal";
+  EXPECT_EQ(json.at("points").at(0).at("dags").at(0).at("missed"), 1);
+  EXPECT_EQ(json.at("points").at(0).at("dags").at(0).at("released"), 23326);
   EXPECT_TRUE(json.at("points").at(1).at("dags").empty()) << "no run is finished";
   EXPECT_EQ(json.at("points").at(0).at("worlds"), nlohmann::json({"ros_nodes"})) << "of the runs, not the plan's";
   EXPECT_TRUE(json.at("points").at(1).at("worlds").empty());
@@ -65,7 +69,7 @@ TEST(ExperimentDocument, OtherFilesAreRefused) {
     return document ? std::string() : to_string(document.error());
   };
   EXPECT_THAT(error_of("{"), HasSubstr("x/factorial.json: error: cannot be read"));
-  EXPECT_THAT(error_of("{\"format\": \"redag.summary/1\"}"), HasSubstr("is no redag.experiment.factorial/1 document"));
+  EXPECT_THAT(error_of("{\"format\": \"redag.summary/1\"}"), HasSubstr("is no redag.experiment.factorial/2 document"));
   nlohmann::json without = small_document();
   without.erase("factors");
   EXPECT_THAT(error_of(without.dump()), HasSubstr("factors"));

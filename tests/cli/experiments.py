@@ -240,7 +240,7 @@ class Factorial(Case):
         self.assertEqual((document["kind"], len(document["points"])), ("factorial", 26))
         self.expect(redag("report", self.folder / "done", self.folder / "done"), 2, "name one folder")
         (self.folder / "done" / "factorial.json").write_text("{}")
-        self.expect(redag("report", self.folder / "done"), 2, "factorial.json: error: is no redag.experiment.factorial/1")
+        self.expect(redag("report", self.folder / "done"), 2, "factorial.json: error: is no redag.experiment.factorial/2")
         self.run_plan(self.folder / "done" / "plan.yaml", "done")  # a page in the folder is no stranger
 
     def test_plan_in_the_folder_is_whole(self):

@@ -167,7 +167,7 @@ await test('experiment: each choice changes its figures', async () => {
   await changes(['curves', 'distance', 'bounds'], pick('demand scale', '5'));
   await changes(['curves', 'bounds'], pick('deadline scale', '1.2'));
   await changes(['curves', 'bounds'], pick('DAG', 'dag2'));
-  await changes(['curves', 'bounds'], pick('of', 'p99 response'));
+  await changes(['curves', 'bounds'], pick('of', 'p99 end to end'));
   await changes(['curves', 'distance'], pick('over', 'max active'));
   await figureShot(page, 'curves', 'experiment-over-bounds');
   await changes(['bounds'], pick('workers', '2'));
@@ -190,7 +190,7 @@ await test('worlds: every row says where it ran, and the worlds of an executor a
   assert.match(await page.locator('ul.verdict').innerText(), /in virtual time ideal [^;]*; on threads of this machine redag [^;]*mte/);
   assert.match(await page.locator('h2#how ~ dl').innerText(), /threads\s+redag, mte, redag-none on threads of this machine/);
   const markup = () => drawing(page, 'worlds');
-  for (const [name, value] of [['of', 'p99 response'], ['DAG', 'control'], ['demand scale', '0.5']]) {
+  for (const [name, value] of [['DAG', 'control'], ['of', 'p99 end to end'], ['demand scale', '0.5']]) {
     const before = await markup();
     await page.getByLabel(name, {exact: true}).selectOption(value);
     assert.notEqual(await markup(), before, name);

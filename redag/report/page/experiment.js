@@ -19,11 +19,14 @@ const varied = factors.filter(({name, levels}) => name !== EXECUTOR && levels.le
 const pairs = (factors.find(({name}) => name === 'max_active') || {levels: []}).levels.filter((level) => /^\d+\+\d+$/.test(level));
 
 const METRICS = {
-  miss_ratio: 'missed: late or dropped', drop_ratio: 'dropped', excess_miss_ratio: 'missed above the ideal', response_p50_ns: 'median response',
-  response_p95_ns: 'p95 response', response_p99_ns: 'p99 response', response_max_ns: 'longest response', max_lateness_ns: 'largest lateness',
+  miss_ratio: 'missed: late or dropped', drop_ratio: 'dropped', excess_miss_ratio: 'missed above the ideal', response_p50_ns: 'median end to end',
+  response_p95_ns: 'p95 end to end', response_p99_ns: 'p99 end to end', response_max_ns: 'longest end to end, of all runs', max_lateness_ns: 'largest lateness, of all runs',
   deferred: 'deferred, of all jobs', preemptions: 'preemptions a job', paper_miss_ratio: 'missed as the paper counts',
   finished_per_s: 'finished jobs a second', work: 'processors in use',
 };
+// Why a figure is empty.
+const nothing = (metric) => (metric.startsWith('response_') ? 'A response is that of one DAG, end to end: choose a DAG. (One that never answered has none.)'
+  : 'There is nothing of this kind: the distance to the ideal needs the executor "ideal" on the same workers and jobs.');
 const isTime = (metric) => metric.endsWith('_ns');
 const isShare = (metric) => metric.endsWith('_ratio') || metric === 'deferred';
 const show = (metric, value) => (isTime(metric) ? formatTime(value) : isShare(metric) ? formatPercent(value) : String(value));
@@ -38,16 +41,21 @@ const byPlace = new Map(points.map((point) => [factors.map(({name}) => point.at[
 const knows = new Map(executors.map((executor) => [executor, new Set(points.filter((point) => point.at.executor === executor)
   .flatMap((point) => Object.keys(point.at)))]));
 
-/** [median, low, high] of an executor at the chosen levels, some of them replaced by `other`; null if it did not run. */
-function spreadAt(executor, metric, other = {}) {
+/** A DAG under an executor at the chosen levels, some of them replaced by `other`; null if it did not run. */
+function dagAt(executor, other = {}) {
   const place = factors.map(({name, levels}) => {
     if (name === EXECUTOR) return executor;
     if (!knows.get(executor).has(name)) return '';
     return other[name] ?? state.levels[name] ?? levels[0];
   }).join('\n');
   const point = byPlace.get(place);
-  const dag = point && (point.dags.find(({name}) => name === state.dag) || point.dags[point.dags.length - 1]);
-  return dag ? dag.values[report.metrics.indexOf(metric)] : null;
+  return (point && (point.dags.find(({name}) => name === state.dag) || point.dags[point.dags.length - 1])) || null;
+}
+
+/** [median, low, high] there; of a largest value [largest of all runs, least, largest]. */
+function spreadAt(executor, metric, other = {}) {
+  const dag = dagAt(executor, other);
+  return dag === null ? null : dag.values[report.metrics.indexOf(metric)];
 }
 
 const where = (skip) => varied.filter(({name}) => !skip.includes(name)).map(({name}) => `${words(name)} ${state.levels[name]}`).join(', ');
@@ -67,7 +75,7 @@ function curvesFigure(name, metricOf, caption) {
         const spread = spreadAt(executor, metric, {[factor.name]: level});
         return spread && [x(i), ...spread];
       }).filter((value) => value !== null)})).filter(({values}) => values.length > 0);
-      if (lines.length === 0) return 'There is nothing of this kind: the distance to the ideal needs the executor "ideal" on the same workers.';
+      if (lines.length === 0) return nothing(metric);
       const symbols = ['circle', 'rect', 'triangle', 'diamond', 'emptyCircle', 'emptyRect', 'emptyTriangle', 'emptyDiamond'];
       const most = Math.max(...lines.flatMap(({values}) => values.map((value) => value[1])));
       return {
@@ -119,7 +127,7 @@ function worldsFigure() {
       const inWorld = (name, world) => executors.find((executor) => plainName(executor) === name && worldOf.get(executor) === world);
       const spread = (name, world) => (inWorld(name, world) ? spreadAt(inWorld(name, world), metric) : null);
       const names = plainNames.filter((name) => worlds.some((world) => spread(name, world) !== null));
-      if (names.length === 0) return 'There is nothing of this kind: the distance to the ideal needs the executor "ideal" on the same workers and jobs.';
+      if (names.length === 0) return nothing(metric);
       const all = names.flatMap((name) => worlds.map((world) => spread(name, world))).filter((one) => one !== null);
       const most = Math.max(...all.map((one) => one[0]));
       // Times are far apart; a logarithmic axis has no place for early ones (negative lateness).
@@ -176,11 +184,11 @@ function boundsFigure() {
   const note = element('p.soft');
   const self = figure({
     name: 'bounds', height: 380, label: 'A metric for each pair of bounds',
-    caption: 'Across: max_active of the first DAG; up: of the second. The number is the median.',
+    caption: 'Across: max_active of the first DAG; up: of the second. The number is the median; of a largest value, the largest of all runs.',
     build(t, width) {
       const owner = owners[state.owner];
       const cells = pairs.map((pair) => [...pair.split('+'), spreadAt(owner, state.metric, {max_active: pair})]).filter((cell) => cell[2] !== null);
-      if (cells.length === 0) return 'There is nothing of this kind.';
+      if (cells.length === 0) return nothing(state.metric);
       const axis = (i) => [...new Set(cells.map((cell) => cell[i]))].sort((a, b) => a - b);
       const [across, up] = [axis(0), axis(1)];
       const values = cells.map((cell) => cell[2][0]);
@@ -259,7 +267,7 @@ function verdict() {
   factors.find(({name}) => name === 'workload').levels.forEach((workload) => {
     const missed = (executor) => {
       const misses = points.filter(({at, dags}) => at.executor === executor && at.workload === workload && dags.length > 0)
-        .map(({dags}) => dags[dags.length - 1].values[0][0]);
+        .map(({dags}) => dags[dags.length - 1]).map((all) => all.missed / Math.max(1, all.released));
       if (misses.length === 0) return null;
       const mean = misses.reduce((a, b) => a + b, 0) / misses.length;
       return `${plainName(executor)} ${formatPercent(mean)}${misses.length > 1 ? ` (${formatPercent(Math.min(...misses))} to ${formatPercent(Math.max(...misses))})` : ''}`;
@@ -287,7 +295,13 @@ function selectionTable() {
       if (spread('miss_ratio') === null) return;
       rows.push({first, cells: [first ? level : '', plainName(executor), ...(worlds.length > 1 ? [WORLDS[worldOf.get(executor)]] : []), ...shownMetrics.map((metric) => {
         const value = spread(metric);
-        return value === null ? '' : {text: show(metric, value[0]), title: `${show(metric, value[1])} to ${show(metric, value[2])}`, kind: metric === 'miss_ratio' && value[0] > 0 ? 'bad' : ''};
+        if (value === null) return '';
+        const range = `${show(metric, value[1])} to ${show(metric, value[2])}`;
+        if (metric !== 'miss_ratio') return {text: show(metric, value[0]), title: range};
+        // Where most runs missed nothing the median hides what the others missed.
+        const {missed, released} = dagAt(executor, factor ? {[factor.name]: level} : {});
+        const counted = `${formatCount(missed)} of ${formatCount(released)}`;
+        return {text: value[0] === 0 && missed > 0 ? counted : show(metric, value[0]), title: `${range}; ${counted} in all runs`, kind: missed > 0 ? 'bad' : ''};
       })]});
       first = false;
     });
@@ -311,7 +325,8 @@ function howItWasRun() {
   ];
 }
 
-const intervals = 'Lines across: a confidence interval for the median over the repetitions, whose level the tables of the experiment give.';
+const intervals = 'Lines across: a confidence interval for the median over the repetitions, whose level the tables of the experiment give; '
+  + 'of a largest value, which is that of all runs, from the least to the largest run.';
 const bars = worlds.length > 1 || varied.length === 0 ? worldsFigure() : null;
 const curves = curvesFigure('curves', () => state.metric, `Medians at the chosen levels. ${intervals}`);
 const distance = curvesFigure('distance', () => 'excess_miss_ratio', 'Missed deadlines above those of the ideal (preemptive, no overhead, no bounds, in virtual '
