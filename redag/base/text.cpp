@@ -117,7 +117,8 @@ std::string format_share(std::uint64_t part, std::uint64_t whole) {
 std::string format_count_and_share(std::uint64_t part, std::uint64_t whole) {
   if (whole == 0) return "-";
   if (part == 0) return "0";
-  return fmt::format("{} ({})", format_count(part), format_percent(static_cast<double>(part) / static_cast<double>(whole)));
+  return fmt::format("{} ({})", format_count(part),
+                     format_percent(static_cast<double>(part) / static_cast<double>(whole)));
 }
 
 bool json_nests_deeper(std::string_view json, std::size_t levels) {

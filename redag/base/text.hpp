@@ -9,15 +9,15 @@
 
 namespace redag {
 
-/// A share of one: 0.1421 -> "14.2 %"; "-" if nothing was counted (not finite). Never reads as none, or as all, where it
-/// is not.
+/// A share of one: 0.1421 -> "14.2 %"; "-" if nothing was counted (not finite). Never reads as none, or as all, where
+/// it is not.
 [[nodiscard]] std::string format_percent(double ratio);
 
 /// 1234567 -> "1 234 567".
 [[nodiscard]] std::string format_count(std::uint64_t count);
 
-/// A share in a sentence: "14.2 %", below 1 % with what was counted: "0.0043 % (1 of 23 326)"; "none" of `whole`, and "-"
-/// where `whole` is 0.
+/// A share in a sentence: "14.2 %", below 1 % with what was counted: "0.0043 % (1 of 23 326)"; "none" of `whole`, and
+/// "-" where `whole` is 0.
 [[nodiscard]] std::string format_share(std::uint64_t part, std::uint64_t whole);
 
 /// The same in a table with a column for `whole`: "0", "1 (0.0043 %)"; "-" where `whole` is 0.

@@ -74,16 +74,12 @@ std::string quoted(const std::string &text) {
 }
 
 std::string comparison_table(const Comparison &comparison, const StreamTraits &terminal) {
-  Table table({{"DAG", false, 9},
-               {"executor", false, 9, true},
-               {"jobs", true, 7},
-               {"late", true, 2},
-               {"missed", true, 8},
-               {"missed, by repetition", true, 3},
-               {"p50", true, 4},
-               {"p95", true, 1},
-               {"p99", true, 6},
-               {"max", true, 5}});
+  const bool is_repeated = comparison.executors.front().repetitions.size() > 1;
+  std::vector<Column> columns = {
+      {"DAG", false, 9}, {"executor", false, 9, true}, {"jobs", true, 7}, {"late", true, 2}, {"missed", true, 8}};
+  if (is_repeated) columns.push_back({"missed, by repetition", true, 3});
+  columns.insert(columns.end(), {{"p50", true, 4}, {"p95", true, 1}, {"p99", true, 6}, {"max", true, 5}});
+  Table table(std::move(columns));
   for (std::size_t dag = 0; dag < comparison.dags.size(); ++dag) {
     for (const ExecutorResults &results : comparison.executors) {
       const metrics::JobCounts jobs = results.jobs(dag);
@@ -92,17 +88,19 @@ std::string comparison_table(const Comparison &comparison, const StreamTraits &t
         return Cell{spread ? humanize_duration(static_cast<Duration>(spread->median)) : "-"};
       };
       const std::optional<Duration> longest = results.longest_end_to_end(dag);
-      table.add({{&results == &comparison.executors.front() ? comparison.dags[dag] : ""},
-                 {results.variant.name},
-                 {format_count(jobs.released)},
-                 {format_count(jobs.late)},
-                 {format_count_and_share(jobs.missed(), jobs.released), jobs.missed() > 0 ? Tint::Bad : Tint::Good},
-                 {range_text(results.miss(dag))},
-                 time(&metrics::Distribution::p50),
-                 time(&metrics::Distribution::p95),
-                 time(&metrics::Distribution::p99),
-                 {longest ? humanize_duration(*longest) : "-",
-                  results.late_end_to_end(dag) > 0 ? Tint::Bad : Tint::Plain}});
+      std::vector<Cell> row = {
+          {&results == &comparison.executors.front() ? comparison.dags[dag] : ""},
+          {results.variant.name},
+          {format_count(jobs.released)},
+          {format_count(jobs.late)},
+          {format_count_and_share(jobs.missed(), jobs.released), jobs.missed() > 0 ? Tint::Bad : Tint::Good}};
+      if (is_repeated) row.push_back({range_text(results.miss(dag))});
+      row.insert(row.end(), {time(&metrics::Distribution::p50),
+                             time(&metrics::Distribution::p95),
+                             time(&metrics::Distribution::p99),
+                             {longest ? humanize_duration(*longest) : "-",
+                              results.late_end_to_end(dag) > 0 ? Tint::Bad : Tint::Plain}});
+      table.add(std::move(row));
     }
   }
   return table.render(terminal.width, terminal.colour);
@@ -112,10 +110,10 @@ std::string comparison_table(const Comparison &comparison, const StreamTraits &t
 std::string legend(const Comparison &comparison, std::size_t repetitions) {
   std::string text = "missed: late, skipped or aborted, of all jobs";
   if (repetitions > 1) text += " of all repetitions";
-  text += "\nmax, p50 to p99: end to end, from the release of a source to the finish of a sink";
-  const bool several = std::any_of(
-      comparison.executors.front().repetitions.front().begin(), comparison.executors.front().repetitions.front().end(),
-      [](const Observation &seen) { return seen.end_to_end.sinks.size() > 1; });
+  text += "\np50 to max: end to end, from the release of a source to the finish of a sink";
+  const bool several = std::any_of(comparison.executors.front().repetitions.front().begin(),
+                                   comparison.executors.front().repetitions.front().end(),
+                                   [](const Observation &seen) { return seen.end_to_end.sinks.size() > 1; });
   if (several) text += ";\nof several sinks, each figure is that of the worst one";
   if (repetitions > 1) text += ";\nmax is of all repetitions, p50 to p99 are medians over the repetitions";
   return text + "\n\n";

@@ -128,8 +128,7 @@ std::string findings(const Diffed &diffed, const StreamTraits &terminal) {
         const FigureDifference &value = row.figures.*figure.value;
         text += fmt::format("{} {}: {} {} -> {} ({})\n", tinted(to_string(wanted), tint_of(wanted), terminal.colour),
                             row_name(row), figure.name, value_text(figure, *row.a, value.a),
-                            value_text(figure, *row.b, value.b),
-                            change_text(figure, value));
+                            value_text(figure, *row.b, value.b), change_text(figure, value));
       }
     }
   }
@@ -183,10 +182,12 @@ Json figure_json(const DifferenceRow &row, const Figure &figure) {
 Json counts_json(const DifferenceSide::Row &row) {
   std::size_t blocks = 0;
   for (const auto &run : row.runs) blocks += run.size();
-  return Json{
-      {"released", row.released}, {"late", row.late},   {"lost", row.lost},
-      {"missed", row.missed()},   {"max_ns", row.has_responses() ? Json(row.max) : Json()},
-      {"blocks", blocks}};
+  return Json{{"released", row.released},
+              {"late", row.late},
+              {"lost", row.lost},
+              {"missed", row.missed()},
+              {"max_ns", row.has_responses() ? Json(row.max) : Json()},
+              {"blocks", blocks}};
 }
 
 Json side_json(const DiffSide &side) {
@@ -249,7 +250,8 @@ std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool al
                         : found;
   text += fmt::format(
       "* more than chance{}; {} tests, false discovery rate 5 %; intervals 95 %, from blocks of time; max is not "
-      "tested\ntimes of a task: finish - release; of a DAG with one sink: end to end; shares: of the jobs of that side\n",
+      "tested\ntimes of a task: finish - release; of a DAG with one sink: end to end; shares: of the jobs of that "
+      "side\n",
       diffed.options.tolerance > 0 ? fmt::format(", response times by more than {:g} %", 100 * diffed.options.tolerance)
                                    : "",
       diffed.difference.tests);

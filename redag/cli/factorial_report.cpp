@@ -161,7 +161,9 @@ std::string describe(const Factorial &factorial, const FactorialResults &results
   };
   if (results.done > 0) {
     if (results.rows.size() <= kMostRows) {
-      heading("Deadlines missed: late or dropped, of all releases (medians, confidence interval); max lateness: of all runs");
+      heading(
+          "Deadlines missed: late or dropped, of all releases (medians, confidence interval); max lateness: of all "
+          "runs");
       text += combination_table(factorial, results, traits);
     } else {
       heading("Deadlines missed: late or dropped, of all releases");

@@ -45,7 +45,8 @@ struct SessionOptions {
   std::function<void(const std::string &text)> on_overdue;
 };
 
-/// Deadline misses while a run goes on, by DAG: jobs that ended late or were lost, as the summary is going to count them.
+/// Deadline misses while a run goes on, by DAG: jobs that ended late or were lost, as the summary is going to count
+/// them.
 class MissCounter {
  public:
   explicit MissCounter(const Workload &workload);

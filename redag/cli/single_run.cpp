@@ -78,7 +78,8 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
     if (written && !arguments.json) console.print(message);
   }
   if (!written) return kExitBad;
-  const bool no = !session->check.ok() || (arguments.check && metrics::has_misses(session->summary.total, session->summary.dags));
+  const bool no =
+      !session->check.ok() || (arguments.check && metrics::has_misses(session->summary.total, session->summary.dags));
   return no ? kExitNo : kExitOk;
 }
 

@@ -47,7 +47,8 @@ std::optional<double> value_of(const DagObservation &seen, Metric metric, Durati
     case Metric::Deferred: return per_release(Measure::Deferred);
     case Metric::Preemptions: return per_release(Measure::Preemptions);
     case Metric::PeakActive: return plain(Measure::PeakActive);
-    case Metric::FinishedPerSecond: return static_cast<double>(seen.of(Measure::Finished)) * kSecond / static_cast<double>(counted);
+    case Metric::FinishedPerSecond:
+      return static_cast<double>(seen.of(Measure::Finished)) * kSecond / static_cast<double>(counted);
     case Metric::Work: return static_cast<double>(seen.of(Measure::Work)) / static_cast<double>(counted);
   }
   return 0;

@@ -81,9 +81,9 @@ class FactorialCounter {
   FactorialResults results_;
 };
 
-/// Of DAG number `dag` of the row: the median over the runs and its confidence interval; of a maximum the largest of all
-/// runs, with the least and the largest. Nothing where no run is finished, nothing was measured (the response of all DAGs
-/// together, or of one that never answered), or there is no ideal to compare with.
+/// Of DAG number `dag` of the row: the median over the runs and its confidence interval; of a maximum the largest of
+/// all runs, with the least and the largest. Nothing where no run is finished, nothing was measured (the response of
+/// all DAGs together, or of one that never answered), or there is no ideal to compare with.
 [[nodiscard]] std::optional<Median> over_runs(const Factorial &factorial, const FactorialResults &results,
                                               const FactorialRow &row, std::size_t dag, Metric metric);
 

@@ -22,9 +22,9 @@ using Json = nlohmann::ordered_json;
 using metrics::JobRecord;
 
 constexpr std::array<const char *, kMeasureCount> kNames = {
-    "released",           "finished",     "late",         "dropped",       "aborted",      "missed",
-    "deferred",           "preemptions",  "max_lateness", "response_mean", "response_p50", "response_p95",
-    "response_p99",       "response_max", "peak_active",  "paper_jobs",    "paper_late",   "paper_max_lateness",
+    "released",           "finished",     "late",         "dropped",       "aborted",        "missed",
+    "deferred",           "preemptions",  "max_lateness", "response_mean", "response_p50",   "response_p95",
+    "response_p99",       "response_max", "peak_active",  "paper_jobs",    "paper_late",     "paper_max_lateness",
     "paper_startup_late", "work",         "answered",     "answers_due",   "end_to_end_late"};
 
 // Of the end-to-end responses, sink by sink; of several sinks the largest, quantile by quantile.

@@ -16,8 +16,8 @@
 
 namespace redag::experiment {
 
-/// Counted or measured in one run; durations in ns. The names of docs/experiments.md. The response of a DAG is end to end,
-/// of several sinks figure by figure that of the worst one; all DAGs together have none.
+/// Counted or measured in one run; durations in ns. The names of docs/experiments.md. The response of a DAG is end to
+/// end, of several sinks figure by figure that of the worst one; all DAGs together have none.
 enum class Measure : std::uint8_t {
   Released,
   Finished,

@@ -1,5 +1,5 @@
-// Follows the jobs of a stream of events and judges each (miss.hpp) when it ends, or when the run does: for callers that
-// need no summary. Not thread-safe.
+// Follows the jobs of a stream of events and judges each (miss.hpp) when it ends, or when the run does: for callers
+// that need no summary. Not thread-safe.
 #pragma once
 
 #include <optional>

@@ -62,8 +62,7 @@ void DifferenceSide::make_rows(const Workload &workload) {
     const bool one_sink = std::count(is_sink.begin(), is_sink.end(), true) == 1;
     for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
       const bool ends_dag = one_sink && is_sink[i];
-      places_.push_back(
-          Places{dag_row, rows_.size(), ends_dag ? std::optional<std::size_t>(dag_row) : std::nullopt});
+      places_.push_back(Places{dag_row, rows_.size(), ends_dag ? std::optional<std::size_t>(dag_row) : std::nullopt});
       Row &row = rows_.emplace_back();
       row.dag = dag.name;
       row.task = dag.tasks[i].name;

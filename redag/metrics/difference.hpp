@@ -26,8 +26,8 @@ class DifferenceSide {
     std::uint64_t released = 0;
     std::uint64_t late = 0;
     std::uint64_t lost = 0;  // skipped, or aborted though they had data
-    /// Of a task f - r, of a DAG with one sink f - origin there: end to end. 0 if none finished, and always of what has no
-    /// response of its own: all DAGs together, a DAG with several sinks.
+    /// Of a task f - r, of a DAG with one sink f - origin there: end to end. 0 if none finished, and always of what has
+    /// no response of its own: all DAGs together, a DAG with several sinks.
     Duration max = 0;
     BlockedRuns runs;  // with those responses
 

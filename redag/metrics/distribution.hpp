@@ -33,8 +33,8 @@ struct Distribution {
 [[nodiscard]] Duration percentile(const std::vector<Duration> &sorted, double percent);
 
 /// Of several distributions the worst, figure by figure: mean, percentiles and maximum are the largest among them, the
-/// minimum is the least, `count` is that of all. Mixes nothing: each figure is that of one of them. Those without values
-/// say nothing.
+/// minimum is the least, `count` is that of all. Mixes nothing: each figure is that of one of them. Those without
+/// values say nothing.
 [[nodiscard]] Distribution worst_of(std::span<const Distribution> all);
 
 /// O(n log n).

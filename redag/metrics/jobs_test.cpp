@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "redag/metrics/miss.hpp"
 #include <unistd.h>
+#include "redag/metrics/miss.hpp"
 
 #include <filesystem>
 

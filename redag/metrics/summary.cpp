@@ -17,8 +17,8 @@ std::size_t exact_jobs_of(std::size_t tasks) {
   return std::max(kLeast, kExactJobs / std::max<std::size_t>(1, tasks));
 }
 
-// By task of a DAG: how many of its jobs the releases of its sources ask for. A timer is released by itself, a data task
-// once all its predecessors have ended: as often as the rarest of them, at most.
+// By task of a DAG: how many of its jobs the releases of its sources ask for. A timer is released by itself, a data
+// task once all its predecessors have ended: as often as the rarest of them, at most.
 std::vector<std::uint64_t> answers_due(const Dag &dag, std::span<const JobStats> stats) {
   const std::vector<std::uint32_t> ranks = topological_ranks(dag);
   std::vector<std::size_t> order(ranks.size());
@@ -138,8 +138,7 @@ EndToEnd Summarizer::end_to_end_of(DagId dag, std::size_t first_task) const {
   const Dag &spec = run_.workload.dags[dag.value];
   EndToEnd end_to_end;
   end_to_end.deadline = spec.deadline;
-  const std::vector<std::uint64_t> due =
-      answers_due(spec, std::span(stats_).subspan(first_task, spec.tasks.size()));
+  const std::vector<std::uint64_t> due = answers_due(spec, std::span(stats_).subspan(first_task, spec.tasks.size()));
   for (std::size_t i = 0; i < spec.tasks.size(); ++i) {
     const std::size_t t = first_task + i;
     if (!is_sink_[t]) continue;

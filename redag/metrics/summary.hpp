@@ -23,8 +23,8 @@ inline constexpr std::size_t kExactJobs = std::size_t{1} << 20U;
 
 inline constexpr std::size_t kReasonCount = static_cast<std::size_t>(kLastReason) + 1;
 
-/// Jobs of a task, of a DAG, or of all, counted. Jobs released before the end of the warm-up are not in it. There are no
-/// times in it but an extreme: those of several tasks' jobs mixed would say nothing of any.
+/// Jobs of a task, of a DAG, or of all, counted. Jobs released before the end of the warm-up are not in it. There are
+/// no times in it but an extreme: those of several tasks' jobs mixed would say nothing of any.
 struct JobCounts {
   std::uint64_t released = 0;  // = finished + skipped + aborted + in_flight
   std::uint64_t finished = 0;
@@ -69,8 +69,8 @@ struct SinkSummary {
   Distribution response;   // f - origin, finished jobs
 };
 
-/// What a DAG answers. Its sinks are not mixed: of several, each figure of `response` is that of the sink with the worst
-/// one (worst_of).
+/// What a DAG answers. Its sinks are not mixed: of several, each figure of `response` is that of the sink with the
+/// worst one (worst_of).
 struct EndToEnd {
   Duration deadline = 0;   // of the DAG; 0: none
   std::uint64_t late = 0;  // at all sinks

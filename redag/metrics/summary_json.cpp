@@ -64,8 +64,8 @@ Json to_json(const TaskSummary &task) {
 Json to_json(const EndToEnd &end_to_end) {
   Json sinks = Json::array();
   for (const SinkSummary &sink : end_to_end.sinks) {
-    sinks.push_back(Json{
-        {"id", sink.task.value}, {"due", sink.due}, {"late", sink.late}, {"response", to_json(sink.response)}});
+    sinks.push_back(
+        Json{{"id", sink.task.value}, {"due", sink.due}, {"late", sink.late}, {"response", to_json(sink.response)}});
   }
   return Json{{"deadline_ns", end_to_end.deadline},
               {"late", end_to_end.late},

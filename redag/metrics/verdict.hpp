@@ -1,5 +1,5 @@
-// The verdict on a run's deadlines, in one place and in one set of words: `run`, `simulate`, `report` and its page say the
-// same. Pure functions.
+// The verdict on a run's deadlines, in one place and in one set of words: `run`, `simulate`, `report` and its page say
+// the same. Pure functions.
 #pragma once
 
 #include <span>

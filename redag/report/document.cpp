@@ -18,8 +18,8 @@ namespace redag::report {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using metrics::JobRecord;
 using metrics::JobCounts;
+using metrics::JobRecord;
 using metrics::JobStats;
 
 Json optional_time(const std::optional<Duration> &time) { return time ? Json(*time) : Json(nullptr); }
@@ -288,8 +288,8 @@ class GroupWriter {
   std::vector<bool> curves_;
 };
 
-// DAGs that all groups have, and each group's figures over its repetitions: shares and percentiles of each repetition as
-// a spread, counts and the maximum of all of them.
+// DAGs that all groups have, and each group's figures over its repetitions: shares and percentiles of each repetition
+// as a spread, counts and the maximum of all of them.
 Json comparison(std::span<const Group> groups) {
   Json rows = Json::array();
   for (const Dag &dag : groups.front().workload().dags) {

@@ -247,8 +247,7 @@ TEST(Compare, OneMissIsNeverNone) {
     all.push_back(group_of(label, traces));
   }
   ASSERT_EQ(all[0].total().released, 23326U);
-  EXPECT_EQ(compare(all).front().text,
-            "control: redag misses 0.0043 % (1 of 23 326), mte none: no clear difference.");
+  EXPECT_EQ(compare(all).front().text, "control: redag misses 0.0043 % (1 of 23 326), mte none: no clear difference.");
   EXPECT_EQ(verdict_of(all[0]).front().tone, Tone::Bad);
   EXPECT_EQ(verdict_of(all[1]).front().tone, Tone::Good);
   const json document = json::parse(to_json(all));

@@ -75,9 +75,10 @@ Sentence on_bounds(const Group &group) {
                                  : fmt::format(" Every response was within its bound ({} of {} have one).", bounded,
                                                plural(bounds.tasks.size(), "task"));
   if (bounds.schedulable && metrics::has_misses(group.total(), group.dags())) {
-    return {Tone::Caution, fmt::format("Analysis, {}: every deadline is met, by {}, if its assumptions hold. This run missed "
-                                       "deadlines: they did not.{}",
-                                       bounds.assumes, first_of(bounds.by, 2), within)};
+    return {Tone::Caution,
+            fmt::format("Analysis, {}: every deadline is met, by {}, if its assumptions hold. This run missed "
+                        "deadlines: they did not.{}",
+                        bounds.assumes, first_of(bounds.by, 2), within)};
   }
   if (bounds.schedulable) {
     return {Tone::Good, fmt::format("Analysis, {}: every deadline is met, by {}.{}", bounds.assumes,

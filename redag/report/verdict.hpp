@@ -26,7 +26,8 @@ struct Sentence {
 /// Of one group: deadlines, bounds, the trace checker, execution times, what disturbs its figures.
 [[nodiscard]] std::vector<Sentence> verdict_of(const Group &group);
 
-/// Is the longest end-to-end response of the DAG above its bound, by more than a machine that was not calibrated may take?
+/// Is the longest end-to-end response of the DAG above its bound, by more than a machine that was not calibrated may
+/// take?
 [[nodiscard]] bool is_above_bound(const Group &group, DagId dag);
 
 /// One number over repetitions.
@@ -50,7 +51,8 @@ struct Contender {
 /// next repetition. Requires a contender.
 [[nodiscard]] std::string ranking(std::span<const Contender> contenders);
 
-/// "control: redag misses 0.0043 % (1 of 23 326), mte 14.2 %: redag misses fewest"; shares are of all repetitions together.
+/// "control: redag misses 0.0043 % (1 of 23 326), mte 14.2 %: redag misses fewest"; shares are of all repetitions
+/// together.
 [[nodiscard]] std::string comparison_line(const std::string &dag, std::span<const Contender> contenders);
 
 /// A sentence for each DAG that all groups have; none for a single group.

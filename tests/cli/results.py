@@ -21,7 +21,7 @@ class Diff(Case):
         full = self.results("full", "--preemption", "os")
         result = self.expect(redag("diff", none, full), 0)
         self.assertIn("differs preemption: none -> os", result.stdout)
-        self.assertIn("better fast.sense: missed 20 (10.0 %) -> 0", result.stdout)
+        self.assertIn("better fast.sense: missed 200 (10.0 %) -> 0", result.stdout)
         self.assertIn("worse slow.plan: p50 27ms -> 33ms", result.stdout)
         self.assertNotIn("lasts longer than the blocks", result.stdout)
         self.expect(redag("diff", none, full, "--check"), 1)

@@ -212,7 +212,7 @@ class Streams(Case):
             status, text = in_terminal("compare", self.cart, "--simulate", "--duration", "1s", "--executors",
                                        "redag-none,redag-os", columns=columns, NO_COLOR="1")
             self.assertEqual(status, 0, text)
-            table = [line for line in text.splitlines() if re.search(r" redag-(none|os) .*%", line) and ":" not in line]
+            table = [line for line in text.splitlines() if re.search(r"redag-(none|os) +\d[\d ]* +\d", line) and ":" not in line]
             self.assertEqual(len(table), 6, text)
             self.assertLessEqual(max(map(len, table)), columns, text)
         self.assertIn("no room for", text)

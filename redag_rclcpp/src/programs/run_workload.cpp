@@ -252,7 +252,8 @@ double median(std::vector<double> values) {
 }
 
 // A percentile of the end-to-end response: its median over the repetitions in which the DAG answered.
-std::string percentile_text(const Repetitions &repetitions, std::size_t dag, redag::Duration Distribution::*percentile) {
+std::string percentile_text(const Repetitions &repetitions, std::size_t dag,
+                            redag::Duration Distribution::*percentile) {
   std::vector<double> values;
   for (const auto &dags : repetitions) {
     const Distribution &response = dags[dag].end_to_end.response;

@@ -93,22 +93,23 @@ std::string describe(const WorkloadRun &run) {
     const redag::metrics::JobStats &jobs = task.jobs;
     tasks.add({task.dag + "." + task.name, fmt::format("{}", jobs.released), fmt::format("{}", jobs.late),
                fmt::format("{}", jobs.skipped), fmt::format("{}", jobs.aborted),
-               redag::format_count_and_share(jobs.missed(), jobs.released), time_text(jobs.response, &Distribution::p50),
-               time_text(jobs.response, &Distribution::p95), time_text(jobs.response, &Distribution::p99),
-               time_text(jobs.response, &Distribution::max)});
+               redag::format_count_and_share(jobs.missed(), jobs.released),
+               time_text(jobs.response, &Distribution::p50), time_text(jobs.response, &Distribution::p95),
+               time_text(jobs.response, &Distribution::p99), time_text(jobs.response, &Distribution::max)});
   }
   TextTable dags({"DAG", "jobs", "missed", "end-to-end p50", "p99", "max", "active"});
   for (const redag::metrics::DagSummary &dag : run.summary.dags) {
     const Distribution &end_to_end = dag.end_to_end.response;
     dags.add({dag.name, fmt::format("{}", dag.jobs.released),
               redag::format_count_and_share(dag.jobs.missed(), dag.jobs.released),
-              time_text(end_to_end, &Distribution::p50),
-              time_text(end_to_end, &Distribution::p99), time_text(end_to_end, &Distribution::max),
+              time_text(end_to_end, &Distribution::p50), time_text(end_to_end, &Distribution::p99),
+              time_text(end_to_end, &Distribution::max),
               fmt::format("{}/{}", dag.peak_active, dag.max_active > 0 ? fmt::format("{}", dag.max_active) : "-")});
   }
   text += "\n" + tasks.render() + "\n" + dags.render() + "\n";
-  text += "missed: late, skipped or aborted; times of a task: finish - release; of a DAG, end to end: finish of a sink - "
-          "release of its source\n";
+  text +=
+      "missed: late, skipped or aborted; times of a task: finish - release; of a DAG, end to end: finish of a sink - "
+      "release of its source\n";
   text += verdict("trace check, as the nodes saw it", run.check);
   if (run.scheduler) text += verdict("trace check, the scheduler's decisions", run.scheduler->check);
   return text;
