@@ -446,6 +446,32 @@ TEST_F(Nodes, ARunInOverloadIsRecordedWhole) {
   }
 }
 
+// The middleware learns late that the nodes of the run before are gone.
+TEST_F(Nodes, AUserOfATopicWhoLeavesIsNoneWhoStays) {
+  const Workload workload = workload_of(
+      "{name: w, dags: [{name: fast, tasks: [{name: a, wcet: 1ms, period: 10ms},"
+      " {name: b, wcet: 1ms, activation: data, after: a}]}]}");
+  WorkloadNodes nodes(workload, NodesOptions());
+  const auto other = std::make_shared<rclcpp::Node>("other");
+  const auto publish = [&] {
+    auto publisher = other->create_publisher<std_msgs::msg::Int64MultiArray>("/fast/a/output", 1);
+    while (other->count_publishers("/fast/a/output") < 2) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return publisher;
+  };
+  auto leaving = publish();
+  std::thread leaver([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    leaving.reset();
+  });
+  const auto connected = nodes.connect(20 * redag::kSecond);
+  leaver.join();
+  EXPECT_TRUE(connected) << redag::to_string(connected.error());
+  const auto staying = publish();
+  const auto refused = nodes.connect(20 * redag::kSecond);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(redag::to_string(refused.error()), HasSubstr("somebody else uses the topic '/fast/a/output'"));
+}
+
 TEST_F(Nodes, TasksOfAGroupShareANodeAndDoNotOverlap) {
   const Workload workload = workload_of(
       "{platform: {workers: 2}, dags: [{name: d, tasks: [{name: a, wcet: 3ms, period: 10ms, group: g},"
