@@ -234,7 +234,7 @@ Action add_compare(CLI::App &app) {
   add_result_arguments(app, options->run);
   add_simulator_arguments(app, options->run);
   add_thread_arguments(app, options->run);
-  for (const char *name : {"--overhead-release", "--overhead-dispatch", "--overhead-preempt", "--max-events"}) {
+  for (const char *name : {"--overhead-release", "--overhead-dispatch", "--overhead-preempt"}) {
     option_named(app, name).needs(simulate);
   }
   for (const char *name : {"--affinity", "--mlockall", "--realtime", "--spin", "--watchdog"}) {

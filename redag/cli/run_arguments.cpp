@@ -71,14 +71,14 @@ void add_result_arguments(CLI::App &app, RunArguments &arguments) {
       ->needs(folder)
       ->group(kResultGroup);
   app.add_flag("--check", arguments.check, "Exit with 1 if a deadline was missed")->group(kResultGroup);
+  add_count(app, "--max-events", arguments.max_events, {1, kMaxEvents},
+            "Events that are checked and written, 32 bytes of memory each; later ones are summarized")
+      ->group(kResultGroup);
 }
 
 void add_simulator_arguments(CLI::App &app, RunArguments &arguments) {
   const std::string group = "Simulator";
   add_overhead_arguments(app, arguments, group);
-  add_count(app, "--max-events", arguments.max_events, {1, kMaxEvents},
-            "Events that are checked and written; later ones are summarized")
-      ->group(group);
 }
 
 void add_thread_arguments(CLI::App &app, RunArguments &arguments) {

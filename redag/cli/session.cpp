@@ -6,10 +6,10 @@
 #include <chrono>
 #include <cstdlib>
 #include <memory>
+#include <span>
 
 #include "redag/analysis/analyze.hpp"
 #include "redag/analysis/executors.hpp"
-#include "redag/metrics/miss.hpp"
 #include "redag/metrics/trace_checker.hpp"
 #include "redag/runtime/run_workload.hpp"
 #include "redag/runtime/threads.hpp"
@@ -54,14 +54,16 @@ class Prefix {
   Prefix(std::vector<JobEvent> &events, std::size_t limit) : events_(events), limit_(limit) {}
 
   void add(std::span<const JobEvent> events) {
-    if (cut_ || events.empty()) return;
+    if (cut_) return;
     // Between two instants nothing happens: up to the end of that gap, the prefix is the whole trace of a shorter run.
     // (At its end, a job could be seen that should have finished there.)
-    if (events_.size() >= limit_ && events.front().time - events_.back().time > 1) {
-      cut_ = events.front().time - 1;
-      return;
+    for (const JobEvent &event : events) {
+      if (events_.size() >= limit_ && event.time - events_.back().time > 1) {
+        cut_ = event.time - 1;
+        return;
+      }
+      events_.push_back(event);
     }
-    events_.insert(events_.end(), events.begin(), events.end());
   }
 
   [[nodiscard]] std::optional<Time> cut() const { return cut_; }
@@ -70,6 +72,43 @@ class Prefix {
   std::vector<JobEvent> &events_;
   std::size_t limit_;
   std::optional<Time> cut_;
+};
+
+// What a run's events become while it goes on: its summary, and the trace of its first events.
+class Evaluation {
+ public:
+  /// `session` must outlive this.
+  Evaluation(Session &session, trace::RunInfo info, std::size_t max_events)
+      : session_(session),
+        info_(std::move(info)),
+        summarizer_(info_),
+        kept_(session.trace.events, std::max<std::size_t>(max_events, 1)) {}
+
+  /// In the order of time, whole instants.
+  void add(std::span<const JobEvent> events) {
+    session_.events += events.size();
+    summarizer_.add(events);
+    kept_.add(events);
+  }
+
+  /// So far, by DAG.
+  [[nodiscard]] const std::vector<std::uint64_t> &missed() const { return summarizer_.missed(); }
+
+  /// `info` is that of the whole run. Call once, at the end.
+  void finish(trace::RunInfo info) {
+    info_.lost_events = info.lost_events;  // the rest of it was known before the first event
+    session_.summary = summarizer_.finish(info.end);
+    session_.info = std::move(info);
+    session_.cut_at = kept_.cut();
+    session_.trace.info = session_.info;
+    if (session_.cut_at) session_.trace.info.end = *session_.cut_at;
+  }
+
+ private:
+  Session &session_;
+  trace::RunInfo info_;
+  metrics::Summarizer summarizer_;
+  Prefix kept_;
 };
 
 Result<Session> simulate(const Workload &workload, const Variant &variant, SessionOptions options,
@@ -81,17 +120,14 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, Sessi
     options.overheads = sim::overheads_of(*machine);
   }
   Session session;
-  session.info = describe_simulation(workload, variant, options);
-  metrics::Summarizer summarizer(session.info);
-  Prefix kept(session.trace.events, std::max<std::size_t>(options.max_events, 1));
+  trace::RunInfo info = describe_simulation(workload, variant, options);
+  Evaluation evaluation(session, info, options.max_events);
   std::uint64_t batches = 0;
   const auto sink = [&](std::span<const JobEvent> events) {
-    session.events += events.size();
-    summarizer.add(events);
-    kept.add(events);
+    evaluation.add(events);
     if (progress) {
       constexpr std::uint64_t kLookEvery = 256;  // asking the clock each instant would be most of the work
-      if (++batches % kLookEvery == 0 && !events.empty()) progress(events.back().time, summarizer.missed());
+      if (++batches % kLookEvery == 0 && !events.empty()) progress(events.back().time, evaluation.missed());
     }
     return options.stop == nullptr || !options.stop->load(std::memory_order_relaxed);
   };
@@ -99,15 +135,12 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, Sessi
   simulator.horizon = options.duration;
   simulator.seed = options.seed;
   simulator.overheads = options.overheads;
-  const auto scheduler = sched::make_scheduler(variant.executor, workload, session.info.config);
-  const sim::Result result = sim::simulate(workload, *scheduler, session.info.config.workers, simulator, sink);
+  const auto scheduler = sched::make_scheduler(variant.executor, workload, info.config);
+  const sim::Result result = sim::simulate(workload, *scheduler, info.config.workers, simulator, sink);
 
   session.stopped = result.end < options.duration;
-  session.info.end = result.end;
-  session.summary = summarizer.finish(result.end);
-  session.cut_at = kept.cut();
-  session.trace.info = session.info;
-  if (session.cut_at) session.trace.info.end = *session.cut_at;
+  info.end = result.end;
+  evaluation.finish(std::move(info));
   return session;
 }
 
@@ -125,16 +158,6 @@ std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant
   const analysis::Report report = analysis::analyze(*system, analysis::methods_of(executor));
   for (std::size_t t = 0; t < bounds.size(); ++t) bounds[t] = report.tasks[t].response.value_or(0);
   return bounds;
-}
-
-// All but the verdict of the trace checker.
-Session evaluate(trace::Trace trace) {
-  Session session;
-  session.trace = std::move(trace);
-  session.info = session.trace.info;
-  session.summary = metrics::summarize(session.trace);
-  session.events = session.trace.events.size();
-  return session;
 }
 
 void check(Session &session) {
@@ -163,15 +186,13 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   run.scheduler = [&](const Workload &w, const sched::Config &config) {
     return sched::make_scheduler(variant.executor, w, config);
   };
-  MissCounter misses(workload);
-  std::size_t seen = 0;
-  if (progress) {
-    run.progress = [&](Time now, std::span<const JobEvent> events) {
-      misses.add(events.subspan(seen));
-      seen = events.size();
-      progress(now, misses.misses());
-    };
-  }
+  Session session;
+  std::optional<Evaluation> evaluation;
+  run.sink = [&](const trace::RunInfo &info, std::span<const JobEvent> events) {
+    if (!evaluation) evaluation.emplace(session, info, options.max_events);
+    evaluation->add(events);
+  };
+  if (progress) run.progress = [&](Time now, std::span<const JobEvent>) { progress(now, evaluation->missed()); };
   Result<runtime::RunResult> result = runtime::run_workload(workload, run);
   if (!result) return tl::unexpected<Diagnostics>(std::move(result.error()));
 
@@ -184,7 +205,7 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
       result->warnings.push_back(machine.error().front().message + ": none were charged");
     }
   }
-  Session session = evaluate(std::move(result->trace));
+  evaluation->finish(std::move(result->trace.info));
   session.realtime_threads = realtime_threads;
   session.stopped = result->stopped;
   session.warnings = std::move(result->warnings);
@@ -197,17 +218,6 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
 }
 
 }  // namespace
-
-MissCounter::MissCounter(const Workload &workload) : folder_(workload), misses_(workload.dags.size()) {
-  for (const TaskRef &ref : flatten(workload)) dag_of_.push_back(ref.dag);
-}
-
-void MissCounter::add(std::span<const JobEvent> events) {
-  folder_.add(events);
-  folder_.drain_ended([this](const metrics::JobRecord &job) {
-    if (metrics::miss_of(job, job.finish) != metrics::Miss::None) ++misses_[dag_of_[job.task.value].value];
-  });
-}
 
 Result<Session> run_session(const Workload &workload, const Variant &variant, const SessionOptions &options,
                             const ProgressHook &progress) {
@@ -224,7 +234,11 @@ Result<Session> run_session(const Workload &workload, const Variant &variant, co
 }
 
 Session session_of(trace::Trace trace) {
-  Session session = evaluate(std::move(trace));
+  Session session;
+  session.trace = std::move(trace);
+  session.info = session.trace.info;
+  session.summary = metrics::summarize(session.trace);
+  session.events = session.trace.events.size();
   check(session);
   return session;
 }

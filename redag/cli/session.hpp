@@ -6,14 +6,12 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "redag/base/result.hpp"
 #include "redag/cli/variant.hpp"
 #include "redag/metrics/check_report.hpp"
-#include "redag/metrics/jobs.hpp"
 #include "redag/metrics/summary.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
@@ -28,8 +26,7 @@ struct SessionOptions {
   Duration duration = 10 * kSecond;
   Duration warm_up = 0;
   std::uint64_t seed = 1;
-  /// Simulated events kept, 32 bytes each; what comes later is summarized, but neither checked nor written. A run on
-  /// threads keeps all.
+  /// Events kept, 32 bytes each, up to the end of an instant. Later ones are summarized, but neither checked nor written.
   std::size_t max_events = std::size_t{1} << 22U;
   const std::atomic<bool> *stop = nullptr;  // ends the run early, with the results so far
   sim::Overheads overheads;                 // simulator
@@ -45,21 +42,8 @@ struct SessionOptions {
   std::function<void(const std::string &text)> on_overdue;
 };
 
-/// Deadline misses while a run goes on, by DAG: jobs that ended late or were lost, as the summary is going to count
-/// them.
-class MissCounter {
- public:
-  explicit MissCounter(const Workload &workload);
-  void add(std::span<const JobEvent> events);
-  [[nodiscard]] const std::vector<std::uint64_t> &misses() const { return misses_; }
-
- private:
-  std::vector<DagId> dag_of_;
-  metrics::JobFolder folder_;
-  std::vector<std::uint64_t> misses_;
-};
-
-/// Called now and then while a session runs: where time stands, and the misses so far by DAG.
+/// Called now and then while a session runs: where time stands, and by DAG the jobs so far that
+/// ended late or were lost.
 using ProgressHook = std::function<void(Time now, const std::vector<std::uint64_t> &misses)>;
 
 struct Session {

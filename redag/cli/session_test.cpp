@@ -93,15 +93,19 @@ TEST(Session, ThreadsAndSimulatorGetTheSameJobs) {
   EXPECT_EQ(real.info.driver, trace::Driver::Threads);
 }
 
-TEST(MissCounter, CountsWhatTheSummaryCounts) {
-  const Session session = run("redag-none", simulated(kSecond));
-  MissCounter counter(session.info.workload);
-  counter.add(session.trace.events);
-  for (std::size_t dag = 0; dag < counter.misses().size(); ++dag) {
-    const metrics::JobCounts &jobs = session.summary.dags[dag].jobs;
-    EXPECT_EQ(counter.misses()[dag], jobs.missed() - jobs.overdue);
-  }
-  EXPECT_GT(counter.misses()[0], 0U);
+TEST(Session, ALongRunOnThreadsKeepsItsFirstEventsAndSummarizesAll) {
+  SessionOptions options = simulated(500 * kMillisecond);
+  options.driver = trace::Driver::Threads;
+  options.max_events = 8;
+  const Session cut = run("redag-none", options);
+  ASSERT_TRUE(cut.cut_at.has_value());
+  EXPECT_GE(cut.trace.events.size(), options.max_events);
+  EXPECT_LT(cut.trace.events.size(), cut.events);
+  EXPECT_LT(cut.trace.events.back().time, *cut.cut_at);
+  EXPECT_TRUE(cut.check.ok()) << cut.check.to_string();
+  EXPECT_EQ(cut.info.end, options.duration);
+  // Every release of the run is in the summary: of 100 ms, fast has ten and slow has one.
+  EXPECT_EQ(cut.summary.total.released, run("redag-none", simulated(500 * kMillisecond)).summary.total.released);
 }
 
 TEST(SensibleDuration, IsWholeHyperperiods) {

@@ -176,6 +176,13 @@ class Run {
     if (!kept) result_.warnings.push_back(fmt::format("no flight record from here on: {}", to_string(kept.error())));
   }
 
+  // What was drained goes to the sink, if there is one.
+  void hand_over() {
+    if (!options_.sink) return;
+    options_.sink(result_.trace.info, result_.trace.events);
+    result_.trace.events.clear();
+  }
+
   void note(const OverdueJob &job) {
     std::string text = fmt::format("{} #{} is overdue: {}", trace::task_name(workload_, job.job.task), job.job.number,
                                    runtime::describe(job));
@@ -215,6 +222,7 @@ class Run {
       }
       never.wait_until(std::min(now + kCollectEvery, end));
       drain(false);
+      hand_over();
       report_overdue();
       if (options_.progress) options_.progress(engine_->now(), result_.trace.events);
     }
@@ -284,6 +292,7 @@ class Run {
     const Time end = engine_->halted_at();
     const auto after = std::find_if(events.begin(), events.end(), [&](const JobEvent &e) { return e.time >= end; });
     events.erase(after, events.end());
+    hand_over();
     result_.trace.info.end = end_;
     result_.trace.info.lost_events = engine_->lost_events();
     if (result_.trace.info.lost_events > 0) {

@@ -58,12 +58,16 @@ struct RunOptions {
   std::string flight;
   trace::FlightOptions flight_options;
   const std::atomic<bool> *stop = nullptr;  // ends the run early when set (Ctrl-C)
-  /// About ten times a second, with all events so far. On the calling thread.
+  /// Takes the events of the run: about ten times a second those that are new, in the order of the trace, on the calling
+  /// thread. The result's trace then holds none, so that memory does not grow with the run. `info` is what the result's
+  /// will be, except `end` and `lost_events`.
+  std::function<void(const trace::RunInfo &info, std::span<const JobEvent> events)> sink;
+  /// About ten times a second, with all events so far; with a sink, with none. On the calling thread.
   std::function<void(Time now, std::span<const JobEvent> events)> progress;
 };
 
 struct RunResult {
-  trace::Trace trace;  // from 0 to trace.info.end; jobs that had not ended by then are in flight
+  trace::Trace trace;  // from 0 to trace.info.end; jobs that had not ended by then are in flight; no events with a sink
   Mode mode;
   std::vector<Usage> usage;             // by task
   std::vector<std::string> unfinished;  // jobs that were told to give up after drain_timeout

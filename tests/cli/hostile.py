@@ -132,7 +132,7 @@ class Combinations(Case):
     def test_options_that_would_be_ignored(self):
         self.refuse("compare", self.cart, "--executors", "redag", says="nothing to compare 'redag' with")
         self.refuse("compare", self.cart, "--simulate", "--affinity", "0", says="excludes")
-        self.refuse("compare", self.cart, "--max-events", "5", says="--max-events requires --simulate")
+        self.refuse("compare", self.cart, "--overhead-release", "5us", says="--overhead-release requires --simulate")
         self.refuse("sensitivity", self.cart, "--duration", "1s", says="--duration requires --simulate")
         self.refuse("simulate", self.cart, "--force", says="--force requires --out")
         self.refuse("generate", "--force", says="--force requires --out")
