@@ -54,7 +54,11 @@ class Ours {
     jobs_[item.id].key = item.level;
     jobs_[item.id].rank = item.level;
     jobs_[item.id].sequence = ++sequence_;
-    queue_.push(jobs_, item.id);
+    if constexpr (std::is_same_v<Queue, redag::sched::LevelQueue>) {
+      queue_.push(jobs_, item.id, item.level);
+    } else {
+      queue_.push(jobs_, item.id);
+    }
   }
 
  private:

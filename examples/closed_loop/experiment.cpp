@@ -6,6 +6,7 @@
 
 #include "loop.hpp"
 #include "redag/metrics/jobs.hpp"
+#include "redag/metrics/miss.hpp"
 #include "redag/runtime/run_workload.hpp"
 #include "redag/sched/executors.hpp"
 #include "redag/sim/simulator.hpp"
@@ -54,8 +55,7 @@ RunOutcome outcome_of(const Workload &workload, const std::vector<JobEvent> &eve
   std::stable_sort(jobs.begin(), jobs.end(), [](const auto &a, const auto &b) { return a.finish < b.finish; });
   for (const metrics::JobRecord &job : jobs) {
     const std::string &dag = workload.dags[tasks[job.task.value].dag.value].name;
-    const bool missed =
-        job.is_late(end) || job.outcome == metrics::JobOutcome::Skipped || job.outcome == metrics::JobOutcome::Aborted;
+    const bool missed = metrics::miss_of(job, end) != metrics::Miss::None;
     const auto plant =
         std::find_if(known.begin(), known.end(), [&](const PlantSpec &spec) { return spec.name == dag; });
     if (plant == known.end()) {

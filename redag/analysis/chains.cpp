@@ -32,7 +32,7 @@ bool goes_first(const System &system, const ChainSegment &from, const ChainSegme
   const bool alone = from.first == from.last && producer.predecessors.empty();
   return system.platform.workers == 1 && sched::is_static(system.policy) && alone && producer.jitter == 0 &&
          producer.group == kNoGroup && system.dags[producer.dag.value].max_active == 0 &&
-         producer.rank < consumer.rank && system.mode != sched::Preemption::Cooperative;
+         producer.tier < consumer.tier && system.mode != sched::Preemption::Cooperative;
 }
 
 Duration one_worker_reaction(const System &system, const std::vector<ChainSegment> &segments) {

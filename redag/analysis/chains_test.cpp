@@ -28,6 +28,7 @@ Schedule simulated(const Workload &workload, const AnalysisPlatform &platform, D
   config.workers = platform.workers;
   config.preemption = platform.preemption;
   config.policy = workload.policy;
+  config.ties = workload.ties;
   sched::PriorityScheduler scheduler(workload, config);
   sim::Options options = chosen;
   options.horizon = horizon;

@@ -95,22 +95,22 @@ std::uint32_t most_started(const SystemDag &dag) {
 
 // True where a job that starts more urgent takes a worker from any less urgent one at once.
 bool preempts_at_once(const System &system) {
-  const std::uint32_t levels = system.platform.levels;
+  const auto has_own_level = [](const SystemTask &task) { return task.level == task.tier; };
   return system.mode == sched::Preemption::Full && sched::is_static(system.policy) &&
-         (levels == 0 || levels >= system.tasks.size());
+         std::all_of(system.tasks.begin(), system.tasks.end(), has_own_level);
 }
 
 // Workers that nothing else can keep from the DAG: as many as it can use, or all, or 0.
 std::uint32_t own_workers(const System &system, std::size_t dag) {
-  std::uint32_t last_rank = 0;
-  for (const std::uint32_t t : system.dags[dag].tasks) last_rank = std::max(last_rank, system.tasks[t].rank);
+  std::uint32_t last_tier = 0;
+  for (const std::uint32_t t : system.dags[dag].tasks) last_tier = std::max(last_tier, system.tasks[t].tier);
   std::uint64_t others = 0;
   Effort::spend(system.dags.size());
   for (std::size_t d = 0; d < system.dags.size(); ++d) {
     const SystemDag &other = system.dags[d];
     const bool interferes =
         !preempts_at_once(system) ||
-        std::any_of(other.tasks.begin(), other.tasks.end(), [&](auto t) { return system.tasks[t].rank <= last_rank; });
+        std::any_of(other.tasks.begin(), other.tasks.end(), [&](auto t) { return system.tasks[t].tier <= last_tier; });
     if (d != dag && interferes) others += most_started(other);
   }
   const std::uint32_t wanted = most_started(system.dags[dag]);

@@ -72,11 +72,12 @@ Task make_task(std::string name, Duration wcet, std::vector<std::uint32_t> after
 }
 
 // A source, three parallel tasks, a sink.
-Dag fork_join(std::string name) {
+Dag fork_join(std::string name, Duration period = 100) {
   Dag dag;
   dag.name = std::move(name);
   dag.tasks = {make_task("source", 2, {}), make_task("a", 10, {0}), make_task("b", 9, {0}), make_task("c", 8, {0}),
                make_task("sink", 3, {1, 2, 3})};
+  for (Task &task : dag.tasks) task.period = task.deadline = period;
   return dag;
 }
 
@@ -120,7 +121,7 @@ TEST(DagIsolated, LongPathsAreNeverAboveGraham) {
 
 TEST(DagIsolated, BoundsThatSumUpToTheWorkersShareNothing) {
   Dag first = fork_join("first");
-  Dag second = fork_join("second");
+  Dag second = fork_join("second", 110);
   first.max_active = 2;
   second.max_active = 1;
   const System enough = compiled(3, {first, second}, sched::Preemption::None);
@@ -133,10 +134,13 @@ TEST(DagIsolated, BoundsThatSumUpToTheWorkersShareNothing) {
   EXPECT_FALSE(dag_response(isolated(), preemptive, 1));
   const System nonpreemptive = compiled(2, {first, second}, sched::Preemption::None);
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(isolated().apply(nonpreemptive)));
+  // Nor where the second takes turns with it.
+  const System equals = compiled(2, {first, fork_join("second")}, sched::Preemption::Full);
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(isolated().apply(equals)));
 }
 
 TEST(DagIsolated, TheMostUrgentHasAllWorkersWhereItPreempts) {
-  const System system = compiled(2, {fork_join("first"), fork_join("second")}, sched::Preemption::Full);
+  const System system = compiled(2, {fork_join("first"), fork_join("second", 110)}, sched::Preemption::Full);
   EXPECT_EQ(dag_response(isolated(), system, 0), 15 + 8);
   EXPECT_FALSE(dag_response(isolated(), system, 1));
 }

@@ -115,19 +115,24 @@ namespace {
 using global::GlobalUnit;
 using global::SharedTerms;
 
+Duration least_window(const GlobalUnit &unit, std::uint32_t workers) {
+  return unit.length + (unit.volume - unit.length) / static_cast<Duration>(workers);
+}
+
 // Fills in `response` of units[k] given those of units[0 .. k), and `work` of these. False: above its limit, or too
-// many steps.
-bool respond(std::span<GlobalUnit> units, std::span<const global::Shape> shapes, std::size_t k, std::uint32_t workers) {
+// many steps. `shapes`: by position in System::units. `start`: below which there is no fixed point.
+bool respond(std::span<GlobalUnit> units, std::span<const global::Shape> shapes, std::size_t k, std::uint32_t workers,
+             Duration start) {
   GlobalUnit &own = units[k];
   if (global::is_hopeless(own, workers)) return false;
   const auto m = static_cast<Duration>(workers);
-  Duration window = own.length + (own.volume - own.length) / m;
+  Duration window = std::max(start, least_window(own, workers));
   const bool found = global::least_fixed_point(own.limit - own.jitter, window, [&](Duration x) {
     Duration sum = own.volume - own.length;
     for (std::size_t i = 0; i < k; ++i) {
       GlobalUnit &other = units[i];
       Effort::spend(other.tasks + 1);
-      other.work = shapes[i].work(x, other.response, other.period);
+      other.work = shapes[other.unit].work(x, other.response, other.period);
       sum += other.work;
     }
     return own.length + sum / m;
@@ -152,26 +157,18 @@ ResponseBound explain(const System &system, std::span<const GlobalUnit> units, s
 Outcome apply_shapes(const System &system) {
   // Without edges no DAG has a shape, and bertogna_cirinei() is never above this, and quicker.
   if (!system.has_edges()) return NotApplicable{"no task has predecessors: see the bounds for independent tasks"};
-  global::Units view = global::units_of(system, {});
+  global::Units view = global::units_of(system, {.equals = true});
   if (view.reason) return NotApplicable{*view.reason};
   std::vector<global::Shape> shapes;
-  shapes.reserve(view.units.size());
-  for (const GlobalUnit &unit : view.units) shapes.emplace_back(system, system.units[unit.unit], view.workers);
-  std::vector<ResponseBound> responses(system.units.size());
-  bool known = true;
-  for (std::size_t k = 0; k < view.units.size(); ++k) {
-    Effort::reached(k, view.units.size());
-    ResponseBound &response = responses[view.units[k].unit];
-    if (!known) {
-      response.absent = global::kMoreUrgent;
-    } else if (respond(view.units, shapes, k, view.workers)) {
-      response = explain(system, view.units, k, view.workers);
-    } else {
-      known = false;
-      response.absent = global::kNoFixedPoint;
-    }
-  }
-  return from_units(system, std::move(responses));
+  shapes.reserve(system.units.size());
+  for (const Unit &unit : system.units) shapes.emplace_back(system, unit, view.workers);
+  return global::from_most_urgent(
+      system, view.units, [&view](GlobalUnit &unit) { unit.response = least_window(unit, view.workers) + unit.jitter; },
+      [&](std::size_t k, bool alone) {
+        const Duration start = alone ? 0 : view.units[k].response - view.units[k].jitter;
+        return respond(view.units, shapes, k, view.workers, start);
+      },
+      [&](std::size_t k) { return explain(system, view.units, k, view.workers); });
 }
 
 }  // namespace
@@ -185,8 +182,8 @@ Method dag_shapes() {
       "of sporadic DAG tasks for global FP scheduling, RTNS 2017; Schedulability analysis of DAG tasks with arbitrary "
       "deadlines under global fixed-priority scheduling, Real-Time Systems 55, 2019";
   method.assumptions =
-      "m workers, full preemption, static priorities that keep DAGs together, some edges, R <= T; release jitter; "
-      "no max_active, shared groups or levels";
+      "m workers, full preemption, static priorities that keep DAGs together, some edges, R <= T; release jitter, "
+      "shared levels; no max_active, no shared groups";
   method.complexity = "pseudo-polynomial; O(tasks log tasks) a step";
   method.apply = [](const System &system) { return across_rates(system, apply_shapes); };
   return method;

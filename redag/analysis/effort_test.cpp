@@ -18,8 +18,9 @@ using testing::BoundCase;
 using testing::BoundCaseLimits;
 
 // Independent tasks of three periods; half of the workers are used.
-System many_tasks(std::size_t count, std::uint32_t workers) {
+System many_tasks(std::size_t count, std::uint32_t workers, Ties ties = Ties::Share) {
   Workload workload;
+  workload.ties = ties;
   workload.platform = Platform{workers, PreemptionMode::Os};
   for (std::size_t i = 0; i < count; ++i) {
     Task task;
@@ -79,7 +80,7 @@ TEST(Effort, AMethodGivesUpAtItsLimitAndTheOthersAnswer) {
 }
 
 TEST(Effort, TheCallerEndsAMethodForAReason) {
-  const System system = many_tasks(3000, 2);
+  const System system = many_tasks(3000, 2, Ties::Fixed);
   std::map<std::string, int> asked;
   AnalyzeOptions options;
   options.stop = [&](const AnalysisProgress &progress) {

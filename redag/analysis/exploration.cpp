@@ -109,7 +109,7 @@ Method exploration(ExplorationOptions options) {
   method.assumptions =
       "any number of workers, jobs run to completion, strictly periodic with the stated offsets; the tasks that edges "
       "join have one rate and one offset; R <= T; jitter, bcet, max_active, groups; static priorities, or edf without "
-      "data tasks; exact on one worker";
+      "data tasks; exact on one worker, but for data tasks among equals";
   method.complexity = "up to max_states states, O(n) each";
   method.apply = [options = std::move(options)](const System &system) -> Outcome {
     if (auto reason = why_not_explore(system)) return NotApplicable{*std::move(reason)};

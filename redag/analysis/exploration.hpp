@@ -45,7 +45,7 @@ struct Exploration {
     Stopped,   // by `proceed`
   };
   End end = End::GaveUp;
-  bool exact = false;              // each range is tight: one worker
+  bool exact = false;              // each range is tight: one worker, and the order of equals is always sure
   std::uint64_t states = 0;        // followed, after merging
   std::uint64_t merged = 0;        // that went up in others
   std::uint64_t jobs = 0;          // of one hyperperiod

@@ -50,6 +50,7 @@ BoundCase random_case(Rng &rng, const Limits &limits) {
   result.platform.dispatch_overhead = chance(0.2) ? limits.scale : 0;
   Workload &workload = result.workload;
   workload.policy = kPolicies[static_cast<std::size_t>(rng.uniform(0, kPolicies.size() - 1))];
+  workload.ties = chance(0.7) ? Ties::Share : Ties::Fixed;
   const std::int64_t dags = rng.uniform(1, limits.max_dags);
   std::uint32_t names = 0;
   for (std::int64_t d = 0; d < dags; ++d) {
@@ -103,6 +104,7 @@ void simulate(const BoundCase &bound_case, const System &system, const Demands &
   config.workers = bound_case.platform.workers;
   config.preemption = sched::Preemption::None;
   config.policy = bound_case.workload.policy;
+  config.ties = bound_case.workload.ties;
   sched::PriorityScheduler scheduler(bound_case.workload, config);
   sim::Options options;
   options.horizon = horizon;
@@ -244,18 +246,23 @@ void enumerate_systems(const Limits &limits, std::uint64_t systems, Judge judge)
   EXPECT_LT(late, compared);
 }
 
+// Unless the order of a data task and an equal was not sure somewhere: then safe, and it says so.
 TEST(ExplorationProperty, OneWorkerIsExact) {
   std::uint64_t exact = 0;
+  std::uint64_t safe = 0;
   const std::uint64_t systems = testing::how_many(1000);
   enumerate_systems(Limits{}, systems, [&](const Exploration &exploration, const Seen &seen) {
-    EXPECT_TRUE(exploration.exact);
-    EXPECT_EQ(exploration.end == Exploration::End::Overrun, seen.overrun);
+    if (seen.overrun || exploration.exact) {
+      EXPECT_EQ(exploration.end == Exploration::End::Overrun, seen.overrun);
+    }
     if (seen.overrun || exploration.end != Exploration::End::Complete) return;
-    EXPECT_EQ(compare(exploration, seen, true), "");
-    ++exact;
+    EXPECT_EQ(compare(exploration, seen, exploration.exact), "");
+    ++(exploration.exact ? exact : safe);
   });
-  fmt::print("[ figures  ] {} systems without an overrun\n", exact);
+  fmt::print("[ figures  ] {} systems without an overrun exact, {} safe\n", exact, safe);
   EXPECT_GT(exact, systems / 10);
+  EXPECT_GT(safe, 0U);
+  EXPECT_LT(safe, exact / 4);
 }
 
 TEST(ExplorationProperty, SeveralWorkersAreSafe) {

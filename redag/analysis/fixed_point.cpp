@@ -1,6 +1,9 @@
 #include "redag/analysis/fixed_point.hpp"
 
 #include <cstddef>
+#include <utility>
+
+#include "redag/analysis/effort.hpp"
 
 namespace redag::analysis::global {
 namespace {
@@ -22,6 +25,61 @@ std::string_view agree(std::span<Duration *const> values, std::string_view excee
     }
   }
   return {};
+}
+
+namespace {
+
+// Units[k] as the last of its peers.
+template <class F>
+auto as_last(std::vector<GlobalUnit> &units, Peers peers, std::size_t k, F f) {
+  std::swap(units[k], units[peers.end - 1]);
+  auto result = f(peers.end - 1);
+  std::swap(units[k], units[peers.end - 1]);
+  return result;
+}
+
+}  // namespace
+
+Bound from_most_urgent(const System &system, std::vector<GlobalUnit> &units,
+                       const std::function<void(GlobalUnit &)> &start,
+                       const std::function<bool(std::size_t, bool)> &respond,
+                       const std::function<ResponseBound(std::size_t)> &explain) {
+  std::vector<ResponseBound> responses(system.units.size());
+  bool known = true;
+  Peers peers;
+  for (; peers.begin < units.size(); peers.begin = peers.end) {
+    Effort::reached(peers.begin, units.size());
+    peers.end = peers_of(system, units, peers.begin).end;
+    const bool alone = peers.end == peers.begin + 1;
+    std::vector<Duration *> values;
+    for (std::size_t k = peers.begin; k < peers.end && known && !alone; ++k) {
+      start(units[k]);
+      values.push_back(&units[k].response);
+    }
+    std::size_t culprit = peers.begin;
+    const auto evaluate = [&](std::size_t i) {
+      culprit = peers.begin + i;
+      return as_last(units, peers, culprit, [&](std::size_t k) { return respond(k, false); });
+    };
+    const bool was_known = known;
+    for (std::size_t k = peers.begin; k < peers.end && known && !alone; ++k) {
+      known = units[k].response <= units[k].limit;
+      if (!known) culprit = k;
+    }
+    if (known) known = alone ? respond(peers.begin, true) : agree(values, kNoFixedPoint, evaluate).empty();
+    for (std::size_t k = peers.begin; k < peers.end; ++k) {
+      ResponseBound &response = responses[units[k].unit];
+      if (!known) {
+        response.absent = !was_known ? kMoreUrgent : k == culprit ? kNoFixedPoint : kPeer;
+        continue;
+      }
+      response = as_last(units, peers, k, [&](std::size_t last) {
+        if (!alone && Effort::itemises(units[last].unit)) (void)respond(last, false);  // what explain() looks at
+        return explain(last);
+      });
+    }
+  }
+  return from_units(system, std::move(responses));
 }
 
 Bound all_that_agree(const System &system, std::vector<GlobalUnit> &units, std::string_view exceeds,

@@ -48,7 +48,16 @@ template <class Next>
 [[nodiscard]] std::string_view agree(std::span<Duration *const> values, std::string_view exceeds,
                                      const std::function<bool(std::size_t k)> &evaluate);
 
-/// The same of the responses of `units`, which respond(k) sets: all have the bound that explain(k) then gives, or none;
+/// Bounds of `units` from the most urgent to the least. respond(k, alone) sets units[k].response from those of units[0
+/// .. k), and answers false above its limit; explain(k) follows a call of it. Peers (peers_of()) are each taken as the
+/// last of them, and not alone: their responses are the least that agree, from those that start() sets, or none has
+/// one.
+[[nodiscard]] Bound from_most_urgent(const System &system, std::vector<GlobalUnit> &units,
+                                     const std::function<void(GlobalUnit &unit)> &start,
+                                     const std::function<bool(std::size_t k, bool alone)> &respond,
+                                     const std::function<ResponseBound(std::size_t k)> &explain);
+
+/// agree() of the responses of `units`, which respond(k) sets: all have the bound that explain(k) then gives, or none;
 /// none either where one is hopeless.
 [[nodiscard]] Bound all_that_agree(const System &system, std::vector<GlobalUnit> &units, std::string_view exceeds,
                                    const std::function<bool(std::size_t k)> &respond,

@@ -43,7 +43,18 @@ std::optional<std::string> why_not_structure(const System &system, const Needs &
   return std::nullopt;
 }
 
-std::optional<std::string> why_not_order(const System &system, const std::vector<GlobalUnit> &units) {
+// What the two share if they are to go first by turns.
+std::uint32_t shared_place(const System &system, std::uint32_t rank) {
+  const SystemTask &task = system.tasks[system.by_rank[rank]];
+  return system.mode == sched::Preemption::Full ? task.level : task.tier;
+}
+
+bool are_equals(const System &system, const GlobalUnit &upper, const GlobalUnit &lower) {
+  return shared_place(system, system.units[upper.unit].last_rank) >=
+         shared_place(system, system.units[lower.unit].first_rank);
+}
+
+std::optional<std::string> why_not_order(const System &system, const std::vector<GlobalUnit> &units, bool equals) {
   for (std::size_t i = 0; i + 1 < units.size(); ++i) {
     const Unit &upper = system.units[units[i].unit];
     const Unit &lower = system.units[units[i + 1].unit];
@@ -51,11 +62,9 @@ std::optional<std::string> why_not_order(const System &system, const std::vector
       return "priorities of '" + system.dags[upper.dag.value].name + "' and '" + system.dags[lower.dag.value].name +
              "' are interleaved";
     }
-    const std::uint32_t upper_level = system.tasks[system.by_rank[upper.last_rank]].level;
-    const std::uint32_t lower_level = system.tasks[system.by_rank[lower.first_rank]].level;
-    if (system.mode == sched::Preemption::Full && upper_level == lower_level) {
+    if (!equals && are_equals(system, units[i], units[i + 1])) {
       return "'" + system.dags[upper.dag.value].name + "' and '" + system.dags[lower.dag.value].name +
-             "' share a priority level, so they do not preempt each other";
+             "' share a priority level: either can go first";
     }
   }
   return std::nullopt;
@@ -132,9 +141,16 @@ Units units_of(const System &system, const Needs &needs) {
   std::sort(result.units.begin(), result.units.end(), [&](const GlobalUnit &a, const GlobalUnit &b) {
     return system.units[a.unit].first_rank < system.units[b.unit].first_rank;
   });
-  if (!needs.any_policy) result.reason = why_not_order(system, result.units);
+  if (!needs.any_policy) result.reason = why_not_order(system, result.units, needs.equals);
   if (!result.reason && !fits(result.units, result.workers)) result.reason = "times too long for exact sums";
   return result;
+}
+
+Peers peers_of(const System &system, const std::vector<GlobalUnit> &units, std::size_t k) {
+  Peers peers{k, k + 1};
+  while (peers.begin > 0 && are_equals(system, units[peers.begin - 1], units[peers.begin])) --peers.begin;
+  while (peers.end < units.size() && are_equals(system, units[peers.end - 1], units[peers.end])) ++peers.end;
+  return peers;
 }
 
 bool is_hopeless(const GlobalUnit &unit, std::uint32_t workers) {

@@ -40,17 +40,26 @@ struct Needs {
   bool edges = true;        // also units of several tasks
   bool bounds = false;      // also max_active, of DAGs that are one unit
   bool groups = false;      // also exclusive groups
+  bool equals = false;      // also units that share a level, of which any can go first: see peers_of()
   bool any_policy = false;  // also policies whose priorities are not static; then the order means nothing
 };
 
 /// The units most urgent first, or why the bound does not apply. Beyond `Needs`: the priorities of two units are not
-/// interleaved, no two units share a level where jobs can be preempted, and no sum of workloads exceeds an integer.
+/// interleaved, and no sum of workloads exceeds an integer.
 struct Units {
   std::optional<std::string> reason;
   std::vector<GlobalUnit> units;
   std::uint32_t workers = 1;
 };
 [[nodiscard]] Units units_of(const System &system, const Needs &needs);
+
+/// Where the units of which units[k] is one share levels: any of them can go before any other. By level where jobs can
+/// be preempted, else by tier: what has started then counts as blocking. Nearly always units[k] alone.
+struct Peers {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+[[nodiscard]] Peers peers_of(const System &system, const std::vector<GlobalUnit> &units, std::size_t k);
 
 /// One unit alone; its order among the others is not looked at.
 [[nodiscard]] GlobalUnit unit_of(const System &system, std::uint32_t unit);

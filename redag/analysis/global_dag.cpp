@@ -78,11 +78,11 @@ class Window {
 
 }  // namespace
 
-bool melani_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
+bool melani_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration start) {
   GlobalUnit &own = units[k];
   if (is_hopeless(own, workers)) return false;
   const auto more_urgent = units.first(k);
-  Duration window = own.length + (own.volume - own.length) / workers;
+  Duration window = std::max(start, own.length + (own.volume - own.length) / workers);
   const bool found = least_fixed_point(own.limit - own.jitter, window, [&](Duration x) {
     Effort::spend(more_urgent.size() + 1);
     Duration sum = own.volume - own.length;
@@ -94,11 +94,11 @@ bool melani_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t w
 }
 
 bool bounded_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration blocking,
-                      Waiting &waiting) {
+                      Waiting &waiting, Duration start) {
   GlobalUnit &own = units[k];
   if (is_hopeless(own, workers) || blocking >= kUnbounded / 4) return false;
   Window window(units.first(k), own, workers, blocking, std::span(waiting.works).first(k));
-  waiting.window = own.length;
+  waiting.window = std::max(start, own.length);
   const bool found =
       least_fixed_point(own.limit - own.jitter, waiting.window, [&window](Duration x) { return window.next(x); });
   waiting.busy = window.busy();
@@ -122,38 +122,40 @@ namespace {
 using global::GlobalUnit;
 using global::SharedTerms;
 
+// Not above any response that is found, and enough for dag_work().
+void start_low(GlobalUnit &unit, std::uint32_t workers) {
+  const Duration more = unit.bound > 0         ? (unit.volume - unit.length) / unit.bound
+                        : unit.tasks > workers ? (unit.volume - unit.length) / static_cast<Duration>(workers)
+                                               : 0;
+  unit.response = unit.length + more + unit.jitter;
+}
+
+// `respond(k, start)`, `explain(k, terms)`.
 template <class Respond, class Explain>
-Bound from_most_urgent(const System &system, const std::vector<GlobalUnit> &units, Respond respond, Explain explain) {
-  std::vector<ResponseBound> responses(system.units.size());
-  bool known = true;
-  for (std::size_t k = 0; k < units.size(); ++k) {
-    Effort::reached(k, units.size());
-    ResponseBound &response = responses[units[k].unit];
-    if (!known) {
-      response.absent = global::kMoreUrgent;
-    } else if (respond(k)) {
-      response.response = units[k].response;
-      SharedTerms terms(system, units[k]);
-      terms.add_path();
-      if (terms.wanted()) explain(k, terms);
-      terms.add_jitter();
-      response.terms = terms.take();
-    } else {
-      known = false;
-      response.absent = global::kNoFixedPoint;
-    }
-  }
-  return from_units(system, std::move(responses));
+Bound from_most_urgent(const System &system, global::Units &view, Respond respond, Explain explain) {
+  return global::from_most_urgent(
+      system, view.units, [&view](GlobalUnit &unit) { start_low(unit, view.workers); },
+      [&](std::size_t k, bool alone) { return respond(k, alone ? 0 : view.units[k].response - view.units[k].jitter); },
+      [&](std::size_t k) {
+        ResponseBound bound;
+        bound.response = view.units[k].response;
+        SharedTerms terms(system, view.units[k]);
+        terms.add_path();
+        if (terms.wanted()) explain(k, terms);
+        terms.add_jitter();
+        bound.terms = terms.take();
+        return bound;
+      });
 }
 
 Outcome apply_melani(const System &system) {
-  global::Units view = global::units_of(system, {});
+  global::Units view = global::units_of(system, {.equals = true});
   if (view.reason) return NotApplicable{*view.reason};
   for (GlobalUnit &unit : view.units) global::set_width(unit, view.workers);
   const std::span<GlobalUnit> units(view.units);
   const std::uint32_t m = view.workers;
   return from_most_urgent(
-      system, view.units, [&](std::size_t k) { return global::melani_response(units, k, m); },
+      system, view, [&](std::size_t k, Duration start) { return global::melani_response(units, k, m, start); },
       [&](std::size_t k, SharedTerms &terms) {
         const GlobalUnit &own = units[k];
         terms.add_share(Term::Kind::Own, own, own.volume - own.length, m);
@@ -187,17 +189,17 @@ void explain_bounded(std::span<const GlobalUnit> units, std::size_t k, std::uint
 }
 
 Outcome apply_bounded(const System &system, sched::Preemption mode) {
-  global::Units view = global::units_of(system, {.mode = mode, .bounds = true});
+  global::Units view = global::units_of(system, {.mode = mode, .bounds = true, .equals = true});
   if (view.reason) return NotApplicable{*view.reason};
   const std::span<GlobalUnit> units(view.units);
   global::Waiting waiting;
   waiting.works.resize(units.size());
   Duration blocking = 0;
   return from_most_urgent(
-      system, view.units,
-      [&](std::size_t k) {
+      system, view,
+      [&](std::size_t k, Duration start) {
         if (mode == sched::Preemption::None) blocking = global::blocking_of(system, view.units, k, view.workers);
-        return global::bounded_response(units, k, view.workers, blocking, waiting);
+        return global::bounded_response(units, k, view.workers, blocking, waiting, start);
       },
       [&](std::size_t k, SharedTerms &terms) { explain_bounded(units, k, view.workers, blocking, waiting, terms); });
 }
@@ -208,13 +210,7 @@ class AgainstAll {
   AgainstAll(const System &system, std::vector<GlobalUnit> &units, std::uint32_t workers)
       : system_(system), units_(units), workers_(workers) {
     waiting_.works.resize(units.size());
-    for (GlobalUnit &unit : units) {
-      // Not above any response that is found, and enough for dag_work().
-      const Duration more = unit.bound > 0         ? (unit.volume - unit.length) / unit.bound
-                            : unit.tasks > workers ? (unit.volume - unit.length) / static_cast<Duration>(workers)
-                                                   : 0;
-      unit.response = unit.length + more + unit.jitter;
-    }
+    for (GlobalUnit &unit : units) start_low(unit, workers);
   }
 
   bool respond(std::size_t k) {
@@ -274,8 +270,8 @@ Method melani() {
       "A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo, Response-time analysis of "
       "conditional DAG tasks in multiprocessor systems, ECRTS 2015";
   method.assumptions =
-      "m workers, full preemption, static priorities that keep DAGs together, R <= T; release jitter; "
-      "no max_active, shared groups or levels";
+      "m workers, full preemption, static priorities that keep DAGs together, R <= T; release jitter, shared levels; "
+      "no max_active, no shared groups";
   method.complexity = "pseudo-polynomial; O(DAGs) a step";
   method.apply = [](const System &system) { return across_rates(system, apply_melani); };
   return method;
@@ -288,7 +284,7 @@ Method dag_bounded() {
   method.cite = "docs/analysis.md, \"Several workers\"; after A. Melani et al., ECRTS 2015";
   method.assumptions =
       "m workers, full preemption, static priorities that keep DAGs together, one rate a DAG, R <= T; release jitter, "
-      "max_active of DAGs in one part; no shared groups or levels";
+      "shared levels, max_active of DAGs in one part; no shared groups";
   method.complexity = "pseudo-polynomial; O(DAGs) a step";
   method.apply = [](const System &system) { return across_rates(system, apply_preemptive); };
   return method;
@@ -318,7 +314,7 @@ Method dag_nonpreemptive() {
       "analysis of DAG tasks under fixed priority scheduling with limited preemptions, DATE 2016";
   method.assumptions =
       "m workers, jobs run to completion, static priorities that keep DAGs together, one rate a DAG, R <= T; release "
-      "jitter, max_active of DAGs in one part; no shared groups";
+      "jitter, equal priorities, max_active of DAGs in one part; no shared groups";
   method.complexity = "pseudo-polynomial; O(DAGs) a step";
   method.apply = [](const System &system) { return across_rates(system, apply_nonpreemptive); };
   return method;

@@ -22,8 +22,9 @@ namespace global {
 }
 
 /// Fills in `response` of units[k] given those of units[0 .. k): R = L + floor((vol - L + sum W_j(R)) / m). False:
-/// above its limit, or too many steps.
-[[nodiscard]] bool melani_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers);
+/// above its limit, or too many steps. `start`: below which there is no fixed point.
+[[nodiscard]] bool melani_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
+                                   Duration start = 0);
 
 /// How a DAG's critical path comes to wait under dag_bounded().
 struct Waiting {
@@ -35,7 +36,7 @@ struct Waiting {
 /// The same with max_active, `blocking` by less urgent work, and counting of each DAG only what its width lets it do
 /// while the critical path waits. `waiting.works` must hold k values.
 [[nodiscard]] bool bounded_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
-                                    Duration blocking, Waiting &waiting);
+                                    Duration blocking, Waiting &waiting, Duration start = 0);
 
 /// What less urgent jobs that run to completion can execute while units[k]'s critical path waits: the m largest once,
 /// and m - 1 each time a job of the DAG ends and its next critical one, or one that max_active held back, finds them

@@ -183,7 +183,7 @@ TEST(GlobalGroups, ResponsesAboveThePeriodAreBounded) {
   std::uint32_t binding = 0;
   BoundCaseLimits limits = overlapping(true);
   limits.caps = true;
-  testing::for_cases(cases(limits), 2000, [&](const testing::BoundCase &, const System &system, Rng &) {
+  testing::for_cases(cases(limits), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
     const Outcome outcome = dag_groups().apply(system);
     const Bound *bound = std::get_if<Bound>(&outcome);
     if (bound == nullptr) return;

@@ -131,11 +131,13 @@ bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t wor
   return found;
 }
 
+Duration start_again(const GlobalUnit &unit) { return window_of(unit); }
+
 bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
-                                       Duration remaining) {
+                                       Duration remaining, Duration start) {
   GlobalUnit &own = units[k];
   if (remaining >= kUnbounded / 4) return false;
-  Duration d = first_window(units.first(k), kNobody, remaining, workers);
+  Duration d = std::max(start, first_window(units.first(k), kNobody, remaining, workers));
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
     return carrying_window(units.first(k), kNobody, waiting, waiting, remaining, workers);
   });
@@ -185,46 +187,41 @@ ResponseBound itemise(const System &system, std::span<const GlobalUnit> units, s
   return bound;
 }
 
-// `respond(k, remaining)` says whether units[k] has a response; `remaining` is its less urgent work, 0 by default.
+// `respond(units, k, alone, remaining)` says whether units[k] has a response; `remaining` is its less urgent work, 0 by
+// default.
 template <class Respond>
-Outcome from_most_urgent(const System &system, sched::Preemption mode, Respond respond) {
-  global::Units view = global::units_of(system, {.mode = mode, .edges = false});
+Outcome from_most_urgent(const System &system, const global::Needs &needs, Respond respond) {
+  global::Units view = global::units_of(system, needs);
   if (view.reason) return NotApplicable{*view.reason};
-  std::vector<ResponseBound> responses(system.units.size());
-  bool known = true;
-  for (std::size_t k = 0; k < view.units.size(); ++k) {
-    Effort::reached(k, view.units.size());
-    ResponseBound &response = responses[view.units[k].unit];
-    Duration remaining = 0;
-    if (!known) {
-      response.absent = global::kMoreUrgent;
-    } else if (respond(view, k, remaining)) {
-      response = itemise(system, view.units, k, view.workers, remaining);
-    } else {
-      known = false;
-      response.absent = global::kNoFixedPoint;
-    }
-  }
-  return from_units(system, std::move(responses));
+  Duration remaining = 0;
+  return global::from_most_urgent(
+      system, view.units, [](GlobalUnit &unit) { unit.response = unit.volume + unit.jitter; },
+      [&](std::size_t k, bool alone) { return respond(view, k, alone, remaining); },
+      [&](std::size_t k) { return itemise(system, view.units, k, view.workers, remaining); });
 }
 
 Outcome apply_bertogna_cirinei(const System &system) {
-  return from_most_urgent(system, sched::Preemption::Full, [](global::Units &view, std::size_t k, Duration &) {
-    return global::bertogna_cirinei_response(view.units, k, view.workers, global::start_after(view.units, k));
-  });
+  return from_most_urgent(
+      system, {.edges = false, .equals = true}, [](global::Units &view, std::size_t k, bool alone, Duration &) {
+        const Duration start = alone ? global::start_after(view.units, k) : global::start_again(view.units[k]);
+        return global::bertogna_cirinei_response(view.units, k, view.workers, start);
+      });
 }
 
+// An earlier job of the task itself can keep a worker from its equals, so that more of them carry work in: no equals.
 Outcome apply_guan(const System &system) {
-  return from_most_urgent(system, sched::Preemption::Full, [](global::Units &view, std::size_t k, Duration &) {
+  return from_most_urgent(system, {.edges = false}, [](global::Units &view, std::size_t k, bool, Duration &) {
     return global::guan_response(view.units, k, view.workers, global::start_after(view.units, k));
   });
 }
 
 Outcome apply_nonpreemptive(const System &system) {
-  return from_most_urgent(system, sched::Preemption::None,
-                          [&system](global::Units &view, std::size_t k, Duration &remaining) {
+  return from_most_urgent(system, {.mode = sched::Preemption::None, .edges = false, .equals = true},
+                          [&system](global::Units &view, std::size_t k, bool alone, Duration &remaining) {
                             remaining = global::largest_remaining(system, view.units, k + 1, view.workers);
-                            return global::sequential_nonpreemptive_response(view.units, k, view.workers, remaining);
+                            const Duration start = alone ? 0 : global::start_again(view.units[k]);
+                            return global::sequential_nonpreemptive_response(view.units, k, view.workers, remaining,
+                                                                             start);
                           });
 }
 
@@ -278,7 +275,8 @@ Method bertogna_cirinei() {
       "M. Bertogna, M. Cirinei, Response-time analysis for globally scheduled symmetric multiprocessor platforms, "
       "RTSS 2007";
   method.assumptions =
-      "m workers, full preemption, static priorities, no edges, R <= T; release jitter; no shared groups or levels";
+      "m workers, full preemption, static priorities, no edges, R <= T; release jitter, shared levels; no shared "
+      "groups";
   method.complexity = "pseudo-polynomial; O(n) a step";
   method.apply = [](const System &system) { return across_rates(system, apply_bertogna_cirinei); };
   return method;
@@ -313,7 +311,8 @@ Method sequential_nonpreemptive() {
   method.name = "sequential_nonpreemptive";
   method.cite = "docs/analysis.md, \"Several workers\"; after N. Guan, W. Yi, Z. Gu, Q. Deng, G. Yu, RTSS 2008";
   method.assumptions =
-      "m workers, jobs run to completion, static priorities, no edges, R <= T; release jitter; no shared groups";
+      "m workers, jobs run to completion, static priorities, no edges, R <= T; release jitter, equal priorities; no "
+      "shared groups";
   method.complexity = "pseudo-polynomial; O(n) a step";
   method.apply = [](const System &system) { return across_rates(system, apply_nonpreemptive); };
   return method;

@@ -31,7 +31,9 @@ namespace global {
 [[nodiscard]] bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration start = 0);
 /// `remaining`: sum of the m largest C - 1 of less urgent tasks.
 [[nodiscard]] bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
-                                                     Duration remaining);
+                                                     Duration remaining, Duration start = 0);
+/// Where the next fixed point may begin that others with larger responses give units[k]: at the last one.
+[[nodiscard]] Duration start_again(const GlobalUnit &unit);
 /// Lowers `response` of units[k] given those of all others, in any work-conserving order.
 [[nodiscard]] bool any_order_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers);
 

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <initializer_list>
+#include <utility>
+#include <variant>
 
 #include "redag/testing/bound_property.hpp"
 
@@ -122,6 +124,33 @@ TEST(GlobalSequential, TheMostUrgentOfEachWorkerNeverWait) {
     EXPECT_EQ(found[1], 5);
     EXPECT_EQ(found[2], 6);
     EXPECT_GT(found[3].value(), 1);
+  }
+}
+
+// Two of one priority on two workers, beside a more urgent one: each can wait for the other, and for no less urgent
+// one. Guan's argument needs that the others preempt the task itself.
+TEST(GlobalSequential, EqualsRelyOnEachOther) {
+  Workload workload = independent(2, {{2, 10}, {3, 20}, {4, 20}, {5, 40}});
+  workload.dags[2].tasks[0].priority = workload.dags[1].tasks[0].priority;
+  const System shared = compiled(workload, sched::Preemption::Full);
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(guan().apply(shared)));
+  const auto found = responses(bertogna_cirinei(), shared);
+  // As if each were the last of the two in a fixed order.
+  std::swap(workload.dags[1].tasks[0].wcet, workload.dags[2].tasks[0].wcet);
+  std::swap(workload.dags[1].tasks[0].bcet, workload.dags[2].tasks[0].bcet);
+  workload.ties = Ties::Fixed;
+  const auto other_last = responses(bertogna_cirinei(), compiled(workload, sched::Preemption::Full));
+  EXPECT_GE(found[1].value(), other_last[2].value());
+  EXPECT_GE(found[2].value(), found[1].value());
+  EXPECT_GE(found[3].value(), found[2].value());
+  const System none = compiled(workload, sched::Preemption::None);
+  EXPECT_TRUE(responses(sequential_nonpreemptive(), none)[3]);
+
+  // None for one of them is none for either.
+  workload = independent(2, {{6, 10}, {6, 10}, {9, 10}});
+  for (Dag &dag : workload.dags) dag.tasks[0].priority = 0;
+  for (const auto &response : responses(bertogna_cirinei(), compiled(workload, sched::Preemption::Full))) {
+    EXPECT_FALSE(response);
   }
 }
 

@@ -129,6 +129,11 @@ void Views::close_levels() {
   std::vector<std::uint32_t> reach(ranks);  // by rank: the least urgent task of units that begin at it or above
   std::iota(reach.begin(), reach.end(), 0);
   for (const Unit &unit : system_.units) reach[unit.first_rank] = std::max(reach[unit.first_rank], unit.last_rank);
+  // Any task of a tier can go before any other of it.
+  for (std::uint32_t rank = ranks; rank-- > 1;) {
+    const auto tier_of = [this](std::uint32_t at) { return system_.tasks[system_.by_rank[at]].tier; };
+    if (tier_of(rank) == tier_of(rank - 1)) reach[rank - 1] = std::max(reach[rank - 1], reach[rank]);
+  }
   for (std::uint32_t rank = 1; rank < ranks; ++rank) reach[rank] = std::max(reach[rank], reach[rank - 1]);
   closed_.resize(ranks);
   for (std::uint32_t rank = ranks; rank-- > 0;) closed_[rank] = reach[rank] == rank ? rank : closed_[rank + 1];
@@ -215,7 +220,6 @@ void Views::count_down_to(std::uint32_t level) {
 View Views::of(std::uint32_t unit) {
   const std::uint32_t last = level(unit);
   View view;
-  view.interleaved = last != system_.units[unit].last_rank;
   count_down_to(last);
   for (std::uint32_t c = 0; c < classes_.size(); ++c) {
     const Class &one = classes_[c];

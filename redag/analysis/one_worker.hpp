@@ -35,12 +35,11 @@ struct View {
   std::vector<Interferer> more_urgent;  // those of one period and jitter together, as one
   std::vector<Blocker> blockers;        // each at most once in a busy period
   Duration blocking = 0;                // their sum
-  /// The unit's own priorities and those of others are interleaved, so that its view is coarser than its priority.
-  bool interleaved = false;
 };
 
-/// Who can delay each unit. The level of the busy period is the least urgent task of the unit, lowered until no other
-/// unit lies on both sides of it (docs/analysis.md, "One worker"). Memory is linear in the size of the system.
+/// Who can delay each unit. The level of the busy period is the least urgent task of the unit, lowered until no tier
+/// and no other unit lies on both sides of it (docs/analysis.md, "One worker"). Memory is linear in the size of the
+/// system.
 class Views {
  public:
   /// `system` must outlive it. O(n log n).
@@ -75,7 +74,7 @@ class Views {
   const System &system_;
   std::vector<std::uint32_t> by_first_rank_;  // units
   std::vector<std::uint32_t> order_;
-  std::vector<std::uint32_t> closed_;  // by rank: the first level from it on that splits no unit
+  std::vector<std::uint32_t> closed_;  // by rank: the first level from it on that splits no unit and no tier
   std::vector<Blocker> longest_;       // by rank: the longest stretch from it on that nothing preempts
   std::vector<Class> classes_;
   std::vector<std::uint32_t> class_of_;  // by unit

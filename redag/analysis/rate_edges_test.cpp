@@ -158,11 +158,14 @@ std::optional<Duration> milliseconds(const ResponseBound &bound) {
 // Camera every 10 ms (R = 1), lidar every 40 ms (R = 5), fused: ready as soon as the lidar's data are there, because
 // a picture comes within 10 + 1 of the last, so the first wait counts alone.
 TEST(RateEdges, DataOfAFastPredecessorAreThereWhenTheSlowOneEnds) {
-  const System system =
-      compiled(make_workload({make_dag("d", {{.name = "camera", .period_ms = 10},
-                                             {.name = "lidar", .period_ms = 40, .wcet_ms = 4},
-                                             {.name = "fuse", .wcet_ms = 3, .after = {0, 1}, .deadline_ms = 5}})},
-                             1));
+  Workload workload =
+      make_workload({make_dag("d", {{.name = "camera", .period_ms = 10},
+                                    {.name = "lidar", .period_ms = 40, .wcet_ms = 4},
+                                    {.name = "fuse", .wcet_ms = 3, .after = {0, 1}, .deadline_ms = 5}})},
+                    1);
+  EXPECT_EQ(milliseconds(bound_of(rta_preemptive(), compiled(workload)).tasks[1]), 8) << "fuse is its equal";
+  workload.ties = Ties::Fixed;
+  const System system = compiled(workload);
   const Bound bound = bound_of(rta_preemptive(), system);
   EXPECT_EQ(milliseconds(bound.tasks[0]), 1);
   EXPECT_EQ(milliseconds(bound.tasks[1]), 5);
@@ -176,10 +179,11 @@ TEST(RateEdges, DataOfAFastPredecessorAreThereWhenTheSlowOneEnds) {
 
 // Released 3 before its predecessor, which answers after 2: it waits 5 in its first period, and so in all.
 TEST(RateEdges, ATimerWaitsForDataOfAnotherOffset) {
-  const System system =
-      compiled(make_workload({make_dag("d", {{.name = "a", .period_ms = 20, .wcet_ms = 2, .offset_ms = 3},
-                                             {.name = "b", .period_ms = 20, .wcet_ms = 4, .after = {0}}})},
-                             1));
+  Workload workload = make_workload({make_dag("d", {{.name = "a", .period_ms = 20, .wcet_ms = 2, .offset_ms = 3},
+                                                    {.name = "b", .period_ms = 20, .wcet_ms = 4, .after = {0}}})},
+                                    1);
+  workload.ties = Ties::Fixed;  // or b would also delay a
+  const System system = compiled(workload);
   const Bound bound = bound_of(rta_preemptive(), system);
   EXPECT_EQ(milliseconds(bound.tasks[1]), 5 + 4 + 2);
   EXPECT_EQ(bound.tasks[1].sum(Term::Kind::Wait), 5 * kMillisecond);

@@ -1,5 +1,8 @@
 #include "redag/analysis/response_time.hpp"
 
+#include <string>
+#include <variant>
+
 #include <gtest/gtest.h>
 
 #include "redag/testing/bound_property.hpp"
@@ -57,6 +60,35 @@ TEST(BoundProperty, DagOneWorkerCooperative) {
   limits.groups = false;
   limits.max_dags = 4;
   expect_bound_holds(dag_one_worker_deferred(), cases(limits), kFew);
+}
+
+// Any of equals can go first: what was released an instant before.
+TEST(ResponseTime, EqualsInterfereBothWays) {
+  Workload workload;
+  for (const Duration wcet : {3, 4}) {
+    Task task;
+    task.name = "t";
+    task.wcet = task.bcet = wcet;
+    task.period = task.deadline = 10;
+    Dag dag;
+    dag.name = "d" + std::to_string(wcet);
+    dag.tasks = {task};
+    workload.dags.push_back(dag);
+  }
+  for (const sched::Preemption mode : {sched::Preemption::Full, sched::Preemption::None}) {
+    for (const Ties ties : {Ties::Share, Ties::Fixed}) {
+      workload.ties = ties;
+      AnalysisPlatform platform;
+      platform.preemption = mode;
+      const Outcome outcome = (mode == sched::Preemption::Full ? rta_preemptive() : rta_nonpreemptive())
+                                  .apply(compile(workload, platform).value());
+      const Bound &bound = std::get<Bound>(outcome);
+      // In the fixed order the first waits for the second only where that cannot be preempted, and not for all of it.
+      const Duration first = ties == Ties::Share ? 7 : mode == sched::Preemption::Full ? 3 : 6;
+      EXPECT_EQ(bound.tasks[0].response, first);
+      EXPECT_EQ(bound.tasks[1].response, 7);
+    }
+  }
 }
 
 }  // namespace

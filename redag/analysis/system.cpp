@@ -19,6 +19,7 @@ class Compiler {
   Compiler(const Workload &workload, const AnalysisPlatform &platform) : workload_(workload) {
     system_.platform = platform;
     system_.policy = workload.policy;
+    system_.ties = workload.ties;
     system_.mode = platform.preemption;
     const auto has_region = [](const Dag &dag) {
       return std::any_of(dag.tasks.begin(), dag.tasks.end(), [](const Task &task) { return task.region > 0; });
@@ -187,10 +188,12 @@ class Compiler {
   }
 
   void assign_ranks() {
-    const auto priorities = sched::assign_priorities(workload_.dags, workload_.policy, system_.platform.levels);
+    const auto priorities =
+        sched::assign_priorities(workload_.dags, workload_.policy, workload_.ties, system_.platform.levels);
     system_.by_rank.resize(priorities.size());
     for (std::uint32_t t = 0; t < priorities.size(); ++t) {
       system_.tasks[t].rank = priorities[t].rank;
+      system_.tasks[t].tier = priorities[t].tier;
       system_.tasks[t].level = priorities[t].level;
       system_.by_rank[priorities[t].rank] = t;
     }

@@ -20,7 +20,7 @@ namespace redag::analysis {
 struct AnalysisPlatform {
   std::uint32_t workers = 1;
   sched::Preemption preemption = sched::Preemption::Full;
-  std::uint32_t levels = 0;       // distinct priority levels; 0: as many as tasks (sched::Config::levels)
+  std::uint32_t levels = 0;       // distinct priority levels; 0: as many as it takes (sched::Config::levels)
   std::uint32_t max_started = 0;  // jobs started and unfinished at once; 0: no bound (sched::Config::max_started)
   Duration release_overhead = 0;  // each job, before its body
   Duration dispatch_overhead = 0;
@@ -61,7 +61,8 @@ struct SystemTask {
   Duration limit = 0;     // response up to which no job of the task is skipped (T, or T * queue_depth)
   Duration region = 0;    // longest stretch without a preemption point, overheads included; 0 with full preemption
   Duration last_region = 0;        // stretch after the last preemption point when it executes for its wcet; 0 likewise
-  std::uint32_t rank = 0;          // place in the total order, 0 the most urgent
+  std::uint32_t rank = 0;          // place in the order of tasks, 0 the most urgent
+  std::uint32_t tier = 0;          // tasks of one tier take turns: any of them can go first
   std::uint32_t level = 0;         // tasks of one level do not preempt each other
   std::uint32_t group = kNoGroup;  // only groups that two or more tasks share
   bool data = false;               // released by its predecessors' completion
@@ -102,6 +103,7 @@ struct SystemDag {
 struct System {
   AnalysisPlatform platform;
   PolicyKind policy = PolicyKind::RateMonotonic;
+  Ties ties = Ties::Share;
   std::vector<SystemTask> tasks;
   std::vector<Unit> units;
   std::vector<SystemDag> dags;

@@ -48,13 +48,22 @@ std::optional<std::vector<std::uint32_t>> units_by_rank(const System &system) {
   return order;
 }
 
-// Utilizations know nothing of jitter, of deadlines below the period, or of another order than by rate.
+// Units of one tier can each go before the other.
+bool take_turns(const System &system, const Unit &upper, const Unit &lower) {
+  return system.tasks[system.by_rank[upper.last_rank]].tier == system.tasks[system.by_rank[lower.first_rank]].tier;
+}
+
+// Utilizations know nothing of jitter, of deadlines below the period, or of another order than by rate. Equals of one
+// period are no other order: whichever goes first, each waits for no more than the last one in a fixed order does.
 std::optional<std::string> why_not_by_rate(const System &system, const std::vector<std::uint32_t> &order) {
   Duration last = 0;
-  for (const std::uint32_t u : order) {
-    const Unit &unit = system.units[u];
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const Unit &unit = system.units[order[i]];
     const std::string name = unit.tasks.size() == 1 ? "task '" + system.tasks[unit.tasks.front()].name + "'"
                                                     : "DAG '" + system.dags[unit.dag.value].name + "'";
+    if (i > 0 && unit.period != last && take_turns(system, system.units[order[i - 1]], unit)) {
+      return name + ": it takes turns with one of another period";
+    }
     if (unit.deadline < unit.period) return name + ": its deadline is below its period";
     if (unit.jitter > 0) return name + ": it has release jitter";
     if (unit.period < last) return name + ": it is less urgent than one of a larger period";
@@ -227,9 +236,9 @@ std::optional<std::string> why_not_global(const System &system) {
     if (dag.max_active > 0 && dag.tasks.size() > 1) return "DAG '" + dag.name + "' has a max_active";
   }
   for (std::size_t rank = 1; rank < system.by_rank.size(); ++rank) {
-    if (system.tasks[system.by_rank[rank]].level == system.tasks[system.by_rank[rank - 1]].level) {
-      return "tasks share priority levels";
-    }
+    const SystemTask &upper = system.tasks[system.by_rank[rank - 1]];
+    const SystemTask &lower = system.tasks[system.by_rank[rank]];
+    if (upper.level == lower.level && upper.tier != lower.tier) return "tasks of different priority share levels";
   }
   return why_not_by_rate(system, *units_by_rank(system));
 }
@@ -286,7 +295,7 @@ constexpr std::string_view kOneWorkerBlocking =
     "= volume";
 constexpr std::string_view kGlobal =
     "m >= 2 workers, full preemption, rate-monotonic order, independent tasks, D >= T, no jitter, groups, max_active "
-    "or shared levels";
+    "or levels that different rates share";
 
 }  // namespace
 

@@ -53,6 +53,24 @@ TEST(BoundProperty, Hyperbolic) {
   expect_bound_holds(hyperbolic(), cases(rate_monotonic(sched::Preemption::Full)), kFew);
 }
 
+// Equals of one period and of several.
+TEST(BoundProperty, UtilizationOfEquals) {
+  for (const sched::Preemption mode : {sched::Preemption::Full, sched::Preemption::None}) {
+    BoundCaseLimits limits = rate_monotonic(mode);
+    limits.policies = {PolicyKind::Fixed};
+    limits.max_dags = 3;
+    limits.max_utilization = 0.9;
+    expect_bound_holds(mode == sched::Preemption::Full ? hyperbolic() : hyperbolic_blocking(), cases(limits), kFew);
+  }
+  BoundCaseLimits limits = rate_monotonic(sched::Preemption::Full);
+  limits.policies = {PolicyKind::Fixed, PolicyKind::RateMonotonic};
+  limits.min_workers = 2;
+  limits.max_workers = 3;
+  limits.max_dags = 6;
+  limits.overheads = false;
+  expect_bound_holds(global_rm_utilization(), cases(limits), kFew);
+}
+
 TEST(BoundProperty, HarmonicChains) {
   BoundCaseLimits limits = rate_monotonic(sched::Preemption::Full);
   limits.max_period = 16;

@@ -21,7 +21,7 @@ void add_analysis_arguments(CLI::App &app, AnalysisArguments &arguments, const s
       ->group("Limits");
   add_platform_arguments(app, run);
   add_count(app, "--levels", arguments.levels, {0, kMaxLevels},
-            "Priority levels; tasks that share one do not preempt; 0: one a task")
+            "Priority levels; tasks that share one do not preempt; 0: one for each priority")
       ->group("Platform");
   add_overhead_arguments(app, run, "Platform");
 }

@@ -106,6 +106,7 @@ Json to_json(const Analysed &analysed, bool each) {
       {"workload", analysed.workload.name},
       {"executor", std::string(analysed.executor->name)},
       {"policy", to_string(analysed.workload.policy)},
+      {"ties", to_string(analysed.workload.ties)},
       {"workers", platform.workers},
       {"preemption", mode_name(analysed)},
       {"preemption_why", mode_reason(analysed)},

@@ -31,6 +31,7 @@ BoundCheck check_bounds(const Session &session) {
   const trace::RunInfo &info = session.info;
   Workload workload = info.workload;
   workload.policy = info.config.policy;
+  workload.ties = info.config.ties;
   analysis::AnalysisPlatform platform = analysis::platform_of(info.config);
   if (const std::optional<Overheads> machine = parse_overheads(info.overheads)) {
     platform = analysis::charge(platform, *machine);

@@ -159,6 +159,11 @@ const Choices<PolicyKind> &policy_choices() {
   return kChoices;
 }
 
+const Choices<Ties> &ties_choices() {
+  static const Choices<Ties> kChoices = {{to_string(Ties::Share), Ties::Share}, {to_string(Ties::Fixed), Ties::Fixed}};
+  return kChoices;
+}
+
 const Choices<PreemptionMode> &preemption_choices() {
   static const Choices<PreemptionMode> kChoices = [] {
     Choices<PreemptionMode> all;

@@ -89,6 +89,7 @@ CLI::Option *add_choice(CLI::App &app, const std::string &name, Target &target, 
 }
 
 [[nodiscard]] const Choices<PolicyKind> &policy_choices();
+[[nodiscard]] const Choices<Ties> &ties_choices();
 [[nodiscard]] const Choices<PreemptionMode> &preemption_choices();
 
 }  // namespace redag::cli

@@ -24,6 +24,7 @@ constexpr const char *kResultGroup = "Results";
 
 void add_platform_arguments(CLI::App &app, RunArguments &arguments) {
   add_choice(app, "--policy", arguments.policy, policy_choices(), "Priority order")->group(kWorkloadGroup);
+  add_choice(app, "--ties", arguments.ties, ties_choices(), "Order of equal priorities")->group(kWorkloadGroup);
   add_choice(app, "--preemption", arguments.preemption, preemption_choices(), "Of redag")->group(kWorkloadGroup);
   add_count(app, "--workers", arguments.workers, {1, kMaxWorkers}, "Workers")->default_str("")->group(kWorkloadGroup);
 }
@@ -104,8 +105,10 @@ std::optional<Workload> load_configured(const RunArguments &arguments, Console &
   }
   console.note(loaded->warnings);
   Workload workload = std::move(loaded->workload);
-  if (!arguments.policy && !arguments.preemption && arguments.workers == 0) return workload;
+  const bool is_unchanged = !arguments.policy && !arguments.ties && !arguments.preemption && arguments.workers == 0;
+  if (is_unchanged) return workload;
   if (arguments.policy) workload.policy = *arguments.policy;
+  if (arguments.ties) workload.ties = *arguments.ties;
   if (arguments.preemption) workload.platform.preemption = *arguments.preemption;
   if (arguments.workers > 0) workload.platform.workers = arguments.workers;
   // The file was fine; what is wrong now came from the command line and has no line to point at.
@@ -130,6 +133,11 @@ bool takes_arguments(const std::vector<Variant> &variants, const RunArguments &a
   if (arguments.policy && none([](const Variant &variant) { return variant.is_redag(); })) {
     console.error(fmt::format("--policy {}: '{}' has an order of its own", to_string(*arguments.policy), first.name),
                   "leave --policy out, or choose the executor 'redag'");
+    return false;
+  }
+  if (arguments.ties && none([](const Variant &variant) { return variant.is_redag(); })) {
+    console.error(fmt::format("--ties {}: '{}' has an order of its own", to_string(*arguments.ties), first.name),
+                  "leave --ties out, or choose the executor 'redag'");
     return false;
   }
   const auto has_workers = [](const Variant &variant) {

@@ -21,6 +21,7 @@ namespace redag::cli {
 struct RunArguments {
   std::string file;
   std::optional<PolicyKind> policy;
+  std::optional<Ties> ties;
   std::optional<PreemptionMode> preemption;
   std::uint32_t workers = 0;  // 0: the workload's
   std::optional<Duration> duration;

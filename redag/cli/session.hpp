@@ -26,7 +26,8 @@ struct SessionOptions {
   Duration duration = 10 * kSecond;
   Duration warm_up = 0;
   std::uint64_t seed = 1;
-  /// Events kept, 32 bytes each, up to the end of an instant. Later ones are summarized, but neither checked nor written.
+  /// Events kept, 32 bytes each, up to the end of an instant. Later ones are summarized, but neither checked nor
+  /// written.
   std::size_t max_events = std::size_t{1} << 22U;
   const std::atomic<bool> *stop = nullptr;  // ends the run early, with the results so far
   sim::Overheads overheads;                 // simulator

@@ -12,6 +12,7 @@ bool misses_nothing(const Workload &workload, const analysis::AnalysisPlatform &
   config.workers = platform.workers;
   config.preemption = platform.preemption;
   config.policy = workload.policy;
+  config.ties = workload.ties;
   config.levels = platform.levels;
   config.max_started = platform.max_started;
   sched::PriorityScheduler scheduler(workload, config);

@@ -56,9 +56,10 @@ bool Activity::is_inverted() const {
   if (least == nullptr) return false;
   // A job that only lacks a thread waits for a less urgent one, too.
   const auto &waiting = replay_.eligible_but_for_threads();
-  if (!waiting.empty() && waiting.begin()->urgency < *least) return true;
-  return std::any_of(replay_.suspended().begin(), replay_.suspended().end(),
-                     [&](const Replay::JobRef &ref) { return replay_.find(ref.task, ref.number)->own < *least; });
+  if (!waiting.empty() && waiting.begin()->urgency.key < least->key) return true;
+  return std::any_of(replay_.suspended().begin(), replay_.suspended().end(), [&](const Replay::JobRef &ref) {
+    return replay_.find(ref.task, ref.number)->own.key < least->key;
+  });
 }
 
 Duration Activity::measured(Time from, Time to) const { return std::max<Duration>(0, to - std::max(from, begin_)); }

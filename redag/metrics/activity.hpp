@@ -10,9 +10,8 @@
 
 namespace redag::metrics {
 
-/// Times at which an eligible (or preempted) job waited while a job behind it in the policy's total order ran, each by
-/// its own priority: inherited priority does not hide an inversion, nor does a lack of threads. Overlapping ones are
-/// one.
+/// Times at which an eligible (or preempted) job waited while one of lower priority ran, each by its own: inherited
+/// priority does not hide an inversion, nor does a lack of threads, and equals have the same. Overlapping ones are one.
 struct Inversions {
   std::uint64_t count = 0;
   Duration total = 0;

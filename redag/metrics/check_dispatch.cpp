@@ -1,6 +1,7 @@
 #include "redag/metrics/check_dispatch.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "redag/model/demand.hpp"
 
@@ -8,6 +9,13 @@ namespace redag::metrics {
 
 using sched::Preemption;
 using State = LiveJob::State;
+
+DispatchRules::DispatchRules(CheckContext &context) : context_(context) {
+  for (const Dag &dag : context.info.workload.dags) {
+    const auto first = static_cast<std::uint32_t>(places_.size());
+    for (const std::uint32_t rank : topological_ranks(dag)) places_.push_back(first + rank);
+  }
+}
 
 void DispatchRules::before(const JobEvent &event) {
   const LiveJob *job = context_.replay.find(event.task, event.job);
@@ -74,7 +82,7 @@ void DispatchRules::check_place(const JobEvent &event, const LiveJob &job) {
   if (stack.empty()) return;
   const LiveJob *below = replay.find(stack.back().task, stack.back().number);
   if (below == nullptr) return;
-  context_.expect(Rule::Preemption, replay.preempts(job.own, urgency_of(*below)), event.task, event.job,
+  context_.expect(Rule::Preemption, replay.preempts(job.own, urgency_of(*below, job.own)), event.task, event.job,
                   [&] { return "it runs on top of " + name(stack.back()) + ", which it does not outrank"; });
   context_.expect(Rule::Priority, replay.free_workers() == 0, event.task, event.job,
                   [&] { return "it runs on top of " + name(stack.back()) + " although a worker is free"; });
@@ -92,8 +100,8 @@ void DispatchRules::check_eviction(const JobEvent &event, const LiveJob &by) {
   const LiveJob *job = replay.find(evicted.task, evicted.number);
   if (job == nullptr) return;
   // Where levels are shared, the job may inherit from one that was looked at only after the preemption: so its own
-  // level decides, and what it inherits only in the total order.
-  const bool outranked = replay.preempts(by.raised, job->own) && by.raised < urgency_of(*job);
+  // level decides, and what it inherits only in the order of priorities.
+  const bool outranked = replay.preempts(by.raised, job->own) && by.raised.key <= urgency_of(*job, by.raised).key;
   context_.expect(Rule::Preemption, outranked, evicted.task, evicted.number, [&] {
     return "preempted by " + context_.job_name(by.task, by.number) + ", which does not outrank it";
   });
@@ -114,13 +122,18 @@ void DispatchRules::check_choice(const LiveJob &chosen, const Urgency &urgency) 
   if (!eligible.empty() && !none_may_start) {
     const Replay::Waiter &best = *eligible.begin();
     const bool is_itself = best.task == chosen.task && best.number == chosen.number;
-    const bool outranks = goes_on ? replay.preempts(best.urgency, urgency) : best.urgency < urgency;
+    const bool outranks = goes_on ? replay.preempts(best.urgency, urgency)
+                                  : replay.goes_first(best.urgency, false, urgency, chosen.state == State::Suspended);
     if (!is_itself && outranks) complain(Replay::JobRef{best.task, best.number});
   }
   if (mode() != Preemption::Full) return;
-  const LiveJob *suspended = most_urgent_suspended();
-  if (suspended == nullptr || (suspended->task == chosen.task && suspended->number == chosen.number)) return;
-  if (urgency_of(*suspended) < urgency) complain(Replay::JobRef{suspended->task, suspended->number});
+  for (const Replay::JobRef &ref : replay.suspended()) {
+    if (ref == Replay::JobRef{chosen.task, chosen.number}) continue;
+    const Urgency other = urgency_of(*replay.find(ref.task, ref.number), urgency);
+    if (!replay.goes_first(other, true, urgency, chosen.state == State::Suspended)) continue;
+    complain(ref);
+    break;
+  }
 }
 
 void DispatchRules::deferred(const JobEvent &event) {
@@ -162,6 +175,7 @@ void DispatchRules::ended(const JobEvent &event, const LiveJob &job) {
                   [] { return std::string("it ended while it was preempted"); });
   context_.expect(Rule::Life, event.value >= job.release && event.value <= event.time, event.task, event.job,
                   [&] { return "it ended at " + format_duration(event.value) + ", which cannot be"; });
+  check_order_of_ends(event);
   if (context_.info.driver != trace::Driver::Simulator || job.state != State::Running) return;
   const Task &task = context_.replay.task(event.task);
   const Duration demand = execution_time(task, event.task, event.job, context_.info.seed);
@@ -175,6 +189,19 @@ void DispatchRules::ended(const JobEvent &event, const LiveJob &job) {
   context_.expect(Rule::Execution, exact() ? executed == expected : executed >= expected, event.task, event.job, [&] {
     return "it executed for " + format_duration(executed) + ", expected " + format_duration(expected);
   });
+}
+
+// In virtual time what ends at one instant ends in the static order of tasks, jobs of one task in that of release.
+void DispatchRules::check_order_of_ends(const JobEvent &event) {
+  if (context_.info.driver != trace::Driver::Simulator) return;
+  const Ended ended{event.time, places_[event.task.value], Replay::JobRef{event.task, event.job}};
+  if (last_ended_ && last_ended_->time == ended.time) {
+    const auto order = [](const Ended &one) { return std::pair(one.place, one.job.number); };
+    context_.expect(Rule::Precedence, order(*last_ended_) < order(ended), event.task, event.job, [&] {
+      return "it ended at the instant at which " + name(last_ended_->job) + " did, and after it";
+    });
+  }
+  last_ended_ = ended;
 }
 
 void DispatchRules::end_of_instant() {
@@ -260,6 +287,11 @@ void DispatchRules::check_running() {
 // been looked at: only its own is sure.
 Urgency DispatchRules::urgency_of(const LiveJob &job) const {
   return context_.info.stepped ? job.own : context_.replay.inherited(job);
+}
+
+// As it is when a job of that urgency is looked at.
+Urgency DispatchRules::urgency_of(const LiveJob &job, const Urgency &looked_at) const {
+  return context_.info.stepped ? job.own : context_.replay.inherited(job, looked_at);
 }
 
 const LiveJob *DispatchRules::most_urgent_suspended() const {

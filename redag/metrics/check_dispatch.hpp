@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,7 +13,7 @@ namespace redag::metrics {
 
 class DispatchRules {
  public:
-  explicit DispatchRules(CheckContext &context) : context_(context) {}
+  explicit DispatchRules(CheckContext &context);
 
   void before(const JobEvent &event);
   /// Time is about to move on.
@@ -30,6 +31,12 @@ class DispatchRules {
     std::uint32_t worker = 0;
   };
 
+  struct Ended {
+    Time time = 0;
+    std::uint32_t place = 0;
+    Replay::JobRef job;
+  };
+
   void dispatched(const JobEvent &event, const LiveJob &job);
   void check_bounds(const JobEvent &event);
   void check_place(const JobEvent &event, const LiveJob &job);
@@ -39,9 +46,11 @@ class DispatchRules {
   void preempted(const JobEvent &event, const LiveJob &job);
   void resumed(const JobEvent &event, const LiveJob &job);
   void ended(const JobEvent &event, const LiveJob &job);
+  void check_order_of_ends(const JobEvent &event);
   void check_free_workers();
   void check_running();
   [[nodiscard]] Urgency urgency_of(const LiveJob &job) const;
+  [[nodiscard]] Urgency urgency_of(const LiveJob &job, const Urgency &looked_at) const;
   [[nodiscard]] const LiveJob *most_urgent_suspended() const;
   [[nodiscard]] std::string name(const Replay::JobRef &job) const { return context_.job_name(job.task, job.number); }
   [[nodiscard]] sched::Preemption mode() const { return context_.info.config.preemption; }
@@ -52,6 +61,8 @@ class DispatchRules {
   CheckContext &context_;
   std::vector<Complaint> complaints_;
   std::vector<Eviction> evictions_;
+  std::vector<std::uint32_t> places_;  // by TaskId: DAG by DAG, in topological order
+  std::optional<Ended> last_ended_;
 };
 
 }  // namespace redag::metrics

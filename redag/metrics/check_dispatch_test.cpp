@@ -54,6 +54,66 @@ TEST(CheckTrace, OnlyTheMoreUrgentPreempt) {
   expect_broken(t.until(3), Rule::Priority);
 }
 
+TEST(CheckTrace, OfEqualsTheEarlierReleaseGoesFirst) {
+  Workload w = make_workload({make_dag("a", {{"one", 10, 5, {}, "", 2}, {"two", 10, 5, {}, "", 1}, {"busy", 30, 3}})},
+                             1, PreemptionMode::None);
+  for (const Ties ties : {Ties::Share, Ties::Fixed}) {
+    w.ties = ties;
+    TraceBuilder t(w);
+    t.at(0).arrives("busy", 0).dispatched("busy", 0, 0, 30).at(1).arrives("two", 0).at(2).arrives("one", 0);
+    t.at(3).finished("busy", 0, 0);
+    TraceBuilder one = t;
+    one.dispatched("one", 0, 0, 12);
+    TraceBuilder two = t;
+    two.dispatched("two", 0, 0, 11);
+    const bool share = ties == Ties::Share;
+    expect_kept((share ? two : one).until(4), Rule::Priority);
+    expect_broken((share ? one : two).until(4), Rule::Priority);
+  }
+}
+
+TEST(CheckTrace, AJobThatTakesAPlaceHasItsTurn) {
+  const Workload w = make_workload({make_dag("a", {{"heavy", 20, 25}, {"light", 20, 5}})}, 1, PreemptionMode::None);
+  TraceBuilder t(w);
+  t.at(0).arrives("heavy", 0).arrives("light", 0).dispatched("heavy", 0, 0, 20);
+  t.at(20).arrives("heavy", 1).released("light", 1).skipped("light", 0, Reason::Overrun).ready("light", 1, 20);
+  t.at(25).finished("heavy", 0, 0);
+  TraceBuilder fair = t;
+  expect_kept(fair.dispatched("light", 1, 0, 40).until(26), Rule::Priority);
+  expect_broken(t.dispatched("heavy", 1, 0, 40).until(26), Rule::Priority);
+}
+
+TEST(CheckTrace, EqualsDoNotPreemptAndGoOnFirst) {
+  Workload w = make_workload({make_dag("a", {{"hi", 5, 1, {}, "", 2}, {"one", 20, 4, {}, "", 1}, {"two", 20, 9}})}, 1,
+                             PreemptionMode::Os);
+  TraceBuilder t(w);
+  t.at(0).arrives("two", 0).dispatched("two", 0, 0, 20).at(1).arrives("one", 0);
+  TraceBuilder preempts = t;
+  preempts.preempted("two", 0, 0).dispatched("one", 0, 0, 21);
+  expect_broken(preempts.until(2), Rule::Preemption);
+  t.at(2).arrives("hi", 0).preempted("two", 0, 0).dispatched("hi", 0, 0, 7).at(3).finished("hi", 0, 0);
+  TraceBuilder goes_on = t;
+  expect_kept(goes_on.resumed("two", 0, 0).until(4), Rule::Priority);
+  expect_broken(t.dispatched("one", 0, 0, 21).until(4), Rule::Priority);
+}
+
+TEST(CheckTrace, EndsOfOneInstantAreInTheOrderOfTasks) {
+  const Workload w =
+      make_workload({make_dag("a", {{"last", 0, 5, {1}}, {"first", 10, 5}}), make_dag("b", {{"other", 10, 5}})}, 2);
+  TraceBuilder t(w);
+  t.at(0).arrives("first", 0).arrives("other", 0).dispatched("first", 0, 0, 10).dispatched("other", 0, 1, 10).at(5);
+  TraceBuilder good = t;
+  good.finished("first", 0, 0).released("last", 0).ready("last", 0, 0).finished("other", 0, 1);
+  expect_kept(good.dispatched("last", 0, 0, 15).until(6), Rule::Precedence);
+  TraceBuilder bad = t;
+  bad.finished("other", 0, 1).finished("first", 0, 0).released("last", 0).ready("last", 0, 0);
+  bad.dispatched("last", 0, 0, 15);
+  expect_broken(bad.until(6), Rule::Precedence);
+  trace::Trace threads = bad.until(6);
+  threads.info.driver = trace::Driver::Threads;
+  expect_kept(threads, Rule::Precedence);
+}
+
 TEST(CheckTrace, TasksThatShareALevelDoNotPreempt) {
   TraceBuilder waits = preemptive(PreemptionMode::Os);
   trace::Trace shared = waits.until(6);
@@ -130,6 +190,20 @@ TEST(CheckTrace, PriorityIsInherited) {
 
 // Threads decide more than once at what their clocks call one instant: what lo inherits after mid took its worker takes
 // nothing back, where lo cannot return at once (cooperative; a level that it shares with mid).
+// Two equals come together, and one of them waits for the group of the job that runs. If the other one is looked at
+// first, nothing has been inherited yet; and if not, it is of the holder's level.
+TEST(CheckTrace, AJobInheritsWhenTheOneThatWaitsIsLookedAt) {
+  for (const bool waits_first : {false, true}) {
+    const redag::testing::TestTask waits{"waits", 10, 2, {}, "g", 5};
+    const redag::testing::TestTask equal{"equal", 10, 2, {}, "", 5};
+    const Dag urgent = waits_first ? make_dag("a", {waits, equal}) : make_dag("a", {equal, waits});
+    TraceBuilder t(make_workload({urgent, make_dag("b", {{"holds", 30, 9, {}, "g"}})}, 1, PreemptionMode::Os));
+    t.at(0).arrives("holds", 0).dispatched("holds", 0, 0, 30).at(5).arrives("equal", 0).arrives("waits", 0);
+    t.preempted("holds", 0, 0).dispatched("equal", 0, 0, 15);
+    waits_first ? expect_broken(t.until(6), Rule::Priority) : expect_kept(t.until(6), Rule::Priority);
+  }
+}
+
 TEST(CheckTrace, WhatIsInheritedTooLateKeepsNobodyFromPreempting) {
   for (const PreemptionMode mode : {PreemptionMode::Cooperative, PreemptionMode::Os}) {
     Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "g", 5}}), make_dag("b", {{"mid", 15, 3, {}, "", 5}}),

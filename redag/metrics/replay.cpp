@@ -10,12 +10,12 @@ using State = LiveJob::State;
 
 Replay::Replay(const Workload &workload, const sched::Config &config)
     : config_(config),
-      priorities_(sched::assign_priorities(workload.dags, config.policy, config.levels)),
+      priorities_(sched::assign_priorities(workload.dags, config.policy, config.ties, config.levels)),
       workers_(config.workers),
       free_workers_(config.workers) {
-  level_of_rank_.resize(priorities_.size() + 1);
-  level_of_rank_.back() = config.levels > 0 ? config.levels : static_cast<std::uint32_t>(priorities_.size());
-  for (const sched::Priority &priority : priorities_) level_of_rank_[priority.rank] = priority.level;
+  const auto lowest = config.levels > 0 ? config.levels : static_cast<std::uint32_t>(priorities_.size());
+  level_of_key_.assign(2 * priorities_.size(), lowest);
+  for (const sched::Priority &priority : priorities_) level_of_key_[priority.tier] = priority.level;
   std::unordered_map<std::string, std::uint32_t> group_ids;
   for (const Dag &dag : workload.dags) {
     Shared shared;
@@ -61,6 +61,10 @@ const char *Replay::apply(const JobEvent &event) {
     job.number = event.job;
     job.release = event.value;
     job.deadline = event.value + task(event.task).deadline;
+    job.turn = job.release;
+    for (const LiveJob &other : tasks_[event.task.value].live) {
+      if (other.state == State::Ready) job.turn = std::max(job.turn, other.turn);
+    }
     tasks_[event.task.value].live.push_back(job);
     ++dags_[dag_of(event.task).value].pending;
     return nullptr;
@@ -143,10 +147,18 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
         problem = "a job that has started cannot be skipped";
         leave_worker(job);
       }
+      hand_turn_on(job, event.reason);
       erase(event.task, event.job);
       return problem;
   }
   return "unknown kind of event";
+}
+
+// A job that takes the place of one that has not started has its turn, too.
+void Replay::hand_turn_on(const LiveJob &skipped, Reason reason) {
+  if (reason != Reason::Overrun && reason != Reason::Precedence) return;
+  LiveJob &newest = tasks_[skipped.task.value].live.back();
+  if (newest.number != skipped.number && newest.state == State::Waiting) newest.turn = skipped.turn;
 }
 
 // Started jobs of lower criticality go on below everything else; the others are to be skipped.
@@ -168,19 +180,19 @@ const char *Replay::change_mode(const JobEvent &event) {
 void Replay::demote(LiveJob &job) {
   if (job.demoted) return;
   job.demoted = true;
-  job.own.key = demoted_key();
+  job.own.key = demoted_key(job.task);
   job.raised = job.own;
   const std::uint32_t group = group_of(job.task);
   if (group == kNoGroup || config_.policy == PolicyKind::Fifo) return;
   for (const TaskId sharer : groups_[group].tasks) {
     const TaskState &task = tasks_[sharer.value];
     const bool goes_away = high_mode() && is_degradable(sharer);
-    if (task.gate == Gate::Group && !goes_away) job.raised = std::min(job.raised, task.waiter.urgency);
+    if (task.gate == Gate::Group && !goes_away) job.raised.key = std::min(job.raised.key, task.waiter.urgency.key);
   }
 }
 
-std::int64_t Replay::demoted_key() const {
-  return sched::is_static(config_.policy) ? static_cast<std::int64_t>(tasks_.size())
+std::int64_t Replay::demoted_key(TaskId task) const {
+  return sched::is_static(config_.policy) ? static_cast<std::int64_t>(tasks_.size() + priorities_[task.value].tier)
                                           : std::numeric_limits<std::int64_t>::max();
 }
 
@@ -278,7 +290,7 @@ void Replay::refresh(TaskId id) {
   if (gate != Gate::Group || config_.policy == PolicyKind::Fifo) return;
   for (const TaskId sharer : groups_[task.group].tasks) {
     for (LiveJob &job : tasks_[sharer.value].live) {
-      if (job.started()) job.raised = std::min(job.raised, first->own);
+      if (job.started()) job.raised.key = std::min(job.raised.key, first->own.key);
     }
   }
 }
@@ -297,14 +309,18 @@ void Replay::refresh_sharers(TaskId id) {
 }
 
 Urgency Replay::urgency_of(const LiveJob &job) {
-  const std::uint32_t rank = priorities_[job.task.value].rank;
-  const std::uint64_t sequence = next_sequence_++;
-  if (high_mode() && is_degradable(job.task)) return Urgency{demoted_key(), rank, sequence};
+  const bool takes_turns = config_.ties == Ties::Share && config_.policy != PolicyKind::Fifo;
+  Urgency urgency;
+  urgency.turn = takes_turns ? job.turn : 0;
+  urgency.rank = priorities_[job.task.value].rank;
+  urgency.sequence = next_sequence_++;
   switch (config_.policy) {
-    case PolicyKind::Edf: return Urgency{job.deadline, rank, sequence};
-    case PolicyKind::Fifo: return Urgency{static_cast<std::int64_t>(sequence), rank, sequence};
-    default: return Urgency{rank, rank, sequence};
+    case PolicyKind::Edf: urgency.key = job.deadline; break;
+    case PolicyKind::Fifo: urgency.key = static_cast<std::int64_t>(urgency.sequence); break;
+    default: urgency.key = priorities_[job.task.value].tier; break;
   }
+  if (high_mode() && is_degradable(job.task)) urgency.key = demoted_key(job.task);
+  return urgency;
 }
 
 const LiveJob *Replay::running(std::uint32_t worker) const {
@@ -314,25 +330,47 @@ const LiveJob *Replay::running(std::uint32_t worker) const {
   return top != nullptr && top->state == State::Running ? top : nullptr;
 }
 
-Urgency Replay::inherited(const LiveJob &job) const {
+template <class Predicate>
+Urgency Replay::inherited_from(const LiveJob &job, Predicate hands_on) const {
   Urgency urgency = job.own;
   const std::uint32_t group = group_of(job.task);
   if (group == kNoGroup || !job.started() || config_.policy == PolicyKind::Fifo) return urgency;
   for (const TaskId sharer : groups_[group].tasks) {
     const TaskState &task = tasks_[sharer.value];
-    if (task.gate == Gate::Group) urgency = std::min(urgency, task.waiter.urgency);
+    if (task.gate != Gate::Group || !hands_on(task.waiter.urgency)) continue;
+    urgency.key = std::min(urgency.key, task.waiter.urgency.key);
   }
   return urgency;
 }
 
+Urgency Replay::inherited(const LiveJob &job) const {
+  return inherited_from(job, [](const Urgency &) { return true; });
+}
+
+Urgency Replay::inherited(const LiveJob &job, const Urgency &looked_at) const {
+  return inherited_from(job, [&](const Urgency &waiter) { return waiter < looked_at; });
+}
+
+std::uint32_t Replay::level_of(const Urgency &urgency) const {
+  return level_of_key_[static_cast<std::size_t>(urgency.key)];
+}
+
 bool Replay::preempts(const Urgency &urgency, const Urgency &running) const {
   switch (config_.policy) {
-    case PolicyKind::Edf: return urgency < running && urgency.key != demoted_key();
+    case PolicyKind::Edf:
+      if (config_.ties == Ties::Share) return urgency.key < running.key;
+      return urgency < running && urgency.key != demoted_key(TaskId(0));
     case PolicyKind::Fifo: return false;  // who became ready later never preempts
-    default:
-      return level_of_rank_[static_cast<std::size_t>(urgency.key)] <
-             level_of_rank_[static_cast<std::size_t>(running.key)];
+    default: return level_of(urgency) < level_of(running);
   }
+}
+
+bool Replay::goes_first(const Urgency &urgency, bool started, const Urgency &other, bool other_started) const {
+  const bool has_levels = config_.preemption == sched::Preemption::Full && sched::is_static(config_.policy);
+  if (!has_levels || started == other_started) return urgency < other;
+  const std::uint32_t level = level_of(urgency);
+  const std::uint32_t other_level = level_of(other);
+  return level != other_level ? level < other_level : started;
 }
 
 }  // namespace redag::metrics

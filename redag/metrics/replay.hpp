@@ -16,10 +16,11 @@
 
 namespace redag::metrics {
 
-/// Place in the total order of jobs; smaller is more urgent. `key`: rank of the task (static policies), absolute
-/// deadline (edf), order of readiness (fifo).
+/// Place in the total order of jobs; smaller is more urgent. `key`: tier of the task (static policies), absolute
+/// deadline (edf), order of readiness (fifo). A job that inherits gets another key, and nothing else.
 struct Urgency {
   std::int64_t key = 0;
+  Time turn = 0;  // Ties::Share: release, or that of the job whose place it took
   std::uint32_t rank = 0;
   std::uint64_t sequence = 0;  // order of readiness
 
@@ -42,8 +43,9 @@ struct LiveJob {
   Time release = 0;
   Time deadline = 0;
   Time origin = 0;
+  Time turn = 0;
   Urgency own;
-  Urgency raised;  // own, or the most urgent job that ever waited for its group while it held it
+  Urgency raised;  // own, with the key of the most urgent job that ever waited for its group while it held it
   Time on_worker_since = 0;
   Duration executed = 0;  // until the last event that changed its state
 
@@ -111,8 +113,14 @@ class Replay {
 
   /// Urgency with what the job inherits from those that wait for its group now.
   [[nodiscard]] Urgency inherited(const LiveJob &job) const;
+  /// The same, from those alone that come before `looked_at`: jobs are looked at in their order, and others have not
+  /// handed on their priority when that one is.
+  [[nodiscard]] Urgency inherited(const LiveJob &job, const Urgency &looked_at) const;
   /// May a job this urgent take the worker of one that is `running` so urgent?
   [[nodiscard]] bool preempts(const Urgency &urgency, const Urgency &running) const;
+  /// Is a worker that is free for both given to the first: the more urgent one, but of one level (full preemption) the
+  /// one that has started?
+  [[nodiscard]] bool goes_first(const Urgency &urgency, bool started, const Urgency &other, bool other_started) const;
 
  private:
   enum class Gate : std::uint8_t { NoJob, Task, Dag, Group, Open };
@@ -133,11 +141,15 @@ class Replay {
     bool degradable = false;
   };
 
+  template <class Predicate>
+  [[nodiscard]] Urgency inherited_from(const LiveJob &job, Predicate hands_on) const;
   LiveJob *find_mutable(TaskId task, std::uint32_t number);
   const char *apply_to(LiveJob &job, const JobEvent &event);
   const char *change_mode(const JobEvent &event);
   void demote(LiveJob &job);
-  [[nodiscard]] std::int64_t demoted_key() const;
+  [[nodiscard]] std::int64_t demoted_key(TaskId task) const;
+  void hand_turn_on(const LiveJob &skipped, Reason reason);
+  [[nodiscard]] std::uint32_t level_of(const Urgency &urgency) const;
   const char *take_worker(LiveJob &job, const JobEvent &event);
   const char *leave_worker(const LiveJob &job);
   void move_to(LiveJob &job, LiveJob::State state);
@@ -150,7 +162,7 @@ class Replay {
 
   sched::Config config_;
   std::vector<sched::Priority> priorities_;
-  std::vector<std::uint32_t> level_of_rank_;
+  std::vector<std::uint32_t> level_of_key_;  // static policies: by tier, and again for demoted jobs
   std::vector<TaskState> tasks_;
   std::vector<Shared> dags_;
   std::vector<Shared> groups_;

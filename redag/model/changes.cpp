@@ -49,6 +49,7 @@ class Comparer {
     add(Kind::Setting, "workers", fmt::format("{}", a.platform.workers), fmt::format("{}", b.platform.workers));
     add(Kind::Setting, "preemption", to_string(a.platform.preemption), to_string(b.platform.preemption));
     add(Kind::Setting, "policy", to_string(a.policy), to_string(b.policy));
+    add(Kind::Setting, "ties", to_string(a.ties), to_string(b.ties));
     match(a.dags, b.dags, "DAG ", [this](const Dag &x, const Dag &y) { compare(x, y); });
   }
 

@@ -15,10 +15,10 @@ namespace redag {
 namespace {
 
 constexpr std::array<const char *, kFieldCount> kFieldNames = {
-    "name",        "platform",    "workers", "preemption", "policy",    "dags",       "tasks",   "max_active",
-    "max_pending", "criticality", "degrade", "wcet",       "wcet_low",  "bcet",       "period",  "deadline",
-    "offset",      "jitter",      "region",  "budget",     "on_budget", "activation", "overrun", "priority",
-    "concurrency", "group",       "after",   "execution",  "callback"};
+    "name",       "platform",    "workers",     "preemption", "policy",    "ties",      "dags",       "tasks",
+    "max_active", "max_pending", "criticality", "degrade",    "wcet",      "wcet_low",  "bcet",       "period",
+    "deadline",   "offset",      "jitter",      "region",     "budget",    "on_budget", "activation", "overrun",
+    "priority",   "concurrency", "group",       "after",      "execution", "callback"};
 
 struct DurationRule {
   Field field;

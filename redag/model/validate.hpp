@@ -31,6 +31,7 @@ enum class Field : std::uint8_t {
   Workers,
   Preemption,
   Policy,
+  Ties,
   Dags,
   Tasks,
   MaxActive,
@@ -57,7 +58,7 @@ enum class Field : std::uint8_t {
   Callback,
 };
 
-inline constexpr std::size_t kFieldCount = 29;
+inline constexpr std::size_t kFieldCount = 30;
 
 [[nodiscard]] const char *to_string(Field field);
 

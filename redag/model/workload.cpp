@@ -118,6 +118,8 @@ const char *to_string(PolicyKind value) {
   return "?";
 }
 
+const char *to_string(Ties value) { return value == Ties::Share ? "share" : "fixed"; }
+
 const char *to_string(PreemptionMode value) {
   switch (value) {
     case PreemptionMode::None: return "none";

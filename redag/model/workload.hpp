@@ -120,6 +120,12 @@ struct Dag {
 
 enum class PolicyKind : std::uint8_t { RateMonotonic, DeadlineMonotonic, Fixed, Edf, Fifo, ChainAware };
 
+/// How jobs that the policy ranks equal are ordered. See docs/model.md, "Ties".
+enum class Ties : std::uint8_t {
+  Share,  // they take turns: the earlier release first, and none preempts another
+  Fixed,  // by the order of their tasks, always
+};
+
 /// What can interrupt a running job. See docs/model.md.
 enum class PreemptionMode : std::uint8_t { None, Cooperative, Os, Auto };
 
@@ -134,6 +140,7 @@ struct Workload {
   std::string name;
   Platform platform;
   PolicyKind policy = PolicyKind::RateMonotonic;
+  Ties ties = Ties::Share;
   std::vector<Dag> dags;
 
   /// Tasks of all DAGs together; TaskIds run from 0 to this, DAG by DAG.
@@ -167,6 +174,7 @@ void inherit_periods(Dag &dag);
 [[nodiscard]] const char *to_string(Callback::Kind value);
 [[nodiscard]] const char *to_string(OnBudget value);
 [[nodiscard]] const char *to_string(PolicyKind value);
+[[nodiscard]] const char *to_string(Ties value);
 [[nodiscard]] const char *to_string(PreemptionMode value);
 
 }  // namespace redag

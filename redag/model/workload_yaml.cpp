@@ -23,7 +23,7 @@ namespace {
 
 using yaml::Node;
 
-constexpr std::array kTopFields = {Field::Name, Field::Platform, Field::Policy, Field::Dags};
+constexpr std::array kTopFields = {Field::Name, Field::Platform, Field::Policy, Field::Ties, Field::Dags};
 constexpr std::array kPlatformFields = {Field::Workers, Field::Preemption};
 constexpr std::array kDagFields = {Field::Name,       Field::Period,      Field::Deadline, Field::MaxActive,
                                    Field::MaxPending, Field::Criticality, Field::Degrade,  Field::Tasks};
@@ -39,6 +39,7 @@ constexpr std::array kActivations = {Activation::Timer, Activation::Data};
 constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic,
                                   PolicyKind::Fixed,         PolicyKind::Edf,
                                   PolicyKind::Fifo,          PolicyKind::ChainAware};
+constexpr std::array kTies = {Ties::Share, Ties::Fixed};
 constexpr std::array kPreemptionModes = {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os,
                                          PreemptionMode::Auto};
 
@@ -138,6 +139,7 @@ class Reader : private yaml::ValueReader {
     structure_known_ = true;
     take_text(root_, Field::Name, workload_.name);
     take_enum(root_, Field::Policy, workload_.policy, kPolicies);
+    take_enum(root_, Field::Ties, workload_.ties, kTies);
     read_platform();
     const std::vector<Node> *dags = take_list(root_, Field::Dags);
     if (dags == nullptr) return;

@@ -30,6 +30,7 @@ TEST(ParseWorkload, GivesDefaults) {
   const Workload workload = read("dags: [{name: d, tasks: [{name: t, wcet: 1ms, period: 10ms}]}]");
   EXPECT_EQ(workload.platform, (Platform{1, PreemptionMode::Auto}));
   EXPECT_EQ(workload.policy, PolicyKind::RateMonotonic);
+  EXPECT_EQ(workload.ties, Ties::Share);
   Task expected;
   expected.name = "t";
   expected.wcet = kMillisecond;
@@ -106,6 +107,7 @@ TEST(ParseWorkload, ReadsEveryKey) {
 name: all
 platform: {workers: 3, preemption: cooperative}
 policy: fixed
+ties: fixed
 dags:
   - name: d
     period: 10ms
@@ -129,6 +131,7 @@ dags:
   EXPECT_EQ(workload.name, "all");
   EXPECT_EQ(workload.platform, (Platform{3, PreemptionMode::Cooperative}));
   EXPECT_EQ(workload.policy, PolicyKind::Fixed);
+  EXPECT_EQ(workload.ties, Ties::Fixed);
   EXPECT_EQ(dag.deadline, 30 * kMillisecond);
   EXPECT_EQ(dag.max_active, 2U);
   EXPECT_EQ(dag.max_pending, 5U);
@@ -270,33 +273,34 @@ TEST_P(ParseWorkloadRefuses, AtThePlace) {
 
 INSTANTIATE_TEST_SUITE_P(
     Text, ParseWorkloadRefuses,
-    testing::Values(
-        Mistake{"", {"w.yaml: error: there is no workload in it"}},
-        Mistake{"# only a comment\n", {"there is no workload in it"}},
-        Mistake{"- a\n", {"w.yaml:1:1: error: a workload must be a map"}},
-        Mistake{"just text", {"w.yaml:1:1: error: a workload must be a map of name, platform, policy, dags, not"}},
-        Mistake{"dags: [\n", {"w.yaml:2:1: error: not YAML: end of sequence flow not found"}},
-        Mistake{"name: 'x\ndags: 3\n", {"w.yaml:1:7: error: not YAML: the quote is never closed"}},
-        Mistake{"name: \"x\\\"\ndags: 3\n", {"w.yaml:1:7: error: not YAML: the quote is never closed"}},
-        Mistake{"name: a: b\n", {"w.yaml:1:8: error: not YAML: illegal map value"}},
-        Mistake{"dags:\n\t- name: d\n", {"w.yaml:2:2: error: not YAML"}},
-        Mistake{"name: x\n--- \nname: y\n", {"w.yaml:3:1: error: a second document"}},
-        Mistake{"name: &a x\ndags: *a\n", {"w.yaml:1:7: error: aliases and anchors"}},
-        Mistake{"dags: *a\n", {"w.yaml:1:7: error: not YAML: the referenced anchor"}},
-        Mistake{"name: !!str x\n", {"w.yaml:1:7: error: tags (here 'tag:yaml.org,2002:str')"}},
-        Mistake{"name: \xff\n", {"w.yaml:1:7: error: byte 0xff is not UTF-8"}},
-        Mistake{"name: \xc0\xaf\n", {"w.yaml:1:7: error: byte 0xc0 is not UTF-8"}},
-        Mistake{"name: \xed\xa0\x80\n", {"w.yaml:1:7: error: byte 0xed is not UTF-8"}},
-        Mistake{"name: \xe2\x82", {"w.yaml:1:7: error: byte 0xe2 is not UTF-8"}},
-        Mistake{std::string("name: a\nb\0", 10), {"w.yaml:2:2: error: control character 0x00"}},
-        Mistake{"name: a\x04: b", {"w.yaml:1:8: error: control character 0x04"}},
-        Mistake{"\xff\xfe"
-                "n",
-                {"w.yaml:1:1: error: byte 0xff is not UTF-8"}},
-        Mistake{"? [a]\n: b\n",
-                {"w.yaml:1:1: error: the workload has no DAGs", "1:3: error: a key must be a name, not a list"}},
-        Mistake{std::string(100'000, '['), {"error: nested more than 32 levels deep"}},
-        Mistake{std::string(100'000, '{'), {"error: nested more than 32 levels deep"}}));
+    testing::Values(Mistake{"", {"w.yaml: error: there is no workload in it"}},
+                    Mistake{"# only a comment\n", {"there is no workload in it"}},
+                    Mistake{"- a\n", {"w.yaml:1:1: error: a workload must be a map"}},
+                    Mistake{"just text",
+                            {"w.yaml:1:1: error: a workload must be a map of name, platform, policy, ties, dags, not"}},
+                    Mistake{"dags: [\n", {"w.yaml:2:1: error: not YAML: end of sequence flow not found"}},
+                    Mistake{"name: 'x\ndags: 3\n", {"w.yaml:1:7: error: not YAML: the quote is never closed"}},
+                    Mistake{"name: \"x\\\"\ndags: 3\n", {"w.yaml:1:7: error: not YAML: the quote is never closed"}},
+                    Mistake{"name: a: b\n", {"w.yaml:1:8: error: not YAML: illegal map value"}},
+                    Mistake{"dags:\n\t- name: d\n", {"w.yaml:2:2: error: not YAML"}},
+                    Mistake{"name: x\n--- \nname: y\n", {"w.yaml:3:1: error: a second document"}},
+                    Mistake{"name: &a x\ndags: *a\n", {"w.yaml:1:7: error: aliases and anchors"}},
+                    Mistake{"dags: *a\n", {"w.yaml:1:7: error: not YAML: the referenced anchor"}},
+                    Mistake{"name: !!str x\n", {"w.yaml:1:7: error: tags (here 'tag:yaml.org,2002:str')"}},
+                    Mistake{"name: \xff\n", {"w.yaml:1:7: error: byte 0xff is not UTF-8"}},
+                    Mistake{"name: \xc0\xaf\n", {"w.yaml:1:7: error: byte 0xc0 is not UTF-8"}},
+                    Mistake{"name: \xed\xa0\x80\n", {"w.yaml:1:7: error: byte 0xed is not UTF-8"}},
+                    Mistake{"name: \xe2\x82", {"w.yaml:1:7: error: byte 0xe2 is not UTF-8"}},
+                    Mistake{std::string("name: a\nb\0", 10), {"w.yaml:2:2: error: control character 0x00"}},
+                    Mistake{"name: a\x04: b", {"w.yaml:1:8: error: control character 0x04"}},
+                    Mistake{"\xff\xfe"
+                            "n",
+                            {"w.yaml:1:1: error: byte 0xff is not UTF-8"}},
+                    Mistake{"? [a]\n: b\n",
+                            {"w.yaml:1:1: error: the workload has no DAGs",
+                             "1:3: error: a key must be a name, not a list"}},
+                    Mistake{std::string(100'000, '['), {"error: nested more than 32 levels deep"}},
+                    Mistake{std::string(100'000, '{'), {"error: nested more than 32 levels deep"}}));
 
 INSTANTIATE_TEST_SUITE_P(
     Keys, ParseWorkloadRefuses,
@@ -403,6 +407,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"policy: rm\n" + with("wcet: 1ms, period: 1s"),
                 {"w.yaml:1:9: error: policy must be one of rate_monotonic, deadline_monotonic, fixed, edf, fifo, "
                  "chain_aware, not 'rm'"}},
+        Mistake{"ties: no\n" + with("wcet: 1ms, period: 1s"),
+                {"w.yaml:1:7: error: ties must be one of share, fixed, not 'no'"}},
         Mistake{"policy: edf\nplatform: {preemption: os}\n" + with("wcet: 1ms, period: 1s"),
                 {"w.yaml:2:24: error: preemption 'os' needs a static policy, and 'edf' is not one"}}));
 
@@ -615,6 +621,7 @@ Workload arbitrary_workload() {
   options.low_share = 0.3;
   Workload workload = generate(options, *rc::gen::arbitrary<std::uint64_t>()).value();
   workload.platform.preemption = *rc::gen::element(PreemptionMode::None, PreemptionMode::Cooperative);
+  workload.ties = *rc::gen::element(Ties::Share, Ties::Fixed);
   workload.name = *rc::gen::element<std::string>("", "plain", "null", "~", "yes", "- a", "a: b", "#x", "'", "\"", "x y",
                                                  "{", "*a", "5ms", "caf\xC3\xA9", "a,b]", "\xF0\x9F\xA4\x96", "!t");
   for (Dag &dag : workload.dags) {

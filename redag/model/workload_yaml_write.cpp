@@ -161,6 +161,7 @@ std::string to_yaml(const Workload &workload) {
   write(out, Field::Preemption, to_string(workload.platform.preemption));
   out << YAML::EndMap;
   write(out, Field::Policy, to_string(workload.policy));
+  if (workload.ties != Ties::Share) write(out, Field::Ties, to_string(workload.ties));
   out << YAML::Key << to_string(Field::Dags) << YAML::Value << YAML::BeginSeq;
   for (const Dag &dag : workload.dags) write_dag(out, dag);
   out << YAML::EndSeq << YAML::EndMap;

@@ -76,6 +76,7 @@ RunBounds bounds_of(const trace::RunInfo &run) {
   if (!read_overheads(run.overheads, platform)) return none("the run's overheads are not understood: " + run.overheads);
   Workload workload = run.workload;
   workload.policy = run.config.policy;
+  workload.ties = run.config.ties;
   const Result<analysis::System> system = analysis::compile_for(*executor, workload, platform);
   if (!system) return none(system.error().front().message);
 

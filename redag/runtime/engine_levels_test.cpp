@@ -87,7 +87,7 @@ TEST_F(EngineLevels, AddedTasksKeepTheOrderOfSuspendedAndRunningJobs) {
   EXPECT_EQ(fast_.priority(), band_.of_level(0));
   EXPECT_EQ(slow_.priority(), band_.of_level(1));
   const Body nothing = [](const Job &) { return Outcome::Finished; };
-  engine_->add_dag(dag_of({kMillisecond, kMillisecond}), {nothing, nothing});
+  engine_->add_dag(dag_of({kMillisecond, 2 * kMillisecond}), {nothing, nothing});
   engine_->release(TaskId(2), engine_->now());  // the decision at which the levels change
   EXPECT_EQ(fast_.priority(), band_.of_level(2));
   EXPECT_EQ(slow_.priority(), band_.of_level(3));

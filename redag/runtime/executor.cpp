@@ -69,6 +69,7 @@ Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
   Result<Setup> setup = set_up(options_.preemption, options_.policy, options_.workers, options_.threads, options_.cpus);
   if (!setup) throw std::runtime_error(to_string(setup.error()));
   setup_ = *std::move(setup);
+  setup_.config.ties = options_.ties;
   options_.workers = setup_.config.workers;
   if (options_.lock_memory) {
     if (const Result<void> locked = redag::runtime::lock_memory(); !locked) {
@@ -161,6 +162,7 @@ void Executor::admit(const Dag &dag) const {
   workload.name = options_.name;
   workload.platform = Platform{options_.workers, setup_.mode.mode};
   workload.policy = options_.policy;
+  workload.ties = options_.ties;
   for (const auto &[id, other] : dags_) {
     if (!other.removed) workload.dags.push_back(other.dag);
   }

@@ -58,6 +58,7 @@ struct ExecutorOptions {
   std::uint32_t workers = 0;  // jobs that execute at the same time, at most 4096; 0: one a usable processor
   PreemptionMode preemption = PreemptionMode::Auto;
   PolicyKind policy = PolicyKind::RateMonotonic;
+  Ties ties = Ties::Share;         // jobs of equal priority: the earlier release first, or the order of tasks
   std::uint32_t threads = 0;       // os: jobs that can be started and unfinished at once; 0: workers + 16; at most 8192
   std::vector<int> cpus{};         // processors for the workers; empty: os takes `workers` of the usable ones
   nanoseconds spin{};              // none, cooperative: how long a worker looks for a job before it sleeps

@@ -61,6 +61,7 @@ class Run {
     Result<Setup> setup = set_up(preemptive ? wanted : PreemptionMode::None, workload_.policy,
                                  workload_.platform.workers, pool_size(workload_, options_), options_.cpus);
     if (!setup) return tl::unexpected(setup.error());
+    setup->config.ties = workload_.ties;
     result_.mode = setup->mode;
     if (!preemptive && wanted != PreemptionMode::None) {
       result_.mode.reason = "executor " + options_.executor + " has no other";

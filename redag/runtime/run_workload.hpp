@@ -58,9 +58,9 @@ struct RunOptions {
   std::string flight;
   trace::FlightOptions flight_options;
   const std::atomic<bool> *stop = nullptr;  // ends the run early when set (Ctrl-C)
-  /// Takes the events of the run: about ten times a second those that are new, in the order of the trace, on the calling
-  /// thread. The result's trace then holds none, so that memory does not grow with the run. `info` is what the result's
-  /// will be, except `end` and `lost_events`.
+  /// Takes the events of the run: about ten times a second those that are new, in the order of the trace, on the
+  /// calling thread. The result's trace then holds none, so that memory does not grow with the run. `info` is what the
+  /// result's will be, except `end` and `lost_events`.
   std::function<void(const trace::RunInfo &info, std::span<const JobEvent> events)> sink;
   /// About ten times a second, with all events so far; with a sink, with none. On the calling thread.
   std::function<void(Time now, std::span<const JobEvent> events)> progress;

@@ -27,18 +27,18 @@ struct alignas(32) Job {
   Time deadline = 0;  // absolute
   Time origin = 0;
 
-  TaskId priority_of;  // the task whose priority it has: its own, or that of a job from which it inherited
-
-  // Order among jobs: (key, rank, sequence), smallest first. For static policies key is the rank, or a more urgent
-  // job's rank that was inherited.
+  // Order among jobs: (key, turn, rank, sequence), smallest first. For static policies key is the task's tier, or the
+  // more urgent one of a job from which this one inherited; the rest is always its own.
   std::int64_t key = 0;
-  std::uint32_t rank = 0;
+  Time turn = 0;               // Ties::Share: its release, or that of the job whose place it took
   std::uint64_t sequence = 0;  // order in which jobs became ready
+  std::uint32_t rank = 0;
+  TaskId priority_of;  // the task whose priority it has: its own, or that of a job from which it inherited
 
   // Links of the one container that the job is in: ready queue or a gate's heap.
   std::uint32_t next = kNil;
   std::uint32_t previous = kNil;
-  std::uint32_t child = kNil;
+  std::uint32_t child = kNil;      // HeapQueue: the first one. LevelQueue: the list
   std::uint32_t parked_at = kNil;  // gate, or kNil
 
   std::uint32_t task_next = kNil;  // next unstarted job of the same task
@@ -51,9 +51,12 @@ struct alignas(32) Job {
   [[nodiscard]] bool started() const { return state == JobState::Running || state == JobState::Suspended; }
 };
 
+static_assert(sizeof(Job) == 96, "a job in at most two cache lines");
+
 /// The total order of jobs: does `a` come before `b`?
 [[nodiscard]] inline bool before(const Job &a, const Job &b) {
   if (a.key != b.key) return a.key < b.key;
+  if (a.turn != b.turn) return a.turn < b.turn;
   if (a.rank != b.rank) return a.rank < b.rank;
   return a.sequence < b.sequence;
 }

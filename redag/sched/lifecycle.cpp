@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <tuple>
 
 #include "redag/base/check.hpp"
 
@@ -298,28 +297,27 @@ void Lifecycle::prioritise() {
                                 dag_states_[task.dag.value].criticality, dag_periods[task.dag.value], task.dag.value,
                                 task.topological_rank, TaskId(t)});
   }
-  rank_count_ = ranked.size();
-  const std::vector<Priority> priorities = assign_priorities(ranked, config_.policy, config_.levels);
+  const std::vector<Priority> priorities = assign_priorities(ranked, config_.policy, config_.ties, config_.levels);
+  tier_count_ = 0;
+  for (const Priority &priority : priorities) tier_count_ = std::max(tier_count_, priority.tier + 1);
   for (std::size_t i = 0; i < ranked.size(); ++i) {
     TaskState &task = tasks_[ranked[i].task.value];
     task.rank = priorities[i].rank;
+    task.tier = priorities[i].tier;
     task.level = priorities[i].level;
-    task.key = task.degraded ? demoted_key() : task.rank;
+    task.key = task.degraded ? demoted_key(task) : task.tier;
   }
   for (Job &job : jobs_) {
     if (job.state == JobState::Free || job.state == JobState::Waiting) continue;
-    const std::uint32_t own_rank = tasks_[job.task.value].rank;
     const bool has_inherited = job.priority_of != job.task;
-    job.rank = tasks_[job.priority_of.value].rank;
+    job.rank = tasks_[job.task.value].rank;
     if (is_static(config_.policy)) {
       job.key = has_inherited ? tasks_[job.priority_of.value].key : own_key(job);
     }
-    // What it inherited may now be less than its own.
-    const std::int64_t own = own_key(job);
-    if (has_inherited && std::tie(own, own_rank) < std::tie(job.key, job.rank)) {
+    // What it inherited may now be no more than its own.
+    if (has_inherited && own_key(job) <= job.key) {
       job.priority_of = job.task;
-      job.key = own;
-      job.rank = own_rank;
+      job.key = own_key(job);
     }
   }
 }
@@ -403,6 +401,7 @@ void Lifecycle::admit(TaskId id, Time nominal, Time origin) {
   fresh.deadline = nominal + task.deadline;
   emit(fresh, JobEventKind::Released, nominal);
 
+  if (takes_turns_) fresh.turn = turn_of(task, nominal);
   if (task.waiting != kNil) skip(task.waiting, Reason::Precedence);
   if (task.queue_depth == 0 && task.ready_count > 0) {
     skip(task.latest_ready, Reason::Overrun);
@@ -427,6 +426,15 @@ void Lifecycle::admit(TaskId id, Time nominal, Time origin) {
     jobs_[slot].state = JobState::Waiting;
     task.waiting = slot;
   }
+}
+
+// Taking turns, of the next job: it inherits that of the job whose place it takes, or the later release of every period
+// would put it behind its equals for ever. And it does not go before an earlier job of its task.
+Time Lifecycle::turn_of(const TaskState &task, Time release) const {
+  if (task.waiting != kNil) return jobs_[task.waiting].turn;
+  if (task.ready_count == 0) return release;
+  const Time earlier = jobs_[task.latest_ready].turn;
+  return task.queue_depth == 0 ? earlier : std::max(release, earlier);
 }
 
 void Lifecycle::make_ready(std::uint32_t slot, Time origin) {

@@ -79,6 +79,7 @@ class Lifecycle : public Scheduler {
     Duration period = 0;
     Duration offset = 0;
     Time let_through = kNoRelease;  // degraded: its newest release that was taken
+    std::uint32_t tier = 0;         // what tasks that take turns share
     std::uint32_t level = 0;
     std::uint32_t group = kNil;  // position among the groups
     std::uint32_t concurrency = 1;
@@ -99,7 +100,7 @@ class Lifecycle : public Scheduler {
   enum class TimerReleases : std::uint8_t { AsTheTaskSays, AllKept };  // AllKept: no overrun, any number can wait
 
   explicit Lifecycle(const Config &config, TimerReleases kept = TimerReleases::AsTheTaskSays)
-      : config_(config), kept_(kept) {}
+      : config_(config), takes_turns_(config.ties == Ties::Share && config.policy != PolicyKind::Fifo), kept_(kept) {}
 
   /// Adds the workload's DAGs; for the subclass's constructor.
   void load(const Workload &workload);
@@ -111,10 +112,9 @@ class Lifecycle : public Scheduler {
   virtual void on_lowered(std::uint32_t slot) = 0;    // a started job is to go on at own_key(), with nothing inherited
   virtual void on_reconfigured() = 0;                 // tasks were added, or timings changed: priorities are new
 
-  /// The key of demoted jobs: after all others.
-  [[nodiscard]] std::int64_t demoted_key() const {
-    return is_static(config_.policy) ? static_cast<std::int64_t>(rank_count_) : kDemotedKey;
-  }
+  /// Of all jobs but demoted ones, whose keys are the same again after these; edf and fifo: kDemotedKey for all.
+  [[nodiscard]] std::uint32_t tier_count() const { return tier_count_; }
+  [[nodiscard]] static bool is_demoted_key(std::int64_t key) { return key == kDemotedKey; }
   /// The key of the job by itself, with nothing inherited.
   [[nodiscard]] std::int64_t own_key(const Job &job) const;
   /// HI mode, and nothing is ready or started: LO mode again.
@@ -135,8 +135,6 @@ class Lifecycle : public Scheduler {
   Step step();
 
   [[nodiscard]] std::size_t group_count() const { return groups_.size(); }
-  /// Tasks in the order of priority: ranks are smaller than this.
-  [[nodiscard]] std::size_t rank_count() const { return rank_count_; }
   [[nodiscard]] const TaskState &task_of(const Job &job) const { return tasks_[job.task.value]; }
 
   Config config_;
@@ -154,6 +152,8 @@ class Lifecycle : public Scheduler {
   void admit_or_refuse(TaskId id, Time nominal, Time origin);
   void refuse(TaskId id, Time nominal, Reason reason);
   static std::uint32_t count_release(TaskState &task);
+  [[nodiscard]] Time turn_of(const TaskState &task, Time release) const;
+  [[nodiscard]] std::int64_t demoted_key(const TaskState &task) const;
   [[nodiscard]] Reason refusal(TaskState &task, Time nominal);
   [[nodiscard]] bool is_let_through(TaskState &task, Time nominal);
   [[nodiscard]] static bool shares_grid(const TaskState &a, const TaskState &b);
@@ -187,6 +187,7 @@ class Lifecycle : public Scheduler {
     std::uint32_t tasks = 0;  // 0: the position is free
   };
 
+  bool takes_turns_;
   TimerReleases kept_;
   Precedence precedence_;
   std::map<std::string, std::uint32_t> group_positions_;
@@ -195,7 +196,7 @@ class Lifecycle : public Scheduler {
   std::vector<TaskId> free_tasks_;
   std::vector<DagId> free_dags_;
   std::vector<std::uint32_t> free_slots_;
-  std::size_t rank_count_ = 0;
+  std::uint32_t tier_count_ = 0;
   bool closed_ = false;
   bool high_mode_ = false;
   std::uint32_t owed_skips_ = 0;  // tasks with skips_next

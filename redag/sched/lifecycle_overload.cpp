@@ -80,7 +80,7 @@ void Lifecycle::enter_high_mode(const Job &cause) {
     if (task.life == TaskLife::Gone || !degrades(dag_states_[task.dag.value])) continue;
     task.degraded = true;
     task.let_through = kNoRelease;
-    task.key = demoted_key();
+    task.key = demoted_key(task);
   }
   for (std::uint32_t slot = 0; slot < jobs_.size(); ++slot) {
     const Job &job = jobs_[slot];
@@ -110,7 +110,7 @@ void Lifecycle::restore() {
     TaskState &task = tasks_[t];
     if (!task.degraded) continue;
     task.degraded = false;
-    task.key = task.rank;
+    task.key = task.tier;
     if (task.life == TaskLife::Live) precedence_.discard(TaskId(t));
   }
   high_mode_ = false;
@@ -125,8 +125,13 @@ void Lifecycle::demote(std::uint32_t slot) {
 
 std::int64_t Lifecycle::own_key(const Job &job) const {
   const TaskState &task = tasks_[job.task.value];
-  if (job.demoted || task.degraded) return demoted_key();
-  return is_static(config_.policy) ? task.rank : job.deadline;
+  if (job.demoted || task.degraded) return demoted_key(task);
+  return is_static(config_.policy) ? task.tier : job.deadline;
+}
+
+// After all others, and among each other in the order of their tasks.
+std::int64_t Lifecycle::demoted_key(const TaskState &task) const {
+  return is_static(config_.policy) ? std::int64_t{tier_count_} + task.tier : kDemotedKey;
 }
 
 }  // namespace redag::sched

@@ -49,30 +49,34 @@ std::vector<Entry> sorted_entries(std::span<const RankedTask> tasks, PolicyKind 
 
 }  // namespace
 
-std::vector<Priority> assign_priorities(std::span<const RankedTask> tasks, PolicyKind policy, std::uint32_t levels) {
+std::vector<Priority> assign_priorities(std::span<const RankedTask> tasks, PolicyKind policy, Ties ties,
+                                        std::uint32_t levels) {
   const std::vector<Entry> entries = sorted_entries(tasks, policy);
   std::vector<Priority> priorities(entries.size());
 
-  const bool own_levels = levels == 0 || levels >= entries.size() || !is_static(policy);
+  const bool takes_turns = ties == Ties::Share && is_static(policy);
   std::uint32_t classes = 0;  // runs of entries with equal keys
   for (std::size_t i = 0; i < entries.size(); ++i) {
     if (i == 0 || entries[i].key != entries[i - 1].key) ++classes;
   }
+  const std::uint32_t tiers = takes_turns ? classes : static_cast<std::uint32_t>(entries.size());
+  const bool own_levels = levels == 0 || levels >= tiers || !is_static(policy);
 
   std::uint32_t class_index = 0;
   for (std::uint32_t rank = 0; rank < entries.size(); ++rank) {
     if (rank > 0 && entries[rank].key != entries[rank - 1].key) ++class_index;
-    std::uint32_t level = rank;
+    const std::uint32_t tier = takes_turns ? class_index : rank;
+    std::uint32_t level = tier;
     if (!own_levels) {
       level =
           classes <= levels ? class_index : static_cast<std::uint32_t>(std::uint64_t{class_index} * levels / classes);
     }
-    priorities[entries[rank].position] = Priority{rank, level};
+    priorities[entries[rank].position] = Priority{rank, tier, level};
   }
   return priorities;
 }
 
-std::vector<Priority> assign_priorities(std::span<const Dag> dags, PolicyKind policy, std::uint32_t levels) {
+std::vector<Priority> assign_priorities(std::span<const Dag> dags, PolicyKind policy, Ties ties, std::uint32_t levels) {
   std::vector<RankedTask> tasks;
   for (std::uint32_t d = 0; d < dags.size(); ++d) {
     const Dag &dag = dags[d];
@@ -85,7 +89,7 @@ std::vector<Priority> assign_priorities(std::span<const Dag> dags, PolicyKind po
                                  topological[i], TaskId(tasks.size())});
     }
   }
-  return assign_priorities(tasks, policy, levels);
+  return assign_priorities(tasks, policy, ties, levels);
 }
 
 }  // namespace redag::sched

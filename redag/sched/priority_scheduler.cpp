@@ -1,5 +1,7 @@
 #include "redag/sched/priority_scheduler.hpp"
 
+#include <algorithm>
+
 #include "redag/base/check.hpp"
 
 namespace redag::sched {
@@ -103,14 +105,15 @@ std::uint32_t PriorityScheduler::least_urgent_running() const {
 
 bool PriorityScheduler::outranks(const Job &a, const Job &b) const {
   if (static_) return level_of(a) < level_of(b);
-  // Demoted jobs do not preempt each other.
-  return config_.policy == PolicyKind::Edf && before(a, b) && a.key != demoted_key();
+  if (config_.policy == PolicyKind::Fifo) return false;
+  // Neither equals nor demoted jobs preempt each other.
+  return config_.ties == Ties::Share ? a.key < b.key : before(a, b) && !is_demoted_key(a.key);
 }
 
 std::uint32_t PriorityScheduler::level_of(const Job &job) const {
   if (!static_) return 0;
-  return level_of_rank_.empty() ? static_cast<std::uint32_t>(job.key)
-                                : level_of_rank_[static_cast<std::size_t>(job.key)];
+  const auto key = static_cast<std::uint32_t>(job.key);
+  return level_of_key_.empty() ? std::min(key, tier_count()) : level_of_key_[key];
 }
 
 void PriorityScheduler::run(std::uint32_t slot, const Place &place) {
@@ -193,14 +196,12 @@ bool PriorityScheduler::park_if_not_eligible(std::uint32_t slot) {
 // none.
 void PriorityScheduler::inherit(std::uint32_t holder_slot, const Job &waiter) {
   Job &holder = jobs_[holder_slot];
-  if (config_.policy == PolicyKind::Fifo || !before(waiter, holder)) return;
+  if (config_.policy == PolicyKind::Fifo || waiter.key >= holder.key) return;
   const bool is_queued = holder.state == JobState::Suspended && config_.preemption == Preemption::Full;
   if (is_queued) remove(holder_slot);
   const std::uint32_t old_level = level_of(holder);
   holder.key = waiter.key;
-  holder.rank = waiter.rank;
   holder.priority_of = waiter.priority_of;
-  holder.sequence = waiter.sequence;
   if (is_queued) push(holder_slot);
   tell_level(holder_slot, old_level);
 }
@@ -219,7 +220,6 @@ void PriorityScheduler::on_lowered(std::uint32_t slot) {
   if (is_queued) remove(slot);
   const std::uint32_t old_level = level_of(job);
   job.key = own_key(job);
-  job.rank = task_of(job).rank;
   job.priority_of = job.task;
   if (is_queued) push(slot);
   tell_level(slot, old_level);
@@ -292,23 +292,43 @@ void PriorityScheduler::promote_one(Gate &gate) {
 
 // ---- the ready queue ----
 
-void PriorityScheduler::push(std::uint32_t slot) { static_ ? levels_.push(jobs_, slot) : heap_.push(jobs_, slot); }
+// A list for the started jobs of each level, then one for each of its tiers: the operating system goes on with a thread
+// that it preempted before it runs a new one of the same level (SCHED_FIFO), and so does the scheduler.
+std::uint32_t PriorityScheduler::list_of(const Job &job) const {
+  const auto key = static_cast<std::uint32_t>(job.key);
+  const std::uint32_t level = level_of(job);
+  if (!job.started()) return key + level + 1;
+  const std::uint32_t first = level_of_key_.empty() ? level : first_of_level_[key];
+  return first + level;
+}
+
+void PriorityScheduler::push(std::uint32_t slot) {
+  static_ ? levels_.push(jobs_, slot, list_of(jobs_[slot])) : heap_.push(jobs_, slot);
+}
 
 void PriorityScheduler::remove(std::uint32_t slot) {
   static_ ? levels_.remove(jobs_, slot) : heap_.remove(jobs_, slot);
 }
 
+void PriorityScheduler::assign_levels() {
+  if (config_.levels == 0) return;
+  const std::uint32_t tiers = tier_count();
+  level_of_key_.assign(2 * std::size_t{tiers}, config_.levels);  // of demoted jobs: below all others
+  for (const TaskState &task : tasks_) {
+    if (task.life != TaskLife::Gone) level_of_key_[task.tier] = task.level;
+  }
+  first_of_level_.resize(level_of_key_.size());
+  for (std::uint32_t key = 0; key < first_of_level_.size(); ++key) {
+    const bool is_first = key == 0 || level_of_key_[key] != level_of_key_[key - 1];
+    first_of_level_[key] = is_first ? key : first_of_level_[key - 1];
+  }
+}
+
 // Gates, levels and the ready queue are built anew; parked jobs go back to the ready queue and find their gates again.
 void PriorityScheduler::on_reconfigured() {
-  const auto ranks = static_cast<std::uint32_t>(rank_count());
-  if (config_.levels > 0) {
-    level_of_rank_.resize(ranks + 1);
-    for (const TaskState &task : tasks_) {
-      if (task.life != TaskLife::Gone) level_of_rank_[task.rank] = task.level;
-    }
-    level_of_rank_[ranks] = config_.levels;  // of demoted jobs: below all others
-  }
-  levels_ = LevelQueue(static_ ? ranks + 1 : 0);
+  assign_levels();
+  const std::size_t lowest = config_.levels > 0 ? config_.levels : tier_count();
+  levels_ = LevelQueue(static_ ? 2 * std::size_t{tier_count()} + lowest + 1 : 0);
   heap_ = HeapQueue();
 
   static_assert(sizeof(TaskGates) == 32, "two tasks' gates in a cache line");

@@ -75,6 +75,8 @@ class PriorityScheduler final : public Lifecycle {
   bool set_aside(std::uint32_t slot);
   void put_back();
 
+  void assign_levels();
+  [[nodiscard]] std::uint32_t list_of(const Job &job) const;
   void push(std::uint32_t slot);
   void remove(std::uint32_t slot);
   [[nodiscard]] std::uint32_t top() const { return static_ ? levels_.top() : heap_.top(); }
@@ -101,8 +103,10 @@ class PriorityScheduler final : public Lifecycle {
   bool static_;
   LevelQueue levels_;  // the ready queue of static policies; otherwise heap_
   HeapQueue heap_;
-  std::vector<std::uint32_t> level_of_rank_;  // empty: each rank is a level
-  std::vector<TaskGates> task_gates_;         // by TaskId
+  // Limited levels, by key: the level, and the first key that has it. Empty: each tier is a level.
+  std::vector<std::uint32_t> level_of_key_;
+  std::vector<std::uint32_t> first_of_level_;
+  std::vector<TaskGates> task_gates_;  // by TaskId
   std::vector<Gate> shared_gates_;
   std::vector<Worker> workers_;
   LevelBitmap free_workers_;

@@ -21,7 +21,8 @@ using redag::testing::ManualWorkers;
 
 ManualWorkers drive(const Workload &workload, Preemption preemption, std::uint32_t levels = 0,
                     std::uint32_t max_started = 0) {
-  const Config config{workload.platform.workers, preemption, workload.policy, levels, max_started};
+  Config config{workload.platform.workers, preemption, workload.policy, levels, max_started};
+  config.ties = workload.ties;
   return {workload, std::make_unique<PriorityScheduler>(workload, config), config.workers};
 }
 
@@ -61,12 +62,104 @@ TEST(PriorityScheduler, PreemptsTheLeastUrgentAndResumesItOnAnyWorker) {
 }
 
 TEST(PriorityScheduler, ATiedLevelDoesNotPreempt) {
-  const Workload workload = make_workload({make_dag("a", {{"second", 10}, {"first", 10}, {"third", 30}})}, 1);
-  for (const std::uint32_t levels : {0U, 2U}) {
-    ManualWorkers workers = drive(workload, Preemption::Full, levels);
-    workers.release("first").decide();
-    workers.at(1).release("second").decide();  // earlier in the total order, of the same period
-    EXPECT_EQ(workers.running(), levels == 0 ? "second" : "first");
+  Workload workload = make_workload({make_dag("a", {{"second", 10}, {"first", 10}, {"third", 30}})}, 1);
+  for (const Ties ties : {Ties::Share, Ties::Fixed}) {
+    for (const std::uint32_t levels : {0U, 2U}) {
+      workload.ties = ties;
+      ManualWorkers workers = drive(workload, Preemption::Full, levels);
+      workers.release("first").decide();
+      workers.at(1).release("second").decide();  // earlier in the order of tasks, of the same period
+      EXPECT_EQ(workers.running(), ties == Ties::Fixed && levels == 0 ? "second" : "first");
+    }
+  }
+}
+
+TEST(PriorityScheduler, OfEqualsTheEarlierReleaseGoesFirst) {
+  Workload workload = make_workload({make_dag("a", {{"one", 10}, {"two", 10}, {"busy", 30}})}, 1);
+  for (const Ties ties : {Ties::Share, Ties::Fixed}) {
+    workload.ties = ties;
+    ManualWorkers workers = drive(workload, Preemption::None);
+    workers.release("busy").decide();
+    workers.at(1).release("two").at(2).release("one").decide();
+    workers.at(3).finish("busy").decide();
+    EXPECT_EQ(workers.running(), ties == Ties::Share ? "two" : "one");
+  }
+}
+
+// Also if it is seen later, and of one instant the order of tasks decides.
+TEST(PriorityScheduler, ATurnIsTheNominalRelease) {
+  const Workload workload = make_workload({make_dag("a", {{"one", 10}, {"two", 10}, {"three", 10}, {"busy", 30}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("busy").decide();
+  workers.at(5).release("three").at(6).release("two", 5).release("one", 6).decide();
+  workers.at(7).finish("busy").decide();
+  EXPECT_EQ(workers.running(), "two");
+  workers.at(8).finish("two").decide();
+  EXPECT_EQ(workers.running(), "three");
+}
+
+// One that takes the place of a job keeps its turn, or with `overrun: skip` a busy equal would go first for ever.
+TEST(PriorityScheduler, AJobThatTakesAPlaceHasItsTurn) {
+  const Workload workload = make_workload({make_dag("a", {{"heavy", 20, 25}, {"light", 20}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("heavy").release("light").decide();
+  workers.at(20).release("heavy").release("light").decide();
+  EXPECT_EQ(count(workers, JobEventKind::Skipped), 1U) << "the second light takes the place of the first";
+  workers.at(25).finish("heavy").decide();
+  EXPECT_EQ(workers.running(), "light");
+}
+
+// A job that waits for its predecessor is replaced, too.
+TEST(PriorityScheduler, ATurnIsKeptWhileAJobWaitsForData) {
+  const Workload workload = make_workload({make_dag("a", {{"heavy", 20, 25}, {"p", 20}, {"q", 20, 1, {1}}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("heavy").release("p").release("q").decide();
+  workers.at(20).release("heavy").release("p").release("q").decide();
+  workers.at(25).finish("heavy").decide();
+  EXPECT_EQ(workers.running(), "p");
+  workers.at(26).finish("p").decide();
+  EXPECT_EQ(workers.running(), "q") << "before the second heavy";
+}
+
+// SCHED_FIFO goes on with a thread that it preempted before it runs a new one of its level.
+TEST(PriorityScheduler, APreemptedJobGoesOnBeforeItsEquals) {
+  const Workload workload =
+      make_workload({make_dag("a", {{"top", 5}, {"high", 10}, {"one", 20}, {"two", 20}, {"other", 30}})}, 1);
+  for (const std::uint32_t levels : {0U, 2U}) {  // two levels: `other` shares that of the two
+    for (const char *preempted : {"two", "other"}) {
+      if (levels == 0 && preempted == std::string("other")) continue;
+      ManualWorkers workers = drive(workload, Preemption::Full, levels);
+      workers.at(5).release(preempted).decide();
+      workers.at(6).release("high").decide();
+      workers.at(7).release("one", 1).decide();
+      EXPECT_EQ(workers.running(), "high");
+      workers.at(8).finish("high").decide();
+      EXPECT_EQ(workers.running(), preempted);
+    }
+  }
+}
+
+TEST(PriorityScheduler, AHolderInheritsThePriorityAndNotTheTurn) {
+  const Workload workload =
+      make_workload({make_dag("a", {{"waits", 10, 1, {}, "g"}, {"equal", 10}, {"holds", 30, 9, {}, "g"}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::Full);
+  workers.release("holds").decide();
+  workers.at(2).release("waits").decide();
+  workers.at(3).release("equal", 1).decide();
+  EXPECT_EQ(workers.running(), "holds") << "of one level now: no job preempts it";
+  workers.at(9).finish("holds").decide();
+  EXPECT_EQ(workers.running(), "equal");
+}
+
+TEST(PriorityScheduler, EqualDeadlinesTakeTurns) {
+  Workload workload = make_workload({make_dag("a", {{"one", 10}, {"two", 10}, {"three", 15}})}, 1, PreemptionMode::None,
+                                    PolicyKind::Edf);
+  for (const Ties ties : {Ties::Share, Ties::Fixed}) {
+    workload.ties = ties;
+    ManualWorkers workers = drive(workload, Preemption::Full);
+    workers.release("three").decide();
+    workers.at(5 * kMillisecond).release("two").decide();  // both by 15 ms
+    EXPECT_EQ(workers.running(), ties == Ties::Share ? "three" : "two");
   }
 }
 
@@ -421,7 +514,7 @@ TEST(PriorityScheduler, TheLevelOfASuspendedJobIsTold) {
   const JobSlot slow = scheduler.dispatch(0).dispatches[0].job;
   scheduler.release(TaskId(1), 1, 1);
   EXPECT_EQ(scheduler.dispatch(1).dispatches[0].over, slow);
-  scheduler.add_dag(make_dag("b", {{"x", 1}, {"y", 1}}), 2);
+  scheduler.add_dag(make_dag("b", {{"x", 1}, {"y", 2}}), 2);
   scheduler.set_timing(TaskId(1), 40 * kMillisecond, 40 * kMillisecond,
                        2);  // what is told twice in one step counts once
   const Step step = scheduler.dispatch(2);

@@ -57,31 +57,33 @@ class LevelBitmap {
   std::vector<std::vector<std::uint64_t>> words_;  // [0] the leaves, last the root
 };
 
-/// FIFO per level, a bitmap over levels. A job's level is its key, in [0, levels).
+/// Lists in order of urgency, a bitmap over them.
 class LevelQueue {
  public:
-  explicit LevelQueue(std::size_t levels = 0) : bitmap_(levels), lists_(levels) {}
+  explicit LevelQueue(std::size_t lists = 0) : bitmap_(lists), lists_(lists) {}
 
-  void push(std::span<Job> jobs, std::uint32_t slot) {
+  /// O(1) where the job comes last in its list, as jobs of one tier do that become ready in the order of their
+  /// releases; otherwise as many steps as jobs of the list come after it.
+  void push(std::span<Job> jobs, std::uint32_t slot, std::uint32_t to) {
     Job &job = jobs[slot];
-    List &list = lists_[static_cast<std::size_t>(job.key)];
-    // Within a level: the total order, which nearly always means at the end.
+    List &list = lists_[to];
     std::uint32_t after = list.tail;
     while (after != kNil && before(job, jobs[after])) after = jobs[after].previous;
+    job.child = to;
     job.previous = after;
     job.next = after == kNil ? list.head : jobs[after].next;
     (after == kNil ? list.head : jobs[after].next) = slot;
     (job.next == kNil ? list.tail : jobs[job.next].previous) = slot;
-    bitmap_.set(static_cast<std::uint32_t>(job.key));
+    bitmap_.set(to);
   }
 
   void remove(std::span<Job> jobs, std::uint32_t slot) {
     Job &job = jobs[slot];
-    List &list = lists_[static_cast<std::size_t>(job.key)];
+    List &list = lists_[job.child];
     (job.previous == kNil ? list.head : jobs[job.previous].next) = job.next;
     (job.next == kNil ? list.tail : jobs[job.next].previous) = job.previous;
-    job.next = job.previous = kNil;
-    if (list.head == kNil) bitmap_.clear(static_cast<std::uint32_t>(job.key));
+    if (list.head == kNil) bitmap_.clear(job.child);
+    job.child = job.next = job.previous = kNil;
   }
 
   /// The first job's slot, or kNil.

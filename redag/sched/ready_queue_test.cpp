@@ -23,6 +23,11 @@ HeapQueue make_queue<HeapQueue>(std::size_t) {
   return {};
 }
 
+void push(LevelQueue &queue, std::vector<Job> &jobs, std::uint32_t slot) {
+  queue.push(jobs, slot, static_cast<std::uint32_t>(jobs[slot].key));
+}
+void push(HeapQueue &queue, std::vector<Job> &jobs, std::uint32_t slot) { queue.push(jobs, slot); }
+
 template <class Queue>
 class ReadyQueueTest : public ::testing::Test {};
 using Queues = ::testing::Types<LevelQueue, HeapQueue>;
@@ -34,6 +39,7 @@ TYPED_TEST(ReadyQueueTest, AgreesWithAnOrderedSet) {
     std::vector<Job> jobs(2 * levels + 10);
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       jobs[i].key = rng.uniform(0, static_cast<std::int64_t>(levels) - 1);
+      jobs[i].turn = rng.uniform(0, 3);
       jobs[i].rank = static_cast<std::uint32_t>(rng.uniform(0, 3));
       jobs[i].sequence = i;
     }
@@ -50,7 +56,7 @@ TYPED_TEST(ReadyQueueTest, AgreesWithAnOrderedSet) {
         queue.remove(jobs, slot);
         expected.erase(slot);
       } else {
-        queue.push(jobs, slot);
+        push(queue, jobs, slot);
         expected.insert(slot);
       }
       ASSERT_EQ(queue.top(), expected.empty() ? kNil : *expected.begin()) << "levels " << levels << " step " << step;

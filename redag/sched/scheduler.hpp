@@ -24,14 +24,15 @@ struct Config {
   std::uint32_t workers = 1;  // m
   Preemption preemption = Preemption::None;
   PolicyKind policy = PolicyKind::RateMonotonic;
-  // Full preemption on an operating system: number of distinct priority levels it has for us (0: as many as tasks).
-  // Where tasks outnumber levels, tasks that share a level do not preempt each other.
+  // Full preemption on an operating system: number of distinct priority levels it has for us (0: as many as it takes).
+  // Where priorities outnumber levels, neighbours share one: tasks of one level do not preempt each other.
   std::uint32_t levels = 0;
   // Full preemption on threads: jobs that can be started and unfinished at once (0: no bound).
   std::uint32_t max_started = 0;
   // Ids, job slots and group positions of removed tasks and DAGs are used again once nothing of them is in flight, so
   // that memory stays flat under endless adding and removing. Otherwise an id names one task for ever, as traces need.
   bool reuse_ids = false;
+  Ties ties = Ties::Share;
 };
 
 /// What a job can use up (docs/model.md, "Budgets" and "Criticality").

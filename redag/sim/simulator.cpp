@@ -51,7 +51,13 @@ class Simulation {
  public:
   Simulation(const Workload &workload, sched::Scheduler &scheduler, std::uint32_t workers, const Options &options,
              const EventSink &sink)
-      : scheduler_(scheduler), options_(options), sink_(sink), tasks_(flatten(workload)), processors_(workers) {
+      : scheduler_(scheduler),
+        options_(options),
+        sink_(sink),
+        tasks_(flatten(workload)),
+        places_(places_of(workload)),
+        processors_(workers) {
+    at_once_.reserve(workers);
     for (std::size_t i = 0; i < tasks_.size(); ++i) {
       const Task &task = *tasks_[i].task;
       has_regions_ = has_regions_ || task.region > 0;
@@ -85,7 +91,9 @@ class Simulation {
     Duration executed = 0;  // so far
     Duration lead = 0;      // overheads, which come before the body and hold no preemption point
     Duration region = 0;
-    bool cut_off = false;  // ends at its budget
+    std::uint32_t place = 0;   // of its task in the static order
+    std::uint32_t number = 0;  // within its task
+    bool cut_off = false;      // ends at its budget
     // Processor time of the body at which these are used up; kNever: not watched, or reported.
     Duration budget = kNever;
     Duration wcet_low = kNever;
@@ -103,15 +111,43 @@ class Simulation {
     return next;
   }
 
-  void complete_jobs() {
-    for (Processor &processor : processors_) {
-      if (processor.finish > now_) continue;
-      const JobSlot job = processor.job;
-      const bool cut_off = progress_[job.value].cut_off;
-      processor = Processor{};
-      ++result_.finished;
-      scheduler_.complete(job, now_, cut_off ? sched::Outcome::BudgetExceeded : sched::Outcome::Finished);
+  // DAG by DAG, in topological order: by TaskId.
+  static std::vector<std::uint32_t> places_of(const Workload &workload) {
+    std::vector<std::uint32_t> places;
+    for (const Dag &dag : workload.dags) {
+      const auto first = static_cast<std::uint32_t>(places.size());
+      for (const std::uint32_t rank : topological_ranks(dag)) places.push_back(first + rank);
     }
+    return places;
+  }
+
+  // What happens at one instant is told in the static order of tasks, whatever the processors: what they are given
+  // depends on tasks that have nothing to do with these.
+  template <class Predicate, class Tell>
+  void tell_in_order(Predicate which, Tell tell) {
+    at_once_.clear();
+    for (Processor &processor : processors_) {
+      if (which(processor)) at_once_.push_back(&processor);
+    }
+    if (at_once_.size() > 1) {
+      std::sort(at_once_.begin(), at_once_.end(), [this](const Processor *a, const Processor *b) {
+        const Progress &x = progress_[a->job.value];
+        const Progress &y = progress_[b->job.value];
+        return x.place != y.place ? x.place < y.place : x.number < y.number;
+      });
+    }
+    for (Processor *processor : at_once_) tell(*processor);
+  }
+
+  void complete_jobs() {
+    tell_in_order([this](const Processor &processor) { return processor.finish <= now_; },
+                  [this](Processor &processor) {
+                    const JobSlot job = processor.job;
+                    const bool cut_off = progress_[job.value].cut_off;
+                    processor = Processor{};
+                    ++result_.finished;
+                    scheduler_.complete(job, now_, cut_off ? sched::Outcome::BudgetExceeded : sched::Outcome::Finished);
+                  });
   }
 
   void release_jobs() {
@@ -137,8 +173,12 @@ class Simulation {
 
   // Jobs that go on although they have used their budget or their wcet_low.
   void reach_limits() {
-    for (Processor &processor : processors_) {
-      if (!processor.job.valid()) continue;
+    const auto reaches_one = [this](const Processor &processor) {
+      if (!processor.job.valid()) return false;
+      const Progress &progress = progress_[processor.job.value];
+      return body_of(processor) >= std::min(progress.wcet_low, progress.budget);
+    };
+    tell_in_order(reaches_one, [this](const Processor &processor) {
       Progress &progress = progress_[processor.job.value];
       const Duration body = body_of(processor);
       if (body >= progress.wcet_low) {
@@ -149,7 +189,7 @@ class Simulation {
         progress.budget = kNever;
         scheduler_.exceed(processor.job, sched::Limit::Budget, now_);
       }
-    }
+    });
   }
 
   // Jobs that stand at a multiple of their region, where that matters.
@@ -204,6 +244,8 @@ class Simulation {
                                       : execution_time(task, dispatch.task, dispatch.number, options_.seed);
     REDAG_CHECK(demand > 0, "a job executes for a positive time");
     Progress progress;
+    progress.place = places_[dispatch.task.value];
+    progress.number = dispatch.number;
     const bool cuts_off = task.on_budget == OnBudget::Abort;
     progress.cut_off = cuts_off && task.budget > 0 && demand > task.budget;
     if (progress.cut_off) demand = task.budget;
@@ -240,7 +282,9 @@ class Simulation {
   const Options &options_;
   const EventSink &sink_;
   std::vector<TaskRef> tasks_;
+  std::vector<std::uint32_t> places_;  // by TaskId
   std::vector<Processor> processors_;
+  std::vector<Processor *> at_once_;
   std::vector<Progress> progress_;
   ReleaseQueue releases_;
   Result result_;
@@ -264,6 +308,7 @@ sched::Config simulated_config(const Workload &workload) {
   sched::Config config;
   config.workers = workload.platform.workers;
   config.policy = workload.policy;
+  config.ties = workload.ties;
   switch (workload.platform.preemption) {
     case PreemptionMode::None: config.preemption = sched::Preemption::None; break;
     case PreemptionMode::Cooperative: config.preemption = sched::Preemption::Cooperative; break;

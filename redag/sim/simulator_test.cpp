@@ -1,8 +1,15 @@
 #include "redag/sim/simulator.hpp"
 
+#include <algorithm>
+#include <utility>
+#include <vector>
+
 #include <gtest/gtest.h>
 
+#include "redag/base/rng.hpp"
+
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/testing/random_workloads.hpp"
 #include "redag/testing/timeline.hpp"
 
 namespace redag::sim {
@@ -173,6 +180,134 @@ TEST(GoldenSchedule, BudgetCutsAJobOff) {
   EXPECT_EQ(timeline(workload, simulate_events(workload, 10 * kMs)),
             "source#0 w0 0-3\n"
             "source#0 aborted budget 3\n");
+}
+
+std::uint64_t finished(const std::vector<JobEvent> &events, TaskId task) {
+  return static_cast<std::uint64_t>(std::count_if(events.begin(), events.end(), [task](const JobEvent &event) {
+    return event.kind == JobEventKind::Finished && event.task == task;
+  }));
+}
+
+// rclcpp#2912: two timers of 20 ms, one whose body takes 25 ms and one that takes nearly nothing. In a fixed order the
+// second one gets nothing. Of releases of one instant the heavy one goes first, as it does in the file.
+TEST(EqualRates, ALightTimerGetsItsTurnBesideAHeavyOne) {
+  Workload workload = make_workload({make_dag("a", {{"heavy", 20, 25}}), make_dag("b", {{"light", 20}})}, 1);
+  workload.dags[1].tasks[0].wcet = workload.dags[1].tasks[0].bcet = kMicrosecond;
+  std::vector<JobEvent> events = simulate_events(workload, 5'000 * kMs);
+  EXPECT_EQ(finished(events, TaskId(0)), 199U);
+  EXPECT_EQ(finished(events, TaskId(1)), 100U);
+  workload.ties = Ties::Fixed;
+  events = simulate_events(workload, 5'000 * kMs);
+  EXPECT_EQ(finished(events, TaskId(0)), 200U);
+  EXPECT_EQ(finished(events, TaskId(1)), 0U);
+}
+
+// rclcpp#2360: two timers of 100 ms in one mutually exclusive group, whose bodies take longer than that.
+TEST(EqualRates, TimersOfOneGroupTakeTurns) {
+  for (const PreemptionMode mode : {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os}) {
+    for (const std::uint32_t workers : {1U, 2U}) {
+      Workload workload =
+          make_workload({make_dag("a", {{"one", 100, 203, {}, "g"}, {"two", 100, 203, {}, "g"}})}, workers, mode);
+      std::vector<JobEvent> events = simulate_events(workload, 10'000 * kMs);
+      EXPECT_EQ(finished(events, TaskId(0)), 25U);
+      EXPECT_EQ(finished(events, TaskId(1)), 24U);
+      workload.ties = Ties::Fixed;
+      events = simulate_events(workload, 10'000 * kMs);
+      EXPECT_EQ(finished(events, TaskId(0)), 49U);
+      EXPECT_EQ(finished(events, TaskId(1)), 0U);
+    }
+  }
+}
+
+// The turn of a data task's job is the end of its predecessor: a chain and a timer of its rate take turns.
+TEST(EqualRates, AChainTakesTurnsWithATimer) {
+  const Workload workload =
+      make_workload({make_dag("a", {{"heavy", 20, 25}}), make_dag("b", {{"source", 20}, {"sink", 0, 1, {0}}})}, 1);
+  const std::vector<JobEvent> events = simulate_events(workload, 2'000 * kMs);
+  for (const std::uint32_t task : {0U, 1U, 2U}) EXPECT_GE(finished(events, TaskId(task)), 35U) << task;
+}
+
+// Which worker a job has depends on tasks that have nothing to do with it; what another one reads must not.
+class CompletionsOfOneInstant : public ::testing::Test {
+ protected:
+  static Task timer(const char *name, Duration wcet, Duration period, Time offset) {
+    Task task;
+    task.name = name;
+    task.wcet = task.bcet = wcet;
+    task.period = period;
+    task.offset = offset;
+    return task;
+  }
+
+  // When q and p end together, x takes the data of both.
+  static Dag joined() {
+    Dag dag;
+    dag.name = "d";
+    dag.tasks = {timer("q", 1, 4, 0), timer("p", 2, 8, 3), timer("x", 1, 0, 0)};
+    dag.tasks[2].activation = Activation::Data;
+    dag.tasks[2].predecessors = {1, 0};
+    inherit_periods(dag);
+    return dag;
+  }
+
+  static std::vector<Time> origins(const Workload &workload, TaskId task) {
+    std::vector<Time> origins;
+    for (const JobEvent &event : simulate_events(workload, 80)) {
+      if (event.kind == JobEventKind::Ready && event.task == task) origins.push_back(event.value);
+    }
+    return origins;
+  }
+};
+
+TEST_F(CompletionsOfOneInstant, AreToldInTheOrderOfTasks) {
+  const Workload alone = make_workload({joined()}, 2);
+  const std::vector<Time> origins_alone = origins(alone, TaskId(2));
+  ASSERT_FALSE(origins_alone.empty());
+  EXPECT_EQ(origins_alone.front(), 3) << "q, which comes first in its DAG, ended first: its second datum is there";
+  Dag unrelated;
+  unrelated.name = "u";
+  unrelated.tasks = {timer("u", 2, 100, 2)};
+  inherit_periods(unrelated);
+  EXPECT_EQ(origins(make_workload({joined(), unrelated}, 2), TaskId(2)), origins_alone);
+  EXPECT_EQ(origins(make_workload({unrelated, joined()}, 2), TaskId(3)), origins_alone);
+}
+
+// The order of the file is not that of the edges.
+TEST_F(CompletionsOfOneInstant, AreToldInTopologicalOrderWithinADag) {
+  const Workload workload = make_workload({make_dag("a", {{"last", 0, 2, {2}}, {"long", 10, 5}, {"first", 10, 3}})}, 2);
+  std::vector<TaskId> ended;
+  for (const JobEvent &event : simulate_events(workload, 9 * kMs)) {
+    if (event.kind == JobEventKind::Finished && event.time == 5 * kMs) ended.push_back(event.task);
+  }
+  EXPECT_EQ(ended, (std::vector<TaskId>{TaskId(1), TaskId(0)}));
+}
+
+// With a worker for everybody nothing is ever delayed, and so nothing that is added changes what any job reads.
+TEST_F(CompletionsOfOneInstant, UnrelatedTasksChangeNoDataWhereNobodyWaits) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    Rng rng(seed);
+    Workload workload =
+        redag::testing::random_workload(rng, {.max_dags = 2, .max_tasks = 5, .groups = false, .bounds = false});
+    Workload more = workload;
+    more.dags.push_back(
+        redag::testing::random_dag(rng, {.max_dags = 1, .max_tasks = 4, .groups = false, .bounds = false}));
+    more.dags.back().name = "unrelated";
+    for (Workload *w : {&workload, &more}) {
+      w->platform = Platform{40, PreemptionMode::None};
+      for (Dag &dag : w->dags) dag.criticality = Criticality::Normal;
+    }
+    Options options;
+    options.seed = seed;
+    const auto of_first = [&](const Workload &w) {
+      std::vector<JobEvent> kept;
+      for (JobEvent event : simulate_events(w, 300 * kMicrosecond, options)) {
+        event.worker = 0;
+        if (event.task.value < workload.task_count()) kept.push_back(event);
+      }
+      return kept;
+    };
+    ASSERT_EQ(of_first(workload), of_first(more)) << "seed " << seed;
+  }
 }
 
 TEST(Simulator, OverheadsLengthenJobs) {

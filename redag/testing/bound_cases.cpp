@@ -54,6 +54,7 @@ class CaseGenerator {
     if (limits_.levels && chance(rng_, 0.5)) {
       result.platform.levels = between(rng_, 1, static_cast<std::uint32_t>(workload.task_count()));
     }
+    workload.ties = chance(rng_, 0.7) ? Ties::Share : Ties::Fixed;
     return result;
   }
 

@@ -162,6 +162,7 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
   config.workers = platform.workers;
   config.preemption = platform.preemption;
   config.policy = workload.policy;
+  config.ties = workload.ties;
   config.levels = platform.levels;
   config.max_started = platform.max_started;
   const auto scheduler = sched::make_scheduler(property.executor, workload, config);
@@ -342,10 +343,10 @@ void for_cases(const BoundGenerator &generator, std::uint32_t count,
 
 std::string describe(const BoundCase &bound_case) {
   const analysis::AnalysisPlatform &platform = bound_case.platform;
-  std::string text =
-      fmt::format("m={} preemption={} policy={} levels={} overheads={}/{}/{}\n", platform.workers,
-                  static_cast<int>(platform.preemption), to_string(bound_case.workload.policy), platform.levels,
-                  platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead);
+  std::string text = fmt::format(
+      "m={} preemption={} policy={} ties={} levels={} overheads={}/{}/{}\n", platform.workers,
+      static_cast<int>(platform.preemption), to_string(bound_case.workload.policy), to_string(bound_case.workload.ties),
+      platform.levels, platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead);
   for (const Dag &dag : bound_case.workload.dags) {
     text += fmt::format("dag {} max_active={} deadline={}\n", dag.name, dag.max_active, dag.deadline);
     for (const Task &task : dag.tasks) {

@@ -149,6 +149,13 @@ bool comes_before(PolicyKind policy, const Workload &w, const TaskRef &a, const 
   return a.dag != b.dag ? a.dag < b.dag : ta < tb;
 }
 
+// All that the policy looks at. chain_aware looks at the DAG and the place in it, which differ.
+bool are_equal(PolicyKind policy, const Task &a, const Task &b) {
+  if (policy == PolicyKind::RateMonotonic) return a.period == b.period;
+  if (policy == PolicyKind::DeadlineMonotonic) return a.deadline == b.deadline;
+  return policy == PolicyKind::Fixed && a.priority.value_or(0) == b.priority.value_or(0);
+}
+
 RC_GTEST_PROP(Priorities, AreThePlacesInTheOrderOfThePolicy, (std::uint64_t seed)) {
   Rng rng(seed);
   const Workload w = random_workload(rng, {4, 6, true, true, true});
@@ -156,8 +163,11 @@ RC_GTEST_PROP(Priorities, AreThePlacesInTheOrderOfThePolicy, (std::uint64_t seed
   for (const PolicyKind policy : {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed,
                                   PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::ChainAware}) {
     const auto levels = static_cast<std::uint32_t>(rng.uniform(0, static_cast<std::int64_t>(tasks.size()) + 1));
-    const std::vector<sched::Priority> priorities = sched::assign_priorities(w.dags, policy, levels);
-    const bool enough = levels == 0 || levels >= tasks.size() || !sched::is_static(policy);
+    const Ties ties = rng.uniform(0, 1) == 0 ? Ties::Share : Ties::Fixed;
+    const std::vector<sched::Priority> priorities = sched::assign_priorities(w.dags, policy, ties, levels);
+    std::uint32_t tiers = 0;
+    for (const sched::Priority &priority : priorities) tiers = std::max(tiers, priority.tier + 1);
+    const bool enough = levels == 0 || levels >= tiers || !sched::is_static(policy);
     for (std::size_t i = 0; i < tasks.size(); ++i) {
       const auto rank = std::count_if(tasks.begin(), tasks.end(),
                                       [&](const TaskRef &other) { return comes_before(policy, w, other, tasks[i]); });
@@ -165,8 +175,11 @@ RC_GTEST_PROP(Priorities, AreThePlacesInTheOrderOfThePolicy, (std::uint64_t seed
       RC_ASSERT(priorities[i].level < (enough ? tasks.size() : levels));
       for (std::size_t j = 0; j < tasks.size(); ++j) {
         if (i == j) continue;
-        RC_ASSERT(!enough || priorities[i].level != priorities[j].level);
-        RC_ASSERT(priorities[i].rank > priorities[j].rank || priorities[i].level <= priorities[j].level);
+        const bool is_tie = ties == Ties::Share && are_equal(policy, *tasks[i].task, *tasks[j].task);
+        RC_ASSERT((priorities[i].tier == priorities[j].tier) == is_tie);
+        RC_ASSERT(!enough || priorities[i].level == priorities[i].tier);
+        RC_ASSERT(priorities[i].rank > priorities[j].rank || priorities[i].tier <= priorities[j].tier);
+        RC_ASSERT(priorities[i].tier > priorities[j].tier || priorities[i].level <= priorities[j].level);
         // Equal rates share before different ones do.
         if (!enough && policy == PolicyKind::RateMonotonic && tasks[i].task->period == tasks[j].task->period) {
           RC_ASSERT(priorities[i].level == priorities[j].level);

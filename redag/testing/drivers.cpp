@@ -155,7 +155,9 @@ void add_last_task(sched::Scheduler &scheduler, const Dag &whole, DagId dag, Pol
 }  // namespace
 
 sched::Config config_of(const RunSpec &spec) {
-  return sched::Config{spec.workload.platform.workers, spec.preemption, spec.workload.policy, 0, 0};
+  sched::Config config{spec.workload.platform.workers, spec.preemption, spec.workload.policy, 0, 0};
+  config.ties = spec.workload.ties;
+  return config;
 }
 
 trace::Trace SimulatorDriver::run(const RunSpec &spec) {

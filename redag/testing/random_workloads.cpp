@@ -102,6 +102,7 @@ Workload random_workload(Rng &rng, const RandomWorkloadLimits &limits) {
   Workload workload;
   workload.name = "random";
   workload.platform.workers = between(rng, 1, 3);
+  workload.ties = chance(rng, 0.7) ? Ties::Share : Ties::Fixed;
   const std::uint32_t count = between(rng, 1, limits.max_dags);
   for (std::size_t i = 0; i < count; ++i) {
     workload.dags.push_back(random_dag(rng, limits));
@@ -115,6 +116,7 @@ sched::Config random_config(Rng &rng, PolicyKind policy, sched::Preemption preem
   config.workers = between(rng, 1, 3);
   config.policy = policy;
   config.preemption = preemption;
+  config.ties = chance(rng, 0.7) ? Ties::Share : Ties::Fixed;
   if (preemption != sched::Preemption::Full) return config;
   const auto tasks = static_cast<std::uint32_t>(task_count);
   if (sched::is_static(policy) && chance(rng, 0.5)) config.levels = between(rng, 1, tasks);
@@ -123,9 +125,9 @@ sched::Config random_config(Rng &rng, PolicyKind policy, sched::Preemption preem
 }
 
 std::string describe(const Workload &workload, const sched::Config &config) {
-  std::string text =
-      fmt::format("{} workers, preemption {}, {}, {} levels, {} started at most\n", config.workers,
-                  static_cast<int>(config.preemption), to_string(config.policy), config.levels, config.max_started);
+  std::string text = fmt::format("{} workers, preemption {}, {}, ties {}, {} levels, {} started at most\n",
+                                 config.workers, static_cast<int>(config.preemption), to_string(config.policy),
+                                 to_string(config.ties), config.levels, config.max_started);
   std::size_t id = 0;
   for (const Dag &dag : workload.dags) {
     text += fmt::format("dag {}: max_active {}, max_pending {}, criticality {}, degrade {} {} {}\n", dag.name,

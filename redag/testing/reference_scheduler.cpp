@@ -52,33 +52,28 @@ Duration ReferenceScheduler::shortest_period(std::size_t dag) const {
   return shortest;
 }
 
-// The table of docs/model.md, "Priority", and its ties.
-bool ReferenceScheduler::task_before(const TaskState &a, const TaskState &b) const {
-  const auto smallest_period = [this](const TaskState &state) { return shortest_period(state.dag); };
+// The table of docs/model.md, "Priority".
+bool ReferenceScheduler::more_urgent(const TaskState &a, const TaskState &b) const {
+  const Criticality criticality_a = dags_[a.dag].dag.criticality;
+  const Criticality criticality_b = dags_[b.dag].dag.criticality;
   switch (config_.policy) {
-    case PolicyKind::RateMonotonic:
-      if (a.task.period != b.task.period) return a.task.period < b.task.period;
-      break;
-    case PolicyKind::DeadlineMonotonic:
-      if (a.task.deadline != b.task.deadline) return a.task.deadline < b.task.deadline;
-      break;
-    case PolicyKind::Fixed:
-      if (a.task.priority.value_or(0) != b.task.priority.value_or(0)) {
-        return a.task.priority.value_or(0) > b.task.priority.value_or(0);
-      }
-      break;
+    case PolicyKind::RateMonotonic: return a.task.period < b.task.period;
+    case PolicyKind::DeadlineMonotonic: return a.task.deadline < b.task.deadline;
+    case PolicyKind::Fixed: return a.task.priority.value_or(0) > b.task.priority.value_or(0);
     case PolicyKind::ChainAware:
-      if (dags_[a.dag].dag.criticality != dags_[b.dag].dag.criticality) {
-        return dags_[a.dag].dag.criticality > dags_[b.dag].dag.criticality;
-      }
-      if (smallest_period(a) != smallest_period(b)) return smallest_period(a) < smallest_period(b);
+      if (criticality_a != criticality_b) return criticality_a > criticality_b;
+      if (shortest_period(a.dag) != shortest_period(b.dag)) return shortest_period(a.dag) < shortest_period(b.dag);
       if (a.dag != b.dag) return a.dag < b.dag;
-      if (a.topological != b.topological) return a.topological > b.topological;
-      break;
+      return a.topological > b.topological;
     case PolicyKind::Edf:
     case PolicyKind::Fifo: break;
   }
-  // TaskId last: `tasks_` is in that order.
+  return false;
+}
+
+// And its ties. TaskId last: `tasks_` is in that order.
+bool ReferenceScheduler::task_before(const TaskState &a, const TaskState &b) const {
+  if (more_urgent(a, b) || more_urgent(b, a)) return more_urgent(a, b);
   return std::tuple(a.dag, a.topological, &a - tasks_.data()) < std::tuple(b.dag, b.topological, &b - tasks_.data());
 }
 
@@ -104,17 +99,21 @@ void ReferenceScheduler::rank_tasks() {
                       dags_[state.dag].dag.criticality, shortest_period(state.dag),
                       static_cast<std::uint32_t>(state.dag), state.topological, TaskId(i)});
   }
-  const auto priorities = sched::assign_priorities(ranked, config_.policy, config_.levels);
+  const auto priorities = sched::assign_priorities(ranked, config_.policy, config_.ties, config_.levels);
   for (std::size_t i = 0; i < ranked.size(); ++i) tasks_[ranked[i].task.value].level = priorities[i].level;
   for (TaskState &state : tasks_) {
-    state.rank = 0;
+    state.rank = state.tier = 0;
     for (const TaskState &other : tasks_) {
-      if (!other.gone && task_before(other, state)) ++state.rank;
+      if (other.gone) continue;
+      if (task_before(other, state)) ++state.rank;
+      if (more_urgent(other, state)) ++state.tier;
     }
+    if (config_.ties == Ties::Fixed) state.tier = state.rank;
   }
-  // An inheritance that has become less than its own is over.
+  // An inheritance that is no more than its own is over.
   for (Job &job : jobs_) {
-    if (job.heir_of != kNone && !key_before(jobs_[job.heir_of], job)) job.heir_of = kNone;
+    if (job.heir_of == kNone) continue;
+    if (!is_of_higher_priority(own_standing(jobs_[job.heir_of]), own_standing(job))) job.heir_of = kNone;
   }
 }
 
@@ -160,6 +159,15 @@ void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, co
     return;
   }
   jobs_[job].consumed = consumed;
+  // "Ties": it has the turn of the job whose place it takes; and not one before that of an earlier job of its task.
+  jobs_[job].turn = release;
+  for (const std::size_t other : jobs_of(task, State::Ready)) {
+    const bool takes_its_place = state.task.overrun == Overrun::Skip;
+    jobs_[job].turn = takes_its_place ? jobs_[other].turn : std::max(jobs_[job].turn, jobs_[other].turn);
+  }
+  for (const std::size_t other : jobs_of(task, State::Waiting)) {
+    if (other != job) jobs_[job].turn = jobs_[other].turn;
+  }
   for (const std::size_t other : jobs_of(task, State::Waiting)) {
     if (other != job) skip(other, now, Reason::Precedence);
   }
@@ -405,44 +413,73 @@ const ReferenceScheduler::Job &ReferenceScheduler::effective(std::size_t job) co
   return jobs_[heir_of == kNone ? job : heir_of];
 }
 
-bool ReferenceScheduler::key_before(const Job &a, const Job &b) const {
-  const TaskState &ta = tasks_[a.task];
-  const TaskState &tb = tasks_[b.task];
-  if (is_demoted(a) != is_demoted(b)) return is_demoted(b);
-  if (is_demoted(a)) return std::tie(ta.rank, a.number) < std::tie(tb.rank, b.number);
-  if (config_.policy == PolicyKind::Edf) {
-    if (a.deadline != b.deadline) return a.deadline < b.deadline;
+ReferenceScheduler::Standing ReferenceScheduler::own_standing(const Job &job) const {
+  const TaskState &task = tasks_[job.task];
+  Standing own;
+  own.demoted = is_demoted(job);
+  switch (config_.policy) {
+    case PolicyKind::Edf: own.priority = own.demoted ? 0 : job.deadline; break;
+    case PolicyKind::Fifo: own.priority = own.demoted ? 0 : static_cast<std::int64_t>(job.ready_order); break;
+    default: own.priority = task.tier; break;
   }
-  if (config_.policy == PolicyKind::Fifo && a.ready_order != b.ready_order) return a.ready_order < b.ready_order;
-  return std::tie(ta.rank, a.number) < std::tie(tb.rank, b.number);
+  const bool take_turns = config_.ties == Ties::Share && config_.policy != PolicyKind::Fifo;
+  own.turn = take_turns ? job.turn : 0;
+  own.rank = task.rank;
+  own.number = job.number;
+  return own;
 }
 
-bool ReferenceScheduler::shares_levels() const {
+bool ReferenceScheduler::is_of_higher_priority(const Standing &a, const Standing &b) {
+  return std::tie(a.demoted, a.priority) < std::tie(b.demoted, b.priority);
+}
+
+bool ReferenceScheduler::is_before(const Standing &a, const Standing &b) {
+  return std::tie(a.demoted, a.priority, a.turn, a.rank, a.number) <
+         std::tie(b.demoted, b.priority, b.turn, b.rank, b.number);
+}
+
+/// With what it has inherited.
+ReferenceScheduler::Standing ReferenceScheduler::standing(std::size_t job) const {
+  Standing result = own_standing(jobs_[job]);
+  const Standing lent = own_standing(effective(job));
+  if (is_of_higher_priority(lent, result)) {
+    result.demoted = lent.demoted;
+    result.priority = lent.priority;
+  }
+  return result;
+}
+
+/// Full preemption by static priorities: what the operating system does, it does by levels.
+bool ReferenceScheduler::has_levels() const {
   return config_.preemption == Preemption::Full && sched::is_static(config_.policy);
 }
 
 std::uint32_t ReferenceScheduler::level_of(std::size_t job) const {
-  const auto level = [this](const Job &j) {
-    const auto below_all = config_.levels > 0
-                               ? config_.levels
-                               : static_cast<std::uint32_t>(std::count_if(
-                                     tasks_.begin(), tasks_.end(), [](const TaskState &task) { return !task.gone; }));
-    return is_demoted(j) ? below_all : tasks_[j.task].level;
-  };
+  std::uint32_t below_all = config_.levels;
+  for (const TaskState &task : tasks_) {
+    if (config_.levels == 0 && !task.gone) below_all = std::max(below_all, task.level + 1);
+  }
+  const auto level = [&](const Job &j) { return is_demoted(j) ? below_all : tasks_[j.task].level; };
   return std::min(level(jobs_[job]), level(effective(job)));
 }
 
 /// Does `a` take the worker of `b`, which has started?
 bool ReferenceScheduler::outranks(std::size_t a, std::size_t b) const {
   if (config_.policy == PolicyKind::Fifo) return false;  // what runs became ready earlier, or had to wait
-  if (is_demoted(effective(a)) && is_demoted(effective(b))) return false;  // all on one level
-  if (shares_levels()) return level_of(a) < level_of(b);
-  return key_before(effective(a), effective(b));
+  const Standing by = standing(a);
+  const Standing of = standing(b);
+  if (by.demoted && of.demoted) return false;  // all on one level
+  if (has_levels()) return level_of(a) < level_of(b);
+  return config_.ties == Ties::Share ? is_of_higher_priority(by, of) : is_before(by, of);
 }
 
-/// The total order decides who is looked at first, also among those that share a level.
+/// Who is looked at first: of one level, as in the operating system, who has started.
 bool ReferenceScheduler::considered_before(std::size_t a, std::size_t b) const {
-  return key_before(effective(a), effective(b));
+  if (has_levels()) {
+    const auto rank = [this](std::size_t job) { return std::pair(level_of(job), !started(jobs_[job])); };
+    if (rank(a) != rank(b)) return rank(a) < rank(b);
+  }
+  return is_before(standing(a), standing(b));
 }
 
 // ---- dispatch -------------------------------------------------------------------------------------------------------
@@ -515,7 +552,8 @@ bool ReferenceScheduler::can_start(std::size_t job, Time now) {
   }
   const std::size_t holder = group_holder(j);
   if (holder != kNone) {
-    if (key_before(j, effective(holder))) jobs_[holder].heir_of = job;
+    const bool inherits = config_.policy != PolicyKind::Fifo;
+    if (inherits && is_of_higher_priority(own_standing(j), standing(holder))) jobs_[holder].heir_of = job;
     return false;
   }
   const auto all_started = std::count_if(jobs_.begin(), jobs_.end(), [this](const Job &o) { return started(o); });

@@ -58,6 +58,7 @@ class ReferenceScheduler final : public sched::Scheduler {
     bool gone = false;  // removed, and no job has its priority: not in the order any more
     std::uint32_t next_number = 0;
     std::uint32_t rank = 0;
+    std::uint32_t tier = 0;  // how many tasks are strictly more urgent; Ties::Fixed: its rank
     std::uint32_t level = 0;
     bool skips_next = false;
     bool has_edges = false;
@@ -82,6 +83,7 @@ class ReferenceScheduler final : public sched::Scheduler {
     Time release = 0;
     Time deadline = 0;
     Time origin = 0;
+    Time turn = 0;
     std::uint64_t ready_order = 0;
     std::uint32_t worker = WorkerId::kNoneValue;
     bool deferred = false;
@@ -92,6 +94,15 @@ class ReferenceScheduler final : public sched::Scheduler {
     std::vector<Data> consumed;  // parallel to the task's predecessors
   };
 
+  /// A job's place in the order. What it inherits is the priority: the first two.
+  struct Standing {
+    bool demoted = false;
+    std::int64_t priority = 0;  // the smaller, the more urgent
+    Time turn = 0;
+    std::uint32_t rank = 0;
+    std::uint32_t number = 0;
+  };
+
   /// A worker's jobs, the lowest first; only the last one can be running.
   using Stack = std::vector<std::size_t>;
 
@@ -99,6 +110,7 @@ class ReferenceScheduler final : public sched::Scheduler {
   void forget_what_is_gone();
   void rank_tasks();
   [[nodiscard]] Duration shortest_period(std::size_t dag) const;
+  [[nodiscard]] bool more_urgent(const TaskState &a, const TaskState &b) const;
   [[nodiscard]] bool task_before(const TaskState &a, const TaskState &b) const;
   [[nodiscard]] bool same_phase(const TaskState &predecessor, const TaskState &successor) const;
 
@@ -124,8 +136,11 @@ class ReferenceScheduler final : public sched::Scheduler {
   [[nodiscard]] std::size_t group_holder(const Job &job) const;
 
   [[nodiscard]] const Job &effective(std::size_t job) const;
-  [[nodiscard]] bool key_before(const Job &a, const Job &b) const;
-  [[nodiscard]] bool shares_levels() const;
+  [[nodiscard]] Standing own_standing(const Job &job) const;
+  [[nodiscard]] Standing standing(std::size_t job) const;
+  [[nodiscard]] static bool is_of_higher_priority(const Standing &a, const Standing &b);
+  [[nodiscard]] static bool is_before(const Standing &a, const Standing &b);
+  [[nodiscard]] bool has_levels() const;
   [[nodiscard]] std::uint32_t level_of(std::size_t job) const;
   [[nodiscard]] bool outranks(std::size_t a, std::size_t b) const;
   [[nodiscard]] bool considered_before(std::size_t a, std::size_t b) const;

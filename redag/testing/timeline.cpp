@@ -35,7 +35,7 @@ Dag make_dag(std::string name, const std::vector<TestTask> &tasks, std::uint32_t
 }
 
 Workload make_workload(std::vector<Dag> dags, std::uint32_t workers, PreemptionMode preemption, PolicyKind policy) {
-  return Workload{"test", Platform{workers, preemption}, policy, std::move(dags)};
+  return Workload{.name = "test", .platform = Platform{workers, preemption}, .policy = policy, .dags = std::move(dags)};
 }
 
 std::vector<JobEvent> simulate_events(const Workload &workload, Duration horizon, const sim::Options &options) {

@@ -199,5 +199,16 @@ TEST(ThisMachine, IsDescribed) {
   EXPECT_NE(machine.kernel, "");
 }
 
+// A file of before equals took turns was recorded in a fixed order.
+TEST_F(EventsFile, WithoutAnOrderOfTiesItWasFixed) {
+  const RunInfo info = example().info;
+  std::string text = run_info_to_json(info);
+  EXPECT_EQ(run_info_from_json(text, "x", 1).value().config.ties, Ties::Share);
+  const std::size_t key = text.find("\"ties\"");
+  ASSERT_NE(key, std::string::npos);
+  text.erase(key, text.find(',', key) + 1 - key);
+  EXPECT_EQ(run_info_from_json(text, "x", 1).value().config.ties, Ties::Fixed);
+}
+
 }  // namespace
 }  // namespace redag::trace

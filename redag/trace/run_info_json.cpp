@@ -76,6 +76,13 @@ sched::Config config_from(const Json &json) {
   config.preemption = one_of(kPreemptions, preemption_name, text_of(json, "preemption"), "preemption");
   config.policy = one_of(
       kPolicies, [](PolicyKind p) { return to_string(p); }, text_of(json, "policy"), "policy");
+  // Before ties were shared, every order was fixed, and the file says nothing.
+  constexpr std::array kTies = {Ties::Share, Ties::Fixed};
+  config.ties = Ties::Fixed;
+  if (json.contains("ties")) {
+    config.ties = one_of(
+        kTies, [](Ties ties) { return to_string(ties); }, text_of(json, "ties"), "ties");
+  }
   config.levels = small_of(json, "levels", 0, kAny);
   config.max_started = small_of(json, "max_started", 0, kAny);
   return config;
@@ -118,6 +125,7 @@ std::string run_info_to_json(const RunInfo &info) {
        {{"workers", config.workers},
         {"preemption", preemption_name(config.preemption)},
         {"policy", to_string(config.policy)},
+        {"ties", to_string(config.ties)},
         {"levels", config.levels},
         {"max_started", config.max_started}}},
       {"preemption", info.preemption},

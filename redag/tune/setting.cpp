@@ -43,7 +43,7 @@ std::vector<std::uint32_t> tied_dags(const Workload &workload) {
   return {tied.begin(), tied.end()};
 }
 
-// One priority for the tasks of a DAG that are equally urgent: among them the topological order goes on to decide.
+// One priority for the tasks of a DAG that are equally urgent: they stay equals.
 void set_priorities(Workload &workload, const std::vector<std::uint32_t> &order) {
   std::vector<std::uint32_t> place(workload.dags.size());
   std::iota(place.begin(), place.end(), 0);

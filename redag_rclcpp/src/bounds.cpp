@@ -88,6 +88,7 @@ bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload
 void Bounds::analyse(const Workload &workload, const redag::sched::Config &config) {
   Workload analysed = workload;
   analysed.policy = config.policy;
+  analysed.ties = config.ties;
   redag::analysis::AnalysisPlatform platform = redag::analysis::platform_of(config);
   machine_.reset();
   if (calibration_) {

@@ -55,6 +55,7 @@ redag::runtime::Setup set_up(const ReDAGOptions &options) {
   auto setup =
       redag::runtime::set_up(options.preemption, options.policy, options.workers, options.threads, options.cpus);
   if (!setup) throw std::runtime_error(to_string(setup.error()));
+  setup->config.ties = options.ties;
   return *std::move(setup);
 }
 
@@ -71,7 +72,7 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
       options_(prepare(std::move(options))),
       setup_(set_up(options_)),
       bridge_(context),
-      tasks_(redag::Platform{setup_.config.workers, setup_.mode.mode}, options_.policy,
+      tasks_(redag::Platform{setup_.config.workers, setup_.mode.mode}, options_.policy, options_.ties,
              options_.workload ? &*options_.workload : nullptr) {
   redag::runtime::EngineOptions engine;
   engine.looks = redag::runtime::looks_before_sleep(setup_, options_.spin.count());

@@ -32,6 +32,7 @@ constexpr std::array kModes = {redag::PreemptionMode::Auto, redag::PreemptionMod
 constexpr std::array kPolicies = {redag::PolicyKind::RateMonotonic, redag::PolicyKind::DeadlineMonotonic,
                                   redag::PolicyKind::Fixed,         redag::PolicyKind::Edf,
                                   redag::PolicyKind::Fifo,          redag::PolicyKind::ChainAware};
+constexpr std::array kTies = {redag::Ties::Share, redag::Ties::Fixed};
 
 [[noreturn]] void refuse(const char *name, const ParameterValue &value, const std::string &allowed) {
   throw rclcpp::exceptions::InvalidParameterValueException(
@@ -161,6 +162,7 @@ void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
   if (options.workers == 0 && states_workers(path)) options.workers = workload.platform.workers;
   if (options.preemption == redag::PreemptionMode::Auto) options.preemption = workload.platform.preemption;
   if (options.policy == redag::PolicyKind::RateMonotonic) options.policy = workload.policy;
+  if (options.ties == redag::Ties::Share) options.ties = workload.ties;
   options.workload = std::move(loaded->workload);
 }
 
@@ -216,6 +218,11 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
   options.policy = reader.one_of(
       {"policy", "The order of callbacks; rate_monotonic: what `config` says, if it says", names_of(kPolicies)},
       kPolicies);
+  options.ties = reader.one_of({"ties",
+                                "Callbacks of equal priority; share: the earlier release first, or what `config` says; "
+                                "fixed: always in the same order",
+                                names_of(kTies)},
+                               kTies);
   const Spec threads{"threads",
                      "Callbacks that can be started and unfinished at once, with preemption os; 0: workers + 16",
                      fmt::format("0, or a whole number from the number of workers to {}, is allowed", kMostThreads)};

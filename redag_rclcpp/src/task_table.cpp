@@ -49,8 +49,8 @@ redag::Callback match_of(const redag::CallbackId &id) {
 
 }  // namespace
 
-TaskTable::TaskTable(redag::Platform platform, redag::PolicyKind policy, const Workload *configured)
-    : platform_(platform), policy_(policy), configured_(configured) {
+TaskTable::TaskTable(redag::Platform platform, redag::PolicyKind policy, redag::Ties ties, const Workload *configured)
+    : platform_(platform), policy_(policy), ties_(ties), configured_(configured) {
   if (configured != nullptr) dags_ = configured->dags;
   for (redag::Dag &dag : dags_) dag.tasks.clear();
   // All that the workload does not name: no bound, and last among equals. In HI mode not more often than its period,
@@ -204,6 +204,7 @@ Workload TaskTable::as_workload(Ids &ids, bool live) const {
   workload.name = configured_ != nullptr ? configured_->name : "ros";
   workload.platform = platform_;
   workload.policy = policy_;
+  workload.ties = ties_;
   std::set<std::string> names;
   for (std::uint32_t d = 0; d < dags_.size(); ++d) {
     redag::Dag dag = dags_[d];

@@ -33,8 +33,8 @@ class TaskTable {
     bool configured = false;  // named by the workload
   };
 
-  /// `platform` and `policy`: the executor's. `configured`: what the user's workload says, or null.
-  TaskTable(redag::Platform platform, redag::PolicyKind policy, const redag::Workload *configured);
+  /// `platform`, `policy` and `ties`: the executor's. `configured`: what the user's workload says, or null.
+  TaskTable(redag::Platform platform, redag::PolicyKind policy, redag::Ties ties, const redag::Workload *configured);
 
   /// The workload's, and last that of all that it does not name. Without tasks.
   [[nodiscard]] const std::vector<redag::Dag> &dags() const { return dags_; }
@@ -75,6 +75,7 @@ class TaskTable {
 
   const redag::Platform platform_;
   const redag::PolicyKind policy_;
+  const redag::Ties ties_;
   const redag::Workload *const configured_;
   std::vector<redag::Dag> dags_;
 

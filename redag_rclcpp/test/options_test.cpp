@@ -28,6 +28,7 @@ using ::testing::HasSubstr;
 constexpr const char *kWorkload = R"(name: robot
 platform: {workers: 3, preemption: none}
 policy: edf
+ties: fixed
 dags:
   - name: control
     tasks:
@@ -75,6 +76,7 @@ TEST_F(OptionsTest, Defaults) {
   EXPECT_EQ(options.workers, 0U);
   EXPECT_EQ(options.preemption, redag::PreemptionMode::Auto);
   EXPECT_EQ(options.policy, redag::PolicyKind::RateMonotonic);
+  EXPECT_EQ(options.ties, redag::Ties::Share);
   EXPECT_EQ(options.threads, 0U);
   EXPECT_TRUE(options.cpus.empty());
   EXPECT_FALSE(options.workload);
@@ -99,6 +101,7 @@ TEST_F(OptionsTest, ValuesAreRead) {
   const auto node = node_with({{"workers", 2},
                                {"preemption", "cooperative"},
                                {"policy", "deadline_monotonic"},
+                               {"ties", "fixed"},
                                {"threads", 7},
                                {"cpu_affinity", std::vector<std::int64_t>{cpu}},
                                {"default_period", 0.02},
@@ -117,6 +120,7 @@ TEST_F(OptionsTest, ValuesAreRead) {
   EXPECT_EQ(options.workers, 2U);
   EXPECT_EQ(options.preemption, redag::PreemptionMode::Cooperative);
   EXPECT_EQ(options.policy, redag::PolicyKind::DeadlineMonotonic);
+  EXPECT_EQ(options.ties, redag::Ties::Fixed);
   EXPECT_EQ(options.threads, 7U);
   EXPECT_EQ(options.cpus, std::vector<int>{static_cast<int>(cpu)});
   EXPECT_EQ(options.default_period, 20ms);
@@ -148,6 +152,7 @@ TEST_F(OptionsTest, TheWorkloadCountsWhereParametersAreAtTheirDefaults) {
   EXPECT_EQ(from_file.workers, 3U);
   EXPECT_EQ(from_file.preemption, redag::PreemptionMode::None);
   EXPECT_EQ(from_file.policy, redag::PolicyKind::Edf);
+  EXPECT_EQ(from_file.ties, redag::Ties::Fixed);
   ASSERT_TRUE(from_file.workload);
   EXPECT_EQ(from_file.workload->name, "robot");
 
@@ -185,6 +190,7 @@ TEST_F(OptionsTest, MistakesSayWhichParameterWhatItIsAndWhatIsAllowed) {
   EXPECT_THAT(mistake_with({{"preemption", "full"}}),
               AllOf(HasSubstr("'preemption'"), HasSubstr("full"), HasSubstr("auto, none, cooperative, os")));
   EXPECT_THAT(mistake_with({{"policy", "rm"}}), AllOf(HasSubstr("'policy'"), HasSubstr("rm"), HasSubstr("edf")));
+  EXPECT_THAT(mistake_with({{"ties", "rr"}}), AllOf(HasSubstr("'ties'"), HasSubstr("rr"), HasSubstr("share, fixed")));
   EXPECT_THAT(mistake_with({{"threads", 2}, {"workers", 4}}),
               AllOf(HasSubstr("'threads'"), HasSubstr("is 2"), HasSubstr("4 workers")));
   EXPECT_THAT(mistake_with({{"cpu_affinity", std::vector<std::int64_t>{100'000}}}),
@@ -265,10 +271,10 @@ rclcpp::ParameterValue any_value(std::mt19937_64 &random, const std::string &wor
 
 // REDAG_SEED chooses the values, REDAG_OPTION_ROUNDS how many.
 TEST_F(OptionsTest, AnyValuesAreReadOrRefused) {
-  const std::vector<std::string> names{"workers",        "preemption",     "policy", "threads",          "cpu_affinity",
-                                       "config",         "default_period", "learn",  "raise_middleware", "live",
-                                       "metrics_period", "trace",          "bounds", "trace_events",     "metrics_file",
-                                       "save_path",      "overheads"};
+  const std::vector<std::string> names{"workers",      "preemption",     "policy",         "ties",   "threads",
+                                       "cpu_affinity", "config",         "default_period", "learn",  "raise_middleware",
+                                       "live",         "metrics_period", "trace",          "bounds", "trace_events",
+                                       "metrics_file", "save_path",      "overheads"};
   const std::string workload = file_with(kWorkload);
   const std::uint64_t seed = from_environment("REDAG_SEED", 1);
   const std::uint64_t rounds = from_environment("REDAG_OPTION_ROUNDS", 400);
@@ -316,9 +322,9 @@ TEST_F(OptionsTest, ParametersSayWhatTheyAreAndStay) {
   const auto node = node_with({});
   const ReDAGOptions options = declare_options(*node);
   (void)declare_monitor_options(*node, options);
-  for (const char *name : {"workers", "preemption", "policy", "threads", "cpu_affinity", "config", "default_period",
-                           "learn", "raise_middleware", "lock_memory", "spin", "watchdog", "metrics_period", "trace",
-                           "bounds", "trace_events", "metrics_file", "save_path"}) {
+  for (const char *name : {"workers", "preemption", "policy", "ties", "threads", "cpu_affinity", "config",
+                           "default_period", "learn", "raise_middleware", "lock_memory", "spin", "watchdog",
+                           "metrics_period", "trace", "bounds", "trace_events", "metrics_file", "save_path"}) {
     const auto descriptor = node->describe_parameter(name);
     EXPECT_FALSE(descriptor.description.empty()) << name;
     EXPECT_FALSE(descriptor.additional_constraints.empty()) << name;

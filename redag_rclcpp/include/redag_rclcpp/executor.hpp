@@ -41,8 +41,9 @@ struct ReDAGOptions {
   std::uint32_t workers = 0;  // callbacks that execute at the same time; 0: one a usable processor
   redag::PreemptionMode preemption = redag::PreemptionMode::Auto;
   redag::PolicyKind policy = redag::PolicyKind::RateMonotonic;
-  std::uint32_t threads = 0;  // os: callbacks that can be started and unfinished at once; 0: workers + 16
-  std::vector<int> cpus{};    // processors for the workers; empty: os takes `workers` of the usable ones
+  redag::Ties ties = redag::Ties::Share;  // callbacks of equal priority: the earlier release first, or a fixed order
+  std::uint32_t threads = 0;              // os: callbacks that can be started and unfinished at once; 0: workers + 16
+  std::vector<int> cpus{};                // processors for the workers; empty: os takes `workers` of the usable ones
 
   /// Which callback is which task of which DAG (docs/workload_format.md, `callback`). Platform and policy of the
   /// workload are not read here: see load_options().

@@ -8,9 +8,9 @@
 
 namespace redag_rclcpp {
 
-/// Declares (where that has not happened) and reads: workers, preemption, policy, threads, cpu_affinity, config,
-/// default_period, learn, raise_middleware, lock_memory, spin, watchdog, live, trace, bounds. The parameters are
-/// read-only from then on.
+/// Declares (where that has not happened) and reads: workers, preemption, policy, ties, threads, cpu_affinity,
+/// config, default_period, learn, raise_middleware, lock_memory, spin, watchdog, live, trace, bounds. The parameters
+/// are read-only from then on.
 ///
 /// `config` names a workload file: what the file says of its platform and policy counts where the parameter is at its
 /// default. Throws rclcpp::exceptions::InvalidParameterValueException, whose text says which parameter, what it is and

@@ -32,6 +32,7 @@ constexpr const char *kHelp = R"(A component container that executes callbacks b
   preemption        auto, os, cooperative, none                                   auto
   policy            rate_monotonic, deadline_monotonic, fixed, edf, fifo, chain_aware
                                                                                   rate_monotonic
+  ties              of equal priorities: share (the earlier release first), fixed share
   threads           os: callbacks started and unfinished at once; 0: workers + 16 0
   cpu_affinity      processors of the workers                                     []
   default_period    seconds, where nobody says                                    0.1

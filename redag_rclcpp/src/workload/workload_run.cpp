@@ -113,6 +113,7 @@ class Run {
       redag.workers = workers_;
       redag.preemption = preemption_of(name).value_or(workload_.platform.preemption);
       redag.policy = workload_.policy;
+      redag.ties = workload_.ties;
       redag.threads = workers_ + kSpareThreads;
       redag.workload = nodes_->bound_workload();
       redag.trace_capacity = kSchedulerEvents;
@@ -198,6 +199,7 @@ class Run {
     // Threads that ran bodies: with os more than run at the same time, which the workload's platform says.
     info.config.workers = std::max(workers_, nodes_->threads_seen());
     info.config.policy = workload_.policy;
+    info.config.ties = workload_.ties;
     info.preemption = "none";
     info.preemption_why = options_.executor + " has no other";
     if (redag_ != nullptr) {
