@@ -104,7 +104,7 @@ dags:
         self.expect(redag("analyze", self.cart, "--check"), 1)
         preempted = self.expect(redag("analyze", self.cart, "--check", "--preemption", "os"), 0)
         self.assertIn("schedulable: every deadline is met, by ", preempted.stdout)
-        self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--policy", "fixed"), 0)
+        self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--policy", "fixed", "--ties", "fixed"), 0)
         self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--workers", "2"), 0)
         self.expect(redag("analyze", self.cart, "--check", "--preemption", "os", "--overhead-dispatch", "5ms"), 1)
 
