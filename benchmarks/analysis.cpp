@@ -5,10 +5,10 @@
 #include <cmath>
 #include <vector>
 
-#include "redag/analysis/global_dag.hpp"
-#include "redag/analysis/global_sequential.hpp"
 #include "redag/base/rng.hpp"
-#include "redag/model/generate.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
+#include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 namespace {
 

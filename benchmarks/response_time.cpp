@@ -6,9 +6,9 @@
 #include <cmath>
 #include <vector>
 
-#include "redag/analysis/fast_rta.hpp"
-#include "redag/analysis/response_time.hpp"
 #include "redag/base/rng.hpp"
+#include "redag_analysis/one_worker/fast_rta.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 
 #include "benchmarks/scheduler_loop.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 
 namespace {
 

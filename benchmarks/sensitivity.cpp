@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "redag/analysis/assignment.hpp"
-#include "redag/analysis/sensitivity.hpp"
-#include "redag/model/generate.hpp"
+#include "redag_lab/search/assignment.hpp"
+#include "redag_lab/search/sensitivity.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 namespace {
 

@@ -5,9 +5,11 @@ find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(tl-expected REQUIRED)
 find_package(Threads REQUIRED)
-find_package(CLI11 REQUIRED)
-find_package(TBB REQUIRED)
 find_package(ZLIB REQUIRED)
+if(NOT redag_parts STREQUAL "executor")  # the workbench as well
+  find_package(CLI11 REQUIRED)
+  find_package(TBB REQUIRED)
+endif()
 # yaml-cpp 0.8 renamed its target.
 if(TARGET yaml-cpp::yaml-cpp)
   set(redag_yaml_cpp yaml-cpp::yaml-cpp)

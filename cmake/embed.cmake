@@ -1,5 +1,5 @@
 # Writes page_assets.cpp, which holds the report page's files as text. Run when building, in script mode:
-#   cmake -DOUTPUT=page_assets.cpp -DPAGE=redag/report/page -DECHARTS=third_party/echarts -P embed.cmake
+#   cmake -DOUTPUT=page_assets.cpp -DPAGE=redag_lab/report/page -DECHARTS=third_party/echarts -P embed.cmake
 cmake_minimum_required(VERSION 3.22)
 
 # Raw strings, in pieces that every compiler takes; none of the files contains the delimiter.
@@ -23,8 +23,8 @@ function(add_text name)
   file(APPEND ${OUTPUT}.new "const std::string_view ${name} =\n${pieces};\n")
 endfunction()
 
-file(WRITE ${OUTPUT}.new "// Made by cmake/embed.cmake out of redag/report/page and third_party/echarts.
-#include \"redag/report/page_assets.hpp\"
+file(WRITE ${OUTPUT}.new "// Made by cmake/embed.cmake out of redag_lab/report/page and third_party/echarts.
+#include \"redag_lab/report/page_assets.hpp\"
 
 #pragma GCC diagnostic ignored \"-Woverlength-strings\"
 namespace redag::report::assets {

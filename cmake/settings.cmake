@@ -1,5 +1,5 @@
 # What every target of this project is built with. Included by whichever CMakeLists.txt is the top one: the
-# repository's, or redag/'s own when a ROS workspace builds that folder as a package.
+# repository's, or that of redag/, redag_analysis/ or redag_lab/ when one of these is built alone.
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
@@ -27,6 +27,7 @@ cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH repository)
 add_compile_options(-fmacro-prefix-map=${repository}/=)
 
 include(GNUInstallDirs)
+include(${CMAKE_CURRENT_LIST_DIR}/package.cmake)
 include(${CMAKE_CURRENT_LIST_DIR}/warnings.cmake)
 include(${CMAKE_CURRENT_LIST_DIR}/sanitizers.cmake)
 include(${CMAKE_CURRENT_LIST_DIR}/hardening.cmake)

@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "redag/model/workload_yaml.hpp"
-#include "redag/runtime/run_workload.hpp"
+#include "redag_lab/run/run_workload.hpp"
 
 using namespace redag;
 

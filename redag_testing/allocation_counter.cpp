@@ -1,4 +1,4 @@
-#include "redag/testing/allocation_counter.hpp"
+#include "redag_testing/allocation_counter.hpp"
 
 #include <cstdlib>
 #include <new>

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "redag/testing/bound_property.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::testing {
 namespace {

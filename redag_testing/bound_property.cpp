@@ -1,4 +1,4 @@
-#include "redag/testing/bound_property.hpp"
+#include "redag_testing/bound_property.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,9 +11,9 @@
 
 #include <fmt/format.h>
 
-#include "redag/analysis/executors.hpp"
-#include "redag/metrics/deadline_watch.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/analyze/executors.hpp"
+#include "redag_analysis/metrics/deadline_watch.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 
 namespace redag::testing {
 namespace {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "redag/analysis/bound.hpp"
 #include "redag/base/rng.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::testing {
 

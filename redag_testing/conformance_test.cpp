@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 
 #include "redag/base/rng.hpp"
-#include "redag/metrics/trace_checker.hpp"
-#include "redag/model/generate.hpp"
-#include "redag/runtime/mode.hpp"
+#include "redag/runtime/setup.hpp"
 #include "redag/sched/policy.hpp"
-#include "redag/testing/drivers.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_lab/workload/generate.hpp"
+#include "redag_testing/drivers.hpp"
 
 namespace redag::testing {
 namespace {

@@ -14,8 +14,8 @@
 #include "redag/base/rng.hpp"
 #include "redag/sched/degradation.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/testing/reference_scheduler.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/reference_scheduler.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::testing {
 namespace {

@@ -11,9 +11,9 @@
 
 #include "redag/sched/policy.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/testing/random_workloads.hpp"
-#include "redag/testing/reference_scheduler.hpp"
-#include "redag/testing/schedule_script.hpp"
+#include "redag_testing/random_workloads.hpp"
+#include "redag_testing/reference_scheduler.hpp"
+#include "redag_testing/schedule_script.hpp"
 
 namespace redag::testing {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/testing/drivers.hpp"
+#include "redag_testing/drivers.hpp"
 
 #include <algorithm>
 #include <memory>
@@ -8,9 +8,9 @@
 #include "redag/base/check.hpp"
 #include "redag/base/rng.hpp"
 #include "redag/model/demand.hpp"
-#include "redag/runtime/run_workload.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_lab/run/run_workload.hpp"
 
 namespace redag::testing {
 namespace {

@@ -11,7 +11,7 @@ namespace redag::testing {
 
 struct RunSpec {
   Workload workload;
-  std::string executor = "redag";  // as in redag/sched/executors.hpp
+  std::string executor = "redag";  // as in redag_analysis/executors/executors.hpp
   sched::Preemption preemption = sched::Preemption::None;
   Duration horizon = kSecond;
   std::uint64_t seed = 1;

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "redag/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
 
 namespace redag::testing {
 

@@ -1,10 +1,10 @@
 // The search: which of the fibers goes on, and what other orders are to be tried.
-#include "redag/testing/explorer.hpp"
+#include "redag_testing/explorer.hpp"
 
 #include <cstdlib>
 #include <utility>
 
-#include "redag/testing/explorer_parts.hpp"
+#include "redag_testing/explorer_parts.hpp"
 
 namespace redag::testing {
 namespace exploring {

@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <utility>
 
-#include "redag/testing/explorer_parts.hpp"
+#include "redag_testing/explorer_parts.hpp"
 
 namespace redag::testing::exploring {
 namespace {

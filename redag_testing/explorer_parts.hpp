@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/testing/explorer.hpp"
+#include "redag_testing/explorer.hpp"
 
 namespace redag::testing::exploring {
 

@@ -1,4 +1,4 @@
-#include "redag/testing/kernel_judge.hpp"
+#include "redag_testing/kernel_judge.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -14,8 +14,8 @@
 #include <string>
 #include <vector>
 
-#include "redag/testing/recording_scheduler.hpp"
-#include "redag/testing/switch_record.hpp"
+#include "redag_testing/recording_scheduler.hpp"
+#include "redag_testing/switch_record.hpp"
 
 namespace redag::testing {
 

@@ -1,5 +1,5 @@
 // The judge itself, by records written by hand: one processor or two, and a beat of each at every millisecond.
-#include "redag/testing/kernel_judge.hpp"
+#include "redag_testing/kernel_judge.hpp"
 
 #include <gtest/gtest.h>
 

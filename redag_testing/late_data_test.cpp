@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/testing/reference_scheduler.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/reference_scheduler.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::testing {
 namespace {

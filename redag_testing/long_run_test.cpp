@@ -11,13 +11,13 @@
 
 #include <fmt/format.h>
 
-#include "redag/analysis/analyze.hpp"
 #include "redag/base/rng.hpp"
-#include "redag/metrics/deadline_watch.hpp"
-#include "redag/model/generate.hpp"
-#include "redag/sched/executors.hpp"
-#include "redag/sim/simulator.hpp"
-#include "redag/testing/allocation_counter.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_analysis/metrics/deadline_watch.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_lab/workload/generate.hpp"
+#include "redag_testing/allocation_counter.hpp"
 
 namespace redag::testing {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/testing/manual_workers.hpp"
+#include "redag_testing/manual_workers.hpp"
 
 #include <algorithm>
 #include <set>

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "redag/sched/executors.hpp"
+#include "redag_analysis/executors/executors.hpp"
 
 namespace redag::testing {
 

@@ -7,16 +7,16 @@
 
 #include <gtest/gtest.h>
 
-#include "redag/analysis/amc.hpp"
-#include "redag/analysis/analyze.hpp"
 #include "redag/base/rng.hpp"
-#include "redag/metrics/jobs.hpp"
-#include "redag/metrics/miss.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/sim/simulator.hpp"
-#include "redag/testing/bound_property.hpp"
-#include "redag/testing/drivers.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/miss.hpp"
+#include "redag_analysis/one_worker/amc.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_testing/bound_property.hpp"
+#include "redag_testing/drivers.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::testing {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/testing/random_workloads.hpp"
+#include "redag_testing/random_workloads.hpp"
 
 #include <set>
 

@@ -1,4 +1,4 @@
-#include "redag/testing/recording_scheduler.hpp"
+#include "redag_testing/recording_scheduler.hpp"
 
 #include <sys/syscall.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-#include "redag/testing/reference_scheduler.hpp"
+#include "redag_testing/reference_scheduler.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "redag/testing/schedule_script.hpp"
+#include "redag_testing/schedule_script.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "redag/sched/policy.hpp"
-#include "redag/testing/random_workloads.hpp"
+#include "redag_testing/random_workloads.hpp"
 
 namespace redag::testing {
 namespace {

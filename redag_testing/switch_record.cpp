@@ -1,4 +1,4 @@
-#include "redag/testing/switch_record.hpp"
+#include "redag_testing/switch_record.hpp"
 
 #include <linux/perf_event.h>
 #include <sys/ioctl.h>

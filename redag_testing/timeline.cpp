@@ -1,4 +1,4 @@
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/timeline.hpp"
 
 #include <map>
 #include <utility>

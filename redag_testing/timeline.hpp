@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "redag/sched/scheduler.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 
 namespace redag::testing {
 

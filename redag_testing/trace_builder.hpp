@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "redag/base/check.hpp"
-#include "redag/sim/simulator.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 
 namespace redag::testing {
 

@@ -1,10 +1,10 @@
 // What workloads/contention.yaml says about itself.
 #include <gtest/gtest.h>
 
-#include "redag/metrics/summary.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/metrics/summary.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 
 namespace redag {
 namespace {

@@ -1,5 +1,5 @@
 // What the kernel really ran, in `os` mode: random workloads on real threads, each judged by the kernel's own record of
-// its context switches (redag/testing/kernel_judge.hpp). Levels come from the reference scheduler without a limit on
+// its context switches (redag_testing/kernel_judge.hpp). Levels come from the reference scheduler without a limit on
 // threads, so that neither the scheduler, nor the engine, nor its pool is asked whether it was right.
 //
 // Needs SCHED_FIFO and the right to perf_event_open; skipped, with the reason, where one is missing.
@@ -23,16 +23,16 @@
 #include <gtest/gtest.h>
 
 #include "redag/base/rng.hpp"
-#include "redag/model/concurrency.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/preemption_point.hpp"
-#include "redag/runtime/run_workload.hpp"
-#include "redag/runtime/synthetic.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/testing/kernel_judge.hpp"
-#include "redag/testing/reference_scheduler.hpp"
+#include "redag_lab/run/concurrency.hpp"
+#include "redag_lab/run/run_workload.hpp"
+#include "redag_lab/run/synthetic.hpp"
+#include "redag_testing/kernel_judge.hpp"
+#include "redag_testing/reference_scheduler.hpp"
 
 namespace redag::testing {
 namespace {

@@ -29,7 +29,7 @@ ROS_KEYS = {"ament_cmake", "diagnostic_msgs", "launch_ros", "rclcpp", "rclcpp_ac
 # What find_package() looks for, by the key that brings it.
 CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "yaml-cpp": "yaml-cpp", "tl-expected": "libexpected-dev",
                   "CLI11": "cli11", "TBB": "tbb", "GTest": "libgtest-dev"}
-PACKAGES = ("redag", "redag_rclcpp")
+PACKAGES = ("redag", "redag_analysis", "redag_lab", "redag_rclcpp")
 
 
 def keys_of(package):
@@ -60,9 +60,10 @@ class Rosdep(unittest.TestCase):
                 self.assertIn(CMAKE_PACKAGES.get(name, name), keys, f"find_package({name})")
 
     def test_redag_needs_no_test_library(self):
-        """colcon builds the library and the program; their tests belong to the repository's own build."""
-        self.assertFalse({"librapidcheck-dev", "rapidcheck"} & keys_of("redag"))
-        self.assertNotIn("BUILD_TESTING", (SOURCE / "redag/CMakeLists.txt").read_text())
+        """colcon builds the libraries and the program; their tests belong to the repository's own build."""
+        for package in ("redag", "redag_analysis", "redag_lab"):
+            self.assertFalse({"librapidcheck-dev", "rapidcheck"} & keys_of(package))
+            self.assertNotIn("BUILD_TESTING", (SOURCE / package / "CMakeLists.txt").read_text())
 
 
 if __name__ == "__main__":

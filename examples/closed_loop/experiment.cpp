@@ -5,11 +5,11 @@
 #include <utility>
 
 #include "loop.hpp"
-#include "redag/metrics/jobs.hpp"
-#include "redag/metrics/miss.hpp"
-#include "redag/runtime/run_workload.hpp"
-#include "redag/sched/executors.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/miss.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_lab/run/run_workload.hpp"
 
 namespace closed_loop {
 namespace {

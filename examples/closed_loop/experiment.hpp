@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "plants.hpp"
-#include "redag/metrics/summary.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_analysis/metrics/summary.hpp"
 
 namespace closed_loop {
 
@@ -16,7 +16,7 @@ namespace closed_loop {
 
 struct ExecutorChoice {
   std::string name;      // as it is written on the command line
-  std::string executor;  // of redag/sched/executors.hpp
+  std::string executor;  // of redag_analysis/executors/executors.hpp
   redag::PreemptionMode preemption = redag::PreemptionMode::Auto;
   bool alone = false;             // the feedback without anything else: what no executor can beat
   bool realtime_threads = false;  // on threads: SCHED_FIFO, as those of redag with preemption os

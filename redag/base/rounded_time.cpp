@@ -19,10 +19,15 @@ std::string humanize_down(Duration duration) {
   return down < 0 ? "-" + humanize_duration(-down) : humanize_duration(down);
 }
 
+Duration round_up(Duration duration) {
+  const Duration step = step_of(duration);
+  const Duration rest = duration % step;
+  return rest > 0 ? duration + (step - rest) : duration - rest;
+}
+
 std::string humanize_up(Duration duration) {
   if (duration < 0) return "-" + humanize_down(-duration);
-  const Duration step = step_of(duration);
-  return humanize_duration(duration + (duration % step != 0 ? step - duration % step : 0));
+  return humanize_duration(round_up(duration));
 }
 
 }  // namespace redag

@@ -7,6 +7,9 @@
 
 namespace redag {
 
+/// The least duration of four significant digits that is not below this one.
+[[nodiscard]] Duration round_up(Duration duration);
+
 /// As humanize_duration(), never more than the duration: room that is left, a largest execution time.
 [[nodiscard]] std::string humanize_down(Duration duration);
 

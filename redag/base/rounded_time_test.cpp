@@ -16,6 +16,8 @@ TEST(RoundedTime, GoesToTheSideAsked) {
   EXPECT_EQ(humanize_down(9'999'999), "9.999ms");
   EXPECT_EQ(humanize_down(1), "1ns");
   EXPECT_EQ(humanize_up(0), "0s");
+  EXPECT_EQ(round_up(60'001), 60'010);
+  EXPECT_EQ(round_up(9'999), 9'999);
 }
 
 TEST(RoundedTime, OfLessThanNothing) {

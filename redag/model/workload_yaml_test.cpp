@@ -12,8 +12,8 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
-#include "redag/model/generate.hpp"
 #include "redag/model/validate.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 namespace redag {
 namespace {

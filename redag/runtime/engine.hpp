@@ -24,10 +24,11 @@
 #include "redag/base/result.hpp"
 #include "redag/base/thread_annotations.hpp"
 #include "redag/runtime/event_merge.hpp"
-#include "redag/runtime/mode.hpp"
+#include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/realtime_share.hpp"
 #include "redag/runtime/running_job.hpp"
+#include "redag/runtime/setup.hpp"
 #include "redag/runtime/thread_priorities.hpp"
 #include "redag/sched/scheduler.hpp"
 #include "redag/trace/ring.hpp"
@@ -78,22 +79,6 @@ struct EngineOptions {
   // none, cooperative: how often a thread without a job looks for one before it sleeps; looks_in().
   std::uint32_t looks = 0;
   std::size_t touched_stack = 0;  // of each worker thread; ThreadSetup
-};
-
-/// Processor time of a task's jobs that ended.
-struct Usage {
-  std::uint64_t jobs = 0;
-  Duration total = 0;
-  Duration longest = 0;
-  std::uint64_t over_wcet = 0;
-  std::uint64_t over_budget = 0;
-  std::uint64_t overdue = 0;  // that watch() named
-};
-
-/// How long a job may be in progress before watch() names it: the shorter of those that are given.
-struct WatchLimits {
-  Duration longest = 0;  // 0: not given
-  double deadlines = 0;  // so many of its own relative deadline; 0: not given
 };
 
 /// A job that has not ended although it should have.

@@ -11,7 +11,7 @@
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/testing/allocation_counter.hpp"
+#include "redag_testing/allocation_counter.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -4,18 +4,28 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <stdexcept>
+#include <map>
+#include <optional>
 #include <type_traits>
 #include <utility>
 
+#include "redag/base/atomic.hpp"
 #include "redag/base/lock_guard.hpp"
+#include "redag/base/mutex.hpp"
+#include "redag/base/pi_mutex.hpp"
 #include "redag/base/text.hpp"
+#include "redag/base/thread_annotations.hpp"
+#include "redag/live/publisher.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/dag_mistakes.hpp"
+#include "redag/runtime/engine.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/looks.hpp"
+#include "redag/runtime/release_timer.hpp"
+#include "redag/runtime/setup.hpp"
 #include "redag/runtime/threads.hpp"
+#include "redag/runtime/watchdog.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
 namespace redag::runtime {
@@ -64,7 +74,71 @@ void check(const ExecutorOptions &options) {
 
 }  // namespace
 
-Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
+class Executor::Impl {
+ public:
+  explicit Impl(ExecutorOptions options);
+  ~Impl();
+  Impl(const Impl &) = delete;
+  Impl &operator=(const Impl &) = delete;
+
+  DagId add(Dag dag, std::vector<DagBuilder::Function> functions);
+  void remove(DagId dag);
+  void run_for(nanoseconds duration);
+  void start();
+  void wait();
+  void stop();
+  void request_stop() noexcept;
+  void drain(std::vector<JobEvent> &events);
+  [[nodiscard]] std::vector<TaskStats> stats(DagId dag) const;
+  [[nodiscard]] std::string task_name(TaskId task) const;
+  [[nodiscard]] const Setup &setup() const { return setup_; }
+  [[nodiscard]] const Engine &engine() const { return *engine_; }
+
+ private:
+  struct Added {
+    std::string name;
+    std::vector<Task> tasks;
+    std::uint32_t max_active = 0;
+    AddedDag ids;          // the engine's
+    std::size_t left = 0;  // of the tasks' ids, those that no later task has
+    bool removed = false;
+    Dag dag;  // for `admission` only
+  };
+  struct Owner {
+    DagId dag;  // ours
+    std::uint32_t position = 0;
+    Time since = 0;  // jobs that were released earlier are another task's, which had the id
+  };
+  void finish();
+  void admit(const Dag &dag) const REDAG_REQUIRES(lock_);
+  void on_overdue(const OverdueJob &job);
+  [[nodiscard]] Result<void> start_threads();
+  [[nodiscard]] Result<void> start_watchdog();
+  void sample(live::Sample &sample) const;
+  void on_exception(const Job &job, std::exception_ptr exception);
+  void own(DagId dag, const std::vector<TaskId> &tasks, Time since) REDAG_REQUIRES(lock_);
+  [[nodiscard]] std::string name_of(const Owner &owner) const REDAG_REQUIRES(lock_);
+
+  ExecutorOptions options_;
+  Setup setup_;
+  std::unique_ptr<Engine> engine_;
+  std::unique_ptr<ReleaseTimer> timer_;
+  std::unique_ptr<Watchdog> watchdog_;  // from start() until no body is left
+  mutable PiMutex lock_;
+  // Without a trace the engine uses ids again, so that memory does not grow with the DAGs there have been.
+  std::map<std::uint32_t, Added> dags_ REDAG_GUARDED_BY(lock_);  // by DagId
+  std::uint32_t next_dag_ REDAG_GUARDED_BY(lock_) = 0;
+  std::vector<Owner> owners_ REDAG_GUARDED_BY(lock_);   // by TaskId
+  std::exception_ptr failure_ REDAG_GUARDED_BY(lock_);  // the first that stopped us
+  bool running_ REDAG_GUARDED_BY(lock_) = false;
+  Mutex finishing_;  // one thread at a time begins or ends the run
+  Atomic<bool> started_{false};
+  Atomic<bool> finished_{false};
+  Event stop_;
+  std::unique_ptr<live::Publisher> live_;  // last: it asks for figures until it is gone
+};
+
+Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   check(options_);
   Result<Setup> setup = set_up(options_.preemption, options_.policy, options_.workers, options_.threads, options_.cpus);
   if (!setup) throw std::runtime_error(to_string(setup.error()));
@@ -102,7 +176,7 @@ Executor::Executor(ExecutorOptions options) : options_(std::move(options)) {
   }
 }
 
-Executor::~Executor() {
+Executor::Impl::~Impl() {
   request_stop();
   timer_->join();
   // As long as a body runs, it is watched.
@@ -111,15 +185,14 @@ Executor::~Executor() {
   engine_->join();
 }
 
-DagId Executor::add(DagBuilder builder) {
-  Dag &dag = builder.dag_;
+DagId Executor::Impl::add(Dag dag, std::vector<DagBuilder::Function> functions) {
   inherit_periods(dag);
   if (const std::string mistakes = mistakes_of(dag, options_.policy); !mistakes.empty()) {
     refuse("Executor::add(): " + mistakes);
   }
 
   std::vector<Body> bodies;
-  for (DagBuilder::Function &body : builder.bodies_) {
+  for (DagBuilder::Function &body : functions) {
     bodies.emplace_back([function = std::move(body)](const Job &) {
       function();
       return sched::Outcome::Finished;
@@ -145,7 +218,7 @@ DagId Executor::add(DagBuilder builder) {
 }
 
 // A DAG is forgotten once all its tasks' ids are others'.
-void Executor::own(DagId dag, const std::vector<TaskId> &tasks, Time since) {
+void Executor::Impl::own(DagId dag, const std::vector<TaskId> &tasks, Time since) {
   for (std::uint32_t position = 0; position < tasks.size(); ++position) {
     const std::uint32_t task = tasks[position].value;
     if (task >= owners_.size()) {
@@ -157,7 +230,7 @@ void Executor::own(DagId dag, const std::vector<TaskId> &tasks, Time since) {
   }
 }
 
-void Executor::admit(const Dag &dag) const {
+void Executor::Impl::admit(const Dag &dag) const {
   Workload workload;
   workload.name = options_.name;
   workload.platform = Platform{options_.workers, setup_.mode.mode};
@@ -172,7 +245,7 @@ void Executor::admit(const Dag &dag) const {
   }
 }
 
-void Executor::remove(DagId dag) {
+void Executor::Impl::remove(DagId dag) {
   DagId removed;
   {
     const LockGuard guard(lock_);
@@ -190,12 +263,7 @@ void Executor::remove(DagId dag) {
 
 // ---- the run ----
 
-void Executor::run() {
-  start();
-  wait();
-}
-
-void Executor::run_for(nanoseconds duration) {
+void Executor::Impl::run_for(nanoseconds duration) {
   if (duration.count() < 0) {
     refuse(fmt::format("Executor::run_for(): {} is negative", format_duration(duration.count())));
   }
@@ -205,7 +273,7 @@ void Executor::run_for(nanoseconds duration) {
   wait();
 }
 
-void Executor::start() {
+void Executor::Impl::start() {
   const LockGuard starting(finishing_);  // a stop() meanwhile waits for what it is going to end
   if (started_.exchange(true)) throw std::logic_error("Executor::start(): an Executor runs once");
   if (const Result<void> ready = start_threads(); !ready) {
@@ -220,14 +288,14 @@ void Executor::start() {
 }
 
 // Those that work comes from wait until all others are there: who catches the exception may start again.
-Result<void> Executor::start_threads() {
+Result<void> Executor::Impl::start_threads() {
   const Result<void> timing = timer_->start(ThreadSetup{options_.name + "-timer", setup_.timer_priority(), {}});
   if (!timing) return timing;
   if (const Result<void> watching = start_watchdog(); !watching) return watching;
   return engine_->start();
 }
 
-Result<void> Executor::start_watchdog() {
+Result<void> Executor::Impl::start_watchdog() {
   if (!options_.watchdog || watchdog_) return {};
   auto watchdog =
       std::make_unique<Watchdog>(*engine_, *options_.watchdog, [this](const OverdueJob &job) { on_overdue(job); });
@@ -236,7 +304,7 @@ Result<void> Executor::start_watchdog() {
   return watching;
 }
 
-void Executor::on_overdue(const OverdueJob &job) {
+void Executor::Impl::on_overdue(const OverdueJob &job) {
   OverdueInfo info{{}, job.job.number, job.elapsed, job.used, {}};
   {
     // It may have ended since it was seen, and its id be another task's.
@@ -252,13 +320,13 @@ void Executor::on_overdue(const OverdueJob &job) {
   }
 }
 
-void Executor::request_stop() noexcept {
+void Executor::Impl::request_stop() noexcept {
   engine_->halt();
   timer_->stop();
   stop_.set();
 }
 
-void Executor::wait() {
+void Executor::Impl::wait() {
   if (engine_->in_body()) {
     throw std::logic_error("Executor::wait(): a body cannot wait for the end of its own executor");
   }
@@ -273,12 +341,12 @@ void Executor::wait() {
   if (failure) std::rethrow_exception(failure);
 }
 
-void Executor::stop() {
+void Executor::Impl::stop() {
   request_stop();
   if (started_ && !engine_->in_body()) finish();
 }
 
-void Executor::finish() {
+void Executor::Impl::finish() {
   const LockGuard guard(finishing_);
   if (finished_) return;
   timer_->join();
@@ -294,7 +362,7 @@ void Executor::finish() {
   finished_ = true;
 }
 
-void Executor::on_exception(const Job &job, std::exception_ptr exception) {
+void Executor::Impl::on_exception(const Job &job, std::exception_ptr exception) {
   if (options_.on_exception) {
     const ExceptionInfo info{task_name(job.task), job.number, exception};
     if (options_.on_exception(info) == OnException::Continue) return;
@@ -308,9 +376,9 @@ void Executor::on_exception(const Job &job, std::exception_ptr exception) {
 
 // ---- what can be asked ----
 
-void Executor::drain(std::vector<JobEvent> &events) { engine_->drain(events, finished_); }
+void Executor::Impl::drain(std::vector<JobEvent> &events) { engine_->drain(events, finished_); }
 
-std::vector<TaskStats> Executor::stats(DagId dag) const {
+std::vector<TaskStats> Executor::Impl::stats(DagId dag) const {
   const LockGuard guard(lock_);
   const auto found = dags_.find(dag.value);
   if (found == dags_.end()) throw std::out_of_range(fmt::format("Executor::stats(): there is no DAG {}", dag.value));
@@ -327,18 +395,18 @@ std::vector<TaskStats> Executor::stats(DagId dag) const {
   return result;
 }
 
-std::string Executor::task_name(TaskId task) const {
+std::string Executor::Impl::task_name(TaskId task) const {
   const LockGuard guard(lock_);
   if (task.value >= owners_.size()) return fmt::format("task {}", task.value);
   return name_of(owners_[task.value]);
 }
 
-std::string Executor::name_of(const Owner &owner) const {
+std::string Executor::Impl::name_of(const Owner &owner) const {
   const Added &dag = dags_.at(owner.dag.value);  // which is there as long as it owns a task
   return dag.name + "." + dag.tasks[owner.position].name;
 }
 
-void Executor::sample(live::Sample &sample) const {
+void Executor::Impl::sample(live::Sample &sample) const {
   const LockGuard guard(lock_);
   for (const auto &[number, dag] : dags_) {
     if (dag.removed) continue;
@@ -356,5 +424,31 @@ void Executor::sample(live::Sample &sample) const {
     }
   }
 }
+
+// ---- the interface ----
+
+Executor::Executor(ExecutorOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
+Executor::~Executor() = default;
+DagId Executor::add(DagBuilder dag) { return impl_->add(std::move(dag.dag_), std::move(dag.bodies_)); }
+void Executor::remove(DagId dag) { impl_->remove(dag); }
+void Executor::run() {
+  impl_->start();
+  impl_->wait();
+}
+void Executor::run_for(nanoseconds duration) { impl_->run_for(duration); }
+void Executor::start() { impl_->start(); }
+void Executor::wait() { impl_->wait(); }
+void Executor::stop() { impl_->stop(); }
+void Executor::request_stop() noexcept { impl_->request_stop(); }
+bool Executor::stopping() const noexcept { return impl_->engine().halting(); }
+const Mode &Executor::mode() const { return impl_->setup().mode; }
+const std::vector<std::string> &Executor::warnings() const { return impl_->setup().warnings; }
+const sched::Config &Executor::config() const { return impl_->engine().options().config; }
+void Executor::drain(std::vector<JobEvent> &events) { impl_->drain(events); }
+Time Executor::stopped_at() const { return impl_->engine().halted_at(); }
+std::uint64_t Executor::lost_events() const { return impl_->engine().lost_events(); }
+std::uint64_t Executor::thread_waits() const { return impl_->engine().thread_waits(); }
+std::vector<TaskStats> Executor::stats(DagId dag) const { return impl_->stats(dag); }
+std::string Executor::task_name(TaskId task) const { return impl_->task_name(task); }
 
 }  // namespace redag::runtime

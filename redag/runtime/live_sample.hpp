@@ -4,7 +4,7 @@
 #include "redag/live/publisher.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/runtime/engine.hpp"
-#include "redag/runtime/mode.hpp"
+#include "redag/runtime/setup.hpp"
 
 namespace redag::runtime {
 

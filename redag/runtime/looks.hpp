@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "redag/base/time.hpp"
-#include "redag/runtime/mode.hpp"
+#include "redag/runtime/setup.hpp"
 
 namespace redag::runtime {
 

@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "redag/runtime/mode.hpp"
+#include "redag/runtime/setup.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -13,11 +13,6 @@
 
 namespace redag::runtime {
 
-struct WatchdogOptions {
-  WatchLimits limits;
-  Duration interval = 10 * kMillisecond;  // between two looks
-};
-
 class Watchdog {
  public:
   /// Called on the watchdog's thread, without locks, once for each such job. What is done for long there delays the

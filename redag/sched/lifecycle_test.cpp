@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::sched {
 namespace {

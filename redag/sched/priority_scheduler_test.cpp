@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 
 #include "redag/base/rng.hpp"
-#include "redag/testing/allocation_counter.hpp"
-#include "redag/testing/manual_workers.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/allocation_counter.hpp"
+#include "redag_testing/manual_workers.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::sched {
 namespace {

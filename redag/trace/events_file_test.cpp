@@ -6,8 +6,8 @@
 #include <filesystem>
 
 #include "redag/base/rng.hpp"
-#include "redag/testing/timeline.hpp"
 #include "redag/trace/run_info_json.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::trace {
 namespace {

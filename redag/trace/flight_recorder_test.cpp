@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::trace {
 namespace {

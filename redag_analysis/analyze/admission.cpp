@@ -1,12 +1,12 @@
-#include "redag/analysis/admission.hpp"
+#include "redag_analysis/analyze/admission.hpp"
 
 #include <fmt/format.h>
 
 #include <string>
 #include <vector>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/system.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/core/system.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,9 +1,9 @@
-#include "redag/analysis/admission.hpp"
+#include "redag_analysis/analyze/admission.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/analysis/analyze.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
 
 #include <algorithm>
 #include <utility>

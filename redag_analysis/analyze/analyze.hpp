@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "redag/analysis/bound.hpp"
-#include "redag/analysis/effort.hpp"
+#include "redag_analysis/core/bound.hpp"
+#include "redag_analysis/core/effort.hpp"
 
 namespace redag::analysis {
 

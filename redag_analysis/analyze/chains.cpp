@@ -1,10 +1,10 @@
-#include "redag/analysis/chains.hpp"
+#include "redag_analysis/analyze/chains.hpp"
 
 #include <numeric>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

@@ -1,4 +1,4 @@
-#include "redag/analysis/chains.hpp"
+#include "redag_analysis/analyze/chains.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,11 +6,11 @@
 
 #include <fmt/format.h>
 
-#include "redag/analysis/global_dag.hpp"
-#include "redag/analysis/response_time.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/sim/simulator.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

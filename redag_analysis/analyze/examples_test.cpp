@@ -3,15 +3,15 @@
 
 #include <map>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/edf_demand.hpp"
-#include "redag/analysis/exact_points.hpp"
-#include "redag/analysis/linear_bound.hpp"
-#include "redag/analysis/paper.hpp"
-#include "redag/analysis/response_time.hpp"
-#include "redag/analysis/utilization.hpp"
-#include "redag/testing/bound_property.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/one_worker/edf_demand.hpp"
+#include "redag_analysis/one_worker/exact_points.hpp"
+#include "redag_analysis/one_worker/linear_bound.hpp"
+#include "redag_analysis/one_worker/paper.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
+#include "redag_analysis/one_worker/utilization.hpp"
+#include "redag_testing/bound_property.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::analysis {
 namespace {

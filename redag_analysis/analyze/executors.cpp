@@ -1,10 +1,10 @@
-#include "redag/analysis/executors.hpp"
+#include "redag_analysis/analyze/executors.hpp"
 
-#include "redag/analysis/dag_isolated.hpp"
-#include "redag/analysis/global_dag.hpp"
-#include "redag/analysis/global_sequential.hpp"
-#include "redag/analysis/wait_set.hpp"
-#include "redag/analysis/wait_set_rates.hpp"
+#include "redag_analysis/many_workers/dag_isolated.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
+#include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/peers/wait_set.hpp"
+#include "redag_analysis/peers/wait_set_rates.hpp"
 
 namespace redag::analysis {
 

@@ -2,8 +2,8 @@
 // `redag analyze`, reports and runs ask. Pure functions.
 #pragma once
 
-#include "redag/analysis/bound.hpp"
-#include "redag/sched/executors.hpp"
+#include "redag_analysis/core/bound.hpp"
+#include "redag_analysis/executors/executors.hpp"
 
 namespace redag::analysis {
 

@@ -1,15 +1,15 @@
-#include "redag/analysis/executors.hpp"
+#include "redag_analysis/analyze/executors.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/dag_isolated.hpp"
-#include "redag/analysis/global_dag.hpp"
-#include "redag/analysis/global_sequential.hpp"
-#include "redag/testing/bound_property.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/many_workers/dag_isolated.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
+#include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_testing/bound_property.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::analysis {
 namespace {

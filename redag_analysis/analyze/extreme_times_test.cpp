@@ -6,15 +6,15 @@
 #include <array>
 #include <cmath>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/assignment.hpp"
-#include "redag/analysis/chains.hpp"
-#include "redag/analysis/executors.hpp"
-#include "redag/analysis/exploration.hpp"
-#include "redag/analysis/sensitivity.hpp"
 #include "redag/model/validate.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/analyze/chains.hpp"
+#include "redag_analysis/analyze/executors.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/explore/exploration.hpp"
+#include "redag_lab/search/assignment.hpp"
+#include "redag_lab/search/sensitivity.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

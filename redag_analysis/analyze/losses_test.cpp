@@ -3,13 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/dag_shapes.hpp"
-#include "redag/analysis/global_dag.hpp"
-#include "redag/analysis/global_groups.hpp"
-#include "redag/analysis/global_sequential.hpp"
-#include "redag/analysis/response_time.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/many_workers/dag_shapes.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
+#include "redag_analysis/many_workers/global_groups.hpp"
+#include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

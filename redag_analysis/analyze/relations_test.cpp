@@ -5,14 +5,14 @@
 
 #include <fmt/format.h>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/exact_points.hpp"
-#include "redag/analysis/linear_bound.hpp"
-#include "redag/analysis/response_time.hpp"
-#include "redag/analysis/utilization.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/sim/simulator.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/one_worker/exact_points.hpp"
+#include "redag_analysis/one_worker/linear_bound.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
+#include "redag_analysis/one_worker/utilization.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "redag/analysis/executors.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/analyze/executors.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

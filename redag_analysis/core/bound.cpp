@@ -1,9 +1,9 @@
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 #include <algorithm>
 #include <utility>
 
-#include "redag/analysis/arithmetic.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
 
 namespace redag::analysis {
 

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "redag/analysis/system.hpp"
+#include "redag_analysis/core/system.hpp"
 
 namespace redag::analysis {
 

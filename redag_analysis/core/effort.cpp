@@ -1,4 +1,4 @@
-#include "redag/analysis/effort.hpp"
+#include "redag_analysis/core/effort.hpp"
 
 #include <fmt/format.h>
 

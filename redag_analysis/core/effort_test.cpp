@@ -1,15 +1,15 @@
-#include "redag/analysis/effort.hpp"
+#include "redag_analysis/core/effort.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <map>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/global_sequential.hpp"
-#include "redag/analysis/response_time.hpp"
-#include "redag/analysis/utilization.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
+#include "redag_analysis/one_worker/utilization.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/analysis/exact_utilization.hpp"
+#include "redag_analysis/core/exact_utilization.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
-#include "redag/analysis/rate_edges.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
 
 #include <algorithm>
 #include <vector>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/jobs_in_progress.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/jobs_in_progress.hpp"
 
 namespace redag::analysis {
 namespace {

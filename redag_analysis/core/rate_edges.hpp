@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

@@ -1,4 +1,4 @@
-#include "redag/analysis/rate_edges.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,14 +6,14 @@
 #include <algorithm>
 #include <string_view>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/global_dag.hpp"
-#include "redag/analysis/global_groups.hpp"
-#include "redag/analysis/global_sequential.hpp"
-#include "redag/analysis/response_time.hpp"
 #include "redag/model/workload_yaml.hpp"
-#include "redag/testing/bound_property.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
+#include "redag_analysis/many_workers/global_groups.hpp"
+#include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
+#include "redag_testing/bound_property.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,13 +1,13 @@
-#include "redag/analysis/system.hpp"
+#include "redag_analysis/core/system.hpp"
 
 #include <algorithm>
 #include <map>
 #include <numeric>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/jobs_in_progress.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/sched/policy.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/jobs_in_progress.hpp"
 
 namespace redag::analysis {
 namespace {

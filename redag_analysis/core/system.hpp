@@ -12,7 +12,7 @@
 #include "redag/base/result.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/sched/scheduler.hpp"
+#include "redag/sched/config.hpp"
 
 namespace redag::analysis {
 

@@ -1,13 +1,13 @@
-#include "redag/analysis/system.hpp"
+#include "redag_analysis/core/system.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/edf_demand.hpp"
-#include "redag/analysis/response_time.hpp"
-#include "redag/analysis/utilization.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/one_worker/edf_demand.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
+#include "redag_analysis/one_worker/utilization.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/sched/models/callback_threads.hpp"
+#include "redag_analysis/executors/callback_threads.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "redag/sched/models/events.hpp"
+#include "redag_analysis/executors/events.hpp"
 
 #include <algorithm>
 #include <utility>

@@ -7,8 +7,8 @@
 #include <deque>
 #include <vector>
 
-#include "redag/sched/models/callback_threads.hpp"
-#include "redag/sched/models/ready_jobs.hpp"
+#include "redag_analysis/executors/callback_threads.hpp"
+#include "redag_analysis/executors/ready_jobs.hpp"
 
 namespace redag::sched {
 

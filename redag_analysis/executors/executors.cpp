@@ -1,12 +1,12 @@
-#include "redag/sched/executors.hpp"
+#include "redag_analysis/executors/executors.hpp"
 
 #include <algorithm>
 #include <array>
 
 #include "redag/base/check.hpp"
-#include "redag/sched/models/events.hpp"
-#include "redag/sched/models/wait_set.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_analysis/executors/events.hpp"
+#include "redag_analysis/executors/wait_set.hpp"
 
 namespace redag::sched {
 namespace {

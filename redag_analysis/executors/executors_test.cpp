@@ -1,4 +1,4 @@
-#include "redag/sched/executors.hpp"
+#include "redag_analysis/executors/executors.hpp"
 
 #include <gtest/gtest.h>
 

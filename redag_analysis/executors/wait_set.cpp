@@ -1,4 +1,4 @@
-#include "redag/sched/models/wait_set.hpp"
+#include "redag_analysis/executors/wait_set.hpp"
 
 namespace redag::sched {
 

@@ -1,4 +1,4 @@
-#include "redag/sched/models/wait_set.hpp"
+#include "redag_analysis/executors/wait_set.hpp"
 
 #include <algorithm>
 #include <map>
@@ -10,9 +10,9 @@
 #include <rapidcheck/gtest.h>
 
 #include "redag/base/rng.hpp"
-#include "redag/sched/executors.hpp"
-#include "redag/testing/named_executor.hpp"
-#include "redag/testing/random_workloads.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_testing/named_executor.hpp"
+#include "redag_testing/random_workloads.hpp"
 
 namespace redag::sched {
 namespace {

@@ -1,10 +1,10 @@
-#include "redag/analysis/exploration.hpp"
+#include "redag_analysis/explore/exploration.hpp"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include "redag/analysis/exploration_model.hpp"
+#include "redag_analysis/explore/exploration_model.hpp"
 
 namespace redag::analysis {
 namespace {

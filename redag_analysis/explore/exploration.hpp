@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

@@ -1,10 +1,10 @@
-#include "redag/analysis/exploration_model.hpp"
+#include "redag_analysis/explore/exploration_model.hpp"
 
 #include <algorithm>
 #include <numeric>
 
-#include "redag/analysis/arithmetic.hpp"
 #include "redag/base/rng.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
 
 namespace redag::analysis {
 namespace {

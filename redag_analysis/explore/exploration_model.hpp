@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "redag/analysis/system.hpp"
+#include "redag_analysis/core/system.hpp"
 
 namespace redag::analysis {
 

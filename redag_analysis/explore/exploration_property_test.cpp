@@ -1,6 +1,6 @@
 // The exploration against the scheduler that runs for real: on tiny systems with every release jitter and execution
 // time there is, on larger ones with random ones, and against the bounds, which hold for more than it does.
-#include "redag/analysis/exploration.hpp"
+#include "redag_analysis/explore/exploration.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,11 +10,11 @@
 
 #include <fmt/format.h>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/response_time.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/sim/simulator.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

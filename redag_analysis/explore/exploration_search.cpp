@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <limits>
 
-#include "redag/analysis/exploration.hpp"
-#include "redag/analysis/exploration_model.hpp"
-#include "redag/analysis/exploration_states.hpp"
 #include "redag/base/check.hpp"
+#include "redag_analysis/explore/exploration.hpp"
+#include "redag_analysis/explore/exploration_model.hpp"
+#include "redag_analysis/explore/exploration_states.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/analysis/exploration_states.hpp"
+#include "redag_analysis/explore/exploration_states.hpp"
 
 #include <gtest/gtest.h>
 

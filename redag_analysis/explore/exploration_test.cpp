@@ -1,12 +1,12 @@
 // The exploration on systems small enough for a pencil; exploration_property_test.cpp holds it to the scheduler.
-#include "redag/analysis/exploration.hpp"
+#include "redag_analysis/explore/exploration.hpp"
 
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

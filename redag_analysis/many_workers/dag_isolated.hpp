@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

@@ -1,10 +1,10 @@
-#include "redag/analysis/dag_isolated.hpp"
+#include "redag_analysis/many_workers/dag_isolated.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "redag/testing/bound_property.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,14 +1,14 @@
-#include "redag/analysis/dag_shapes.hpp"
+#include "redag_analysis/many_workers/dag_shapes.hpp"
 
 #include <algorithm>
 #include <map>
 #include <span>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/dag_isolated.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/fixed_point.hpp"
-#include "redag/analysis/rate_edges.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
+#include "redag_analysis/many_workers/dag_isolated.hpp"
+#include "redag_analysis/many_workers/fixed_point.hpp"
 
 namespace redag::analysis {
 namespace global {

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "redag/analysis/bound.hpp"
-#include "redag/analysis/global.hpp"
+#include "redag_analysis/core/bound.hpp"
+#include "redag_analysis/many_workers/global.hpp"
 
 namespace redag::analysis {
 

@@ -1,13 +1,13 @@
-#include "redag/analysis/dag_shapes.hpp"
+#include "redag_analysis/many_workers/dag_shapes.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <map>
 
-#include "redag/analysis/dag_isolated.hpp"
-#include "redag/analysis/global_dag.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/many_workers/dag_isolated.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,14 +1,14 @@
-#include "redag/analysis/global.hpp"
+#include "redag_analysis/many_workers/global.hpp"
 
 #include <algorithm>
 #include <map>
 #include <numeric>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/jobs_in_progress.hpp"
-#include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/jobs_in_progress.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
 
 namespace redag::analysis::global {
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis::global {
 

@@ -1,11 +1,11 @@
-#include "redag/analysis/global_dag.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
 
 #include <utility>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/fixed_point.hpp"
-#include "redag/analysis/rate_edges.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
+#include "redag_analysis/many_workers/fixed_point.hpp"
 
 namespace redag::analysis {
 namespace global {

@@ -1,11 +1,11 @@
-#include "redag/analysis/global_dag.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "redag/analysis/response_time.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

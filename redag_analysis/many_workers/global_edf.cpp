@@ -1,13 +1,13 @@
-#include "redag/analysis/global_edf.hpp"
+#include "redag_analysis/many_workers/global_edf.hpp"
 
 #include <algorithm>
 #include <cstdio>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/fixed_point.hpp"
-#include "redag/analysis/global_sequential.hpp"
-#include "redag/analysis/waiting_window.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/many_workers/fixed_point.hpp"
+#include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/many_workers/waiting_window.hpp"
 
 namespace redag::analysis {
 namespace {

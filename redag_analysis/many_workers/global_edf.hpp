@@ -1,7 +1,7 @@
 // Independent tasks under global EDF on m workers. Pure functions.
 #pragma once
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

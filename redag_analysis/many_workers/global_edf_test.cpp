@@ -1,12 +1,12 @@
-#include "redag/analysis/global_edf.hpp"
+#include "redag_analysis/many_workers/global_edf.hpp"
 
 #include <gtest/gtest.h>
 
 #include <initializer_list>
 
-#include "redag/analysis/edf_demand.hpp"
-#include "redag/analysis/global_sequential.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/one_worker/edf_demand.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,14 +1,14 @@
-#include "redag/analysis/global_groups.hpp"
+#include "redag_analysis/many_workers/global_groups.hpp"
 
 #include <algorithm>
 #include <vector>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/global.hpp"
-#include "redag/analysis/group_windows.hpp"
-#include "redag/analysis/jobs_in_progress.hpp"
-#include "redag/analysis/rate_edges.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/jobs_in_progress.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
+#include "redag_analysis/many_workers/global.hpp"
+#include "redag_analysis/many_workers/group_windows.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -8,7 +8,7 @@
 // in one window). Proof: docs/analysis.md, "Exclusive groups".
 #pragma once
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

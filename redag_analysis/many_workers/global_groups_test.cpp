@@ -1,8 +1,8 @@
-#include "redag/analysis/global_groups.hpp"
+#include "redag_analysis/many_workers/global_groups.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/testing/bound_property.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,12 +1,12 @@
-#include "redag/analysis/global_sequential.hpp"
+#include "redag_analysis/many_workers/global_sequential.hpp"
 
 #include <algorithm>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/fixed_point.hpp"
-#include "redag/analysis/rate_edges.hpp"
-#include "redag/analysis/waiting_window.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
+#include "redag_analysis/many_workers/fixed_point.hpp"
+#include "redag_analysis/many_workers/waiting_window.hpp"
 
 namespace redag::analysis {
 namespace global {

@@ -4,8 +4,8 @@
 
 #include <span>
 
-#include "redag/analysis/bound.hpp"
-#include "redag/analysis/global.hpp"
+#include "redag_analysis/core/bound.hpp"
+#include "redag_analysis/many_workers/global.hpp"
 
 namespace redag::analysis {
 

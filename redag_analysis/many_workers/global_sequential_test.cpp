@@ -1,4 +1,4 @@
-#include "redag/analysis/global_sequential.hpp"
+#include "redag_analysis/many_workers/global_sequential.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <utility>
 #include <variant>
 
-#include "redag/testing/bound_property.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

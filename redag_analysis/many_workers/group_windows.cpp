@@ -1,12 +1,12 @@
-#include "redag/analysis/group_windows.hpp"
+#include "redag_analysis/many_workers/group_windows.hpp"
 
 #include <algorithm>
 #include <functional>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/fixed_point.hpp"
 #include "redag/sched/policy.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/many_workers/fixed_point.hpp"
 
 namespace redag::analysis::groups {
 namespace {

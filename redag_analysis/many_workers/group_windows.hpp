@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "redag/analysis/global.hpp"
-#include "redag/analysis/system.hpp"
+#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/many_workers/global.hpp"
 
 namespace redag::analysis::groups {
 

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <span>
 
-#include "redag/analysis/global.hpp"
+#include "redag_analysis/many_workers/global.hpp"
 
 namespace redag::analysis::global {
 

@@ -1,4 +1,4 @@
-#include "redag/analysis/waiting_window.hpp"
+#include "redag_analysis/many_workers/waiting_window.hpp"
 
 #include <gtest/gtest.h>
 

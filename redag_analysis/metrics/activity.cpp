@@ -1,4 +1,4 @@
-#include "redag/metrics/activity.hpp"
+#include "redag_analysis/metrics/activity.hpp"
 
 #include <algorithm>
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "redag/metrics/replay.hpp"
+#include "redag_analysis/metrics/replay.hpp"
 
 namespace redag::metrics {
 

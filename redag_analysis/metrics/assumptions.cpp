@@ -1,4 +1,4 @@
-#include "redag/metrics/assumptions.hpp"
+#include "redag_analysis/metrics/assumptions.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "redag/metrics/jobs.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
 
 namespace redag::metrics {
 

@@ -1,9 +1,9 @@
-#include "redag/metrics/assumptions.hpp"
+#include "redag_analysis/metrics/assumptions.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/metrics/block_bootstrap.hpp"
+#include "redag_analysis/metrics/block_bootstrap.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "redag/base/rng.hpp"
-#include "redag/metrics/distribution.hpp"
+#include "redag_analysis/metrics/distribution.hpp"
 
 namespace redag::metrics {
 namespace {

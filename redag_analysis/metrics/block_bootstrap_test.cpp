@@ -1,4 +1,4 @@
-#include "redag/metrics/block_bootstrap.hpp"
+#include "redag_analysis/metrics/block_bootstrap.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "redag/metrics/bound_watch.hpp"
+#include "redag_analysis/metrics/bound_watch.hpp"
 
 #include <algorithm>
 

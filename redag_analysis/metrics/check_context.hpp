@@ -4,9 +4,9 @@
 #include <string>
 #include <string_view>
 
-#include "redag/metrics/check_report.hpp"
-#include "redag/metrics/replay.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/check_report.hpp"
+#include "redag_analysis/metrics/replay.hpp"
 
 namespace redag::metrics {
 

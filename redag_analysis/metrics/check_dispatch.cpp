@@ -1,4 +1,4 @@
-#include "redag/metrics/check_dispatch.hpp"
+#include "redag_analysis/metrics/check_dispatch.hpp"
 
 #include <algorithm>
 #include <utility>

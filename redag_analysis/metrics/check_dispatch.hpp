@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/metrics/check_context.hpp"
+#include "redag_analysis/metrics/check_context.hpp"
 
 namespace redag::metrics {
 

@@ -1,11 +1,11 @@
 // Preemption and inheritance: traces that keep their rules and, for each rule, one that breaks it, written by hand.
-#include "redag/metrics/check_dispatch.hpp"
+#include "redag_analysis/metrics/check_dispatch.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/testing/expect_trace.hpp"
-#include "redag/testing/timeline.hpp"
-#include "redag/testing/trace_builder.hpp"
+#include "redag_testing/expect_trace.hpp"
+#include "redag_testing/timeline.hpp"
+#include "redag_testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/metrics/check_overload.hpp"
+#include "redag_analysis/metrics/check_overload.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -3,7 +3,7 @@
 // metrics/.
 #pragma once
 
-#include "redag/metrics/check_context.hpp"
+#include "redag_analysis/metrics/check_context.hpp"
 
 namespace redag::metrics {
 

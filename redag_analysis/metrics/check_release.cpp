@@ -1,11 +1,11 @@
-#include "redag/metrics/check_release.hpp"
+#include "redag_analysis/metrics/check_release.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "redag/base/int128.hpp"
-#include "redag/sched/executors.hpp"
+#include "redag_analysis/executors/executors.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "redag/metrics/check_context.hpp"
+#include "redag_analysis/metrics/check_context.hpp"
 
 namespace redag::metrics {
 

@@ -1,4 +1,4 @@
-#include "redag/metrics/check_report.hpp"
+#include "redag_analysis/metrics/check_report.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "redag/metrics/check_start.hpp"
+#include "redag_analysis/metrics/check_start.hpp"
 
 #include <algorithm>
 

@@ -1,11 +1,11 @@
 // Whether a dispatched job's body begins: traces of real threads, written by hand.
-#include "redag/metrics/check_start.hpp"
+#include "redag_analysis/metrics/check_start.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/testing/expect_trace.hpp"
-#include "redag/testing/timeline.hpp"
-#include "redag/testing/trace_builder.hpp"
+#include "redag_testing/expect_trace.hpp"
+#include "redag_testing/timeline.hpp"
+#include "redag_testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

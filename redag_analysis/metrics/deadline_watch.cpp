@@ -1,4 +1,4 @@
-#include "redag/metrics/deadline_watch.hpp"
+#include "redag_analysis/metrics/deadline_watch.hpp"
 
 namespace redag::metrics {
 

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "redag/metrics/jobs.hpp"
-#include "redag/metrics/miss.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/miss.hpp"
 
 namespace redag::metrics {
 

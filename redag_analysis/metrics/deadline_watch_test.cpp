@@ -1,11 +1,11 @@
-#include "redag/metrics/deadline_watch.hpp"
+#include "redag_analysis/metrics/deadline_watch.hpp"
 
 #include <gtest/gtest.h>
 
 #include <string>
 
-#include "redag/testing/timeline.hpp"
-#include "redag/testing/trace_builder.hpp"
+#include "redag_testing/timeline.hpp"
+#include "redag_testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/metrics/difference.hpp"
+#include "redag_analysis/metrics/difference.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/rng.hpp"
-#include "redag/metrics/miss.hpp"
+#include "redag_analysis/metrics/miss.hpp"
 
 namespace redag::metrics {
 namespace {

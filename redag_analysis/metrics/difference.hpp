@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "redag/metrics/block_bootstrap.hpp"
-#include "redag/metrics/jobs.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/block_bootstrap.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
 
 namespace redag::metrics {
 

@@ -1,11 +1,11 @@
-#include "redag/metrics/difference.hpp"
+#include "redag_analysis/metrics/difference.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag/sched/executors.hpp"
-#include "redag/sim/simulator.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/metrics/distribution.hpp"
+#include "redag_analysis/metrics/distribution.hpp"
 
 #include <algorithm>
 #include <cmath>

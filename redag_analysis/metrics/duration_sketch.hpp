@@ -11,7 +11,7 @@
 
 #include "redag/base/int128.hpp"
 #include "redag/base/log_buckets.hpp"
-#include "redag/metrics/distribution.hpp"
+#include "redag_analysis/metrics/distribution.hpp"
 
 namespace redag::metrics {
 

@@ -1,4 +1,4 @@
-#include "redag/metrics/duration_sketch.hpp"
+#include "redag_analysis/metrics/duration_sketch.hpp"
 
 #include <gtest/gtest.h>
 

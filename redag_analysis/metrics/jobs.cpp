@@ -1,4 +1,4 @@
-#include "redag/metrics/jobs.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
 
 #include <algorithm>
 #include <utility>

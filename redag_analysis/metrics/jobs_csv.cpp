@@ -1,4 +1,4 @@
-#include "redag/metrics/jobs_csv.hpp"
+#include "redag_analysis/metrics/jobs_csv.hpp"
 
 #include <fmt/format.h>
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/metrics/jobs.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
 
 namespace redag::metrics {
 

@@ -1,16 +1,16 @@
-#include "redag/metrics/jobs.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
 
 #include <gtest/gtest.h>
 
 #include <unistd.h>
-#include "redag/metrics/miss.hpp"
+#include "redag_analysis/metrics/miss.hpp"
 
 #include <filesystem>
 
-#include "redag/metrics/jobs_csv.hpp"
-#include "redag/testing/timeline.hpp"
-#include "redag/testing/trace_builder.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_analysis/metrics/jobs_csv.hpp"
+#include "redag_testing/timeline.hpp"
+#include "redag_testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

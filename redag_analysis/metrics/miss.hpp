@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "redag/metrics/jobs.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
 
 namespace redag::metrics {
 

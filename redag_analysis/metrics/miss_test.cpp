@@ -1,4 +1,4 @@
-#include "redag/metrics/miss.hpp"
+#include "redag_analysis/metrics/miss.hpp"
 
 #include <gtest/gtest.h>
 

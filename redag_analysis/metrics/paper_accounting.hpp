@@ -10,8 +10,8 @@
 #include <optional>
 #include <span>
 
-#include "redag/metrics/jobs.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
 
 namespace redag::metrics {
 

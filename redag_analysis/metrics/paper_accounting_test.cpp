@@ -1,4 +1,4 @@
-#include "redag/metrics/paper_accounting.hpp"
+#include "redag_analysis/metrics/paper_accounting.hpp"
 
 #include <gtest/gtest.h>
 

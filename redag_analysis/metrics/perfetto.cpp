@@ -1,4 +1,4 @@
-#include "redag/metrics/perfetto.hpp"
+#include "redag_analysis/metrics/perfetto.hpp"
 
 #include <fmt/format.h>
 
@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "redag/metrics/jobs.hpp"
-#include "redag/metrics/miss.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/miss.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/metrics/replay.hpp"
+#include "redag_analysis/metrics/replay.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -6,11 +6,11 @@
 #include <array>
 
 #include "redag/base/rng.hpp"
-#include "redag/metrics/summary.hpp"
-#include "redag/metrics/trace_checker.hpp"
-#include "redag/model/generate.hpp"
-#include "redag/sched/executors.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_analysis/metrics/summary.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -1,9 +1,9 @@
-#include "redag/metrics/summary.hpp"
+#include "redag_analysis/metrics/summary.hpp"
 
 #include <algorithm>
 #include <utility>
 
-#include "redag/metrics/miss.hpp"
+#include "redag_analysis/metrics/miss.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "redag/metrics/activity.hpp"
-#include "redag/metrics/distribution.hpp"
-#include "redag/metrics/duration_sketch.hpp"
-#include "redag/metrics/jobs.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/activity.hpp"
+#include "redag_analysis/metrics/distribution.hpp"
+#include "redag_analysis/metrics/duration_sketch.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
 
 namespace redag::metrics {
 

@@ -1,4 +1,4 @@
-#include "redag/metrics/summary_json.hpp"
+#include "redag_analysis/metrics/summary_json.hpp"
 
 #include <nlohmann/json.hpp>
 #include <utility>

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "redag/base/result.hpp"
-#include "redag/metrics/summary.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/summary.hpp"
 
 namespace redag::metrics {
 

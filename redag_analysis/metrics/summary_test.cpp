@@ -1,4 +1,4 @@
-#include "redag/metrics/summary.hpp"
+#include "redag_analysis/metrics/summary.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -7,11 +7,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "redag/metrics/perfetto.hpp"
-#include "redag/metrics/summary_json.hpp"
-#include "redag/testing/timeline.hpp"
-#include "redag/testing/trace_builder.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_analysis/metrics/perfetto.hpp"
+#include "redag_analysis/metrics/summary_json.hpp"
+#include "redag_testing/timeline.hpp"
+#include "redag_testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -1,14 +1,14 @@
-#include "redag/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
 
 #include <limits>
 
-#include "redag/metrics/check_context.hpp"
-#include "redag/metrics/check_dispatch.hpp"
-#include "redag/metrics/check_overload.hpp"
-#include "redag/metrics/check_release.hpp"
-#include "redag/metrics/check_start.hpp"
-#include "redag/metrics/replay.hpp"
-#include "redag/sched/executors.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_analysis/metrics/check_context.hpp"
+#include "redag_analysis/metrics/check_dispatch.hpp"
+#include "redag_analysis/metrics/check_overload.hpp"
+#include "redag_analysis/metrics/check_release.hpp"
+#include "redag_analysis/metrics/check_start.hpp"
+#include "redag_analysis/metrics/replay.hpp"
 
 namespace redag::metrics {
 namespace {

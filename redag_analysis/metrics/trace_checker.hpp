@@ -6,8 +6,8 @@
 // moves on, preemptions when the more urgent job gets the worker.
 #pragma once
 
-#include "redag/metrics/check_report.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/check_report.hpp"
 
 namespace redag::metrics {
 

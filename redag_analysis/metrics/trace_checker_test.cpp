@@ -1,12 +1,12 @@
 // Every rule with a trace that keeps it and at least one that breaks it, written by hand; those of preemption and of
 // overload in check_dispatch_test.cpp and check_overload_test.cpp.
-#include "redag/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/testing/expect_trace.hpp"
-#include "redag/testing/timeline.hpp"
-#include "redag/testing/trace_builder.hpp"
+#include "redag_testing/expect_trace.hpp"
+#include "redag_testing/timeline.hpp"
+#include "redag_testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/metrics/verdict.hpp"
+#include "redag_analysis/metrics/verdict.hpp"
 
 #include <algorithm>
 

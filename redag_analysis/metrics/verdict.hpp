@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/metrics/summary.hpp"
+#include "redag_analysis/metrics/summary.hpp"
 
 namespace redag::metrics {
 

@@ -2,7 +2,7 @@
 // Three bounds a task: in LO mode, in HI mode, and across the change. O(n) a step, pseudo-polynomial in all.
 #pragma once
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

@@ -1,10 +1,10 @@
-#include "redag/analysis/edf_demand.hpp"
+#include "redag_analysis/one_worker/edf_demand.hpp"
 
 #include <algorithm>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/rate_edges.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
 
 namespace redag::analysis {
 namespace {

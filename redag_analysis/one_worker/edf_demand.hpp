@@ -3,7 +3,7 @@
 // worker (or reach a preemption point late) block once: h(t) + max_{D_l > t} (region_l - 1) <= t.
 #pragma once
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

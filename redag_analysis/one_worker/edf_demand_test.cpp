@@ -1,8 +1,8 @@
-#include "redag/analysis/edf_demand.hpp"
+#include "redag_analysis/one_worker/edf_demand.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/testing/bound_property.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

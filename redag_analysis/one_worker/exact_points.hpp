@@ -4,7 +4,7 @@
 // 53(11), 2004.
 #pragma once
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

@@ -1,9 +1,9 @@
-#include "redag/analysis/exact_points.hpp"
+#include "redag_analysis/one_worker/exact_points.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/analysis/linear_bound.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/one_worker/linear_bound.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

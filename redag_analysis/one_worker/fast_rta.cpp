@@ -1,11 +1,11 @@
-#include "redag/analysis/fast_rta.hpp"
+#include "redag_analysis/one_worker/fast_rta.hpp"
 
 #include <algorithm>
 #include <array>
 #include <vector>
 
-#include "redag/analysis/arithmetic.hpp"
 #include "redag/base/check.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
 
 namespace redag::analysis {
 namespace {

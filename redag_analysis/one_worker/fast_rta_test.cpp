@@ -1,9 +1,9 @@
-#include "redag/analysis/fast_rta.hpp"
+#include "redag_analysis/one_worker/fast_rta.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/analysis/response_time.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,10 +1,10 @@
-#include "redag/analysis/linear_bound.hpp"
+#include "redag_analysis/one_worker/linear_bound.hpp"
 
 #include <span>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/one_worker.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/one_worker/one_worker.hpp"
 
 namespace redag::analysis {
 namespace {

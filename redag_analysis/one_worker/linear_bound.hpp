@@ -3,7 +3,7 @@
 // E. Bini, T. H. C. Nguyen, P. Richard, S. Baruah, IEEE Transactions on Computers 58(2), 2009.
 #pragma once
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

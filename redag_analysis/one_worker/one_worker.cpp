@@ -1,14 +1,14 @@
-#include "redag/analysis/one_worker.hpp"
+#include "redag_analysis/one_worker/one_worker.hpp"
 
 #include <algorithm>
 #include <map>
 #include <numeric>
 #include <utility>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
 
 namespace redag::analysis::one_worker {
 namespace {

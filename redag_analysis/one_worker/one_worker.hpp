@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "redag/analysis/bound.hpp"
 #include "redag/base/int128.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis::one_worker {
 

@@ -1,4 +1,4 @@
-#include "redag/analysis/paper.hpp"
+#include "redag_analysis/one_worker/paper.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,11 +6,11 @@
 #include <map>
 #include <span>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/exact_utilization.hpp"
-#include "redag/analysis/one_worker.hpp"
-#include "redag/analysis/utilization.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/exact_utilization.hpp"
+#include "redag_analysis/one_worker/one_worker.hpp"
+#include "redag_analysis/one_worker/utilization.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -3,7 +3,7 @@
 // does not trust it. docs/analysis.md, "The paper's equations", has the counterexamples.
 #pragma once
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

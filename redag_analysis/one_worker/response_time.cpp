@@ -1,7 +1,7 @@
-#include "redag/analysis/response_time.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
 
-#include "redag/analysis/one_worker.hpp"
-#include "redag/analysis/rate_edges.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
+#include "redag_analysis/one_worker/one_worker.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -2,7 +2,7 @@
 // points of one_worker.hpp. O(n) a step, pseudo-polynomial in all.
 #pragma once
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

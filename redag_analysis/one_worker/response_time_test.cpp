@@ -1,11 +1,11 @@
-#include "redag/analysis/response_time.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
 
 #include <string>
 #include <variant>
 
 #include <gtest/gtest.h>
 
-#include "redag/testing/bound_property.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

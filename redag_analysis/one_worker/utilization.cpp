@@ -1,16 +1,16 @@
-#include "redag/analysis/utilization.hpp"
+#include "redag_analysis/one_worker/utilization.hpp"
 
 #include <algorithm>
 #include <cstdio>
 #include <span>
 #include <vector>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/exact_utilization.hpp"
-#include "redag/analysis/one_worker.hpp"
-#include "redag/analysis/rate_edges.hpp"
 #include "redag/sched/policy.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/exact_utilization.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
+#include "redag_analysis/one_worker/one_worker.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -2,7 +2,7 @@
 // of one rate as one task with C = its volume. Nothing is accepted or refused by rounding (exact_utilization.hpp).
 #pragma once
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

@@ -1,4 +1,4 @@
-#include "redag/analysis/utilization.hpp"
+#include "redag_analysis/one_worker/utilization.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "redag/analysis/exact_utilization.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/core/exact_utilization.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

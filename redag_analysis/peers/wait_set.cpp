@@ -1,11 +1,11 @@
-#include "redag/analysis/wait_set.hpp"
+#include "redag_analysis/peers/wait_set.hpp"
 
 #include <algorithm>
 #include <vector>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/global.hpp"
-#include "redag/analysis/rate_edges.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
+#include "redag_analysis/many_workers/global.hpp"
 
 namespace redag::analysis {
 namespace {

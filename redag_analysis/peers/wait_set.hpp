@@ -2,7 +2,7 @@
 // and so not in methods(). One worker is the SingleThreadedExecutor, more the MultiThreadedExecutor. Pure functions.
 #pragma once
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

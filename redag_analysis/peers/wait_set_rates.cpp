@@ -1,4 +1,4 @@
-#include "redag/analysis/wait_set_rates.hpp"
+#include "redag_analysis/peers/wait_set_rates.hpp"
 
 #include <algorithm>
 #include <functional>
@@ -6,12 +6,12 @@
 #include <utility>
 #include <vector>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
-#include "redag/analysis/fixed_point.hpp"
-#include "redag/analysis/global.hpp"
-#include "redag/analysis/rate_edges.hpp"
-#include "redag/analysis/waiting_window.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/rate_edges.hpp"
+#include "redag_analysis/many_workers/fixed_point.hpp"
+#include "redag_analysis/many_workers/global.hpp"
+#include "redag_analysis/many_workers/waiting_window.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -8,7 +8,7 @@
 // answers within the largest J_i + R_i of its tasks. Requires J_i + R_i <= T_i of all tasks, or nothing is bounded.
 #pragma once
 
-#include "redag/analysis/bound.hpp"
+#include "redag_analysis/core/bound.hpp"
 
 namespace redag::analysis {
 

@@ -1,13 +1,13 @@
-#include "redag/analysis/wait_set.hpp"
+#include "redag_analysis/peers/wait_set.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <optional>
 
-#include "redag/analysis/executors.hpp"
-#include "redag/analysis/wait_set_rates.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/analyze/executors.hpp"
+#include "redag_analysis/peers/wait_set_rates.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

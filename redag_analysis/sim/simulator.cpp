@@ -1,4 +1,4 @@
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 
 #include <algorithm>
 #include <numeric>

@@ -1,4 +1,4 @@
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -9,8 +9,8 @@
 #include "redag/base/rng.hpp"
 
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/testing/random_workloads.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/random_workloads.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::sim {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/experiment/acceptance.hpp"
+#include "redag_lab/experiment/acceptance.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -6,11 +6,11 @@
 
 #include <fmt/format.h>
 
-#include "redag/analysis/analyze.hpp"
 #include "redag/base/check.hpp"
-#include "redag/experiment/seed.hpp"
-#include "redag/experiment/simulated_misses.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_lab/experiment/seed.hpp"
+#include "redag_lab/experiment/simulated_misses.hpp"
 
 namespace redag::experiment {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/experiment/acceptance_plan.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_lab/experiment/acceptance_plan.hpp"
 
 namespace redag::experiment {
 

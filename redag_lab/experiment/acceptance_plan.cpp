@@ -1,14 +1,14 @@
-#include "redag/experiment/acceptance_plan.hpp"
+#include "redag_lab/experiment/acceptance_plan.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "redag/analysis/bound.hpp"
-#include "redag/experiment/acceptance.hpp"
-#include "redag/experiment/plan_yaml.hpp"
 #include "redag/model/workload_yaml_nearest.hpp"
+#include "redag_analysis/core/bound.hpp"
+#include "redag_lab/experiment/acceptance.hpp"
+#include "redag_lab/experiment/plan_yaml.hpp"
 
 namespace redag::experiment {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/experiment/simulated_misses.hpp"
-#include "redag/model/generate.hpp"
+#include "redag_lab/experiment/simulated_misses.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 namespace redag::experiment {
 

@@ -1,4 +1,4 @@
-#include "redag/experiment/acceptance_plan.hpp"
+#include "redag_lab/experiment/acceptance_plan.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

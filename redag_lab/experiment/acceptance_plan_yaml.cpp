@@ -4,10 +4,10 @@
 
 #include <fmt/format.h>
 
-#include "redag/experiment/acceptance_plan.hpp"
-#include "redag/experiment/plan_yaml.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_lab/experiment/acceptance_plan.hpp"
+#include "redag_lab/experiment/plan_yaml.hpp"
 
 namespace redag::experiment {
 namespace {

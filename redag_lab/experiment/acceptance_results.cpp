@@ -1,4 +1,4 @@
-#include "redag/experiment/acceptance_results.hpp"
+#include "redag_lab/experiment/acceptance_results.hpp"
 
 #include <algorithm>
 #include <tuple>
@@ -8,10 +8,10 @@
 #include <nlohmann/json.hpp>
 
 #include "redag/base/provenance.hpp"
-#include "redag/experiment/folder.hpp"
-#include "redag/experiment/line_plot.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/version.hpp"
+#include "redag_lab/experiment/folder.hpp"
+#include "redag_lab/experiment/line_plot.hpp"
 
 namespace redag::experiment {
 namespace {

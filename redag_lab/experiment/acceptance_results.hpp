@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/experiment/acceptance.hpp"
-#include "redag/experiment/journal.hpp"
-#include "redag/experiment/proportion.hpp"
+#include "redag_lab/experiment/acceptance.hpp"
+#include "redag_lab/experiment/journal.hpp"
+#include "redag_lab/experiment/proportion.hpp"
 
 namespace redag::experiment {
 

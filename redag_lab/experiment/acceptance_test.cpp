@@ -1,4 +1,4 @@
-#include "redag/experiment/acceptance.hpp"
+#include "redag_lab/experiment/acceptance.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <set>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/experiment/acceptance_results.hpp"
-#include "redag/experiment/line_plot.hpp"
-#include "redag/experiment/seed.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_lab/experiment/acceptance_results.hpp"
+#include "redag_lab/experiment/line_plot.hpp"
+#include "redag_lab/experiment/seed.hpp"
 
 namespace redag::experiment {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/experiment/effects.hpp"
+#include "redag_lab/experiment/effects.hpp"
 
 #include <gtest/gtest.h>
 

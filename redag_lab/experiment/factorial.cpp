@@ -1,4 +1,4 @@
-#include "redag/experiment/factorial.hpp"
+#include "redag_lab/experiment/factorial.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "redag/experiment/seed.hpp"
 #include "redag/model/validate.hpp"
+#include "redag_lab/experiment/seed.hpp"
 
 namespace redag::experiment {
 namespace {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/experiment/factorial_plan.hpp"
-#include "redag/experiment/observation.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_lab/experiment/factorial_plan.hpp"
+#include "redag_lab/experiment/observation.hpp"
 
 namespace redag::experiment {
 

@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include "redag/base/provenance.hpp"
-#include "redag/experiment/factorial_results.hpp"
-#include "redag/experiment/folder.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/version.hpp"
+#include "redag_lab/experiment/factorial_results.hpp"
+#include "redag_lab/experiment/folder.hpp"
 
 namespace redag::experiment {
 namespace {

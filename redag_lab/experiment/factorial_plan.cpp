@@ -1,4 +1,4 @@
-#include "redag/experiment/factorial_plan.hpp"
+#include "redag_lab/experiment/factorial_plan.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "redag/experiment/plan_yaml.hpp"
 #include "redag/model/workload_yaml_nearest.hpp"
-#include "redag/sched/executors.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_lab/experiment/plan_yaml.hpp"
 
 namespace redag::experiment {
 namespace {

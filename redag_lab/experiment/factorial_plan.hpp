@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/experiment/acceptance_plan.hpp"
-#include "redag/model/generate.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_lab/experiment/acceptance_plan.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 namespace redag::experiment {
 

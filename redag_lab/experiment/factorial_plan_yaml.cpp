@@ -6,11 +6,11 @@
 
 #include <fmt/format.h>
 
-#include "redag/experiment/factorial_plan.hpp"
-#include "redag/experiment/plan_yaml.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_lab/experiment/factorial_plan.hpp"
+#include "redag_lab/experiment/plan_yaml.hpp"
 
 namespace redag::experiment {
 namespace {

@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "redag/experiment/factorial_results.hpp"
-#include "redag/experiment/line_plot.hpp"
+#include "redag_lab/experiment/factorial_results.hpp"
+#include "redag_lab/experiment/line_plot.hpp"
 
 namespace redag::experiment {
 namespace {

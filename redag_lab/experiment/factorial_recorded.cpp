@@ -1,4 +1,4 @@
-#include "redag/experiment/factorial_recorded.hpp"
+#include "redag_lab/experiment/factorial_recorded.hpp"
 
 #include <algorithm>
 #include <map>
@@ -7,10 +7,10 @@
 
 #include <fmt/format.h>
 
-#include "redag/experiment/factorial.hpp"
-#include "redag/metrics/summary.hpp"
-#include "redag/metrics/trace_checker.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag_analysis/metrics/summary.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_lab/experiment/factorial.hpp"
 
 namespace redag::experiment {
 namespace {

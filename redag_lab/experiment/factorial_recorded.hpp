@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/experiment/factorial_plan.hpp"
-#include "redag/experiment/journal.hpp"
-#include "redag/experiment/observation.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_lab/experiment/factorial_plan.hpp"
+#include "redag_lab/experiment/journal.hpp"
+#include "redag_lab/experiment/observation.hpp"
 
 namespace redag::experiment {
 

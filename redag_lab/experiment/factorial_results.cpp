@@ -1,4 +1,4 @@
-#include "redag/experiment/factorial_results.hpp"
+#include "redag_lab/experiment/factorial_results.hpp"
 
 #include <algorithm>
 #include <array>

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/experiment/effects.hpp"
-#include "redag/experiment/factorial.hpp"
-#include "redag/experiment/median.hpp"
-#include "redag/experiment/observation.hpp"
+#include "redag_lab/experiment/effects.hpp"
+#include "redag_lab/experiment/factorial.hpp"
+#include "redag_lab/experiment/median.hpp"
+#include "redag_lab/experiment/observation.hpp"
 
 namespace redag::experiment {
 

@@ -1,12 +1,12 @@
-#include "redag/experiment/factorial.hpp"
+#include "redag_lab/experiment/factorial.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag/experiment/factorial_results.hpp"
-#include "redag/metrics/trace_checker.hpp"
-#include "redag/sched/executors.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_lab/experiment/factorial_results.hpp"
 
 namespace redag::experiment {
 namespace {

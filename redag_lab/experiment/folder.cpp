@@ -1,4 +1,4 @@
-#include "redag/experiment/folder.hpp"
+#include "redag_lab/experiment/folder.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -8,8 +8,8 @@
 
 #include "redag/base/result.hpp"
 #include "redag/base/time.hpp"
-#include "redag/experiment/journal.hpp"
-#include "redag/experiment/shard.hpp"
+#include "redag_lab/experiment/journal.hpp"
+#include "redag_lab/experiment/shard.hpp"
 
 namespace redag::experiment {
 

@@ -1,4 +1,4 @@
-#include "redag/experiment/journal.hpp"
+#include "redag_lab/experiment/journal.hpp"
 
 #include <fcntl.h>
 #include <sys/file.h>

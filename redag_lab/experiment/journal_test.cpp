@@ -1,4 +1,4 @@
-#include "redag/experiment/journal.hpp"
+#include "redag_lab/experiment/journal.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

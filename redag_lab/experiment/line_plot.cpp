@@ -1,4 +1,4 @@
-#include "redag/experiment/line_plot.hpp"
+#include "redag_lab/experiment/line_plot.hpp"
 
 #include <algorithm>
 #include <array>

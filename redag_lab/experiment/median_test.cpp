@@ -1,4 +1,4 @@
-#include "redag/experiment/median.hpp"
+#include "redag_lab/experiment/median.hpp"
 
 #include <gtest/gtest.h>
 

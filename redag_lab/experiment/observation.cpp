@@ -1,4 +1,4 @@
-#include "redag/experiment/observation.hpp"
+#include "redag_lab/experiment/observation.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +10,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "redag/metrics/distribution.hpp"
-#include "redag/metrics/jobs.hpp"
-#include "redag/metrics/paper_accounting.hpp"
 #include "redag/trace/worker_count.hpp"
+#include "redag_analysis/metrics/distribution.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/paper_accounting.hpp"
 
 namespace redag::experiment {
 namespace {

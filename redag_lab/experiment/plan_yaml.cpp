@@ -1,4 +1,4 @@
-#include "redag/experiment/plan_yaml.hpp"
+#include "redag_lab/experiment/plan_yaml.hpp"
 
 #include <algorithm>
 #include <charconv>

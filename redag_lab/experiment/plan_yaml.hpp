@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "redag/model/generate.hpp"
 #include "redag/model/workload_yaml_tree.hpp"
 #include "redag/model/workload_yaml_values.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 namespace redag::experiment {
 

@@ -1,4 +1,4 @@
-#include "redag/experiment/proportion.hpp"
+#include "redag_lab/experiment/proportion.hpp"
 
 #include <algorithm>
 #include <cmath>

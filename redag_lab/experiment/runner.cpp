@@ -1,4 +1,4 @@
-#include "redag/experiment/runner.hpp"
+#include "redag_lab/experiment/runner.hpp"
 
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_pipeline.h>

@@ -1,4 +1,4 @@
-#include "redag/experiment/runner.hpp"
+#include "redag_lab/experiment/runner.hpp"
 
 #include <gtest/gtest.h>
 

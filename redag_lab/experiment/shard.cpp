@@ -1,4 +1,4 @@
-#include "redag/experiment/shard.hpp"
+#include "redag_lab/experiment/shard.hpp"
 
 #include <charconv>
 

@@ -1,4 +1,4 @@
-#include "redag/experiment/simulated_misses.hpp"
+#include "redag_lab/experiment/simulated_misses.hpp"
 
 #include <algorithm>
 #include <span>
@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 
 #include "redag/base/rng.hpp"
-#include "redag/experiment/seed.hpp"
-#include "redag/metrics/deadline_watch.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/sim/simulator.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/deadline_watch.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_lab/experiment/seed.hpp"
 
 namespace redag::experiment {
 namespace {

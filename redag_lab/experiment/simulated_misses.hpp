@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "redag/analysis/system.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_analysis/core/system.hpp"
 
 namespace redag::experiment {
 

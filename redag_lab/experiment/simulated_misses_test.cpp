@@ -1,4 +1,4 @@
-#include "redag/experiment/simulated_misses.hpp"
+#include "redag_lab/experiment/simulated_misses.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

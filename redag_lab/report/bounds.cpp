@@ -1,13 +1,13 @@
-#include "redag/report/bounds.hpp"
+#include "redag_lab/report/bounds.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <string_view>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/executors.hpp"
-#include "redag/metrics/assumptions.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/analyze/executors.hpp"
+#include "redag_analysis/metrics/assumptions.hpp"
 
 namespace redag::report {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/report/curves.hpp"
+#include "redag_lab/report/curves.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
-#include "redag/report/digest.hpp"
+#include "redag_lab/report/digest.hpp"
 
 #include <algorithm>
 
 #include "redag/base/check.hpp"
-#include "redag/metrics/trace_checker.hpp"
 #include "redag/trace/worker_count.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
 
 namespace redag::report {
 namespace {

@@ -9,15 +9,15 @@
 #include <utility>
 #include <vector>
 
-#include "redag/metrics/assumptions.hpp"
-#include "redag/metrics/check_report.hpp"
-#include "redag/metrics/jobs.hpp"
-#include "redag/metrics/summary.hpp"
-#include "redag/report/bounds.hpp"
-#include "redag/report/curves.hpp"
-#include "redag/report/schedule.hpp"
-#include "redag/report/timeline.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/assumptions.hpp"
+#include "redag_analysis/metrics/check_report.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/summary.hpp"
+#include "redag_lab/report/bounds.hpp"
+#include "redag_lab/report/curves.hpp"
+#include "redag_lab/report/schedule.hpp"
+#include "redag_lab/report/timeline.hpp"
 
 namespace redag::report {
 

@@ -1,4 +1,4 @@
-#include "redag/report/document.hpp"
+#include "redag_lab/report/document.hpp"
 
 #include <fmt/format.h>
 
@@ -9,10 +9,10 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
-#include "redag/metrics/miss.hpp"
-#include "redag/report/verdict.hpp"
 #include "redag/trace/run_info_json.hpp"
 #include "redag/version.hpp"
+#include "redag_analysis/metrics/miss.hpp"
+#include "redag_lab/report/verdict.hpp"
 
 namespace redag::report {
 namespace {

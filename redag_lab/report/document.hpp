@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/report/digest.hpp"
+#include "redag_lab/report/digest.hpp"
 
 namespace redag::report {
 

@@ -1,4 +1,4 @@
-#include "redag/report/experiment.hpp"
+#include "redag_lab/report/experiment.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "redag/report/experiment.hpp"
+#include "redag_lab/report/experiment.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

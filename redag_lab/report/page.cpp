@@ -1,9 +1,9 @@
-#include "redag/report/page.hpp"
+#include "redag_lab/report/page.hpp"
 
 #include <utility>
 
 #include "redag/base/check.hpp"
-#include "redag/report/page_assets.hpp"
+#include "redag_lab/report/page_assets.hpp"
 
 namespace redag::report {
 

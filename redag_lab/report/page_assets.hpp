@@ -1,4 +1,5 @@
-// The files of redag/report/page and third_party/echarts, put into the library when it is built (cmake/embed.cmake).
+// The files of redag_lab/report/page and third_party/echarts, put into the library when it is built
+// (cmake/embed.cmake).
 #pragma once
 
 #include <string_view>

@@ -1,10 +1,10 @@
-#include "redag/report/page.hpp"
+#include "redag_lab/report/page.hpp"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "redag/report/page_assets.hpp"
+#include "redag_lab/report/page_assets.hpp"
 
 namespace redag::report {
 namespace {

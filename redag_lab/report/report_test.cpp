@@ -4,11 +4,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "redag/report/document.hpp"
-#include "redag/report/verdict.hpp"
-#include "redag/sched/executors.hpp"
-#include "redag/testing/timeline.hpp"
-#include "redag/testing/trace_builder.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_lab/report/document.hpp"
+#include "redag_lab/report/verdict.hpp"
+#include "redag_testing/timeline.hpp"
+#include "redag_testing/trace_builder.hpp"
 
 namespace redag::report {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/report/schedule.hpp"
+#include "redag_lab/report/schedule.hpp"
 
 #include <algorithm>
 #include <optional>

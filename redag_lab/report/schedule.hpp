@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "redag/metrics/jobs.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
 
 namespace redag::report {
 

@@ -1,13 +1,13 @@
-#include "redag/report/schedule.hpp"
+#include "redag_lab/report/schedule.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <set>
 
-#include "redag/report/timeline.hpp"
-#include "redag/testing/timeline.hpp"
-#include "redag/testing/trace_builder.hpp"
+#include "redag_lab/report/timeline.hpp"
+#include "redag_testing/timeline.hpp"
+#include "redag_testing/trace_builder.hpp"
 
 namespace redag::report {
 namespace {

@@ -1,9 +1,9 @@
-#include "redag/report/timeline.hpp"
+#include "redag_lab/report/timeline.hpp"
 
 #include <algorithm>
 
 #include "redag/base/check.hpp"
-#include "redag/metrics/miss.hpp"
+#include "redag_analysis/metrics/miss.hpp"
 
 namespace redag::report {
 namespace {

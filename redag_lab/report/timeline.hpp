@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "redag/metrics/jobs.hpp"
-#include "redag/report/schedule.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_lab/report/schedule.hpp"
 
 namespace redag::report {
 

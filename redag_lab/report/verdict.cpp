@@ -1,4 +1,4 @@
-#include "redag/report/verdict.hpp"
+#include "redag_lab/report/verdict.hpp"
 
 #include <fmt/format.h>
 

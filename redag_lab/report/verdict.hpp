@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "redag/metrics/verdict.hpp"
-#include "redag/report/digest.hpp"
+#include "redag_analysis/metrics/verdict.hpp"
+#include "redag_lab/report/digest.hpp"
 
 namespace redag::report {
 

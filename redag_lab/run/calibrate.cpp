@@ -1,4 +1,4 @@
-#include "redag/runtime/calibrate.hpp"
+#include "redag_lab/run/calibrate.hpp"
 
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -15,14 +15,15 @@
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
+#include "redag/base/rounded_time.hpp"
 #include "redag/runtime/clock.hpp"
-#include "redag/runtime/machine_load.hpp"
-#include "redag/runtime/mode.hpp"
 #include "redag/runtime/preemption_point.hpp"
-#include "redag/runtime/run_workload.hpp"
-#include "redag/runtime/stall_probe.hpp"
+#include "redag/runtime/setup.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_lab/run/machine_load.hpp"
+#include "redag_lab/run/run_workload.hpp"
+#include "redag_lab/run/stall_probe.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -351,6 +352,11 @@ class Calibrating {
       take_larger(charged.stall, beyond);
       charged.preempt = usual_delay(all.preempt, all.ran, beyond);
       take_larger(charged.stall, beyond);
+      // People read these numbers, and no measurement is good to the nanosecond.
+      for (const std::string_view name : overhead_names()) {
+        Duration &value = *overhead_named(charged, name);
+        value = round_up(value);
+      }
       (realtime ? result_.realtime : result_.normal) = charged;
     }
     if (!result_.realtime && !result_.normal) {

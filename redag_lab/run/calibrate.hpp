@@ -12,7 +12,7 @@
 #include "redag/model/job_event.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/runtime/stall_probe.hpp"
+#include "redag_lab/run/stall_probe.hpp"
 
 namespace redag::runtime {
 

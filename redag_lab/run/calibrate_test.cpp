@@ -1,12 +1,12 @@
-#include "redag/runtime/calibrate.hpp"
+#include "redag_lab/run/calibrate.hpp"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
 
 #include "redag/model/validate.hpp"
-#include "redag/runtime/stall_probe.hpp"
-#include "redag/testing/trace_builder.hpp"
+#include "redag_lab/run/stall_probe.hpp"
+#include "redag_testing/trace_builder.hpp"
 
 namespace redag::runtime {
 namespace {

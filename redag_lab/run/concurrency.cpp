@@ -1,4 +1,4 @@
-#include "redag/model/concurrency.hpp"
+#include "redag_lab/run/concurrency.hpp"
 
 #include <algorithm>
 #include <set>

@@ -9,8 +9,8 @@
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/live_sample.hpp"
-#include "redag/runtime/run_workload.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_lab/run/run_workload.hpp"
 
 namespace redag::runtime {
 namespace {

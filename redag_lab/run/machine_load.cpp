@@ -1,4 +1,4 @@
-#include "redag/runtime/machine_load.hpp"
+#include "redag_lab/run/machine_load.hpp"
 
 #include <sched.h>
 #include <unistd.h>

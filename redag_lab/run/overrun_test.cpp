@@ -3,10 +3,10 @@
 
 #include <atomic>
 
-#include "redag/metrics/assumptions.hpp"
-#include "redag/runtime/run_workload.hpp"
-#include "redag/runtime/synthetic.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_analysis/metrics/assumptions.hpp"
+#include "redag_lab/run/run_workload.hpp"
+#include "redag_lab/run/synthetic.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/runtime/run_workload.hpp"
+#include "redag_lab/run/run_workload.hpp"
 
 #include <fmt/format.h>
 
@@ -8,15 +8,15 @@
 
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
-#include "redag/model/concurrency.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/looks.hpp"
 #include "redag/runtime/release_timer.hpp"
-#include "redag/runtime/synthetic.hpp"
 #include "redag/runtime/threads.hpp"
-#include "redag/sched/executors.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_lab/run/concurrency.hpp"
+#include "redag_lab/run/synthetic.hpp"
 
 namespace redag::runtime {
 namespace {

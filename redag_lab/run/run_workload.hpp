@@ -32,7 +32,7 @@ struct RunOptions {
   Duration duration = 10 * kSecond;          // releases in [0, duration); the trace ends there
   Duration warm_up = 0;                      // of it: noted in the trace, for the metrics to leave out
   std::uint64_t seed = 1;                    // execution times and jitter
-  std::string executor = "redag";            // as in redag/sched/executors.hpp
+  std::string executor = "redag";            // as in redag_analysis/executors/executors.hpp
   SchedulerFactory scheduler;                // instead of the one that `executor` names
   std::optional<PreemptionMode> preemption;  // instead of the workload's
   // os: jobs that can be started at once; 0: as many as the workload can have (most_started()), at most 1,024. Where

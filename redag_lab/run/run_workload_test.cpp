@@ -1,4 +1,4 @@
-#include "redag/runtime/run_workload.hpp"
+#include "redag_lab/run/run_workload.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -7,9 +7,9 @@
 #include <atomic>
 #include <span>
 
-#include "redag/metrics/trace_checker.hpp"
-#include "redag/runtime/mode.hpp"
-#include "redag/sched/executors.hpp"
+#include "redag/runtime/setup.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/runtime/stall_probe.hpp"
+#include "redag_lab/run/stall_probe.hpp"
 
 #include <algorithm>
 #include <memory>

@@ -1,4 +1,4 @@
-#include "redag/runtime/synthetic.hpp"
+#include "redag_lab/run/synthetic.hpp"
 
 #include <algorithm>
 

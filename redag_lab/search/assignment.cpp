@@ -1,10 +1,10 @@
-#include "redag/analysis/assignment.hpp"
+#include "redag_lab/search/assignment.hpp"
 
 #include <algorithm>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/coordinate_search.hpp"
 #include "redag/sched/policy.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_lab/search/coordinate_search.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/audsley.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_lab/search/audsley.hpp"
 
 namespace redag::analysis {
 

@@ -1,4 +1,4 @@
-#include "redag/analysis/assignment.hpp"
+#include "redag_lab/search/assignment.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "redag/model/workload_yaml.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/analysis/audsley.hpp"
+#include "redag_lab/search/audsley.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,11 +6,11 @@
 #include <numeric>
 #include <tuple>
 
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/global_dag.hpp"
-#include "redag/analysis/global_sequential.hpp"
-#include "redag/analysis/response_time.hpp"
 #include "redag/base/check.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
+#include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/one_worker/response_time.hpp"
 
 namespace redag::analysis {
 namespace {

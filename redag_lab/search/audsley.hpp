@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "redag/analysis/system.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_analysis/core/system.hpp"
 
 namespace redag::analysis {
 

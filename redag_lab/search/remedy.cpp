@@ -1,13 +1,13 @@
-#include "redag/analysis/remedy.hpp"
+#include "redag_lab/search/remedy.hpp"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/sensitivity.hpp"
 #include "redag/base/rounded_time.hpp"
 #include "redag/sched/policy.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_lab/search/sensitivity.hpp"
 
 namespace redag::analysis {
 namespace {

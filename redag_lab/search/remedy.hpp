@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/analysis/system.hpp"
+#include "redag_analysis/core/system.hpp"
 
 namespace redag::analysis {
 

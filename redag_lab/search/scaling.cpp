@@ -1,9 +1,9 @@
-#include "redag/analysis/scaling.hpp"
+#include "redag_lab/search/scaling.hpp"
 
 #include <algorithm>
 
-#include "redag/analysis/arithmetic.hpp"
 #include "redag/base/check.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "redag/analysis/system.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_analysis/core/system.hpp"
 
 namespace redag::analysis {
 

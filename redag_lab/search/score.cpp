@@ -1,9 +1,9 @@
-#include "redag/tune/score.hpp"
+#include "redag_lab/search/score.hpp"
 
 #include <algorithm>
 
-#include "redag/metrics/deadline_watch.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_analysis/metrics/deadline_watch.hpp"
 
 namespace redag::tune {
 namespace {

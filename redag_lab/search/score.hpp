@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "redag/model/workload.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 
 namespace redag::tune {
 

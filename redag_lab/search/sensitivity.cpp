@@ -1,4 +1,4 @@
-#include "redag/analysis/sensitivity.hpp"
+#include "redag_lab/search/sensitivity.hpp"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <set>
 #include <utility>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/arithmetic.hpp"
-#include "redag/analysis/effort.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
 
 namespace redag::analysis {
 namespace {

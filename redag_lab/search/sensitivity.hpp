@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/scaling.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_lab/search/scaling.hpp"
 
 namespace redag::analysis {
 

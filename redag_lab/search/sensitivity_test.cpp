@@ -1,12 +1,12 @@
-#include "redag/analysis/sensitivity.hpp"
+#include "redag_lab/search/sensitivity.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "redag/model/validate.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/sim/simulator.hpp"
-#include "redag/testing/bound_property.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

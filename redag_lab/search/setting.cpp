@@ -1,4 +1,4 @@
-#include "redag/tune/setting.hpp"
+#include "redag_lab/search/setting.hpp"
 
 #include <algorithm>
 #include <map>
@@ -6,7 +6,7 @@
 #include <set>
 #include <tuple>
 
-#include "redag/analysis/assignment.hpp"
+#include "redag_lab/search/assignment.hpp"
 
 namespace redag::tune {
 namespace {

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "redag/analysis/coordinate_search.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_lab/search/coordinate_search.hpp"
 
 namespace redag::tune {
 

@@ -1,4 +1,4 @@
-#include "redag/tune/tune.hpp"
+#include "redag_lab/search/tune.hpp"
 
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -8,8 +8,8 @@
 #include <span>
 #include <utility>
 
-#include "redag/analysis/analyze.hpp"
 #include "redag/model/demand.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
 
 namespace redag::tune {
 namespace {

@@ -13,8 +13,8 @@
 
 #include "redag/base/result.hpp"
 #include "redag/model/overheads.hpp"
-#include "redag/tune/score.hpp"
-#include "redag/tune/setting.hpp"
+#include "redag_lab/search/score.hpp"
+#include "redag_lab/search/setting.hpp"
 
 namespace redag::tune {
 

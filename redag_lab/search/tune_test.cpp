@@ -1,4 +1,4 @@
-#include "redag/tune/tune.hpp"
+#include "redag_lab/search/tune.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <set>
 
 #include "redag/model/validate.hpp"
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::tune {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/model/changes.hpp"
+#include "redag_lab/workload/changes.hpp"
 
 #include <algorithm>
 #include <optional>

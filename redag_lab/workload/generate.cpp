@@ -1,4 +1,4 @@
-#include "redag/model/generate.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
-#include "redag/model/generate_utilization.hpp"
 #include "redag/model/validate.hpp"
+#include "redag_lab/workload/generate_utilization.hpp"
 
 namespace redag {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/model/generate.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 #include <algorithm>
 #include <map>
@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "redag/model/generate_utilization.hpp"
 #include "redag/model/validate.hpp"
+#include "redag_lab/workload/generate_utilization.hpp"
 
 namespace redag {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/model/generate_utilization.hpp"
+#include "redag_lab/workload/generate_utilization.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "redag/analysis/analyze.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
 
 namespace redag_rclcpp {
 

@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "redag/metrics/bound_watch.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/scheduler.hpp"
+#include "redag_analysis/metrics/bound_watch.hpp"
 #include "redag_rclcpp/executor.hpp"
 
 namespace redag_rclcpp {

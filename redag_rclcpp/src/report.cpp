@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "redag/base/time.hpp"
-#include "redag/metrics/assumptions.hpp"
+#include "redag_analysis/metrics/assumptions.hpp"
 
 namespace redag_rclcpp {
 

@@ -12,7 +12,7 @@
 
 #include "bounds.hpp"
 #include "diagnostic_msgs/msg/diagnostic_array.hpp"
-#include "redag/runtime/mode.hpp"
+#include "redag/runtime/setup.hpp"
 #include "redag_rclcpp/executor.hpp"
 
 namespace redag_rclcpp {

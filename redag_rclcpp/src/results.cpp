@@ -8,12 +8,12 @@
 #include <system_error>
 #include <utility>
 
-#include "redag/metrics/jobs.hpp"
-#include "redag/metrics/jobs_csv.hpp"
-#include "redag/metrics/perfetto.hpp"
-#include "redag/metrics/summary_json.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/jobs_csv.hpp"
+#include "redag_analysis/metrics/perfetto.hpp"
+#include "redag_analysis/metrics/summary_json.hpp"
 
 namespace redag_rclcpp {
 

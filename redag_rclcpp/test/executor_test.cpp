@@ -18,10 +18,10 @@
 #include "rclcpp/rclcpp.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/live/writer.hpp"
-#include "redag/metrics/trace_checker.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/preemption_point.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
 #include "spinning.hpp"
 
 namespace redag_rclcpp {

@@ -10,7 +10,7 @@
 
 #include "parse.hpp"
 #include "rclcpp/rclcpp.hpp"
-#include "redag/runtime/mode.hpp"
+#include "redag/runtime/setup.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "test_msgs/msg/empty.hpp"
 

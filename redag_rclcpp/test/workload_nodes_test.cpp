@@ -12,13 +12,13 @@
 #include <tuple>
 
 #include "rclcpp/version.h"
-#include "redag/metrics/jobs.hpp"
-#include "redag/metrics/trace_checker.hpp"
 #include "redag/model/callback_match.hpp"
 #include "redag/model/demand.hpp"
 #include "redag/model/workload_yaml.hpp"
-#include "redag/runtime/mode.hpp"
+#include "redag/runtime/setup.hpp"
 #include "redag/trace/worker_count.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
 #include "workload/node_events.hpp"
 #include "workload/peers.hpp"
 #include "workload/workload_run.hpp"

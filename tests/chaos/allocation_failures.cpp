@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/cli/program.hpp"
+#include "redag_lab/cli/terminal/program.hpp"
 
 namespace {
 

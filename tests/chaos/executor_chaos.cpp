@@ -16,11 +16,11 @@
 #include "redag/base/mutex.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/rng.hpp"
-#include "redag/metrics/trace_checker.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/runtime/threads.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
 #include "tests/chaos/chaos.hpp"
 
 namespace redag::chaos {

@@ -2,12 +2,12 @@
 #include <array>
 
 #include "redag/base/rng.hpp"
-#include "redag/metrics/jobs.hpp"
-#include "redag/metrics/trace_checker.hpp"
 #include "redag/model/validate.hpp"
-#include "redag/sched/executors.hpp"
-#include "redag/sim/simulator.hpp"
-#include "redag/testing/random_workloads.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_testing/random_workloads.hpp"
 #include "tests/chaos/chaos.hpp"
 
 namespace redag::chaos {

@@ -1,7 +1,7 @@
 #include <filesystem>
 
 #include "redag/base/check.hpp"
-#include "redag/cli/recorded_runs.hpp"
+#include "redag_lab/cli/run/recorded_runs.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 #include "tests/fuzz/targets.hpp"
 

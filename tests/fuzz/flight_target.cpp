@@ -5,9 +5,9 @@
 #include <string>
 
 #include "redag/base/check.hpp"
-#include "redag/metrics/summary.hpp"
-#include "redag/metrics/trace_checker.hpp"
 #include "redag/trace/flight_recorder.hpp"
+#include "redag_analysis/metrics/summary.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 #include "tests/fuzz/targets.hpp"
 

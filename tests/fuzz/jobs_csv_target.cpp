@@ -1,6 +1,6 @@
 #include "redag/base/check.hpp"
-#include "redag/metrics/jobs_csv.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag_analysis/metrics/jobs_csv.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {

@@ -1,7 +1,7 @@
 #include "redag/base/check.hpp"
-#include "redag/experiment/acceptance.hpp"
-#include "redag/experiment/acceptance_plan.hpp"
-#include "redag/experiment/factorial_plan.hpp"
+#include "redag_lab/experiment/acceptance.hpp"
+#include "redag_lab/experiment/acceptance_plan.hpp"
+#include "redag_lab/experiment/factorial_plan.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {

@@ -1,7 +1,7 @@
 #include "redag/base/check.hpp"
-#include "redag/experiment/acceptance.hpp"
-#include "redag/experiment/acceptance_results.hpp"
-#include "redag/experiment/journal.hpp"
+#include "redag_lab/experiment/acceptance.hpp"
+#include "redag_lab/experiment/acceptance_results.hpp"
+#include "redag_lab/experiment/journal.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 #include "tests/fuzz/targets.hpp"
 

@@ -2,9 +2,9 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/time.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/experiment/acceptance_plan.hpp"
 #include "redag/model/callback_match.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/experiment/acceptance_plan.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "redag/testing/explorer.hpp"
+#include "redag_testing/explorer.hpp"
 
 namespace redag::detail {
 

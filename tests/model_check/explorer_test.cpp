@@ -1,4 +1,4 @@
-#include "redag/testing/explorer.hpp"
+#include "redag_testing/explorer.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>

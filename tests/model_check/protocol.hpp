@@ -16,7 +16,7 @@
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/runtime/running_job.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/testing/explorer.hpp"
+#include "redag_testing/explorer.hpp"
 
 namespace redag::model_check {
 

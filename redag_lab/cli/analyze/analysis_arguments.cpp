@@ -1,9 +1,9 @@
-#include "redag/cli/analysis_arguments.hpp"
+#include "redag_lab/cli/analyze/analysis_arguments.hpp"
 
 #include <fmt/format.h>
 
-#include "redag/cli/options.hpp"
-#include "redag/cli/signals.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
 
 namespace redag::cli {
 namespace {

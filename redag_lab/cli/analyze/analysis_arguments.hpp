@@ -6,11 +6,11 @@
 #include <optional>
 #include <string>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/system.hpp"
-#include "redag/cli/progress.hpp"
-#include "redag/cli/run_arguments.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/core/system.hpp"
+#include "redag_lab/cli/run/run_arguments.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
 
 namespace redag::cli {
 

@@ -1,11 +1,11 @@
-#include "redag/cli/analysis_chains.hpp"
+#include "redag_lab/cli/analyze/analysis_chains.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "redag/cli/analysis_explanation.hpp"
-#include "redag/cli/table.hpp"
+#include "redag_lab/cli/analyze/analysis_explanation.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

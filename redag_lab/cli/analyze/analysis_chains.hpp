@@ -7,8 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "redag/analysis/chains.hpp"
-#include "redag/cli/analysis_report.hpp"
+#include "redag_analysis/analyze/chains.hpp"
+#include "redag_lab/cli/analyze/analysis_report.hpp"
 
 namespace redag::cli {
 

@@ -1,4 +1,4 @@
-#include "redag/cli/analysis_chains.hpp"
+#include "redag_lab/cli/analyze/analysis_chains.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
-#include "redag/cli/analysis_explanation.hpp"
+#include "redag_lab/cli/analyze/analysis_explanation.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "redag/base/rounded_time.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/cli/table.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

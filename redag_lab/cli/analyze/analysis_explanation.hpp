@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "redag/cli/analysis_report.hpp"
+#include "redag_lab/cli/analyze/analysis_report.hpp"
 
 namespace redag::cli {
 

@@ -1,4 +1,4 @@
-#include "redag/cli/analysis_explanation.hpp"
+#include "redag_lab/cli/analyze/analysis_explanation.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::cli {
 namespace {

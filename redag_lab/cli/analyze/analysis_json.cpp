@@ -1,5 +1,5 @@
 // The document `redag.analysis/1`; docs/cli.md lists its keys.
-#include "redag/cli/analysis_report.hpp"
+#include "redag_lab/cli/analyze/analysis_report.hpp"
 
 namespace redag::cli {
 namespace {

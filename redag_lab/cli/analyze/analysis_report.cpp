@@ -1,4 +1,4 @@
-#include "redag/cli/analysis_report.hpp"
+#include "redag_lab/cli/analyze/analysis_report.hpp"
 
 #include <fmt/format.h>
 
@@ -6,12 +6,12 @@
 #include <cmath>
 #include <numeric>
 
-#include "redag/analysis/global.hpp"
-#include "redag/analysis/remedy.hpp"
 #include "redag/base/rounded_time.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/cli/table.hpp"
-#include "redag/cli/variant.hpp"
+#include "redag_analysis/many_workers/global.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
+#include "redag_lab/cli/terminal/variant.hpp"
+#include "redag_lab/search/remedy.hpp"
 
 namespace redag::cli {
 namespace {

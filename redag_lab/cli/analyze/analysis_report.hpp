@@ -9,12 +9,12 @@
 #include <string_view>
 #include <vector>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/executors.hpp"
-#include "redag/analysis/exploration.hpp"
-#include "redag/cli/console.hpp"
-#include "redag/cli/json.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/analyze/executors.hpp"
+#include "redag_analysis/explore/exploration.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
 
 namespace redag::cli {
 

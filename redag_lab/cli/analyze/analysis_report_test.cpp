@@ -1,8 +1,8 @@
-#include "redag/cli/analysis_report.hpp"
+#include "redag_lab/cli/analyze/analysis_report.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/cli/analysis_explanation.hpp"
+#include "redag_lab/cli/analyze/analysis_explanation.hpp"
 
 namespace redag::cli {
 namespace {

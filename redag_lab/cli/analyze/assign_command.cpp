@@ -3,14 +3,14 @@
 #include <memory>
 
 #include "redag/base/provenance.hpp"
-#include "redag/cli/analysis_arguments.hpp"
-#include "redag/cli/assignment_report.hpp"
-#include "redag/cli/commands.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/cli/progress.hpp"
-#include "redag/cli/signals.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag_lab/cli/analyze/analysis_arguments.hpp"
+#include "redag_lab/cli/analyze/assignment_report.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
 
 namespace redag::cli {
 namespace {

@@ -1,12 +1,12 @@
-#include "redag/cli/assignment_report.hpp"
+#include "redag_lab/cli/analyze/assignment_report.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "redag/cli/table.hpp"
-#include "redag/model/changes.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
+#include "redag_lab/workload/changes.hpp"
 
 namespace redag::cli {
 namespace {

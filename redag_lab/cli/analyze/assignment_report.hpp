@@ -4,9 +4,9 @@
 
 #include <string>
 
-#include "redag/analysis/assignment.hpp"
-#include "redag/cli/console.hpp"
-#include "redag/cli/json.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
+#include "redag_lab/search/assignment.hpp"
 
 namespace redag::cli {
 

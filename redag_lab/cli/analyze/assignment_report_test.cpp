@@ -1,8 +1,8 @@
-#include "redag/cli/assignment_report.hpp"
+#include "redag_lab/cli/analyze/assignment_report.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/cli/sensitivity_report.hpp"
+#include "redag_lab/cli/analyze/sensitivity_report.hpp"
 
 namespace redag::cli {
 namespace {

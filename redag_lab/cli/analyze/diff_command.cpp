@@ -3,14 +3,14 @@
 #include <memory>
 #include <optional>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/difference_report.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/cli/progress.hpp"
-#include "redag/cli/recorded_runs.hpp"
-#include "redag/cli/signals.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/worker_count.hpp"
+#include "redag_lab/cli/analyze/difference_report.hpp"
+#include "redag_lab/cli/run/recorded_runs.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
 
 namespace redag::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/cli/difference_report.hpp"
+#include "redag_lab/cli/analyze/difference_report.hpp"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,8 @@
 #include <set>
 
 #include "redag/base/text.hpp"
-#include "redag/cli/table.hpp"
 #include "redag/trace/worker_count.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

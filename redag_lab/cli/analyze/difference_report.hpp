@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "redag/cli/console.hpp"
-#include "redag/cli/json.hpp"
-#include "redag/metrics/difference.hpp"
-#include "redag/model/changes.hpp"
+#include "redag_analysis/metrics/difference.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
+#include "redag_lab/workload/changes.hpp"
 
 namespace redag::cli {
 

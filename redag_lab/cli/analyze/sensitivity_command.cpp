@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <memory>
 
-#include "redag/cli/analysis_arguments.hpp"
-#include "redag/cli/analysis_explanation.hpp"
-#include "redag/cli/commands.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/cli/progress.hpp"
-#include "redag/cli/sensitivity_report.hpp"
-#include "redag/cli/signals.hpp"
-#include "redag/cli/simulated_verdict.hpp"
-#include "redag/cli/table.hpp"
+#include "redag_lab/cli/analyze/analysis_arguments.hpp"
+#include "redag_lab/cli/analyze/analysis_explanation.hpp"
+#include "redag_lab/cli/analyze/sensitivity_report.hpp"
+#include "redag_lab/cli/run/simulated_verdict.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

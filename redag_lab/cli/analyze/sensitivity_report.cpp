@@ -1,4 +1,4 @@
-#include "redag/cli/sensitivity_report.hpp"
+#include "redag_lab/cli/analyze/sensitivity_report.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "redag/base/rounded_time.hpp"
-#include "redag/cli/table.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

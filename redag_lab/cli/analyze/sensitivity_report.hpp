@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "redag/analysis/sensitivity.hpp"
-#include "redag/cli/analysis_report.hpp"
+#include "redag_lab/cli/analyze/analysis_report.hpp"
+#include "redag_lab/search/sensitivity.hpp"
 
 namespace redag::cli {
 

@@ -6,15 +6,15 @@
 
 #include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
-#include "redag/cli/commands.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/cli/progress.hpp"
-#include "redag/cli/run_arguments.hpp"
-#include "redag/cli/signals.hpp"
-#include "redag/cli/tuning_report.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag_lab/cli/analyze/tuning_report.hpp"
+#include "redag_lab/cli/run/run_arguments.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
 
 namespace redag::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/cli/tuning_report.hpp"
+#include "redag_lab/cli/analyze/tuning_report.hpp"
 
 #include <fmt/format.h>
 
@@ -7,8 +7,8 @@
 #include <map>
 
 #include "redag/base/text.hpp"
-#include "redag/cli/table.hpp"
-#include "redag/model/changes.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
+#include "redag_lab/workload/changes.hpp"
 
 namespace redag::cli {
 namespace {

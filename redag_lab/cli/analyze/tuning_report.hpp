@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "redag/cli/console.hpp"
-#include "redag/cli/json.hpp"
-#include "redag/tune/tune.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
+#include "redag_lab/search/tune.hpp"
 
 namespace redag::cli {
 

@@ -4,11 +4,11 @@
 #include <optional>
 #include <utility>
 
-#include "redag/cli/experiment_plan_options.hpp"
-#include "redag/cli/experiment_report.hpp"
-#include "redag/cli/experiment_run.hpp"
-#include "redag/cli/experiment_studies.hpp"
-#include "redag/experiment/acceptance_results.hpp"
+#include "redag_lab/cli/experiment/experiment_plan_options.hpp"
+#include "redag_lab/cli/experiment/experiment_report.hpp"
+#include "redag_lab/cli/experiment/experiment_run.hpp"
+#include "redag_lab/cli/experiment/experiment_studies.hpp"
+#include "redag_lab/experiment/acceptance_results.hpp"
 
 namespace redag::cli {
 namespace {

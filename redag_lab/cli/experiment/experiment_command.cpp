@@ -4,14 +4,14 @@
 #include <utility>
 #include <vector>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/experiment_run.hpp"
-#include "redag/cli/experiment_studies.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/json.hpp"
-#include "redag/experiment/factorial_recorded.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/version.hpp"
+#include "redag_lab/cli/experiment/experiment_run.hpp"
+#include "redag_lab/cli/experiment/experiment_studies.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
+#include "redag_lab/experiment/factorial_recorded.hpp"
 
 namespace redag::cli {
 namespace {

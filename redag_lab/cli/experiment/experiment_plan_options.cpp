@@ -1,12 +1,12 @@
-#include "redag/cli/experiment_plan_options.hpp"
+#include "redag_lab/cli/experiment/experiment_plan_options.hpp"
 
 #include <charconv>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "redag/cli/options.hpp"
 #include "redag/model/validate.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
 
 namespace redag::cli {
 namespace {

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "redag/cli/console.hpp"
-#include "redag/experiment/acceptance_plan.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/experiment/acceptance_plan.hpp"
 
 namespace redag::cli {
 

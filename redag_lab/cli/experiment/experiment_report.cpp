@@ -1,11 +1,11 @@
-#include "redag/cli/experiment_report.hpp"
+#include "redag_lab/cli/experiment/experiment_report.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <tuple>
 
-#include "redag/cli/table.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/cli/experiment_run.hpp"
+#include "redag_lab/cli/experiment/experiment_run.hpp"
 
 #include <fmt/format.h>
 
@@ -6,14 +6,14 @@
 #include <optional>
 #include <utility>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/cli/progress.hpp"
-#include "redag/cli/signals.hpp"
-#include "redag/experiment/folder.hpp"
-#include "redag/experiment/runner.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
+#include "redag_lab/experiment/folder.hpp"
+#include "redag_lab/experiment/runner.hpp"
 
 namespace redag::cli {
 namespace {

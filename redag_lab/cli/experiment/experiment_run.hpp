@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "redag/cli/console.hpp"
-#include "redag/cli/experiment_study.hpp"
-#include "redag/experiment/journal.hpp"
-#include "redag/experiment/shard.hpp"
+#include "redag_lab/cli/experiment/experiment_study.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/experiment/journal.hpp"
+#include "redag_lab/experiment/shard.hpp"
 
 namespace redag::cli {
 

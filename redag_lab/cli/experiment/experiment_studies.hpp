@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/experiment_study.hpp"
-#include "redag/experiment/factorial_plan.hpp"
+#include "redag_lab/cli/experiment/experiment_study.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/experiment/factorial_plan.hpp"
 
 namespace redag::cli {
 

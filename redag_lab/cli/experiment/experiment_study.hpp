@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/cli/console.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
 
 namespace redag::cli {
 
@@ -35,7 +35,7 @@ class Study {
   [[nodiscard]] virtual Result<void> add(std::uint64_t unit, const std::string &result) = 0;
   [[nodiscard]] virtual std::uint64_t done() const = 0;
 
-  /// The results so far: files, a JSON document (`runs`: redag/experiment/folder.hpp), words.
+  /// The results so far: files, a JSON document (`runs`: redag_lab/experiment/folder.hpp), words.
   [[nodiscard]] virtual Result<void> write(const std::string &folder) const = 0;
   [[nodiscard]] virtual std::string json(const std::vector<std::string> &runs) const = 0;
   [[nodiscard]] virtual std::string describe(const StreamTraits &traits) const = 0;

@@ -6,14 +6,14 @@
 #include <utility>
 
 #include "redag/base/check.hpp"
-#include "redag/cli/experiment_run.hpp"
-#include "redag/cli/experiment_studies.hpp"
-#include "redag/cli/factorial_report.hpp"
-#include "redag/cli/ros2_run.hpp"
-#include "redag/cli/session.hpp"
-#include "redag/cli/signals.hpp"
-#include "redag/cli/variant.hpp"
-#include "redag/experiment/factorial_results.hpp"
+#include "redag_lab/cli/experiment/experiment_run.hpp"
+#include "redag_lab/cli/experiment/experiment_studies.hpp"
+#include "redag_lab/cli/experiment/factorial_report.hpp"
+#include "redag_lab/cli/run/ros2_run.hpp"
+#include "redag_lab/cli/run/session.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
+#include "redag_lab/cli/terminal/variant.hpp"
+#include "redag_lab/experiment/factorial_results.hpp"
 
 namespace redag::cli {
 namespace {

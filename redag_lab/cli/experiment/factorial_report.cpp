@@ -1,4 +1,4 @@
-#include "redag/cli/factorial_report.hpp"
+#include "redag_lab/cli/experiment/factorial_report.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "redag/cli/table.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "redag/cli/console.hpp"
-#include "redag/experiment/factorial_results.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/experiment/factorial_results.hpp"
 
 namespace redag::cli {
 

@@ -4,17 +4,17 @@
 #include <memory>
 #include <system_error>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/progress.hpp"
-#include "redag/cli/recorded_runs.hpp"
-#include "redag/cli/signals.hpp"
-#include "redag/report/document.hpp"
-#include "redag/report/experiment.hpp"
-#include "redag/report/page.hpp"
-#include "redag/report/verdict.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_lab/cli/run/recorded_runs.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
+#include "redag_lab/report/document.hpp"
+#include "redag_lab/report/experiment.hpp"
+#include "redag_lab/report/page.hpp"
+#include "redag_lab/report/verdict.hpp"
 
 namespace redag::cli {
 namespace {

@@ -1,13 +1,13 @@
-#include "redag/cli/bound_check.hpp"
+#include "redag_lab/cli/run/bound_check.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/cli/analysis_report.hpp"
-#include "redag/cli/table.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_lab/cli/analyze/analysis_report.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

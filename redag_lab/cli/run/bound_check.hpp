@@ -1,15 +1,15 @@
 // A run on threads against what was proven before it: responses above their bounds and executions above the wcet, by
-// name, with the assumption that broke (redag/metrics/assumptions.hpp). Pure.
+// name, with the assumption that broke (redag_analysis/metrics/assumptions.hpp). Pure.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "redag/cli/console.hpp"
-#include "redag/cli/json.hpp"
-#include "redag/cli/session.hpp"
-#include "redag/metrics/assumptions.hpp"
+#include "redag_analysis/metrics/assumptions.hpp"
+#include "redag_lab/cli/run/session.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
 
 namespace redag::cli {
 

@@ -1,9 +1,9 @@
-#include "redag/cli/bound_check.hpp"
+#include "redag_lab/cli/run/bound_check.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::cli {
 namespace {

@@ -5,15 +5,15 @@
 
 #include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
-#include "redag/cli/commands.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/json.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/cli/progress.hpp"
-#include "redag/cli/session.hpp"
-#include "redag/cli/signals.hpp"
-#include "redag/cli/table.hpp"
-#include "redag/runtime/calibrate.hpp"
+#include "redag_lab/cli/run/session.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
+#include "redag_lab/run/calibrate.hpp"
 
 namespace redag::cli {
 namespace {

@@ -2,12 +2,12 @@
 
 #include <memory>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/run_report.hpp"
-#include "redag/cli/table.hpp"
-#include "redag/metrics/trace_checker.hpp"
 #include "redag/trace/events_file.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_lab/cli/run/run_report.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

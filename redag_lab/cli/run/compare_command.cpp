@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <memory>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/comparison.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/cli/run_arguments.hpp"
-#include "redag/cli/run_report.hpp"
-#include "redag/cli/signals.hpp"
+#include "redag_lab/cli/run/comparison.hpp"
+#include "redag_lab/cli/run/run_arguments.hpp"
+#include "redag_lab/cli/run/run_report.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
 
 namespace redag::cli {
 namespace {

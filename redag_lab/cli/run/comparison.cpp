@@ -1,10 +1,10 @@
-#include "redag/cli/comparison.hpp"
+#include "redag_lab/cli/run/comparison.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "redag/cli/table.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

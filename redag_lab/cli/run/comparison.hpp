@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "redag/cli/console.hpp"
-#include "redag/cli/json.hpp"
-#include "redag/cli/session.hpp"
-#include "redag/cli/variant.hpp"
-#include "redag/report/verdict.hpp"
+#include "redag_lab/cli/run/session.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
+#include "redag_lab/cli/terminal/variant.hpp"
+#include "redag_lab/report/verdict.hpp"
 
 namespace redag::cli {
 

@@ -1,4 +1,4 @@
-#include "redag/cli/comparison.hpp"
+#include "redag_lab/cli/run/comparison.hpp"
 
 #include <gtest/gtest.h>
 

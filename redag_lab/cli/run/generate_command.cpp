@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <memory>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/model/generate.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 namespace redag::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/cli/live_text.hpp"
+#include "redag_lab/cli/run/live_text.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "redag/cli/table.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

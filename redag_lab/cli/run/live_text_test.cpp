@@ -1,10 +1,10 @@
-#include "redag/cli/live_text.hpp"
+#include "redag_lab/cli/run/live_text.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag/cli/screen.hpp"
-#include "redag/cli/top_screen.hpp"
+#include "redag_lab/cli/terminal/screen.hpp"
+#include "redag_lab/cli/top/top_screen.hpp"
 
 namespace redag::cli {
 namespace {

@@ -3,11 +3,11 @@
 #include <filesystem>
 #include <memory>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/run_report.hpp"
-#include "redag/cli/table.hpp"
 #include "redag/trace/flight_recorder.hpp"
+#include "redag_lab/cli/run/run_report.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/cli/ros2_run.hpp"
+#include "redag_lab/cli/run/ros2_run.hpp"
 
 #include <fcntl.h>
 #include <spawn.h>
@@ -15,10 +15,10 @@
 
 #include <fmt/format.h>
 
-#include "redag/metrics/trace_checker.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
 
 extern char **environ;  // NOLINT(readability-redundant-declaration): POSIX has it in no header
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/experiment/factorial.hpp"
+#include "redag_lab/experiment/factorial.hpp"
 
 namespace redag::cli {
 

@@ -1,4 +1,4 @@
-#include "redag/cli/run_arguments.hpp"
+#include "redag_lab/cli/run/run_arguments.hpp"
 
 #include <fmt/format.h>
 
@@ -6,13 +6,13 @@
 
 #include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/options.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/runtime/threads.hpp"
-#include "redag/sched/executors.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
 
 namespace redag::cli {
 namespace {

@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "redag/base/time.hpp"
-#include "redag/cli/console.hpp"
-#include "redag/cli/progress.hpp"
-#include "redag/cli/session.hpp"
-#include "redag/cli/variant.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_lab/cli/run/session.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
+#include "redag_lab/cli/terminal/variant.hpp"
 
 namespace redag::cli {
 

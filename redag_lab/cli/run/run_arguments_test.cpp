@@ -1,4 +1,4 @@
-#include "redag/cli/run_arguments.hpp"
+#include "redag_lab/cli/run/run_arguments.hpp"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
 #include <memory>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/cli/single_run.hpp"
+#include "redag_lab/cli/run/single_run.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
 
 namespace redag::cli {
 

@@ -1,18 +1,18 @@
-#include "redag/cli/run_report.hpp"
+#include "redag_lab/cli/run/run_report.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <numeric>
 
-#include "redag/cli/bound_check.hpp"
-#include "redag/cli/table.hpp"
-#include "redag/metrics/jobs.hpp"
-#include "redag/metrics/jobs_csv.hpp"
-#include "redag/metrics/perfetto.hpp"
-#include "redag/metrics/summary_json.hpp"
-#include "redag/metrics/verdict.hpp"
 #include "redag/trace/events_file.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/jobs_csv.hpp"
+#include "redag_analysis/metrics/perfetto.hpp"
+#include "redag_analysis/metrics/summary_json.hpp"
+#include "redag_analysis/metrics/verdict.hpp"
+#include "redag_lab/cli/run/bound_check.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "redag/cli/console.hpp"
-#include "redag/cli/json.hpp"
-#include "redag/cli/session.hpp"
+#include "redag_lab/cli/run/session.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
 
 namespace redag::cli {
 

@@ -1,4 +1,4 @@
-#include "redag/cli/session.hpp"
+#include "redag_lab/cli/run/session.hpp"
 
 #include <fmt/format.h>
 
@@ -8,12 +8,12 @@
 #include <memory>
 #include <span>
 
-#include "redag/analysis/analyze.hpp"
-#include "redag/analysis/executors.hpp"
-#include "redag/metrics/trace_checker.hpp"
-#include "redag/runtime/run_workload.hpp"
 #include "redag/runtime/threads.hpp"
-#include "redag/sched/executors.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/analyze/executors.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_lab/run/run_workload.hpp"
 
 namespace redag::cli {
 namespace {

@@ -10,14 +10,14 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/cli/variant.hpp"
-#include "redag/metrics/check_report.hpp"
-#include "redag/metrics/summary.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/sim/simulator.hpp"
 #include "redag/trace/flight_recorder.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/check_report.hpp"
+#include "redag_analysis/metrics/summary.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_lab/cli/terminal/variant.hpp"
 
 namespace redag::cli {
 

@@ -1,8 +1,8 @@
-#include "redag/cli/session.hpp"
+#include "redag_lab/cli/run/session.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/metrics/summary_json.hpp"
+#include "redag_analysis/metrics/summary_json.hpp"
 
 namespace redag::cli {
 namespace {

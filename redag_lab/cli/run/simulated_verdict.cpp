@@ -1,8 +1,8 @@
-#include "redag/cli/simulated_verdict.hpp"
+#include "redag_lab/cli/run/simulated_verdict.hpp"
 
-#include "redag/metrics/deadline_watch.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/metrics/deadline_watch.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 
 namespace redag::cli {
 

@@ -4,8 +4,8 @@
 
 #include <atomic>
 
-#include "redag/analysis/system.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_analysis/core/system.hpp"
 
 namespace redag::cli {
 

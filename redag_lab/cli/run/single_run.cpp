@@ -1,11 +1,11 @@
-#include "redag/cli/single_run.hpp"
+#include "redag_lab/cli/run/single_run.hpp"
 
 #include <fmt/format.h>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/run_report.hpp"
-#include "redag/cli/signals.hpp"
-#include "redag/metrics/verdict.hpp"
+#include "redag_analysis/metrics/verdict.hpp"
+#include "redag_lab/cli/run/run_report.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
 
 namespace redag::cli {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "redag/cli/console.hpp"
-#include "redag/cli/run_arguments.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_lab/cli/run/run_arguments.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
 
 namespace redag::cli {
 

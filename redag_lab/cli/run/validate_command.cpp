@@ -4,10 +4,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/json.hpp"
-#include "redag/sim/simulator.hpp"
+#include "redag_analysis/sim/simulator.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
 
 namespace redag::cli {
 namespace {

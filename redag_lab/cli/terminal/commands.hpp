@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 
-#include "redag/cli/console.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
 
 namespace redag::cli {
 

@@ -1,4 +1,4 @@
-#include "redag/cli/console.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
 
 #include <fmt/format.h>
 #include <sys/ioctl.h>

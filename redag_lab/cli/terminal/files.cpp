@@ -1,4 +1,4 @@
-#include "redag/cli/files.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -12,8 +12,8 @@
 #include <memory>
 #include <system_error>
 
-#include "redag/cli/variant.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_lab/cli/terminal/variant.hpp"
 
 namespace redag::cli {
 namespace {

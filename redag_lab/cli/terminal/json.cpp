@@ -1,4 +1,4 @@
-#include "redag/cli/json.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
 
 #include "redag/base/provenance.hpp"
 

@@ -2,8 +2,8 @@
 #include <string>
 #include <vector>
 
-#include "redag/cli/console.hpp"
-#include "redag/cli/program.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/cli/terminal/program.hpp"
 
 int main(int argc, char **argv) {
   // A reader that goes away (`| head`) must not end a run before its files are written: writing says so instead.

@@ -1,4 +1,4 @@
-#include "redag/cli/options.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
 
 #include <fmt/format.h>
 

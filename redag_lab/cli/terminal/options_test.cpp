@@ -1,9 +1,9 @@
-#include "redag/cli/options.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/cli/files.hpp"
-#include "redag/cli/variant.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/variant.hpp"
 
 namespace redag::cli {
 namespace {

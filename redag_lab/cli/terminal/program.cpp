@@ -1,4 +1,4 @@
-#include "redag/cli/program.hpp"
+#include "redag_lab/cli/terminal/program.hpp"
 
 #include <fmt/format.h>
 
@@ -10,9 +10,9 @@
 
 #include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
-#include "redag/cli/commands.hpp"
-#include "redag/cli/options.hpp"
 #include "redag/version.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
 
 namespace redag::cli {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/cli/console.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
 
 namespace redag::cli {
 

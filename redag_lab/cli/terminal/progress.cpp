@@ -1,11 +1,11 @@
-#include "redag/cli/progress.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
 
-#include "redag/cli/table.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

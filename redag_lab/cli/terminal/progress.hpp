@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "redag/base/time.hpp"
-#include "redag/cli/console.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
 
 namespace redag::cli {
 

@@ -1,4 +1,4 @@
-#include "redag/cli/screen.hpp"
+#include "redag_lab/cli/terminal/screen.hpp"
 
 #include <poll.h>
 #include <sys/ioctl.h>

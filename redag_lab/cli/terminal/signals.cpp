@@ -1,4 +1,4 @@
-#include "redag/cli/signals.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
 
 #include <unistd.h>
 

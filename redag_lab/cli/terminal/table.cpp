@@ -1,4 +1,4 @@
-#include "redag/cli/table.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 #include <fmt/format.h>
 

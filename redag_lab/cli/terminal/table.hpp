@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "redag/base/text.hpp"
-#include "redag/cli/console.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
 
 namespace redag::cli {
 

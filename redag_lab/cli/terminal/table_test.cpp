@@ -1,10 +1,10 @@
-#include "redag/cli/table.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 #include <gtest/gtest.h>
 
 #include <sstream>
 
-#include "redag/cli/progress.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
 
 namespace redag::cli {
 namespace {

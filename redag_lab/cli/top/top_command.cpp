@@ -7,12 +7,12 @@
 #include <optional>
 
 #include "redag/base/text.hpp"
-#include "redag/cli/commands.hpp"
-#include "redag/cli/live_text.hpp"
-#include "redag/cli/options.hpp"
-#include "redag/cli/top_screen.hpp"
 #include "redag/live/writer.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag_lab/cli/run/live_text.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/top/top_screen.hpp"
 
 namespace redag::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "redag/cli/top_screen.hpp"
+#include "redag_lab/cli/top/top_screen.hpp"
 
 #include <fmt/format.h>
 
@@ -6,10 +6,10 @@
 #include <array>
 #include <utility>
 
-#include "redag/cli/commands.hpp"
-#include "redag/cli/signals.hpp"
-#include "redag/cli/table.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
+#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "redag/base/time.hpp"
-#include "redag/cli/live_text.hpp"
-#include "redag/cli/screen.hpp"
 #include "redag/live/reader.hpp"
+#include "redag_lab/cli/run/live_text.hpp"
+#include "redag_lab/cli/terminal/screen.hpp"
 
 namespace redag::cli {
 

@@ -21,7 +21,7 @@
 #include "redag/model/callback_match.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/runtime/engine.hpp"
-#include "redag/runtime/mode.hpp"
+#include "redag/runtime/setup.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag_rclcpp {

@@ -18,9 +18,9 @@
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
-#include "redag/metrics/summary.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/events_file.hpp"
+#include "redag_analysis/metrics/summary.hpp"
 #include "workload/text_table.hpp"
 #include "workload/workload_run.hpp"
 

@@ -6,12 +6,12 @@
 #include <numeric>
 
 #include "redag/base/text.hpp"
-#include "redag/metrics/jobs.hpp"
-#include "redag/metrics/jobs_csv.hpp"
-#include "redag/metrics/perfetto.hpp"
-#include "redag/metrics/summary_json.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/jobs_csv.hpp"
+#include "redag_analysis/metrics/perfetto.hpp"
+#include "redag_analysis/metrics/summary_json.hpp"
 #include "workload/text_table.hpp"
 #include "workload/workload_run.hpp"
 

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/metrics/check_report.hpp"
-#include "redag/metrics/summary.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/check_report.hpp"
+#include "redag_analysis/metrics/summary.hpp"
 
 namespace redag_rclcpp {
 

@@ -1,19 +1,25 @@
-// The smallest program outside this repository that uses the library: it fails where a symbol, a header or a dependency
-// of the installation is missing.
+// A small program outside this repository that uses the library: it fails where a symbol, a header or a dependency of
+// the installation is missing.
 #include <cstdio>
 
-#include "redag/base/time.hpp"
-#include "redag/model/workload.hpp"
-#include "redag/version.hpp"
+#include "redag/redag.hpp"
 
 int main() {
-  redag::Workload workload;
-  redag::Task task;
-  task.wcet = redag::kMillisecond;
-  task.period = 4 * redag::kMillisecond;
-  workload.dags.push_back(redag::Dag{.name = "control", .tasks = {task}});
+  using namespace std::chrono_literals;
+  redag::runtime::DagBuilder control("control");
+  int runs = 0;
+  const auto sense = control.timer("sense", 5ms, [] {});
+  control.data("act", {sense}, [&runs] { ++runs; });
 
-  const bool right = workload.task_count() == 1 && workload.utilization() == 0.25;
-  std::printf("redag %s: %s\n", redag::kVersion, right ? redag::format_duration(task.period).c_str() : "wrong");
+  redag::runtime::ExecutorOptions options;
+  options.workers = 1;
+  options.preemption = redag::PreemptionMode::None;
+  redag::runtime::Executor executor(options);
+  const redag::DagId dag = executor.add(std::move(control));
+  executor.run_for(100ms);
+
+  const auto stats = executor.stats(dag);
+  const bool right = runs > 0 && stats.size() == 2 && stats[0].jobs.finished > 0;
+  std::printf("redag %s: %d runs of %s\n", redag::kVersion, runs, stats[1].task.c_str());
   return right ? 0 : 1;
 }

@@ -5,7 +5,7 @@
 #include <atomic>
 #include <utility>
 
-#include "redag/testing/explorer.hpp"
+#include "redag_testing/explorer.hpp"
 
 namespace redag {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "redag/base/thread_annotations.hpp"
-#include "redag/testing/explorer.hpp"
+#include "redag_testing/explorer.hpp"
 
 namespace redag {
 

@@ -4,7 +4,7 @@
 #include <ctime>
 
 #include "redag/base/time.hpp"
-#include "redag/testing/explorer.hpp"
+#include "redag_testing/explorer.hpp"
 
 namespace redag::runtime {
 

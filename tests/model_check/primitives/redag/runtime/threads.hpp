@@ -13,7 +13,7 @@
 
 #include "redag/base/result.hpp"
 #include "redag/runtime/realtime_share.hpp"
-#include "redag/testing/explorer.hpp"
+#include "redag_testing/explorer.hpp"
 
 namespace redag::runtime {
 

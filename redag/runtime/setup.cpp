@@ -1,4 +1,4 @@
-#include "redag/runtime/mode.hpp"
+#include "redag/runtime/setup.hpp"
 
 #include <fmt/format.h>
 #include <sched.h>

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "redag/analysis/bound.hpp"
-#include "redag/analysis/global.hpp"
+#include "redag_analysis/core/bound.hpp"
+#include "redag_analysis/many_workers/global.hpp"
 
 namespace redag::analysis::global {
 

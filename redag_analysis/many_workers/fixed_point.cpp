@@ -1,9 +1,9 @@
-#include "redag/analysis/fixed_point.hpp"
+#include "redag_analysis/many_workers/fixed_point.hpp"
 
 #include <cstddef>
 #include <utility>
 
-#include "redag/analysis/effort.hpp"
+#include "redag_analysis/core/effort.hpp"
 
 namespace redag::analysis::global {
 namespace {

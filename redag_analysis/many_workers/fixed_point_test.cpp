@@ -1,4 +1,4 @@
-#include "redag/analysis/fixed_point.hpp"
+#include "redag_analysis/many_workers/fixed_point.hpp"
 
 #include <gtest/gtest.h>
 

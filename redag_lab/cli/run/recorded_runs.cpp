@@ -1,4 +1,4 @@
-#include "redag/cli/recorded_runs.hpp"
+#include "redag_lab/cli/run/recorded_runs.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -6,9 +6,9 @@
 #include <system_error>
 
 #include "redag/base/text.hpp"
-#include "redag/cli/files.hpp"
-#include "redag/cli/json.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
 
 namespace redag::cli {
 namespace {

@@ -1,12 +1,12 @@
-#include "redag/cli/variant.hpp"
+#include "redag_lab/cli/terminal/variant.hpp"
 
 #include <algorithm>
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
-#include "redag/cli/options.hpp"
 #include "redag/model/validate.hpp"
-#include "redag/sched/executors.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
 
 namespace redag::cli {
 

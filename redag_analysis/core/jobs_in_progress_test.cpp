@@ -1,8 +1,8 @@
-#include "redag/analysis/jobs_in_progress.hpp"
+#include "redag_analysis/core/jobs_in_progress.hpp"
 
 #include <gtest/gtest.h>
 
-#include "redag/testing/timeline.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -1,11 +1,11 @@
-#include "redag/analysis/jobs_in_progress.hpp"
+#include "redag_analysis/core/jobs_in_progress.hpp"
 
 #include <algorithm>
 #include <map>
 #include <utility>
 #include <vector>
 
-#include "redag/analysis/effort.hpp"
+#include "redag_analysis/core/effort.hpp"
 
 namespace redag::analysis {
 namespace {

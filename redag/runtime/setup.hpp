@@ -9,15 +9,11 @@
 
 #include "redag/base/result.hpp"
 #include "redag/model/workload.hpp"
+#include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/realtime_share.hpp"
 #include "redag/sched/scheduler.hpp"
 
 namespace redag::runtime {
-
-struct Mode {
-  PreemptionMode mode = PreemptionMode::None;  // never Auto
-  std::string reason;                          // empty: it was asked for
-};
 
 /// SCHED_FIFO priorities: jobs have 1 to `top_job`, level 0 the top and the last one for demoted jobs; the release
 /// timer is above all of them. The highest priorities are left to the kernel's own threads.

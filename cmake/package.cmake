@@ -1,0 +1,56 @@
+# What the packages redag/, redag_analysis/ and redag_lab/ have in common. Included by settings.cmake.
+include(CMakePackageConfigHelpers)
+cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH redag_repository)
+
+# Stops where package.xml states another version than the project.
+function(redag_check_version)
+  file(STRINGS ${PROJECT_SOURCE_DIR}/package.xml stated REGEX "<version>")
+  if(NOT stated MATCHES "<version>${PROJECT_VERSION}</version>")
+    message(FATAL_ERROR "${PROJECT_NAME}/package.xml says '${stated}', its CMakeLists.txt says '${PROJECT_VERSION}'")
+  endif()
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/package.xml)
+endfunction()
+
+# redag_sources(<variable> <folder>...): the sources of these folders without their tests. Adding a file needs no edit.
+function(redag_sources variable)
+  set(sources)
+  foreach(folder IN LISTS ARGN)
+    file(GLOB_RECURSE found CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.cpp)
+    list(APPEND sources ${found})
+  endforeach()
+  list(FILTER sources EXCLUDE REGEX "_test\\.cpp$")
+  set(${variable} ${sources} PARENT_SCOPE)
+endfunction()
+
+# redag_add_library(<target> <folder>...): the library of this project. Headers are included by their path from the
+# repository's root, here and once installed.
+function(redag_add_library target)
+  redag_sources(sources ${ARGN})
+  add_library(${target} ${sources})
+  set_target_properties(${target} PROPERTIES
+    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  target_include_directories(${target} PUBLIC
+    $<BUILD_INTERFACE:${redag_repository}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+endfunction()
+
+# redag_install_library(<target>...): for find_package(<project>), with the config file that stands in the project's folder.
+function(redag_install_library)
+  set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/${PROJECT_NAME})
+  install(TARGETS ${ARGN} EXPORT ${PROJECT_NAME}_targets
+    RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR}
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(EXPORT ${PROJECT_NAME}_targets NAMESPACE redag:: DESTINATION ${package_dir})
+  list(GET ARGN 0 library)
+  get_target_property(library_type ${library} TYPE)
+  configure_package_config_file(${PROJECT_SOURCE_DIR}/${PROJECT_NAME}-config.cmake.in
+    ${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config.cmake INSTALL_DESTINATION ${package_dir})
+  # Before 1.0 a new minor version may break what uses the old one.
+  write_basic_package_version_file(${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config-version.cmake
+    COMPATIBILITY SameMinorVersion)
+  install(FILES ${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config.cmake
+    ${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config-version.cmake DESTINATION ${package_dir})
+  # colcon and ros2 look packages up here.
+  install(FILES ${PROJECT_SOURCE_DIR}/package.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/${PROJECT_NAME})
+endfunction()

@@ -1,0 +1,14 @@
+// The whole interface of the library: what a program includes that runs its own DAGs, or a workload's.
+#pragma once
+
+#include "redag/base/result.hpp"
+#include "redag/base/time.hpp"
+#include "redag/model/job_event.hpp"
+#include "redag/model/validate.hpp"
+#include "redag/model/workload.hpp"
+#include "redag/model/workload_yaml.hpp"
+#include "redag/runtime/dag_builder.hpp"
+#include "redag/runtime/executor.hpp"
+#include "redag/runtime/executor_options.hpp"
+#include "redag/runtime/preemption_point.hpp"
+#include "redag/version.hpp"
