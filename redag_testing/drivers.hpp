@@ -17,7 +17,7 @@ struct RunSpec {
   std::uint64_t seed = 1;
 };
 
-/// Virtual time, redag/sim.
+/// Virtual time, redag_analysis/sim.
 struct SimulatorDriver {
   static trace::Trace run(const RunSpec &spec);
 };

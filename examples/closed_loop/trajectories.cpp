@@ -12,7 +12,7 @@
 namespace closed_loop {
 namespace {
 
-// Sizes in pixels; colours as in the plots of redag/experiment: told apart with any colour vision.
+// Sizes in pixels; colours as in the plots of redag_lab/experiment: told apart with any colour vision.
 constexpr double kWidth = 960;
 constexpr double kPanel = 104;
 constexpr double kLeft = 150;

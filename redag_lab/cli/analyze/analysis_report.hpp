@@ -1,4 +1,4 @@
-// What `analyze` says about a report of redag/analysis: where every task and DAG stands, in a table, in words, as JSON.
+// What `analyze` says about a report of redag_analysis: where every task and DAG stands, in a table, in words, as JSON.
 // Decides nothing about bounds. Pure functions.
 #pragma once
 

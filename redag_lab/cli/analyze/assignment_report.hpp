@@ -1,4 +1,4 @@
-// What `assign` says about an assignment of redag/analysis: what it would change, what that gains, what else was tried.
+// What `assign` says about an assignment of redag_lab/search: what it would change, what that gains, what else was tried.
 // Pure functions.
 #pragma once
 

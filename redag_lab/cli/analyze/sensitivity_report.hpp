@@ -1,4 +1,4 @@
-// What `sensitivity` says about margins of redag/analysis: a table, words, JSON. Pure functions.
+// What `sensitivity` says about margins of redag_lab/search: a table, words, JSON. Pure functions.
 #pragma once
 
 #include <optional>
