@@ -27,6 +27,12 @@ class Pages(unittest.TestCase):
         self.assertGreater(len(declared), 15)
         self.assertEqual(sorted(first_cells("docs/ros2.md", "Parameters")), sorted(declared))
 
+    def test_the_map_has_every_page(self):
+        docs = SOURCE / "docs"
+        linked = {(docs / target).resolve() for target in re.findall(r"\]\(([^)#]+)", (docs / "README.md").read_text(encoding="utf-8"))}
+        pages = {f.resolve() for f in docs.rglob("*.md") if not re.match(r"\d{4}-", f.name)} - {(docs / "README.md").resolve()}
+        self.assertEqual(pages - linked, set())
+
     def test_contributing_lists_the_targets_of_the_makefile(self):
         makefile = (SOURCE / "Makefile").read_text(encoding="utf-8")
         targets = set(re.findall(r"^([a-z]+):.*## ", makefile, re.M)) - {"help", "demo", "install", "clean"}
