@@ -28,16 +28,18 @@ class Pages(unittest.TestCase):
         self.assertEqual(sorted(first_cells("docs/ros2.md", "Parameters")), sorted(declared))
 
     def test_the_map_has_every_page(self):
-        docs = SOURCE / "docs"
-        linked = {(docs / target).resolve() for target in re.findall(r"\]\(([^)#]+)", (docs / "README.md").read_text(encoding="utf-8"))}
-        pages = {f.resolve() for f in docs.rglob("*.md") if not re.match(r"\d{4}-", f.name)} - {(docs / "README.md").resolve()}
-        self.assertEqual(pages - linked, set())
+        """A page of docs/ is linked from the README.md of that folder, or of its own one."""
+        docs = (SOURCE / "docs").resolve()
+        maps = {docs / "README.md", *docs.glob("*/README.md")}
+        linked = {(page.parent / target).resolve() for page in maps
+                  for target in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8"))}
+        self.assertEqual(set(docs.rglob("*.md")) - linked - {docs / "README.md"}, set())
 
     def test_contributing_lists_the_targets_of_the_makefile(self):
         makefile = (SOURCE / "Makefile").read_text(encoding="utf-8")
         targets = set(re.findall(r"^([a-z]+):.*## ", makefile, re.M)) - {"help", "demo", "install", "clean"}
-        listed = {cell[len("make "):] for cell in first_cells("CONTRIBUTING.md", "Build and test") if cell.startswith("make ")}
-        self.assertEqual(listed, targets)
+        cells = first_cells("CONTRIBUTING.md", "Build and test")
+        self.assertEqual({cell[len("make "):] for cell in cells if cell.startswith("make ")}, targets)
 
     def test_contributing_says_what_ci_runs(self):
         stages = set(re.findall(r"^stage \w+ make (\w+)", (SOURCE / ".ci" / "run").read_text(encoding="utf-8"), re.M))
