@@ -9,6 +9,7 @@
 #include <csignal>
 #include <thread>
 
+#include "redag/runtime/parker.hpp"
 #include "redag/runtime/preemption_point.hpp"
 
 namespace redag::runtime {

@@ -99,7 +99,7 @@ Method dag_one_worker_preemptive() {
   Method method;
   method.name = "dag_one_worker_preemptive";
   method.subject = Subject::Dag;
-  method.cite = "as rta_preemptive, with C = volume of the DAG (docs/analysis.md, \"DAGs on one worker\")";
+  method.cite = "as rta_preemptive, with C = volume of the DAG (docs/analysis.md, \"One worker\")";
   method.assumptions =
       "one worker, full preemption, static priorities; R <= T for DAGs; timers that keep their periods where edges "
       "join rates; jitter, groups with inheritance, shared levels, max_active";
@@ -112,7 +112,7 @@ Method dag_one_worker_deferred() {
   Method method;
   method.name = "dag_one_worker_deferred";
   method.subject = Subject::Dag;
-  method.cite = "as rta_deferred, with C = volume of the DAG (docs/analysis.md, \"DAGs on one worker\")";
+  method.cite = "as rta_deferred, with C = volume of the DAG (docs/analysis.md, \"One worker\")";
   method.assumptions =
       "one worker, jobs run to completion or to a preemption point, static priorities; R <= T for DAGs; timers that "
       "keep their periods where edges join rates; jitter, max_active; groups unless cooperative";

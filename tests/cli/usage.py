@@ -38,6 +38,20 @@ class Usage(Case):
             for option in re.findall(r"--[a-z-]+", examples):
                 self.assertIn(option, options, command)
 
+    def test_the_page_has_the_commands_and_their_options(self):
+        """docs/cli.md: every command has a row, and an option named in a command's section is one of that command."""
+        page = (SOURCE / "docs" / "cli.md").read_text(encoding="utf-8")
+        helps = {" ".join(command): redag(*command, "--help").stdout for command in [*COMMANDS, ["recover"]]}
+        commands = re.findall(r"^  ([a-z][a-z-]+) {2,}", redag("--help").stdout.split("Subcommands:")[1], re.M)
+        for command in commands:
+            self.assertRegex(page, rf"(?m)^\|.*`{command}[ `].*\|")
+        for section in re.split(r"(?m)^## ", page):
+            heading = re.match(r"`([a-z-]+)`\n", section)
+            texts = [text for name, text in helps.items() if not heading or name.split()[0] == heading[1]]
+            self.assertTrue(texts, heading)
+            for option in set(re.findall(r"`(?:[a-z]+ )*(--[a-z-]+)", section)) - {"--help"}:
+                self.assertTrue(any(re.search(rf"{option}\b", text) for text in texts), (heading and heading[1], option))
+
     def test_mistakes_are_near_something(self):
         self.expect(redag("simualte", self.cart), 2, "did you mean 'simulate'?")
         self.expect(redag("simulate", self.cart, "--durtion", "1s"), 2, "did you mean '--duration'?")
