@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 # The front door: each target does one everyday thing from a fresh clone on. What it runs is plain CMake and the scripts
 # of tools/; nothing is built here that `cmake --preset` could not build.
 .DEFAULT_GOAL := help
@@ -48,6 +51,8 @@ instructions: ## what the scheduler executes for a job, counted by valgrind: the
 lint: ## layers, references, commits, formatting, locks, and clang-tidy on the files that differ from the main branch
 	@tools/bootstrap lint
 	tools/check_layers
+	tools/check_prose
+	tools/check_spdx
 	tools/check_references
 	tools/check_commits
 	tools/format --check

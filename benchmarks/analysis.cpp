@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Speed of the bounds for several workers. Guan: 20 tasks on 4 workers, bare numbers and as a method with its terms.
 // Melani and its kin: sets of 2-5 DAGs of 3-9 tasks on 4 workers. Rates are task sets a second.
 #include <benchmark/benchmark.h>

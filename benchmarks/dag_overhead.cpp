@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a node of a DAG costs when its body is empty: chains, fan-outs and random graphs of 64 nodes, started anew by
 // their last node. Beside it the flow graph of oneTBB and, where its headers are found, Taskflow: both start nodes in
 // no order of priority and time none of them. cpu_ns/node counts all threads.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a job costs beside its body: processor time with and without tracing, context switches; and what an executor
 // costs that has nothing to do.
 #include <benchmark/benchmark.h>

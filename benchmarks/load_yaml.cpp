@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Reading a workload file: DAGs of ten tasks each, as generated.
 #include <benchmark/benchmark.h>
 

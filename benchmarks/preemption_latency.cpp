@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How fast a more urgent job starts when every processor is busy with less urgent ones, in os mode: from release() to
 // the first line of its body. Beside it, sample by sample in the same run, the least that Linux takes for the same
 // thing: a futex wake of a SCHED_FIFO thread that has to preempt one of the same busy threads.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The ready queue beside the queues that a user would take instead: each thread takes the most urgent of 1000 items and
 // inserts it again at another of 64 levels. Ordered: ours (by levels, and the heap for dynamic policies),
 // std::priority_queue, tbb::concurrent_priority_queue. Not ordered, for comparison: moodycamel and boost::lockfree,

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How fast a job starts on a worker that sleeps: from release() to the first line of its body, and from the point on
 // the grid at which the release timer has to release it. Beside it, sample by sample in the same run, the least that
 // Linux takes for the same thing: a futex wake of a thread, and a thread that sleeps until an absolute time. All

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Task sets a second on one worker: n tasks, UUniFast utilizations, log-uniform periods of 10 ms to 1 s, D = T,
 // rate-monotonic. ExactTest: yes or no from bare numbers; ResponseTimes: rta_preemptive with all its terms.
 #include <benchmark/benchmark.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the benchmarks of the scheduler run: a workload of many independent tasks, and jobs on their way through the
 // scheduler.
 #pragma once

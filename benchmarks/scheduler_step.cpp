@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What one job costs the scheduler: release + dispatch + complete + dispatch, by number of tasks and DAGs, with and
 // without bounds; and the simulator's speed.
 #include <benchmark/benchmark.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Speed of what acts on the bounds: the critical scaling factor of all wcets, all knobs, and Audsley's assignment, on
 // sets of 20 independent tasks. Rates are task sets a second.
 #include <benchmark/benchmark.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Jobs a second when there are always more ready jobs than workers: what scheduling costs at most, and whether it
 // collapses with more workers than processors. Each of 64 tasks releases its next job from its body. Beside it oneTBB,
 // which takes its tasks in no order.

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 # Every package that is looked for, by whichever CMakeLists.txt is the top one: imported targets are seen from that folder
 # and those below it only. tools/bootstrap installs them all.
 find_package(fmt REQUIRED)

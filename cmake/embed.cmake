@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 # Writes page_assets.cpp, which holds the report page's files as text. Run when building, in script mode:
 #   cmake -DOUTPUT=page_assets.cpp -DPAGE=redag_lab/report/page -DECHARTS=third_party/echarts -P embed.cmake
 cmake_minimum_required(VERSION 3.22)

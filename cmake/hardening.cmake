@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 # Optimised builds check buffer sizes, guard stacks, mark where indirect jumps may land, map relocations read-only and have
 # no executable stack; what it costs: docs/promises.md. Debug builds check the standard library's preconditions instead.
 # Neither goes together with the sanitizers' own checks of memory.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Part of builds with sanitizers: threads have the SCHED_FIFO priorities that they are given in name only. The kernel
 // answers that it has set them, and does not; pthread_getschedparam() says what was asked for, since the C library
 // keeps it. A sanitizer's own locks spin and yield: a real-time thread that waits for one never yields to the thread

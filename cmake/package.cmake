@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 # What the packages redag/, redag_analysis/ and redag_lab/ have in common. Included by settings.cmake.
 include(CMakePackageConfigHelpers)
 cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH redag_repository)

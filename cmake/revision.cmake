@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 # Writes build_revision.cpp, which holds the git revision of the sources. Run at every build, in script mode; the file
 # changes only when the revision does, so that a commit compiles this one file again and nothing else:
 #   cmake -DOUTPUT=build_revision.cpp -DSOURCE=. [-DREVISION=given] -P revision.cmake

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 # REDAG_SANITIZE=address,undefined or thread: applied to everything, the library included.
 set(REDAG_SANITIZE "" CACHE STRING "Sanitizers, as in -fsanitize=<value>")
 if(REDAG_SANITIZE)

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 # What every target of this project is built with. Included by whichever CMakeLists.txt is the top one: the
 # repository's, or that of redag/, redag_analysis/ or redag_lab/ when one of these is built alone.
 set(CMAKE_CXX_STANDARD 20)

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 # The tests that stand beside the sources: one program for each group of folders, redag_<group>_test, and each of its tests
 # in ctest as <group>.<name>, with the group as label (`ctest -L '^sched$'`). Included by the repository's CMakeLists.txt.
 set(base redag/base)

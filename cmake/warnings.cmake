@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 # redag_warnings: what every target of this project is compiled with.
 add_library(redag_warnings INTERFACE)
 target_compile_options(redag_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion

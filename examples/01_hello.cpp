@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The smallest program: one task every 100 ms, and a body that ends the run.
 #include <cstdio>
 

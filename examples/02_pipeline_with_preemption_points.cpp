@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Two rates on one worker: a control chain every 5 ms and a detector that computes for 40 ms. Three runs: without
 // preemption the chain waits for the detector, at preemption points it runs in between, and where the process may use
 // SCHED_FIFO (preemption: os) the detector needs no preemption points at all.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What happens when a body throws, and when it computes for too long.
 #include <cstdio>
 #include <stdexcept>

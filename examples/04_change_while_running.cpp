@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // DAGs that come and go while others run, and Ctrl-C.
 #include <csignal>
 #include <cstdio>

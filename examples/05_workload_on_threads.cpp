@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A workload from a file, on real threads, with bodies that use the processor time the file says: what a run would be
 // like before the callbacks are written.
 //

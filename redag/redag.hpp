@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The whole interface of the library: what a program includes that runs its own DAGs, or a workload's.
 #pragma once
 

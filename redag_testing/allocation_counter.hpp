@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Counts heap allocations of the calling thread. Linking this replaces the global operator new.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The property that every bound must have: no job of a simulated run answers later than the bound says. Random
 // workloads, each simulated several times with other offsets, sporadic gaps, execution times and jitter, under the
 // scheduler that runs for real. Generic over analysis::Method. Not thread-safe.

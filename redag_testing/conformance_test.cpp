@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What every driver owes every workload, under every policy and preemption mode: the trace passes the checker.
 #include <cstdlib>
 

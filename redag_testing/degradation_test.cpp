@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A degraded DAG stays in step: of tasks that edges join, HI mode lets through the same periods, whatever each of them
 // saw first after it began. For the scheduler and the reference scheduler alike, which would agree on a common mistake.
 #include <algorithm>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // PriorityScheduler against ReferenceScheduler: the same events must give the same decisions.
 #include <algorithm>
 #include <cstdlib>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The drivers behind one interface, for suites that run the same workload on each of them.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The search: which of the fibers goes on, and what other orders are to be tried.
 #include "redag_testing/explorer.hpp"
 

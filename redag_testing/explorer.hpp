@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Runs a concurrent program in every interleaving that can make a difference: its threads are fibers of one thread, and
 // at each operation that another thread could notice the explorer chooses who goes on. Stateless depth-first search
 // with dynamic partial-order reduction by source sets (Abdulla, Aronis, Jonsson and Sagonas, POPL 2014) and sleep sets

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The program's threads as fibers of one thread: each runs to its next operation, and stops there until it is chosen.
 #include <cxxabi.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The explorer's own types: fibers, what they are about to do, and the tree of what was tried. For explorer*.cpp only.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Judges what the kernel ran by what was decided: at every instant the processors belong to the most urgent started
 // jobs. Levels come from a scheduler that was told the same (RecordingScheduler), what ran from the kernel's record, so
 // that neither the engine nor its trace has a say. A pure function.

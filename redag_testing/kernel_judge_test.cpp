@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The judge itself, by records written by hand: one processor or two, and a beat of each at every millisecond.
 #include "redag_testing/kernel_judge.hpp"
 

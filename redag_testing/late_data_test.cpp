@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A task of which two jobs can be in progress may end them in the other order: what its successors then get. For the
 // scheduler and for the reference scheduler alike, which would agree on a common mistake.
 #include <memory>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A day of scheduler time in the simulator, for random systems: what a long run could wear out. REDAG_LONG_RUN=<n>: so
 // many systems (24), each for 24 hours (otherwise for 2); REDAG_LONG_RUN_SEED=<s>: the first one's seed (1).
 #include <gtest/gtest.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A driver whose every step a test takes by hand: no clock, no threads. Keeps what each worker runs, as a real driver
 // would, and collects the events.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Drives a scheduler by the names of tasks, for tests of who runs next.
 #pragma once
 

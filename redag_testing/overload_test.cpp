@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Budgets and modes as people would check them: schedules worked out by hand, and what jobs of high criticality are
 // owed however large the rest of the load is.
 #include <algorithm>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Small workloads that provoke: equal periods and deadlines, edges between rates, AND-joins, groups across DAGs, tight
 // bounds and queues, several tasks a level. For properties of schedulers; generate.hpp makes realistic ones. Pure
 // functions of their generator.

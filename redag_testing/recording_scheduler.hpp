@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A scheduler that notes what it is told, so that another one can be told the same afterwards: then what was decided is
 // known without asking who decided it. Records nothing of cooperative preemption, and ids must not be used again.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // docs/model.md written down a second time, as plainly as possible: at each dispatch() every live job is looked at,
 // sorted by the total order and decided. For tests: what PriorityScheduler decides must equal this. It shares with the
 // library's scheduler the interface and assign_priorities() (for levels only), nothing else. Ids are never used again.

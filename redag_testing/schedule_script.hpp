@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A random sequence of what can happen to a scheduler, and two schedulers driven by the same sequence side by side: the
 // engine of differential_test.cpp. Virtual time; deterministic.
 #pragma once

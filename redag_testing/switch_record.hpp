@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the kernel itself says about which thread it ran on which processor: its context switches and its timer's
 // interrupts, by perf_event_open. Needs CAP_PERFMON, or root, or kernel.perf_event_paranoid <= 0. One thread uses it.
 #pragma once

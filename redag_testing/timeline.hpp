@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Schedules as text, for golden tests: what ran where and when, a line a job, readable in a failure message.
 #pragma once
 

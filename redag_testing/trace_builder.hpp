@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Traces written by hand, for tests of what reads them: one call an event, times in milliseconds, tasks by name.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What workloads/contention.yaml says about itself.
 #include <gtest/gtest.h>
 

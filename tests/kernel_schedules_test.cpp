@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the kernel really ran, in `os` mode: random workloads on real threads, each judged by the kernel's own record of
 // its context switches (redag_testing/kernel_judge.hpp). Levels come from the reference scheduler without a limit on
 // threads, so that neither the scheduler, nor the engine, nor its pool is asked whether it was right.

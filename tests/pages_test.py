@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """Tables of pages against the code that they describe.
 
 Usage: pages_test.py SOURCE_DIR. Uses the standard library only. What the program itself can be asked is compared by

@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """What `rosdep install --from-paths` has to resolve: the dependencies in our package.xml files.
 
 Usage: rosdep_test.py SOURCE_DIR. Uses the standard library only. A key that rosdep does not know stops the installation

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Jobs on their way through the scheduler, for tools/count_instructions to count what that takes.
 //
 //   redag_scheduler_steps TASKS PREEMPTION MAX_ACTIVE STEPS       PREEMPTION: 0 none, 1 cooperative, 2 full

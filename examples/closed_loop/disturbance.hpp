@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Another program that takes processors and caches from the threads under test, as long as this object lives. Not
 // thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // One executor, one seed, all plants: in virtual time (exact, the same on every machine) or on threads (this machine).
 #pragma once
 

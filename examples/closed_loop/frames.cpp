@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Drawn by MuJoCo itself, in software: OSMesa needs neither screen nor graphics card.
 #include <stdexcept>
 

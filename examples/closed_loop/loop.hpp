@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Plants in the hands of jobs: which job senses and which actuates, and when its effect begins. The one place where a
 // schedule meets physics, for both worlds: virtual time reports when jobs start and end, threads call from inside them.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The gain of the linear-quadratic regulator in discrete time, by iterating the Riccati equation: for the handful of
 // states of a plant. Pure.
 #pragma once

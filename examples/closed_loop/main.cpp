@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Unstable plants under feedback that shares its workers with perception and planning: what an executor's misses do to
 // a robot. README.md beside this file explains it.
 //

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a run looked like: angles over time as SVG, and frames of the scene as PNG where MuJoCo can draw without a
 // screen.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The plants: cart-poles with poles of several lengths and a planar quadrotor, as MuJoCo models, and the feedback that
 // keeps them upright. A plant's time is virtual or wall-clock time, whatever calls it: physics is stepped to "now" when
 // somebody senses or actuates, never later than the clock and never ahead of it.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Signals that are to run their handlers elsewhere. Any thread.
 #pragma once
 

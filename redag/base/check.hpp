@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Broken invariants. REDAG_CHECK stays on in release builds: a scheduler that goes on after losing count of a job is
 // worse than one that stops and says where.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The three futex operations this project uses (man 2 futex), for words that are private to the process. All waits can
 // wake spuriously; callers loop. Any thread; futex_wake is async-signal-safe.
 #pragma once

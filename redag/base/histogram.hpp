@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Durations in buckets that grow with them (8 an octave: a percentile is at most 1/8 above the true one). Any thread;
 // adding allocates nothing and takes no lock.
 #pragma once

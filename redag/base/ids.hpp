@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Typed indices. An id is a position in the array that owns the thing it names; the tag keeps a task's index from
 // being used where a DAG's is meant.
 #pragma once

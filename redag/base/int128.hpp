@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // 128-bit integers for exact intermediate products; a compiler extension (GCC and Clang), spelled once.
 #pragma once
 

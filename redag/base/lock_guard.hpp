@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // std::lock_guard that clang's -Wthread-safety understands: libstdc++'s is not annotated.
 #pragma once
 

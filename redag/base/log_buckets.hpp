@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Buckets whose width grows with the value: 2^kBits of them an octave, so that a bucket is at most 1 / 2^kBits of its
 // values wide. Values below 2^(kBits + 1) have a bucket each. Pure functions.
 #pragma once

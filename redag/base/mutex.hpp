@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // std::mutex that clang's -Wthread-safety understands, for threads whose priorities do not matter: otherwise PiMutex.
 #pragma once
 

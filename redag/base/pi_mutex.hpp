@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A mutex whose owner inherits the priority of the most urgent thread that waits for it (PTHREAD_PRIO_INHERIT): a
 // preempted low-priority owner delays a high-priority waiter by short critical sections only. BasicLockable and
 // Lockable, for LockGuard, std::lock_guard and std::unique_lock. Use it for data that callbacks of different rates

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 #include "redag/base/pi_mutex.hpp"
 
 #include <gtest/gtest.h>

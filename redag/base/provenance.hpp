@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Where a result comes from: the one block that every result file and page carries (docs/results_format.md).
 // Comparisons of results leave it out; all else in a simulated result is the same for the same seed. Holds the command
 // line and no environment. Thread-safe.

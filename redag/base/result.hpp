@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a function returns when its input can be bad: a value, or every mistake found, each with its place and a hint.
 #pragma once
 

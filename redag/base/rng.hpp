@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Random numbers that are the same on every machine and standard library, which <random>'s distributions are not.
 // Generator: xoshiro256++ seeded through SplitMix64 (Blackman & Vigna, https://prng.di.unimi.it).
 #pragma once

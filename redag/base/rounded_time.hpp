@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Durations for people that must not promise more than they are: four significant digits, rounded to the safe side.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Numbers as text for people, the same in tables, verdicts and pages; and what is asked of texts from outside before
 // they are parsed. Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What clang's -Wthread-safety is told: which mutex guards a member, which one a function needs. Nothing for other
 // compilers. tools/thread_safety (make lint) checks it.
 // https://clang.llvm.org/docs/ThreadSafetyAnalysis.html

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Time in this project: int64 nanoseconds. A `Time` is a point on a steady clock (or the simulator's), a `Duration` a
 // difference of two. Text form: a decimal number and a unit, "5ms", "1.5us".
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a live page says, as values: an executor with its DAGs and tasks at one moment. No memory shared with anybody.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // From counters that only grow to what people want to see: percentiles, sums of DAGs, and what happened lately. A value
 // with memory of earlier samples; no clock, no thread.
 #pragma once

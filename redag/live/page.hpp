@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The live page: what a running executor tells `redag top`, as bytes in shared memory. Layout only, with its version;
 // who writes and reads it is in writer.hpp and reader.hpp, and the words are in docs/live_page.md. Everything is
 // native-endian; times and durations are int64 nanoseconds; a change of meaning is a new version, and what is appended

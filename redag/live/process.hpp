@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Who a process is, beyond a number that is used again: when it began, and in which namespace its number counts.
 // Reads /proc; any thread.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Keeps a live page up to date: a thread of normal priority that now and then asks for figures and writes them. What it
 // asks must not keep real-time threads waiting. The page is there from the constructor's return to the destructor's.
 //

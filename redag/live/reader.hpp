@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The reading end of live pages: finds them, and makes values of them. What it reads can be anything: a page is copied
 // before it is looked at, every size in it is checked, its names are made fit for a terminal, and pages that somebody
 // else could have written are refused. No state; any thread.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The writing end of a live page: a file in shared memory that only its owner can read, gone when this is destroyed.
 // Not thread-safe. Writing allocates nothing but the memory of rows that were never used before.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Which task of a workload is which ROS 2 callback: patterns of the file against callbacks that were found at run time,
 // and what to tell people where the two do not meet. For set-up, not for the hot path. Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What one job of one task asks for: its execution time and its release jitter. Both depend on (seed, task, job number)
 // alone, so every executor, simulated or real, is given the same jobs.
 #pragma once

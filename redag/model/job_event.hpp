@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The vocabulary of every trace: what can happen to a job. A stream of events is in decision order, and its times never
 // decrease; what was measured more exactly than the decision stands in `value`.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a machine adds to the jobs of a workload, as `redag calibrate` measures it, and the file that holds it
 // (docs/calibration.md). Plain values; nothing here knows how they are measured or charged. Pure functions, except for
 // the file that is read.

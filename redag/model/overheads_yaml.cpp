@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The text form of a calibration: docs/calibration.md.
 #include <fmt/format.h>
 #include <yaml-cpp/emitter.h>

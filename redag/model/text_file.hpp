@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A small text file as one string, for the readers of YAML files. Reads at most what a reader accepts. Any thread.
 #pragma once
 

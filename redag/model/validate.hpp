@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The rules that a workload must keep, each stated once: for workloads built in C++ and, through workload_yaml.hpp,
 // for files. Rules about text (units, unknown keys, names that do not resolve) belong to the reader. Pure functions.
 #pragma once

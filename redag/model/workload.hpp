@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The model that docs/model.md defines ("Workload"): a workload is a platform, a policy and DAGs of tasks. Plain
 // values: no behaviour, no validation (see validate.hpp), no text form (see workload_yaml.hpp).
 #pragma once

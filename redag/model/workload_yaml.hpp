@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The text form of a workload (docs/workload_format.md): reading with every mistake reported at its line, and writing.
 // The rules about values are in validate.hpp. Pure functions, except for the file that is read or written.
 #pragma once

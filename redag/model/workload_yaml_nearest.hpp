@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // "Did you mean": the name nearest to a mistyped one. Pure.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // YAML text as a tree of nodes that know their place, for the readers of YAML files. Built from yaml-cpp's events
 // rather than its Node, because Node loses the place of keys, merges duplicate keys, follows aliases. Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Values of a YAML tree (durations, numbers, names, choices) for the readers of YAML files, and the list of mistakes
 // found on the way. Knows types, not rules: those of workloads are in validate.hpp. Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The clocks of the threaded runtime, in nanoseconds. Any thread; async-signal-safe.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The processor time that the jobs of one thread use. The kernel's answer is a system call of 0.2 to 0.5 us, so it is
 // not asked about jobs that are over within kShort on the clock: those are charged what the clock says, which is at
 // least what they used. One thread.

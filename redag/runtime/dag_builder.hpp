@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Builds one DAG of C++ functions for Executor::add(). Owns the tasks and their bodies until then. Not thread-safe.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What is wrong with a DAG that was built in C++, in the words of DagBuilder: which call, which argument or option. The
 // rules themselves are those of model/validate.hpp. Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The threaded runtime: owns worker threads, the lock around the scheduler, and the rings of events; carries out what
 // the scheduler decides, and decides nothing. Who releases jobs (release timer, rclcpp) and what jobs do (bodies) is
 // given from outside.

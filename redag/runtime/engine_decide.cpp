@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How the engine carries out the scheduler's decisions. Everything here runs under the engine's lock, allocates nothing
 // and looks nothing up by name.
 #include <algorithm>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // `os`: the kernel schedules preempted jobs too, so each started job's SCHED_FIFO priority has to follow its level at
 // every decision, running or suspended. The bodies wait instead of computing: nothing here depends on time.
 #include <gtest/gtest.h>

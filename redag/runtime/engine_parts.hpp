@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The engine's own types: its threads, its tasks, its lock. For engine*.cpp only.
 #pragma once
 

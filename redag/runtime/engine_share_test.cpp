@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Real-time throttling on threads: who leaves the real-time class before the kernel takes a processor from all. What
 // the kernel leaves is said by the test, and is mostly nothing: then what gives way does so all the time.
 #include <gtest/gtest.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the engine spares jobs that are over within CpuMeter::kShort, and that nobody notices it.
 #include <gtest/gtest.h>
 

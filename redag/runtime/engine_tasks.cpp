@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The engine's tasks: how they come, change and go while jobs run, and what they did.
 #include "redag/base/check.hpp"
 #include "redag/base/lock_guard.hpp"

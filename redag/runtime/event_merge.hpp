@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // One stream out of several rings: the scheduler's decisions, in their order, and the workers' events (Started and
 // Executed), by time. Pure; one thread. Relies on how the engine pushes: Dispatched before Started before Executed
 // before Finished, for each job.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The C++ interface of the threaded runtime: DAGs of functions, executed in priority order until stopped. Owns its
 // threads. Behaviour in every corner: docs/runtime.md.
 //

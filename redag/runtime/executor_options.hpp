@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What an Executor is asked for, what it tells its callbacks, and what it counts. Plain values.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What an Executor and a DagBuilder refuse, and in which words: the caller's, not those of the file format.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How long an idle thread looks for a job before it sleeps: counted in looks, so that an idle thread reads no clock.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Two ways for a thread to sleep on a futex word of its own. Parker: one owner parks, anybody unparks, a token that was
 // given early is not lost. Event: set once, any number of waiters. unpark() and set() are async-signal-safe.
 #pragma once

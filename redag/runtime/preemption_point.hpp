@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a job's body may call about itself: a preemption point, and its own processor time. Free functions; outside a
 // job they do nothing. Called from the thread that runs the job.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What SCHED_FIFO threads may use of each processor before the kernel takes it from all of them (real-time throttling),
 // kept as a credit, so that some of them can leave the real-time class in time. A value: time is an argument, in ns.
 #pragma once

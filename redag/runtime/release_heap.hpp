@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // When timer tasks release next: the release grid, jitter and order, without a clock or a thread. Allocates in add()
 // only. Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 #include "redag/runtime/release_heap.hpp"
 
 #include <gtest/gtest.h>

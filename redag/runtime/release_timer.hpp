@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // One thread that releases timer tasks on their grids: sleeps until the next release (absolute, CLOCK_MONOTONIC), and
 // reports all that are due as one instant. Makes no wake-ups while there is nothing to release. Owns its thread and a
 // ReleaseHeap. add(), remove(): any thread; stop(): async-signal-safe.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The job that a thread runs now, for preemption_point() and job_cpu_time(). Internal to the engine.
 #pragma once
 

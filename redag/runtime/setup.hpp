@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Which preemption mode a run can have on this machine, and why. Decides once, before threads exist.
 #pragma once
 

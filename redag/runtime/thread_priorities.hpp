@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // SCHED_FIFO priorities of threads that run one job each (0: an ordinary thread), changed as seldom as can be: a change
 // is a system call of about 1 us. A thread that is given a short job keeps a higher priority which it has from the job
 // before where that makes no difference among these threads, until it does. A value, without threads of its own.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the runtime asks of Linux for its threads: names, processors, SCHED_FIFO, timer slack, locked memory; and what
 // the process may ask for. No state of its own. Any thread.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Names jobs that do not end, while they do not: a thread that looks at an engine's jobs now and then. With it,
 // `on_budget` and HI mode take effect without preemption points, up to an interval late (Engine::watch). Owns its
 // thread. The engine must be started before and joined after.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Time is an argument of what is tested here; what needs real threads waits for what happens, never for a time.
 #include "redag/runtime/watchdog.hpp"
 

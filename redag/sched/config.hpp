@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a scheduler is told about its platform, and what it counts for each task. Plain values.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Which releases HI mode lets through (docs/model.md, "Criticality"). A pure function.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A live job as the scheduler keeps it: one slot of the job table. Slots are reused; nothing here outlives the job.
 #pragma once
 

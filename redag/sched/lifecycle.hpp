@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The rules every scheduler shares: jobs from release to end, precedence, overrun, admission, accounting, and the
 // events that tell of them. What runs where and when is left to the subclass: PriorityScheduler (ours) or a model of
 // another executor. Not thread-safe.

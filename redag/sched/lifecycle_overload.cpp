@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Budgets and criticality: what happens when a job has used a limit, and HI mode from its beginning to its end.
 #include <algorithm>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Priorities: the order of docs/model.md turned into numbers. A task's rank is its place in the order of its policy (0
 // first), its tier the place that it shares with its equals, its level the tier as the platform can tell it apart.
 #pragma once

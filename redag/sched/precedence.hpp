@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Precedence inside DAGs: which predecessor's data a task has not consumed yet. Knows edges and nothing of jobs' lives,
 // workers or priorities.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // ReDAG-RT's scheduler: one global order over all ready jobs of all DAGs (eqs. rm_priority and dispatch), per-DAG
 // bounds, exclusive groups, preemption. Semantics: docs/model.md. A value: no thread, no clock, no I/O; not
 // thread-safe.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Ready queues: the jobs that could run, most urgent first. Two of them behind one set of operations: LevelQueue for
 // static priorities, O(1) by a bitmap; HeapQueue for any order, O(log n) amortised. Both are intrusive (links live in
 // Job), so nothing is allocated after construction. They hold slots; the jobs themselves are passed in.

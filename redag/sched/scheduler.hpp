@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The scheduler's interface: events in, decisions out. An implementation is a value: no thread, no clock, no I/O, and
 // after construction no allocation (except in reconfiguration). Not thread-safe: the driver serialises the calls.
 //

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // events.jsonl, the lossless form of a trace: a line for the run, a line an event, a last line that proves that nothing
 // is missing. See docs/results_format.md. Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A record of a run that survives its process: events are written to disk while the run goes on, and recover() makes a
 // trace of them. What has been appended is kept if the process is killed; what was appended a second before is kept
 // if the machine loses power. Files: docs/results_format.md. One thread appends; a second one, of the recorder's own,

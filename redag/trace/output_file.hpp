@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A file that appears whole or not at all: written under a temporary name beside its place and renamed by commit().
 // Every error (unwritable directory, full disk) is kept and reported by commit(). Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A ring of JobEvents from one writing thread to one reading thread. Owns its storage, which is allocated once; push()
 // never blocks, allocates or fails loudly: what does not fit is dropped and counted. Threads: push() from one thread,
 // pop() from one other; capacity(), pushed() and dropped() from any.

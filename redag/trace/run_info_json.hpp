@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // RunInfo as a JSON object: the "run" of events.jsonl, summary.json and flight records. The workload stands in it as
 // its YAML text. Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A run, as it is kept: what happened (events, in decision order) and what a reader must know to judge it (RunInfo).
 // Plain values; see events_file.hpp for the text form and docs/results_format.md for the files.
 #pragma once

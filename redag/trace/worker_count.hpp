@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How many jobs could run at the same time, whatever the driver counts as workers.
 #pragma once
 

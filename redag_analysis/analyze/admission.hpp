@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Is there time for another DAG? For whoever adds some at run time. Pure function; its cost is that of analyze().
 #pragma once
 

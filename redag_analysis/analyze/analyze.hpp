@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Every method on one system: which apply, why the others do not, and the tightest sound bound of each task and DAG
 // with the method that gave it. A pure function.
 #pragma once

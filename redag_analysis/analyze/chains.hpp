@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // End-to-end bounds of cause-effect chains: how long until an input shows in the output (reaction), and how old the
 // input behind an output is just before the next output (age). Response bounds come from a method; here they are put
 // together. Tasks read when they start and write when they end; within a DAG data follow the edges. Pure functions.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Published examples and hand-made ones, with the numbers that their authors give.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 #include "redag_analysis/analyze/executors.hpp"
 
 #include "redag_analysis/many_workers/dag_isolated.hpp"

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Which bounds hold under which executor: ours, or a model of one of rclcpp's (sched/models). The one place that
 // `redag analyze`, reports and runs ask. Pure functions.
 #pragma once

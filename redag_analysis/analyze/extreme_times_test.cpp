@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Every method on systems whose times lie anywhere between a nanosecond and the longest there is: no bound may come of
 // a sum or product that wrapped. UndefinedBehaviorSanitizer (make asan) sees what wraps; here only what comes of it.
 #include <gtest/gtest.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a machine takes from jobs (AnalysisPlatform::stall, lateness, preempt_overhead on several workers), charged by
 // compile() as jitter: no simulated response with such losses exceeds a bound that counts them.
 #include <gmock/gmock.h>

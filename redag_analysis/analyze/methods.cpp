@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The registry: one line a method, in the order of a report.
 #include "redag_analysis/core/bound.hpp"
 #include "redag_analysis/many_workers/dag_isolated.hpp"

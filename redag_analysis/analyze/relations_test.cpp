@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What theory says of the bounds among themselves, on random workloads.
 #include <gtest/gtest.h>
 

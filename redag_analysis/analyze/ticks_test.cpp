@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Bounds are computed in nanoseconds. The other tests draw times of a few ticks, where an iteration that goes a tick a
 // step ends soon: here the same workloads with a tick of 100 ns, and of a millisecond; and with ticks so long that sums
 // come near what a time can hold.

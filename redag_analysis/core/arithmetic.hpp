@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Integer arithmetic of the bounds: nothing is rounded in the unsafe direction, nothing wraps. A sum that no duration
 // can hold saturates at kUnbounded, which means "no bound". Pure functions.
 #pragma once

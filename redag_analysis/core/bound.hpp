@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a schedulability analysis is and what it answers. A method is a pure function of a System; it answers with a
 // bound or says why it does not apply, and it says no when in doubt. Response times run from the nominal release.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What an analysis may cost, and whether it itemises its bounds: set by the caller for the current thread, looked at by
 // the loops of the methods, so that every method is bounded in time and none needs a parameter for it. Outside any
 // scope a method itemises all bounds and runs to its end.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Comparisons of utilizations with the limits of the tests, as rational numbers: nothing is accepted or refused by
 // rounding. Decided by intervals of 2^-60, and where these do not tell, by whole numbers of any length. Pure functions.
 #pragma once

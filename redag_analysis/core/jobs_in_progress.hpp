@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How many jobs of a DAG can be started and unfinished at once while every response stays within its period, so that a
 // max_active or a number of threads that is at least as large never makes a job wait. Pure functions.
 #pragma once

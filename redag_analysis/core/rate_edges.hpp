@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Bounds for units alone, made to hold for units that wait for data of other rates. Waiting is release jitter of the
 // unit that waits: a job that waits holds nothing, and never waits again once it is ready. So each method that knows
 // jitter is applied anew with the waits that its own responses imply, until they agree. Pure functions.

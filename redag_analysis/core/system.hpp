@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the bounds see: a workload on a platform, compiled once into numbers. Execution times are charged with the
 // platform's overheads, priorities are those of sched::assign_priorities, and tasks of one rate joined by edges form
 // one unit.

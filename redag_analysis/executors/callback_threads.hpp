@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the models of rclcpp's executors share: threads that run one callback after the other, each to its end, and know
 // neither priorities nor budgets. Which one is next, the model says. Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Models of the event-driven executors of ROS 2: rclcpp's experimental EventsExecutor, and EventsCBGExecutor. Owns
 // which ready job runs next. Not thread-safe. Allocates where the executors' queues do:
 // events in them have no bound.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The executors by name: the one place where drivers and the program get schedulers from.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The ready jobs of one task, oldest first: a list through Job::task_next. What models of rclcpp's executors have for
 // each timer and subscription.
 #pragma once

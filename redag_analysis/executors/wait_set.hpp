@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Model of rclcpp's executors that wait for a set of entities, as of ROS 2 Humble: SingleThreadedExecutor,
 // MultiThreadedExecutor, StaticSingleThreadedExecutor. Owns which ready job runs next. Not thread-safe. What is
 // modelled and what is not: at the class.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Exploration of all schedules of a strictly periodic system whose jobs run to completion: the least and the largest
 // response of every job, over all release jitters in [0, J] and execution times in [bcet, wcet]. Unlike the other
 // methods it takes the offsets at their word. What is explored and why that suffices: docs/analysis.md, "Exploration".

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A system as exploration.cpp follows it: numbers by task, and where a state keeps what. Plain values, immutable.
 #pragma once
 

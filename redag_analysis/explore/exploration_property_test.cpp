@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The exploration against the scheduler that runs for real: on tiny systems with every release jitter and execution
 // time there is, on larger ones with random ones, and against the bounds, which hold for more than it does.
 #include "redag_analysis/explore/exploration.hpp"

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // explore(): breadth first, a level for each number of jobs dispatched.
 #include <algorithm>
 #include <limits>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What exploration.hpp keeps of the schedules that it has not followed to their end: for each set of jobs dispatched so
 // far a node, for each node the states in which that can leave the platform. Knows nothing of tasks or priorities.
 #pragma once

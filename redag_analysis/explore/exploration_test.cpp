@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The exploration on systems small enough for a pencil; exploration_property_test.cpp holds it to the scheduler.
 #include "redag_analysis/explore/exploration.hpp"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Response times of DAGs that nothing else delays: alone on the platform, or because the max_active of all that could
 // interfere leave them workers enough. And the max_active that make a system so (federated scheduling). Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Response times of DAGs under global scheduling on m workers, where the first job of a window counts with the shape of
 // its DAG and the last one with how parallel it can be. Pure functions.
 #pragma once

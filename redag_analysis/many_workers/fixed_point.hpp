@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Fixed points of the bounds for several workers: of one window, and of responses that rely on each other. Every
 // function iterated is monotone: larger windows and larger responses assumed of others never give less.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the bounds for several workers share: when global scheduling by whole units applies, each unit in numbers, and
 // exact shares of a divided sum. Values only; pure functions. The bounds themselves are in files of their own.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Response times of DAGs under global scheduling on m workers, by whole DAGs in order of priority. A DAG's jobs of
 // successive releases must not overlap: R <= T. Pure functions; the fixed points allocate nothing.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Independent tasks under global EDF on m workers. Pure functions.
 #pragma once
 

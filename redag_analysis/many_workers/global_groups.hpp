@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Response times of tasks and DAGs whose tasks share exclusive groups, on one worker or several, with full preemption
 // and priority inheritance or run to completion. Within a group jobs run one after the other, so what a chain of jobs
 // waits for its groups counts in full, not divided by m. Pure functions.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Response times of independent tasks under global scheduling on m workers: three fixed points and their methods.
 // Responses must stay within the period. Pure functions; the fixed points allocate nothing.
 #pragma once

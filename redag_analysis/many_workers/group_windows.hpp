@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How long a job whose task shares exclusive groups can take: the window from its release, or from its readiness, to
 // its end or its first tick of execution, given the responses of all that can go first. docs/analysis.md, "Exclusive
 // groups", has the proof. Values and pure functions; not thread-safe (scratch).

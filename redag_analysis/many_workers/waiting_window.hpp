@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How long a job can wait while all workers execute others: the arithmetic that the bounds for independent tasks on m
 // workers share. Pure functions that allocate nothing.
 #pragma once

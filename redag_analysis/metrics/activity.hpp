@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What can only be seen across jobs: how many of a DAG are in progress, how busy workers are, priority inversion.
 // Incremental, one pass over the events. Not thread-safe.
 #pragma once

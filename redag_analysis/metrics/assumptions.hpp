@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a bound assumes of a run on threads, against what the run was: executions within the wcet (as processor time),
 // releases on time, a platform that takes no more than was charged. The one place that decides what is an alarm and
 // what is the noise of the machine. Pure functions.

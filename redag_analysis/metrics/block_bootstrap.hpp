@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Is what was measured on two sides different, or could it be chance? Jobs of a run follow each other: misses come in
 // bursts, and a test that takes jobs for independent finds differences where there are none. So what is resampled is
 // not jobs but blocks of time, long against the periods (E. Carlstein, Annals of Statistics 14(3), 1986; how many: B.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Which responses of a run exceeded what was proven for them. Follows a stream of events, in pieces if need be; knows
 // tasks by id alone. Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Shared by the parts of the trace checker: what they look at, and where they report. Internal to metrics/.
 #pragma once
 

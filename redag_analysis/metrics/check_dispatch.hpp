@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The checker's rules about decisions: bounds, groups, workers, preemption, priority, work conservation, deferral and
 // execution. Sees each event before the replay applies it. Internal to metrics/.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The checker's rules about budgets and modes: who has used what, and when HI mode begins and ends. What is skipped for
 // it is ReleaseRules' business, who is demoted Replay's. Sees each event before the replay applies it. Internal to
 // metrics/.

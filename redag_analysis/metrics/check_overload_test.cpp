@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Budgets and HI mode: traces that keep their rules and, for each rule, one that breaks it, written by hand.
 #include "redag_analysis/metrics/check_overload.hpp"
 

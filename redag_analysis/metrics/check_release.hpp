@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The checker's rules about releases: the timer grid, precedence, overrun and admission. Sees each event before the
 // replay applies it. Internal to metrics/.
 #pragma once

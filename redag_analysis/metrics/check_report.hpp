@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the trace checker found: violations by rule, and how often each rule was put to the test (a rule that was never
 // tested proves nothing). Plain values.
 #pragma once

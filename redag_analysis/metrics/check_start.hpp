@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The checker's rule about bodies: a job that was dispatched is only a decision, until a thread begins its body. Sees
 // each event before the replay applies it. Internal to metrics/.
 #pragma once

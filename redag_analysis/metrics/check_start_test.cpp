@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Whether a dispatched job's body begins: traces of real threads, written by hand.
 #include "redag_analysis/metrics/check_start.hpp"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Follows the jobs of a stream of events and judges each (miss.hpp) when it ends, or when the run does: for callers
 // that need no summary. Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Two sides of runs beside each other, row by row (each task, each DAG, all jobs): figures, intervals, and what is more
 // than chance (block_bootstrap.hpp). Rows are matched by name. Parallel, the same answer for any number of processors.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A set of durations in few numbers. Percentiles are nearest rank, i.e. the p-th percentile of n sorted values is the
 // ceil(p n / 100)-th, always one of the values; exact here (duration_sketch.hpp: of more values than memory should
 // hold). Pure functions.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Any number of durations in bounded memory: exact up to a given number of values, then counts in buckets that are at
 // most 1/128 of their values wide (redag/base/log_buckets.hpp). Percentiles are then wrong by at most kRelativeError;
 // count, minimum, mean and maximum stay exact. Sketches of parts merge to that of the whole. Not thread-safe.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Jobs out of events: one JobRecord per job, as docs/model.md ("What is measured") means it. Incremental: a long run's
 // events need not be kept. Tolerant: judges nothing (trace_checker.hpp does), and events of unknown jobs are counted
 // and ignored. Not thread-safe.

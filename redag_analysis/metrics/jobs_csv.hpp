@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // jobs.csv: a row per job, for spreadsheets and data frames. Columns: docs/results_format.md. Pure but for the file.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a deadline miss is (docs/model.md, "What is measured"): the one place, for summaries, watches, tables, pages and
 // experiments. verdict.hpp says the same of whole runs in words. Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Deadline misses as the baseline program of the ReDAG-RT paper counts them, for comparison only: no result of this
 // project is judged by it. Pure.
 //

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // trace.json for ui.perfetto.dev and chrome://tracing: a track per worker with the jobs' slices, and a process per DAG
 // with every job from release to end, misses and skips. Written as the events are read; memory does not grow with the
 // run. Format: "Trace Event Format", Chromium project.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The state of a run as its events tell it: which job is where, what each worker does, which ready jobs are eligible
 // and how urgent they are (docs/model.md). Written from the model, not from the scheduler, so that the trace checker
 // does not repeat the scheduler's mistakes. Policy ranks come from sched::assign_priorities. Not thread-safe.

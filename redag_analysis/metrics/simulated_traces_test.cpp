@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The checker and our scheduler against each other, over random workloads; and the checker against damage: whatever
 // event of a good trace is dropped, doubled or shifted, it must notice.
 #include <gtest/gtest.h>

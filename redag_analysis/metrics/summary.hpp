@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A run in numbers: per task, per DAG and in total (docs/model.md, "What is measured"). Incremental: Summarizer takes
 // events as they come. Memory does not grow with the length of a run: percentiles are exact for the first
 // kExactJobs / (number of tasks) jobs of each task, then of a sketch (duration_sketch.hpp). Not thread-safe.

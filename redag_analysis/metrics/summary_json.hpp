@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // summary.json ("redag.summary/2"): everything in a Summary and the description of its run. Keys:
 // docs/results_format.md. Pure but for the file.
 #pragma once

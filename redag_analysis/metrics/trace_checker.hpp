@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Holds a trace to docs/model.md: replays the events and reports every place where they say something that the model
 // forbids. Independent of the scheduler's code; near-linear in the number of events. Pure function.
 //

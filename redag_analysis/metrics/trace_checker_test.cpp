@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Every rule with a trace that keeps it and at least one that breaks it, written by hand; those of preemption and of
 // overload in check_dispatch_test.cpp and check_overload_test.cpp.
 #include "redag_analysis/metrics/trace_checker.hpp"

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The verdict on a run's deadlines, in one place and in one set of words: `run`, `simulate`, `report` and its page say
 // the same. Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // AMC-rtb: response times under adaptive mixed criticality (docs/model.md, "Criticality"), one worker, full preemption.
 // Three bounds a task: in LO mode, in HI mode, and across the change. O(n) a step, pseudo-polynomial in all.
 #pragma once

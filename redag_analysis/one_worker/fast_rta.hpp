@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The exact test for bare numbers, for those who ask it of millions of task sets: one worker, full preemption,
 // independent tasks, D <= T, no jitter, no blocking. The same answer as rta_preemptive, an order of magnitude faster.
 #pragma once

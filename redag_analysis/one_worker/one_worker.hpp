@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What all fixed-priority bounds for one worker share: when they apply, who interferes, who blocks, and the fixed
 // points themselves. Works on units, so that a DAG on one core is one task with C = its volume. Pure functions.
 #pragma once

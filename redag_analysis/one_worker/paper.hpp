@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The equations of the ReDAG-RT paper as it prints them: per callback, one worker's formulas on any platform. They are
 // kept for comparison. Each says when its numbers are a bound; elsewhere its answer carries `unsound`, and a report
 // does not trust it. docs/analysis.md, "The paper's equations", has the counterexamples.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Response-time analyses for one worker and static priorities, independent tasks and DAGs: five methods on the fixed
 // points of one_worker.hpp. O(n) a step, pseudo-polynomial in all.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Tests that compare utilizations with a limit: O(n) or nearly so, and sufficient only. Those for one worker take a DAG
 // of one rate as one task with C = its volume. Nothing is accepted or refused by rounding (exact_utilization.hpp).
 #pragma once

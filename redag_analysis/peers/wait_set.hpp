@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A bound for rclcpp's own executors as sched/models/wait_set.hpp models them, to compare with: not for our scheduler,
 // and so not in methods(). One worker is the SingleThreadedExecutor, more the MultiThreadedExecutor. Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Bounds for rclcpp's own executors (sched/models/wait_set.hpp) that look at rates: published ones for one thread, and
 // one for several threads. To compare with: executor_methods(), not methods(). Pure functions.
 //

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Driver 1: a scheduler in virtual time. Discrete events in integer nanoseconds; the same workload, options and seed
 // give the same events, bit for bit, on every machine. Works with any sched::Scheduler. Single-threaded.
 #pragma once

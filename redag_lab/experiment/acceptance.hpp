@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The experiment "acceptance": which share of random workloads do the methods accept, over utilization? A unit is one
 // workload at one point, judged by all methods of the plan. Pure functions.
 #pragma once

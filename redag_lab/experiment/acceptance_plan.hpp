@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the experiment "acceptance" does: which random workloads are drawn at which points, and who judges them. The
 // text form is docs/experiments.md. Plain values; pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The text form of a plan: docs/experiments.md.
 #include <array>
 #include <utility>

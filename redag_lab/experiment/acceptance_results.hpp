@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the units of the experiment "acceptance" come to: counts a point and method, as CSV, JSON and a plot. All of it
 // follows from the plan and the units; only the JSON adds who worked on it. Pure functions but for write_results().
 #pragma once

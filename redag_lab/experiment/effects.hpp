@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How much of the variation of a result each factor of a full factorial explains, alone and together with another one:
 // the sums of squares of an analysis of variance with equal numbers of runs. Pure.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The experiment "factorial": every executor on every combination of the factors' levels. A unit is one run. Knows what
 // is to be run, not how: the caller brings the driver. Pure functions, but for the driver.
 #pragma once

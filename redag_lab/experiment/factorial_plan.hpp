@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the experiment "factorial" does: every executor on every combination of the factors' levels, repeated. The text
 // form is docs/experiments.md. Plain values; pure functions, but for the files that load_factorial_plan() reads.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The plots of factorial_results.hpp.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Runs that were recorded elsewhere, by `run_workload` on a machine with ROS, as runs of a factorial experiment: each
 // becomes a repetition of the executor "ros2/NAME" at the combination whose workload it ran. Pure functions.
 #pragma once

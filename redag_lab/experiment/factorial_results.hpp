@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The results of the experiment "factorial": observations of runs become medians with confidence intervals, distances
 // to the ideal, effects of the factors; and files. Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The folder of an experiment: plan.yaml (what it is), units.csv (what is finished; journal.hpp), runs.jsonl (who
 // worked on it, when and where). All else in it is made of these. Not thread-safe.
 #pragma once

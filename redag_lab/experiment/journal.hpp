@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // units.csv: the finished units of an experiment, a line each, only ever appended to, so that a killed run goes on
 // where it was. Lines reach the kernel within kWriteEvery and the disk within kSyncEvery. Of one process at a time
 // (flock); not thread-safe.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Lines with confidence bands, in panels beside each other, as one self-contained SVG. For the shares that experiments
 // measure; no more than that. Pure.
 #pragma once

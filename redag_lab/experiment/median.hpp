@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The median of a sample with a confidence interval that assumes nothing about the distribution: between two of the
 // sorted values, by the binomial distribution of how many lie below the true median. Pure.
 #pragma once

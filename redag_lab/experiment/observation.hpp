@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What is kept of one run of the experiment "factorial": numbers of each DAG and of all together. Plain values with a
 // text form of one line, for the journal.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the readers and writers of plans share: lists of values, numbers, ranges, and how random workloads are drawn.
 // The text forms are docs/experiments.md. Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Runs the units of an experiment on several processors (oneTBB) and hands the results over one at a time, in the order
 // of the units, whichever finished first: what is written is the same for every number of jobs.
 #pragma once

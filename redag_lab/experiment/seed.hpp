@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Seeds of the units of an experiment: each unit draws from a seed of its own, which depends on what the unit is and
 // not on how many others there are. Pure.
 #pragma once

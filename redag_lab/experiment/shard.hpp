@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A share of the units of an experiment, for one of several machines: shard i of n has the units u with
 // u mod n = i - 1. Plain values.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A necessary test by simulation: a workload in which a deadline miss was seen is not schedulable; one in which none
 // was seen may be. It ends at the first miss. Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the analysis says of a run that was recorded: its workload on the platform and under the executor that really
 // ran, so that a measured response stands beside the bound that it must not exceed. Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What figures show of many durations: a distribution function in few points, and lateness in equal classes. Pure
 // functions; errors: none.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A run cut down to what a report shows of it: everything that grows with its length is counted, sampled or cut here,
 // so that the trace itself can be forgotten. Runs of one executor on one workload form a group, whose figures are those
 // of all its jobs together. Not thread-safe.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The report as data ("redag.report/2", docs/results_format.md): groups of runs as one JSON text of bounded size. The
 // page shows it; other programs can read it. Pure function: equal runs give equal bytes.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The page of a factorial experiment: of its factorial.json (docs/experiments.md), what the page draws. Pure functions.
 #pragma once
 

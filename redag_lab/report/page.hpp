@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The report as one HTML file: a template, the page's own styles and scripts, ECharts, and the document, all in one.
 // Opens without a network and lets none be used. Pure function.
 #pragma once

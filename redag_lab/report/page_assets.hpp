@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The files of redag_lab/report/page and third_party/echarts, put into the library when it is built
 // (cmake/embed.cmake).
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Runs to document: bounds, verdicts, what is pooled, what is cut.
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The schedule as a picture: which job held which worker when, and, of a run too long to be drawn, the stretches of
 // time worth a look: its beginning, and where each DAG came closest to its deadline or farthest beyond. Pure functions.
 #pragma once

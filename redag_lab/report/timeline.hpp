@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A run at a glance, however long: for each of a fixed number of equal stretches of time, how busy each DAG kept the
 // workers and how many deadlines it missed there. Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A report's first lines: what the runs showed, in sentences that can be quoted. Everything here is also in the tables;
 // nothing is here that they do not say. Pure functions.
 #pragma once

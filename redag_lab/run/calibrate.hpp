@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Measures what this machine adds to jobs: the runtime itself runs a workload made for it, and its trace tells how late
 // releases, dispatches and resumptions were; stall_probe.hpp tells what the machine takes besides. Blocks for as long
 // as it was told. Nothing else should run meanwhile, unless that is what is to be measured.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How many jobs of a workload can be in progress at once. Pure functions.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the engine tells a live page, and that executors make one and take it away.
 #include <gtest/gtest.h>
 #include <unistd.h>

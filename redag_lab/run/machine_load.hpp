@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Ordinary threads that keep a machine busy: memory, system calls and wake-ups, as other programs would. Owns its
 // threads; ends them in the destructor.
 #pragma once

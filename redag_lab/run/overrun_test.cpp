@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Alarms of real runs: a body that overruns its wcet is found by its processor time, whatever else the machine does.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Runs a whole workload on real threads, with synthetic bodies unless told otherwise, and returns its trace: the
 // real-time counterpart of sim::simulate(). Blocks the calling thread, which collects events meanwhile and does no
 // real-time work.

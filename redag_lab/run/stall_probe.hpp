@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How long a machine takes a processor away from a thread that wants nothing else: a thread on each processor reads the
 // clock without end and notes the gaps, as Linux's osnoise tracer does. Owns its threads while it runs. Blocks.
 #pragma once

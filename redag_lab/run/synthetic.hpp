@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Bodies that use a given amount of processor time and nothing else: jobs of a workload without its real code. Called
 // on the thread that runs the job.
 #pragma once

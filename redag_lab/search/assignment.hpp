@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Which priorities and which max_active a workload should have: candidates for both, each judged by all bounds of
 // analyze(), so that what comes out is as sound as they are, however it was found. Pure functions, but for hooks.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Priorities for whole units (tasks that are released together): Audsley's assignment from the least urgent one up, and
 // what it needs of a test. A unit's tasks get one `priority`, so that they stay neighbours. Pure functions.
 #pragma once

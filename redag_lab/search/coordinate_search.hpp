@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The search that `assign` and `tune` share: one of some values in each dimension. Small spaces are tried as a whole;
 // in larger ones one dimension at a time goes to its best value until nothing helps, from several places. What a point
 // is worth is asked in batches, so that it can be found in parallel; the answer does not depend on how. Pure, but for

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // One change of a workload that lets every deadline be shown: what `analyze` suggests. Each is tried by analyze(), none
 // is a guess. Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Changes to the load of a workload by one number: what sensitivity turns, and what a reader may ask about. Every
 // knob's position grows with the load. Values only; pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a workload does in the simulator, over several seeds, in the numbers that `tune` compares; and which of two such
 // results is better. Observations, not bounds: other seeds can be worse. Pure but for `stop`.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // How far execution times and rates can grow until the analysis no longer says "schedulable", or how far they have to
 // shrink until it does. Searches positions of knobs (scaling.hpp), exact to one nanosecond or one millionth. Pure
 // functions, but for the hooks of the caller.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What `tune` may change of a workload, as one point of a search: workers, max_active of each DAG, and which DAG goes
 // first where tasks of several have the same priority. Pure functions.
 #pragma once

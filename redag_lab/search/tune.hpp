@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Better workers, max_active and tie order for a workload: what the simulator shows of each over some seeds, and what
 // the bounds prove, judged in the end on seeds that the search has not seen. Parallel (oneTBB); the same answer for
 // every number of processors.

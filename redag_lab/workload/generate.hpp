@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Random workloads from a seed: for experiments and as the source of property tests. The same options and seed give
 // the same workload on every machine. Pure functions.
 #pragma once

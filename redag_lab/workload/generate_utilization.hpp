@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Vectors of utilizations with a given sum and a bound for each, for generate.cpp. Pure, given the generator.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The executors that the benchmarks compare: ours in each preemption mode that can be had here, and its peers.
 #pragma once
 

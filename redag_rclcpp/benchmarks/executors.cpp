@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Latency and cost of executors, side by side: ours in each preemption mode and its peers (workload/peers.hpp),
 // interleaved round by round in one process. Prints a table of medians over the rounds.
 //

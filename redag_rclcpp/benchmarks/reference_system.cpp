@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The Autoware reference system (github.com/ros-realtime/reference-system) under every executor: latency of its hot
 // path from the lidar drivers to the collision estimator, samples dropped on it, jitter of the behavior planner, and
 // processor time. Executors take turns, each in a process of its own. Built where package autoware_reference_system is.

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """A ReDAG component container with components in it.
 
     ros2 launch redag_rclcpp container.launch.py

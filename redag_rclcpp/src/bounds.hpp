@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Response times against proven bounds: which bound each task of a workload has on the executor as it runs, and which
 // responses exceeded it. A value; not thread-safe.
 #pragma once

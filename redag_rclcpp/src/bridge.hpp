@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The part of the world that only a wait set can watch: the executor's guard conditions, guard conditions of timers,
 // and entities without hooks. One thread at a time waits; any thread may add, remove and wake.
 #pragma once

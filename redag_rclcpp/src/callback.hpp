@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // One callback of a node as a task: its entity (timer, subscription, ...), the hooks that tell when it has something to
 // do, what is pending, and how it is executed. Owns no entity: nodes can be destroyed at any time.
 //

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Callbacks as jobs: what arrived is taken and handled.
 #include <rcl/wait.h>
 

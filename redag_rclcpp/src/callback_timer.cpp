@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Timers as callbacks: when they are due, and how they are called.
 #include <rcl/timer.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What differs between ROS 2 distributions, behind one set of names. Humble: rclcpp 16; Jazzy: 28.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What is behind ReDAGExecutor: the engine with its scheduler, the callbacks of all groups, and the threads that tell
 // when they have something to do. Knows rclcpp's entities, not its Executor (see Host).
 //

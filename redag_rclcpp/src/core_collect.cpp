@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the executor's callback groups hold, as tasks of the engine.
 #include <algorithm>
 #include <set>

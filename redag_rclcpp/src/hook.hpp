@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A hook of the middleware's that can be called at any time, also when what it belongs to is being destroyed.
 //
 // rclcpp keeps the function of set_on_new_message_callback() and its like in the Subscription, Service or Client, and

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The middleware's own threads in this process, found by the names and the signal mask that it gives them, and raised
 // above the workers while an executor spins. Any thread.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A recursive mutex whose owner inherits the priority of the threads that wait for it, and that clang's -Wthread-safety
 // understands. std::recursive_mutex does not inherit.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the monitor says, as values and as text: a snapshot of an executor, its JSON, its diagnostics. Pure functions
 // and one value that remembers what was reported last.
 #pragma once

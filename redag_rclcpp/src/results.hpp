@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A run's trace as files: what the executor's rings give, kept until the end, because only then it is known what the
 // events' task ids mean. Not thread-safe.
 #pragma once

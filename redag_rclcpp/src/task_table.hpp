@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Which callback is which task: of which DAG, under which name, with which parameters. For all who ask about tasks:
 // figures, traces, what was learned. Decides nothing. Any thread; its lock is the innermost.
 #pragma once

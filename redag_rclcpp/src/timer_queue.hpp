@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // When which timer expires next: a heap of due times, without a thread. The expiry itself is the timer's affair: the
 // queue asks it (Timer::expire). Any thread; allocates only while it grows.
 #pragma once

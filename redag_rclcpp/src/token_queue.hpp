@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A FIFO in a ring that grows by doubling: allocates only while it grows. Not thread-safe.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Nodes whose callbacks misbehave, at random from a seed: what the chaos test gives an executor.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Chaos: callbacks that throw, block, overrun, spin their own executor, destroy what they belong to, cancel, and let
 // ROS time jump, while nodes come and go. Nothing crashes or hangs, every exception is told, exclusive groups do not
 // overlap, and afterwards the executor serves a new node. REDAG_SEED: of the first episode; REDAG_CHAOS_EPISODES: how

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Nodes, groups and entities that come and go at random, from several threads and from callbacks: what the churn test
 // gives an executor.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Nodes, groups and entities come and go, from several threads and from callbacks, while the executor is busy: what
 // stays goes on, what goes is let go of, and nothing runs that nobody asked for. REDAG_SEED chooses what happens,
 // REDAG_CHURN_SECONDS how long for each mode.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What users of any rclcpp executor rely on, for ours and for rclcpp's own: conformance_*_test.cpp. Waits are for
 // things to happen, with a generous limit; nothing is asserted about how fast.
 #pragma once

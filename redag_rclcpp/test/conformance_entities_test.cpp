@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Conformance: subscriptions, services, actions, parameters, waitables and QoS events.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Conformance: callback groups, and what comes and goes while it spins.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The component container as a program of its own: loading, running, metrics, a clean end with results, bad parameters.
 #include <fcntl.h>
 #include <gmock/gmock.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Tests that can do more than they do by default: how much, and from which seed, stands in the environment.
 #pragma once
 

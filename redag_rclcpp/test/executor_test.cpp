@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What our executor does beyond rclcpp's: order, bounds, learning, exceptions, figures, traces.
 #include "redag_rclcpp/executor.hpp"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The executors that every conformance test runs with: one listed here runs all of them.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // libredag_pi.so, against which this program is linked: every mutex inherits priority and otherwise stays what it was.
 #include "redag_rclcpp/inherit.h"
 

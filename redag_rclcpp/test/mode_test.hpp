@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Tests of our executor in each preemption mode: a node, and options of one worker.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The monitor's parts in virtual time: bounds, diagnostics, what is saved.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The monitor with a real executor: what is reported, when, and what is written.
 #include "redag_rclcpp/monitor.hpp"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Parameters become options: defaults, what wins over what, and what mistakes are called.
 #include "redag_rclcpp/options.hpp"
 

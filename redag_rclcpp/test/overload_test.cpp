@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What our executor does with what is too much: full queues, budgets, criticality.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The executor's parts that need no nodes: timer queue, token queue, hooks.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

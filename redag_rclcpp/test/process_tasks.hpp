@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The threads of this process as the kernel shows them, for tests of what an executor leaves behind or wakes.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the executor asks of Linux: priorities of its own threads and of the middleware's, locked memory, threads that
 // cannot be had, jobs that do not end.
 #include <gmock/gmock.h>

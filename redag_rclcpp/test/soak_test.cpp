@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What an executor costs while nothing happens, and what it holds on to in the long run. REDAG_SOAK_SECONDS says how
 // long the busy part is (10), REDAG_SOAK_WORKERS how many workers there are (2), REDAG_SOAK_LOAD what share of them is
 // used (0); REDAG_SOAK_EXECUTOR=multi_threaded does the same with rclcpp's, to compare with.

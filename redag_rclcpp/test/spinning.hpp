@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What tests need that spin an executor in a thread of its own, and callbacks that take time.
 #pragma once
 

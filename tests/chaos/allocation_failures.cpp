@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The first, second, third, ... allocation fails, until none does any more: each time the program says "out of memory"
 // (or, where a library handles it, something else) and ends with 2, as a child would; nothing leaks into the next try.
 //   redag_allocation_failures FOLDER_OF_WORKLOADS

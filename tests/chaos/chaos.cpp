@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 //   redag_chaos simulator|executor [RUNS [FIRST_SEED]]
 #include <cstdio>
 #include <cstdlib>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // One run of each kind of chaos, from a seed. Returns what broke, or nothing; `survived` counts faults by kind.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // For LD_PRELOAD: the time of day (CLOCK_REALTIME) jumps to and fro by a day to some years with every look at it, and a
 // wait for a time of day ends the program. To set the machine's own clock would hurt whatever else runs on it.
 #include <dlfcn.h>

@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """Faults from outside, at random moments: signals, limits, full and read-only folders, lost rights, fewer processors.
 
 Usage: process.py PROGRAM SOURCE_DIR [--runs N] [--seed S] [--fault NAME]... [--clock LIBRARY]

@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """Time and memory of the program are bounded: what a large workload or a long run costs, and what ends it.
 
 Usage: bounded.py PROGRAM SOURCE_DIR. Uses the standard library only. Judged are peak memory and what is said, never seconds.

@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """`redag experiment` as its users meet it: the same results however it was run.
 
 Usage: experiments.py PROGRAM SOURCE_DIR. Uses the standard library only.

@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """Bad values: of every option that --help lists, of combinations of options, and in files. What is wrong is said, by the
 option's name or by file, line and column; the exit status is 2, nothing is written, and no terminal is steered.
 

@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """`redag top`: runs that are watched.
 
 Usage: live.py PROGRAM SOURCE_DIR. Uses the standard library only.

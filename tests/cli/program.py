@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """What the tests of the program share: how it is called, and a folder for each test.
 
 The first two arguments of whoever imports this are the program and the source tree.

@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """What is made of results: `redag diff`, `check-trace`, `report`, `tune`.
 
 Usage: results.py PROGRAM SOURCE_DIR. Uses the standard library only.

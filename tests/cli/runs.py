@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """Simulations, runs and comparisons: what they print and write, and what streams and signals do to them.
 
 Usage: runs.py PROGRAM SOURCE_DIR. Uses the standard library only.

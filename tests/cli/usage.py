@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """The program as its users first meet it: help, mistakes, workloads checked and generated.
 
 Usage: usage.py PROGRAM SOURCE_DIR. Uses the standard library only.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // libFuzzer's entry for one target, which the build names.
 #include <cstddef>
 #include <cstdint>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 #include "redag/base/check.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag_analysis/metrics/jobs_csv.hpp"

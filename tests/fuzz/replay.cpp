@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Runs a target on files and on those of folders: the corpus as a test, and a crash once more in a debugger.
 //   redag_fuzz_replay <target> <file or folder>...
 #include <algorithm>

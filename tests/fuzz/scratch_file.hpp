@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A folder of the process in memory, for readers that take paths; removed when the process ends as it should.
 #pragma once
 

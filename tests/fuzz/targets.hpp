@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Readers of input from outside as functions of bytes. A target ends by returning; what is wrong with the reader ends
 // the process: a failed REDAG_CHECK, a sanitizer's finding, too much time or memory. One thread.
 #pragma once

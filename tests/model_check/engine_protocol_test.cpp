@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Every interleaving of small uses of the engine: how jobs are released, handed to threads, run, preempted, and how the
 // engine is halted.
 #include <array>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Every interleaving of pausing, stepping and reconfiguring an engine that is at work.
 #include <deque>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the protocol tests share: an engine whose every job is watched, and the exploration of a scenario with it.
 //
 // Watching makes an operation of the explorer only where the engine itself has to keep two things apart: there it costs

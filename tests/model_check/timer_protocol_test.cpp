@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Every interleaving of what sleeps by time: the parker, the event, the release timer, and an executor around it all.
 #include <array>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Opens report pages in Chromium: every figure draws, nothing is logged as an error, nothing is requested from anywhere,
 // nothing is wider than a phone, hostile names stay text, figures can be saved. Leaves screenshots to look at.
 import assert from 'node:assert/strict';

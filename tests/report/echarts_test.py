@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
 """The bundle of ECharts is what its package files say: version, notices, nothing that would end a <script>.
 
 Usage: echarts_test.py FOLDER. That it is byte for byte what they make, third_party/echarts/build --check says; it needs npm.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What this process holds and does, as the kernel and the allocator count it. No state.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // An executor under load for a long time, while DAGs come and go: does anything grow? Writes a sample a minute (a
 // second, if it runs for less than ten minutes) as CSV, and at the end a verdict on each series by its slope. Exit 1:
 // something grows, or no work was done.

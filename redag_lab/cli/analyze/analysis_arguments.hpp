@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the commands that analyse a workload ask for alike: the workload, and the platform on which it is looked at.
 #pragma once
 

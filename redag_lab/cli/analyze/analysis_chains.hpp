@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Cause-effect chains that `analyze --chain` asks for: reaction and age end to end, also over several DAGs. Pure
 // functions.
 #pragma once

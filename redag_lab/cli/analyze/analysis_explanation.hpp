@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Where a response time comes from, in words: what `analyze --explain` prints. Pure functions.
 #pragma once
 

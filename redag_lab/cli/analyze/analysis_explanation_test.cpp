@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 #include "redag_lab/cli/analyze/analysis_explanation.hpp"
 
 #include <gmock/gmock.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The document `redag.analysis/1`; docs/cli.md lists its keys.
 #include "redag_lab/cli/analyze/analysis_report.hpp"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What `analyze` says about a report of redag_analysis: where every task and DAG stands, in a table, in words, as JSON.
 // Decides nothing about bounds. Pure functions.
 #pragma once

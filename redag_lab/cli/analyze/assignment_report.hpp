@@ -1,5 +1,8 @@
-// What `assign` says about an assignment of redag_lab/search: what it would change, what that gains, what else was tried.
-// Pure functions.
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// What `assign` says about an assignment of redag_lab/search: what it would change, what that gains, what else was
+// tried. Pure functions.
 #pragma once
 
 #include <string>

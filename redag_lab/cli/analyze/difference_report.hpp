@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What `diff` says about two sides: a table, what is more than chance in words, and what to beware of. Pure functions.
 #pragma once
 

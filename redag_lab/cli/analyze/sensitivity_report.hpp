@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What `sensitivity` says about margins of redag_lab/search: a table, words, JSON. Pure functions.
 #pragma once
 

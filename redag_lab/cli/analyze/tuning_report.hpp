@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What `tune` says: what it would change, what that gains on seeds that the search has not seen, what else was tried.
 // Pure functions.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The plan of `redag experiment acceptance`: a file, options, or a file with some of it replaced by options. Called
 // while the program starts and right after; no threads.
 #pragma once

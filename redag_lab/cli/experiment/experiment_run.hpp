@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the experiments share: running units with progress and Ctrl-C, going on after a kill, shards, merging, showing.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The subcommands of `redag experiment` that run a study, and how their plans become studies again, for merging.
 #pragma once
 

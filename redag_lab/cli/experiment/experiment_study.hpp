@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // An experiment as `redag experiment` sees it, whatever it measures: numbered units with results of one line each. One
 // study belongs to one command; evaluate() is called from several threads unless the study takes turns.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A run on threads against what was proven before it: responses above their bounds and executions above the wcet, by
 // name, with the assumption that broke (redag_analysis/metrics/assumptions.hpp). Pure.
 #pragma once

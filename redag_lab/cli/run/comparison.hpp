@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Sessions of several executors on the same jobs, put side by side: counts and maxima of all repetitions together,
 // percentiles as medians over repetitions with their spread, and a verdict in words. Pure values and functions.
 #pragma once

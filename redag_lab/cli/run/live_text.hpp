@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A frame of a live page as people and programs read it: lines with a table, or JSON. Pure functions.
 #pragma once
 

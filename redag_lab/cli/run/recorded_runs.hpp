@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Result folders as a report sees them: which runs lie there, which are repetitions of one another, and what to call
 // them. Reads names and comparison.json, no trace. Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // One run in ROS 2, by the program run_workload of redag_rclcpp in a process of its own: rclcpp's executors, and ours,
 // with real nodes and topics. Blocks until it is over.
 #pragma once

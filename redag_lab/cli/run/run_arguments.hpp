@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What `simulate`, `run` and `compare` ask for alike: the workload and changes to it, length, seed, where results go.
 // The steps that they share from there to a session. `analyze` takes the workload's part. Not thread-safe.
 #pragma once

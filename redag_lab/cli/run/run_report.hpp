@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What a person is shown of a session, and the files that it leaves. Pure but for the files.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // One executor on one workload in one world, simulated or real: the one place where a run becomes a trace, a summary
 // and a verdict of the trace checker. Prints nothing. Blocks until the run is over; one session at a time.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Does a workload miss a deadline in one simulated run? An observation to set beside a bound, never a proof: other
 // offsets or shorter executions can be worse.
 #pragma once

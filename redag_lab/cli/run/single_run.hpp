@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What `simulate` and `run` share: one session, shown and written. Blocks until it is over or was interrupted.
 #pragma once
 

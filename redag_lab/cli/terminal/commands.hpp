@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The subcommands. Each has one file, <name>_command.cpp, and one function that declares its options and returns what
 // to do once they are parsed.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Where a command's text goes: results to standard output (buffered, so that a broken pipe or a full disk is seen once,
 // at the end), everything else to standard error (at once). Knows what the terminals can show. Not thread-safe.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 #include "redag_lab/cli/terminal/files.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Files on behalf of commands: reading a workload ("-" is standard input), writing one text file, and result folders,
 // which are made when missing and never mixed with somebody else's files. Not thread-safe.
 #pragma once

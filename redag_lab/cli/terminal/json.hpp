@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // JSON as the commands write it: every document says where it comes from (redag/base/provenance.hpp).
 #pragma once
 

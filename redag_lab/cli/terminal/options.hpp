@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Command-line options whose values have a text form of this project: durations, names of choices, processors. What is
 // wrong with a value is said in the words that a workload file would get. Called while the program starts; no threads.
 #pragma once

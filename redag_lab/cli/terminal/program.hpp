@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The program `redag` as a function: which subcommand, usage errors, help. main.cpp gives it the process's arguments
 // and streams.
 #pragma once

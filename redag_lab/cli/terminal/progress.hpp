@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A line on standard error that tells how far a long command is. On a terminal it is redrawn at most ten times a second
 // and erased when done; elsewhere a plain line comes every five seconds. Not thread-safe.
 #pragma once

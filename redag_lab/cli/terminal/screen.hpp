@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A whole terminal for a while: alternate screen, keys one by one, the size as it is now. What was there comes back
 // when this ends, also if the program crashes or is killed by a signal that can be caught. One at a time, one thread.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Ctrl-C as a wish, not as an accident: the first SIGINT or SIGTERM sets a flag that the running command looks at, the
 // second ends the process at once. One guard at a time.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A table for people: aligned columns that fit the terminal. Where they do not, text columns are cut first, then the
 // least important columns go, and a line below says which.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // An executor as the command line names it: which scheduler, which preemption, which threads. "redag", "redag-none",
 // "redag-cooperative", "redag-os"; the models of other executors, "mte", "ste", ..., and "mte-fifo", "ste-fifo", ...,
 // the same on real-time threads. Pure.

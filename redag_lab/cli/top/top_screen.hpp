@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // `redag top` on a terminal: keys, what is chosen, what is shown. Takes the screen until the user has seen enough; one
 // thread.
 #pragma once

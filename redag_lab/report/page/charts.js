@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // ECharts in this page: one theme, light or dark; each chart redraws when theme, width or data change, and can be saved
 // as PNG and SVG.
 

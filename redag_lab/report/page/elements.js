@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Building the page. Names come from users: they are only ever set as text, never as markup.
 
 /** element('td.bad', {title: 'x'}, 'text', child, ...). */

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The page of a factorial experiment: executors over any factor, at chosen levels of the others; the bounds of two DAGs as
 // a map; what explains the differences.
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Figures of many jobs: distributions of responses, lateness, the run at a glance, executors side by side.
 
 const LATENESS_CLASSES = 80;  // on [-1, 1) deadlines; the last count is what lies beyond

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // What every page has: places that are made again, a verdict, the choice of a theme, a foot, and the start.
 
 const MARKS = {good: '\u2713', bad: '\u2717', caution: '!', plain: '\u2022'};

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The page: what stands where, and what the reader has chosen.
 
 const report = JSON.parse(document.getElementById('data').textContent);

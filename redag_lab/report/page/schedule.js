@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The schedule: what ran where and when. Rows are tasks (with releases, deadlines and misses) or workers.
 
 const OPEN = 3;       // Slice::End

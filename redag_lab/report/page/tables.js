@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Tables: per DAG, per task, executors side by side, the runs.
 
 const MOST_ROWS_AT_ONCE = 40;

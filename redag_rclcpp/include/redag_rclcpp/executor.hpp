@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // ReDAG-RT as an rclcpp executor: executes the callbacks of all its nodes in one global order, most urgent first, by
 // the library's scheduler. Takes the place of rclcpp::executors::MultiThreadedExecutor; docs/ros2.md says what changes.
 //

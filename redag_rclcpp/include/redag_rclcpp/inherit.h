@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 /* The interface of libredag_pi.so, which makes the mutexes of a process inherit priority (PTHREAD_PRIO_INHERIT).
  *
  * The library stands before libc when symbols are looked up: preload it (LD_PRELOAD) or link the program against it.

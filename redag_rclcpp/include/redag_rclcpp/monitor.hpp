@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Says what an executor's callbacks do: diagnostics, a JSON snapshot, services to ask for one and to save what was
 // learned, response times above their proven bounds, and result files when spinning has ended. Decides nothing.
 //

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // ROS parameters of a node as options of the executor and of its monitor, with descriptions, so that `ros2 param
 // describe` tells what docs/ros2.md tells. Reads a workload file; keeps nothing. Call from one thread, before spinning.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // Components to try the container with: a sensor (timer), a filter and a controller (subscriptions), which use the
 // processor as long as they are told. Two such pipelines at different rates are what the executor is for.
 #include <time.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // libredag_pi.so: mutexes inherit priority, although the library that owns them never asked for it.
 //
 // pthread_mutex_init() is replaced and adds PTHREAD_PRIO_INHERIT to the attributes. A mutex with a static initialiser

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // component_container: rclcpp_components' container with a ReDAGExecutor. Components need no change; what they do is
 // ordered, measured and reported (docs/ros2.md).
 #include <fmt/format.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // `ros2 run redag_rclcpp run_workload`: a workload as real ROS 2 nodes on a chosen executor, or on several in turn.
 #include <fmt/format.h>
 #include <sys/wait.h>

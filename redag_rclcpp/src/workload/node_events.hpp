@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The life of every job of a workload that runs as ROS 2 nodes, out of what the nodes themselves saw: when which body
 // began and ended. What no callback sees follows from the model: releases stand on the timers' grid or at the end of
 // the last predecessor, and a job that never began was skipped. Pure function.

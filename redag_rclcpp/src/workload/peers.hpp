@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // The executors that ours is compared with, by the names of programs and tests: rclcpp's own, and what is built beside
 // it. Which there are depends on the ROS distribution, and on the packages that were found when this was built.
 #pragma once

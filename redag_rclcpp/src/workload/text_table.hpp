@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A table in plain text: the first column to the left, the others to the right. Not thread-safe.
 #pragma once
 

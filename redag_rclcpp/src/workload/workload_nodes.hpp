@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A workload as real ROS 2 nodes: a node per task (or per exclusive group), a wall timer per timer task, a topic per
 // task with successors, a subscription per edge. Bodies use the processor time that the workload asks for, publish at
 // their end, and record when they began and ended; node_events() makes jobs of that. Knows no executor.

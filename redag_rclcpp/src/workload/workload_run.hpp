@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // One run of a workload as ROS 2 nodes on one executor, from the file to result files; what `redag run` is without
 // ROS. Blocks until the run is over; one at a time. rclcpp must be initialised.
 #pragma once

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // A small program outside this repository that uses the library: it fails where a symbol, a header or a dependency of
 // the installation is missing.
 #include <cstdio>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // In place of redag/base/atomic.hpp: an atomic whose every access is an operation of the explorer. Sequentially
 // consistent, whatever order is asked for.
 #pragma once

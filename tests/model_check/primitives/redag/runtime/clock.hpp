@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // In place of redag/runtime/clock.hpp: the explorer's time. Processor time stands still.
 #pragma once
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
 // In place of redag/runtime/threads.hpp: the explorer's threads, which can do all that is asked of them, save that
 // thread_that_fails is refused.
 #pragma once
