@@ -98,7 +98,7 @@ class Cost {
 
 void redag_engine(benchmark::State &state, Shape shape, PreemptionMode mode, Duration spin = 0) {
   const auto workers = static_cast<std::uint32_t>(state.range(0));
-  Result<Setup> setup = set_up(mode, PolicyKind::Fixed, workers, 0, {});
+  Result<Setup> setup = set_up({.preemption = mode, .policy = PolicyKind::Fixed, .workers = workers});
   if (!setup) return state.SkipWithError("this mode cannot be had here");
   Workload workload;
   workload.dags.emplace_back();

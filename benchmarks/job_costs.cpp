@@ -178,7 +178,7 @@ void idle(benchmark::State &state, const Setup &setup) {
       return benchmark::RegisterBenchmark((name + "/" + to_string(mode)).c_str(),
                                           [=](benchmark::State &state) {
                                             const Result<Setup> setup =
-                                                set_up(mode, PolicyKind::RateMonotonic, workers, 0, {});
+                                                set_up({.preemption = mode, .workers = workers});
                                             if (!setup) return state.SkipWithError("this mode cannot be had here");
                                             function(state, *setup);
                                           })

@@ -168,7 +168,8 @@ void timer(benchmark::State &state, const Setup &setup) {
     const auto add = [mode](const std::string &name, void (*function)(benchmark::State &, const Setup &)) {
       benchmark::RegisterBenchmark((name + "/" + to_string(mode)).c_str(),
                                    [=](benchmark::State &state) {
-                                     const Result<Setup> setup = set_up(mode, PolicyKind::Fixed, 1, 0, {});
+                                     const Result<Setup> setup =
+                                         set_up({.preemption = mode, .policy = PolicyKind::Fixed, .workers = 1});
                                      if (!setup) return state.SkipWithError("this mode cannot be had here");
                                      function(state, *setup);
                                    })

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Task sets a second on one worker: n tasks, UUniFast utilizations, log-uniform periods of 10 ms to 1 s, D = T,
-// rate-monotonic. ExactTest: yes or no from bare numbers; ResponseTimes: rta_preemptive with all its terms.
+// rate-monotonic, analysed by rta_preemptive with all its terms.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -10,12 +10,14 @@
 #include <vector>
 
 #include "redag/base/rng.hpp"
-#include "redag_analysis/one_worker/fast_rta.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 
 namespace {
 
-using redag::analysis::SimpleTask;
+struct SimpleTask {
+  redag::Duration wcet = 0;
+  redag::Duration period = 0;
+};
 
 std::vector<SimpleTask> task_set(redag::Rng &rng, std::size_t count, double utilization) {
   std::vector<SimpleTask> tasks;
@@ -24,7 +26,7 @@ std::vector<SimpleTask> task_set(redag::Rng &rng, std::size_t count, double util
         i + 1 < count ? utilization * std::pow(rng.uniform01(), 1.0 / static_cast<double>(count - 1 - i)) : 0.0;
     const auto period = static_cast<redag::Duration>(1e7 * std::pow(100.0, rng.uniform01()));
     const auto wcet = static_cast<redag::Duration>((utilization - rest) * static_cast<double>(period));
-    tasks.push_back({std::max<redag::Duration>(1, wcet), period, period});
+    tasks.push_back({std::max<redag::Duration>(1, wcet), period});
     utilization = rest;
   }
   std::sort(tasks.begin(), tasks.end(), [](const SimpleTask &a, const SimpleTask &b) { return a.period < b.period; });
@@ -39,19 +41,6 @@ std::vector<std::vector<SimpleTask>> task_sets(std::size_t count, double utiliza
 }
 
 // Arguments: tasks, utilization in percent.
-void exact_test(benchmark::State &state) {
-  const auto sets = task_sets(static_cast<std::size_t>(state.range(0)), static_cast<double>(state.range(1)) / 100.0);
-  std::int64_t schedulable = 0;
-  for (auto _ : state) {
-    schedulable = 0;
-    for (const auto &set : sets) schedulable += redag::analysis::is_schedulable(set) ? 1 : 0;
-    benchmark::DoNotOptimize(schedulable);
-  }
-  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(sets.size()));
-  state.counters["schedulable"] = static_cast<double>(schedulable) / static_cast<double>(sets.size());
-}
-BENCHMARK(exact_test)->Name("ExactTest")->ArgsProduct({{5, 20, 50}, {70, 80, 90}});
-
 void response_times(benchmark::State &state) {
   std::vector<redag::analysis::System> systems;
   for (const auto &set :

@@ -38,7 +38,7 @@ void BM_Simulator(benchmark::State &state) {
   std::size_t memory = 0;  // of the scheduler and the simulator
   const std::size_t before = heap_bytes();
   for (auto _ : state) {
-    sched::PriorityScheduler scheduler(workload, redag::sim::simulated_config(workload));
+    sched::PriorityScheduler scheduler(workload, redag::sched::config_of(workload));
     redag::sim::Options options;
     options.horizon = 100 * redag::kSecond;
     std::uint64_t events = 0;

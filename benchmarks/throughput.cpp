@@ -38,7 +38,7 @@ void BM_Engine(benchmark::State &state) {
   const auto workers = static_cast<std::uint32_t>(state.range(0));
   const auto wanted = static_cast<PreemptionMode>(state.range(1));
   const Duration work = state.range(2) * kMicrosecond;
-  Result<Setup> setup = set_up(wanted, PolicyKind::RateMonotonic, workers, 0, {});
+  Result<Setup> setup = set_up({.preemption = wanted, .workers = workers});
   if (!setup) return state.SkipWithError("this mode cannot be had here");
   Workload workload;
   workload.dags.emplace_back();

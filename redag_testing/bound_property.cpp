@@ -161,13 +161,7 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
     return Rng::stream(run.seed + 2, id.value, number).uniform(0, latest);
   };
 
-  sched::Config config;
-  config.workers = platform.workers;
-  config.preemption = platform.preemption;
-  config.policy = workload.policy;
-  config.ties = workload.ties;
-  config.levels = platform.levels;
-  config.max_started = platform.max_started;
+  const sched::Config config = analysis::config_of(platform, workload);
   const auto scheduler = sched::make_scheduler(property.executor, workload, config);
   metrics::DeadlineWatch watch(workload);
   const auto see = [&](const metrics::JudgedJob &job) { observe(job, system, observed); };

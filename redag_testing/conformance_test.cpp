@@ -98,7 +98,7 @@ class Conformance : public ::testing::TestWithParam<Combination> {
 // Real time is dear: few workloads, by default; together they still meet every feature.
 TEST_P(Conformance, Threads) {
   const bool os = GetParam().preemption == sched::Preemption::Full;
-  if (os && !sched::is_static(GetParam().policy)) GTEST_SKIP() << "os preemption needs a static policy";
+  if (os && !is_static(GetParam().policy)) GTEST_SKIP() << "os preemption needs a static policy";
   if (os && runtime::probe_priority_band().top_job == 0) GTEST_SKIP() << "no real-time rights";
   check<ThreadsDriver>(4);
 }

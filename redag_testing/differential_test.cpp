@@ -170,7 +170,7 @@ RC_GTEST_PROP(Priorities, AreThePlacesInTheOrderOfThePolicy, (std::uint64_t seed
     const std::vector<sched::Priority> priorities = sched::assign_priorities(w.dags, policy, ties, levels);
     std::uint32_t tiers = 0;
     for (const sched::Priority &priority : priorities) tiers = std::max(tiers, priority.tier + 1);
-    const bool enough = levels == 0 || levels >= tiers || !sched::is_static(policy);
+    const bool enough = levels == 0 || levels >= tiers || !is_static(policy);
     for (std::size_t i = 0; i < tasks.size(); ++i) {
       const auto rank = std::count_if(tasks.begin(), tasks.end(),
                                       [&](const TaskRef &other) { return comes_before(policy, w, other, tasks[i]); });

@@ -136,7 +136,7 @@ class Day {
 void run_a_day(std::uint64_t seed, Duration length, Figures &figures) {
   const Workload workload = random_system(seed);
   if (workload.dags.empty()) return;
-  const sched::Config config = sim::simulated_config(workload);
+  const sched::Config config = sched::config_of(workload);
   const auto system = analysis::compile(workload, analysis::platform_of(workload));
   ASSERT_TRUE(system) << to_string(system.error());
   const analysis::Report report = analysis::analyze(*system);

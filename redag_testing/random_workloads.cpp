@@ -122,7 +122,7 @@ sched::Config random_config(Rng &rng, PolicyKind policy, sched::Preemption preem
   config.ties = chance(rng, 0.7) ? Ties::Share : Ties::Fixed;
   if (preemption != sched::Preemption::Full) return config;
   const auto tasks = static_cast<std::uint32_t>(task_count);
-  if (sched::is_static(policy) && chance(rng, 0.5)) config.levels = between(rng, 1, tasks);
+  if (is_static(policy) && chance(rng, 0.5)) config.levels = between(rng, 1, tasks);
   if (chance(rng, 0.3)) config.max_started = config.workers + between(rng, 0, 2);
   return config;
 }

@@ -454,7 +454,7 @@ ReferenceScheduler::Standing ReferenceScheduler::standing(std::size_t job) const
 
 /// Full preemption by static priorities: what the operating system does, it does by levels.
 bool ReferenceScheduler::has_levels() const {
-  return config_.preemption == Preemption::Full && sched::is_static(config_.policy);
+  return config_.preemption == Preemption::Full && is_static(config_.policy);
 }
 
 std::uint32_t ReferenceScheduler::level_of(std::size_t job) const {

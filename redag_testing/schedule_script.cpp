@@ -288,7 +288,7 @@ class Run {
   std::optional<std::string> compare_started() {
     for (const auto &[key, state] : jobs_) {
       if (state != State::Running && config_.preemption != Preemption::Full) continue;
-      if (sched::is_static(config_.policy) && tested_.level(key) != expected_.level(key)) {
+      if (is_static(config_.policy) && tested_.level(key) != expected_.level(key)) {
         return fmt::format("  task {} job {} has level {}, expected {}", key.first, key.second, tested_.level(key),
                            expected_.level(key));
       }

@@ -44,7 +44,7 @@ Workload make_workload(std::vector<Dag> dags, std::uint32_t workers, PreemptionM
 std::vector<JobEvent> simulate_events(const Workload &workload, Duration horizon, const sim::Options &options) {
   sim::Options with_horizon = options;
   with_horizon.horizon = horizon;
-  sched::PriorityScheduler scheduler(workload, sim::simulated_config(workload));
+  sched::PriorityScheduler scheduler(workload, sched::config_of(workload));
   std::vector<JobEvent> events;
   sim::simulate(workload, scheduler, workload.platform.workers, with_horizon, [&](std::span<const JobEvent> batch) {
     events.insert(events.end(), batch.begin(), batch.end());

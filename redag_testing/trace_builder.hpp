@@ -17,7 +17,7 @@ class TraceBuilder {
  public:
   explicit TraceBuilder(Workload workload) {
     trace_.info.executor = "redag";
-    trace_.info.config = sim::simulated_config(workload);
+    trace_.info.config = sched::config_of(workload);
     trace_.info.preemption = trace::preemption_name(trace_.info.config.preemption);
     trace_.info.workload = std::move(workload);
   }

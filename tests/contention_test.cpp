@@ -18,7 +18,7 @@ metrics::Summary simulate(PreemptionMode mode, PolicyKind policy) {
   workload.policy = policy;
   trace::RunInfo info;
   info.workload = workload;
-  info.config = sim::simulated_config(workload);
+  info.config = sched::config_of(workload);
   sim::Options options;
   options.horizon = 20 * kSecond;
   info.end = options.horizon;

@@ -122,7 +122,7 @@ RunOutcome run_in_virtual_time(const Workload &workload, const ExecutorChoice &c
     }
   };
 
-  const sched::Config config = sim::simulated_config(run);
+  const sched::Config config = sched::config_of(run);
   const auto scheduler = sched::make_scheduler(choice.executor, run, config);
   const sched::ExecutorKind *kind = sched::find_executor(choice.executor);
   sim::Options options;

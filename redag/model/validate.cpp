@@ -71,7 +71,7 @@ class Checker {
     if (platform.workers < 1 || platform.workers > kMaxWorkers) {
       error(Field::Workers, {}, fmt::format("workers must be from 1 to {}, not {}", kMaxWorkers, platform.workers));
     }
-    const bool dynamic = workload_.policy == PolicyKind::Edf || workload_.policy == PolicyKind::Fifo;
+    const bool dynamic = !is_static(workload_.policy);
     if (platform.preemption == PreemptionMode::Os && dynamic) {
       error(Field::Preemption, Field::Policy,
             fmt::format("preemption 'os' needs a static policy, and '{}' is not one", to_string(workload_.policy)),

@@ -123,6 +123,11 @@ struct Dag {
 
 enum class PolicyKind : std::uint8_t { RateMonotonic, DeadlineMonotonic, Fixed, Edf, Fifo, ChainAware };
 
+/// True for policies that order two jobs by their tasks alone.
+[[nodiscard]] constexpr bool is_static(PolicyKind policy) {
+  return policy != PolicyKind::Edf && policy != PolicyKind::Fifo;
+}
+
 /// How jobs that the policy ranks equal are ordered. See docs/model.md, "Ties".
 enum class Ties : std::uint8_t {
   Share,  // they take turns: the earlier release first, and none preempts another

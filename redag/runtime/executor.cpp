@@ -143,10 +143,14 @@ class Executor::Impl {
 
 Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   check(options_);
-  Result<Setup> setup = set_up(options_.preemption, options_.policy, options_.workers, options_.threads, options_.cpus);
+  Result<Setup> setup = set_up({.preemption = options_.preemption,
+                                .policy = options_.policy,
+                                .ties = options_.ties,
+                                .workers = options_.workers,
+                                .threads = options_.threads,
+                                .cpus = options_.cpus});
   if (!setup) throw std::runtime_error(to_string(setup.error()));
   setup_ = *std::move(setup);
-  setup_.config.ties = options_.ties;
   options_.workers = setup_.config.workers;
   if (options_.lock_memory) {
     if (const Result<void> locked = redag::runtime::lock_memory(); !locked) {

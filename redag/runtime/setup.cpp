@@ -19,8 +19,6 @@ constexpr int kKernelRoom = 9;
 constexpr int kUserRoom = 9;
 constexpr std::uint32_t kSpareThreads = 16;
 
-bool is_static(PolicyKind policy) { return policy != PolicyKind::Edf && policy != PolicyKind::Fifo; }
-
 }  // namespace
 
 PriorityBand probe_priority_band() {
@@ -54,15 +52,10 @@ sched::Config make_config(const Mode &mode, std::uint32_t workers, PolicyKind po
   sched::Config config;
   config.workers = workers;
   config.policy = policy;
-  switch (mode.mode) {
-    case PreemptionMode::Os:
-      config.preemption = sched::Preemption::Full;
-      config.levels = band.levels();
-      config.max_started = threads;
-      break;
-    case PreemptionMode::Cooperative: config.preemption = sched::Preemption::Cooperative; break;
-    case PreemptionMode::None:
-    case PreemptionMode::Auto: config.preemption = sched::Preemption::None; break;
+  config.preemption = sched::preemption_of(mode.mode);
+  if (mode.mode == PreemptionMode::Os) {
+    config.levels = band.levels();
+    config.max_started = threads;
   }
   return config;
 }
@@ -72,17 +65,17 @@ int Setup::timer_priority() const {
   return fifo_priority_above_this_thread();
 }
 
-Result<Setup> set_up(PreemptionMode wanted, PolicyKind policy, std::uint32_t workers, std::uint32_t threads,
-                     const std::vector<int> &cpus) {
+Result<Setup> set_up(const SetupRequest &request) {
   Setup setup;
   setup.band = probe_priority_band();
-  Result<Mode> mode = resolve_mode(wanted, policy, setup.band);
+  Result<Mode> mode = resolve_mode(request.preemption, request.policy, setup.band);
   if (!mode) return tl::unexpected(mode.error());
   setup.mode = *std::move(mode);
-  const std::size_t processors = cpus.empty() ? usable_cpus().size() : cpus.size();
-  if (workers == 0) workers = static_cast<std::uint32_t>(processors);
-  threads = std::max(threads == 0 ? workers + kSpareThreads : threads, workers);
-  setup.config = make_config(setup.mode, workers, policy, setup.band, threads);
+  const std::size_t processors = request.cpus.empty() ? usable_cpus().size() : request.cpus.size();
+  const std::uint32_t workers = request.workers == 0 ? static_cast<std::uint32_t>(processors) : request.workers;
+  const std::uint32_t threads = std::max(request.threads == 0 ? workers + kSpareThreads : request.threads, workers);
+  setup.config = make_config(setup.mode, workers, request.policy, setup.band, threads);
+  setup.config.ties = request.ties;
   if (setup.mode.mode == PreemptionMode::Os) setup.throttling = realtime_throttling();
   setup.warnings = mode_warnings(workers, processors, setup.throttling);
   return setup;

@@ -53,10 +53,18 @@ struct Setup {
   [[nodiscard]] int timer_priority() const;
 };
 
-/// `workers` 0: one for each of `cpus` (empty: of the processors that the process may use). `threads` (jobs that can be
-/// started at once, with os) 0: some more than workers. Error: as resolve_mode().
-[[nodiscard]] Result<Setup> set_up(PreemptionMode wanted, PolicyKind policy, std::uint32_t workers,
-                                   std::uint32_t threads, const std::vector<int> &cpus);
+/// What an executor is asked for.
+struct SetupRequest {
+  PreemptionMode preemption = PreemptionMode::Auto;
+  PolicyKind policy = PolicyKind::RateMonotonic;
+  Ties ties = Ties::Share;
+  std::uint32_t workers = 0;  // 0: one for each of `cpus`
+  std::uint32_t threads = 0;  // os: jobs that can be started and unfinished at once; 0: some more than workers
+  std::vector<int> cpus{};    // empty: the processors that the process may use
+};
+
+/// Error: as resolve_mode().
+[[nodiscard]] Result<Setup> set_up(const SetupRequest &request);
 
 /// What a user should know before trusting the figures: too few processors, real-time throttling.
 [[nodiscard]] std::vector<std::string> mode_warnings(std::uint32_t workers, std::size_t cpus,

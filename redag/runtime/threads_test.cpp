@@ -166,7 +166,7 @@ TEST(ResolveMode, TheMostUrgentLevelHasTheTopPriorityAndTheLastOneIsValid) {
 TEST(Setup, TheTimerOutranksWorkersThatInheritAPriority) {
   if (available_fifo_priority(8) < 8) GTEST_SKIP() << "this process may not use SCHED_FIFO 8";
   for (const PreemptionMode mode : {PreemptionMode::None, PreemptionMode::Cooperative}) {
-    const auto setup = set_up(mode, PolicyKind::RateMonotonic, 1, 0, {});
+    const auto setup = set_up({.preemption = mode, .workers = 1});
     ASSERT_TRUE(setup);
     EXPECT_EQ(setup->timer_priority(), 0);
     std::thread([&] {

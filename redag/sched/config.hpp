@@ -17,6 +17,17 @@ enum class Preemption : std::uint8_t {
   Full,         // a job can be preempted at any time and resumed on any worker
 };
 
+/// What a preemption mode asks of the platform. `Auto` counts as `Os`: a driver that may get less resolves it first.
+[[nodiscard]] constexpr Preemption preemption_of(PreemptionMode mode) {
+  switch (mode) {
+    case PreemptionMode::None: return Preemption::None;
+    case PreemptionMode::Cooperative: return Preemption::Cooperative;
+    case PreemptionMode::Os:
+    case PreemptionMode::Auto: break;
+  }
+  return Preemption::Full;
+}
+
 struct Config {
   std::uint32_t workers = 1;  // m
   Preemption preemption = Preemption::None;
@@ -31,6 +42,16 @@ struct Config {
   bool reuse_ids = false;
   Ties ties = Ties::Share;
 };
+
+/// What a scheduler of this workload is told, on a platform without limits on levels and started jobs.
+[[nodiscard]] inline Config config_of(const Workload &workload) {
+  Config config;
+  config.workers = workload.platform.workers;
+  config.preemption = preemption_of(workload.platform.preemption);
+  config.policy = workload.policy;
+  config.ties = workload.ties;
+  return config;
+}
 
 /// Jobs of one task: released = finished + skipped + aborted + in flight.
 struct Accounting {

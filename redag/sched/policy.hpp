@@ -21,11 +21,6 @@ struct Priority {
   friend bool operator==(const Priority &, const Priority &) = default;
 };
 
-/// Policies whose order of two jobs depends on their tasks alone.
-[[nodiscard]] constexpr bool is_static(PolicyKind policy) {
-  return policy != PolicyKind::Edf && policy != PolicyKind::Fifo;
-}
-
 /// A task as the order sees it.
 struct RankedTask {
   Duration period = 0;

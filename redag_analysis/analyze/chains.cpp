@@ -33,7 +33,7 @@ bool goes_first(const System &system, const ChainSegment &from, const ChainSegme
   const SystemTask &producer = system.tasks[from.last.value];
   const SystemTask &consumer = system.tasks[to.first.value];
   const bool alone = from.first == from.last && producer.predecessors.empty();
-  return system.platform.workers == 1 && sched::is_static(system.policy) && alone && producer.jitter == 0 &&
+  return system.platform.workers == 1 && is_static(system.policy) && alone && producer.jitter == 0 &&
          producer.group == kNoGroup && system.dags[producer.dag.value].max_active == 0 &&
          producer.tier < consumer.tier && system.mode != sched::Preemption::Cooperative;
 }

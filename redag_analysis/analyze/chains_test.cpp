@@ -27,11 +27,7 @@ using Schedule = std::vector<std::vector<Job>>;
 
 Schedule simulated(const Workload &workload, const AnalysisPlatform &platform, Duration horizon,
                    const sim::Options &chosen) {
-  sched::Config config;
-  config.workers = platform.workers;
-  config.preemption = platform.preemption;
-  config.policy = workload.policy;
-  config.ties = workload.ties;
+  const sched::Config config = config_of(platform, workload);
   sched::PriorityScheduler scheduler(workload, config);
   sim::Options options = chosen;
   options.horizon = horizon;

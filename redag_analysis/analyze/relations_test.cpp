@@ -180,10 +180,7 @@ TEST(Relations, ResponseTimeIsReachedAtTheCriticalInstant) {
     const System system = compile(bound_case.workload, bound_case.platform).value();
     const Outcome outcome = rta_preemptive().apply(system);
     ASSERT_NE(bound_of(outcome), nullptr);
-    sched::Config config;
-    config.preemption = sched::Preemption::Full;
-    config.policy = bound_case.workload.policy;
-    config.ties = bound_case.workload.ties;
+    const sched::Config config = config_of(bound_case.platform, bound_case.workload);
     sched::PriorityScheduler scheduler(bound_case.workload, config);
     sim::Options options;
     options.horizon = 200;

@@ -83,15 +83,15 @@ enum class Subject : std::uint8_t { Task, Dag, System };
 [[nodiscard]] const char *to_string(Term::Kind kind);
 
 struct Method {
-  std::string_view name;  // as in "--method rta_preemptive"
+  std::string_view name{};  // as in "--method rta_preemptive"
   Subject subject = Subject::Task;
-  std::string_view cite;         // authors, title, where, year
-  std::string_view assumptions;  // when it applies, in words
-  std::string_view complexity;
-  std::string_view sound_only_if;  // of the paper's own equations; empty: sound wherever it applies
-  bool quick = false;              // about linear in the tasks: worth asking first
-  bool knows_modes = false;        // applies where there is a HI mode (System::has_modes)
-  std::function<Outcome(const System &system)> apply;
+  std::string_view cite{};         // authors, title, where, year
+  std::string_view assumptions{};  // when it applies, in words
+  std::string_view complexity{};
+  std::string_view sound_only_if{};  // of the paper's own equations; empty: sound wherever it applies
+  bool quick = false;                // about linear in the tasks: worth asking first
+  bool knows_modes = false;          // applies where there is a HI mode (System::has_modes)
+  std::function<Outcome(const System &system)> apply{};
 
   [[nodiscard]] bool is_paper() const { return !sound_only_if.empty(); }
 };

@@ -377,16 +377,15 @@ AnalysisPlatform platform_of(const sched::Config &config) {
   return platform;
 }
 
-AnalysisPlatform platform_of(const Workload &workload) {
-  AnalysisPlatform platform;
-  platform.workers = workload.platform.workers;
-  switch (workload.platform.preemption) {
-    case PreemptionMode::None: platform.preemption = sched::Preemption::None; break;
-    case PreemptionMode::Cooperative: platform.preemption = sched::Preemption::Cooperative; break;
-    case PreemptionMode::Os:
-    case PreemptionMode::Auto: platform.preemption = sched::Preemption::Full; break;
-  }
-  return platform;
+AnalysisPlatform platform_of(const Workload &workload) { return platform_of(sched::config_of(workload)); }
+
+sched::Config config_of(const AnalysisPlatform &platform, const Workload &workload) {
+  sched::Config config = sched::config_of(workload);
+  config.workers = platform.workers;
+  config.preemption = platform.preemption;
+  config.levels = platform.levels;
+  config.max_started = platform.max_started;
+  return config;
 }
 
 bool System::has_edges() const {

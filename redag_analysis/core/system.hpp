@@ -39,6 +39,9 @@ struct AnalysisPlatform {
 /// `platform` with what was measured of a machine (docs/calibration.md, "What is charged").
 [[nodiscard]] AnalysisPlatform charge(AnalysisPlatform platform, const Overheads &overheads);
 
+/// What the scheduler is told whose schedules of `workload` the bounds on `platform` hold for.
+[[nodiscard]] sched::Config config_of(const AnalysisPlatform &platform, const Workload &workload);
+
 /// What a scheduler was told, no overheads.
 [[nodiscard]] AnalysisPlatform platform_of(const sched::Config &config);
 

@@ -102,23 +102,26 @@ Bound to_bound(const System &system, const Exploration &exploration) {
 }
 
 Method exploration(ExplorationOptions options) {
-  Method method;
-  method.name = "exploration";
-  method.subject = Subject::Task;
-  method.cite =
-      "M. Nasri, B. Brandenburg, An exact and sustainable analysis of non-preemptive scheduling, RTSS 2017; M. Nasri, "
-      "G. Nelissen, B. Brandenburg, Response-time analysis of limited-preemptive parallel DAG tasks under global "
-      "scheduling, ECRTS 2019 (docs/analysis.md, \"Exploration\")";
-  method.assumptions =
-      "any number of workers, jobs run to completion, strictly periodic with the stated offsets; the tasks that edges "
-      "join have one rate and one offset; R <= T; jitter, bcet, max_active, groups; static priorities, or edf without "
-      "data tasks; exact on one worker, but for data tasks among equals";
-  method.complexity = "up to max_states states, O(n) each";
-  method.apply = [options = std::move(options)](const System &system) -> Outcome {
-    if (auto reason = why_not_explore(system)) return NotApplicable{*std::move(reason)};
-    return to_bound(system, explore(system, options));
+  return Method{
+      .name = "exploration",
+      .subject = Subject::Task,
+      .cite =
+          "M. Nasri, B. Brandenburg, An exact and sustainable analysis of non-preemptive scheduling, RTSS 2017; M. "
+          "Nasri, "
+          "G. Nelissen, B. Brandenburg, Response-time analysis of limited-preemptive parallel DAG tasks under global "
+          "scheduling, ECRTS 2019 (docs/analysis.md, \"Exploration\")",
+      .assumptions =
+          "any number of workers, jobs run to completion, strictly periodic with the stated offsets; the tasks that "
+          "edges "
+          "join have one rate and one offset; R <= T; jitter, bcet, max_active, groups; static priorities, or edf "
+          "without "
+          "data tasks; exact on one worker, but for data tasks among equals",
+      .complexity = "up to max_states states, O(n) each",
+      .apply = [options = std::move(options)](const System &system) -> Outcome {
+        if (auto reason = why_not_explore(system)) return NotApplicable{*std::move(reason)};
+        return to_bound(system, explore(system, options));
+      },
   };
-  return method;
 }
 
 }  // namespace redag::analysis

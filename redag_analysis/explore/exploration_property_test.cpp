@@ -103,11 +103,7 @@ struct Seen {
 };
 
 void simulate(const BoundCase &bound_case, const System &system, const Demands &demands, Time horizon, Seen &seen) {
-  sched::Config config;
-  config.workers = bound_case.platform.workers;
-  config.preemption = sched::Preemption::None;
-  config.policy = bound_case.workload.policy;
-  config.ties = bound_case.workload.ties;
+  const sched::Config config = config_of(bound_case.platform, bound_case.workload);
   sched::PriorityScheduler scheduler(bound_case.workload, config);
   sim::Options options;
   options.horizon = horizon;

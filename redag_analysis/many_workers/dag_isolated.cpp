@@ -99,7 +99,7 @@ std::uint32_t most_started(const SystemDag &dag) {
 // True where a job that starts more urgent takes a worker from any less urgent one at once.
 bool preempts_at_once(const System &system) {
   const auto has_own_level = [](const SystemTask &task) { return task.level == task.tier; };
-  return system.mode == sched::Preemption::Full && sched::is_static(system.policy) &&
+  return system.mode == sched::Preemption::Full && is_static(system.policy) &&
          std::all_of(system.tasks.begin(), system.tasks.end(), has_own_level);
 }
 
@@ -200,46 +200,49 @@ std::optional<std::vector<std::uint32_t>> federated_bounds(const System &system)
 }
 
 Method graham() {
-  Method method;
-  method.name = "graham";
-  method.subject = Subject::Dag;
-  method.cite =
-      "R. Graham, Bounds on multiprocessing timing anomalies, SIAM Journal on Applied Mathematics 17(2), 1969";
-  method.assumptions =
-      "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared groups, "
-      "not cooperative";
-  method.complexity = "O(tasks + edges)";
-  method.apply = apply_graham;
-  return method;
+  return Method{
+      .name = "graham",
+      .subject = Subject::Dag,
+      .cite = "R. Graham, Bounds on multiprocessing timing anomalies, SIAM Journal on Applied Mathematics 17(2), 1969",
+      .assumptions =
+          "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared "
+          "groups, "
+          "not cooperative",
+      .complexity = "O(tasks + edges)",
+      .apply = apply_graham,
+  };
 }
 
 Method long_paths() {
-  Method method;
-  method.name = "long_paths";
-  method.subject = Subject::Dag;
-  method.cite =
-      "Q. He, N. Guan, M. Lv, X. Jiang, W. Chang, Bounding the response time of DAG tasks using long paths, RTSS 2022";
-  method.assumptions =
-      "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared groups, "
-      "not cooperative";
-  method.complexity = "O(workers (tasks + edges))";
-  method.apply = apply_long_paths;
-  return method;
+  return Method{
+      .name = "long_paths",
+      .subject = Subject::Dag,
+      .cite =
+          "Q. He, N. Guan, M. Lv, X. Jiang, W. Chang, Bounding the response time of DAG tasks using long paths, RTSS "
+          "2022",
+      .assumptions =
+          "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared "
+          "groups, "
+          "not cooperative",
+      .complexity = "O(workers (tasks + edges))",
+      .apply = apply_long_paths,
+  };
 }
 
 Method isolated() {
-  Method method;
-  method.name = "isolated";
-  method.subject = Subject::Dag;
-  method.cite =
-      "docs/analysis.md, \"Isolation\"; J. Li, J. Chen, K. Agrawal, C. Lu, C. Gill, A. Saifullah, Analysis of "
-      "federated and global scheduling for parallel real-time tasks, ECRTS 2014; RTSS 2022 (see long_paths)";
-  method.assumptions =
-      "the max_active of the DAG and of all that can take a worker from it sum up to at most m; any policy and mode; "
-      "one rate a DAG with edges, R <= T; no shared groups";
-  method.complexity = "O(DAGs tasks + workers (tasks + edges))";
-  method.apply = apply_isolated;
-  return method;
+  return Method{
+      .name = "isolated",
+      .subject = Subject::Dag,
+      .cite =
+          "docs/analysis.md, \"Isolation\"; J. Li, J. Chen, K. Agrawal, C. Lu, C. Gill, A. Saifullah, Analysis of "
+          "federated and global scheduling for parallel real-time tasks, ECRTS 2014; RTSS 2022 (see long_paths)",
+      .assumptions =
+          "the max_active of the DAG and of all that can take a worker from it sum up to at most m; any policy and "
+          "mode; "
+          "one rate a DAG with edges, R <= T; no shared groups",
+      .complexity = "O(DAGs tasks + workers (tasks + edges))",
+      .apply = apply_isolated,
+  };
 }
 
 }  // namespace redag::analysis

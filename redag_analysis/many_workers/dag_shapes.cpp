@@ -177,19 +177,21 @@ Outcome apply_shapes(const System &system) {
 }  // namespace
 
 Method dag_shapes() {
-  Method method;
-  method.name = "dag_shapes";
-  method.subject = Subject::Dag;
-  method.cite =
-      "docs/analysis.md, \"Shapes of DAGs\"; after J. Fonseca, G. Nelissen, V. Nelis, Improved response time analysis "
-      "of sporadic DAG tasks for global FP scheduling, RTNS 2017; Schedulability analysis of DAG tasks with arbitrary "
-      "deadlines under global fixed-priority scheduling, Real-Time Systems 55, 2019";
-  method.assumptions =
-      "m workers, full preemption, static priorities that keep DAGs together, some edges, R <= T; release jitter, "
-      "shared levels; no max_active, no shared groups";
-  method.complexity = "pseudo-polynomial; O(tasks log tasks) a step";
-  method.apply = [](const System &system) { return across_rates(system, apply_shapes); };
-  return method;
+  return Method{
+      .name = "dag_shapes",
+      .subject = Subject::Dag,
+      .cite =
+          "docs/analysis.md, \"Shapes of DAGs\"; after J. Fonseca, G. Nelissen, V. Nelis, Improved response time "
+          "analysis "
+          "of sporadic DAG tasks for global FP scheduling, RTNS 2017; Schedulability analysis of DAG tasks with "
+          "arbitrary "
+          "deadlines under global fixed-priority scheduling, Real-Time Systems 55, 2019",
+      .assumptions =
+          "m workers, full preemption, static priorities that keep DAGs together, some edges, R <= T; release jitter, "
+          "shared levels; no max_active, no shared groups",
+      .complexity = "pseudo-polynomial; O(tasks log tasks) a step",
+      .apply = [](const System &system) { return across_rates(system, apply_shapes); },
+  };
 }
 
 }  // namespace redag::analysis

@@ -17,7 +17,7 @@ namespace redag::analysis::global {
 namespace {
 
 std::optional<std::string> why_not_mode(const System &system, const Needs &needs) {
-  if (!needs.any_policy && !sched::is_static(system.policy)) {
+  if (!needs.any_policy && !is_static(system.policy)) {
     return std::string("for static priorities; the policy is ") + to_string(system.policy);
   }
   if (system.mode == needs.mode) return std::nullopt;

@@ -266,61 +266,65 @@ Outcome apply_nonpreemptive(const System &system) { return apply_bounded(system,
 }  // namespace
 
 Method melani() {
-  Method method;
-  method.name = "melani";
-  method.subject = Subject::Dag;
-  method.cite =
-      "A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo, Response-time analysis of "
-      "conditional DAG tasks in multiprocessor systems, ECRTS 2015";
-  method.assumptions =
-      "m workers, full preemption, static priorities that keep DAGs together, R <= T; release jitter, shared levels; "
-      "no max_active, no shared groups";
-  method.complexity = "pseudo-polynomial; O(DAGs) a step";
-  method.apply = [](const System &system) { return across_rates(system, apply_melani); };
-  return method;
+  return Method{
+      .name = "melani",
+      .subject = Subject::Dag,
+      .cite =
+          "A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo, Response-time analysis of "
+          "conditional DAG tasks in multiprocessor systems, ECRTS 2015",
+      .assumptions =
+          "m workers, full preemption, static priorities that keep DAGs together, R <= T; release jitter, shared "
+          "levels; "
+          "no max_active, no shared groups",
+      .complexity = "pseudo-polynomial; O(DAGs) a step",
+      .apply = [](const System &system) { return across_rates(system, apply_melani); },
+  };
 }
 
 Method dag_bounded() {
-  Method method;
-  method.name = "dag_bounded";
-  method.subject = Subject::Dag;
-  method.cite = "docs/analysis.md, \"Several workers\"; after A. Melani et al., ECRTS 2015";
-  method.assumptions =
-      "m workers, full preemption, static priorities that keep DAGs together, one rate a DAG, R <= T; release jitter, "
-      "shared levels, max_active of DAGs in one part; no shared groups";
-  method.complexity = "pseudo-polynomial; O(DAGs) a step";
-  method.apply = [](const System &system) { return across_rates(system, apply_preemptive); };
-  return method;
+  return Method{
+      .name = "dag_bounded",
+      .subject = Subject::Dag,
+      .cite = "docs/analysis.md, \"Several workers\"; after A. Melani et al., ECRTS 2015",
+      .assumptions =
+          "m workers, full preemption, static priorities that keep DAGs together, one rate a DAG, R <= T; release "
+          "jitter, "
+          "shared levels, max_active of DAGs in one part; no shared groups",
+      .complexity = "pseudo-polynomial; O(DAGs) a step",
+      .apply = [](const System &system) { return across_rates(system, apply_preemptive); },
+  };
 }
 
 Method dag_any() {
-  Method method;
-  method.name = "dag_any";
-  method.subject = Subject::Dag;
-  method.cite =
-      "docs/analysis.md, \"Several workers\"; after A. Melani et al., ECRTS 2015 (global EDF), and M. Bertogna, M. "
-      "Cirinei, RTSS 2007";
-  method.assumptions =
-      "m workers, full preemption or none, any work-conserving order (EDF, FIFO, interleaved priorities), one rate a "
-      "DAG, R <= T for all; release jitter, shared levels, max_active of DAGs in one part; no shared groups";
-  method.complexity = "pseudo-polynomial; O(DAGs^2) a step, at most 1000 rounds";
-  method.apply = apply_any;
-  return method;
+  return Method{
+      .name = "dag_any",
+      .subject = Subject::Dag,
+      .cite =
+          "docs/analysis.md, \"Several workers\"; after A. Melani et al., ECRTS 2015 (global EDF), and M. Bertogna, M. "
+          "Cirinei, RTSS 2007",
+      .assumptions =
+          "m workers, full preemption or none, any work-conserving order (EDF, FIFO, interleaved priorities), one rate "
+          "a "
+          "DAG, R <= T for all; release jitter, shared levels, max_active of DAGs in one part; no shared groups",
+      .complexity = "pseudo-polynomial; O(DAGs^2) a step, at most 1000 rounds",
+      .apply = apply_any,
+  };
 }
 
 Method dag_nonpreemptive() {
-  Method method;
-  method.name = "dag_nonpreemptive";
-  method.subject = Subject::Dag;
-  method.cite =
-      "docs/analysis.md, \"Several workers\"; after M. Serrano, A. Melani, M. Bertogna, E. Quinones, Response-time "
-      "analysis of DAG tasks under fixed priority scheduling with limited preemptions, DATE 2016";
-  method.assumptions =
-      "m workers, jobs run to completion, static priorities that keep DAGs together, one rate a DAG, R <= T; release "
-      "jitter, equal priorities, max_active of DAGs in one part; no shared groups";
-  method.complexity = "pseudo-polynomial; O(DAGs) a step";
-  method.apply = [](const System &system) { return across_rates(system, apply_nonpreemptive); };
-  return method;
+  return Method{
+      .name = "dag_nonpreemptive",
+      .subject = Subject::Dag,
+      .cite =
+          "docs/analysis.md, \"Several workers\"; after M. Serrano, A. Melani, M. Bertogna, E. Quinones, Response-time "
+          "analysis of DAG tasks under fixed priority scheduling with limited preemptions, DATE 2016",
+      .assumptions =
+          "m workers, jobs run to completion, static priorities that keep DAGs together, one rate a DAG, R <= T; "
+          "release "
+          "jitter, equal priorities, max_active of DAGs in one part; no shared groups",
+      .complexity = "pseudo-polynomial; O(DAGs) a step",
+      .apply = [](const System &system) { return across_rates(system, apply_nonpreemptive); },
+  };
 }
 
 }  // namespace redag::analysis

@@ -181,34 +181,37 @@ Outcome apply_density(const System &system) {
 }  // namespace
 
 Method edf_global_density() {
-  Method method;
-  method.name = "edf_global_density";
-  method.subject = Subject::System;
-  method.cite =
-      "J. Goossens, S. Funk, S. Baruah, Priority-driven scheduling of periodic task systems on multiprocessors, "
-      "Real-Time Systems 25, 2003; M. Bertogna, M. Cirinei, G. Lipari, Improved schedulability analysis of EDF on "
-      "multiprocessor platforms, ECRTS 2005";
-  method.assumptions =
-      "m workers, full preemption, edf, no edges, D <= T and no jobs skipped before it, jitter below the deadline; no "
-      "shared groups, no max_active";
-  method.complexity = "O(n)";
-  method.quick = true;
-  method.apply = apply_density;
-  return method;
+  return Method{
+      .name = "edf_global_density",
+      .subject = Subject::System,
+      .cite =
+          "J. Goossens, S. Funk, S. Baruah, Priority-driven scheduling of periodic task systems on multiprocessors, "
+          "Real-Time Systems 25, 2003; M. Bertogna, M. Cirinei, G. Lipari, Improved schedulability analysis of EDF on "
+          "multiprocessor platforms, ECRTS 2005",
+      .assumptions =
+          "m workers, full preemption, edf, no edges, D <= T and no jobs skipped before it, jitter below the deadline; "
+          "no "
+          "shared groups, no max_active",
+      .complexity = "O(n)",
+      .quick = true,
+      .apply = apply_density,
+  };
 }
 
 Method edf_global_response() {
-  Method method;
-  method.name = "edf_global_response";
-  method.cite =
-      "M. Bertogna, M. Cirinei, Response-time analysis for globally scheduled symmetric multiprocessor platforms, RTSS "
-      "2007; without preemption: docs/analysis.md, \"EDF on several workers\"";
-  method.assumptions =
-      "m workers, full preemption or none, edf, no edges, R <= T for all tasks; release jitter; no shared groups, no "
-      "max_active";
-  method.complexity = "pseudo-polynomial; O(n^2) a step, at most 1000 rounds";
-  method.apply = apply_response;
-  return method;
+  return Method{
+      .name = "edf_global_response",
+      .cite =
+          "M. Bertogna, M. Cirinei, Response-time analysis for globally scheduled symmetric multiprocessor platforms, "
+          "RTSS "
+          "2007; without preemption: docs/analysis.md, \"EDF on several workers\"",
+      .assumptions =
+          "m workers, full preemption or none, edf, no edges, R <= T for all tasks; release jitter; no shared groups, "
+          "no "
+          "max_active",
+      .complexity = "pseudo-polynomial; O(n^2) a step, at most 1000 rounds",
+      .apply = apply_response,
+  };
 }
 
 }  // namespace redag::analysis

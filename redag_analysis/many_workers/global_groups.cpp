@@ -304,20 +304,20 @@ Outcome apply_groups(const System &system) {
 }  // namespace
 
 Method dag_groups() {
-  Method method;
-  method.name = "dag_groups";
-  method.subject = Subject::Dag;
-  method.cite =
-      "docs/analysis.md, \"Exclusive groups\"; after L. Sha, R. Rajkumar, J. Lehoczky, IEEE TC 39(9), 1990, and A. "
-      "Melani et al., ECRTS 2015";
-  method.assumptions =
-      "m workers, full preemption (a group's holder inherits) or none, any policy, one rate a DAG; with full "
-      "preemption "
-      "responses up to 16 T where no job is skipped, else R <= T; release jitter, shared levels, exclusive groups "
-      "within and across DAGs; with full preemption max_active of DAGs in one part";
-  method.complexity = "pseudo-polynomial; O(tasks^2) a step";
-  method.apply = apply_groups;
-  return method;
+  return Method{
+      .name = "dag_groups",
+      .subject = Subject::Dag,
+      .cite =
+          "docs/analysis.md, \"Exclusive groups\"; after L. Sha, R. Rajkumar, J. Lehoczky, IEEE TC 39(9), 1990, and A. "
+          "Melani et al., ECRTS 2015",
+      .assumptions =
+          "m workers, full preemption (a group's holder inherits) or none, any policy, one rate a DAG; with full "
+          "preemption "
+          "responses up to 16 T where no job is skipped, else R <= T; release jitter, shared levels, exclusive groups "
+          "within and across DAGs; with full preemption max_active of DAGs in one part",
+      .complexity = "pseudo-polynomial; O(tasks^2) a step",
+      .apply = apply_groups,
+  };
 }
 
 }  // namespace redag::analysis

@@ -272,17 +272,17 @@ Outcome apply_any(const System &system) {
 }  // namespace
 
 Method bertogna_cirinei() {
-  Method method;
-  method.name = "bertogna_cirinei";
-  method.cite =
-      "M. Bertogna, M. Cirinei, Response-time analysis for globally scheduled symmetric multiprocessor platforms, "
-      "RTSS 2007";
-  method.assumptions =
-      "m workers, full preemption, static priorities, no edges, R <= T; release jitter, shared levels; no shared "
-      "groups";
-  method.complexity = "pseudo-polynomial; O(n) a step";
-  method.apply = [](const System &system) { return across_rates(system, apply_bertogna_cirinei); };
-  return method;
+  return Method{
+      .name = "bertogna_cirinei",
+      .cite =
+          "M. Bertogna, M. Cirinei, Response-time analysis for globally scheduled symmetric multiprocessor platforms, "
+          "RTSS 2007",
+      .assumptions =
+          "m workers, full preemption, static priorities, no edges, R <= T; release jitter, shared levels; no shared "
+          "groups",
+      .complexity = "pseudo-polynomial; O(n) a step",
+      .apply = [](const System &system) { return across_rates(system, apply_bertogna_cirinei); },
+  };
 }
 
 Method bertogna_cirinei_any() {
@@ -297,28 +297,30 @@ Method bertogna_cirinei_any() {
 }
 
 Method guan() {
-  Method method;
-  method.name = "guan";
-  method.cite =
-      "N. Guan, M. Stigge, W. Yi, G. Yu, New response time bounds for fixed priority multiprocessor scheduling, RTSS "
-      "2009";
-  method.assumptions =
-      "m workers, full preemption, static priorities, no edges, R <= T; release jitter; no shared groups or levels";
-  method.complexity = "pseudo-polynomial; O(n m) a step";
-  method.apply = [](const System &system) { return across_rates(system, apply_guan); };
-  return method;
+  return Method{
+      .name = "guan",
+      .cite =
+          "N. Guan, M. Stigge, W. Yi, G. Yu, New response time bounds for fixed priority multiprocessor scheduling, "
+          "RTSS "
+          "2009",
+      .assumptions =
+          "m workers, full preemption, static priorities, no edges, R <= T; release jitter; no shared groups or levels",
+      .complexity = "pseudo-polynomial; O(n m) a step",
+      .apply = [](const System &system) { return across_rates(system, apply_guan); },
+  };
 }
 
 Method sequential_nonpreemptive() {
-  Method method;
-  method.name = "sequential_nonpreemptive";
-  method.cite = "docs/analysis.md, \"Several workers\"; after N. Guan, W. Yi, Z. Gu, Q. Deng, G. Yu, RTSS 2008";
-  method.assumptions =
-      "m workers, jobs run to completion, static priorities, no edges, R <= T; release jitter, equal priorities; no "
-      "shared groups";
-  method.complexity = "pseudo-polynomial; O(n) a step";
-  method.apply = [](const System &system) { return across_rates(system, apply_nonpreemptive); };
-  return method;
+  return Method{
+      .name = "sequential_nonpreemptive",
+      .cite = "docs/analysis.md, \"Several workers\"; after N. Guan, W. Yi, Z. Gu, Q. Deng, G. Yu, RTSS 2008",
+      .assumptions =
+          "m workers, jobs run to completion, static priorities, no edges, R <= T; release jitter, equal priorities; "
+          "no "
+          "shared groups",
+      .complexity = "pseudo-polynomial; O(n) a step",
+      .apply = [](const System &system) { return across_rates(system, apply_nonpreemptive); },
+  };
 }
 
 }  // namespace redag::analysis

@@ -43,7 +43,7 @@ std::uint32_t last_level(const System &system, const Unit &unit) {
 }  // namespace
 
 std::vector<Block> blocks_of(const System &system, const std::vector<GlobalUnit> &units) {
-  if (!sched::is_static(system.policy)) return {Block{0, units.size()}};
+  if (!is_static(system.policy)) return {Block{0, units.size()}};
   std::vector<Block> blocks;
   std::uint32_t last_rank = 0;
   std::uint32_t last = 0;
@@ -109,7 +109,7 @@ Windows::Windows(const System &system, std::vector<GlobalUnit> &units)
 // An own task that is less urgent than all of the chain does not keep it waiting, unless it holds a group: not without
 // preemption, nor where it has a place of their max_active.
 bool Windows::obeys_levels(std::size_t unit) const {
-  return preempts_ && sched::is_static(system_.policy) && units_[unit].bound == 0;
+  return preempts_ && is_static(system_.policy) && units_[unit].bound == 0;
 }
 
 bool Windows::follows(std::size_t unit, std::uint32_t before, std::uint32_t after) const {

@@ -34,7 +34,7 @@ trace::Trace run_of(const Workload &workload, sched::Preemption mode, std::uint6
                     Duration warm_up = 0) {
   trace::Trace trace;
   trace.info.workload = workload;
-  trace.info.config = sim::simulated_config(workload);
+  trace.info.config = sched::config_of(workload);
   trace.info.config.preemption = mode;
   trace.info.end = length;
   trace.info.warm_up = warm_up;

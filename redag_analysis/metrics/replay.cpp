@@ -195,8 +195,8 @@ void Replay::demote(LiveJob &job) {
 }
 
 std::int64_t Replay::demoted_key(TaskId task) const {
-  return sched::is_static(config_.policy) ? static_cast<std::int64_t>(tasks_.size() + priorities_[task.value].tier)
-                                          : std::numeric_limits<std::int64_t>::max();
+  return is_static(config_.policy) ? static_cast<std::int64_t>(tasks_.size() + priorities_[task.value].tier)
+                                   : std::numeric_limits<std::int64_t>::max();
 }
 
 // Puts the job on the event's worker; a resumed one leaves where it waited.
@@ -369,7 +369,7 @@ bool Replay::preempts(const Urgency &urgency, const Urgency &running) const {
 }
 
 bool Replay::goes_first(const Urgency &urgency, bool started, const Urgency &other, bool other_started) const {
-  const bool has_levels = config_.preemption == sched::Preemption::Full && sched::is_static(config_.policy);
+  const bool has_levels = config_.preemption == sched::Preemption::Full && is_static(config_.policy);
   if (!has_levels || started == other_started) return urgency < other;
   const std::uint32_t level = level_of(urgency);
   const std::uint32_t other_level = level_of(other);

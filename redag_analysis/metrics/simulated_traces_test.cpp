@@ -72,10 +72,10 @@ trace::RunInfo drawn(std::uint64_t seed) {
   add_details(*workload, rng);
   info.executor = "redag";
   info.seed = seed;
-  info.config = sim::simulated_config(*workload);
+  info.config = sched::config_of(*workload);
   info.workload = std::move(*workload);
   if (info.config.preemption == sched::Preemption::Full) {
-    if (sched::is_static(info.config.policy) && coin(rng)) info.config.levels = pick(rng, 1, 5);
+    if (is_static(info.config.policy) && coin(rng)) info.config.levels = pick(rng, 1, 5);
     if (coin(rng)) info.config.max_started = info.config.workers + pick(rng, 0, 2);
   }
   return info;

@@ -153,18 +153,19 @@ Outcome apply(const System &system) {
 }  // namespace
 
 Method amc_rtb() {
-  Method method;
-  method.name = "amc_rtb";
-  method.subject = Subject::Task;
-  method.cite =
-      "S. Baruah, A. Burns, R. Davis, Response-time analysis for mixed criticality systems, RTSS 2011 (AMC-rtb)";
-  method.assumptions =
-      "one worker, full preemption, static priorities, some wcet_low below its wcet, no groups, R <= T; any degrade; "
-      "DAGs of one rate as in dag_one_worker_preemptive, without jitter if of lower criticality; shared levels";
-  method.complexity = "pseudo-polynomial; O(n) a step";
-  method.knows_modes = true;
-  method.apply = apply;
-  return method;
+  return Method{
+      .name = "amc_rtb",
+      .subject = Subject::Task,
+      .cite =
+          "S. Baruah, A. Burns, R. Davis, Response-time analysis for mixed criticality systems, RTSS 2011 (AMC-rtb)",
+      .assumptions =
+          "one worker, full preemption, static priorities, some wcet_low below its wcet, no groups, R <= T; any "
+          "degrade; "
+          "DAGs of one rate as in dag_one_worker_preemptive, without jitter if of lower criticality; shared levels",
+      .complexity = "pseudo-polynomial; O(n) a step",
+      .knows_modes = true,
+      .apply = apply,
+  };
 }
 
 }  // namespace redag::analysis

@@ -80,18 +80,19 @@ Outcome apply(const System &system) {
 }  // namespace
 
 Method exact_points() {
-  Method method;
-  method.name = "exact_points";
-  method.subject = Subject::System;
-  method.cite =
-      "E. Bini, G. C. Buttazzo, Schedulability analysis of periodic fixed priority systems, IEEE Transactions on "
-      "Computers 53(11), 2004";
-  method.assumptions =
-      "one worker, full preemption, static priorities, D <= T, no jitter; blocking added; a DAG of one rate counts as "
-      "one task with C = volume";
-  method.complexity = "O(n 2^n) at worst, in practice far less";
-  method.apply = apply;
-  return method;
+  return Method{
+      .name = "exact_points",
+      .subject = Subject::System,
+      .cite =
+          "E. Bini, G. C. Buttazzo, Schedulability analysis of periodic fixed priority systems, IEEE Transactions on "
+          "Computers 53(11), 2004",
+      .assumptions =
+          "one worker, full preemption, static priorities, D <= T, no jitter; blocking added; a DAG of one rate counts "
+          "as "
+          "one task with C = volume",
+      .complexity = "O(n 2^n) at worst, in practice far less",
+      .apply = apply,
+  };
 }
 
 }  // namespace redag::analysis

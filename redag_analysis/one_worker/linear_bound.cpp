@@ -95,18 +95,18 @@ Outcome apply(const System &system) {
 }  // namespace
 
 Method linear_bound() {
-  Method method;
-  method.name = "linear_bound";
-  method.subject = Subject::Task;
-  method.cite =
-      "E. Bini, T. H. C. Nguyen, P. Richard, S. K. Baruah, A response-time bound in fixed-priority scheduling with "
-      "arbitrary deadlines, IEEE Transactions on Computers 58(2), 2009";
-  method.assumptions =
-      "one worker, full preemption, static priorities, any deadlines, no jitter; blocking added; a DAG of one rate "
-      "counts as one task with C = volume";
-  method.complexity = "O(n log n)";
-  method.apply = apply;
-  return method;
+  return Method{
+      .name = "linear_bound",
+      .subject = Subject::Task,
+      .cite =
+          "E. Bini, T. H. C. Nguyen, P. Richard, S. K. Baruah, A response-time bound in fixed-priority scheduling with "
+          "arbitrary deadlines, IEEE Transactions on Computers 58(2), 2009",
+      .assumptions =
+          "one worker, full preemption, static priorities, any deadlines, no jitter; blocking added; a DAG of one rate "
+          "counts as one task with C = volume",
+      .complexity = "O(n log n)",
+      .apply = apply,
+  };
 }
 
 }  // namespace redag::analysis

@@ -92,7 +92,7 @@ std::optional<std::string> why_not(const System &system) {
   if (auto reason = why_not_directly(system)) return reason;
   if (system.platform.workers != 1)
     return "for one worker; the platform has " + std::to_string(system.platform.workers);
-  if (!sched::is_static(system.policy)) {
+  if (!is_static(system.policy)) {
     return std::string("for static priorities; the policy is ") + to_string(system.policy);
   }
   if (system.mode == sched::Preemption::None) return std::nullopt;

@@ -187,15 +187,15 @@ Outcome apply_rta_blocking(const System &system) { return apply_recurrence(syste
 
 Method make(std::string_view name, Subject subject, std::string_view equation, std::string_view sound_only_if,
             std::string_view complexity, Outcome (*apply)(const System &)) {
-  Method method;
-  method.name = name;
-  method.subject = subject;
-  method.cite = equation;
-  method.assumptions = "none: it computes what the equation says";
-  method.sound_only_if = sound_only_if;
-  method.complexity = complexity;
-  method.apply = apply;
-  return method;
+  return Method{
+      .name = name,
+      .subject = subject,
+      .cite = equation,
+      .assumptions = "none: it computes what the equation says",
+      .complexity = complexity,
+      .sound_only_if = sound_only_if,
+      .apply = apply,
+  };
 }
 
 }  // namespace

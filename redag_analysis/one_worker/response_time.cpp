@@ -52,76 +52,80 @@ Outcome dags_deferred(const System &system) {
 }  // namespace
 
 Method rta_preemptive() {
-  Method method;
-  method.name = "rta_preemptive";
-  method.subject = Subject::Task;
-  method.cite =
-      "M. Joseph, P. Pandya, Finding response times in a real-time system, The Computer Journal 29(5), 1986; "
-      "K. Tindell, A. Burns, A. Wellings, An extendible approach for analysing fixed priority hard real-time tasks, "
-      "Real-Time Systems 6(2), 1994";
-  method.assumptions =
-      "one worker, full preemption, static priorities, edges only between rates; any deadlines, release jitter, shared "
-      "groups with priority inheritance, shared levels";
-  method.complexity = "pseudo-polynomial; O(n) a step";
-  method.apply = [](const System &system) { return across_rates(system, independent_full); };
-  return method;
+  return Method{
+      .name = "rta_preemptive",
+      .subject = Subject::Task,
+      .cite =
+          "M. Joseph, P. Pandya, Finding response times in a real-time system, The Computer Journal 29(5), 1986; "
+          "K. Tindell, A. Burns, A. Wellings, An extendible approach for analysing fixed priority hard real-time "
+          "tasks, "
+          "Real-Time Systems 6(2), 1994",
+      .assumptions =
+          "one worker, full preemption, static priorities, edges only between rates; any deadlines, release jitter, "
+          "shared "
+          "groups with priority inheritance, shared levels",
+      .complexity = "pseudo-polynomial; O(n) a step",
+      .apply = [](const System &system) { return across_rates(system, independent_full); },
+  };
 }
 
 Method rta_nonpreemptive() {
-  Method method;
-  method.name = "rta_nonpreemptive";
-  method.subject = Subject::Task;
-  method.cite =
-      "R. Davis, A. Burns, R. Bril, J. Lukkien, Controller Area Network (CAN) schedulability analysis: Refuted, "
-      "revisited and revised, Real-Time Systems 35(3), 2007";
-  method.assumptions =
-      "one worker, jobs run to completion, static priorities, edges only between rates; any deadlines, release jitter, "
-      "groups";
-  method.complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period";
-  method.apply = [](const System &system) { return across_rates(system, independent_none); };
-  return method;
+  return Method{
+      .name = "rta_nonpreemptive",
+      .subject = Subject::Task,
+      .cite =
+          "R. Davis, A. Burns, R. Bril, J. Lukkien, Controller Area Network (CAN) schedulability analysis: Refuted, "
+          "revisited and revised, Real-Time Systems 35(3), 2007",
+      .assumptions =
+          "one worker, jobs run to completion, static priorities, edges only between rates; any deadlines, release "
+          "jitter, "
+          "groups",
+      .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
+      .apply = [](const System &system) { return across_rates(system, independent_none); },
+  };
 }
 
 Method rta_deferred() {
-  Method method;
-  method.name = "rta_deferred";
-  method.subject = Subject::Task;
-  method.cite =
-      "R. Bril, J. Lukkien, W. Verhaegh, Worst-case response time analysis of real-time tasks under fixed-priority "
-      "scheduling with deferred preemption, Real-Time Systems 42, 2009";
-  method.assumptions =
-      "one worker, cooperative preemption points every `region`, static priorities, edges only between rates, no "
-      "shared groups; any "
-      "deadlines, release jitter, shared levels";
-  method.complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period";
-  method.apply = [](const System &system) { return across_rates(system, independent_cooperative); };
-  return method;
+  return Method{
+      .name = "rta_deferred",
+      .subject = Subject::Task,
+      .cite =
+          "R. Bril, J. Lukkien, W. Verhaegh, Worst-case response time analysis of real-time tasks under fixed-priority "
+          "scheduling with deferred preemption, Real-Time Systems 42, 2009",
+      .assumptions =
+          "one worker, cooperative preemption points every `region`, static priorities, edges only between rates, no "
+          "shared groups; any "
+          "deadlines, release jitter, shared levels",
+      .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
+      .apply = [](const System &system) { return across_rates(system, independent_cooperative); },
+  };
 }
 
 Method dag_one_worker_preemptive() {
-  Method method;
-  method.name = "dag_one_worker_preemptive";
-  method.subject = Subject::Dag;
-  method.cite = "as rta_preemptive, with C = volume of the DAG (docs/analysis.md, \"One worker\")";
-  method.assumptions =
-      "one worker, full preemption, static priorities; R <= T for DAGs; timers that keep their periods where edges "
-      "join rates; jitter, groups with inheritance, shared levels, max_active";
-  method.complexity = "pseudo-polynomial; O(n) a step";
-  method.apply = [](const System &system) { return across_rates(system, dags_full); };
-  return method;
+  return Method{
+      .name = "dag_one_worker_preemptive",
+      .subject = Subject::Dag,
+      .cite = "as rta_preemptive, with C = volume of the DAG (docs/analysis.md, \"One worker\")",
+      .assumptions =
+          "one worker, full preemption, static priorities; R <= T for DAGs; timers that keep their periods where edges "
+          "join rates; jitter, groups with inheritance, shared levels, max_active",
+      .complexity = "pseudo-polynomial; O(n) a step",
+      .apply = [](const System &system) { return across_rates(system, dags_full); },
+  };
 }
 
 Method dag_one_worker_deferred() {
-  Method method;
-  method.name = "dag_one_worker_deferred";
-  method.subject = Subject::Dag;
-  method.cite = "as rta_deferred, with C = volume of the DAG (docs/analysis.md, \"One worker\")";
-  method.assumptions =
-      "one worker, jobs run to completion or to a preemption point, static priorities; R <= T for DAGs; timers that "
-      "keep their periods where edges join rates; jitter, max_active; groups unless cooperative";
-  method.complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period";
-  method.apply = [](const System &system) { return across_rates(system, dags_deferred); };
-  return method;
+  return Method{
+      .name = "dag_one_worker_deferred",
+      .subject = Subject::Dag,
+      .cite = "as rta_deferred, with C = volume of the DAG (docs/analysis.md, \"One worker\")",
+      .assumptions =
+          "one worker, jobs run to completion or to a preemption point, static priorities; R <= T for DAGs; timers "
+          "that "
+          "keep their periods where edges join rates; jitter, max_active; groups unless cooperative",
+      .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
+      .apply = [](const System &system) { return across_rates(system, dags_deferred); },
+  };
 }
 
 }  // namespace redag::analysis

@@ -229,7 +229,7 @@ std::optional<std::string> why_not_global(const System &system) {
   if (auto reason = why_not_directly(system)) return reason;
   // With m = 1 the limits would be 1 and more, which no fixed priorities reach.
   if (system.platform.workers < 2) return "for two workers or more";
-  if (!sched::is_static(system.policy)) {
+  if (!is_static(system.policy)) {
     return std::string("for rate-monotonic priorities; the policy is ") + to_string(system.policy);
   }
   if (system.mode != sched::Preemption::Full) return "for full preemption";
@@ -279,15 +279,15 @@ Outcome apply_global_rm_utilization(const System &system) {
 
 Method make(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
             Outcome (*apply)(const System &)) {
-  Method method;
-  method.name = name;
-  method.subject = Subject::System;
-  method.cite = cite;
-  method.assumptions = assumptions;
-  method.complexity = complexity;
-  method.quick = true;
-  method.apply = apply;
-  return method;
+  return Method{
+      .name = name,
+      .subject = Subject::System,
+      .cite = cite,
+      .assumptions = assumptions,
+      .complexity = complexity,
+      .quick = true,
+      .apply = apply,
+  };
 }
 
 constexpr std::string_view kOneWorker =

@@ -70,18 +70,19 @@ Outcome apply_wait_set(const System &system) {
 }  // namespace
 
 Method wait_set() {
-  Method method;
-  method.name = "wait_set";
-  method.subject = Subject::Dag;
-  method.cite =
-      "docs/analysis.md, \"rclcpp's executors\"; windows: D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, "
-      "Response-time analysis of ROS 2 processing chains under reservation-based scheduling, ECRTS 2019";
-  method.assumptions =
-      "rclcpp's single- or multi-threaded executor of Humble, m threads with processors of their own; one rate a DAG "
-      "with edges, R <= T; no shared exclusive groups";
-  method.complexity = "O(tasks + edges)";
-  method.apply = apply_wait_set;
-  return method;
+  return Method{
+      .name = "wait_set",
+      .subject = Subject::Dag,
+      .cite =
+          "docs/analysis.md, \"rclcpp's executors\"; windows: D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, "
+          "Response-time analysis of ROS 2 processing chains under reservation-based scheduling, ECRTS 2019",
+      .assumptions =
+          "rclcpp's single- or multi-threaded executor of Humble, m threads with processors of their own; one rate a "
+          "DAG "
+          "with edges, R <= T; no shared exclusive groups",
+      .complexity = "O(tasks + edges)",
+      .apply = apply_wait_set,
+  };
 }
 
 }  // namespace redag::analysis

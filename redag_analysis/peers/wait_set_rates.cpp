@@ -281,14 +281,14 @@ constexpr std::string_view kOneThread =
 
 Method make(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
             Outcome (*apply)(const System &)) {
-  Method method;
-  method.name = name;
-  method.subject = Subject::Dag;
-  method.cite = cite;
-  method.assumptions = assumptions;
-  method.complexity = complexity;
-  method.apply = apply;
-  return method;
+  return Method{
+      .name = name,
+      .subject = Subject::Dag,
+      .cite = cite,
+      .assumptions = assumptions,
+      .complexity = complexity,
+      .apply = apply,
+  };
 }
 
 }  // namespace

@@ -307,20 +307,6 @@ Overheads overheads_of(const redag::Overheads &machine) {
   return Overheads{.release = machine.timer, .dispatch = machine.dispatch, .preempt = machine.preempt};
 }
 
-sched::Config simulated_config(const Workload &workload) {
-  sched::Config config;
-  config.workers = workload.platform.workers;
-  config.policy = workload.policy;
-  config.ties = workload.ties;
-  switch (workload.platform.preemption) {
-    case PreemptionMode::None: config.preemption = sched::Preemption::None; break;
-    case PreemptionMode::Cooperative: config.preemption = sched::Preemption::Cooperative; break;
-    case PreemptionMode::Os:
-    case PreemptionMode::Auto: config.preemption = sched::Preemption::Full; break;
-  }
-  return config;
-}
-
 std::optional<Duration> hyperperiod(const Workload &workload, Duration limit) {
   Int128 result = 1;
   for (const Dag &dag : workload.dags) {

@@ -54,9 +54,6 @@ struct Result {
 Result simulate(const Workload &workload, sched::Scheduler &scheduler, std::uint32_t workers, const Options &options,
                 const EventSink &sink);
 
-/// The scheduler config that the simulator uses for a workload: `os` and `auto` mean full preemption.
-[[nodiscard]] sched::Config simulated_config(const Workload &workload);
-
 /// Least common multiple of the timer tasks' periods, or nothing if it exceeds `limit`.
 [[nodiscard]] std::optional<Duration> hyperperiod(const Workload &workload, Duration limit = kMaxDuration);
 

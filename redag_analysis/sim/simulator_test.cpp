@@ -342,7 +342,7 @@ TEST(Simulator, SameSeedSameEvents) {
 
 TEST(Simulator, SinkCanEndIt) {
   const Workload workload = make_workload({make_dag("a", {{"x", 1, 1}})}, 1);
-  sched::PriorityScheduler scheduler(workload, simulated_config(workload));
+  sched::PriorityScheduler scheduler(workload, sched::config_of(workload));
   const Result result = simulate(workload, scheduler, 1, {}, [](auto events) { return events.front().time < 5 * kMs; });
   EXPECT_EQ(result.end, 5 * kMs);
 }

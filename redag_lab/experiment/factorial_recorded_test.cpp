@@ -42,7 +42,7 @@ trace::Trace simulated(Workload workload, const std::string &executor, std::uint
   trace::Trace trace;
   trace.info.workload = workload;
   trace.info.executor = executor;
-  trace.info.config = sched::effective_config(*sched::find_executor(executor), sim::simulated_config(workload));
+  trace.info.config = sched::effective_config(*sched::find_executor(executor), sched::config_of(workload));
   trace.info.seed = seed;
   trace.info.end = duration;
   const auto scheduler = sched::make_scheduler(executor, workload, trace.info.config);

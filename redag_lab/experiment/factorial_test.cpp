@@ -48,7 +48,7 @@ Result<FinishedRun> simulate_run(const PlannedRun &planned) {
   FinishedRun run;
   run.trace.info.workload = workload;
   run.trace.info.executor = name;
-  run.trace.info.config = sched::effective_config(*kind, sim::simulated_config(workload));
+  run.trace.info.config = sched::effective_config(*kind, sched::config_of(workload));
   run.trace.info.preemption = trace::preemption_name(run.trace.info.config.preemption);
   run.trace.info.seed = planned.seed;
   run.trace.info.end = planned.duration;

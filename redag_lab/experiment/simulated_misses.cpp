@@ -70,7 +70,7 @@ std::optional<SeenMiss> find_miss(const Workload &workload, const analysis::Syst
                                   const SimulationEffort &effort, std::uint64_t seed) {
   Duration slowest = 0;
   for (const analysis::SystemTask &task : system.tasks) slowest = std::max(slowest, task.period);
-  const sched::Config config = sim::simulated_config(workload);
+  const sched::Config config = sched::config_of(workload);
   SeenMiss run{at_worst(workload), 0, 0, {}};
   for (std::uint32_t i = 0; i <= effort.offsets; ++i) {
     run.seed = derive_seed(seed, {i});

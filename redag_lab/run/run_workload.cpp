@@ -61,10 +61,13 @@ class Run {
     if (!mistakes.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes));
     const bool preemptive = kind == nullptr || kind->ours;
     const auto wanted = options_.preemption.value_or(workload_.platform.preemption);
-    Result<Setup> setup = set_up(preemptive ? wanted : PreemptionMode::None, workload_.policy,
-                                 workload_.platform.workers, pool_size(workload_, options_), options_.cpus);
+    Result<Setup> setup = set_up({.preemption = preemptive ? wanted : PreemptionMode::None,
+                                  .policy = workload_.policy,
+                                  .ties = workload_.ties,
+                                  .workers = workload_.platform.workers,
+                                  .threads = pool_size(workload_, options_),
+                                  .cpus = options_.cpus});
     if (!setup) return tl::unexpected(setup.error());
-    setup->config.ties = workload_.ties;
     result_.mode = setup->mode;
     if (!preemptive && wanted != PreemptionMode::None) {
       result_.mode.reason = "executor " + options_.executor + " has no other";

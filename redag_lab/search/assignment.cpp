@@ -60,8 +60,7 @@ class Search {
     Assignment &result = result_;
     result.present = judged("present", workload_, caps_of(workload_));
     result.best = result.present;
-    const bool may_order =
-        options_.priorities && (sched::is_static(workload_.policy) || !result.present.score.schedulable);
+    const bool may_order = options_.priorities && (is_static(workload_.policy) || !result.present.score.schedulable);
     add_order("present", workload_);
     if (may_order) {
       if (workload_.policy != PolicyKind::RateMonotonic) {

@@ -78,7 +78,7 @@ class Search {
   }
 
   [[nodiscard]] std::optional<std::string> preempt() const {
-    if (platform_.preemption == sched::Preemption::Full || !sched::is_static(workload_.policy)) return std::nullopt;
+    if (platform_.preemption == sched::Preemption::Full || !is_static(workload_.policy)) return std::nullopt;
     AnalysisPlatform platform = platform_;
     platform.preemption = sched::Preemption::Full;
     if (!suffices(workload_, platform)) return std::nullopt;

@@ -86,7 +86,7 @@ bool is_better(const Score &a, const Score &b, const Goal &goal) {
 std::optional<std::array<ClassScore, kCriticalities>> simulate_once(const Workload &workload, std::uint64_t seed,
                                                                     const Simulation &simulation,
                                                                     const std::atomic<bool> *stop) {
-  const sched::Config config = sim::simulated_config(workload);
+  const sched::Config config = sched::config_of(workload);
   sched::PriorityScheduler scheduler(workload, config);
   sim::Options options;
   options.horizon = simulation.duration;

@@ -182,12 +182,7 @@ TEST(Sensitivity, TheRatesOfTheOnlyDagAreAllRates) {
 
 // No deadline missed and no job skipped when all start together and run for their wcet.
 bool simulated_without_a_miss(const BoundCase &bound_case, const Workload &workload) {
-  sched::Config config;
-  config.workers = bound_case.platform.workers;
-  config.preemption = bound_case.platform.preemption;
-  config.policy = workload.policy;
-  config.ties = workload.ties;
-  config.levels = bound_case.platform.levels;
+  const sched::Config config = config_of(bound_case.platform, workload);
   sched::PriorityScheduler scheduler(workload, config);
   sim::Options options;
   Duration longest = 0;

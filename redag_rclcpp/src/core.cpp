@@ -55,10 +55,13 @@ ReDAGOptions prepare(ReDAGOptions options) {
 }
 
 redag::runtime::Setup set_up(const ReDAGOptions &options) {
-  auto setup =
-      redag::runtime::set_up(options.preemption, options.policy, options.workers, options.threads, options.cpus);
+  auto setup = redag::runtime::set_up({.preemption = options.preemption,
+                                       .policy = options.policy,
+                                       .ties = options.ties,
+                                       .workers = options.workers,
+                                       .threads = options.threads,
+                                       .cpus = options.cpus});
   if (!setup) throw std::runtime_error(to_string(setup.error()));
-  setup->config.ties = options.ties;
   return *std::move(setup);
 }
 

@@ -334,8 +334,7 @@ std::string mode_reason(const Analysed &analysed) {
   }
   if (!analysed.executor->ours) return "rclcpp's executors do not preempt";
   if (analysed.workload.platform.preemption != PreemptionMode::Auto) return {};
-  const bool is_static = system.policy != PolicyKind::Edf && system.policy != PolicyKind::Fifo;
-  return is_static
+  return is_static(system.policy)
              ? "auto is analysed as os; a process without SCHED_FIFO runs it as cooperative: see --preemption"
              : fmt::format("auto is analysed as os, as simulated; threads run {} as cooperative: see --preemption",
                            to_string(system.policy));

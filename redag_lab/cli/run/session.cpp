@@ -35,7 +35,7 @@ trace::RunInfo describe_simulation(const Workload &workload, const Variant &vari
   trace::RunInfo info;
   info.workload = workload;
   info.executor = variant.executor;
-  info.config = sched::effective_config(*sched::find_executor(variant.executor), sim::simulated_config(workload));
+  info.config = sched::effective_config(*sched::find_executor(variant.executor), sched::config_of(workload));
   info.preemption = mode_name(info.config.preemption);
   const PreemptionMode wanted = workload.platform.preemption;
   if (wanted == PreemptionMode::Os || wanted == PreemptionMode::Auto) {

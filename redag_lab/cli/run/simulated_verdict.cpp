@@ -11,13 +11,7 @@ namespace redag::cli {
 
 bool misses_nothing(const Workload &workload, const analysis::AnalysisPlatform &platform, Duration duration,
                     const std::atomic<bool> *stop) {
-  sched::Config config;
-  config.workers = platform.workers;
-  config.preemption = platform.preemption;
-  config.policy = workload.policy;
-  config.ties = workload.ties;
-  config.levels = platform.levels;
-  config.max_started = platform.max_started;
+  const sched::Config config = analysis::config_of(platform, workload);
   sched::PriorityScheduler scheduler(workload, config);
 
   sim::Options options;
