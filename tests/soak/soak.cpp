@@ -24,6 +24,7 @@
 #include <thread>
 #include <vector>
 
+#include "redag/live/publisher.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/preemption_point.hpp"
