@@ -260,7 +260,7 @@ TEST_F(EngineShare, WhereNobodyIsSparedNobodyGivesWay) {
   for (const Criticality all : {Criticality::Normal, Criticality::High}) {
     std::atomic<int> ordinary{0};
     const Body body = [&](const Job &) {
-      const Time end = monotonic_now() + 60 * kMillisecond;  // three times what the kernel looks at
+      const Time end = monotonic_now() + 60 * kMillisecond;  // three periods of the kernel's account
       while (monotonic_now() < end) {
         if (own_priority() == 0) ++ordinary;
       }

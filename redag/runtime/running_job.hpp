@@ -28,7 +28,7 @@ struct RunningJob {
   RunningJob *below = nullptr;
   Atomic<RunningJob *> *top = nullptr;  // Thread::top of its thread: points here while the body runs
   Duration total = -1;                  // processor time of the whole job; below 0: not known yet
-  bool used_wcet_low = false;           // and the scheduler was told; written under the engine's lock
+  bool used_wcet_low = false;           // reported to the scheduler; written under the engine's lock
   bool used_budget = false;
   bool named = false;  // was reported overdue; written under the engine's lock
 

@@ -13,8 +13,8 @@
 namespace redag::runtime {
 namespace {
 
-// From the top: 9 priorities for the kernel's own threads (migration, watchdog, raised interrupt threads), one for the
-// release timer, then room for the user's own urgent threads above the jobs.
+// From the top: 9 priorities for the kernel's own threads (migration, watchdog, raised interrupt threads), then one for
+// the release timer. Below it is room for the user's own urgent threads above the jobs.
 constexpr int kKernelRoom = 9;
 constexpr int kUserRoom = 9;
 constexpr std::uint32_t kSpareThreads = 16;

@@ -31,9 +31,9 @@ struct alignas(32) Job {
   Time deadline = 0;  // absolute
   Time origin = 0;
 
-  // Jobs are ordered by (key, turn, rank, sequence), smallest first. Under a static policy, key is the task's tier
-  // (plus the number of tiers for a demoted job), or the more urgent key of a job from which this one inherited. Turn,
-  // rank and sequence are always the job's own.
+  // Jobs are ordered by (key, turn, rank, sequence), smallest first. Under a static policy, key is the task's tier; for
+  // a demoted job it is the tier plus the number of tiers. A job that inherits has the more urgent key of another job.
+  // Turn, rank and sequence are always the job's own.
   std::int64_t key = 0;
   Time turn = 0;               // Ties::Share: its release, or the turn of the job that it replaced
   std::uint64_t sequence = 0;  // order in which jobs became ready
