@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The whole interface of the library: what a program includes that runs its own DAGs, or a workload's.
+// The whole interface of the library, for programs that run their own DAGs or those of a workload.
 #pragma once
 
 #include "redag/base/result.hpp"

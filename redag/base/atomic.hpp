@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The atomics that threads agree through. An alias, in a header of its own so that tests/model_check can put another
-// type in its place and try every interleaving of the code that uses it. What is only counted, or only read by a
-// program's own signal handler, is plain std::atomic.
+// The type of the atomics by which threads coordinate. It has a header of its own so that tests/model_check can replace
+// the type and try every interleaving of the code that uses it. Plain counters, and values that only a program's own
+// signal handler reads, are std::atomic instead.
 #pragma once
 
 #include <atomic>

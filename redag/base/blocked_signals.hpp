@@ -1,16 +1,16 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Signals that are to run their handlers elsewhere. Any thread.
+// Keeps signal handlers off the threads that run jobs. Any thread.
 #pragma once
 
 #include <csignal>
 
 namespace redag {
 
-/// While it lives, the calling thread and threads that it creates take no signals but those of their own mistakes
-/// (SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS, SIGABRT): a handler of the process then interrupts a thread of
-/// the program, never a job or what is above all jobs.
+/// While it lives, the calling thread and threads that it creates take no signals but those that they cause themselves
+/// (SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS, SIGABRT). A handler of the process then interrupts a thread of
+/// the program, never a job or a thread above all jobs.
 class BlockedSignals {
  public:
   BlockedSignals() noexcept {

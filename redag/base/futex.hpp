@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The three futex operations this project uses (man 2 futex), for words that are private to the process. All waits can
-// wake spuriously; callers loop. Any thread; futex_wake is async-signal-safe.
+// The three futex operations that this project uses (man 2 futex), for words that are private to the process. All waits
+// can wake spuriously; callers loop. Any thread; futex_wake is async-signal-safe.
 #pragma once
 
 #include <linux/futex.h>
@@ -26,13 +26,13 @@ inline void futex_wait(FutexWord &word, std::uint32_t expected) noexcept {
   syscall(SYS_futex, &word, FUTEX_WAIT_PRIVATE, expected, nullptr, nullptr, 0);
 }
 
-/// Sleeps while `word` holds `expected`, at most until `deadline` on CLOCK_MONOTONIC. False if it timed out.
+/// Sleeps while `word` holds `expected`, at most until `deadline` on CLOCK_MONOTONIC. Returns false if it timed out.
 inline bool futex_wait_until(FutexWord &word, std::uint32_t expected, Time deadline) noexcept {
   if (deadline < 0) return false;
   timespec until{};
   until.tv_sec = static_cast<std::time_t>(deadline / kSecond);
   until.tv_nsec = static_cast<long>(deadline % kSecond);
-  // FUTEX_WAIT takes a relative timeout; the BITSET form an absolute one, on CLOCK_MONOTONIC.
+  // FUTEX_WAIT takes a relative timeout, the BITSET form an absolute one on CLOCK_MONOTONIC.
   const long result =
       syscall(SYS_futex, &word, FUTEX_WAIT_BITSET_PRIVATE, expected, &until, nullptr, FUTEX_BITSET_MATCH_ANY);
   return !(result == -1 && errno == ETIMEDOUT);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Durations in buckets that grow with them (8 an octave: a percentile is at most 1/8 above the true one). Any thread;
-// adding allocates nothing and takes no lock.
+// A histogram of durations with 8 buckets an octave: a percentile is at most 1/8 above the true one. Any thread; adding
+// a value allocates nothing and takes no lock.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace redag {
 
-/// What a Histogram held at some time. Two of them subtract to what came in between; several add up to all of theirs.
+/// The content of a Histogram at some time. The difference of two is what came in between; sums combine histograms.
 class HistogramCounts {
  public:
   static constexpr unsigned kBits = 3;  // 8 buckets an octave
@@ -27,10 +27,10 @@ class HistogramCounts {
     for (const std::uint32_t bucket : buckets_) total += bucket;
     return total;
   }
-  /// Of all that was ever added, also where these are the counts of a part.
+  /// The longest value ever added, even if these are the counts of a part.
   [[nodiscard]] Duration longest() const noexcept { return longest_; }
 
-  /// The smallest bound that at least `share` of the values do not exceed; 0 without values.
+  /// Returns the smallest bound that at least `share` of the values do not exceed; 0 without values.
   [[nodiscard]] Duration percentile(double share) const noexcept {
     const auto wanted = static_cast<std::uint64_t>(share * static_cast<double>(total()));
     std::uint64_t seen = 0;
@@ -46,7 +46,7 @@ class HistogramCounts {
     longest_ = std::max(longest_, other.longest_);
     return *this;
   }
-  /// `other`: of the same histogram, earlier.
+  /// `other` is an earlier state of the same histogram.
   HistogramCounts &operator-=(const HistogramCounts &other) noexcept {
     for (std::size_t i = 0; i < kBuckets; ++i) buckets_[i] -= other.buckets_[i];
     return *this;
@@ -61,7 +61,7 @@ class HistogramCounts {
     return std::min(Buckets::bucket_of(value), kBuckets - 1);
   }
   static Duration upper_bound_of(std::size_t index) noexcept {
-    // The last one takes all that is longer.
+    // The last bucket takes all longer values.
     return index == kBuckets - 1 ? kNever : static_cast<Duration>(Buckets::highest_in(index));
   }
 
@@ -73,7 +73,7 @@ class Histogram {
  public:
   void add(Duration value) noexcept {
     value = std::max<Duration>(value, 0);
-    // First, so that counts() never knows of a value and not of its length.
+    // Stored first: counts() must never include a value whose length longest_ does not cover yet.
     Duration longest = longest_.load(std::memory_order_relaxed);
     while (value > longest && !longest_.compare_exchange_weak(longest, value, std::memory_order_release)) {
     }

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Typed indices. An id is a position in the array that owns the thing it names; the tag keeps a task's index from
-// being used where a DAG's is meant.
+// Typed indices. An id is an index into the array that owns what it names. The tag keeps a task's index from being used
+// as a DAG's. Plain values.
 #pragma once
 
 #include <cstdint>
@@ -26,8 +26,8 @@ struct Id {
   friend constexpr auto operator<=>(const Id &, const Id &) = default;  // NOLINT(modernize-use-nullptr): a false alarm
 };
 
-using TaskId = Id<struct TaskTag>;      // position of a task in its workload: DAG by DAG, task by task
-using DagId = Id<struct DagTag>;        // position of a DAG in its workload
+using TaskId = Id<struct TaskTag>;      // index of a task in its workload: DAG by DAG, task by task
+using DagId = Id<struct DagTag>;        // index of a DAG in its workload
 using WorkerId = Id<struct WorkerTag>;  // one of the platform's m processors
 using JobSlot = Id<struct JobTag>;      // storage of a live job; reused once the job has ended
 

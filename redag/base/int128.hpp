@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// 128-bit integers for exact intermediate products; a compiler extension (GCC and Clang), spelled once.
+// 128-bit integers for exact intermediate products: a compiler extension (GCC and Clang), named in one place.
 #pragma once
 
 namespace redag {

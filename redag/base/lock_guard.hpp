@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// std::lock_guard that clang's -Wthread-safety understands: libstdc++'s is not annotated.
+// A std::lock_guard for clang's -Wthread-safety, because libstdc++'s has no annotations.
 #pragma once
 
 #include "redag/base/thread_annotations.hpp"

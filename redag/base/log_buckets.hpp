@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Buckets whose width grows with the value: 2^kBits of them an octave, so that a bucket is at most 1 / 2^kBits of its
-// values wide. Values below 2^(kBits + 1) have a bucket each. Pure functions.
+// Buckets whose width grows with the value: 2^kBits of them an octave. A bucket is at most 1 / 2^kBits of its values
+// wide. Values below 2^(kBits + 1) have a bucket each. Pure functions.
 #pragma once
 
 #include <bit>
@@ -13,7 +13,7 @@ namespace redag {
 
 template <unsigned kBits>
 struct LogBuckets {
-  /// Of 64-bit values.
+  /// Number of buckets for 64-bit values.
   static constexpr std::size_t kCount = (std::size_t{64 - kBits} + 1) << kBits;
 
   [[nodiscard]] static constexpr std::size_t bucket_of(std::uint64_t value) noexcept {

@@ -20,7 +20,7 @@ void expect_buckets_without_gaps() {
     ASSERT_EQ(Buckets::bucket_of(next), i);
     ASSERT_EQ(Buckets::bucket_of(last), i);
     ASSERT_LE(last - next, next >> kBits) << "wider than 1 / 2^bits of its values";
-    next = last + 1;  // 0 after the last
+    next = last + 1;  // 0 after the last bucket
   }
   EXPECT_EQ(next, 0U);
   EXPECT_EQ(Buckets::bucket_of(std::numeric_limits<std::uint64_t>::max()), Buckets::kCount - 1);

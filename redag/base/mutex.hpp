@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// std::mutex that clang's -Wthread-safety understands, for threads whose priorities do not matter: otherwise PiMutex.
+// A std::mutex for clang's -Wthread-safety, for threads whose priorities do not matter. Otherwise use PiMutex.
 #pragma once
 
 #include <mutex>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A mutex whose owner inherits the priority of the most urgent thread that waits for it (PTHREAD_PRIO_INHERIT): a
+// A mutex whose owner inherits the priority of the most urgent thread that waits for it (PTHREAD_PRIO_INHERIT). A
 // preempted low-priority owner delays a high-priority waiter by short critical sections only. BasicLockable and
 // Lockable, for LockGuard, std::lock_guard and std::unique_lock. Use it for data that callbacks of different rates
 // share. It may be destroyed once every unlock() has returned.
@@ -17,16 +17,16 @@
 
 namespace redag {
 
-// The kernel hands such a mutex to the first that sleeps for it. Until that one has woken up nobody else gets it and
-// all who come go to sleep, too: a mutex held for 100 ns then costs 10 us each time, for ever. So whoever finds it
-// taken tries for a short while, and of those for whom this was not enough only one at a time sleeps for the mutex; the
-// others sleep for `queue_`, which inherits, too. When the one has been served, the next is woken while the mutex is
-// free: others can have it meanwhile, but only until it is awake and asks for it. So a thread waits for the owner, for
-// the one ahead of it in the queue, who then runs at its priority, and for more urgent ones. On cache lines of its own:
-// whoever tries does not slow down what the owner does to the data beside it.
+// The kernel hands such a mutex to the first thread that sleeps for it. Until that thread has woken up, all later ones
+// sleep, too, and a mutex held for 100 ns then costs each of them 10 us. Therefore a thread that finds the mutex taken
+// spins for a short while. If that does not suffice, it queues: only the first in the queue sleeps for the mutex, the
+// others for `queue_`, which also inherits. After the first has been served, the next one is woken while the mutex is
+// free. Until it is awake, other threads can have the mutex. A thread thus waits for the owner, for the one ahead of it
+// in the queue (which then runs at its priority), and for more urgent threads. The mutex has cache lines of its own,
+// because spinning must not slow down the owner's access to the data beside it.
 class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
  public:
-  /// `inherits` false: for when all threads that take it are alike.
+  /// `inherits` can be false if all threads that take the mutex have the same priority.
   explicit PiMutex(bool inherits = true) : inherits_(inherits) {
     initialize(mutex_, inherits);
     initialize(queue_, inherits);
@@ -55,7 +55,7 @@ class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
   }
 
  private:
-  // The longest pause between two tries; all of them together take less than 2 us.
+  // The longest pause between two tries, in calls of relax(). All pauses together take less than 2 us.
   static constexpr int kPauses = 32;
 
   static void initialize(pthread_mutex_t &mutex, bool inherits) {
@@ -74,7 +74,7 @@ class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
     REDAG_CHECK(pthread_mutex_unlock(&mutex) == 0, "a mutex is unlocked by who does not own it");
   }
 
-  /// Tries for longer than a short critical section on another processor takes, less and less often.
+  /// Tries for longer than a short critical section takes on another processor, with growing pauses.
   bool spin() noexcept {
     static const int kLongest = std::thread::hardware_concurrency() > 1 ? kPauses : 0;
     for (int pauses = 1;; pauses *= 2) {
@@ -85,9 +85,9 @@ class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
   }
 
   pthread_mutex_t mutex_;
-  pthread_mutex_t queue_;  // who owns it is the only one that sleeps for `mutex_`
+  pthread_mutex_t queue_;  // its owner is the only thread that sleeps for `mutex_`
   const bool inherits_;
-  bool queued_ = false;  // the owner of `mutex_` owns `queue_`, too
+  bool queued_ = false;  // the owner of `mutex_` also owns `queue_`
 };
 
 }  // namespace redag

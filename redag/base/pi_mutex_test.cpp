@@ -28,7 +28,7 @@ TEST(PiMutex, ExcludesOthers) {
   EXPECT_FALSE(taken);
 }
 
-// More threads than processors: some are preempted as owners, and others queue.
+// There are more threads than processors: some are preempted as owners, and others queue.
 TEST(PiMutex, CountsRightUnderContention) {
   PiMutex mutex;
   int count = 0;
@@ -45,7 +45,7 @@ TEST(PiMutex, CountsRightUnderContention) {
   EXPECT_EQ(count, 80'000);
 }
 
-// Field 18 of /proc/<pid>/stat: for real-time threads minus (priority + 1), inherited priority included.
+// Field 18 of /proc/<pid>/stat: for real-time threads minus (priority + 1), with inherited priority.
 int kernel_priority(long thread) {
   std::ifstream file("/proc/self/task/" + std::to_string(thread) + "/stat");
   std::string text;
@@ -55,7 +55,7 @@ int kernel_priority(long thread) {
   return -std::stoi(text) - 1;
 }
 
-// The first waiter sleeps for the mutex, the second behind it.
+// The first waiter sleeps for the mutex, the second one in the queue behind it.
 TEST(PiMutex, TheOwnerRunsAtThePriorityOfWhoeverWaits) {
 #ifdef REDAG_NOMINAL_PRIORITIES
   GTEST_SKIP() << "with sanitizers priorities are nominal, and this is about the kernel's";

@@ -68,7 +68,7 @@ std::string iso_8601(std::time_t time) {
   return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &parts)};
 }
 
-// An argument as a shell reads it back.
+// Quotes an argument so that a shell reads it back.
 std::string quoted(std::string_view argument) {
   constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_@%+=:,./-";
   if (!argument.empty() && argument.find_first_not_of(kPlain) == std::string_view::npos) return std::string(argument);
@@ -77,7 +77,7 @@ std::string quoted(std::string_view argument) {
   return text + "'";
 }
 
-// From the kernel, so that it is there for every program that uses the library.
+// Read from the kernel, and therefore available in every program that uses the library.
 std::string command_line() {
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
   const std::string raw{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};

@@ -54,7 +54,7 @@ TEST_F(ProvenanceTest, NamesTheCalibrationInUse) {
   EXPECT_EQ(current_provenance().calibration, "overheads.yaml of 2026-01-31");
 }
 
-// No variable of the environment may stand in a result: it may hold a secret.
+// A result must not contain environment variables, because they can hold secrets.
 TEST_F(ProvenanceTest, HoldsNothingOfTheEnvironment) {
   ::setenv("REDAG_TEST_TOKEN", "s3cr3t-value", 1);
   EXPECT_EQ(provenance_to_json(current_provenance()).find("s3cr3t-value"), std::string::npos);

@@ -15,7 +15,7 @@ std::string Diagnostic::to_string() const {
   text += severity == Severity::Error ? "error: " : "warning: ";
   text += message;
   if (!hint.empty()) text += " (" + hint + ")";
-  return printable(text);  // whatever was quoted: a message must not steer the terminal that shows it
+  return printable(text);  // quoted text must not control the terminal that shows the message
 }
 
 std::string to_string(const Diagnostics &diagnostics) {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a function returns when its input can be bad: a value, or every mistake found, each with its place and a hint.
+// The result of a function whose input can be bad: a value, or every mistake found, each with its place and a hint.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace redag {
 
 enum class Severity : std::uint8_t { Error, Warning };
 
-/// One mistake in something a user wrote. `line` and `column` count from 1; 0 means that there is no place to point at.
+/// One mistake in a user's text. `line` and `column` count from 1; 0: there is no place to point at.
 struct Diagnostic {
   Severity severity = Severity::Error;
   std::string file;
@@ -24,7 +24,7 @@ struct Diagnostic {
   std::string message;
   std::string hint;
 
-  /// "cart.yaml:4:12: error: unknown key 'wect' (did you mean 'wcet'?)"
+  /// For example "cart.yaml:4:12: error: unknown key 'wect' (did you mean 'wcet'?)".
   [[nodiscard]] std::string to_string() const;
 
   friend bool operator==(const Diagnostic &, const Diagnostic &) = default;
@@ -35,13 +35,13 @@ using Diagnostics = std::vector<Diagnostic>;
 template <class T>
 using Result = tl::expected<T, Diagnostics>;
 
-/// A Result's error side from one message without a place.
+/// Makes the error of a Result from one message without a place.
 [[nodiscard]] inline tl::unexpected<Diagnostics> make_error(std::string message, std::string hint = {}) {
   return tl::unexpected<Diagnostics>(
       Diagnostics{Diagnostic{Severity::Error, {}, 0, 0, std::move(message), std::move(hint)}});
 }
 
-/// One diagnostic a line.
+/// Returns one diagnostic a line.
 [[nodiscard]] std::string to_string(const Diagnostics &diagnostics);
 
 }  // namespace redag

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Random numbers that are the same on every machine and standard library, which <random>'s distributions are not.
-// Generator: xoshiro256++ seeded through SplitMix64 (Blackman & Vigna, https://prng.di.unimi.it).
+// Random numbers that are the same on every machine and standard library; <random>'s distributions are not. Generator:
+// xoshiro256++ seeded through SplitMix64 (Blackman & Vigna, https://prng.di.unimi.it). Not thread-safe.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace redag {
 
-/// One step of SplitMix64; also a good mixing function for building seeds out of several numbers.
+/// One step of SplitMix64. Also a good mixing function for seeds made from several numbers.
 [[nodiscard]] constexpr std::uint64_t mix(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
@@ -33,7 +33,7 @@ class Rng {
     }
   }
 
-  /// A generator of its own for each (stream, index): what job k of task i draws depends on no other job.
+  /// Returns a separate generator for each (stream, index): what job k of task i draws depends on no other job.
   [[nodiscard]] static constexpr Rng stream(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) {
     return Rng(mix(mix(seed) ^ mix(stream * 2 + 1) ^ mix(index * 2) * 3));
   }
@@ -54,7 +54,7 @@ class Rng {
     return result;
   }
 
-  /// Uniform in [0, 1), 53 random bits.
+  /// Uniform in [0, 1), with 53 random bits.
   constexpr double uniform01() { return static_cast<double>((*this)() >> 11U) * 0x1.0p-53; }
 
   /// Uniform in [low, high], both included. Requires low <= high.
@@ -65,7 +65,7 @@ class Rng {
     return static_cast<std::int64_t>(static_cast<std::uint64_t>(low) + static_cast<std::uint64_t>(scaled >> 64U));
   }
 
-  /// Standard normal (Box-Muller, one of the pair).
+  /// Standard normal (Box-Muller, one value of each pair).
   double normal() {
     const double u = 1.0 - uniform01();
     const double v = uniform01();

@@ -13,7 +13,7 @@
 namespace redag {
 namespace {
 
-// First outputs of the published splitmix64.c for seed 0; mix() is one step of it.
+// The first outputs of the published splitmix64.c for seed 0; mix() is one step of it.
 TEST(Mix, IsSplitMix64) {
   EXPECT_EQ(mix(0), 0xe220a8397b1dcdafULL);
   EXPECT_EQ(mix(0x9e3779b97f4a7c15ULL), 0x6e789e6aa1b965f4ULL);
@@ -67,7 +67,7 @@ TEST(Rng, UniformIsEven) {
   Rng rng(7);
   constexpr int kDraws = 60'000;
   for (int i = 0; i < kDraws; ++i) ++counts[static_cast<std::size_t>(rng.uniform(0, 5))];
-  // Chi-square with 5 degrees of freedom: 20.5 has probability 0.001; the seed is fixed.
+  // Chi-square with 5 degrees of freedom: 20.5 has probability 0.001. The seed is fixed.
   double chi = 0;
   for (const int n : counts) chi += (n - 10'000.0) * (n - 10'000.0) / 10'000.0;
   EXPECT_LT(chi, 20.5);

@@ -6,7 +6,7 @@
 namespace redag {
 namespace {
 
-// What four significant digits leave out.
+// The unit of the fourth significant digit.
 Duration step_of(Duration duration) {
   Duration step = 1;
   while (duration / step >= 10'000 || duration / step <= -10'000) step *= 10;

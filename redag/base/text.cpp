@@ -92,7 +92,7 @@ std::string in_quotes(std::string_view text) {
 
 std::string format_percent(double ratio) {
   if (!std::isfinite(ratio)) return "-";
-  // Never let a miss read as none: 3 of 100 000 is 0.003 %.
+  // Never shows a miss as none: 3 of 100 000 is 0.003 %.
   const double percent = 100 * ratio;
   if (percent > 0 && percent < 0.05) return fmt::format("{:.2g} %", percent);
   if (percent < 100 && percent >= 99.95) {

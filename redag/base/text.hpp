@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Numbers as text for people, the same in tables, verdicts and pages; and what is asked of texts from outside before
-// they are parsed. Pure functions.
+// Numbers as text for people, the same in tables, verdicts and pages. Also checks of texts from outside, before they
+// are parsed. Pure functions.
 #pragma once
 
 #include <cstddef>
@@ -12,40 +12,42 @@
 
 namespace redag {
 
-/// A share of one: 0.1421 -> "14.2 %"; "-" if nothing was counted (not finite). Never reads as none, or as all, where
-/// it is not.
+/// Formats a ratio: 0.1421 -> "14.2 %"; "-" if it is not finite (nothing was counted). Never shows a ratio above 0 as
+/// 0, or one below 1 as 100 %.
 [[nodiscard]] std::string format_percent(double ratio);
 
 /// 1234567 -> "1 234 567".
 [[nodiscard]] std::string format_count(std::uint64_t count);
 
-/// A share in a sentence: "14.2 %", below 1 % with what was counted: "0.0043 % (1 of 23 326)"; "none" of `whole`, and
-/// "-" where `whole` is 0.
+/// Formats a share for a sentence: "14.2 %"; below 1 % with its counts: "0.0043 % (1 of 23 326)"; "none" if `part` is
+/// 0; "-" if `whole` is 0.
 [[nodiscard]] std::string format_share(std::uint64_t part, std::uint64_t whole);
 
-/// The same in a table with a column for `whole`: "0", "1 (0.0043 %)"; "-" where `whole` is 0.
+/// The same for a table with a column for `whole`: "0", "1 (0.0043 %)"; "-" if `whole` is 0.
 [[nodiscard]] std::string format_count_and_share(std::uint64_t part, std::uint64_t whole);
 
 inline constexpr const char *kMaxDurationText = "1281023h (146 years)";  // kMaxDuration, for messages
 
-/// Length of the UTF-8 sequence at `at`, 0 if there is none (overlong forms, surrogates and beyond U+10FFFF included).
+/// Length of the UTF-8 sequence at `at`; 0: invalid (also overlong forms, surrogates, and beyond U+10FFFF).
 [[nodiscard]] std::size_t utf8_length(std::string_view text, std::size_t at);
 
-/// The first character that a terminal would obey instead of showing, as "U+001B": controls (C0, DEL, C1), line
-/// separators, marks that reverse the direction of text. "byte 0xFF" for what is not UTF-8. Empty: all can be shown.
+/// Returns the first character that a terminal would obey instead of show, as "U+001B": controls (C0, DEL, C1), line
+/// separators, marks that reverse the direction of text. Returns "byte 0xFF" for a byte that is not UTF-8. Empty: all
+/// can be shown.
 [[nodiscard]] std::string find_unprintable(std::string_view text);
 
-/// `text` with each character that find_unprintable() finds written out: "\\u{1B}[2J". Line feeds and tabs stay.
+/// Returns `text` with each character that find_unprintable() finds written out: "\\u{1B}[2J". Keeps line feeds and
+/// tabs.
 [[nodiscard]] std::string printable(std::string_view text);
 
-/// What somebody wrote, as a message quotes it: in quotes, printable, and of a long text the beginning.
+/// Quotes a user's text for a message: in quotes, printable, and cut if it is long.
 [[nodiscard]] std::string in_quotes(std::string_view text);
 
-/// No JSON that this project writes is nested as deep.
+/// The deepest nesting in JSON that is read. JSON that this project writes is less deep.
 inline constexpr std::size_t kMaxJsonDepth = 32;
 
-/// Are there more than `levels` arrays and objects inside one another? What copies or prints a tree of JSON calls
-/// itself once a level: ask before parsing what others wrote. Of a text that is not JSON, any answer.
+/// Returns true if more than `levels` arrays and objects are nested. Code that copies or prints a JSON tree recurses
+/// once a level: call this before parsing JSON from others. For text that is not JSON the answer is undefined.
 [[nodiscard]] bool json_nests_deeper(std::string_view json, std::size_t levels = kMaxJsonDepth);
 
 }  // namespace redag

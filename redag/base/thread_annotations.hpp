@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What clang's -Wthread-safety is told: which mutex guards a member, which one a function needs. Nothing for other
-// compilers. tools/thread_safety (make lint) checks it.
+// Annotations for clang's -Wthread-safety: which mutex guards a member, and which one a function needs. Empty for other
+// compilers. tools/thread_safety (make lint) checks them.
 // https://clang.llvm.org/docs/ThreadSafetyAnalysis.html
 #pragma once
 
@@ -12,19 +12,19 @@
 #define REDAG_THREAD_ANNOTATION(x)
 #endif
 
-// Of a class: it is a mutex; it holds one for as long as it lives.
+// For a class: it is a mutex, or it holds one for its lifetime.
 #define REDAG_CAPABILITY(name) REDAG_THREAD_ANNOTATION(capability(name))
 #define REDAG_SCOPED_CAPABILITY REDAG_THREAD_ANNOTATION(scoped_lockable)
-// Of a member: used only under that mutex; what it points to is.
+// For a member: it, or what it points to, is used only under that mutex.
 #define REDAG_GUARDED_BY(mutex) REDAG_THREAD_ANNOTATION(guarded_by(mutex))
 #define REDAG_PT_GUARDED_BY(mutex) REDAG_THREAD_ANNOTATION(pt_guarded_by(mutex))
-// Of a function: its caller holds the mutex; must not hold it; gets it; gives it back.
+// For a function: its caller holds the mutex, or must not hold it; the function takes it, or releases it.
 #define REDAG_REQUIRES(...) REDAG_THREAD_ANNOTATION(requires_capability(__VA_ARGS__))
 #define REDAG_EXCLUDES(...) REDAG_THREAD_ANNOTATION(locks_excluded(__VA_ARGS__))
 #define REDAG_ACQUIRE(...) REDAG_THREAD_ANNOTATION(acquire_capability(__VA_ARGS__))
 #define REDAG_TRY_ACQUIRE(...) REDAG_THREAD_ANNOTATION(try_acquire_capability(__VA_ARGS__))
 #define REDAG_RELEASE(...) REDAG_THREAD_ANNOTATION(release_capability(__VA_ARGS__))
-// Tells the analysis that the mutex is held where it cannot see that: the comment there says why.
+// Tells the analysis that the mutex is held where the analysis cannot see it. A comment there says why.
 #define REDAG_ASSERT_CAPABILITY(mutex) REDAG_THREAD_ANNOTATION(assert_capability(mutex))
 #define REDAG_RETURN_CAPABILITY(mutex) REDAG_THREAD_ANNOTATION(lock_returned(mutex))
 #define REDAG_NO_THREAD_SAFETY_ANALYSIS REDAG_THREAD_ANNOTATION(no_thread_safety_analysis)

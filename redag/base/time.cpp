@@ -19,8 +19,8 @@ struct Unit {
   Duration nanoseconds;
 };
 
-// Longest first, so that format_duration() finds the largest unit that fits. "\xC2\xB5" and "\xCE\xBC" are the two
-// code points people type for micro.
+// Longest first, because format_duration() looks for the largest unit that fits. "\xC2\xB5" and "\xCE\xBC" are the two
+// code points that people type for micro.
 constexpr std::array kUnits = {
     Unit{"h", 3600 * kSecond},       Unit{"min", 60 * kSecond},       Unit{"s", kSecond},
     Unit{"ms", kMillisecond},        Unit{"us", kMicrosecond},        Unit{"ns", kNanosecond},
@@ -47,7 +47,7 @@ Result<Duration> parse_duration(std::string_view text) {
   const bool negative = rest.starts_with('-');
   if (negative) rest.remove_prefix(1);
 
-  // The digits are gathered into one integer and the decimal point is remembered, so that no rounding can happen.
+  // Collects the digits in one integer and notes the decimal point, which avoids rounding.
   Int128 digits = 0;
   Int128 scale = 1;
   std::size_t used = 0;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Time in this project: int64 nanoseconds. A `Time` is a point on a steady clock (or the simulator's), a `Duration` a
-// difference of two. Text form: a decimal number and a unit, "5ms", "1.5us".
+// difference of two. Text form: a decimal number and a unit, "5ms", "1.5us". Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -25,17 +25,17 @@ inline constexpr Duration kSecond = 1'000'000'000;
 /// Later than every time that can be scheduled.
 inline constexpr Time kNever = std::numeric_limits<Time>::max();
 
-/// Longest duration accepted from outside (about 146 years): sums of two never overflow.
+/// The longest duration accepted from outside (about 146 years): the sum of two never overflows.
 inline constexpr Duration kMaxDuration = std::numeric_limits<Duration>::max() / 2;
 
-/// Reads "250ns", "3us", "1.5ms", "2s", "1min", "1h" (also "µs"); "0" needs no unit. Exact: a value that is not a whole
-/// number of nanoseconds, has no unit, or does not fit is an error. A leading "-" is read, for a caller to reject.
+/// Reads "250ns", "3us", "1.5ms", "2s", "1min", "1h" (also "µs"); "0" needs no unit. Exact: it is an error if the value
+/// has no unit, does not fit, or is not a whole number of nanoseconds. Reads a leading "-", for the caller to reject.
 [[nodiscard]] Result<Duration> parse_duration(std::string_view text);
 
-/// The shortest text that parse_duration() reads back as the same value: 1'500'000 -> "1.5ms".
+/// Returns the shortest text that parse_duration() reads back as the same value: 1'500'000 -> "1.5ms".
 [[nodiscard]] std::string format_duration(Duration duration);
 
-/// For people: three or four significant digits and a unit that fits: 12'345'678 -> "12.35ms".
+/// Formats a duration for people, with three or four significant digits and a suitable unit: 12'345'678 -> "12.35ms".
 [[nodiscard]] std::string humanize_duration(Duration duration);
 
 }  // namespace redag

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a live page says, as values: an executor with its DAGs and tasks at one moment. No memory shared with anybody.
+// The content of a live page as plain values: an executor with its DAGs and tasks at one moment. Shares no memory.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace redag::live {
 struct DagFrame {
   std::string name;
   std::uint32_t max_active = 0;  // 0: no bound
-  page::Figures figures{};       // sums; response times only of a single task: those of several are not mixed
+  page::Figures figures{};  // sums; response times only of a DAG with a single task: those of several are not mixed
 };
 
 struct TaskFrame {
@@ -43,7 +43,7 @@ struct Frame {
   Duration publisher_cpu = 0;
   std::uint64_t left_out = 0;
   std::vector<DagFrame> dags;
-  std::vector<TaskFrame> tasks;  // each after those of earlier DAGs
+  std::vector<TaskFrame> tasks;  // ordered by DAG
 };
 
 }  // namespace redag::live

@@ -84,7 +84,8 @@ void FrameBuilder::build(const Sample &sample, Time now, Frame &frame) {
       history.next = current;
     }
   }
-  // The response of a DAG is end to end, which its tasks do not tell: only that of a single task is the DAG's, too.
+  // The response of a DAG is end to end, which its tasks' responses do not give. Only that of a single task is also the
+  // DAG's.
   for (const TaskFrame &task : frame.tasks) {
     if (tasks_of[task.dag] == 1) copy_response(task.figures, frame.dags[task.dag].figures);
   }

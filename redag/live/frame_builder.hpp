@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// From counters that only grow to what people want to see: percentiles, sums of DAGs, and what happened lately. A value
-// with memory of earlier samples; no clock, no thread.
+// Turns counters that only grow into the figures that people want: percentiles, sums of DAGs, and recent figures. A
+// value that remembers earlier samples, without clock or thread. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -21,11 +21,11 @@ struct DagSample {
   std::uint32_t max_active = 0;  // 0: no bound
 };
 
-/// What is known of a task at some moment; counters since it was added.
+/// The state of a task at some moment. Counters start when the task is added.
 struct TaskSample {
   std::uint64_t key = 0;  // names the task from sample to sample
   std::string name;       // within its DAG
-  std::uint32_t dag = 0;  // position among the DAGs
+  std::uint32_t dag = 0;  // index among the DAGs
   Duration period = 0;
   Duration deadline = 0;  // 0: none
   Duration bound = 0;     // 0: not known
@@ -45,15 +45,15 @@ struct TaskSample {
 
 struct Sample {
   std::vector<DagSample> dags;
-  std::vector<TaskSample> tasks;  // of any order; `dag` must be among the DAGs
+  std::vector<TaskSample> tasks;  // in any order; `dag` must be among the DAGs
 };
 
 class FrameBuilder {
  public:
-  /// What is recent goes back for at least `window` (once there was so much time) and less than twice that.
+  /// Recent figures go back at least `window` (once so much time has passed) and less than twice as far.
   FrameBuilder(Time began, Duration window);
 
-  /// The figures of `frame` at `now`: its rows, times and window. `now` must not decrease.
+  /// Sets the figures of `frame` at `now`: its rows, times and window. `now` must not decrease.
   void build(const Sample &sample, Time now, Frame &frame);
 
  private:
@@ -65,9 +65,9 @@ class FrameBuilder {
     HistogramCounts response;
   };
   struct History {
-    std::shared_ptr<const Histogram> histogram;  // kept: another task's is another one
-    Mark base;                                   // what is recent came after it
-    Mark next;                                   // the base to come
+    std::shared_ptr<const Histogram> histogram;  // kept alive: a reused key has another histogram
+    Mark base;                                   // recent figures count from here
+    Mark next;                                   // the next base
     std::uint64_t seen = 0;
   };
 
@@ -79,7 +79,7 @@ class FrameBuilder {
   Time base_at_;
   Time next_at_;
   std::uint64_t builds_ = 0;
-  std::map<std::uint64_t, History> histories_;  // by key
+  std::map<std::uint64_t, History> histories_;  // by TaskSample::key
 };
 
 }  // namespace redag::live

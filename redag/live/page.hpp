@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The live page: what a running executor tells `redag top`, as bytes in shared memory. Layout only, with its version;
-// who writes and reads it is in writer.hpp and reader.hpp, and the words are in docs/live_page.md. Everything is
-// native-endian; times and durations are int64 nanoseconds; a change of meaning is a new version, and what is appended
-// to a row or to a header is not: their sizes are in the page.
+// The live page: the figures of a running executor for `redag top`, as bytes in shared memory. Owns the layout and its
+// version; writer.hpp and reader.hpp write and read it, and docs/live_page.md describes it. All values are
+// native-endian; times and durations are int64 nanoseconds. A change of meaning needs a new version. Fields appended to
+// a row or a header do not, because their sizes are in the page. Plain values.
 #pragma once
 
 #include <cstddef>
@@ -17,43 +17,43 @@ namespace redag::live::page {
 
 inline constexpr char kMagic[8] = {'r', 'e', 'd', 'a', 'g', 't', 'o', 'p'};
 inline constexpr std::uint32_t kVersion = 1;
-inline constexpr std::size_t kNameSize = 96;  // UTF-8, cut there, padded with zeros
+inline constexpr std::size_t kNameSize = 96;  // UTF-8, cut to this size, padded with zeros
 
-/// At offset 0. Written once, the magic last, save `sequence`.
+/// At offset 0. Written once, magic last; only `sequence` changes later.
 struct Header {
   char magic[8];
   std::uint32_t version;
-  std::uint32_t header_size;  // bytes, as all sizes and offsets
+  std::uint32_t header_size;  // in bytes, as all sizes and offsets
   std::uint32_t frame_header_size;
   std::uint32_t dag_row_size;
   std::uint32_t task_row_size;
   std::uint32_t reserved;
   std::uint64_t page_size;
-  std::uint64_t slot_offset;  // of the first of two slots, one frame each
+  std::uint64_t slot_offset;  // of the first of two slots; each holds one frame
   std::uint64_t slot_size;
   std::int64_t pid;             // of the writer, in its namespace
   std::uint64_t process_start;  // clock ticks after boot (field 22 of /proc/PID/stat)
   std::uint64_t pid_namespace;  // inode of /proc/PID/ns/pid
-  // Number of the latest complete frame, from 1; it is in slot `sequence % 2`. 0: there is none. Written after the
-  // frame, with release order.
+  // Number of the latest complete frame, from 1; 0: none. The frame is in slot `sequence % 2`. Written after the frame,
+  // with release order.
   std::uint64_t sequence;
 };
 
-/// What rows of DAGs and of tasks have in common. Counters since the executor began; those of a DAG are the sums of its
-/// tasks. `recent`: of the last FrameHeader::window.
+/// Figures of a DAG or a task. Counters start with the executor; those of a DAG are the sums of its tasks. `recent`
+/// covers the last FrameHeader::window.
 struct Figures {
   std::uint64_t released;
   std::uint64_t finished;
   std::uint64_t skipped;
   std::uint64_t aborted;
-  std::uint64_t misses;  // finished late, skipped, or aborted; in ROS 2 aborted ones, most without data, are none
+  std::uint64_t misses;  // finished late, skipped, or aborted; in ROS 2 aborted ones (most had no data) are no misses
   std::uint64_t deferred;
   std::uint64_t preemptions;
-  std::int64_t cpu;  // processor time of jobs that ended
+  std::int64_t cpu;  // processor time of ended jobs
   std::int64_t response_p50;
   std::int64_t response_p99;
   std::int64_t response_max;
-  std::uint64_t recent_jobs;  // that finished
+  std::uint64_t recent_jobs;  // finished jobs
   std::uint64_t recent_misses;
   std::uint64_t recent_preemptions;
   std::int64_t recent_cpu;
@@ -61,8 +61,8 @@ struct Figures {
   std::int64_t recent_p99;
   std::int64_t recent_max;
   std::uint32_t active;   // jobs that have started and not ended
-  std::uint32_t ready;    // that could start
-  std::uint32_t waiting;  // that were released, and whose predecessors are incomplete
+  std::uint32_t ready;    // jobs that could start
+  std::uint32_t waiting;  // released jobs whose predecessors are incomplete
   std::uint32_t reserved;
 };
 
@@ -75,30 +75,30 @@ struct DagRow {
 
 struct TaskRow {
   char name[kNameSize];
-  std::uint32_t dag;  // position among the DAG rows
+  std::uint32_t dag;  // index among the DAG rows
   std::uint32_t reserved;
   std::int64_t period;    // 0: none
   std::int64_t deadline;  // relative; 0: none
-  std::int64_t bound;     // proven, on the response time; 0: not known
+  std::int64_t bound;     // proven bound on the response time; 0: not known
   Figures figures;
 };
 
-/// At the beginning of a slot. `dags` rows of DAGs and `tasks` rows of tasks follow.
+/// At the start of a slot. `dags` rows of DAGs follow, then `tasks` rows of tasks.
 struct FrameHeader {
-  std::uint64_t checksum;  // of all that follows it in the frame
+  std::uint64_t checksum;  // of all later bytes in the frame
   std::uint64_t sequence;  // as Header::sequence
   std::uint32_t dags;
   std::uint32_t tasks;
-  std::uint64_t left_out;      // DAGs and tasks that found no room
+  std::uint64_t left_out;      // DAGs and tasks for which there was no room
   std::int64_t began;          // CLOCK_MONOTONIC
   std::int64_t published;      // CLOCK_MONOTONIC
-  std::int64_t interval;       // to the next frame
-  std::int64_t window;         // that `recent` covers
-  std::int64_t publisher_cpu;  // processor time that the page has cost
+  std::int64_t interval;       // until the next frame
+  std::int64_t window;         // the time that `recent` covers
+  std::int64_t publisher_cpu;  // processor time that the page has used
   std::uint32_t workers;
   std::uint32_t reserved;
   char name[kNameSize];  // of the executor: the workload's, or the user's
-  char program[32];      // of the process
+  char program[32];      // name of the process
   char driver[16];       // "threads", "ros"
   char preemption[16];   // "os", ...
   char policy[32];
@@ -109,7 +109,7 @@ inline constexpr bool kIsPlain = std::is_trivially_copyable_v<Row>&& std::is_sta
                                  sizeof(Row) % 8 == 0;
 static_assert(kIsPlain<Header> && kIsPlain<Figures> && kIsPlain<DagRow> && kIsPlain<TaskRow> && kIsPlain<FrameHeader>);
 
-// As docs/live_page.md has them.
+// Sizes and offsets as in docs/live_page.md.
 static_assert(sizeof(Header) == 88 && offsetof(Header, page_size) == 32 && offsetof(Header, pid) == 56);
 static_assert(offsetof(Header, sequence) == 80);
 static_assert(sizeof(Figures) == 160 && offsetof(Figures, response_p50) == 64 && offsetof(Figures, active) == 144);

@@ -32,7 +32,7 @@ std::uint64_t own_namespace() {
 }  // namespace
 
 std::optional<std::uint64_t> start_time_in(const std::string &stat) {
-  // "PID (program) state ppid ...": the program's name can hold anything, also ") 1 2 3".
+  // The form is "PID (program) state ppid ...". The program's name can hold anything, also ") 1 2 3".
   std::size_t at = stat.rfind(')');
   constexpr int kField = 22;
   for (int field = 2; field < kField && at != std::string::npos; ++field) at = stat.find(' ', at + 1);

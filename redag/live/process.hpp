@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Who a process is, beyond a number that is used again: when it began, and in which namespace its number counts.
+// Identifies a process beyond its number, which is used again: when it began, and in which namespace its number counts.
 // Reads /proc; any thread.
 #pragma once
 
@@ -24,13 +24,13 @@ struct Process {
 enum class Life : std::uint8_t {
   Alive,
   Dead,
-  Unknown,  // of another namespace: its number says nothing here
+  Unknown,  // in another namespace: its number says nothing here
 };
 
 [[nodiscard]] Life life_of(const Process &process);
 
-/// Clock ticks after boot at which the process began, out of the text of /proc/PID/stat, whatever its program is
-/// called. Nothing if it is not such a text.
+/// Returns the clock ticks after boot at which the process began, from the text of /proc/PID/stat. Works for any
+/// program name. Empty if the text has another form.
 [[nodiscard]] std::optional<std::uint64_t> start_time_in(const std::string &stat);
 
 }  // namespace redag::live

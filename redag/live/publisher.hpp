@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Keeps a live page up to date: a thread of normal priority that now and then asks for figures and writes them. What it
-// asks must not keep real-time threads waiting. The page is there from the constructor's return to the destructor's.
+// Keeps a live page up to date: a thread of normal priority samples figures at an interval and writes them. The sampler
+// must not keep real-time threads waiting. The page exists from start() until the destructor.
 //
 // Threads: the sampler is called on the publisher's thread, and not after the destructor.
 #pragma once
@@ -36,7 +36,7 @@ using Sampler = std::function<void(Sample &sample)>;
 
 class Publisher {
  public:
-  /// Error: a page or a thread that the system refused; the executor is none the worse.
+  /// Error: the system refused the page or the thread; the executor is not affected.
   [[nodiscard]] static Result<std::unique_ptr<Publisher>> start(const PublisherOptions &options, Sampler sampler);
   ~Publisher();
   Publisher(const Publisher &) = delete;

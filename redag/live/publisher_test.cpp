@@ -84,7 +84,7 @@ TEST(FrameBuilder, ADagIsTheSumOfItsTasks) {
   EXPECT_EQ(frame.dags[1].figures.response_p50, 0) << "of jobs of two tasks there is none";
   EXPECT_EQ(frame.dags[1].figures.response_max, 0);
   EXPECT_EQ(frame.dags[1].figures.recent_p99, 0);
-  // By DAG, in the order given.
+  // By DAG, within a DAG in the given order.
   EXPECT_EQ(frame.tasks[0].name, "t1");
   EXPECT_EQ(frame.tasks[1].name, "t3");
   EXPECT_EQ(frame.tasks[2].name, "t2");
@@ -128,7 +128,7 @@ class TemporaryFolder {
   std::string path_;
 };
 
-/// Waits until `is_so` says yes; a test that waits in vain ends by its own limit.
+/// Waits until `is_so` returns true; otherwise the test ends by its own time limit.
 template <class Condition>
 void wait_until(Condition is_so) {
   while (!is_so()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -151,7 +151,7 @@ TEST(Publisher, PublishesUntilItIsGone) {
   });
   ASSERT_TRUE(publisher) << to_string(publisher.error());
   const std::string path = (*publisher)->path();
-  // Somebody works meanwhile, as workers do.
+  // Jobs run meanwhile, as on workers.
   for (int i = 0; i < 20'000; ++i) {
     response->add(kMillisecond);
     ++finished;

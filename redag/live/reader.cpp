@@ -33,7 +33,7 @@ constexpr auto kPause = std::chrono::milliseconds(2);
 
 class File {
  public:
-  // O_NONBLOCK: what is called like a page can be a pipe.
+  // O_NONBLOCK, because a pipe can have the name of a page.
   explicit File(const std::string &path)
       : descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)) {}
   ~File() {
@@ -45,7 +45,8 @@ class File {
   [[nodiscard]] bool is_open() const { return descriptor_ >= 0; }
   [[nodiscard]] bool inspect(struct stat &info) const { return ::fstat(descriptor_, &info) == 0; }
 
-  /// False: there are not so many bytes. Read and not mapped: a page that is cut off meanwhile would kill us (SIGBUS).
+  /// Returns false if there are too few bytes. Reads instead of mapping: a page truncated meanwhile would kill us
+  /// (SIGBUS).
   [[nodiscard]] bool read(void *target, std::size_t size, std::uint64_t offset) const {
     auto *to = static_cast<std::byte *>(target);
     while (size > 0) {
@@ -67,7 +68,7 @@ tl::unexpected<Diagnostics> damaged(const std::string &path, const char *what) {
   return make_error(fmt::format("{} is no live page: {}", path, what), "was it written by another program?");
 }
 
-/// UTF-8 that a terminal prints as it is; what is not becomes '?'.
+/// Returns UTF-8 that a terminal prints unchanged; all other bytes become '?'.
 std::string printable(std::string_view text) {
   std::string result;
   for (std::size_t i = 0; i < text.size();) {
@@ -82,11 +83,11 @@ std::string printable(std::string_view text) {
     bool good = length > 0 && i + length <= text.size() && first >= 0x20 && first != 0x7f;
     for (std::size_t k = 1; good && k < length; ++k) good = (byte(i + k) & 0xc0U) == 0x80;
     if (good && first == 0xc2 && byte(i + 1) < 0xa0) good = false;   // a control character
-    if (good && first == 0xe0 && byte(i + 1) < 0xa0) good = false;   // longer than need be
+    if (good && first == 0xe0 && byte(i + 1) < 0xa0) good = false;   // an overlong form
     if (good && first == 0xed && byte(i + 1) >= 0xa0) good = false;  // a surrogate
     if (good && first == 0xf0 && byte(i + 1) < 0x90) good = false;
     if (good && first == 0xf4 && byte(i + 1) >= 0x90) good = false;
-    // Directional marks and their kin (U+200E .. U+202E, U+2066 .. U+2069) would turn what stands beside them.
+    // Directional marks and similar ones (U+200E .. U+202E, U+2066 .. U+2069) would reverse the text beside them.
     if (good && first == 0xe2 &&
         ((byte(i + 1) == 0x80 && byte(i + 2) >= 0x8b && byte(i + 2) <= 0xaf) ||
          (byte(i + 1) == 0x81 && byte(i + 2) >= 0xa0))) {
@@ -155,7 +156,7 @@ Result<Header> read_header(const File &file, const std::string &path, std::uint6
   return header;
 }
 
-/// The frame's bytes, checked; empty while it is being overwritten, or if it is damaged.
+/// Returns the frame's bytes, checked; empty while it is being overwritten, or if it is damaged.
 std::vector<std::byte> read_slot(const File &file, const Header &header, FrameHeader &frame) {
   const std::uint64_t offset = header.slot_offset + header.sequence % 2 * header.slot_size;
   if (!file.read(&frame, sizeof(frame), offset)) return {};
@@ -209,7 +210,7 @@ Result<Frame> decode(const std::string &path, const Header &header, const FrameH
   return frame;
 }
 
-/// "redag.PID.N"
+/// Parses "redag.PID.N".
 bool parse_name(std::string_view name, std::int64_t &pid, std::uint32_t &number) {
   constexpr std::string_view kPrefix = "redag.";
   if (name.substr(0, kPrefix.size()) != kPrefix) return false;
@@ -239,14 +240,14 @@ std::vector<Named> named_pages(const std::string &folder) {
   return found;
 }
 
-/// Removes the page if it is ours, and its process is gone.
+/// Removes the page if it can be trusted and its process is dead.
 bool remove_if_stale(const std::string &path) {
   const File file(path);
   struct stat info {};
   if (problem_with(file, path, info)) return false;
   const Result<Header> header = read_header(file, path, static_cast<std::uint64_t>(info.st_size));
   if (!header || life_of({header->pid, header->process_start, header->pid_namespace}) != Life::Dead) return false;
-  // Whoever has taken the name meanwhile keeps it.
+  // Another process may have taken the name meanwhile; its page stays.
   struct stat now {};
   if (::lstat(path.c_str(), &now) != 0 || now.st_ino != info.st_ino || now.st_dev != info.st_dev) return false;
   return ::unlink(path.c_str()) == 0;
@@ -262,7 +263,7 @@ Result<Page> read_page(const std::string &path, int tries) {
     if (i > 0) std::this_thread::sleep_for(kPause);
     const Result<Header> header = read_header(file, path, static_cast<std::uint64_t>(info.st_size));
     if (!header) return tl::unexpected<Diagnostics>(header.error());
-    if (header->sequence == 0) continue;  // its first frame is being written
+    if (header->sequence == 0) continue;  // the first frame is being written
     FrameHeader head{};
     const std::vector<std::byte> bytes = read_slot(file, *header, head);
     if (bytes.empty()) continue;

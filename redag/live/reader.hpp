@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The reading end of live pages: finds them, and makes values of them. What it reads can be anything: a page is copied
-// before it is looked at, every size in it is checked, its names are made fit for a terminal, and pages that somebody
-// else could have written are refused. No state; any thread.
+// Finds live pages and reads them into values. Pages are not trusted: a page is copied before it is examined, every
+// size in it is checked, and its names are made fit for a terminal. Pages that another user could have written are
+// refused. No state; any thread.
 #pragma once
 
 #include <cstddef>
@@ -22,22 +22,22 @@ struct Page {
   Frame frame;
 };
 
-/// Looks up to `tries` times, 2 ms apart, for a frame that is not just being written.
-/// Error: there is none, it is not ours (owned by the user or by root, nobody else may open it), or it is damaged.
+/// Tries up to `tries` times, 2 ms apart, to read a frame that is not being written. Error: there is none, the page
+/// could be another user's (not owned by the user or root, or open to others), or it is damaged.
 [[nodiscard]] Result<Page> read_page(const std::string &path, int tries = 10);
 
 struct Listed {
   std::string path;
-  std::int64_t pid = 0;  // as the name has it
+  std::int64_t pid = 0;  // from the file's name
   std::uint32_t number = 0;
   Result<Page> page;
 };
 
-/// The pages of processes that live, by pid and number; those of dead ones are removed where that is permitted. A
-/// folder that cannot be read has none.
+/// Returns the pages of live processes, by pid and number. Removes those of dead processes where permitted. A folder
+/// that cannot be read gives no pages.
 [[nodiscard]] std::vector<Listed> list_pages(const std::string &folder);
 
-/// Removes the pages of processes that are gone: how many.
+/// Removes the pages of dead processes; returns how many.
 std::size_t remove_stale_pages(const std::string &folder);
 
 [[nodiscard]] std::string page_path(const std::string &folder, std::int64_t pid, std::uint32_t number);

@@ -42,7 +42,7 @@ class LivePage : public ::testing::Test {
     return *std::move(writer);
   }
 
-  /// A page as `writer` left it, under another name that tests may spoil.
+  /// Copies the page of `writer` to another name, for tests that damage it.
   std::string copy(const PageWriter &writer) const {
     std::string path = page_path(folder_, 1, 0);
     std::filesystem::copy_file(writer.path(), path, std::filesystem::copy_options::overwrite_existing);
@@ -156,7 +156,7 @@ TEST_F(LivePage, SaysWhatFoundNoRoom) {
 TEST_F(LivePage, LongNamesAreCutBetweenCharacters) {
   const auto writer = make_writer();
   Frame frame = make_frame(1, 1);
-  frame.tasks[0].name = std::string(95, 'x') + "\u00e4";  // the second byte of the last one is beyond the field
+  frame.tasks[0].name = std::string(95, 'x') + "\u00e4";  // the second byte of its last character is beyond the field
   writer->publish(frame);
   const Result<Page> page = read_page(writer->path());
   ASSERT_TRUE(page) << to_string(page.error());
@@ -173,11 +173,11 @@ TEST_F(LivePage, NamesCannotCommandTheTerminal) {
   const Result<Page> page = read_page(writer->path());
   ASSERT_TRUE(page) << to_string(page.error());
   EXPECT_EQ(page->frame.tasks[0].name, "a?[2Jb???");
-  EXPECT_EQ(page->frame.tasks[1].name, "\u00e4\u20ac\U0001f916 " + std::string(11, '?'));  // one a byte
+  EXPECT_EQ(page->frame.tasks[1].name, "\u00e4\u20ac\U0001f916 " + std::string(11, '?'));  // one for each byte
   EXPECT_EQ(page->frame.name, "??");
 }
 
-// At the edges of what UTF-8 can say, and of what turns or hides the text beside it.
+// The limits of valid UTF-8, and characters that reverse or hide the text beside them.
 TEST_F(LivePage, OnlyCharactersThatShowThemselvesAreKept) {
   const auto writer = make_writer();
   const auto shown = [&](const std::string &name) {
@@ -260,7 +260,7 @@ TEST_F(LivePage, WhatIsNoFileIsRefused) {
   const std::string path = page_path(folder_, 1, 0);
   EXPECT_THAT(error_of(path), HasSubstr("No such file"));
   ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
-  EXPECT_THAT(error_of(path), HasSubstr("not a file"));  // and does not wait for somebody to write into it
+  EXPECT_THAT(error_of(path), HasSubstr("not a file"));  // and does not wait for a writer to the pipe
   ::unlink(path.c_str());
   const auto writer = make_writer();
   writer->publish(make_frame());
@@ -298,7 +298,7 @@ TEST_F(LivePage, DamageIsSaid) {
   EXPECT_THAT(error_of(path), HasSubstr("too short"));
 }
 
-// A page whose author knows the format: the checksum is right, and the rest is not.
+// The writer of this page knows the format: the checksum is right, and the rest is not.
 TEST_F(LivePage, LiesAreFound) {
   const auto writer = make_writer();
   Frame frame = make_frame();
@@ -315,8 +315,8 @@ TEST_F(LivePage, LiesAreFound) {
   EXPECT_THAT(error_of(writer->path()), HasSubstr("cannot be"));
 }
 
-// Bytes at random places, in a page whose checksum is then made right again, and pages of nothing but noise: whatever
-// is there, reading ends, and what it calls a frame keeps its promises.
+// Random bytes, in a page whose checksum is then corrected, and pages of noise only. Reading always ends, and each
+// frame that it returns keeps its promises.
 TEST_F(LivePage, NoiseDoesNotCrashTheReader) {
   const auto writer = make_writer(8192);
   writer->publish(make_frame());
@@ -331,7 +331,7 @@ TEST_F(LivePage, NoiseDoesNotCrashTheReader) {
     const bool all = round % 20 == 0;
     const std::size_t edits = all ? bytes.size() : 1 + random() % 6;
     for (std::size_t i = 0; i < edits; ++i) {
-      // Most where the structure is; what stands in the header decides what the rest means.
+      // Most changes hit the structure; the header decides what the rest means.
       const std::size_t at = all ? i : random() % 3 == 0 ? random() % 88 : slot + random() % 2600;
       bytes[at] = random() % 4 == 0 ? '\xff' : static_cast<char>(random());
     }
@@ -357,10 +357,10 @@ TEST_F(LivePage, NoiseDoesNotCrashTheReader) {
       for (const char c : task.name) EXPECT_GE(static_cast<unsigned char>(c), 0x20);
     }
   }
-  EXPECT_GT(read, 20);  // otherwise nothing but the first checks was tried
+  EXPECT_GT(read, 20);  // otherwise only the first checks were tried
 }
 
-// Every row of a frame holds the frame's number: a frame out of two would show.
+// Every row of a frame holds the frame's number, which would show a mix of two frames.
 TEST_F(LivePage, IsWholeWhileItIsWritten) {
   const auto writer = make_writer();
   writer->publish(make_frame(5, 40, 1));
@@ -372,7 +372,7 @@ TEST_F(LivePage, IsWholeWhileItIsWritten) {
   std::uint64_t last = 0;
   for (int i = 0; i < 300; ++i) {
     const Result<Page> page = read_page(writer->path());
-    if (!page) continue;  // the writer was faster, ten times: it does nothing else
+    if (!page) continue;  // the writer was faster ten times: it does nothing else
     ++whole;
     EXPECT_GE(page->frame.sequence, last);
     last = page->frame.sequence;
@@ -412,25 +412,25 @@ TEST_F(LivePage, OfADeadProcessIsRemoved) {
   writer->publish(make_frame());
   const std::string path = copy(*writer);
   ASSERT_TRUE(read_page(path));
-  // The number lives and is somebody else's: the process began at another time.
+  // Another process now has the pid: it began at another time.
   overwrite(path, offsetof(page::Header, process_start), this_process().start + 1);
   EXPECT_THAT(list_pages(folder_), SizeIs(1));
   EXPECT_FALSE(std::filesystem::exists(path));
 
-  // No such process.
+  // There is no such process.
   const std::string gone = copy(*writer);
   overwrite(gone, offsetof(page::Header, pid), std::int64_t{0x7fffffff});
   EXPECT_EQ(remove_stale_pages(folder_), 1U);
   EXPECT_FALSE(std::filesystem::exists(gone));
 
-  // In another namespace the number says nothing.
+  // In another namespace the pid says nothing.
   const std::string elsewhere = copy(*writer);
   overwrite(elsewhere, offsetof(page::Header, process_start), std::uint64_t{1});
   overwrite(elsewhere, offsetof(page::Header, pid_namespace), std::uint64_t{1});
   EXPECT_EQ(remove_stale_pages(folder_), 0U);
   EXPECT_THAT(list_pages(folder_), SizeIs(2));
 
-  // What is no page is not ours to remove.
+  // A file that is no page must not be removed.
   overwrite(elsewhere, 0, 'x');
   EXPECT_THAT(list_pages(folder_), SizeIs(2));
   EXPECT_TRUE(std::filesystem::exists(elsewhere));

@@ -33,7 +33,7 @@ constexpr unsigned kMostPages = 1000;  // of one process
 static_assert(sizeof(Header) <= kFirstSlot);
 static_assert(std::atomic_ref<std::uint64_t>::is_always_lock_free);
 
-/// Cut between two characters, the rest zeros.
+/// Copies a name, cut between two characters, and fills the rest with zeros.
 template <std::size_t Size>
 void put_name(char (&target)[Size], const std::string &name) {
   std::size_t length = std::min(name.size(), Size);
@@ -50,11 +50,11 @@ tl::unexpected<Diagnostics> refused(const std::string &what) {
                     "redag top will not see this executor; all else works");
 }
 
-/// A new file that only its owner can open, or the error in errno.
+/// Creates a new file that only its owner can open; negative, with errno, on an error.
 int create_file(const std::string &path) {
   constexpr mode_t kOwnerOnly = S_IRUSR | S_IWUSR;
   const int descriptor = ::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC | O_NOFOLLOW, kOwnerOnly);
-  if (descriptor >= 0) (void)::fchmod(descriptor, kOwnerOnly);  // whatever the umask took away
+  if (descriptor >= 0) (void)::fchmod(descriptor, kOwnerOnly);  // restores what the umask took away
   return descriptor;
 }
 
@@ -79,7 +79,7 @@ Result<std::unique_ptr<PageWriter>> PageWriter::create(const std::string &folder
     return refused(path);
   };
   if (::ftruncate(descriptor, static_cast<off_t>(size)) != 0) return give_up(errno);
-  // Memory that is not there kills who writes to it (SIGBUS): it is asked for first.
+  // Writing to missing memory kills the process (SIGBUS). The memory is therefore reserved first.
   if (const int error = ::posix_fallocate(descriptor, 0, kFirstSlot); error != 0) return give_up(error);
   void *memory = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0);
   if (memory == MAP_FAILED) return give_up(errno);
@@ -135,7 +135,7 @@ void PageWriter::publish(const Frame &frame) {
   };
   while (!reserve(slot, size_of(dags, tasks))) {
     if (dags == 0 && tasks == 0) return;
-    // A task's row names its DAG's.
+    // A task's row refers to its DAG's row, which must be kept.
     tasks /= 2;
     if (tasks == 0) dags /= 2;
   }

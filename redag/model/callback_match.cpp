@@ -17,7 +17,7 @@ using Kind = Callback::Kind;
 
 bool has_wildcard(std::string_view pattern) { return pattern.find_first_of("*?") != std::string_view::npos; }
 
-/// `name`, `period` and `index` as far as they are given.
+/// Formats a callback; `name`, `period` and `index` only if they are given.
 std::string describe(std::string_view node, Kind kind, std::string_view name, Duration period,
                      std::optional<std::uint32_t> index) {
   std::string text = fmt::format("{} {}", node, to_string(kind));
@@ -33,7 +33,7 @@ std::string describe(std::string_view node, Kind kind, std::string_view name, Du
 
 bool is_counted(Kind kind) { return kind == Kind::Timer || kind == Kind::Waitable; }
 
-/// The callback in the words of the pattern, so that only what the pattern gives is compared.
+/// Formats the callback with only those parts that the pattern gives, so that only these are compared.
 std::string in_words_of(const Callback &pattern, const CallbackId &id) {
   return describe(id.node, id.kind, id.name, pattern.period != 0 ? id.period : 0,
                   pattern.index ? std::optional(id.index) : std::nullopt);
@@ -44,8 +44,8 @@ std::string in_words_of(const Callback &pattern, const CallbackId &id) {
 bool glob_match(std::string_view pattern, std::string_view text) {
   std::size_t p = 0;
   std::size_t t = 0;
-  // The last "*" takes as little as possible, and one more each time what follows does not fit. Earlier ones never need
-  // to be tried again.
+  // The last "*" takes as little as possible, and one character more each time the rest does not fit. Earlier ones need
+  // no second try.
   std::size_t after_star = std::string_view::npos;
   std::size_t taken_to = 0;
   while (t < text.size()) {
@@ -107,7 +107,7 @@ bool is_ros_internal(const CallbackId &id) {
       "_container/list_nodes", "_container/load_node", "_container/unload_node"};
   if (id.kind == Kind::Subscription) return std::find(kTopics.begin(), kTopics.end(), id.name) != kTopics.end();
   if (id.kind != Kind::Service) return false;
-  // Of the node itself: an application may well offer "/map/get_state" in a node of another name.
+  // The service must be the node's own: an application may offer "/map/get_state" in a node of another name.
   const std::size_t length = id.node.size();
   if (id.name.size() <= length || id.name.compare(0, length, id.node) != 0 || id.name[length] != '/') return false;
   const std::string_view service = std::string_view(id.name).substr(length + 1);
@@ -152,7 +152,7 @@ std::optional<TaskRef> CallbackMatcher::find(const CallbackId &id) {
 std::string CallbackMatcher::explain(const Entry &entry) const {
   const Callback &pattern = *entry.task.task->callback;
   const std::string wanted = to_string(pattern);
-  // One that fits but went to another task.
+  // A callback that fits may have gone to another task.
   for (const Seen &seen : seen_) {
     if (seen.entry && matches(pattern, seen.id)) {
       return fmt::format("{}: {} is the callback of {}", entry.name, to_string(seen.id), entries_[*seen.entry].name);
@@ -166,7 +166,7 @@ std::string CallbackMatcher::explain(const Entry &entry) const {
   if (!best.empty()) {
     near = seen_.begin() + (std::find(texts.begin(), texts.end(), best) - texts.begin());
   } else {
-    // No slip of the pen. Another period or topic of the same node, another namespace, another kind?
+    // No name is close. Looks for another period or topic of the same node, another namespace, or another kind.
     const auto same_node = [&](const Seen &seen) { return glob_match(pattern.node, seen.id.node); };
     const auto same_name = [&](const Seen &seen) {
       return !pattern.name.empty() && glob_match(pattern.name, seen.id.name);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Which task of a workload is which ROS 2 callback: patterns of the file against callbacks that were found at run time,
-// and what to tell people where the two do not meet. For set-up, not for the hot path. Not thread-safe.
+// Finds the task of a workload for each ROS 2 callback: compares the file's patterns with the callbacks found at run
+// time, and explains mismatches. For set-up, not for the hot path. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@
 
 namespace redag {
 
-/// A real callback. All names are fully qualified and hold no patterns.
+/// An existing callback. All names are fully qualified and hold no patterns.
 struct CallbackId {
   Callback::Kind kind = Callback::Kind::Timer;
   std::string node;
@@ -28,48 +28,47 @@ struct CallbackId {
   friend bool operator==(const CallbackId &, const CallbackId &) = default;
 };
 
-/// Does `pattern` describe all of `text`? "*" is any run of characters (also none, also with "/"), "?" is any one;
-/// there is no escape, because no ROS name contains either. O(pattern * text) at worst, O(text) with one "*"; no
-/// allocation.
+/// Returns true if `pattern` describes all of `text`. "*" stands for any run of characters (also none, also with "/"),
+/// "?" for any one. There is no escape, because no ROS name contains either. O(pattern * text) at worst, O(text) with
+/// one "*"; no allocation.
 [[nodiscard]] bool glob_match(std::string_view pattern, std::string_view text);
 
-/// Why `pattern` cannot stand for a fully qualified ROS name, to follow that name in a message ("does not begin with
-/// '/'"); empty if it can.
+/// Says why `pattern` cannot stand for a fully qualified ROS name, to follow that name in a message ("does not begin
+/// with '/'"). Empty if it can.
 [[nodiscard]] std::string ros_name_mistake(std::string_view pattern);
 
 [[nodiscard]] bool matches(const Callback &pattern, const CallbackId &id);
 
-/// "/ekf subscription /imu/data", "/imu_driver timer 2 ms (0)", "/camera waitable (1)".
+/// For example "/ekf subscription /imu/data", "/imu_driver timer 2 ms (0)", "/camera waitable (1)".
 [[nodiscard]] std::string to_string(const CallbackId &id);
 
 /// The same for a pattern: "/lidar_* timer", "/imu_driver timer 2 ms", "/imu_driver timer (0)".
 [[nodiscard]] std::string to_string(const Callback &pattern);
 
-/// Does ROS itself create this callback in a node that did not ask for it: parameters, clock, log levels, life cycle?
+/// Returns true if ROS itself creates this callback in every such node: parameters, clock, log levels, life cycle.
 [[nodiscard]] bool is_ros_internal(const CallbackId &id);
 
-/// Gives real callbacks their tasks and keeps account of both sides. Needs the workload for as long as it lives,
-/// unchanged.
+/// Assigns tasks to callbacks, and keeps account of both sides. The workload must outlive it and stay unchanged.
 class CallbackMatcher {
  public:
   explicit CallbackMatcher(const Workload &workload);
 
-  /// The task that runs this callback; none if the file names none. A task whose node has no wildcard wins over one
-  /// whose node has, then the first in the file. A task can be found for several callbacks.
+  /// Returns the task that runs this callback, if the file names one. A task whose node has no wildcard wins over one
+  /// whose node has, then the first in the file wins. One task can be found for several callbacks.
   [[nodiscard]] std::optional<TaskRef> find(const CallbackId &id);
 
-  /// A line for every task with a callback that was not found so far, in the order of the file: what it names, and what
-  /// is nearest to it among the callbacks seen.
+  /// Returns a line for every task whose callback was not found yet, in the order of the file. It says what the task
+  /// names, and which of the callbacks seen is nearest to it.
   [[nodiscard]] std::vector<std::string> unmatched() const;
 
-  /// The callbacks seen that no task names, each once, in the order in which they were first seen, without those of ROS
-  /// itself.
+  /// Returns the callbacks seen that no task names, each once, in the order in which they were first seen. Leaves out
+  /// those of ROS itself.
   [[nodiscard]] std::vector<std::string> unconfigured() const;
 
  private:
   struct Seen {
     CallbackId id;
-    std::optional<std::uint32_t> entry;  // position in entries_
+    std::optional<std::uint32_t> entry;  // index in entries_
   };
   struct Entry {
     TaskRef task;
@@ -81,8 +80,8 @@ class CallbackMatcher {
   [[nodiscard]] std::string explain(const Entry &entry) const;
 
   std::vector<Entry> entries_;                                                // tasks with a callback
-  std::unordered_map<std::string_view, std::vector<std::uint32_t>> by_node_;  // entries without wildcard in the node
-  std::vector<std::uint32_t> patterns_;                                       // the others
+  std::unordered_map<std::string_view, std::vector<std::uint32_t>> by_node_;  // entries without a wildcard in the node
+  std::vector<std::uint32_t> patterns_;                                       // the other entries
   std::vector<Seen> seen_;
   std::unordered_set<std::string> seen_texts_;
 };

@@ -52,10 +52,10 @@ TEST(GlobMatch, DoesNotBacktrackExponentially) {
   std::string pattern;
   for (int i = 0; i < 100; ++i) pattern += "*a";
   pattern += "*b";
-  EXPECT_FALSE(glob_match(pattern, std::string(10'000, 'a')));  // 2e6 steps; one choice a star would never end
+  EXPECT_FALSE(glob_match(pattern, std::string(10'000, 'a')));  // 2e6 steps; full backtracking would never end
 }
 
-/// The definition, word by word.
+/// The definition of a match, taken literally.
 bool naive_match(std::string_view pattern, std::string_view text) {
   if (pattern.empty()) return text.empty();
   if (pattern.front() == '*') {
@@ -77,7 +77,7 @@ RC_GTEST_PROP(GlobMatch, IsTheDefinition, ()) {
   };
   const std::string text = letters("ab", 12);
   std::string pattern = letters("ab**?", 9);
-  if (*rc::gen::arbitrary<bool>()) {  // one made of the text, so that enough of them match
+  if (*rc::gen::arbitrary<bool>()) {  // made from the text, so that enough patterns match
     pattern = text;
     const int holes = *rc::gen::inRange(0, 4);
     for (int i = 0; i < holes && !pattern.empty(); ++i) {
@@ -153,7 +153,7 @@ TEST(IsRosInternal, KnowsWhatEveryNodeHas) {
 
 // --- the matcher ---
 
-/// Two DAGs; `callbacks` go to tasks t0, t1, ... of DAG "control", the last one to task "last" of DAG "other".
+/// Two DAGs: `callbacks` go to tasks t0, t1, ... of DAG "control", the last one to task "last" of DAG "other".
 Workload workload_of(const std::vector<Callback> &callbacks) {
   Workload workload;
   workload.dags.resize(2);
@@ -166,7 +166,7 @@ Workload workload_of(const std::vector<Callback> &callbacks) {
     task.callback = callbacks[i];
     workload.dags[last ? 1 : 0].tasks.push_back(task);
   }
-  workload.dags[0].tasks.emplace_back().name = "synthetic";  // no callback: never found, never reported
+  workload.dags[0].tasks.emplace_back().name = "synthetic";  // without a callback: never found, never reported
   return workload;
 }
 
@@ -263,12 +263,12 @@ TEST(CallbackMatcher, ListsWhatIsNotConfiguredOnceAndWithoutRosOwn) {
     found(matcher, subscription("/ekf", "/parameter_events"));
     found(matcher, service("/ekf", "/ekf/get_parameters"));
   }
-  EXPECT_EQ(found(matcher, subscription("/ekf", "/rosout")), "last");  // whoever names it gets it
+  EXPECT_EQ(found(matcher, subscription("/ekf", "/rosout")), "last");  // a task that names it gets it
   EXPECT_THAT(matcher.unconfigured(),
               ElementsAre("/ekf subscription /odometry", "/pid timer 1 ms (0)", "/pid timer 1 ms (1)"));
 }
 
-// Against the rule read literally: the first task in file order that matches, of those with an exact node, else of all.
+// Compares with the literal rule: the first match in file order among tasks with an exact node, otherwise among all.
 RC_GTEST_PROP(CallbackMatcher, FollowsTheRule, ()) {
   const auto node = [](bool pattern) {
     return pattern ? *rc::gen::element<std::string>("/a", "/b", "/a_1", "/a_?", "/*", "*", "/a*")

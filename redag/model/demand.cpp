@@ -11,7 +11,7 @@
 namespace redag {
 namespace {
 
-// Two streams per task, so that adding jitter to a workload leaves its execution times as they were.
+// Two streams for each task: adding jitter to a workload does not change its execution times.
 Rng job_rng(std::uint64_t seed, TaskId id, std::uint32_t number, unsigned stream) {
   return Rng::stream(seed, std::uint64_t{id.value} * 2 + stream, number);
 }

@@ -83,7 +83,7 @@ TEST(Demand, VariesWhereTwoJobsCanDiffer) {
   EXPECT_FALSE(demand_varies(task_of(Kind::Constant, 1, 500)));
   EXPECT_TRUE(demand_varies(task_of(Kind::Uniform, 1, 500)));
   EXPECT_FALSE(demand_varies(task_of(Kind::Uniform, 500, 500)));
-  EXPECT_FALSE(demand_varies(task_of(Kind::Uniform, 0, 1)));  // never below 1ns
+  EXPECT_FALSE(demand_varies(task_of(Kind::Uniform, 0, 1)));  // never below 1 ns
   Task normal = task_of(Kind::Normal, 1, 500);
   EXPECT_FALSE(demand_varies(normal));
   normal.execution.stddev = 10;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The vocabulary of every trace: what can happen to a job. A stream of events is in decision order, and its times never
-// decrease; what was measured more exactly than the decision stands in `value`.
+// decrease. `value` holds times that were measured more exactly than the decision. Plain values.
 #pragma once
 
 #include <cstdint>
@@ -16,24 +16,24 @@ namespace redag {
 //   Released -> Ready -> Dispatched -> Finished | Aborted
 //   Dispatched -> Preempted -> Resumed -> ... -> Finished | Aborted
 //   Released -> Skipped, Released -> Ready -> Skipped
-// Exceeded can happen to a job that has started; HighMode and LowMode happen to the run, and name the job that caused
+// Exceeded can happen to a job that has started. HighMode and LowMode happen to the run, and name the job that caused
 // them.
-// Where a platform preempts for real, a job can also end while Preempted (the operating system ran it meanwhile).
+// On real threads a job can also end while Preempted, because the operating system ran it meanwhile.
 enum class JobEventKind : std::uint8_t {
   Released,    // value: nominal release r, the point on the timer's grid (data tasks: the last predecessor's finish)
   Ready,       // precedence resolved; value: origin, the earliest source release whose data this job carries
-  Deferred,    // would have been dispatched, but its DAG is at max_active; at most once a job
+  Deferred,    // would have been dispatched, but its DAG is at max_active; at most once for a job
   Dispatched,  // decision: start on `worker`; value: absolute deadline
   Started,     // the body began on `worker` (reported by the driver, not by the scheduler); value: same as time
   Preempted,   // lost `worker` to a higher-priority job
-  Resumed,     // goes on, on `worker`
+  Resumed,     // continues on `worker`
   Finished,    // value: finish f as measured
   Skipped,     // never started; see reason
-  Aborted,     // started and ended without a result; see reason; value: when, as measured
-  Exceeded,    // used its budget, and was not cut off there; what follows is its task's `on_budget`
+  Aborted,     // started and ended without a result; see reason; value: the end as measured
+  Exceeded,    // used its budget and was not cut off; its task's `on_budget` follows
   HighMode,    // HI mode begins: this job of a high-criticality DAG used its `wcet_low`
   LowMode,     // HI mode ends: nothing is ready or started; the job is that of HighMode, value: when HI mode began
-  Executed,    // the body ended (reported by the driver, before what ends the job); value: processor time that it used
+  Executed,    // the body ended (reported by the driver, before the job's end); value: processor time that it used
 };
 
 enum class Reason : std::uint8_t {
@@ -45,24 +45,24 @@ enum class Reason : std::uint8_t {
   Removed,     // Skipped: its task or its DAG was removed
   Exception,   // Aborted: the body threw
   Budget,      // Aborted: cut off at its budget; Skipped: a job of its task used its budget (skip_next)
-  NoData,      // Aborted: it found nothing to do (its message was overwritten, its timer cancelled)
+  NoData,      // Aborted: it found no data to work on (its message was overwritten, its timer cancelled)
   Degraded,    // Skipped: in HI mode its DAG is degraded
 };
 
 inline constexpr auto kLastJobEventKind = JobEventKind::Executed;
 inline constexpr auto kLastReason = Reason::Degraded;
 
-/// Reported and stamped by the thread that runs the job: no decisions, and not in their order.
+/// True for events that the job's thread reports and stamps. They are no decisions, and not in their order.
 [[nodiscard]] constexpr bool is_of_body(JobEventKind kind) {
   return kind == JobEventKind::Started || kind == JobEventKind::Executed;
 }
 
-/// Events of the whole run and not of the job that they name, which may have ended.
+/// True for events of the whole run. The job that they name may have ended.
 [[nodiscard]] constexpr bool is_mode_change(JobEventKind kind) {
   return kind == JobEventKind::HighMode || kind == JobEventKind::LowMode;
 }
 
-/// 32 bytes, trivially copyable: what the rings hold.
+/// An event as the rings hold it: 32 bytes, trivially copyable.
 struct JobEvent {
   Time time = 0;
   std::int64_t value = 0;

@@ -21,7 +21,7 @@ struct Name {
   Member member;
 };
 
-// The one list of what there is: for the text form and for the file.
+// The only list of the overheads, for the text form and for the file.
 constexpr std::array kNames = {
     Name{"timer", [](Overheads &o) -> Duration & { return o.timer; }},
     Name{"dispatch", [](Overheads &o) -> Duration & { return o.dispatch; }},
@@ -83,7 +83,7 @@ std::optional<Overheads> parse_overheads(std::string_view text) {
 }
 
 const Overheads &plausible_overheads() {
-  // A time slice of a kernel without real-time patches for the longest stall; 2 % of a processor for all of them.
+  // The longest stall is a time slice of a kernel without real-time patches. All stalls take 2 % of a processor.
   static const Overheads kPlausible{.timer = 20 * kMicrosecond,
                                     .dispatch = 200 * kMicrosecond,
                                     .preempt = 100 * kMicrosecond,

@@ -23,7 +23,7 @@ class Reader : private yaml::ValueReader {
   Reader(const Node &root, std::string file) : ValueReader(std::move(file)), root_(root) {}
 
   Result<Calibration> run() {
-    // `measured` is for people: it is not read.
+    // `measured` is for people and is not read.
     if (check_map(root_, "an overheads file", {"overheads", "provenance", "measured"})) {
       read_overheads();
       read_provenance();

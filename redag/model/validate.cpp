@@ -37,7 +37,7 @@ constexpr std::array kDurationRules = {
     DurationRule{Field::WcetLow, &Task::wcet_low, 0},
 };
 
-/// Collects findings about one workload; the place is set as the walk goes.
+/// Collects findings about one workload. Sets their place while it walks through the workload.
 class Checker {
  public:
   Checker(const Workload &workload, ValidateOptions options) : workload_(workload), options_(options) {}
@@ -156,9 +156,9 @@ class Checker {
       const Duration value = task.*rule.member;
       const char *name = to_string(rule.field);
       if (rule.field == Field::Wcet && value == 0 && options_.wcet_optional && task.callback) continue;
-      // A data task's period is check_inherited_periods()' business.
+      // check_inherited_periods() checks the period of a data task.
       if (rule.field == Field::Period && task.activation == Activation::Data) continue;
-      // A deadline that was taken over from a bad period is not a second mistake.
+      // A deadline that was copied from a bad period is not a second mistake.
       if (rule.field == Field::Deadline && task.period <= 0 && value == task.period) continue;
       if (rule.field == Field::Period && value == 0) {
         error(rule.field, {}, fmt::format("timer task '{}' has no period", task.name),
@@ -209,7 +209,7 @@ class Checker {
     }
   }
 
-  // C(LO) and what it sets off, docs/model.md, "Criticality".
+  // C(LO) and its effects (docs/model.md, "Criticality").
   void check_wcet_low(const Dag &dag, const Task &task) {
     if (task.wcet_low <= 0) return;
     if (dag.criticality != Criticality::High) {
@@ -391,13 +391,13 @@ class Checker {
     }
   }
 
-  // Depth-first search along predecessors, without recursion; an edge back to the current path closes a cycle. One
-  // finding for every such edge, up to a bound that keeps the report readable.
+  // Depth-first search along predecessors, without recursion. An edge back to the current path closes a cycle. Reports
+  // each such edge, up to a bound that keeps the report readable.
   bool check_cycles(const Dag &dag) {
     enum class Mark : std::uint8_t { New, OnPath, Done };
     struct Step {
       std::uint32_t task;
-      std::uint32_t next = 0;  // position in its predecessors
+      std::uint32_t next = 0;  // index in its predecessors
     };
     constexpr std::size_t kMostReported = 10;
     std::vector<Mark> marks(dag.tasks.size(), Mark::New);
@@ -431,7 +431,7 @@ class Checker {
     return cycles == 0;
   }
 
-  // `cycle` runs against the edges: each is a successor of the next.
+  // `cycle` runs against the edges: each task is a successor of the next one.
   void report_cycle(const Dag &dag, std::vector<std::uint32_t> cycle) {
     constexpr std::size_t kMostNamed = 12;
     std::reverse(cycle.begin(), cycle.end());
@@ -445,7 +445,7 @@ class Checker {
     task_ = Finding::kNone;
   }
 
-  // Only on acyclic DAGs without unsound edges: elsewhere there is nothing to inherit.
+  // Requires an acyclic DAG without unsound edges; other DAGs have no periods to inherit.
   void check_inherited_periods(const Dag &dag) {
     for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {
       const Task &task = dag.tasks[i];

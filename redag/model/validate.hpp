@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The rules that a workload must keep, each stated once: for workloads built in C++ and, through workload_yaml.hpp,
-// for files. Rules about text (units, unknown keys, names that do not resolve) belong to the reader. Pure functions.
+// The rules that a workload must keep, each stated once: for workloads built in C++ and, through workload_yaml.hpp, for
+// files. Rules about text (units, unknown keys, unresolved names) belong to the reader. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -23,11 +23,10 @@ inline constexpr std::uint32_t kMaxDegrade = 1'000'000;  // releases skipped, or
 inline constexpr std::uint32_t kMaxBound = 1'000'000;    // max_active, max_pending
 inline constexpr std::size_t kMaxNameBytes = 1000;
 
-/// Why `name` cannot stand in one-line messages and tables, after it: "is empty", "contains U+001B, ...". Empty: it
-/// can.
+/// Says why `name` cannot stand in one-line messages and tables: "is empty", "contains U+001B, ...". Empty if it can.
 [[nodiscard]] std::string name_mistake(std::string_view name);
 
-/// What a workload is made of; the text is the key of the file format.
+/// The parts of a workload. to_string() gives the key of the file format.
 enum class Field : std::uint8_t {
   Name,
   Platform,
@@ -93,24 +92,24 @@ struct Finding {
   static constexpr std::uint32_t kNone = UINT32_MAX;
 
   Severity severity = Severity::Error;
-  DagId dag;                   // none: about the workload
-  std::uint32_t task = kNone;  // position in the DAG; none: about the DAG
-  Field field = Field::Name;   // to point at
-  std::uint32_t item = kNone;  // position in `predecessors` or `samples`, or part of the callback
-  FieldSet involves;           // everything the rule looked at
+  DagId dag;                   // invalid: about the workload
+  std::uint32_t task = kNone;  // index in the DAG; kNone: about the DAG
+  Field field = Field::Name;   // the field to point at
+  std::uint32_t item = kNone;  // index in `predecessors` or `samples`, or part of the callback
+  FieldSet involves;           // all fields that the rule examined
   std::string message;
   std::string hint;
 };
 
 struct ValidateOptions {
-  /// A task with a callback may have no wcet (0): what is going to be measured is not known before.
+  /// Allows a task with a callback to have no wcet (0), because it is yet to be measured.
   bool wcet_optional = false;
 };
 
-/// Every broken rule, in the order of the workload. Linear in its size. Never crashes, whatever the workload holds.
+/// Returns every broken rule, in the order of the workload. Linear in its size. Accepts any workload without a crash.
 [[nodiscard]] std::vector<Finding> find_mistakes(const Workload &workload, ValidateOptions options = {});
 
-/// find_mistakes() as messages without a place: errors and warnings; empty for a flawless workload.
+/// Returns find_mistakes() as messages without a place, errors and warnings; empty for a flawless workload.
 [[nodiscard]] Diagnostics validate(const Workload &workload, ValidateOptions options = {});
 
 [[nodiscard]] bool has_errors(const Diagnostics &diagnostics);

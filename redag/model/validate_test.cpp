@@ -149,7 +149,7 @@ TEST(Validate, PointsAtTheFieldAndTheItem) {
   EXPECT_TRUE(findings[0].involves.intersects(Field::After));
 }
 
-// Whatever is in the workload: no crash, and what passes has what everything else relies on.
+// No workload causes a crash, and a workload that passes has the properties on which all other code relies.
 RC_GTEST_PROP(Validate, PassesOnlyWhatIsSound, ()) {
   Workload workload = valid();
   Dag &dag = workload.dags[0];
@@ -182,7 +182,7 @@ RC_GTEST_PROP(Validate, PassesOnlyWhatIsSound, ()) {
     task.predecessors = *rc::gen::container<std::vector<std::uint32_t>>(rc::gen::inRange(0U, 6U));
   }
   if (*rc::gen::inRange(0, 2) == 0) {
-    for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {  // makes valid ones frequent enough to matter
+    for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {  // makes valid ones frequent enough
       dag.tasks[i] = valid().dags[0].tasks[0];
       dag.tasks[i].name = std::string(1, static_cast<char>('a' + i));
       if (i > 0) dag.tasks[i].predecessors = {*rc::gen::inRange(0U, i)};

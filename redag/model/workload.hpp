@@ -24,18 +24,18 @@ enum class Activation : std::uint8_t {
   Data,   // when every predecessor has completed once more since this task's last job (AND-join)
 };
 
-/// What happens to releases that find earlier jobs of the same task unfinished.
+/// What happens to releases while earlier jobs of the same task are unfinished.
 enum class Overrun : std::uint8_t {
-  Skip,   // at most one job waits; the next release replaces (skips) one that has not started
+  Skip,   // at most one job waits; the next release replaces (skips) it if it has not started
   Queue,  // up to `queue_depth` ready jobs wait, oldest first; a release beyond that is skipped
 };
 
-/// What happens when a job has used its task's budget. It has a result all the same, unless it is cut off.
+/// What happens when a job has used its task's budget. The job still has a result, unless it is cut off.
 enum class OnBudget : std::uint8_t {
   Abort,     // cut off at its next preemption point
-  Log,       // told in the trace, nothing else
-  Demote,    // goes on below everything else
-  SkipNext,  // goes on; the next release of its task is skipped
+  Log,       // recorded in the trace, nothing else
+  Demote,    // continues below everything else
+  SkipNext,  // continues; the next release of its task is skipped
 };
 
 /// How long a synthetic job executes, in processor time.
@@ -54,15 +54,15 @@ struct ExecutionTime {
   friend bool operator==(const ExecutionTime &, const ExecutionTime &) = default;
 };
 
-/// Which ROS 2 callback a task is. Names are patterns: "*" stands for any run of characters, "?" for one.
+/// The ROS 2 callback of a task. Names are patterns: "*" stands for any run of characters, "?" for one.
 struct Callback {
   enum class Kind : std::uint8_t { Timer, Subscription, Service, Client, Action, Waitable };
 
   std::string node;  // fully qualified: "/nav/planner", "/lidar_*"
   Kind kind = Kind::Timer;
   std::string name;                    // of the topic, service or action; empty for timers and waitables
-  Duration period = 0;                 // of the timer; 0: any, and for all other kinds
-  std::optional<std::uint32_t> index;  // n-th timer (waitable) of its node by creation, from 0; none: any
+  Duration period = 0;                 // of the timer; 0: any; 0 for all other kinds
+  std::optional<std::uint32_t> index;  // n-th timer (waitable) of its node by creation, from 0; empty: any
 
   friend bool operator==(const Callback &, const Callback &) = default;
 };
@@ -77,7 +77,7 @@ struct Task {
   Duration offset = 0;    // first release (timer tasks)
   Duration jitter = 0;    // a release happens up to this much after its point on the grid (timer tasks)
   Duration region = 0;    // longest stretch without a preemption point (cooperative mode); 0: the whole job
-  Duration budget = 0;    // processor time after which `on_budget` happens to a job; 0: none
+  Duration budget = 0;    // processor time after which `on_budget` happens; 0: none
   OnBudget on_budget = OnBudget::Abort;
   Duration wcet_low = 0;  // C(LO) of a task of a high-criticality DAG, <= wcet = C(HI); 0: none
   Criticality criticality = Criticality::Normal;
@@ -85,21 +85,21 @@ struct Task {
   Overrun overrun = Overrun::Skip;
   std::uint32_t queue_depth = 1;            // for Overrun::Queue, >= 1
   std::optional<int> priority;              // for PolicyKind::Fixed; larger is more urgent
-  std::uint32_t concurrency = 1;            // jobs in progress at once (a reentrant callback)
+  std::uint32_t concurrency = 1;            // most jobs in progress at once (a reentrant callback)
   std::string group;                        // jobs of one group never overlap; empty: no group; shared by all DAGs
-  std::vector<std::uint32_t> predecessors;  // positions in the same DAG
+  std::vector<std::uint32_t> predecessors;  // indices in the same DAG
   ExecutionTime execution;
-  std::optional<Callback> callback;  // what runs its jobs under ROS 2; its wcet may then be unknown (0)
+  std::optional<Callback> callback;  // runs its jobs under ROS 2; its wcet may then be unknown (0)
 
   friend bool operator==(const Task &, const Task &) = default;
 };
 
-/// What a DAG of lower criticality is left with in HI mode (docs/model.md, "Criticality").
+/// Which releases a DAG of lower criticality keeps in HI mode (docs/model.md, "Criticality").
 struct Degrade {
   enum class Kind : std::uint8_t {
     Stop,     // no releases
-    Skip,     // after each period that is let through, `skip` ones are skipped
-    Stretch,  // a release of a timer task is let through when `stretch` periods have passed since the last such
+    Skip,     // after each period that is let through, `skip` periods are skipped
+    Stretch,  // lets a timer release through once `stretch` periods have passed since the last one let through
   };
   Kind kind = Kind::Stop;
   std::uint32_t skip = 1;
@@ -116,7 +116,7 @@ struct Dag {
   std::uint32_t max_pending = 0;  // jobs released and not started at any time; 0: no bound
   Duration deadline = 0;          // end to end, from a source's release to a sink's finish; 0: none
   Criticality criticality = Criticality::Normal;
-  Degrade degrade;  // not of high criticality
+  Degrade degrade;  // only used if the DAG is not of high criticality
 
   friend bool operator==(const Dag &, const Dag &) = default;
 };
@@ -130,8 +130,8 @@ enum class PolicyKind : std::uint8_t { RateMonotonic, DeadlineMonotonic, Fixed, 
 
 /// How jobs that the policy ranks equal are ordered. See docs/model.md, "Ties".
 enum class Ties : std::uint8_t {
-  Share,  // they take turns: the earlier release first, and none preempts another
-  Fixed,  // by the order of their tasks, always
+  Share,  // take turns: the earlier release first; none preempts another
+  Fixed,  // always by the order of tasks
 };
 
 /// What can interrupt a running job. See docs/model.md.
@@ -151,7 +151,7 @@ struct Workload {
   Ties ties = Ties::Share;
   std::vector<Dag> dags;
 
-  /// Tasks of all DAGs together; TaskIds run from 0 to this, DAG by DAG.
+  /// Number of tasks of all DAGs. TaskIds are smaller, and follow the order of DAGs.
   [[nodiscard]] std::size_t task_count() const;
 
   /// U = sum C_i / T_i (eq. utilization).
@@ -160,21 +160,21 @@ struct Workload {
   friend bool operator==(const Workload &, const Workload &) = default;
 };
 
-/// One row per TaskId: where the task stands in its workload. Valid while the workload is unchanged.
+/// One row for each TaskId: the task's place in its workload. Valid while the workload is unchanged.
 struct TaskRef {
   DagId dag;
-  std::uint32_t index = 0;  // position in the DAG
+  std::uint32_t index = 0;  // index in the DAG
   const Task *task = nullptr;
   TaskId id;
 };
 
 [[nodiscard]] std::vector<TaskRef> flatten(const Workload &workload);
 
-/// Positions in a topological order: result[i] is the rank of task i; ties by position. Requires acyclic edges.
+/// Ranks in a topological order: result[i] is the rank of task i; ties by index. Requires acyclic edges.
 [[nodiscard]] std::vector<std::uint32_t> topological_ranks(const Dag &dag);
 
-/// Gives every data task the largest period among its predecessors (in topological order), and the deadline to go with
-/// it where none is set (0). Requires acyclic edges.
+/// Gives every data task the largest period among its predecessors, in topological order. Sets its deadline to that
+/// period where none is set (0). Requires acyclic edges.
 void inherit_periods(Dag &dag);
 
 [[nodiscard]] const char *to_string(Criticality value);

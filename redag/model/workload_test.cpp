@@ -42,7 +42,7 @@ TEST(InheritPeriods, TakesTheLargestOfThePredecessors) {
   EXPECT_EQ(dag.tasks[1].period, 40);
   EXPECT_EQ(dag.tasks[1].deadline, 40);
   EXPECT_EQ(dag.tasks[0].period, 40);    // through another data task
-  EXPECT_EQ(dag.tasks[0].deadline, 25);  // a deadline that is given stays
+  EXPECT_EQ(dag.tasks[0].deadline, 25);  // a given deadline is kept
   EXPECT_EQ(dag.tasks[4].deadline, 80);
 }
 

@@ -46,14 +46,14 @@ constexpr std::array kTies = {Ties::Share, Ties::Fixed};
 constexpr std::array kPreemptionModes = {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os,
                                          PreemptionMode::Auto};
 
-/// A map of the file and which of its values could not be read. Findings that look at those are not repeated.
+/// A map of the file, and which of its values could not be read. Findings that depend on those are not reported.
 struct Part {
   const Node *node = nullptr;
   FieldSet broken;
 };
 
 struct TaskPart : Part {
-  std::vector<const Node *> edges;  // beside Task::predecessors
+  std::vector<const Node *> edges;  // parallel to Task::predecessors
 };
 
 struct DagPart : Part {
@@ -68,7 +68,7 @@ std::vector<std::string_view> names_of(std::span<const Field> fields) {
   return names;
 }
 
-/// One file on its way to a workload: reads the tree, gathers every mistake, then lets validate.hpp look at the whole.
+/// Turns one file into a workload: reads the tree, gathers all mistakes, then validates the whole by validate.hpp.
 class Reader : private yaml::ValueReader {
  public:
   Reader(const Node &root, std::string file, LoadOptions options) : ValueReader(std::move(file)), options_(options) {
@@ -89,7 +89,7 @@ class Reader : private yaml::ValueReader {
  private:
   // --- keys of a part ---
 
-  /// Reads `field` of `part` with `read` into `out`, if it is there; remembers a failure.
+  /// Reads `field` of `part` with `read` into `out` if it is there. Notes a failure in `part`.
   template <class T, class Read>
   void take(Part &part, Field field, T &out, Read read) {
     const Node *node = find(part, field);
@@ -121,7 +121,7 @@ class Reader : private yaml::ValueReader {
          [&](const Node &node, std::string_view key) { return one_of(node, key, std::span<const Enum>(values)); });
   }
 
-  /// The items of a list that may be absent or null (then validate.hpp says what is missing).
+  /// Returns the items of a list. The list may be absent or null: validate.hpp then reports what is missing.
   const std::vector<Node> *take_list(Part &part, Field field) {
     const Node *node = find(part, field);
     if (node == nullptr || node->kind == Node::Kind::Null) return nullptr;
@@ -219,7 +219,7 @@ class Reader : private yaml::ValueReader {
     take(part, Field::Callback, task.callback, [this](const Node &value, std::string_view) { return callback(value); });
   }
 
-  /// The scheduler knows the DAG's alone: another one would be without effect.
+  /// The scheduler only uses the DAG's criticality. Warns if a task has another one, which would have no effect.
   void take_criticality(Task &task, TaskPart &part) {
     const Criticality of_dag = task.criticality;
     take_enum(part, Field::Criticality, task.criticality, kCriticalities);
@@ -314,7 +314,7 @@ class Reader : private yaml::ValueReader {
     part.broken |= Field::Degrade;
   }
 
-  /// Names become positions once all tasks of the DAG are known.
+  /// Turns names into indices, once all tasks of the DAG are known.
   void read_edges(Dag &dag, DagPart &part) {
     std::unordered_map<std::string_view, std::uint32_t> positions;
     std::vector<std::string_view> names;
@@ -352,7 +352,7 @@ class Reader : private yaml::ValueReader {
 
   // --- the workload as a whole ---
 
-  /// Periods of data tasks and deadlines that are not given. A DAG whose edges are wrong has none to inherit.
+  /// Sets periods of data tasks, and deadlines that are not given. A DAG with wrong edges has no periods to inherit.
   void inherit() {
     std::vector<bool> unsound(workload_.dags.size(), false);
     for (const Finding &finding : find_mistakes(workload_, options_)) {
@@ -403,7 +403,7 @@ class Reader : private yaml::ValueReader {
     }
     for (Finding &finding : findings) {
       const Part *part = &root_;
-      FieldSet unknown = broken;  // what is said about the whole workload looks at all of it
+      FieldSet unknown = broken;  // a finding about the whole workload depends on all of it
       if (finding.dag.valid()) {
         const DagPart &dag = dags_[finding.dag.value];
         part = finding.task == Finding::kNone ? static_cast<const Part *>(&dag) : &dag.tasks[finding.task];

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The text form of a workload (docs/workload_format.md): reading with every mistake reported at its line, and writing.
-// The rules about values are in validate.hpp. Pure functions, except for the file that is read or written.
+// The text form of a workload (docs/workload_format.md): reading, with every mistake reported at its line, and writing.
+// validate.hpp holds the rules about values. Pure functions, except those that read or write a file.
 #pragma once
 
 #include <filesystem>
@@ -20,17 +20,17 @@ struct LoadedWorkload {
   Diagnostics warnings;
 };
 
-/// What a file has to say: LoadOptions{.wcet_optional = true} is for what runs callbacks and measures them.
+/// What a file must state. LoadOptions{.wcet_optional = true} is for programs that run callbacks and measure them.
 using LoadOptions = ValidateOptions;
 
-/// Longest text that is read, in bytes: yaml-cpp can take 400 times as much memory.
+/// The longest text that is read, in bytes. yaml-cpp can take 400 times as much memory.
 inline constexpr std::size_t kMaxWorkloadBytes = std::size_t{16} << 20U;
 
-/// Reads and validates a file. Errors: all mistakes, by line (with the warnings among them), or why the file cannot be
+/// Reads and validates a file. Errors: all mistakes by line (with the warnings among them), or why the file cannot be
 /// read.
 [[nodiscard]] Result<LoadedWorkload> load_workload(const std::filesystem::path &path, LoadOptions options = {});
 
-/// The same for text that is already in memory; `file_name` is what the diagnostics call it.
+/// The same for text in memory. `file_name` is its name in diagnostics.
 [[nodiscard]] Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_name,
                                                     LoadOptions options = {});
 

@@ -66,7 +66,7 @@ std::optional<Callback> ValueReader::callback(const Node &node) {
   return sound ? std::optional(std::move(callback)) : std::nullopt;
 }
 
-/// The forms of a timer, "any", a period, {period, index}, and of a waitable, "any", {index}. False after a mistake.
+/// Reads a timer ("any", a period, {period, index}) or a waitable ("any", {index}). Returns false after a mistake.
 bool ValueReader::counted_callback(const Node &node, Callback &callback) {
   const std::string_view kind = to_string(callback.kind);
   const bool is_timer = callback.kind == Kind::Timer;

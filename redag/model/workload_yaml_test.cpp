@@ -192,7 +192,7 @@ TEST(ParseWorkload, ReadsEveryFormOfACallback) {
   const auto &tasks = workload.dags.at(0).tasks;
   const auto none = std::nullopt;
   EXPECT_EQ(tasks.at(0).callback, (Callback{"/imu_driver", Kind::Timer, "", 2 * kMillisecond, none}));
-  EXPECT_EQ(tasks.at(0).period, 2 * kMillisecond);  // of the timer rather than of the DAG
+  EXPECT_EQ(tasks.at(0).period, 2 * kMillisecond);  // the timer's, not the DAG's
   EXPECT_EQ(tasks.at(0).deadline, 2 * kMillisecond);
   EXPECT_EQ(tasks.at(0).concurrency, 3U);
   EXPECT_EQ(tasks.at(1).callback, (Callback{"/imu_driver", Kind::Timer, "", 0, 0}));
@@ -245,7 +245,7 @@ TEST(ParseWorkload, AcceptsAByteOrderMarkAndWindowsLineEnds) {
 
 // --- mistakes ---
 
-/// `d` and `t` shorten the table: a DAG with these tasks, each on a line of its own from line 4 at column 7.
+/// A DAG with these tasks, each on a line of its own, from line 4 at column 7.
 std::string tasks(std::initializer_list<const char *> lines) {
   std::string text = "dags:\n  - name: d\n    tasks:\n";
   for (const char *line : lines) text += fmt::format("    - {}\n", line);
@@ -254,7 +254,7 @@ std::string tasks(std::initializer_list<const char *> lines) {
 
 struct Mistake {
   std::string text;
-  std::vector<std::string> expected;  // each is part of one reported line, in order, and there are no others
+  std::vector<std::string> expected;  // parts of the reported lines, in order; there are no other lines
 
   friend std::ostream &operator<<(std::ostream &out, const Mistake &mistake) {
     return out << mistake.text.substr(0, 300);
@@ -463,7 +463,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{tasks({"{name: a, wcet: 1ms, period: 1s}",
                        "{name: b, wcet: 1ms, activation: data, after: a, callback: {node: /n, timer: any}}"}),
                 {"w.yaml:5:84: error: data task 'b' names a timer (its predecessors release it"}},
-        // What a broken timer may have given is not missed.
+        // A value that a broken timer could have given is not reported as missing.
         Mistake{with("wcet: 1ms, callback: {node: /n, timer: 2sec}"), {"4:56: error: timer: '2sec' is not a duration"}},
         Mistake{with("wcet: 1ms, callback: {node: /n, timer: any}"), {"4:7: error: timer task 't' has no period"}},
         Mistake{with("wcet: 1ms, period: 1s, concurrency: 0"),
@@ -495,11 +495,11 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{tasks({"{name: a, wcet: 1ms, period: 1s}",
                        "{name: b, wcet: 1ms, activation: data, after: a, offset: 1ms, jitter: 1ms}"}),
                 {"w.yaml:5:64: error: data task 'b' has 'offset'", "w.yaml:5:77: error: data task 'b' has 'jitter'"}},
-        // What follows from a mistake is not reported again: no wcet > deadline, no period of b.
+        // Consequences of a mistake are not reported: no wcet > deadline, no period of b.
         Mistake{tasks({"{name: a, wcet: 1ms, period: 1sec}", "{name: b, wcet: 1ms, activation: data, after: a}",
                        "{name: c, wcet: 2ms, activation: data, after: [a, b]}"}),
                 {"w.yaml:4:36: error: period: '1sec' is not a duration: unknown unit 'sec'"}},
-        // All mistakes at once, in the order of the file.
+        // All mistakes are reported at once, in the order of the file.
         Mistake{
             "policy: best\n" + tasks({"{name: a, wcet: 1, period: 1s}", "{name: a, wcet: 1ms, period: 1s, bcte: 1ms}",
                                       "{name: c, wcet: 1ms, activation: data, after: [x]}"}),
@@ -600,7 +600,7 @@ Callback arbitrary_callback(Activation activation) {
   return callback;
 }
 
-/// A generated workload with every optional part drawn as well.
+/// A generated workload with every optional part drawn, too.
 Workload arbitrary_workload() {
   GenerateOptions options;
   options.dags = *rc::gen::inRange(1U, 5U);
@@ -648,7 +648,7 @@ Workload arbitrary_workload() {
       if (*rc::gen::arbitrary<bool>()) task.execution = {ExecutionTime::Kind::Constant, 0, 0, {}};
       if (task.group.empty()) task.concurrency = *rc::gen::element(1U, 2U, kMaxConcurrency);
       if (*rc::gen::arbitrary<bool>()) task.callback = arbitrary_callback(task.activation);
-      // The rate of the timer itself, or another one.
+      // The timer's own rate, or another one.
       if (task.callback && task.callback->period != 0 && *rc::gen::arbitrary<bool>()) {
         task.callback->period = task.period;
       }

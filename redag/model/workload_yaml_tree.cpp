@@ -19,7 +19,7 @@
 namespace redag::yaml {
 namespace {
 
-/// Thrown through yaml-cpp to stop it at the first construct that is not allowed.
+/// Thrown through yaml-cpp to stop it at the first forbidden construct.
 struct Rejected {
   YAML::Mark mark;
   std::string message;
@@ -83,7 +83,7 @@ class TreeBuilder : public YAML::EventHandler {
     }
   }
 
-  // The pointers in open_ stay valid: only the innermost open node's children grow.
+  // Pointers in open_ stay valid, because only the innermost open node's children grow.
   Node &add(Node::Kind kind, const YAML::Mark &mark) {
     Node *node = &root_;
     if (!open_.empty()) node = &open_.back()->children.emplace_back();
@@ -117,7 +117,7 @@ struct BadCharacter {
   std::string hint;
 };
 
-// yaml-cpp guesses other encodings, and takes the character 4 for the end of the file.
+// Checked before yaml-cpp, which guesses other encodings and takes the character 4 for the end of the file.
 std::optional<BadCharacter> find_bad_character(std::string_view text) {
   int line = 1;
   std::size_t line_start = 0;
@@ -137,7 +137,7 @@ std::optional<BadCharacter> find_bad_character(std::string_view text) {
   return std::nullopt;
 }
 
-/// yaml-cpp lets a quoted text that is never closed run to the end of the file. It is then the last scalar.
+/// yaml-cpp lets an unclosed quoted text run to the end of the file. It is then the last scalar.
 bool is_unclosed(std::string_view text, int position) {
   if (position < 0 || static_cast<std::size_t>(position) >= text.size()) return false;
   auto i = static_cast<std::size_t>(position);
@@ -155,7 +155,7 @@ bool is_unclosed(std::string_view text, int position) {
   return true;
 }
 
-/// A stream over text that is already in memory.
+/// A stream over text in memory.
 class ViewBuffer : public std::streambuf {
  public:
   explicit ViewBuffer(std::string_view text) {

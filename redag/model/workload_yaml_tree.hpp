@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// YAML text as a tree of nodes that know their place, for the readers of YAML files. Built from yaml-cpp's events
-// rather than its Node, because Node loses the place of keys, merges duplicate keys, follows aliases. Pure functions.
+// Parses YAML text into a tree of nodes that know their place, for the readers of YAML files. Uses yaml-cpp's events,
+// because its Node loses the place of keys, merges duplicate keys and follows aliases. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -25,14 +25,14 @@ struct Node {
   std::vector<Node> children;  // of a sequence: the items; of a map: key, value, key, value, ...
 };
 
-/// Deepest nesting that is read; a workload needs seven levels.
+/// The deepest nesting that is read. A workload needs seven levels.
 inline constexpr std::size_t kMaxDepth = 32;
 
-/// The one document in `text`. Errors: not UTF-8, control characters, YAML syntax, aliases, anchors and tags, more than
-/// one document, nesting beyond kMaxDepth. A text without a document gives a Null node.
+/// Returns the one document in `text`; a text without one gives a Null node. Errors: not UTF-8, control characters,
+/// YAML syntax, aliases, anchors and tags, more than one document, nesting beyond kMaxDepth.
 [[nodiscard]] Result<Node> parse(std::string_view text, const std::string &file);
 
-/// "a map", "a list", "'5ms'": for messages.
+/// Describes a node for messages: "a map", "a list", "'5ms'".
 [[nodiscard]] std::string describe(const Node &node);
 
 }  // namespace redag::yaml

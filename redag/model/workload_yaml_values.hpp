@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Values of a YAML tree (durations, numbers, names, choices) for the readers of YAML files, and the list of mistakes
-// found on the way. Knows types, not rules: those of workloads are in validate.hpp. Not thread-safe.
+// Reads values of a YAML tree (durations, numbers, names, choices) for the readers of YAML files, and collects the
+// mistakes. Knows types, not rules: validate.hpp holds the rules of workloads. Not thread-safe.
 #pragma once
 
 #include <charconv>
@@ -22,10 +22,11 @@
 
 namespace redag::yaml {
 
-/// The value of `key`, the first if it is given twice; null if there is none.
+/// Returns the value of `key`, the first one if there are two; null if there is none.
 [[nodiscard]] const Node *find(const Node &map, std::string_view key);
 
-/// Each reading function gives nothing where it has reported a mistake. `key` names the value in messages.
+/// Base of the readers. Each reading function returns an empty value after it has reported a mistake. `key` names the
+/// value in messages.
 class ValueReader {
  public:
   explicit ValueReader(std::string file) : file_(std::move(file)) {}
@@ -34,19 +35,20 @@ class ValueReader {
   void error(const Node &at, std::string message, std::string hint = {});
   void wrong_type(const Node &at, std::string_view key, std::string_view expected);
 
-  /// "did you mean 'x'?", or `else_say` if nothing is near.
+  /// Returns "did you mean 'x'?", or `else_say` if no candidate is near.
   std::string did_you_mean(std::string_view name, const std::vector<std::string_view> &candidates,
                            std::string_view else_say);
 
-  /// False if the node is not a map. Reports unknown, repeated and odd keys.
+  /// Returns false if the node is not a map. Reports unknown, repeated and odd keys.
   bool check_map(const Node &node, std::string_view what, const std::vector<std::string_view> &keys);
 
-  /// What was found, in the order of the file; of very many the first ones, and how many more there are.
+  /// Returns the mistakes in the order of the file. If there are very many, only the first ones and the number of the
+  /// others.
   [[nodiscard]] Diagnostics take_diagnostics();
 
   std::optional<Duration> duration(const Node &node, std::string_view key);
   std::optional<Duration> positive_duration(const Node &node, std::string_view key);
-  /// A name: see name_mistake().
+  /// Reads a name; see name_mistake().
   std::optional<std::string> text(const Node &node, std::string_view key);
   std::optional<ExecutionTime> execution(const Node &node);
   std::optional<Callback> callback(const Node &node);
@@ -66,7 +68,7 @@ class ValueReader {
 
   std::optional<double> real(const Node &node, std::string_view key);
 
-  /// Choices are written as to_string() writes them.
+  /// Reads a choice, as to_string() writes it.
   template <class Enum>
   std::optional<Enum> one_of(const Node &node, std::string_view key, std::span<const Enum> values) {
     std::vector<std::string_view> names;
@@ -87,7 +89,8 @@ class ValueReader {
   std::optional<ExecutionTime> empirical_execution(const Node &node);
   bool counted_callback(const Node &node, Callback &callback);
 
-  // Many wrong names among many candidates would take quadratic time: after so many comparisons, no more hints.
+  // Many wrong names among many candidates would take quadratic time. After this many comparisons there are no more
+  // hints.
   std::size_t comparisons_left_ = 200'000;
 };
 

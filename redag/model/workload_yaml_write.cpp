@@ -31,7 +31,7 @@ void write_duration(YAML::Emitter &out, Field field, Duration value) {
   if (value != 0) write(out, field, format_duration(value));
 }
 
-/// The period that all timer tasks share, for the DAG to state once; 0 if there is none.
+/// Returns the period that all timer tasks share, to be stated once for the DAG; 0: they share none.
 Duration common_period(const Dag &dag) {
   Duration common = 0;
   for (const Task &task : dag.tasks) {
@@ -80,7 +80,7 @@ void write_overrun(YAML::Emitter &out, const Task &task) {
   out << YAML::Key << "queue" << YAML::Value << task.queue_depth << YAML::EndMap;
 }
 
-// A factor as it was written: the shortest text that reads back the same.
+// Writes a factor as the shortest text that reads back the same.
 void write_degrade(YAML::Emitter &out, const Degrade &degrade) {
   if (degrade == Degrade{}) return;
   out << YAML::Key << to_string(Field::Degrade) << YAML::Value << YAML::Flow << YAML::BeginMap;

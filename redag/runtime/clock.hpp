@@ -21,10 +21,11 @@ inline Time read_clock(clockid_t clock) noexcept {
 /// CLOCK_MONOTONIC: never set back, the same on every processor.
 [[nodiscard]] inline Time monotonic_now() noexcept { return detail::read_clock(CLOCK_MONOTONIC); }
 
-/// Processor time of the calling thread: stands still while it sleeps or is preempted. A system call.
+/// Processor time of the calling thread, which stands still while the thread sleeps or is preempted. A system call.
 [[nodiscard]] inline Duration thread_cpu_now() noexcept { return detail::read_clock(CLOCK_THREAD_CPUTIME_ID); }
 
-/// The same of any thread: cpu_clock_of() of redag/runtime/threads.hpp. Once that has ended, anything.
+/// Processor time of any thread, by its clock (cpu_clock_of() in redag/runtime/threads.hpp). Undefined once that thread
+/// has ended.
 [[nodiscard]] inline Duration cpu_now(clockid_t clock) noexcept { return detail::read_clock(clock); }
 
 }  // namespace redag::runtime

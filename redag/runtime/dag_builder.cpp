@@ -58,7 +58,7 @@ TaskHandle DagBuilder::append(Task task, const std::vector<TaskHandle> &predeces
   task.priority = options.priority;
   task.group = options.group;
   task.criticality = dag_.criticality;
-  static std::atomic<std::uint64_t> next_serial{0};  // tells tasks apart, and orders nothing
+  static std::atomic<std::uint64_t> next_serial{0};  // only tells tasks apart; orders nothing
   const TaskHandle handle(static_cast<std::uint32_t>(dag_.tasks.size()),
                           next_serial.fetch_add(1, std::memory_order_relaxed));
   bodies_.push_back(std::move(body));

@@ -17,12 +17,12 @@ namespace redag::runtime {
 
 using std::chrono::nanoseconds;
 
-/// A task of a DagBuilder, to name it as a predecessor of later tasks of the same DagBuilder.
+/// Names a task of a DagBuilder as a predecessor of later tasks of the same DagBuilder.
 class TaskHandle {
   friend class DagBuilder;
   TaskHandle(std::uint32_t index, std::uint64_t serial) : index_(index), serial_(serial) {}
   std::uint32_t index_;
-  std::uint64_t serial_;  // of all tasks of all builders: the index alone would fit a task of another one
+  std::uint64_t serial_;  // unique among all builders' tasks; index_ alone could match a task of another one
 };
 
 struct DagOptions {
@@ -39,22 +39,22 @@ struct TaskOptions {
   Overrun overrun = Overrun::Skip;
   std::uint32_t queue_depth = 1;    // for Overrun::Queue
   std::optional<int> priority{};    // for PolicyKind::Fixed
-  std::string group{};              // jobs of one group never overlap, in whatever DAG
+  std::string group{};              // jobs of one group never overlap, in any DAG
   std::vector<TaskHandle> after{};  // predecessors of a timer
 };
 
-/// timer() and data() throw std::invalid_argument for a task without a body and for a predecessor that is no task of
-/// this DagBuilder. Every other mistake is found by Executor::add(), which knows the policy and tells all of them.
+/// timer() and data() throw std::invalid_argument for a task without a body, and for a predecessor that is no task of
+/// this DagBuilder. Executor::add() knows the policy. It finds all other mistakes and reports all of them.
 class DagBuilder {
  public:
   using Function = std::function<void()>;
 
   explicit DagBuilder(std::string name, const DagOptions &options = {});
 
-  /// A task that is released every `period`.
+  /// Adds a task that is released every `period`.
   TaskHandle timer(std::string name, nanoseconds period, Function body, const TaskOptions &options = {});
 
-  /// A task that is released when every predecessor has completed once more.
+  /// Adds a task that is released when every predecessor has completed once more.
   TaskHandle data(std::string name, const std::vector<TaskHandle> &predecessors, Function body,
                   const TaskOptions &options = {});
 

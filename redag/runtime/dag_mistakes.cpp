@@ -15,7 +15,7 @@
 namespace redag::runtime {
 namespace {
 
-/// What to change for a mistake in a field.
+/// Names what to change to mend a mistake in a field.
 struct Remedy {
   Field field;
   const char *text;
@@ -63,7 +63,7 @@ std::string remedy_for(const Finding &finding, const Task *task) {
 std::string describe(const Finding &finding, const Dag &dag) {
   const Task *task = finding.task == Finding::kNone ? nullptr : &dag.tasks[finding.task];
   std::string message = finding.message;
-  // In a file it is absent; here it was said.
+  // In a file a period of 0 means that it is absent. Here the caller passed it.
   if (task != nullptr && finding.field == Field::Period && task->period == 0) message = "the period must be above 0";
   const std::string place = task == nullptr ? place_of(dag.name) : place_of(dag.name, task->activation, task->name);
   const std::string remedy = remedy_for(finding, task);
@@ -84,7 +84,7 @@ std::string mistakes_of(const Dag &dag, PolicyKind policy) {
   alone.policy = policy;
   alone.dags = {dag};
   for (Task &task : alone.dags[0].tasks) {
-    if (task.wcet == 0) task.wcet = 1;  // may be unknown here
+    if (task.wcet == 0) task.wcet = 1;  // a wcet may be unknown here
   }
   std::string text;
   const auto add = [&](const std::string &mistake) { text += (text.empty() ? "" : "\n") + mistake; };

@@ -21,7 +21,7 @@ using sched::Outcome;
 
 namespace {
 
-// Any thread can run most of the jobs, but not all threads can: large pools share what 64 threads have.
+// Any thread can run most of the jobs, but not all threads can do so at once. Large pools share the room of 64 threads.
 std::size_t events_of_thread(std::size_t trace_capacity, std::uint32_t threads) {
   constexpr std::size_t kWhole = 64;
   constexpr std::size_t kLeast = 4096;
@@ -71,8 +71,8 @@ Result<void> Engine::start() {
   std::vector<int> cpus = options_.cpus;
   const std::vector<int> usable = usable_cpus();
   if (os() && cpus.empty()) {
-    // The kernel runs the m most urgent threads only if it has exactly m processors to choose for; the last ones,
-    // because the first ones serve most interrupts.
+    // The kernel runs the m most urgent threads only if it has exactly m processors to choose from. The last ones are
+    // taken, because the first ones serve most interrupts.
     const std::size_t workers = options_.config.workers;
     if (workers <= usable.size()) cpus.assign(usable.end() - static_cast<std::ptrdiff_t>(workers), usable.end());
   }
@@ -117,7 +117,7 @@ Result<void> Engine::start_threads(const std::vector<int> &cpus) {
   return {};
 }
 
-// None of them has a job: before running_ none starts.
+// No thread has a job: none starts before running_ is set.
 void Engine::end_threads() {
   exit_.store(true, std::memory_order_release);
   for (auto &thread : threads_) {
@@ -130,7 +130,7 @@ void Engine::end_threads() {
 
 void Engine::main(Thread &self) noexcept {
   for (;;) {
-    // Read before the mail: all that was handed out was so before this was set.
+    // Read before the mail: all mail was posted before this was set.
     const bool exiting = exit_.load(std::memory_order_acquire);
     if (self.claim_mail()) {
       const Assignment first = self.mail;
@@ -149,7 +149,7 @@ void Engine::main(Thread &self) noexcept {
 void Engine::join() {
   halt();
   {
-    // A decision that was under way has handed out its jobs; no other starts one.
+    // A decision that was under way has posted its jobs. No later one starts a job.
     Locked locked(*this);
     withdraw_if_halting();
     for (auto &thread : threads_) thread->processor = nullptr;  // it ends with the thread
@@ -164,7 +164,7 @@ void Engine::join() {
   if (share_keeper_->handle.joinable()) share_keeper_->handle.join();
 }
 
-// Sleeps until a job is in progress, and then looks several times a second as long as some are.
+// The throttling guard: sleeps until a job is in progress, then checks several times a second while there are jobs.
 void Engine::keep_share() noexcept {
   for (Duration until_next = kNever;;) {
     if (until_next == kNever) {
@@ -186,9 +186,9 @@ std::optional<TaskId> Engine::current_task() const noexcept {
 
 // ---- jobs, on their threads ----
 
-// Runs a job to its end, on top of `below` if that is one. `at`: when it begins, and then when it ends: a job which
-// follows another on its thread is charged for the decision between the two, which saves reading clocks. Returns what
-// this thread is to do next.
+// Runs a job to its end, on top of `below` if that is valid. `at` is when it begins, and is set to when it ends. A job
+// that follows another on its thread is charged for the decision between the two, which saves reading clocks. Returns
+// the thread's next action.
 Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept {
   const Job &job = assignment.job;
   if (options_.trace_capacity > 0) {
@@ -221,7 +221,7 @@ Engine::Next Engine::run(Thread &self, const Assignment &assignment, JobSlot bel
   return finish(self, assignment, running, outcome, at, used, below);
 }
 
-// What a job that ended at `at` has used.
+// Returns the processor time that a job used which ended at `at`.
 Duration Engine::charge(Thread &self, const TaskEntry &entry, const RunningJob &running, Time at) noexcept {
   const Duration took = at - running.begun;
   if (running.total < 0 && took <= CpuMeter::kShort && !entry.always_measured()) {
@@ -284,7 +284,7 @@ void RunningJob::reach_preemption_point() { engine->preemption_point(*this); }
 
 void RunningJob::reach_limit(Duration used) { engine->reach_limit(*this, used); }
 
-// At a preemption point: what the job has used is told to the scheduler, or ends the job.
+// At a preemption point: reports the limits that the job has used to the scheduler, or cuts the job off.
 void Engine::reach_limit(RunningJob &job, Duration used) {
   const Time at = now();
   Locked locked(*this);
@@ -302,7 +302,7 @@ void Engine::report_limits(RunningJob &job, Duration used, Time now) {
   job.limit = tasks_[job.task.value].next_limit(job);
 }
 
-// From outside, a job that is to be cut off is left alone until its own preemption point, or its end.
+// From outside, leaves a job that is to be cut off alone until its own preemption point or its end.
 bool Engine::tell_limits(RunningJob &job, Duration used, Time now, bool from_outside) {
   const TaskEntry &entry = tasks_[job.task.value];
   bool told = false;
@@ -317,10 +317,10 @@ bool Engine::tell_limits(RunningJob &job, Duration used, Time now, bool from_out
   return told;
 }
 
-// `RunningJob::limit` belongs to the job's thread, which looks at it without the lock: from here it is left as it is,
-// and the next preemption point finds nothing more to tell.
+// `RunningJob::limit` belongs to the job's thread, which reads it without the lock. watch() does not change it. The
+// next preemption point then finds nothing more to report.
 void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob> &out) {
-  // What a job that has just ended can be seen to have used besides.
+  // A job that has just ended can seem to have used up to this much more than it did.
   constexpr Duration kSlack = 10 * kMicrosecond;
   const Time at = now();
   Locked locked(*this);
@@ -333,12 +333,12 @@ void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob
     TaskEntry &entry = tasks_[job.task.value];
     const Duration elapsed = as_of - running->begun;
     const bool overdue = !running->named && entry.is_overdue(elapsed, limits);
-    // A job has not used more than the time that has passed.
+    // A job cannot have used more than the time that has passed.
     const Duration limit = entry.next_limit(*running);
     if (!overdue && (limit == kNever || elapsed <= limit)) continue;
-    // Of a task with limits the start is exact; of others `used` is only told to people.
+    // For a task with limits the start is exact. For others, `used` only serves the report.
     const Duration used = cpu_now(thread->cpu_clock) - running->start.cpu;
-    if (thread->top.load(std::memory_order_acquire) != running) continue;  // it has ended, and waits for the lock
+    if (thread->top.load(std::memory_order_acquire) != running) continue;  // it has ended and waits for the lock
     if (used - kSlack > limit) told = tell_limits(*running, used - kSlack, at, true) || told;
     if (!overdue) continue;
     running->named = true;
@@ -456,8 +456,8 @@ bool Engine::run_one() {
 
 // ---- the end ----
 
-// The first to take the lock after halt() takes away what has not started. Those skips are the engine's, not the
-// model's: they are not recorded, and the jobs count as in flight.
+// The first thread to take the lock after halt() skips the jobs that have not started. These skips are the engine's,
+// not the model's: they are not recorded, and the jobs count as in flight.
 void Engine::withdraw_if_halting() {
   if (halted_at_ != kNever || !halting_.load(std::memory_order_acquire)) return;
   halted_at_ = now();

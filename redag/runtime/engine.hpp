@@ -1,12 +1,11 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The threaded runtime: owns worker threads, the lock around the scheduler, and the rings of events; carries out what
-// the scheduler decides, and decides nothing. Who releases jobs (release timer, rclcpp) and what jobs do (bodies) is
-// given from outside.
+// The threaded runtime: owns worker threads, the lock around the scheduler, and the rings of events. It carries out the
+// scheduler's decisions and takes none. Others release jobs (release timer, rclcpp) and provide the bodies.
 //
-// Threads: any thread, also a body, may call anything but start(), join(), wait_idle(), wait_paused(), run_one() and
-// drain(); drain() is for one thread at a time; halt() is async-signal-safe. No lock is held while a body runs.
+// Threads: any thread, also a body, may call any member but start(), join(), wait_idle(), wait_paused(), run_one() and
+// drain(). drain() is for one thread at a time. halt() is async-signal-safe. No lock is held while a body runs.
 #pragma once
 
 #include <atomic>
@@ -38,23 +37,25 @@
 
 namespace redag::runtime {
 
-/// What a body is told.
+/// Describes a job to its body.
 struct Job {
   TaskId task;
   std::uint32_t number = 0;  // within its task, from 0
   Time release = 0;          // nominal
   JobSlot slot;
-  WorkerId worker;  // the scheduler's: threads are not tied to workers; with `os` the first one it was given
+  WorkerId worker;  // the scheduler's: threads are not tied to workers; with `os` the first one of the job
 };
 
-/// Runs one job. What it throws becomes Outcome::Threw, or BudgetExceeded if it is redag::BudgetExceeded.
+/// Runs one job. The engine turns a thrown redag::BudgetExceeded into Outcome::BudgetExceeded, and any other exception
+/// into Outcome::Threw.
 using Body = std::function<sched::Outcome(const Job &)>;
 
-/// Told of every exception that left a body, on the worker's thread, before the job counts as ended. Must not throw.
+/// Called for every exception that leaves a body, on the worker's thread, before the job counts as ended. Must not
+/// throw.
 using ExceptionHandler = std::function<void(const Job &, std::exception_ptr)>;
 
-/// Told of each release of a task whose job was skipped before it started, also in the midst of release(); not of
-/// miss(). On the thread that had the scheduler decide, without the engine's lock.
+/// Called when a released job is skipped before it starts, even inside release(), but not for miss(). Runs on the
+/// thread that asked the scheduler for decisions, without the engine's lock.
 class SkipListener {
  public:
   virtual ~SkipListener() = default;
@@ -68,36 +69,36 @@ struct Release {
 
 struct EngineOptions {
   std::string name = "redag";  // prefix of the threads' names
-  sched::Config config;        // what the scheduler was built with; Full means `os`: threads = max_started
-  PriorityBand band;           // os, or realtime_threads
-  // os: the kernel's. Where there are DAGs of high criticality, jobs of the others leave the real-time class before the
-  // kernel takes the processor from all.
+  sched::Config config;        // the scheduler's configuration; Full means `os`, with max_started threads
+  PriorityBand band;           // for os and realtime_threads
+  // os: the kernel's throttling. If there are DAGs of high criticality, jobs of the others are demoted to ordinary
+  // threads before the kernel takes the processor from all.
   std::optional<Throttling> throttling;
   bool realtime_threads = false;   // none, cooperative: all workers at SCHED_FIFO band.top_job
-  std::vector<int> cpus;           // worker threads run there only; empty: anywhere, with `os` on m processors
-  std::size_t trace_capacity = 0;  // events the rings hold between two drain(); 0: no events
+  std::vector<int> cpus;           // processors for the worker threads; empty: any, with `os` m of them
+  std::size_t trace_capacity = 0;  // events that the rings hold between two drain(); 0: no events
   ExceptionHandler on_exception;   // empty: exceptions are only counted
   bool start_paused = false;       // as after pause()
-  bool measure = false;            // figures() has responses, misses and preemptions
-  // none, cooperative: how often a thread without a job looks for one before it sleeps; looks_in().
+  bool measure = false;            // figures() includes responses, misses and preemptions
+  // none, cooperative: how many spins a thread without a job makes before it sleeps; see looks_in().
   std::uint32_t looks = 0;
-  std::size_t touched_stack = 0;  // of each worker thread; ThreadSetup
+  std::size_t touched_stack = 0;  // bytes of each worker thread's stack; see ThreadSetup
 };
 
-/// A job that has not ended although it should have.
+/// A job that is overdue and has not ended.
 struct OverdueJob {
   Job job;
   Duration elapsed = 0;  // since its body began
-  Duration used = 0;     // processor time: little where it blocks, or where more urgent jobs leave it none
+  Duration used = 0;     // processor time; small if the job blocks or more urgent jobs leave it none
 };
 
-/// What a live view shows of a task.
+/// The figures of one task for a live view.
 struct TaskFigures {
   sched::Accounting jobs;
   Usage usage;
   std::uint32_t active = 0;  // jobs that have started and not ended
   std::uint32_t ready = 0;
-  // Without EngineOptions::measure nothing:
+  // Zero or null unless EngineOptions::measure is set:
   std::uint64_t late = 0;  // finished after the deadline
   std::uint64_t preemptions = 0;
   std::shared_ptr<const Histogram> response;  // of finished jobs, from the nominal release
@@ -111,86 +112,88 @@ struct AddedDag {
 class Engine {
  public:
   Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options);
-  ~Engine();  // halts and joins: waits for the bodies that run
+  ~Engine();  // halts and joins: waits for the running bodies
   Engine(const Engine &) = delete;
   Engine &operator=(const Engine &) = delete;
 
-  /// Gives the tasks that the scheduler was built with their bodies, in TaskId order. Before start().
+  /// Sets the bodies of the tasks with which the scheduler was built, in TaskId order. Call it before start().
   void bind(const Workload &workload, std::vector<Body> bodies);
 
-  /// Creates the threads; until then no job starts on them, and what is released waits. Error: what the system refused,
-  /// with a hint; no thread is left then, and it may be called again. Once, or never: run_one() needs no threads.
+  /// Creates the threads. Until then no job starts on them, and released jobs wait. The error says what the system
+  /// refused, with a hint. After an error no thread is left, and start() can be called again. After success it must not
+  /// be. An engine that only uses run_one() needs no start().
   [[nodiscard]] Result<void> start();
 
-  /// Sets the origin of all times that the scheduler sees (CLOCK_MONOTONIC). Until then now() is 0. Before any release.
+  /// Sets the origin (CLOCK_MONOTONIC) of all times that the scheduler sees. Until then now() is 0. Call it before any
+  /// release.
   void set_origin(Time monotonic) noexcept { origin_.store(monotonic, std::memory_order_relaxed); }
   [[nodiscard]] Time now() const noexcept;
 
-  /// Jobs of timer tasks are released, all at this instant (more than sched::kMostReleasesAtOnce: one such lot after
-  /// the other); decisions are carried out before it returns. Nothing allocates under the lock.
+  /// Releases jobs of timer tasks, all at this instant. More than sched::kMostReleasesAtOnce are split into lots, one
+  /// after the other. Decisions are carried out before it returns. Nothing allocates under the lock.
   void release(std::span<const Release> releases);
   void release(TaskId task, Time nominal);
-  /// A release that is skipped at once, as `reason` (sched::Scheduler::miss).
+  /// Reports a release that is skipped at once for `reason` (sched::Scheduler::miss).
   void miss(TaskId task, Time nominal, Reason reason);
 
-  /// Reconfiguration while running; bodies in the DAG's task order, which may be none. All of it allocates under the
-  /// lock. Which tasks can be added, and what ids they get: sched::Scheduler.
+  /// Reconfiguration while running. All of it allocates under the lock. `bodies` is in the DAG's task order; a DAG can
+  /// have no tasks. sched::Scheduler says which tasks can be added and what ids they get.
   AddedDag add_dag(const Dag &dag, std::vector<Body> bodies);
-  /// Jobs that have not started are skipped. A body is destroyed as soon as its last job has ended.
+  /// Skips jobs that have not started. A body is destroyed as soon as its last job has ended.
   void remove_dag(DagId dag);
-  /// `listener`: something that the body owns, too, or null.
+  /// `listener` can be null; otherwise the body should own it, too.
   TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Body body,
                   std::shared_ptr<SkipListener> listener = nullptr);
-  /// As remove_dag(). With reuse_ids nobody may use the id from here on.
+  /// As remove_dag(). With reuse_ids, the caller must not use the id from here on.
   void remove_task(TaskId task);
   void set_timing(TaskId task, Duration period, Duration deadline);
 
-  /// From when it returns the scheduler starts no job, until resume(). Jobs that have started go on (one that a thread
-  /// was just given counts as started); releases are accepted and kept.
+  /// Once it has returned, the scheduler starts no job until resume(). Started jobs continue; a job that a thread was
+  /// just given counts as started. Releases are accepted and kept.
   void pause();
-  /// Waits until no started job is left, while paused. False: not by `deadline` (CLOCK_MONOTONIC; kNever: for ever), or
-  /// resumed meanwhile.
+  /// While paused, waits until no started job is left. Returns false after `deadline` (CLOCK_MONOTONIC; kNever: no
+  /// limit), or if the engine is resumed.
   [[nodiscard]] bool wait_paused(Time deadline);
-  /// Decides at once.
+  /// Ends a pause and decides at once.
   void resume();
-  /// Starts the most urgent eligible job, if there is one and a worker is free for it, and runs it to its end on the
-  /// calling thread, at that thread's own priority; a preemption point in it only looks at its budget. False: there was
-  /// none. Requires pause(), and that no other run_one() is in progress.
+  /// Starts the most urgent eligible job if a worker is free for it, and runs it to its end on the calling thread, at
+  /// that thread's priority. A preemption point in the job only checks its budget. Returns false if there is no such
+  /// job. Requires pause(), and that no other run_one() is in progress.
   bool run_one();
 
-  /// No job starts from now on; jobs that have started go on. What was released and has not started stays in flight.
+  /// No job starts from now on; started jobs continue. Jobs that were released and have not started stay in flight.
   void halt() noexcept { halting_.store(true, std::memory_order_release); }
   [[nodiscard]] bool halting() const noexcept { return halting_.load(std::memory_order_acquire); }
-  /// After halt(): waits until no started job is left. False: not by `deadline` (CLOCK_MONOTONIC); see started().
+  /// After halt(): waits until no started job is left. Returns false after `deadline` (CLOCK_MONOTONIC); see started().
   [[nodiscard]] bool wait_idle(Time deadline);
-  [[nodiscard]] Time halted_at() const;  // on the origin's clock; kNever before
+  [[nodiscard]] Time halted_at() const;  // relative to the origin; kNever before halt()
   /// Jobs that have started and not ended.
   [[nodiscard]] std::vector<Job> started() const;
-  /// halt(), and ends the threads once all that has started has ended. Not from a body.
+  /// Calls halt(), and ends the threads once all started jobs have ended. Not from a body.
   void join();
 
-  /// Appends the events since the last call, merged into one stream whose times do not decrease. `last`: nothing
-  /// follows.
+  /// Appends the events since the last call, merged into one stream whose times do not decrease. `last`: no events
+  /// follow.
   void drain(std::vector<JobEvent> &out, bool last = false);
   [[nodiscard]] std::uint64_t lost_events() const;
 
-  /// For a watchdog, now and then, between start() and join(). Tells the scheduler of running jobs that have used a
-  /// limit and have not come to a preemption point since: `on_budget` and HI mode then need not wait for one (being cut
-  /// off does). Appends jobs that are in progress for too long at `as_of` (the origin's clock), each once.
+  /// For a watchdog, from time to time between start() and join(). Reports running jobs that have used a limit since
+  /// their last preemption point to the scheduler. `on_budget` (except abort) and HI mode then need no preemption
+  /// point. Appends jobs that are overdue at `as_of` (relative to the origin), each once.
   void watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob> &out);
 
   [[nodiscard]] sched::Accounting accounting(TaskId task) const;
   [[nodiscard]] Usage usage(TaskId task) const;
   [[nodiscard]] TaskFigures figures(TaskId task) const;
-  /// For how long jobs that are not of high criticality had to be ordinary threads, because of throttling.
+  /// For how long jobs that are not of high criticality were demoted to ordinary threads because of throttling.
   [[nodiscard]] Duration gave_way() const;
-  /// How often a job could have had a processor, and waited for a thread: all had jobs in progress.
+  /// How often a job could have had a processor but waited for a thread, because all threads had jobs.
   [[nodiscard]] std::uint64_t thread_waits() const;
-  /// Priority changes that the system refused while running (rights were taken away).
+  /// Priority changes that the system refused while running, because rights were taken away.
   [[nodiscard]] std::uint64_t refused_priorities() const noexcept { return refused_priorities_.load(); }
-  /// Is the calling thread inside one of this engine's bodies?
+  /// Returns true if the calling thread is inside one of this engine's bodies.
   [[nodiscard]] bool in_body() const noexcept { return current_task().has_value(); }
-  /// The task whose job the calling thread runs in this engine, the topmost one of several; nothing outside bodies.
+  /// The task whose job the calling thread runs in this engine, the topmost one of several. Empty outside bodies.
   [[nodiscard]] std::optional<TaskId> current_task() const noexcept;
   [[nodiscard]] std::uint32_t thread_count() const { return static_cast<std::uint32_t>(threads_.size()); }
   [[nodiscard]] const EngineOptions &options() const { return options_; }
@@ -240,7 +243,7 @@ class Engine {
   void remove_entry(TaskId id, std::vector<Body> &doomed) REDAG_REQUIRES(lock_);
   void withdraw_if_halting() REDAG_REQUIRES(lock_);
   void wake_pause_waiters() REDAG_REQUIRES(lock_);
-  /// Some tasks are to be spared when the kernel takes processors away, and others can bear it.
+  /// Returns true if there are tasks to spare from throttling and others that can bear it.
   [[nodiscard]] bool can_give_way() const REDAG_REQUIRES(lock_) { return high_tasks_ > 0 && other_tasks_ > 0; }
   [[nodiscard]] bool may_start() const REDAG_REQUIRES(lock_) { return running_ && !paused_; }
 
@@ -251,23 +254,23 @@ class Engine {
   mutable PiMutex lock_;
   std::unique_ptr<sched::Scheduler> scheduler_ REDAG_PT_GUARDED_BY(lock_);
   std::vector<std::unique_ptr<Thread>> threads_;
-  std::unique_ptr<Thread> caller_;                                 // whoever is in run_one()
-  std::vector<Thread *> idle_ REDAG_GUARDED_BY(lock_);             // threads without a job, the last one first
+  std::unique_ptr<Thread> caller_;                                 // stands for the thread in run_one()
+  std::vector<Thread *> idle_ REDAG_GUARDED_BY(lock_);             // threads without a job; the last one is used first
   std::vector<Thread *> handed_ REDAG_GUARDED_BY(lock_);           // threads that may have mail; each once
-  std::deque<TaskEntry> tasks_ REDAG_GUARDED_BY(lock_);            // by TaskId; entries stay where they are
+  std::deque<TaskEntry> tasks_ REDAG_GUARDED_BY(lock_);            // by TaskId; entries keep their addresses
   std::size_t most_started_ REDAG_GUARDED_BY(lock_) = 0;           // jobs that all tasks together can have in progress
   std::uint32_t unfinished_ REDAG_GUARDED_BY(lock_) = 0;           // jobs dispatched and not ended
   ThreadPriorities priorities_ REDAG_GUARDED_BY(lock_);            // os
   std::optional<RealtimeShare> share_ REDAG_GUARDED_BY(lock_);     // os, throttled
-  std::vector<std::size_t> share_places_ REDAG_GUARDED_BY(lock_);  // by processor: its place in `share_`
-  std::vector<bool> realtime_on_ REDAG_GUARDED_BY(lock_);          // by place
-  bool share_is_kept_ REDAG_GUARDED_BY(lock_) = false;             // somebody looks at it again, without being woken
+  std::vector<std::size_t> share_places_ REDAG_GUARDED_BY(lock_);  // by processor number: its index in `share_`
+  std::vector<bool> realtime_on_ REDAG_GUARDED_BY(lock_);          // by index in `share_`
+  bool share_is_kept_ REDAG_GUARDED_BY(lock_) = false;             // the throttling guard looks again by itself
   bool giving_way_ REDAG_GUARDED_BY(lock_) = false;
   Time giving_way_since_ REDAG_GUARDED_BY(lock_) = 0;
-  Duration gave_way_ REDAG_GUARDED_BY(lock_) = 0;       // before that
-  std::size_t high_tasks_ REDAG_GUARDED_BY(lock_) = 0;  // of DAGs of high criticality, not removed
+  Duration gave_way_ REDAG_GUARDED_BY(lock_) = 0;       // total of earlier demotions
+  std::size_t high_tasks_ REDAG_GUARDED_BY(lock_) = 0;  // not removed, of DAGs of high criticality
   std::size_t other_tasks_ REDAG_GUARDED_BY(lock_) = 0;
-  bool running_ REDAG_GUARDED_BY(lock_) = false;  // the threads are there
+  bool running_ REDAG_GUARDED_BY(lock_) = false;  // the threads have been started
   bool paused_ REDAG_GUARDED_BY(lock_);
   std::uint32_t pause_waiters_ REDAG_GUARDED_BY(lock_) = 0;
   FutexWord pause_changes_{0};  // counts what wait_paused() waits for; written under the lock
@@ -279,7 +282,7 @@ class Engine {
   Atomic<Time> origin_{kNever};
   Atomic<bool> halting_{false};
   Atomic<bool> exit_{false};
-  std::atomic<bool> has_listeners_{false};  // some task has or had one; written under the lock
+  std::atomic<bool> has_listeners_{false};  // a task has or had a listener; written under the lock
   Atomic<std::uint64_t> refused_priorities_{0};
 };
 

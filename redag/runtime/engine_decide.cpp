@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// How the engine carries out the scheduler's decisions. Everything here runs under the engine's lock, allocates nothing
-// and looks nothing up by name.
+// Carries out the scheduler's decisions. Everything here runs under the engine's lock, allocates nothing, and looks up
+// no names.
 #include <algorithm>
 
 #include "redag/base/check.hpp"
@@ -12,9 +12,9 @@ namespace redag::runtime {
 
 using sched::Dispatch;
 
-// `self`: the calling thread, if it has just lost its job and can take another; `below`: the job suspended on it.
+// `self` is the calling thread if it has just lost its job and can take another. `below` is the job suspended on it.
 Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot below) {
-  // Paused, only run_one() starts a job, on the caller's thread.
+  // While paused, only run_one() starts a job, on the caller's thread.
   const std::uint32_t for_caller = self == caller_.get() ? 1 : 0;
   const sched::Step step = scheduler_->dispatch(now, may_start() ? sched::kNoLimit : for_caller);
   if (options_.trace_capacity > 0) {
@@ -33,8 +33,8 @@ Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot belo
   }
   const bool shares = share_ && can_give_way();
   if (shares && !share_is_kept_ && (unfinished_ > 0 || !step.dispatches.empty())) {
-    // Before any job: one that is above the calling thread may keep it from all that comes after. And the keeper, above
-    // all, waits for the lock, so that until then nobody preempts its owner.
+    // Wakes the throttling guard before any job: a job above the calling thread may delay everything that follows. The
+    // guard is above all jobs and waits for the lock. Its owner is raised meanwhile, and no job preempts it.
     share_is_kept_ = true;
     share_keeper_->parker.unpark();
   }
@@ -47,16 +47,16 @@ Engine::Next Engine::decide(Locked &locked, Time now, Thread *self, JobSlot belo
   return next;
 }
 
-// Threads are alike: whichever is idle gets the job, and a job that is suspended under others is on its thread. `os`:
-// the kernel decides what really runs, by priority; nothing is done to a job that is preempted, since whoever outranks
-// it has a higher priority. Of the jobs to start the calling thread takes the most urgent one, so that none of those it
-// then wakes preempts it under the lock.
+// Threads are alike: any idle thread gets the job. A job that is suspended under others stays on its thread. In `os`
+// mode the kernel decides by priority which job really runs, and the engine does nothing to a preempted job. The
+// calling thread takes the most urgent job to start. Therefore none of the threads that it wakes preempts it under the
+// lock.
 Engine::Next Engine::place(Locked &locked, const sched::Step &step, Thread *self, JobSlot below) {
   const bool is_caller = self == caller_.get();
   const Dispatch *own = self == nullptr ? nullptr : choose_own(step, below);
   Next next;
   if (self != nullptr && !below.valid() && !is_caller) {
-    // `os`: only so as not to be idle; two threads that exchange jobs have to exchange priorities.
+    // In `os` mode a thread steals only if it would be idle: two threads that exchange jobs must exchange priorities.
     const std::uint32_t above = own == nullptr ? sched::kNoLimit : (os() ? 0 : own->level);
     if (Thread *other = rob(above)) {
       next = Next{Next::Kind::Start, move_job(*other, *self)};
@@ -86,7 +86,7 @@ Engine::Next Engine::place(Locked &locked, const sched::Step &step, Thread *self
   return next;
 }
 
-// What the calling thread is to start: on top of the job below, or the most urgent of all.
+// Chooses the job that the calling thread starts: the one on top of the job below, or the most urgent of all.
 const Dispatch *Engine::choose_own(const sched::Step &step, JobSlot below) {
   const Dispatch *own = nullptr;
   for (const Dispatch &dispatch : step.dispatches) {
@@ -96,8 +96,8 @@ const Dispatch *Engine::choose_own(const sched::Step &step, JobSlot below) {
   return own;
 }
 
-// A thread that was given a job above `level` and has not begun it, since it is not awake yet; it does not begin it any
-// more. Its wake-up takes longer than most jobs: it is not waited for by a thread that could begin at once.
+// Steals the job of a thread that is not awake yet, if that job is above `level`; waking it takes longer than most
+// jobs. Returns that thread, or null. The thread then finds no mail.
 Engine::Thread *Engine::rob(std::uint32_t level) {
   Thread *victim = nullptr;
   for (std::size_t i = 0; i < handed_.size();) {
@@ -131,13 +131,13 @@ Engine::Assignment Engine::move_job(Thread &from, Thread &to) {
 
 void Engine::set_priority_for_job(Thread &thread, const Assignment &assignment) {
   if (!os()) return;
-  // One that gives way must not keep a priority of a job before it.
+  // A demoted thread must not keep the priority of its previous job.
   const bool is_short = assignment.expected_short && !gives_way(thread);
   apply(priorities_.start(thread.index, priority_of(thread), is_short));
 }
 
-// Its job is an ordinary thread's, so that it does not count as real-time where that is throttled: not that of a DAG of
-// high criticality, and nothing that is more urgent waits for it.
+// Returns true if the thread's job is demoted to an ordinary thread, because real-time threads are throttled. Spares
+// jobs of DAGs of high criticality and jobs for which a more urgent one waits.
 bool Engine::gives_way(const Thread &thread) const {
   return giving_way_ && !thread.inherits && !tasks_[thread.stack.back().task.value].is_high;
 }
@@ -146,7 +146,7 @@ int Engine::priority_of(const Thread &thread) const {
   return gives_way(thread) ? 0 : options_.band.of_level(thread.level);
 }
 
-// Where the thread runs, or ran last; kNowhere: nobody says.
+// Returns the index in `share_` of the processor where the thread runs or ran last; kNowhere: unknown.
 std::size_t Engine::place_of(const Thread &thread) const {
   const int cpu = processor_of(thread.processor);
   return cpu < 0 || static_cast<std::size_t>(cpu) >= share_places_.size()
@@ -154,8 +154,8 @@ std::size_t Engine::place_of(const Thread &thread) const {
              : share_places_[static_cast<std::size_t>(cpu)];
 }
 
-// The kernel chooses where threads run, and moves them only when one begins to run or stops: so a thread is charged
-// where it is found at two looks in a row, of which each decision is one.
+// The kernel chooses where threads run, and moves them only when a thread begins or stops to run. A thread is charged
+// where two consecutive looks find it; each decision is a look.
 void Engine::note_where_realtime_ran() {
   for (const auto &thread : threads_) {
     if (!thread->is_realtime) continue;
@@ -173,7 +173,7 @@ void Engine::set_realtime_busy(Time now) {
   std::fill(realtime_on_.begin(), realtime_on_.end(), false);
   for (const auto &thread : threads_) {
     thread->is_realtime = priorities_.any_realtime() && !thread->stack.empty() && !gives_way(*thread);
-    if (!thread->is_realtime || thread->has_mail.load(std::memory_order_relaxed)) continue;  // it is not awake yet
+    if (!thread->is_realtime || thread->has_mail.load(std::memory_order_relaxed)) continue;  // not awake yet
     const std::size_t place = place_of(*thread);
     anywhere = anywhere || place == kNowhere;
     if (place != kNowhere) realtime_on_[place] = true;
@@ -185,7 +185,7 @@ void Engine::set_realtime_busy(Time now) {
   }
 }
 
-// Returns when to look again; kNever: not before somebody is woken for it.
+// Returns the time until the next look; kNever: not before the guard is woken.
 Duration Engine::look_at_share() {
   const Time at = now();
   Locked locked(*this);
@@ -206,7 +206,7 @@ Duration Engine::look_at_share() {
 
 void Engine::change_level(const Dispatch &dispatch) {
   const auto runs_it = [&](const auto &t) { return !t->stack.empty() && t->stack.back().slot == dispatch.job; };
-  if (runs_it(caller_)) return;  // at its own priority
+  if (runs_it(caller_)) return;  // runs at its own priority
   const auto thread = std::find_if(threads_.begin(), threads_.end(), runs_it);
   REDAG_CHECK(thread != threads_.end(), "a job goes on that no thread has");
   (*thread)->level = dispatch.level;
@@ -243,7 +243,7 @@ void Engine::apply(std::span<const ThreadPriorities::Change> changes) {
   }
 }
 
-// Lets preemption points cost one load while there is nothing to do.
+// Updates the flags that let a preemption point cost one load while no job is more urgent.
 void Engine::refresh_outranked() {
   for (auto &thread : threads_) {
     const bool outranked = may_start() && !thread->stack.empty() && scheduler_->outranked(thread->stack.back().slot);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// `os`: the kernel schedules preempted jobs too, so each started job's SCHED_FIFO priority has to follow its level at
-// every decision, running or suspended. The bodies wait instead of computing: nothing here depends on time.
+// In `os` mode the kernel also schedules preempted jobs. Each started job's SCHED_FIFO priority must follow its level
+// at every decision, running or suspended. The bodies wait instead of computing; no result depends on time.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -48,7 +48,7 @@ Dag dag_of(std::vector<Duration> periods, Criticality criticality = Criticality:
   return dag;
 }
 
-// One worker: of two jobs in progress the less urgent one is suspended.
+// An engine with one worker: of two jobs in progress, the less urgent one is suspended.
 class EngineLevels : public ::testing::Test {
  protected:
   void SetUp() override {

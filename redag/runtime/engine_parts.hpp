@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The engine's own types: its threads, its tasks, its lock. For engine*.cpp only.
+// The engine's own types: its threads, its tasks, its lock. For engine*.cpp only; members say which of them the
+// engine's lock guards.
 #pragma once
 
 #include <array>
@@ -19,7 +20,7 @@ inline constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
 struct Engine::TaskEntry {
   static constexpr std::uint32_t kStreak = 8;
 
-  /// A job that used that much and took that long ended.
+  /// Counts a job that ended, used `used` of processor time and took `took` on the clock.
   void count(Duration used, Duration took) {
     short_jobs = took <= CpuMeter::kShort ? std::min(short_jobs + 1, kStreak) : 0;
     ++usage.jobs;
@@ -29,7 +30,7 @@ struct Engine::TaskEntry {
     if (budget > 0 && used > budget) ++usage.over_budget;
   }
 
-  /// Processor time of the next limit that a job looks at, given what it has used before.
+  /// Processor time of the job's next limit, given what was reported before; kNever: none.
   [[nodiscard]] Duration next_limit(const RunningJob &job) const {
     Duration next = kNever;
     if (wcet_low > 0 && !job.used_wcet_low) next = wcet_low;
@@ -37,14 +38,15 @@ struct Engine::TaskEntry {
     return next;
   }
 
-  /// Its limits act at once, or lie below what is taken on trust: its processor time is always measured.
+  /// Returns true if its jobs are always measured: their limits act at once, or its wcet is below the time charged
+  /// without measuring.
   [[nodiscard]] bool always_measured() const {
     return wcet_low > 0 || budget > 0 || (wcet > 0 && wcet < CpuMeter::kShort);
   }
-  /// Its last jobs were short: the next one is taken to be, too, until it proves otherwise.
+  /// Returns true if its last jobs were short: the next one is expected to be short, too.
   [[nodiscard]] bool expected_short() const { return short_jobs == kStreak && !always_measured(); }
 
-  /// Is a job that has been in progress for `elapsed` overdue?
+  /// Returns true if a job that has been in progress for `elapsed` is overdue.
   [[nodiscard]] bool is_overdue(Duration elapsed, const WatchLimits &limits) const {
     return (limits.longest > 0 && elapsed > limits.longest) ||
            (limits.deadlines > 0 && deadline > 0 &&
@@ -52,7 +54,7 @@ struct Engine::TaskEntry {
   }
 
   Body body;
-  std::shared_ptr<SkipListener> listener;  // or null
+  std::shared_ptr<SkipListener> listener;  // can be null
   Duration wcet = 0;
   Duration wcet_low = 0;
   Duration budget = 0;
@@ -63,20 +65,20 @@ struct Engine::TaskEntry {
   std::shared_ptr<Histogram> response;  // null: not measured
   std::uint64_t late = 0;
   std::uint64_t preemptions = 0;
-  std::uint64_t withdrawn = 0;    // jobs taken away at the end
-  std::uint32_t concurrency = 0;  // jobs that can be in progress
+  std::uint64_t withdrawn = 0;    // jobs skipped by halt()
+  std::uint32_t concurrency = 0;  // jobs that can be in progress at once
   std::uint32_t busy = 0;         // jobs that have started and not ended
-  std::uint32_t short_jobs = 0;   // in a row, until now; at most kStreak
+  std::uint32_t short_jobs = 0;   // consecutive short jobs up to now; at most kStreak
   bool removed = false;
 };
 
 struct Engine::Assignment {
   Job job;
-  TaskEntry *entry = nullptr;  // stays where it is; its body is not touched while `busy`
+  TaskEntry *entry = nullptr;  // keeps its address; its body is not touched while `busy`
   bool expected_short = false;
 };
 
-/// What a thread does after a decision.
+/// The next action of a thread after a decision.
 struct Engine::Next {
   enum class Kind : std::uint8_t {
     Nothing,  // waits for mail
@@ -90,27 +92,27 @@ struct Engine::Next {
 struct alignas(64) Engine::Thread {
   Thread(std::uint32_t its_index, std::size_t trace_capacity) : index(its_index), events(trace_capacity) {}
 
-  /// Whoever gets true has the mail, and nobody else does.
+  /// Takes the mail; returns true for one caller only.
   bool claim_mail() noexcept {
     return has_mail.load(std::memory_order_relaxed) && has_mail.exchange(false, std::memory_order_acquire);
   }
 
   std::uint32_t index;
   Parker parker;
-  // Written under the lock by whoever dispatches, while the thread has no job; read by whoever claims it: the thread,
-  // without the lock, or another one that is free before this one is awake, under it.
+  // Written under the lock, by the thread that dispatches, while this thread has no job. Read by the thread that took
+  // it: this one, without the lock, or one that steals it before this one is awake, under the lock.
   Assignment mail;
   Atomic<bool> has_mail{false};
-  bool is_handed = false;         // lock: is among Engine::handed_
-  std::uint32_t level = 0;        // lock: of the job it was given last; inherited only with `os`
-  bool is_realtime = false;       // lock, throttled: had a job at real-time priority when that was last looked at
-  bool inherits = false;          // lock: that level is of a more urgent job, which waits for this thread's
+  bool is_handed = false;         // lock: is in Engine::handed_
+  std::uint32_t level = 0;        // lock: of the job that it was given last; inherited only with `os`
+  bool is_realtime = false;       // lock, throttled: had a job at real-time priority at the last look
+  bool inherits = false;          // lock: `level` is that of a more urgent job that waits for this thread's job
   Atomic<bool> outranked{false};  // written under the lock
   std::vector<Job> stack;         // lock: the jobs started here, the running one last
-  trace::Ring events;             // Started; written by the thread
-  CpuMeter meter;                 // of the thread
-  // The job whose body the thread is in, the topmost one; null from when it has returned. Written by the thread. Under
-  // the lock what it points to stays: a job's end needs the lock after this is cleared.
+  trace::Ring events;             // Started and Executed; written by the thread
+  CpuMeter meter;                 // used by the thread only
+  // The topmost job whose body the thread is in; null once the body has returned. Written by the thread. What it points
+  // to stays valid under the lock, because a job's end takes the lock after clearing this.
   Atomic<RunningJob *> top{nullptr};
 
   ThreadHandle handle;
@@ -118,20 +120,20 @@ struct alignas(64) Engine::Thread {
   ProcessorWord processor = nullptr;  // lock: of `handle`, while the engine runs
 };
 
-/// The thread that looks at what the kernel leaves real-time threads.
+/// The throttling guard: a thread that checks how much the kernel leaves to real-time threads.
 struct Engine::ShareKeeper {
   Parker parker;
   ThreadHandle handle;
 };
 
-/// Holds the engine's lock; wakes threads and tells of skips after it. Real-time threads are woken under the lock
-/// instead: one that were preempted between its decision and the wake-up would leave an urgent job asleep, and only as
-/// the lock's owner is it raised when the next decision is due.
+/// Holds the engine's lock. Wakes threads and reports skips after releasing it. Real-time threads are woken under the
+/// lock instead: a waker preempted between decision and wake-up would leave an urgent job asleep. As the lock's owner,
+/// the waker is raised as soon as the next decision is due.
 class REDAG_SCOPED_CAPABILITY Engine::Locked {
  public:
   explicit Locked(Engine &engine) REDAG_ACQUIRE(engine.lock_) : engine_(engine) { engine_.lock_.lock(); }
-  /// For so many releases: each can skip a job that is ready, and one that waits for its predecessors. What that takes
-  /// is allocated before the lock is taken.
+  /// For `releases` releases. Each can skip a ready job and one that waits for its predecessors. Allocates room for
+  /// these skips before it takes the lock.
   Locked(Engine &engine, std::size_t releases) REDAG_ACQUIRE(engine.lock_) : engine_(engine) {
     if (2 * releases > kFewSkips && engine_.has_listeners_.load(std::memory_order_relaxed)) {
       more_skips_.reserve(2 * releases - kFewSkips);
@@ -150,7 +152,7 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   Locked(const Locked &) = delete;
   Locked &operator=(const Locked &) = delete;
 
-  /// Allocates only where one decision skips more than kFewSkips jobs (HI mode begins).
+  /// Allocates only if one decision skips more than kFewSkips jobs (HI mode begins).
   void tell(std::shared_ptr<SkipListener> listener, Reason reason) {
     if (skip_count_ < kFewSkips) {
       std::construct_at(&few_skips_[skip_count_++], Skip{std::move(listener), reason});
@@ -158,7 +160,7 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
       more_skips_.push_back(Skip{std::move(listener), reason});
     }
   }
-  /// What was skipped is what the caller itself called missed.
+  /// Drops the skips: the caller itself reported them as missed.
   void tell_nobody() {
     std::destroy_n(few_skips_, skip_count_);
     skip_count_ = 0;
@@ -181,7 +183,7 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   };
   static constexpr std::size_t kFewSkips = 8;
   union {
-    // The first skip_count_ are there: the others cost nothing.
+    // Only the first skip_count_ are constructed; the others cost nothing.
     Skip few_skips_[kFewSkips];  // NOLINT(readability-identifier-naming): a private member, of a union without a name
   };
   std::size_t skip_count_ = 0;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Real-time throttling on threads: who leaves the real-time class before the kernel takes a processor from all. What
-// the kernel leaves is said by the test, and is mostly nothing: then what gives way does so all the time.
+// Real-time throttling on threads: which jobs are demoted before the kernel takes a processor from all. The test sets
+// what the kernel leaves, mostly nothing. Jobs that can be demoted are then demoted all the time.
 #include <gtest/gtest.h>
 #include <sched.h>
 
@@ -26,7 +26,7 @@ using sched::Outcome;
 
 constexpr Throttling kNothingIsLeft{0, 20'000};
 
-// Two DAGs of one task each; the second one is more urgent.
+// An engine for two DAGs of one task each; the second one is more urgent.
 class EngineShare : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -62,7 +62,7 @@ class EngineShare : public ::testing::Test {
     engine_->join();
   }
 
-  // In a body: false if it does not come true for long.
+  // For a body: waits for the condition, and returns false if it does not come true for a long time.
   template <typename Condition>
   static bool wait_for(Condition condition) {
     const Time end = monotonic_now() + 20 * kSecond;
@@ -77,9 +77,9 @@ class EngineShare : public ::testing::Test {
   std::unique_ptr<Engine> engine_;
 };
 
-// Jobs of lower criticality run one after the other on one thread, which moves to the other processor in between: some
-// processor is busy all the time, and each for half of it. One run in which the machine takes nothing from them is
-// enough.
+// Jobs of lower criticality run one after the other on one thread, which moves to the other processor in between. One
+// of the processors is busy all the time, and each is busy for half of it. One run without interference from the
+// machine is enough.
 TEST_F(EngineShare, EachProcessorCountsByItself) {
   const std::vector<int> cpus = usable_cpus();
   if (cpus.size() < 2) GTEST_SKIP() << "one processor is all of them";
@@ -95,7 +95,7 @@ TEST_F(EngineShare, EachProcessorCountsByItself) {
     constexpr int kJobs = 40;
     int ran = 0;
     Event done;
-    // A credit of 20 ms, and 670 ms in a second come back.
+    // A credit of 20 ms; 670 ms are refilled in a second.
     start(Throttling{700'000, 1'000'000}, Criticality::Low, Criticality::High,
           {[&](const Job &) {
              const Time begin = monotonic_now();
@@ -119,7 +119,7 @@ TEST_F(EngineShare, EachProcessorCountsByItself) {
   EXPECT_TRUE(kept);
 }
 
-// The calling thread, and threads that it starts, for as long as this lives.
+// Keeps the calling thread, and threads that it starts, on one processor for its lifetime.
 class OnOneProcessor {
  public:
   OnOneProcessor() {
@@ -140,7 +140,7 @@ class OnOneProcessor {
 TEST_F(EngineShare, AJobOfLowerCriticalityGivesWayAndComesBack) {
   bool gave_way = false;
   bool came_back = false;
-  // A credit of 20 ms, and 170 ms in a second come back.
+  // A credit of 20 ms; 170 ms are refilled in a second.
   start(Throttling{200'000, 1'000'000}, Criticality::Normal, Criticality::High,
         {[&](const Job &) {
            gave_way = wait_for([] { return own_priority() == 0; });
@@ -183,8 +183,8 @@ TEST_F(EngineShare, AJobOfHighCriticalityNeverDoes) {
   EXPECT_EQ(ordinary, 0);
 }
 
-// The job takes the only processor from the ordinary thread that releases it, in the middle of that, and keeps it until
-// the kernel serves ordinary threads again: that is up to a second, by chance less.
+// The job takes the only processor from the ordinary thread that releases it, in the middle of the release. It keeps it
+// until the kernel serves ordinary threads again: up to a second, by chance less.
 TEST_F(EngineShare, AJobGivesWayThatPreemptsWhoReleasesIt) {
   const OnOneProcessor one;
   for (int round = 0; round < 5; ++round) {
@@ -202,7 +202,7 @@ TEST_F(EngineShare, AJobGivesWayThatPreemptsWhoReleasesIt) {
   }
 }
 
-// A thread keeps a higher priority for a job that is expected to be short: not for one that gives way.
+// A thread keeps a higher priority for a job that is expected to be short, but not for a demoted job.
 TEST_F(EngineShare, ShortJobsDoToo) {
   constexpr int kRounds = 300;
   std::atomic<int> ran{0};
@@ -231,7 +231,7 @@ TEST_F(EngineShare, ShortJobsDoToo) {
   EXPECT_EQ(realtime, 0);
 }
 
-// It would be preempted by ordinary threads while the urgent job waits.
+// Without inheritance, ordinary threads would preempt the job while the urgent one waits.
 TEST_F(EngineShare, AJobThatAnUrgentOneWaitsForIsRaised) {
   std::atomic<bool> is_ordinary{false};
   int raised = 0;
@@ -260,7 +260,7 @@ TEST_F(EngineShare, WhereNobodyIsSparedNobodyGivesWay) {
   for (const Criticality all : {Criticality::Normal, Criticality::High}) {
     std::atomic<int> ordinary{0};
     const Body body = [&](const Job &) {
-      const Time end = monotonic_now() + 60 * kMillisecond;  // three times what the kernel looks at
+      const Time end = monotonic_now() + 60 * kMillisecond;  // three periods of the kernel's account
       while (monotonic_now() < end) {
         if (own_priority() == 0) ++ordinary;
       }
@@ -275,7 +275,7 @@ TEST_F(EngineShare, WhereNobodyIsSparedNobodyGivesWay) {
   }
 }
 
-// The only task that was spared goes while another gives way.
+// The only spared task is removed while another one is demoted.
 TEST_F(EngineShare, WithTheLastOneThatIsSparedItEnds) {
   std::atomic<bool> is_ordinary{false};
   bool came_back = false;

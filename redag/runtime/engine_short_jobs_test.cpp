@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the engine spares jobs that are over within CpuMeter::kShort, and that nobody notices it.
+// What the engine saves for jobs that are over within CpuMeter::kShort, without any visible difference.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -22,9 +22,9 @@ namespace {
 
 using sched::Outcome;
 
-constexpr int kEnoughToBeExpectedShort = 200;  // eight in a row will do; a loaded machine interrupts some
+constexpr int kEnoughToBeExpectedShort = 200;  // eight in a row suffice, but a loaded machine interrupts some
 
-// Independent tasks on one worker; the first one is the most urgent.
+// An engine for independent tasks on one worker; the first one is the most urgent.
 class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
  protected:
   void SetUp() override {
@@ -115,12 +115,13 @@ TEST_P(ShortJobs, AJobIsNotChargedForTheOneBefore) {
   EXPECT_LT(engine_->usage(TaskId(1)).longest, 10 * kMillisecond);
 }
 
-// The other modes do not change priorities.
+// Only `os` changes priorities.
 class ShortJobsWithPriorities : public ShortJobs {};
 INSTANTIATE_TEST_SUITE_P(Modes, ShortJobsWithPriorities, ::testing::Values(PreemptionMode::Os),
                          [](const auto &instance) { return std::string(to_string(instance.param)); });
 
-// Between the jobs of 2 and 0 there is one of 1: it must not wait for 2, whose thread has the priority of 0 before it.
+// The thread of job 2 keeps the priority of the job of 0 before it. A job of 1 lies in between, and must not wait for
+// 2.
 TEST_P(ShortJobsWithPriorities, AThreadThatKeptItsPriorityLosesItToAJobInBetween) {
   std::atomic<bool> waits{false};
   std::atomic<bool> seen{false};
@@ -145,7 +146,7 @@ TEST_P(ShortJobsWithPriorities, AThreadThatKeptItsPriorityLosesItToAJobInBetween
   run(2);
 }
 
-// The thread is asked for its priority from within: what is short keeps the one before, what is not has its own.
+// The body reads its thread's priority. A short job keeps the priority of the job before; a longer one has its own.
 TEST_P(ShortJobsWithPriorities, OnlyOneThatIsExpectedToBeShortKeepsAHigherPriority) {
   std::atomic<int> last{0};
   std::atomic<bool> is_long{true};
@@ -162,7 +163,7 @@ TEST_P(ShortJobsWithPriorities, OnlyOneThatIsExpectedToBeShortKeepsAHigherPriori
   run(1);
   EXPECT_EQ(last, band_.of_level(1));
   is_long = false;
-  // A machine that others use makes them long now and then.
+  // On a shared machine, jobs take longer now and then.
   for (const Time limit = monotonic_now() + 60 * kSecond; last == band_.of_level(1) && monotonic_now() < limit;) {
     run(1, 10);
     run(0);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The engine's tasks: how they come, change and go while jobs run, and what they did.
+// The engine's tasks: adds, changes and removes them while jobs run, and reports their counts.
 #include "redag/base/check.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/runtime/engine.hpp"
@@ -71,7 +71,7 @@ void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
   decide(locked, at, nullptr, JobSlot());
 }
 
-// An id that is used again begins anew; the body of before went when its last job ended.
+// A reused id starts with a new entry. Its former body was destroyed when its last job ended.
 void Engine::register_task(TaskId id, const Task &task, DagId dag, Body &body, std::shared_ptr<SkipListener> listener) {
   REDAG_CHECK(id.value <= tasks_.size(), "the scheduler numbers tasks differently");
   if (id.value == tasks_.size()) tasks_.emplace_back();

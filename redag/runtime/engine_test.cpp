@@ -21,7 +21,7 @@ namespace {
 
 using sched::Outcome;
 
-// One DAG of independent timer tasks; task t has priority t: the last one is the most urgent.
+// One DAG of independent timer tasks. Task t has priority t: the last one is the most urgent.
 Workload ladder(std::size_t tasks) {
   Workload workload;
   workload.policy = PolicyKind::Fixed;
@@ -78,7 +78,7 @@ class Bench {
     engine->release(batch);
   }
 
-  // Stops, and checks what must hold at the end of every run.
+  // Stops the engine, and checks what must hold at the end of every run.
   void finish() {
     engine->halt();
     ASSERT_TRUE(engine->wait_idle(kNever));
@@ -144,14 +144,14 @@ TEST_P(EngineInEveryMode, OneWorkerTakesTheMostUrgentJobFirst) {
   };
   bench.start();
   bench.release({3});
-  bench.release({1, 0, 2});  // of one instant, and while the worker is busy
+  bench.release({1, 0, 2});  // at one instant, while the worker is busy
   go.set();
   done.wait();
   bench.finish();
   EXPECT_EQ(bench.log(), "+3 -3 +2 -2 +1 -1 +0 -0");
 }
 
-// The low job releases the high one and, where preemption is on, does not end before the high one has.
+// The low job releases the high one. With preemption, the high one ends before the low one.
 TEST_P(EngineInEveryMode, AMoreUrgentJobStartsBeforeTheRunningOneEnds) {
   Bench bench(ladder(2), GetParam(), 1);
   std::atomic<bool> high_ended{false};
@@ -260,7 +260,7 @@ TEST_P(EngineInEveryMode, TheHotPathDoesNotAllocate) {
   std::uint64_t after = 0;
   constexpr std::uint32_t kJobs = 200;
   std::vector<Body> bodies(3, [](const Job &) { return Outcome::Finished; });
-  // Each job releases the next one; the thread's allocations are counted from job 20 to the last.
+  // Each job releases the next one. The thread's allocations are counted from job 20 to the last.
   bodies[0] = [&](const Job &job) {
     preemption_point();
     if (job.number == 20) before = testing::allocation_count();
@@ -286,7 +286,7 @@ class CountsSkips : public SkipListener {
   std::atomic<std::uint32_t> overruns{0};
 };
 
-// Each job releases two of its task, the first of which is skipped.
+// Each job releases two jobs of its task; the first one is skipped.
 TEST_P(EngineInEveryMode, ToTellOfASkipDoesNotAllocate) {
   Bench bench(ladder(1), GetParam(), 1);
   bench.start();
@@ -297,7 +297,7 @@ TEST_P(EngineInEveryMode, ToTellOfASkipDoesNotAllocate) {
   const auto listener = std::make_shared<CountsSkips>();
   Task task = ladder(1).dags[0].tasks[0];
   task.name = "skipped";
-  // Numbers of jobs: 0, 2, 4, ...
+  // This task's jobs that run have the numbers 0, 2, 4, ...
   const auto body = [&](const Job &job) {
     if (job.number == 20) before = testing::allocation_count();
     if (job.number == 2 * kJobs) {
@@ -317,7 +317,7 @@ TEST_P(EngineInEveryMode, ToTellOfASkipDoesNotAllocate) {
   EXPECT_EQ(after, before);
 }
 
-// More at once than there is room for.
+// The releases skip more jobs at once than Engine::Locked has room for.
 TEST_P(EngineInEveryMode, EverySkipIsTold) {
   Bench bench(ladder(1), GetParam(), 1);
   bench.start();
@@ -369,7 +369,7 @@ TEST_P(EngineInEveryMode, PausedItStartsNothingAndKeepsWhatIsReleased) {
   bench.finish();
 }
 
-// Without a thread of its own: jobs run one by one, the most urgent first, on the thread that asks.
+// Jobs run one by one on the calling thread, the most urgent first.
 TEST_P(EngineInEveryMode, RunOneNeedsNoThreads) {
   Bench bench(ladder(3), GetParam(), 2);
   const std::thread::id here = std::this_thread::get_id();
@@ -402,8 +402,8 @@ TEST_P(EngineInEveryMode, RunOneNeedsNoThreads) {
   EXPECT_EQ(starts, 3);
 }
 
-// Tasks come and go, the engine is paused, stepped and resumed, while threads release: every body of a task that was
-// removed is destroyed, and none runs after.
+// Tasks come and go, and the engine is paused, stepped and resumed, while threads release. Every body of a removed task
+// is destroyed, and none runs afterwards.
 TEST_P(EngineInEveryMode, TasksComeAndGoWhileItRuns) {
   const PriorityBand band = probe_priority_band();
   EngineOptions options;
@@ -519,7 +519,7 @@ TEST(Engine, ABudgetEndsTheJobAtItsNextPreemptionPoint) {
     try {
       for (;;) preemption_point();
     } catch (const std::exception &) {
-      caught = true;  // user code that swallows everything it knows
+      caught = true;  // user code that swallows every exception it knows
     }
     return Outcome::Finished;
   };

@@ -22,7 +22,7 @@ void EventMerge::merge(std::vector<JobEvent> &out, bool last) {
   auto next = started_.begin();
   for (const JobEvent &decision : decisions_) {
     for (; next != started_.end() && next->time < decision.time; ++next) append(out, *next);
-    // Of equal times a decision comes first, except that a job's body begins and ends before the job ends.
+    // At equal times a decision comes first. Exception: a job's body begins and ends before the job ends.
     while (ends(decision)) {
       const auto of_job = std::find_if(
           next, started_.end(), [&](const JobEvent &e) { return e.time > decision.time || same_job(e, decision); });

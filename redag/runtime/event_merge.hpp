@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// One stream out of several rings: the scheduler's decisions, in their order, and the workers' events (Started and
-// Executed), by time. Pure; one thread. Relies on how the engine pushes: Dispatched before Started before Executed
-// before Finished, for each job.
+// Merges several rings into one stream: the scheduler's decisions in their order, and the workers' events (Started and
+// Executed) by time. Relies on the engine's order for each job: Dispatched, Started, Executed, Finished. Owns no ring.
+// For one thread at a time.
 #pragma once
 
 #include <vector>
@@ -14,14 +14,14 @@ namespace redag::runtime {
 
 class EventMerge {
  public:
-  /// Where the next batch goes before merge(): decisions drained first, the workers' rings after them. Then every
-  /// Finished among the decisions has its workers' events here, now or from an earlier batch.
+  /// Buffers for the next batch. Drain the decisions first and the workers' rings after them. Then, for every Finished
+  /// among the decisions, the workers' events are here or came with an earlier batch.
   [[nodiscard]] std::vector<JobEvent> &decisions() { return decisions_; }
   [[nodiscard]] std::vector<JobEvent> &started() { return started_; }
 
-  /// Appends to `out` what is sure to be in place; keeps back workers' events that later decisions may have to
-  /// precede, unless `last`. Times do not decrease: a Started that comes late gets the time of its neighbour, `value`
-  /// stays exact.
+  /// Appends the events whose place is certain to `out`. Unless `last`, keeps back workers' events that later decisions
+  /// may have to precede. Times do not decrease: a late Started gets the time of its neighbour, and its `value` stays
+  /// exact.
   void merge(std::vector<JobEvent> &out, bool last);
 
  private:

@@ -18,7 +18,7 @@ JobEvent event(Time time, Kind kind, std::uint32_t task) {
   return e;
 }
 
-// "D0@5": kinds by their first letter.
+// Formats events as "D0@5": the first letter of the kind, the task, the time.
 std::string text(const std::vector<JobEvent> &events) {
   std::string out;
   for (const JobEvent &e : events) {
@@ -46,7 +46,7 @@ TEST(EventMerge, AtEqualTimesAJobIsDispatchedThenBeginsThenEnds) {
   merge.started() = {event(4, Kind::Started, 2), event(4, Kind::Started, 0)};
   std::vector<JobEvent> out;
   merge.merge(out, false);
-  ASSERT_EQ(out.size(), 4U);  // job 0's dispatch may still come
+  ASSERT_EQ(out.size(), 4U);  // job 0's Dispatched may still come
   EXPECT_EQ(out[0].kind, Kind::Dispatched);
   EXPECT_EQ(out[1].kind, Kind::Finished);
   EXPECT_EQ(out[2].kind, Kind::Started);
@@ -63,7 +63,7 @@ TEST(EventMerge, AtEqualTimesABodyEndsBeforeItsJob) {
   merge.started() = {event(7, Kind::Executed, 1), event(7, Kind::Executed, 0), event(7, Kind::Started, 1)};
   std::vector<JobEvent> out;
   merge.merge(out, false);
-  ASSERT_EQ(out.size(), 4U);  // job 0's may have to wait
+  ASSERT_EQ(out.size(), 4U);  // the events of job 0 may have to wait
   EXPECT_EQ(out[1].kind, Kind::Started);
   EXPECT_EQ(out[2].kind, Kind::Executed);
   EXPECT_EQ(out[2].task, TaskId(1));
@@ -75,7 +75,7 @@ TEST(EventMerge, ALateStartedKeepsItsExactTimeInValue) {
   std::vector<JobEvent> out;
   merge.decisions() = {event(1, Kind::Dispatched, 0), event(8, Kind::Dispatched, 1)};
   merge.merge(out, false);
-  merge.started() = {event(2, Kind::Started, 0)};  // its thread was preempted before it could tell
+  merge.started() = {event(2, Kind::Started, 0)};  // its thread was preempted before it could report it
   merge.decisions() = {event(9, Kind::Finished, 0)};
   merge.merge(out, false);
   ASSERT_EQ(out.size(), 4U);

@@ -34,7 +34,7 @@
 namespace redag::runtime {
 namespace {
 
-constexpr Duration kStartMargin = kMillisecond;  // from the threads being ready to the first release
+constexpr Duration kStartMargin = kMillisecond;  // from all threads being ready to the first release
 constexpr std::size_t kMaxTraceCapacity = std::size_t{1} << 28U;
 constexpr double kMaxWatchedDeadlines = 1e6;
 
@@ -102,15 +102,15 @@ class Executor::Impl {
     std::string name;
     std::vector<Task> tasks;
     std::uint32_t max_active = 0;
-    AddedDag ids;          // the engine's
-    std::size_t left = 0;  // of the tasks' ids, those that no later task has
+    AddedDag ids;          // the engine's ids
+    std::size_t left = 0;  // how many of the tasks' ids no later task has
     bool removed = false;
     Dag dag;  // for `admission` only
   };
   struct Owner {
-    DagId dag;  // ours
+    DagId dag;  // the executor's id, not the engine's
     std::uint32_t position = 0;
-    Time since = 0;  // jobs that were released earlier are another task's, which had the id
+    Time since = 0;  // jobs released earlier belong to a former task with this id
   };
   void finish();
   void admit(const Dag &dag) const REDAG_REQUIRES(lock_);
@@ -128,17 +128,17 @@ class Executor::Impl {
   std::unique_ptr<ReleaseTimer> timer_;
   std::unique_ptr<Watchdog> watchdog_;  // from start() until no body is left
   mutable PiMutex lock_;
-  // Without a trace the engine uses ids again, so that memory does not grow with the DAGs there have been.
+  // Without a trace the engine uses ids again. Memory then does not grow with the number of former DAGs.
   std::map<std::uint32_t, Added> dags_ REDAG_GUARDED_BY(lock_);  // by DagId
   std::uint32_t next_dag_ REDAG_GUARDED_BY(lock_) = 0;
   std::vector<Owner> owners_ REDAG_GUARDED_BY(lock_);   // by TaskId
-  std::exception_ptr failure_ REDAG_GUARDED_BY(lock_);  // the first that stopped us
+  std::exception_ptr failure_ REDAG_GUARDED_BY(lock_);  // the first exception that stopped the executor
   bool running_ REDAG_GUARDED_BY(lock_) = false;
-  Mutex finishing_;  // one thread at a time begins or ends the run
+  Mutex finishing_;  // held by the one thread that begins or ends the run
   Atomic<bool> started_{false};
   Atomic<bool> finished_{false};
   Event stop_;
-  std::unique_ptr<live::Publisher> live_;  // last: it asks for figures until it is gone
+  std::unique_ptr<live::Publisher> live_;  // last: asks for figures until it is destroyed
 };
 
 Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
@@ -186,7 +186,7 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
 Executor::Impl::~Impl() {
   request_stop();
   timer_->join();
-  // As long as a body runs, it is watched.
+  // The watchdog watches until no body runs.
   if (watchdog_) (void)engine_->wait_idle(kNever);
   watchdog_.reset();
   engine_->join();
@@ -224,7 +224,7 @@ DagId Executor::Impl::add(Dag dag, std::vector<DagBuilder::Function> functions) 
   return id;
 }
 
-// A DAG is forgotten once all its tasks' ids are others'.
+// Records which task owns each id. A DAG's record is erased once later tasks own all of its ids.
 void Executor::Impl::own(DagId dag, const std::vector<TaskId> &tasks, Time since) {
   for (std::uint32_t position = 0; position < tasks.size(); ++position) {
     const std::uint32_t task = tasks[position].value;
@@ -265,7 +265,7 @@ void Executor::Impl::remove(DagId dag) {
     timer_->remove(gone.ids.tasks);
     removed = gone.ids.dag;
   }
-  engine_->remove_dag(removed);  // destroys bodies, which may own anything: not under our lock
+  engine_->remove_dag(removed);  // destroys bodies, which may own anything: not under lock_
 }
 
 // ---- the run ----
@@ -281,7 +281,7 @@ void Executor::Impl::run_for(nanoseconds duration) {
 }
 
 void Executor::Impl::start() {
-  const LockGuard starting(finishing_);  // a stop() meanwhile waits for what it is going to end
+  const LockGuard starting(finishing_);  // a concurrent stop() waits until the run has begun
   if (started_.exchange(true)) throw std::logic_error("Executor::start(): an Executor runs once");
   if (const Result<void> ready = start_threads(); !ready) {
     started_ = false;
@@ -294,7 +294,8 @@ void Executor::Impl::start() {
   timer_->begin(origin, kNever);
 }
 
-// Those that work comes from wait until all others are there: who catches the exception may start again.
+// The release timer waits for begin(), which comes once all threads exist. If a thread cannot be created, the caller
+// may catch the exception and start again.
 Result<void> Executor::Impl::start_threads() {
   const Result<void> timing = timer_->start(ThreadSetup{options_.name + "-timer", setup_.timer_priority(), {}});
   if (!timing) return timing;
@@ -314,7 +315,7 @@ Result<void> Executor::Impl::start_watchdog() {
 void Executor::Impl::on_overdue(const OverdueJob &job) {
   OverdueInfo info{{}, job.job.number, job.elapsed, job.used, {}};
   {
-    // It may have ended since it was seen, and its id be another task's.
+    // The job may have ended since watch() saw it. Its id may be another task's.
     const LockGuard guard(lock_);
     const Owner &owner = owners_[job.job.task.value];
     info.task = job.job.release < owner.since ? "a task that was removed meanwhile" : name_of(owner);
@@ -409,7 +410,7 @@ std::string Executor::Impl::task_name(TaskId task) const {
 }
 
 std::string Executor::Impl::name_of(const Owner &owner) const {
-  const Added &dag = dags_.at(owner.dag.value);  // which is there as long as it owns a task
+  const Added &dag = dags_.at(owner.dag.value);  // exists as long as it owns a task
   return dag.name + "." + dag.tasks[owner.position].name;
 }
 

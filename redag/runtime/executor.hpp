@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The C++ interface of the threaded runtime: DAGs of functions, executed in priority order until stopped. Owns its
-// threads. Behaviour in every corner: docs/runtime.md.
+// The C++ interface of the threaded runtime: executes DAGs of functions in priority order until stopped. Owns its
+// threads. docs/runtime.md describes every corner case. An Executor runs once.
 //
-// Threads: every member may be called from any thread and from a body, except where it says otherwise;
-// request_stop() also from a signal handler. An Executor runs once.
+// Threads: every member may be called from any thread and from a body, unless it says otherwise. request_stop() may
+// also be called from a signal handler.
 #pragma once
 
 #include <cstdint>
@@ -28,57 +28,59 @@ struct AdmissionRefused : std::runtime_error {
 
 class Executor {
  public:
-  /// Throws std::invalid_argument for an option out of its range; std::runtime_error if preemption `os` is asked for
-  /// and cannot be had; the text says how to get it.
+  /// Throws std::invalid_argument for an option out of its range. Throws std::runtime_error if preemption `os` is asked
+  /// for and not available; its text says how to get it.
   explicit Executor(ExecutorOptions options = {});
-  /// Stops, and waits for the bodies that run, however long they take.
+  /// Stops, and waits for the running bodies without a limit.
   ~Executor();
   Executor(const Executor &) = delete;
   Executor &operator=(const Executor &) = delete;
 
-  /// Adds a DAG, before or while running; its release grid begins at the start, or now. Throws std::invalid_argument
-  /// with all mistakes if it is not valid or another DAG here has its name, AdmissionRefused with the reason if
-  /// `admission` says no; nothing is changed then. Ids of DAGs are not used again.
+  /// Adds a DAG before or during the run. Its release grid begins at the start of the run, or now. Throws
+  /// std::invalid_argument with all mistakes of the DAG, also if its name is taken. Throws AdmissionRefused with the
+  /// reason if `admission` refuses it. Changes nothing if it throws. Ids of DAGs are not used again.
   DagId add(DagBuilder dag);
-  /// What has not started is skipped, what has started ends as usual; a body is destroyed once it no longer runs. Does
-  /// nothing the second time. Throws std::out_of_range if there has been no such DAG.
+  /// Skips jobs that have not started. Started jobs end as usual, and a body is destroyed once it no longer runs. A
+  /// second call does nothing. Throws std::out_of_range if there has been no such DAG.
   void remove(DagId dag);
 
-  /// start(), and wait(). Throws what start() and wait() throw.
+  /// Calls start() and wait(), and throws what they throw.
   void run();
-  /// As run(), for at most `duration`. Throws std::invalid_argument if that is negative.
+  /// As run(), for at most `duration`. Throws std::invalid_argument if `duration` is negative.
   void run_for(nanoseconds duration);
 
-  /// Returns when all threads are ready. Throws std::runtime_error if the system refuses a thread, and can be called
-  /// again then; std::logic_error if it has been started.
+  /// Returns when all threads are ready. Throws std::runtime_error if the system refuses a thread, and can then be
+  /// called again. Throws std::logic_error if the executor has already been started.
   void start();
-  /// Waits until somebody stops the executor and all bodies have returned; then throws the exception that stopped it,
-  /// if one did. Throws std::runtime_error that names the bodies which run on after stop_timeout. Not from a body.
+  /// Waits until the executor is stopped and all bodies have returned. Then throws the exception that stopped it, if
+  /// there is one. Throws std::runtime_error that names the bodies which still run after stop_timeout. Not from a body.
   void wait();
-  /// request_stop(), and waits as wait() does, but throws no body's exception. From a body: request_stop() alone.
+  /// Calls request_stop() and waits as wait() does, but throws no body's exception. From a body it only requests the
+  /// stop.
   void stop();
   /// No job starts from now on. Async-signal-safe.
   void request_stop() noexcept;
   [[nodiscard]] bool stopping() const noexcept;
 
-  /// Which preemption mode this is, and why.
+  /// The preemption mode, and why.
   [[nodiscard]] const Mode &mode() const;
   [[nodiscard]] const std::vector<std::string> &warnings() const;
-  /// What the scheduler was told: with the events, all that a trace needs.
+  /// The scheduler's configuration. With the events it is all that a trace needs.
   [[nodiscard]] const sched::Config &config() const;
 
-  /// Appends the events since the last call; times count from the start. One thread at a time.
+  /// Appends the events since the last call. Times count from the start. For one thread at a time.
   void drain(std::vector<JobEvent> &events);
-  /// When the scheduler stopped deciding, on the clock of the events; kNever before. A trace ends there: what happens
-  /// to started jobs afterwards follows no rules.
+  /// When the scheduler stopped deciding, on the clock of the events; kNever before. A trace ends there, because later
+  /// events of started jobs follow no rules.
   [[nodiscard]] Time stopped_at() const;
   [[nodiscard]] std::uint64_t lost_events() const;
-  /// os: how often a job could have had a processor and waited for a thread, since all had jobs in progress. Above 0, a
-  /// less urgent job may have gone first: raise ExecutorOptions::threads.
+  /// os: how often a job could have had a processor but waited for a thread, because all had jobs. Above 0, a less
+  /// urgent job may have gone first: raise ExecutorOptions::threads.
   [[nodiscard]] std::uint64_t thread_waits() const;
-  /// Of a DAG that was removed as long as no later one has its place; with a trace always. Throws std::out_of_range.
+  /// Also for a removed DAG until its slot is reused (never when tracing). Throws std::out_of_range otherwise.
   [[nodiscard]] std::vector<TaskStats> stats(DagId dag) const;
-  /// "control.ekf"; of a task that was removed as long as none has its id, which is as long as a job of it runs.
+  /// For example "control.ekf". Also for a removed task until its id is used again, which is not before its last job
+  /// ends.
   [[nodiscard]] std::string task_name(TaskId task) const;
 
  private:

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What an Executor and a DagBuilder refuse, and in which words: the caller's, not those of the file format.
+// What an Executor and a DagBuilder refuse, in the caller's words instead of those of the file format.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -38,7 +38,7 @@ std::string thrown_by(const std::function<void()> &call) {
 
 const DagBuilder::Function kBody = [] {};
 
-/// What add() says of a DAG with a task `t` made by `make`.
+/// Returns the text of the exception that add() throws for a DAG with a task `t` made by `make`.
 std::string refused(const std::function<void(DagBuilder &)> &make, const DagOptions &dag_options = {}) {
   Executor executor(without_preemption());
   DagBuilder dag("d", dag_options);
@@ -56,12 +56,12 @@ TEST(DagBuilder, RefusesTasksOfOtherBuilders) {
               AllOf(HasSubstr("DagBuilder(\"one\").data(\"next\")"), HasSubstr(says)));
   EXPECT_THAT(thrown_by([&] { one.timer("next", 1ms, kBody, {.after = {foreign}}); }),
               AllOf(HasSubstr("DagBuilder(\"one\").timer(\"next\")"), HasSubstr(says)));
-  // A copy has the tasks that there were, and not those that the other one got later.
+  // A copy has the tasks that existed when it was made, not later ones of the original.
   DagBuilder copy = one;
   copy.data("same", {first}, kBody);
   const TaskHandle later = one.timer("later", 1ms, kBody);
   EXPECT_THAT(thrown_by([&] { copy.data("bad", {later}, kBody); }), HasSubstr(says));
-  // What was refused left nothing behind.
+  // Refused calls changed nothing.
   Executor executor(without_preemption());
   EXPECT_EQ(executor.stats(executor.add(std::move(one))).size(), 2U);
 }

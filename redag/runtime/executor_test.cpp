@@ -34,7 +34,7 @@ TEST(Executor, RunsAChainUntilABodyStopsIt) {
   DagBuilder control("control");
   const TaskHandle imu = control.timer("imu", 1ms, [&] { ++imu_jobs; }, {.wcet = 300us});
   control.data("ekf", {imu}, [&] {
-    if (++ekf_jobs == 5) executor.stop();  // from a body: asks, and returns
+    if (++ekf_jobs == 5) executor.stop();  // in a body this only requests the stop
   });
   const DagId dag = executor.add(std::move(control));
   executor.run();
@@ -52,7 +52,7 @@ TEST(Executor, WorkersCanLookForJobsBeforeTheySleep) {
     ExecutorOptions options;
     options.workers = 2;
     options.preemption = mode;
-    options.spin = 200us;  // some hand-overs find a thread that looks, others one that sleeps
+    options.spin = 200us;  // some jobs are posted to a thread that spins, others to one that sleeps
     Executor executor(options);
     std::atomic<int> left{0};
     std::atomic<int> right{0};
@@ -157,7 +157,7 @@ TEST(Executor, DagsComeAndGoWhileItRunsAlsoFromBodies) {
   }
 }
 
-// Without a trace, what is kept does not grow with the DAGs there have been; a trace needs ids that name one task.
+// Without a trace, memory does not grow with the number of former DAGs. A trace needs ids that name one task for ever.
 TEST(Executor, WhatWasRemovedMakesRoom) {
   for (const bool traced : {false, true}) {
     ExecutorOptions options = one_worker();
@@ -187,14 +187,14 @@ TEST(Executor, WhatWasRemovedMakesRoom) {
     } else {
       EXPECT_THROW(executor.stats(DagId(0)), std::out_of_range);
     }
-    executor.remove(DagId(0));  // once more: nothing happens
+    executor.remove(DagId(0));  // a second call does nothing
     EXPECT_EQ(executor.stats(last).size(), 2U);
     EXPECT_THROW(executor.remove(DagId(kDags)), std::out_of_range);
     EXPECT_THROW(executor.stats(DagId(kDags)), std::out_of_range);
   }
 }
 
-// Another DAG takes the place of its sibling while a job of the removed DAG is in progress.
+// Another DAG takes the slot of its sibling while a job of the removed DAG is in progress.
 TEST(Executor, AJobOfARemovedDagKeepsItsName) {
   std::vector<std::string> failed;
   ExecutorOptions options = one_worker();
@@ -227,7 +227,7 @@ TEST(Executor, ABodyThatRemovesItsOwnDagFinishes) {
   DagBuilder dag("dag");
   dag.timer("only", 1ms, [&executor, &self, owned] {
     executor.remove(self);
-    EXPECT_GE(owned.use_count(), 2);  // what it captured is still there
+    EXPECT_GE(owned.use_count(), 2);  // the captures are still alive
     executor.stop();
   });
   self = executor.add(std::move(dag));
@@ -276,7 +276,7 @@ TEST(Executor, ABodyThatDoesNotReturnIsNamed) {
   go.set();
 }
 
-// Threads that cannot be created: stacks of a size that no machine has.
+// While it lives, threads cannot be created: their stacks would have a size that no machine has.
 class NoRoomForThreads {
  public:
   NoRoomForThreads() {
@@ -348,7 +348,7 @@ TEST(Executor, OverrunsOfAssumedExecutionTimesAreCounted) {
   const DagId dag = executor.add(std::move(builder));
   executor.run();
   const TaskStats stats = executor.stats(dag)[0];
-  EXPECT_EQ(stats.jobs.finished, 1U);  // without a preemption point nothing cuts it off
+  EXPECT_EQ(stats.jobs.finished, 1U);  // without a preemption point the job is not cut off
   EXPECT_EQ(stats.usage.over_wcet, 1U);
   EXPECT_EQ(stats.usage.over_budget, 1U);
 }
@@ -401,7 +401,7 @@ TEST(Executor, IsDestroyedCleanlyInEveryState) {
   }
 }
 
-// Refused, nothing has changed; what was removed makes room.
+// A refused DAG changes nothing, and a removed one makes room.
 TEST(Executor, AsksWhetherADagIsAdmitted) {
   ExecutorOptions options = one_worker();
   std::vector<std::size_t> asked;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The engine's figures as the live page wants them. Pure functions.
+// Converts the engine's figures for the live page. Pure functions.
 #pragma once
 
 #include "redag/live/publisher.hpp"
@@ -11,7 +11,7 @@
 
 namespace redag::runtime {
 
-/// Counters and response times; what the task is (key, name, DAG, timing) stays as it is.
+/// Sets counters and response times of `sample`. The task's description (key, name, DAG, timing) is left as it is.
 void fill(live::TaskSample &sample, const TaskFigures &figures);
 
 [[nodiscard]] live::PublisherOptions live_options(const std::string &name, const std::string &driver, const Mode &mode,

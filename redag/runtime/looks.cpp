@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint32_t kSample = 256;
 
-// The fastest of a few samples: the others were interrupted.
+// Returns the time of the fastest of a few samples: the others were interrupted.
 Duration measure() {
   Parker parker;
   Duration fastest = kNever;

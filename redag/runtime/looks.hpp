@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// How long an idle thread looks for a job before it sleeps: counted in looks, so that an idle thread reads no clock.
+// How long an idle thread spins before it sleeps. Counted in spins, because a spinning thread reads no clock. Any
+// thread.
 #pragma once
 
 #include <cstdint>
@@ -11,11 +12,12 @@
 
 namespace redag::runtime {
 
-/// Looks of Parker::park() that take about `duration` (ns) on this machine: measured once, in less than a millisecond.
+/// Returns how many spins of Parker::park() take about `duration` (ns) on this machine. Measures it once, in less than
+/// a millisecond.
 [[nodiscard]] std::uint32_t looks_in(Duration duration);
 
-/// For EngineOptions::looks. With os none, and a warning in `setup`: a real-time thread that looks for a job would keep
-/// others off its processor.
+/// Returns the value for EngineOptions::looks. With os it is 0, with a warning in `setup`: a real-time thread that
+/// spins would keep others off its processor.
 [[nodiscard]] std::uint32_t looks_before_sleep(Setup &setup, Duration spin);
 
 }  // namespace redag::runtime

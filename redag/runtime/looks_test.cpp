@@ -12,7 +12,7 @@ TEST(Looks, AreProportionalToTheDuration) {
   EXPECT_EQ(looks_in(0), 0U);
   EXPECT_EQ(looks_in(1), 1U);
   const std::uint32_t in_a_millisecond = looks_in(kMillisecond);
-  EXPECT_GT(in_a_millisecond, 100U);  // a look takes less than 10 us
+  EXPECT_GT(in_a_millisecond, 100U);  // a spin takes less than 10 us
   EXPECT_NEAR(looks_in(10 * kMillisecond), 10.0 * in_a_millisecond, 10);
   EXPECT_EQ(looks_in(1'000'000 * kSecond), 0xffffffffU);
 }

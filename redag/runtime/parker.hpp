@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Two ways for a thread to sleep on a futex word of its own. Parker: one owner parks, anybody unparks, a token that was
-// given early is not lost. Event: set once, any number of waiters. unpark() and set() are async-signal-safe.
+// Two ways for a thread to sleep on a futex word. Parker: one owner parks and any thread unparks; an early token is not
+// lost. Event: set once, for any number of waiters. unpark() and set() are async-signal-safe.
 #pragma once
 
 #include <atomic>
@@ -17,8 +17,8 @@ namespace redag::runtime {
 
 class Parker {
  public:
-  /// Owner only: takes a token; sleeps until there is one if it does not come within `looks` looks. A token that does
-  /// spares whoever gives it a system call.
+  /// Owner only: takes a token. Spins up to `looks` times for it, then sleeps. A token that comes during the spin needs
+  /// no system call.
   void park(std::uint32_t looks = 0) noexcept {
     static_cast<void>(look(looks));
     if (begin()) return;
@@ -27,7 +27,7 @@ class Parker {
     } while (!take());
   }
 
-  /// Owner only: as park(), at most until `deadline` (CLOCK_MONOTONIC). True if a token was taken.
+  /// Owner only: as park(), at most until `deadline` (CLOCK_MONOTONIC). Returns true if it took a token.
   bool park_until(Time deadline) noexcept {
     if (begin()) return true;
     while (futex_wait_until(state_, kParked, deadline)) {
@@ -36,7 +36,8 @@ class Parker {
     return state_.exchange(kEmpty, std::memory_order_acquire) == kToken;
   }
 
-  /// Owner only: looks for a token so often, with a pause in between, and leaves it there. True: it has come.
+  /// Owner only: spins up to `looks` times, with a pause after each, until there is a token. Leaves the token there.
+  /// Returns true if there is one.
   [[nodiscard]] bool look(std::uint32_t looks) const noexcept {
     for (; looks > 0; --looks) {
       if (state_.load(std::memory_order_relaxed) == kToken) return true;
@@ -45,7 +46,7 @@ class Parker {
     return false;
   }
 
-  /// Leaves a token; several are one.
+  /// Leaves a token. Several tokens count as one.
   void unpark() noexcept {
     if (state_.exchange(kToken, std::memory_order_release) == kParked) futex_wake(state_, 1);
   }
@@ -79,7 +80,7 @@ class Event {
     while (!is_set()) futex_wait(word_, 0);
   }
 
-  /// Until set, at most until `deadline` (CLOCK_MONOTONIC). True if it was set.
+  /// Waits until set, at most until `deadline` (CLOCK_MONOTONIC). Returns true if it was set.
   bool wait_until(Time deadline) noexcept {
     while (!is_set()) {
       if (!futex_wait_until(word_, 0, deadline)) return is_set();

@@ -25,14 +25,14 @@ TEST(Parker, TimesOutNotBeforeTheDeadline) {
   const Time deadline = monotonic_now() + 2 * kMillisecond;
   EXPECT_FALSE(parker.park_until(deadline));
   EXPECT_GE(monotonic_now(), deadline);
-  EXPECT_FALSE(parker.park_until(-1));  // a deadline in the past, however far
+  EXPECT_FALSE(parker.park_until(-1));  // a deadline in the distant past
 }
 
 TEST(Parker, NoWakeUpIsLostBetweenTwoThreads) {
   Parker ping;
   Parker pong;
   constexpr int kRounds = 20'000;
-  int shared = 0;  // handed to and fro: the parkers order the accesses
+  int shared = 0;  // posted to and fro: the parkers order the accesses
   std::thread other([&] {
     for (int i = 0; i < kRounds; ++i) {
       ping.park();

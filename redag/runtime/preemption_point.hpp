@@ -1,25 +1,24 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a job's body may call about itself: a preemption point, and its own processor time. Free functions; outside a
-// job they do nothing. Called from the thread that runs the job.
+// Functions that a job's body may call about itself: a preemption point, and its own processor time. Outside a job they
+// do nothing. Call them on the thread that runs the job.
 #pragma once
 
 #include "redag/base/time.hpp"
 
 namespace redag {
 
-/// Lets a more urgent job run now, on top of the caller's stack, and returns when that has ended (preemption:
-/// cooperative). Costs one relaxed atomic load while nothing is more urgent; a task with a budget also pays for a look
-/// at its processor time. Do not call it while holding a lock that other jobs take: the job on top would wait for
-/// itself. Throws BudgetExceeded if the job's processor time exceeds its task's budget and `on_budget` is abort (all
-/// modes): let it pass.
+/// Lets a more urgent job run now on top of the caller's stack, and returns when that job has ended (preemption:
+/// cooperative). Costs one relaxed atomic load while no job is more urgent; a task with a limit also pays for reading
+/// its processor time. Do not call it while holding a lock that other jobs take: the job on top would wait for ever.
+/// Throws BudgetExceeded, in all modes, if the job has used more than its budget and `on_budget` is abort. Let it pass.
 void preemption_point();
 
-/// Processor time the current job has used, jobs on top of it not counted; 0 outside a job.
+/// Processor time that the current job has used, without jobs on top of it; 0 outside a job.
 [[nodiscard]] Duration job_cpu_time();
 
-/// Ends a job from within (see preemption_point). Not a std::exception, so that a body's own handlers let it pass.
+/// Ends a job from within (see preemption_point). It is not a std::exception, so that it passes a body's own handlers.
 struct BudgetExceeded {};
 
 }  // namespace redag

@@ -7,8 +7,8 @@
 
 namespace redag::runtime {
 
-// Of the time that the kernel keeps from real-time threads (50 ms by default) two fifths may be used in one piece, and
-// a fifth is for the timer's own work, threads of others, and wake-ups that come late.
+// The kernel keeps some time from real-time threads (50 ms by default). Up to two fifths of it can be used in one
+// piece. One fifth is for the timer's own work, other programs' threads, and late wake-ups.
 RealtimeShare::RealtimeShare(const Throttling &throttling, std::size_t processors)
     : period_(throttling.period_us * kMicrosecond) {
   const Duration runtime = throttling.runtime_us * kMicrosecond;
@@ -57,14 +57,15 @@ Duration RealtimeShare::until_change() const {
   return used_up_ ? last : first;
 }
 
-// Where nothing comes back: as long as the kernel itself looks at.
+// Returns the time in which `credit` changes at `rate`: at least 1 ms, at most one period of the kernel.
 Duration RealtimeShare::time_for(Duration credit, double rate) const {
   const auto needed = static_cast<double>(credit);
   return rate * static_cast<double>(period_) <= needed ? period_
                                                        : std::max(kMillisecond, static_cast<Duration>(needed / rate));
 }
 
-// More than a period's worth is neither saved nor owed: the kernel, too, forgets what lies further back.
+// Updates all credits to `now`. A debt is at most about one period's worth, because the kernel, too, forgets earlier
+// use.
 void RealtimeShare::settle(Time now) {
   const Duration passed = std::max<Duration>(0, now - settled_);
   settled_ = std::max(settled_, now);

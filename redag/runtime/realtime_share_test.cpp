@@ -18,13 +18,13 @@ namespace {
 
 constexpr Throttling kDefault{950'000, 1'000'000};
 
-// A processor on which somebody wants to run at real-time priority all the time, and does while the share is not used
-// up; others come now and then and run whatever is left. Somebody looks as late as `lateness`.
+// Models a processor with one thread that always wants to run at real-time priority, and does while the share is not
+// used up. Other threads run now and then, whatever credit is left. The guard looks up to `lateness` late.
 struct Processor {
   Processor(const Throttling &throttling, std::uint64_t seed)
       : share(throttling), period(throttling.period_us * kMicrosecond), rng(seed) {}
 
-  // `urgent`: how much of the time the others use, in pieces of up to `piece`.
+  // `urgent`: the part of the time that the other threads use, in pieces of up to `piece`.
   void run(Duration length, double urgent, Duration piece, Duration lateness) {
     Time next_look = 0;
     Time next_urgent = 0;
@@ -56,7 +56,7 @@ struct Processor {
       in_window += next - now;
     }
     now = next;
-    // What lies before the last period no longer counts.
+    // Use before the last period no longer counts.
     while (!pieces.empty() && pieces.front().first < now - period) {
       auto &[from, to] = pieces.front();
       const Time cut = std::min(to, now - period);
@@ -99,7 +99,7 @@ TEST(RealtimeShare, IsNotUsedUpByWhatIsIdleNowAndThen) {
 }
 
 TEST(RealtimeShare, IsUsedUpUntilHalfOfItIsThereAgain) {
-  RealtimeShare share(kDefault);  // 20 ms; 920 of 1000 come back
+  RealtimeShare share(kDefault);  // 20 ms of credit; 920 of 1000 ms are refilled
   share.set_busy(true, 0);
   EXPECT_FALSE(share.used_up(249 * kMillisecond));
   EXPECT_TRUE(share.used_up(251 * kMillisecond));
@@ -109,7 +109,7 @@ TEST(RealtimeShare, IsUsedUpUntilHalfOfItIsThereAgain) {
   EXPECT_FALSE(share.used_up(263 * kMillisecond));
 }
 
-// Some processor is busy all the time, and none for long: the kernel takes none of them.
+// One of the processors is busy all the time, but none for long: the kernel throttles none of them.
 TEST(RealtimeShare, EachProcessorCountsByItself) {
   RealtimeShare share(kDefault, 2);
   for (Time now = 0; now < 20 * kSecond; now += 20 * kMillisecond) {
@@ -121,7 +121,7 @@ TEST(RealtimeShare, EachProcessorCountsByItself) {
 }
 
 TEST(RealtimeShare, OneProcessorIsEnoughToUseItUp) {
-  RealtimeShare share(kDefault, 3);  // 20 ms; 920 of 1000 come back
+  RealtimeShare share(kDefault, 3);  // 20 ms of credit; 920 of 1000 ms are refilled
   share.set_busy(std::vector<bool>{false, true, false}, 0);
   EXPECT_EQ(share.until_change(), 250 * kMillisecond);
   EXPECT_FALSE(share.used_up(249 * kMillisecond));
@@ -131,7 +131,7 @@ TEST(RealtimeShare, OneProcessorIsEnoughToUseItUp) {
   EXPECT_FALSE(share.used_up(263 * kMillisecond));
 }
 
-// A thread was seen to run elsewhere in between: there it counts, too.
+// A thread was seen on another processor in between. That processor is charged, too.
 TEST(RealtimeShare, WhereAThreadMovedToIsCharged) {
   RealtimeShare share(kDefault, 2);
   share.set_busy(std::vector<bool>{true, false}, 0);
@@ -177,7 +177,7 @@ RC_GTEST_PROP(RealtimeShare, TheKernelHasNothingToTake, ()) {
   const Duration period = period_us * kMicrosecond;
   const Duration kept = period - runtime;
   Processor processor(throttling, *rc::gen::arbitrary<std::uint64_t>());
-  // What runs whatever is left must leave room itself; a piece of it can begin when nothing is left.
+  // The thread that runs whatever credit is left must leave room itself. A piece of it can begin with no credit left.
   const Duration room = std::min(10 * kMillisecond, kept / 5);
   const double left = static_cast<double>(runtime - 3 * room) / static_cast<double>(period);
   processor.run(20 * period, *rc::gen::inRange(1, 90) / 100.0 * left, room / 2, room / 2);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// When timer tasks release next: the release grid, jitter and order, without a clock or a thread. Allocates in add()
+// Computes when timer tasks release next: release grid, jitter and order, without clock or thread. Allocates in add()
 // only. Not thread-safe.
 #pragma once
 
@@ -17,19 +17,19 @@ namespace redag::runtime {
 
 class ReleaseHeap {
  public:
-  /// `seed`: of the release jitter.
+  /// `seed` is that of the release jitter.
   explicit ReleaseHeap(std::uint64_t seed) : seed_(seed) {}
 
-  /// Job k of a timer task is released at base + offset + k * period; data tasks are ignored.
+  /// Job k of a timer task is released at base + offset + k * period. Data tasks are ignored.
   void add(const Task &task, TaskId id, Time base);
-  /// These tasks release no more.
+  /// Ends the releases of these tasks.
   void remove(std::span<const TaskId> tasks);
 
-  /// When the next release is to be seen; kNever if there is none.
+  /// When the next release is to be seen; kNever: there is none.
   [[nodiscard]] Time next() const { return heap_.empty() ? kNever : heap_.front().seen; }
 
-  /// Appends every release to be seen at or before `now`, in order, until `out` is full (its capacity): none is left
-  /// out, however late the call.
+  /// Appends every release to be seen at or before `now`, in order, until `out` is full (its capacity). No release is
+  /// left out, however late the call.
   void pop_due(Time now, std::vector<Release> &out);
 
  private:
@@ -45,7 +45,7 @@ class ReleaseHeap {
   [[nodiscard]] Duration jitter(const Entry &entry);
 
   std::vector<Entry> heap_;
-  Task task_;  // what release_jitter() reads
+  Task task_;  // the input of release_jitter()
   std::uint64_t seed_;
 };
 

@@ -12,7 +12,7 @@
 namespace redag::runtime {
 namespace {
 
-constexpr std::size_t kBatch = sched::kMostReleasesAtOnce;  // releases reported at once; more follow at once
+constexpr std::size_t kBatch = sched::kMostReleasesAtOnce;  // releases reported as one instant; more follow at once
 
 }  // namespace
 
@@ -68,11 +68,11 @@ void ReleaseTimer::join() {
 
 void ReleaseTimer::main() noexcept {
   for (;;) {
-    // Read before the clock: a stop that was seen here lies before `now`, so all that was due by then is reported.
+    // Read before the clock: a stop seen here happened before the clock is read. Releases due by then are all reported.
     const bool stopping = stopping_.load(std::memory_order_acquire);
     Time wake_up = kNever;
     {
-      // Kept while it reports: whoever removes a task then knows that no release of it is on its way.
+      // The lock is held during the report. When remove() gets it, no release of a removed task is under way.
       const LockGuard guard(lock_);
       if (origin_ != kNever) {
         due_.clear();

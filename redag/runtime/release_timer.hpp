@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// One thread that releases timer tasks on their grids: sleeps until the next release (absolute, CLOCK_MONOTONIC), and
-// reports all that are due as one instant. Makes no wake-ups while there is nothing to release. Owns its thread and a
-// ReleaseHeap. add(), remove(): any thread; stop(): async-signal-safe.
+// One thread that releases timer tasks on their grids. It sleeps until the next release (absolute, CLOCK_MONOTONIC) and
+// reports all due releases as one instant. It does not wake up while there is nothing to release. Owns its thread and a
+// ReleaseHeap. add(), remove(): any thread. stop(): async-signal-safe.
 #pragma once
 
 #include <functional>
@@ -23,7 +23,7 @@ namespace redag::runtime {
 
 class ReleaseTimer {
  public:
-  /// Called on the timer's thread, under the timer's lock: it must not call the timer.
+  /// Called on the timer's thread, under the timer's lock. It must not call the timer.
   using Sink = std::function<void(std::span<const Release>)>;
 
   ReleaseTimer(Sink sink, std::uint64_t seed);
@@ -31,19 +31,19 @@ class ReleaseTimer {
   ReleaseTimer(const ReleaseTimer &) = delete;
   ReleaseTimer &operator=(const ReleaseTimer &) = delete;
 
-  /// `base`: on the clock whose zero is start()'s `origin`. Before or after start().
+  /// `base` is relative to the `origin` of start(). Call it before or after start().
   void add(const Dag &dag, std::span<const TaskId> tasks, Time base);
-  /// When it returns, no release of these tasks is reported any more, nor is one under way: their ids are free.
+  /// When it returns, no release of these tasks is under way or will be reported. Their ids are free.
   void remove(std::span<const TaskId> tasks);
 
-  /// Nothing is released at or after `horizon` (kNever: for ever). Error: the thread cannot be set up as asked.
+  /// Releases nothing at or after `horizon` (kNever: no end). Error: the thread cannot be set up as asked.
   [[nodiscard]] Result<void> start(Time origin, Time horizon, const ThreadSetup &setup);
-  /// The same in two steps: the thread, which waits, and what cannot fail. Where there is a thread already, start()
-  /// does nothing.
+  /// The same in two steps: start() creates the thread, which waits for begin(). begin() cannot fail. If there is a
+  /// thread already, start() does nothing.
   [[nodiscard]] Result<void> start(const ThreadSetup &setup);
   void begin(Time origin, Time horizon);
 
-  /// No releases after this moment; what was due before is still reported.
+  /// Ends the releases at this moment. Releases that were due before are still reported.
   void stop() noexcept;
   /// Waits for the thread, after stop().
   void join();
@@ -57,7 +57,7 @@ class ReleaseTimer {
   std::vector<Release> due_ REDAG_GUARDED_BY(lock_);
   Parker parker_;
   Atomic<bool> stopping_{false};
-  Time origin_ REDAG_GUARDED_BY(lock_) = kNever;  // before begin()
+  Time origin_ REDAG_GUARDED_BY(lock_) = kNever;  // kNever: before begin()
   Time horizon_ REDAG_GUARDED_BY(lock_) = kNever;
   ThreadHandle thread_;
 };

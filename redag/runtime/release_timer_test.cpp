@@ -51,7 +51,7 @@ TEST(ReleaseTimer, AnEarlierReleaseAddedLaterWakesIt) {
   collector.wanted = 1;
   ReleaseTimer timer(collector.sink(), 1);
   const Time origin = monotonic_now();
-  ASSERT_TRUE(timer.start(origin, kNever, {}));  // nothing to do: sleeps for ever
+  ASSERT_TRUE(timer.start(origin, kNever, {}));  // nothing to do: sleeps without end
   timer.add(one_timer(3600 * kSecond), std::array{TaskId(4)}, monotonic_now() - origin);
   collector.enough.wait();
   timer.stop();
@@ -70,7 +70,7 @@ TEST(ReleaseTimer, WhatIsDueAtTheStopIsReported) {
   EXPECT_EQ(collector.releases.size(), 10'000U);
 }
 
-// The thread comes first, and waits for what cannot fail.
+// The thread is created first, and waits for begin(), which cannot fail.
 TEST(ReleaseTimer, ReleasesNothingBeforeItBegins) {
   Collector collector;
   collector.wanted = 1;

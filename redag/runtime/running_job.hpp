@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The job that a thread runs now, for preemption_point() and job_cpu_time(). Internal to the engine.
+// The job that a thread runs now, for preemption_point() and job_cpu_time(). Internal to the engine. Written by that
+// thread.
 #pragma once
 
 #include <cstdint>
@@ -17,31 +18,31 @@ class Engine;
 
 struct RunningJob {
   Engine *engine = nullptr;
-  std::uint32_t thread = 0;                 // position among the engine's threads
+  std::uint32_t thread = 0;                 // index among the engine's threads
   const Atomic<bool> *outranked = nullptr;  // set while a more urgent job could run on top
   TaskId task;
   JobSlot slot;
-  Duration limit = kNever;  // processor time of the next of its limits that is to be looked at; kNever: none
+  Duration limit = kNever;  // processor time of its next limit to check; kNever: none
   Time begun = 0;           // on the engine's clock
-  CpuMeter::Start start;    // without what jobs that ran on top used
+  CpuMeter::Start start;    // excludes jobs that ran on top
   RunningJob *below = nullptr;
-  Atomic<RunningJob *> *top = nullptr;  // the thread's: this, while the body runs
-  Duration total = -1;                  // the whole job's, once that is known
-  bool used_wcet_low = false;           // and the scheduler was told; written under the engine's lock
+  Atomic<RunningJob *> *top = nullptr;  // Thread::top of its thread: points here while the body runs
+  Duration total = -1;                  // processor time of the whole job; below 0: not known yet
+  bool used_wcet_low = false;           // reported to the scheduler; written under the engine's lock
   bool used_budget = false;
-  bool named = false;  // as overdue; written under the engine's lock
+  bool named = false;  // was reported overdue; written under the engine's lock
 
   void reach_preemption_point();
   void reach_limit(Duration used);
-  /// Processor time until now. Never too little; if its start is not exact, not more than the job took on the clock.
+  /// Processor time until now, never too little. If its start is not exact, at most what the job took on the clock.
   [[nodiscard]] Duration cpu_time() const noexcept;
-  /// For a body that is about to return and wants to know: the engine then need not read the clock again.
+  /// For a body that is about to return and needs its processor time: the engine then need not read the clock again.
   Duration close() noexcept {
     leave();
     return total = cpu_time();
   }
 
-  /// From here on, and no longer, watch() may look at what the job has used.
+  /// watch() may read what the job has used between enter() and leave() only.
   void enter() noexcept { top->store(this, std::memory_order_release); }
   void leave() noexcept { top->store(nullptr, std::memory_order_release); }
 

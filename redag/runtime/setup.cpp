@@ -13,8 +13,8 @@
 namespace redag::runtime {
 namespace {
 
-// From the top: 9 priorities for the kernel's own threads (migration, watchdog, interrupt threads that were raised),
-// one for the release timer, then some room for the user's own urgent threads above the jobs.
+// From the top: 9 priorities for the kernel's own threads (migration, watchdog, raised interrupt threads), then one for
+// the release timer. Below it is room for the user's own urgent threads above the jobs.
 constexpr int kKernelRoom = 9;
 constexpr int kUserRoom = 9;
 constexpr std::uint32_t kSpareThreads = 16;
@@ -23,7 +23,7 @@ constexpr std::uint32_t kSpareThreads = 16;
 
 PriorityBand probe_priority_band() {
   const int timer = available_fifo_priority(sched_get_priority_max(SCHED_FIFO) - kKernelRoom);
-  if (timer < 2) return {};  // one for the timer and one for jobs at least
+  if (timer < 2) return {};  // needs at least one for the timer and one for jobs
   return PriorityBand{timer > 4 * kUserRoom ? timer - kUserRoom - 1 : timer - 1, timer};
 }
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Which preemption mode a run can have on this machine, and why. Decides once, before threads exist.
+// Decides which preemption mode a run can have on this machine, and why. Runs once, before threads exist.
 #pragma once
 
 #include <algorithm>
@@ -18,42 +18,42 @@
 
 namespace redag::runtime {
 
-/// SCHED_FIFO priorities: jobs have 1 to `top_job`, level 0 the top and the last one for demoted jobs; the release
-/// timer is above all of them. The highest priorities are left to the kernel's own threads.
+/// SCHED_FIFO priorities. Jobs have top_job (level 0) down to 1 (demoted jobs). The release timer is above all of them.
+/// The highest priorities are left to the kernel's own threads.
 struct PriorityBand {
   int top_job = 0;  // 0: the process has no real-time rights
   int timer = 0;
 
-  /// Levels of jobs that are not demoted.
+  /// Number of levels for jobs that are not demoted.
   [[nodiscard]] std::uint32_t levels() const { return static_cast<std::uint32_t>(std::max(1, top_job - 1)); }
   [[nodiscard]] int of_level(std::uint32_t level) const { return std::max(1, top_job - static_cast<int>(level)); }
 };
 
-/// What the process may use; tried, not guessed.
+/// Finds the priorities that the process may use, by trying them.
 [[nodiscard]] PriorityBand probe_priority_band();
 
-/// `auto` becomes `os` where `band` and the policy allow it, else `cooperative`. Error: `os` was asked for and cannot
-/// be.
+/// `auto` becomes `os` where `band` and the policy allow it, else `cooperative`. Error: `os` was asked for and is not
+/// available.
 [[nodiscard]] Result<Mode> resolve_mode(PreemptionMode wanted, PolicyKind policy, const PriorityBand &band);
 
-/// What the scheduler is to be told. `threads`: jobs that can be started at once, with os.
+/// Returns the scheduler's configuration. `threads`: jobs that can be started and unfinished at once, with os.
 [[nodiscard]] sched::Config make_config(const Mode &mode, std::uint32_t workers, PolicyKind policy,
                                         const PriorityBand &band, std::uint32_t threads);
 
-/// An executor's share of this machine: what it was asked for, as it can be had.
+/// An executor's options as this machine can provide them.
 struct Setup {
   Mode mode;
   PriorityBand band;
   sched::Config config;
-  std::optional<Throttling> throttling;  // of what runs at SCHED_FIFO with `os`
+  std::optional<Throttling> throttling;  // for threads at SCHED_FIFO with `os`
   std::vector<std::string> warnings;
 
-  /// SCHED_FIFO priority of what must not wait for jobs, the release timer first of all; 0: none. Without `os`, one
-  /// above that of the calling thread, which workers that it starts inherit (`chrt -f 10 program`).
+  /// SCHED_FIFO priority of threads that must not wait for jobs, first of all the release timer; 0: none. Without `os`
+  /// it is one above that of the calling thread, which workers inherit (`chrt -f 10 program`).
   [[nodiscard]] int timer_priority() const;
 };
 
-/// What an executor is asked for.
+/// The options that an executor asks for.
 struct SetupRequest {
   PreemptionMode preemption = PreemptionMode::Auto;
   PolicyKind policy = PolicyKind::RateMonotonic;
@@ -63,10 +63,10 @@ struct SetupRequest {
   std::vector<int> cpus{};    // empty: the processors that the process may use
 };
 
-/// Error: as resolve_mode().
+/// Returns what this machine can provide. Error: as resolve_mode().
 [[nodiscard]] Result<Setup> set_up(const SetupRequest &request);
 
-/// What a user should know before trusting the figures: too few processors, real-time throttling.
+/// What a user should know before trusting the figures: too few processors, or real-time throttling.
 [[nodiscard]] std::vector<std::string> mode_warnings(std::uint32_t workers, std::size_t cpus,
                                                      const std::optional<Throttling> &throttling);
 

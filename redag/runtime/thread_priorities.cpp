@@ -44,7 +44,8 @@ std::span<const ThreadPriorities::Change> ThreadPriorities::place(Thread &self, 
     unordered_ = false;
     return changes_;
   }
-  // Threads whose order with this one is not that of their jobs, or not for every job that may come in between.
+  // True for a started thread whose order with this one can differ from the order of their jobs, or of a job in
+  // between.
   const auto overlaps = [&self](const Thread &other) {
     return &other != &self && other.started && other.of_job <= self.priority && self.of_job <= other.priority;
   };

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// SCHED_FIFO priorities of threads that run one job each (0: an ordinary thread), changed as seldom as can be: a change
-// is a system call of about 1 us. A thread that is given a short job keeps a higher priority which it has from the job
-// before where that makes no difference among these threads, until it does. A value, without threads of its own.
+// SCHED_FIFO priorities of threads that run one job each (0: an ordinary thread). A change is a system call of about 1
+// us, and is avoided where possible. A thread that is given a short job keeps a higher priority from its previous job
+// while that makes no difference among these threads. A value without threads of its own. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -19,21 +19,21 @@ class ThreadPriorities {
     int priority = 0;
   };
 
-  /// Threads of that priority, none of which has a job.
+  /// Starts with `threads` threads of that priority, all without a job.
   ThreadPriorities(std::size_t threads, int priority);
 
-  /// While no more jobs are started than that, each has a processor and their order does not matter.
+  /// While at most this many jobs are started, each has a processor and their order does not matter.
   void set_processors(std::size_t processors) { processors_ = processors; }
 
-  // The next two return what has to be changed; valid until the next call. Nothing allocates.
+  // start() and change() return the required changes, valid until the next call. Nothing allocates.
 
-  /// A thread without a job gets one.
+  /// A thread without a job gets one of this priority.
   std::span<const Change> start(std::size_t thread, int priority, bool is_short);
-  /// Its job gets another priority.
+  /// The thread's job gets another priority.
   std::span<const Change> change(std::size_t thread, int priority);
   void end(std::size_t thread);
 
-  /// Has a thread with a job a priority?
+  /// Returns true if a thread with a job has a real-time priority.
   [[nodiscard]] bool any_realtime() const { return realtime_ > 0; }
 
  private:
@@ -50,7 +50,7 @@ class ThreadPriorities {
   std::vector<Change> changes_;
   std::size_t processors_ = 0;
   std::size_t started_ = 0;
-  std::size_t realtime_ = 0;  // of them; what their jobs ask for counts
+  std::size_t realtime_ = 0;  // started threads whose job asks for a real-time priority
   bool unordered_ = false;    // a priority was kept although another job's lies in between
 };
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kFirst = 80;
 
-// What the kernel has, beside the jobs that the threads have.
+// Models the kernel's priorities of the threads, and the threads' jobs.
 struct Kernel {
   explicit Kernel(std::size_t count, std::size_t cpus)
       : processors(cpus), priorities(count, kFirst), threads(count, kFirst), jobs(count) {
@@ -51,7 +51,7 @@ struct Kernel {
     return static_cast<std::size_t>(std::count_if(jobs.begin(), jobs.end(), [](auto &j) { return j.has_value(); })) <=
            processors;
   }
-  // The threads are in the order of their jobs, and above what these ask for at most.
+  // Returns true if the threads' priorities are in the order of their jobs' priorities.
   [[nodiscard]] bool ordered() const {
     for (std::size_t a = 0; a < jobs.size(); ++a) {
       for (std::size_t b = 0; b < jobs.size(); ++b) {
@@ -104,7 +104,7 @@ TEST(ThreadPriorities, AJobMoreThanProcessorsPutsAllInOrder) {
   EXPECT_TRUE(kernel.ordered());
 }
 
-// Though its own place is clear: two that each had a processor are not in order.
+// The new job's own place is clear. But two jobs that each had a processor are not in order yet.
 TEST(ThreadPriorities, AJobAboveAllOthersPutsThemInOrder) {
   Kernel kernel(3, 2);
   for (std::size_t thread = 0; thread < 2; ++thread) {

@@ -53,7 +53,7 @@ Result<void> pin(const ThreadSetup &setup) {
 
 // Writes to every page of the stack below the caller's frame, as far as there is room.
 [[gnu::noinline]] void touch_stack(std::size_t bytes) {
-  constexpr std::size_t kReserve = std::size_t{32} << 10;  // for this function and what it calls
+  constexpr std::size_t kReserve = std::size_t{32} << 10;  // bytes for this function and those that it calls
   pthread_attr_t attributes;
   if (pthread_getattr_np(pthread_self(), &attributes) != 0) return;
   void *lowest = nullptr;
@@ -92,7 +92,7 @@ clockid_t cpu_clock_of(ThreadHandle &thread) noexcept {
   return clock;
 }
 
-// The kernel writes it whenever it puts the thread on a processor (restartable sequences, which glibc registers).
+// The kernel writes this word whenever it puts the thread on a processor (restartable sequences, registered by glibc).
 ProcessorWord this_threads_processor() noexcept {
 #if __has_include(<sys/rseq.h>) && defined(__GLIBC__)
   if (__rseq_size > 0) {
@@ -115,8 +115,9 @@ bool set_fifo_priority(pthread_t thread, int priority) noexcept {
 
 namespace {
 
-// What a thread does after its work, such as destroying what is its own, is urgent to nobody; and under ThreadSanitizer
-// threads that end at several priorities wait for each other for ever, since its spin locks do not inherit them.
+// Makes the thread an ordinary one: what it does after its work, such as destroying its data, is not urgent.
+// ThreadSanitizer's spin locks also do not inherit priority. Under it, threads that end at several priorities would
+// wait for each other for ever.
 void leave_fifo() noexcept {
   if (fifo_priority(pthread_self()) > 0) static_cast<void>(set_fifo_priority(pthread_self(), 0));
 }

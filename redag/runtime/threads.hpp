@@ -23,61 +23,62 @@ namespace redag::runtime {
 
 using ThreadHandle = std::thread;
 
-/// Says where a thread runs, until it ends; null: this system does not say.
+/// Holds the processor where a thread runs, valid until the thread ends; null: this system does not provide it.
 using ProcessorWord = const volatile std::uint32_t *;
 
 /// How a thread of the runtime is set up.
 struct ThreadSetup {
   std::string name;       // shown by top -H and ps; cut to 15 characters
-  int fifo_priority = 0;  // SCHED_FIFO, 1 to 99; 0: stays as it is created
-  std::vector<int> cpus;  // may run only there; empty: wherever the process may
-  // Bytes of its stack that it touches first, so that bodies meet no page fault there; with lock_memory() for good.
+  int fifo_priority = 0;  // SCHED_FIFO, 1 to 99; 0: unchanged
+  std::vector<int> cpus;  // processors where it may run; empty: wherever the process may
+  // Bytes of its stack that it touches first, so that bodies meet no page fault there. With lock_memory() they stay
+  // resident.
   std::size_t touched_stack = 0;
-  ProcessorWord *processor = nullptr;  // where it is noted, if anywhere
+  ProcessorWord *processor = nullptr;  // if not null, receives the thread's ProcessorWord
 };
 
-/// Enough for a callback that keeps its large objects elsewhere.
+/// 256 KiB: enough for a callback that keeps its large objects elsewhere.
 inline constexpr std::size_t kTouchedStack = std::size_t{256} << 10;
 
-/// Applies it to the calling thread, with a timer slack of 1 ns (the default of 50 us is most of an idle timer's
-/// lateness). Error: the first thing that the system refused.
+/// Applies `setup` to the calling thread, with a timer slack of 1 ns. (The default of 50 us causes most of an idle
+/// timer's lateness.) Error: the first thing that the system refused.
 [[nodiscard]] Result<void> set_up_this_thread(const ThreadSetup &setup);
 
-/// A thread that is set up so and then runs `main`; returns once it is set up. It takes no signals but those of its own
-/// mistakes (BlockedSignals). Error: as set_up_this_thread(), and `main` does not run.
+/// Creates a thread that is set up like this and then runs `main`. Returns once it is set up. It takes no signals but
+/// those that it causes itself (BlockedSignals). Error: as set_up_this_thread(), and `main` does not run.
 [[nodiscard]] Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()> main);
 
 /// The clock of a running thread's processor time.
 [[nodiscard]] clockid_t cpu_clock_of(ThreadHandle &thread) noexcept;
 
 [[nodiscard]] ProcessorWord this_threads_processor() noexcept;
-/// The processor on which that thread runs, or ran last; negative: unknown. Any thread.
+/// The processor where that thread runs or ran last; negative: unknown. Any thread.
 [[nodiscard]] int processor_of(ProcessorWord word) noexcept;
 
-/// 0: an ordinary thread (SCHED_OTHER). False if the system refused.
+/// Priority 0: an ordinary thread (SCHED_OTHER). Returns false if the system refused.
 [[nodiscard]] bool set_fifo_priority(pthread_t thread, int priority) noexcept;
 
 /// SCHED_FIFO priority of a thread; 0 if it is scheduled otherwise.
 [[nodiscard]] int fifo_priority(pthread_t thread) noexcept;
 
-/// One above that of the calling thread; 0: that has none, or the process may not have more.
+/// One above the priority of the calling thread; 0 if that has none, or the process may not have more.
 [[nodiscard]] int fifo_priority_above_this_thread();
 
-/// Processors that the calling thread may run on, ascending.
+/// Processors where the calling thread may run, ascending.
 [[nodiscard]] std::vector<int> usable_cpus();
 
-/// Highest SCHED_FIFO priority up to `wanted` that this process can really get; 0: none. Tried on a thread of its own,
+/// The highest SCHED_FIFO priority up to `wanted` that this process can really get; 0: none. Tried on a scratch thread,
 /// because rights come from several places (CAP_SYS_NICE, RLIMIT_RTPRIO, the cgroup's real-time share).
 [[nodiscard]] int available_fifo_priority(int wanted);
 
-/// How to get the right to use SCHED_FIFO.
+/// Says how to get the right to use SCHED_FIFO.
 [[nodiscard]] const char *realtime_hint();
 
-/// Locks the process's memory, page by page as it is used (MCL_ONFAULT), so that the stacks of many threads do not all
-/// become resident. Error: RLIMIT_MEMLOCK or no right.
+/// Locks the process's memory page by page as it is used (MCL_ONFAULT). Otherwise the stacks of many threads would all
+/// become resident. Error: RLIMIT_MEMLOCK, or no right.
 [[nodiscard]] Result<void> lock_memory();
 
-/// Of this kernel. None: unlimited or unknown.
+/// This kernel's setting. Empty: unlimited or unknown.
 [[nodiscard]] std::optional<Throttling> realtime_throttling();
 
 }  // namespace redag::runtime

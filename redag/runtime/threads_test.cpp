@@ -102,7 +102,7 @@ TEST(Threads, AThreadIsNoLongerUrgentWhenItsWorkIsDone) {
   EXPECT_EQ(at_its_end, 0);
 }
 
-/// How many of the pages that lie below the caller's frame on its stack are in memory.
+/// Counts the pages below the caller's frame on its stack that are in memory.
 std::size_t resident_pages_below(std::size_t bytes) {
   const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
   const auto here = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0)) / page * page;

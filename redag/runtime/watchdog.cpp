@@ -15,7 +15,7 @@ namespace redag::runtime {
 Watchdog::Watchdog(Engine &engine, WatchdogOptions options, Report report)
     : engine_(engine), options_(options), report_(std::move(report)) {
   options_.interval = std::max(options_.interval, kMillisecond);
-  overdue_.reserve(engine.thread_count());  // what is found is appended under the engine's lock
+  overdue_.reserve(engine.thread_count());  // watch() appends under the engine's lock
 }
 
 Watchdog::~Watchdog() {

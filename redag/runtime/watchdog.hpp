@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Names jobs that do not end, while they do not: a thread that looks at an engine's jobs now and then. With it,
-// `on_budget` and HI mode take effect without preemption points, up to an interval late (Engine::watch). Owns its
-// thread. The engine must be started before and joined after.
+// Reports overdue jobs while they still run: a thread looks at an engine's jobs at an interval. With it, `on_budget`
+// (except abort) and HI mode need no preemption points; they take effect up to one interval late (Engine::watch). Owns
+// its thread. Start the engine before it, and join the engine after it.
 #pragma once
 
 #include <functional>
@@ -18,8 +18,8 @@ namespace redag::runtime {
 
 class Watchdog {
  public:
-  /// Called on the watchdog's thread, without locks, once for each such job. What is done for long there delays the
-  /// next look. Must not throw.
+  /// Called on the watchdog's thread, without locks, once for each overdue job. A long call delays the next look. Must
+  /// not throw.
   using Report = std::function<void(const OverdueJob &)>;
 
   Watchdog(Engine &engine, WatchdogOptions options, Report report);
@@ -27,11 +27,11 @@ class Watchdog {
   Watchdog(const Watchdog &) = delete;
   Watchdog &operator=(const Watchdog &) = delete;
 
-  /// In real-time programs at a priority above that of jobs: below it, a job that spins would not let it look. Error:
-  /// the thread cannot be set up as asked.
+  /// In real-time programs, use a priority above that of jobs: below it, a job that spins would keep the thread from
+  /// looking. Error: the thread cannot be set up as asked.
   [[nodiscard]] Result<void> start(const ThreadSetup &setup);
 
-  /// One look, as if it were `as_of`. The thread does nothing else.
+  /// Looks once, as if it were `as_of`. The thread does nothing else.
   void look(Time as_of);
 
  private:
@@ -45,7 +45,8 @@ class Watchdog {
   ThreadHandle thread_;
 };
 
-/// "in progress for 10.02 s, 9.98 s of processor time" or "...: it waits, or more urgent jobs leave it no processor".
+/// For example "in progress for 10.02 s, 9.98 s of processor time". Adds ": it waits, or more urgent jobs leave it no
+/// processor" if the job used little.
 [[nodiscard]] std::string describe(const OverdueJob &job);
 
 }  // namespace redag::runtime

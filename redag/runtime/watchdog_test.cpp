@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Time is an argument of what is tested here; what needs real threads waits for what happens, never for a time.
+// Time is an argument of the tested functions. Tests with real threads wait for events, never for a time.
 #include "redag/runtime/watchdog.hpp"
 
 #include <gmock/gmock.h>
@@ -32,7 +32,7 @@ using ::testing::Not;
 
 constexpr Time kForever = 3600 * kSecond;
 
-// One worker, and an engine for `workload`.
+// An engine with one worker for `workload`; halts and joins at its end.
 class Watched {
  public:
   Watched(const Workload &workload, std::vector<Body> works, sched::Preemption preemption = sched::Preemption::None) {
@@ -62,7 +62,7 @@ class Watched {
 
 Workload one_task() { return make_workload({make_dag("d", {{"t", 10, 5}})}, 1, PreemptionMode::None); }
 
-// Holds the job until it is let go; begun() returns once its body has begun.
+// Holds the job until open(); begun() returns once its body has begun.
 class Gate {
  public:
   Body body() {
@@ -117,7 +117,7 @@ TEST(Watchdog, TheLimitCanBeAMultipleOfTheDeadline) {
   gate.open();
 }
 
-// A body without preemption points: nobody else can tell.
+// The body has no preemption points: only the watchdog can notice.
 TEST(Watchdog, ABudgetIsNoticedWhileTheJobRuns) {
   Workload workload = one_task();
   workload.dags[0].tasks[0].budget = kMillisecond;
@@ -178,7 +178,7 @@ TEST(Watchdog, OnlyProcessorTimeCounts) {
   gate.open();
 }
 
-// With `abort` it is the job's own preemption point that ends it, and tells of it.
+// With `abort`, the job's own preemption point ends it and reports it.
 TEST(Watchdog, AJobThatIsToBeCutOffIsLeftAlone) {
   Workload workload = one_task();
   workload.dags[0].tasks[0].budget = kMillisecond;
@@ -262,7 +262,7 @@ TEST(Watchdog, OfAnExecutorNamesTheBody) {
   EXPECT_EQ(executor.stats(dag)[0].usage.overdue, 1U);
 }
 
-// To tell of one job takes time. Meanwhile the next one, seen in the same look, ends, and another task has its id.
+// Reporting one job takes time. Meanwhile the next job of the same look ends, and another task gets its id.
 TEST(Watchdog, NamesNoTaskThatCameLater) {
   std::vector<std::string> names;
   Event told;
@@ -304,7 +304,7 @@ TEST(Watchdog, NamesNoTaskThatCameLater) {
   EXPECT_THAT(names, Each(Not(HasSubstr("later"))));
 }
 
-// The body that keeps a stop from ending is the one that has to be named.
+// The body that delays a stop is the one that must be reported.
 TEST(Watchdog, GoesOnWhileTheExecutorStops) {
   std::vector<std::string> texts;
   Event named;
@@ -320,7 +320,7 @@ TEST(Watchdog, GoesOnWhileTheExecutorStops) {
     executor.start();
     begun.wait();
   }
-  EXPECT_GE(texts.size(), 1U);  // a job after it may be kept waiting, and then is named as well
+  EXPECT_GE(texts.size(), 1U);  // a job after it may have to wait, and is then reported, too
 }
 
 }  // namespace

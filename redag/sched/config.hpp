@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a scheduler is told about its platform, and what it counts for each task. Plain values.
+// The scheduler's configuration and the counts it keeps for each task. Plain values without threads.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,15 @@
 
 namespace redag::sched {
 
-/// What the platform can do to a running job.
+/// How a running job can lose its worker.
 enum class Preemption : std::uint8_t {
   None,         // a job keeps its worker until it ends
-  Cooperative,  // at its own preemption points a job lets a higher-priority one run on top of it, on the same worker
+  Cooperative,  // at its own preemption points a job lets a more urgent one run on top of it, on the same worker
   Full,         // a job can be preempted at any time and resumed on any worker
 };
 
-/// What a preemption mode asks of the platform. `Auto` counts as `Os`: a driver that may get less resolves it first.
+/// Returns the preemption that a mode asks of the platform. `Auto` counts as `Os`: a driver that may get less resolves it
+/// first.
 [[nodiscard]] constexpr Preemption preemption_of(PreemptionMode mode) {
   switch (mode) {
     case PreemptionMode::None: return Preemption::None;
@@ -32,18 +33,18 @@ struct Config {
   std::uint32_t workers = 1;  // m
   Preemption preemption = Preemption::None;
   PolicyKind policy = PolicyKind::RateMonotonic;
-  // Full preemption on an operating system: number of distinct priority levels it has for us (0: as many as it takes).
-  // Where priorities outnumber levels, neighbours share one: tasks of one level do not preempt each other.
+  // Full preemption on an operating system: the number of priority levels that it offers (0: as many as needed). If
+  // there are fewer levels than tiers, neighbouring tiers share a level. Jobs of one level do not preempt each other.
   std::uint32_t levels = 0;
-  // Full preemption on threads: jobs that can be started and unfinished at once (0: no bound).
+  // Full preemption on threads: the most jobs that can be started and unfinished at once (0: no bound).
   std::uint32_t max_started = 0;
-  // Ids, job slots and group positions of removed tasks and DAGs are used again once nothing of them is in flight, so
-  // that memory stays flat under endless adding and removing. Otherwise an id names one task for ever, as traces need.
+  // If set, ids, job slots and group positions of removed tasks and DAGs are used again once none of their jobs is in
+  // flight. Memory then stays flat while tasks come and go. Traces need the opposite: one id names one task for ever.
   bool reuse_ids = false;
   Ties ties = Ties::Share;
 };
 
-/// What a scheduler of this workload is told, on a platform without limits on levels and started jobs.
+/// Returns the config of a scheduler for this workload, on a platform without limits on levels and started jobs.
 [[nodiscard]] inline Config config_of(const Workload &workload) {
   Config config;
   config.workers = workload.platform.workers;
@@ -53,7 +54,7 @@ struct Config {
   return config;
 }
 
-/// Jobs of one task: released = finished + skipped + aborted + in flight.
+/// Counts of one task's jobs: released = finished + skipped + aborted + in flight.
 struct Accounting {
   std::uint64_t released = 0;
   std::uint64_t finished = 0;

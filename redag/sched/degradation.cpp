@@ -15,11 +15,11 @@ bool lets_through(const Degrade &degrade, Duration period, Time last, Time relea
   const bool skips = degrade.kind == Degrade::Kind::Skip;
   const Int128 distance = Int128{release} - last;
   if (distance > 0) {
-    // Periods are counted, and not releases: those of no grid (messages) need not be exactly a period apart.
+    // Counts periods instead of releases: messages follow no grid and need not arrive exactly one period apart.
     if (skips) return distance > Int128{degrade.skip} * period + period / 2;
     return distance >= static_cast<Int128>(std::ceil(degrade.stretch * static_cast<double>(period)));
   }
-  // Seen after a newer release of another task on its grid: the choice is made.
+  // This release was seen after a newer one of another task on its grid. That newer one fixed the choice.
   const Int128 of_these_one = skips ? Int128{degrade.skip} + 1 : static_cast<Int128>(std::ceil(degrade.stretch));
   return -distance % (of_these_one * period) == 0;
 }

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Which releases HI mode lets through (docs/model.md, "Criticality"). A pure function.
+// Decides which releases HI mode lets through (docs/model.md, "Criticality"). Pure functions without state.
 #pragma once
 
 #include <limits>
@@ -11,11 +11,11 @@
 
 namespace redag::sched {
 
-/// In place of a release: none was let through yet.
+/// Stands for "no release was let through yet".
 inline constexpr Time kNoRelease = std::numeric_limits<Time>::min();
 
-/// Is this release of a timer task of a degraded DAG taken? `last`: the newest release that was, in this HI mode, of
-/// the tasks that share the task's grid; kNoRelease: none. `period`: positive.
+/// Returns true if a release of a timer task of a degraded DAG is let through. `last` is the newest release that this
+/// HI mode has let through for the tasks on the same grid, or kNoRelease. `period` must be positive.
 [[nodiscard]] bool lets_through(const Degrade &degrade, Duration period, Time last, Time release);
 
 }  // namespace redag::sched

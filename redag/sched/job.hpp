@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A live job as the scheduler keeps it: one slot of the job table. Slots are reused; nothing here outlives the job.
+// A live job as the scheduler keeps it: one slot of the job table. Slots are reused, and a slot's content is valid only
+// as long as its job lives. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,16 +14,16 @@ namespace redag::sched {
 
 inline constexpr std::uint32_t kNil = 0xffffffff;  // no slot, in the links of intrusive containers
 
-// Free -> Waiting -> Ready -> Running <-> Suspended -> Free;  Waiting, Ready -> Free (skipped).
+// Free -> Waiting -> Ready -> Running <-> Suspended -> Free; a skipped job goes from Waiting or Ready to Free.
 enum class JobState : std::uint8_t {
   Free,       // the slot holds no job
-  Waiting,    // released; predecessors incomplete
+  Waiting,    // released; waits for predecessors
   Ready,      // not started; in the ready queue, or parked at a gate that is full
   Running,    // has a worker
   Suspended,  // started, lost its worker: in the ready queue (Full) or under another job on its worker (Cooperative)
 };
 
-// Never in more than two cache lines.
+// The alignment keeps a job within two cache lines.
 struct alignas(32) Job {
   TaskId task;
   std::uint32_t number = 0;
@@ -30,33 +31,34 @@ struct alignas(32) Job {
   Time deadline = 0;  // absolute
   Time origin = 0;
 
-  // Order among jobs: (key, turn, rank, sequence), smallest first. For static policies key is the task's tier, or the
-  // more urgent one of a job from which this one inherited; the rest is always its own.
+  // Jobs are ordered by (key, turn, rank, sequence), smallest first. Under a static policy, key is the task's tier; for
+  // a demoted job it is the tier plus the number of tiers. A job that inherits has the more urgent key of another job.
+  // Turn, rank and sequence are always the job's own.
   std::int64_t key = 0;
-  Time turn = 0;               // Ties::Share: its release, or that of the job whose place it took
+  Time turn = 0;               // Ties::Share: its release, or the turn of the job that it replaced
   std::uint64_t sequence = 0;  // order in which jobs became ready
   std::uint32_t rank = 0;
-  TaskId priority_of;  // the task whose priority it has: its own, or that of a job from which it inherited
+  TaskId priority_of;  // the task whose priority it has: its own, or the task of a job from which it inherited
 
-  // Links of the one container that the job is in: ready queue or a gate's heap.
+  // Links of the container that holds the job: the ready queue or a gate's heap.
   std::uint32_t next = kNil;
   std::uint32_t previous = kNil;
-  std::uint32_t child = kNil;      // HeapQueue: the first one. LevelQueue: the list
-  std::uint32_t parked_at = kNil;  // gate, or kNil
+  std::uint32_t child = kNil;      // HeapQueue: the first child; LevelQueue: the number of the list
+  std::uint32_t parked_at = kNil;  // the gate where it is parked, or kNil
 
   std::uint32_t task_next = kNil;  // next unstarted job of the same task
   std::uint32_t under = kNil;      // Cooperative: the job suspended below this one
   WorkerId worker;                 // where it runs, or ran last
   JobState state = JobState::Free;
   bool deferred = false;
-  bool demoted = false;  // below everything else, save for what it inherits
+  bool demoted = false;  // comes after all other jobs, unless it inherits
 
   [[nodiscard]] bool started() const { return state == JobState::Running || state == JobState::Suspended; }
 };
 
 static_assert(sizeof(Job) == 96, "a job in at most two cache lines");
 
-/// The total order of jobs: does `a` come before `b`?
+/// The total order of jobs: returns true if `a` comes before `b`.
 [[nodiscard]] inline bool before(const Job &a, const Job &b) {
   if (a.key != b.key) return a.key < b.key;
   if (a.turn != b.turn) return a.turn < b.turn;

@@ -47,7 +47,7 @@ void Lifecycle::miss(TaskId id, Time nominal, Time now, Reason reason) {
   refuse(id, nominal, refused == Reason::None ? reason : refused);
 }
 
-// The number of the job that this makes.
+// Counts a release and returns the number of its job.
 std::uint32_t Lifecycle::count_release(TaskState &task) {
   const std::uint32_t number = task.next_number++;
   if (task.next_number == 0) task.released_earlier += std::uint64_t{1} << 32U;
@@ -78,7 +78,7 @@ void Lifecycle::complete(JobSlot job_slot, Time now, Outcome outcome) {
     ++task.aborted;
     emit(job, JobEventKind::Aborted, now, reason_of(outcome));
   }
-  // It used its budget and ended at one instant: its new level is nobody's business any more.
+  // The job used its budget and ended at one instant: drop its pending level change.
   std::erase_if(dispatches_, [&](const Dispatch &change) { return change.job == job_slot; });
   on_end(slot);
   free_slot(slot);
@@ -214,7 +214,7 @@ TaskId Lifecycle::append_task(DagId dag, std::uint32_t rank, const Task &task) {
   if (state.timer && kept_ == TimerReleases::AllKept) state.queue_depth = kUnboundedQueue;
   state.on_budget = task.on_budget;
   state.degraded = high_mode_ && degrades(dag_states_[dag.value]);
-  // The jobs that have started, the ready ones, and one that waits for its predecessors.
+  // One slot for each job that can be started, each that can be ready, and one that waits for predecessors.
   const std::uint32_t queued = state.queue_depth == kUnboundedQueue ? 1 : std::max(1U, state.queue_depth);
   const std::uint32_t slot_count = state.concurrency + queued + 1;
   for (std::uint32_t i = 0; i < slot_count; ++i) {
@@ -227,15 +227,15 @@ TaskId Lifecycle::append_task(DagId dag, std::uint32_t rank, const Task &task) {
   return id;
 }
 
-// Room for what one instant can bring: each task's release, the skip of its last job, readiness, deferral, start,
-// preemption; HI mode, that skips and demotes all there is; and the releases that a late timer reports at once.
+// Reserves room for what one instant can bring. That is, for each task: a release, the skip of its last job, readiness,
+// deferral, start and preemption. HI mode can skip or demote every job, and a late timer reports many releases at once.
 void Lifecycle::reserve_step() {
   events_.reserve(3 * (jobs_.size() + kMostReleasesAtOnce) + 64);
   // Any started job can change its level.
   dispatches_.reserve(3 * std::size_t{config_.workers} + jobs_.size() + 16);
 }
 
-// Removed tasks of which nothing is left leave the order of priority, and with reuse_ids also their places.
+// Removes tasks without any job left from the order of priority. With reuse_ids, also frees their slots.
 void Lifecycle::collect() {
   std::vector<bool> in_use(tasks_.size(), false);
   for (const Job &job : jobs_) {
@@ -317,7 +317,7 @@ void Lifecycle::prioritise() {
     if (is_static(config_.policy)) {
       job.key = has_inherited ? tasks_[job.priority_of.value].key : own_key(job);
     }
-    // What it inherited may now be no more than its own.
+    // What the job inherited may now be no more urgent than its own key.
     if (has_inherited && own_key(job) <= job.key) {
       job.priority_of = job.task;
       job.key = own_key(job);
@@ -366,7 +366,7 @@ void Lifecycle::resume(std::uint32_t slot, WorkerId worker, std::uint32_t over, 
 }
 
 void Lifecycle::change_level(std::uint32_t slot, std::uint32_t level) {
-  // What an earlier change of this step said no longer counts, and leaves its place: so no step outgrows its storage.
+  // A newer level change replaces an earlier one of the same step. Therefore no step outgrows its storage.
   std::erase_if(dispatches_,
                 [slot](const Dispatch &d) { return d.kind == DispatchKind::Level && d.job == JobSlot(slot); });
   tell(slot, DispatchKind::Level, kNil, level);
@@ -393,7 +393,7 @@ void Lifecycle::defer(std::uint32_t slot) {
   emit(job, JobEventKind::Deferred, 0);
 }
 
-// `origin` counts for tasks without predecessors and for data tasks, whose data is already consumed.
+// `origin` is used for tasks without predecessors and for data tasks, whose data is already consumed.
 void Lifecycle::admit(TaskId id, Time nominal, Time origin) {
   TaskState &task = tasks_[id.value];
   DagState &dag = dag_states_[task.dag.value];
@@ -431,8 +431,9 @@ void Lifecycle::admit(TaskId id, Time nominal, Time origin) {
   }
 }
 
-// Taking turns, of the next job: it inherits that of the job whose place it takes, or the later release of every period
-// would put it behind its equals for ever. And it does not go before an earlier job of its task.
+// Returns the turn of the task's next job (Ties::Share). A job that replaces another takes its turn: with its own,
+// later release, each replacement would put the task behind its equals for ever. A queued job never comes before an
+// earlier job of its task.
 Time Lifecycle::turn_of(const TaskState &task, Time release) const {
   if (task.waiting != kNil) return jobs_[task.waiting].turn;
   if (task.ready_count == 0) return release;

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The rules every scheduler shares: jobs from release to end, precedence, overrun, admission, accounting, and the
-// events that tell of them. What runs where and when is left to the subclass: PriorityScheduler (ours) or a model of
-// another executor. Not thread-safe.
+// Lifecycle holds the rules that all schedulers share: jobs from release to end, precedence, overrun, admission,
+// budgets, HI mode, accounting, and the events that report them. A subclass decides which job runs where and when:
+// PriorityScheduler, or a model of another executor. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -47,42 +47,43 @@ class Lifecycle : public Scheduler {
 
   [[nodiscard]] const Job &job(JobSlot slot) const { return jobs_[slot.value]; }
   [[nodiscard]] const Config &config() const { return config_; }
-  /// Room there is for jobs and groups: how memory grows.
+  /// The numbers of slots for jobs and for groups. Tests use them to see how memory grows.
   [[nodiscard]] std::size_t job_slots() const { return jobs_.size(); }
   [[nodiscard]] std::size_t group_slots() const { return groups_.size(); }
 
  protected:
-  // Live -> Removed -> Gone (no job of it is left, and none has its priority) -> with reuse_ids another Live task.
+  // Live -> Removed -> Gone. A task is gone once it has no job left and no job has its priority. With reuse_ids, its
+  // slot then serves another live task.
   enum class TaskLife : std::uint8_t { Live, Removed, Gone };
 
-  // What a job needs that is released, starts and finishes is in the first 64 bytes.
+  // The first 64 bytes hold everything that a job needs from its release to its end.
   struct alignas(64) TaskState {
     Duration deadline = 0;
-    std::int64_t key = 0;  // static policies: of its jobs that have inherited nothing
+    std::int64_t key = 0;  // static policies: the key of its jobs that have inherited nothing
     std::uint64_t finished = 0;
-    std::uint32_t rank = 0;  // its place in the order of priority; not of one that is gone
+    std::uint32_t rank = 0;  // its place in the order of tasks; not valid for a task that is gone
     DagId dag;
-    std::uint32_t queue_depth = 0;      // 0: overrun by skipping; kUnboundedQueue
-    std::uint32_t free_slot = kNil;     // list through Job::next
+    std::uint32_t queue_depth = 0;      // 0: overrun by skipping; kUnboundedQueue: no limit
+    std::uint32_t free_slot = kNil;     // head of the list of free job slots, linked by Job::next
     std::uint32_t waiting = kNil;       // the job whose predecessors are incomplete
-    std::uint32_t latest_ready = kNil;  // the job that became ready last; not started if ready_count > 0
+    std::uint32_t latest_ready = kNil;  // the job that became ready last; it has not started if ready_count > 0
     std::uint32_t ready_count = 0;      // ready and not started
-    std::uint32_t next_number = 0;      // so many were released, and the earlier ones
+    std::uint32_t next_number = 0;      // number of the next job, modulo 2^32
     bool timer = true;
-    bool joined = false;  // it has predecessors or successors
+    bool joined = false;  // has predecessors or successors
     TaskLife life = TaskLife::Live;
     OnBudget on_budget = OnBudget::Abort;
-    bool skips_next = false;  // a job used its budget, and the next release is not taken
-    bool degraded = false;    // its jobs are demoted from the start: HI mode, and its DAG is of lower criticality
+    bool skips_next = false;  // a job used its budget: the next release is skipped
+    bool degraded = false;    // HI mode, and its DAG is of lower criticality: its jobs are demoted from the start
 
-    std::uint64_t released_earlier = 0;  // before numbers began anew at 0
+    std::uint64_t released_earlier = 0;  // releases before next_number last wrapped around to 0
     std::uint64_t skipped = 0;
     std::uint64_t aborted = 0;
     std::uint64_t deferred = 0;
     Duration period = 0;
     Duration offset = 0;
-    Time let_through = kNoRelease;  // degraded: its newest release that was taken
-    std::uint32_t tier = 0;         // what tasks that take turns share
+    Time let_through = kNoRelease;  // while degraded: its newest release that was let through
+    std::uint32_t tier = 0;         // shared by the tasks that take turns
     std::uint32_t level = 0;
     std::uint32_t group = kNil;  // position among the groups
     std::uint32_t concurrency = 1;
@@ -95,46 +96,49 @@ class Lifecycle : public Scheduler {
     std::uint32_t pending = 0;  // released, not started
     Criticality criticality = Criticality::Normal;
     bool removed = false;
-    bool free = false;          // its id is to be used again
-    std::vector<TaskId> tasks;  // not those that are gone
+    bool free = false;          // its id can be used again
+    std::vector<TaskId> tasks;  // without those that are gone
     Degrade degrade;
   };
 
-  enum class TimerReleases : std::uint8_t { AsTheTaskSays, AllKept };  // AllKept: no overrun, any number can wait
+  // AllKept: no overrun rule, any number of jobs can wait.
+  enum class TimerReleases : std::uint8_t { AsTheTaskSays, AllKept };
 
   explicit Lifecycle(const Config &config, TimerReleases kept = TimerReleases::AsTheTaskSays)
       : config_(config), takes_turns_(config.ties == Ties::Share && config.policy != PolicyKind::Fifo), kept_(kept) {}
 
-  /// Adds the workload's DAGs; for the subclass's constructor.
+  /// Adds the workload's DAGs. For the constructor of the subclass.
   void load(const Workload &workload);
 
-  // What a subclass decides with. Each is called with the job still in its old state.
+  // Hooks for the subclass's decisions. Each is called while the job is still in its old state.
   virtual void on_ready(std::uint32_t slot) = 0;      // the job can be queued
-  virtual void on_withdrawn(std::uint32_t slot) = 0;  // a ready, not started job is skipped
-  virtual void on_end(std::uint32_t slot) = 0;        // a started job ended; afterwards its slot is free
-  virtual void on_lowered(std::uint32_t slot) = 0;    // a started job is to go on at own_key(), with nothing inherited
-  virtual void on_reconfigured() = 0;                 // tasks were added, or timings changed: priorities are new
+  virtual void on_withdrawn(std::uint32_t slot) = 0;  // a ready job that has not started is skipped
+  virtual void on_end(std::uint32_t slot) = 0;        // a started job ended; its slot is free after this call
+  virtual void on_lowered(std::uint32_t slot) = 0;  // a started job continues at own_key() and loses what it inherited
+  virtual void on_reconfigured() = 0;               // tasks were added or timings changed: all priorities are new
 
-  /// Of all jobs but demoted ones, whose keys are the same again after these; edf and fifo: kDemotedKey for all.
+  /// The number of tiers. Under a static policy, the key of a job that is not demoted is below it. A demoted job's key
+  /// is its task's tier plus this number. Under edf and fifo all demoted jobs have kDemotedKey.
   [[nodiscard]] std::uint32_t tier_count() const { return tier_count_; }
   [[nodiscard]] static bool is_demoted_key(std::int64_t key) { return key == kDemotedKey; }
-  /// The key of the job by itself, with nothing inherited.
+  /// The job's own key, without what it inherited.
   [[nodiscard]] std::int64_t own_key(const Job &job) const;
-  /// HI mode, and nothing is ready or started: LO mode again.
+  /// Ends HI mode. Call it when no job is ready or started.
   void restore();
 
-  /// Moves time forward and, after a dispatch, empties the step's buffers. Every verb begins with it.
+  /// Advances the time to `now`. The first call after a dispatch also empties the step's buffers. Each public call that
+  /// reports an event begins with it.
   void begin(Time now);
 
-  // Decisions, recorded in the step.
+  // These record decisions in the step.
   void start(std::uint32_t slot, WorkerId worker, std::uint32_t over, std::uint32_t level);
   void suspend(std::uint32_t slot);
   void resume(std::uint32_t slot, WorkerId worker, std::uint32_t over, std::uint32_t level);
-  /// Tells the driver that a started job, running or suspended, now has another level.
+  /// Records for the driver that a started job, running or suspended, has a new level.
   void change_level(std::uint32_t slot, std::uint32_t level);
   void defer(std::uint32_t slot);
 
-  /// What dispatch() returns.
+  /// Returns the recorded decisions and events: the result of dispatch().
   Step step();
 
   [[nodiscard]] std::size_t group_count() const { return groups_.size(); }
@@ -144,8 +148,7 @@ class Lifecycle : public Scheduler {
   std::vector<Job> jobs_;
   std::vector<TaskState> tasks_;
   std::vector<DagState> dag_states_;
-  bool has_chores_ =
-      false;  // a dispatch has more to do than to decide: HI mode may end, or what the subclass sets it for
+  bool has_chores_ = false;  // dispatch() must also end HI mode or requeue held-back jobs
 
  private:
   static constexpr std::uint32_t kUnboundedQueue = std::numeric_limits<std::uint32_t>::max();
@@ -195,15 +198,15 @@ class Lifecycle : public Scheduler {
   Precedence precedence_;
   std::map<std::string, std::uint32_t> group_positions_;
   std::vector<Group> groups_;
-  // To be used again (reuse_ids); group positions always are.
+  // Free ids and slots, with reuse_ids. Free group positions are always used again.
   std::vector<TaskId> free_tasks_;
   std::vector<DagId> free_dags_;
   std::vector<std::uint32_t> free_slots_;
   std::uint32_t tier_count_ = 0;
   bool closed_ = false;
   bool high_mode_ = false;
-  std::uint32_t owed_skips_ = 0;  // tasks with skips_next
-  bool restricted_ = false;       // not every release is taken: closed, HI mode, or a skip is owed
+  std::uint32_t owed_skips_ = 0;  // number of tasks with skips_next
+  bool restricted_ = false;       // some releases are refused: closed, in HI mode, or a skip is owed
   Job mode_cause_;                // HI mode: the job that began it
   Time high_since_ = 0;
   std::vector<JobEvent> events_;

@@ -17,7 +17,7 @@ void Lifecycle::exceed(JobSlot job_slot, Limit limit, Time now) {
   emit(job, JobEventKind::Exceeded, 0);
   TaskState &task = tasks_[job.task.value];
   switch (task.on_budget) {
-    case OnBudget::Abort:  // the driver cuts it off as soon as it can
+    case OnBudget::Abort:  // the driver cuts the job off as soon as it can
     case OnBudget::Log: break;
     case OnBudget::Demote: demote(job_slot.value); break;
     case OnBudget::SkipNext:
@@ -36,7 +36,7 @@ void Lifecycle::forget_skip(TaskState &task) {
   refresh_restricted();
 }
 
-// Why a release of a live task is not taken; None: it is.
+// Returns why a release of a live task is refused, or None if it is admitted.
 Reason Lifecycle::refusal(TaskState &task, Time nominal) {
   if (task.skips_next) {
     forget_skip(task);
@@ -51,8 +51,8 @@ bool Lifecycle::is_let_through(TaskState &task, Time nominal) {
   if (!task.timer) return dag.degrade.kind != Degrade::Kind::Stop;
   Time last = task.let_through;
   if (task.joined) {
-    // One choice for all: by itself, each would begin with the release that it saw first after HI mode began, and a job
-    // could wait for ever for one that another choice skipped.
+    // All tasks on one grid share one choice. On its own, each would start from the release that it saw first in HI
+    // mode. A job could then wait for ever for a job that the other task skipped.
     for (const TaskId id : dag.tasks) {
       const TaskState &other = tasks_[id.value];
       if (shares_grid(task, other)) last = std::max(last, other.let_through);
@@ -63,13 +63,13 @@ bool Lifecycle::is_let_through(TaskState &task, Time nominal) {
   return true;
 }
 
-// Does job k of one wait, be it through other tasks, for job k of the other?
+// Returns true if both tasks are on one grid: same period and offset, joined by edges. Job k of one can then wait,
+// directly or through other tasks, for job k of the other.
 bool Lifecycle::shares_grid(const TaskState &a, const TaskState &b) {
   return a.joined && b.joined && b.timer && b.life == TaskLife::Live && a.period == b.period && a.offset == b.offset;
 }
 
-// AMC (Baruah, Burns, Davis, RTSS 2011): from this instant no job of a DAG of lower criticality is in the way of
-// others.
+// AMC (Baruah, Burns, Davis, RTSS 2011): from this instant, no job of a DAG of lower criticality delays other jobs.
 void Lifecycle::enter_high_mode(const Job &cause) {
   if (high_mode_ || closed_ || degrades(dag_states_[tasks_[cause.task.value].dag.value])) return;
   high_mode_ = true;
@@ -89,7 +89,7 @@ void Lifecycle::enter_high_mode(const Job &cause) {
     const Job &job = jobs_[slot];
     if (job.state == JobState::Free) continue;
     if (job.started()) {
-      // What it inherited from a job that is skipped now goes, too.
+      // A started job also loses the priority of a job that is skipped now.
       if (tasks_[job.task.value].degraded && !job.demoted) {
         demote(slot);
       } else if (tasks_[job.priority_of.value].degraded) {
@@ -105,7 +105,8 @@ void Lifecycle::enter_high_mode(const Job &cause) {
   }
 }
 
-// Nothing is in progress: the degraded DAGs begin afresh, without data of before and without jobs that wait for some.
+// No job is in progress. The degraded DAGs begin afresh: old data is discarded, and jobs that wait for data are
+// skipped.
 void Lifecycle::restore() {
   emit(mode_cause_, JobEventKind::LowMode, high_since_);
   skip_all(Reason::Degraded, [this](const Job &job) { return tasks_[job.task.value].degraded; });
@@ -132,7 +133,7 @@ std::int64_t Lifecycle::own_key(const Job &job) const {
   return is_static(config_.policy) ? task.tier : job.deadline;
 }
 
-// After all others, and among each other in the order of their tasks.
+// The key of the task's demoted jobs: after all other jobs, and among themselves in the order of tiers.
 std::int64_t Lifecycle::demoted_key(const TaskState &task) const {
   return is_static(config_.policy) ? std::int64_t{tier_count_} + task.tier : kDemotedKey;
 }

@@ -16,7 +16,7 @@ namespace {
 using testing::make_dag;
 using testing::make_workload;
 
-// One task whose next job has `number`; it decides nothing.
+// A lifecycle with one task, whose next job has `number`. It takes no decisions.
 class Counter final : public Lifecycle {
  public:
   explicit Counter(std::uint32_t number) : Lifecycle(Config{}) {
@@ -38,7 +38,7 @@ class Counter final : public Lifecycle {
   void on_reconfigured() override {}
 };
 
-// At 1 kHz that is after 49 days and 17 hours.
+// At 1 kHz, job numbers wrap around after 49 days and 17 hours.
 TEST(Lifecycle, AfterTheLastNumberComesTheFirst) {
   constexpr std::uint64_t kNumbers = std::uint64_t{1} << 32U;
   constexpr std::uint64_t kBefore = 2;

@@ -10,7 +10,7 @@
 namespace redag::sched {
 namespace {
 
-// What a policy sorts by, smallest first; where these are equal, the common order (DAG, topological, TaskId) decides.
+// What a policy sorts by, smallest first. Equal keys are ordered by DAG, topological rank and TaskId.
 using PolicyKey = std::array<std::int64_t, 4>;
 
 PolicyKey policy_key(PolicyKind policy, const RankedTask &task) {
@@ -18,8 +18,8 @@ PolicyKey policy_key(PolicyKind policy, const RankedTask &task) {
     case PolicyKind::RateMonotonic: return {task.period};
     case PolicyKind::DeadlineMonotonic: return {task.deadline};
     case PolicyKind::Fixed: return {-std::int64_t{task.priority}};
-    // PiCAS (Choi, Xiang, Kim, RTAS 2021): the chain first, and within it downstream first, so that an instance is
-    // finished before the next one starts.
+    // PiCAS (Choi, Xiang, Kim, RTAS 2021): orders by chain, and within a chain downstream first. One instance of a
+    // chain thus finishes before the next one starts.
     case PolicyKind::ChainAware:
       return {-static_cast<std::int64_t>(task.dag_criticality), task.dag_period, task.dag,
               -std::int64_t{task.topological_rank}};
@@ -34,7 +34,7 @@ struct Entry {
   std::uint32_t dag = 0;
   std::uint32_t topological_rank = 0;
   TaskId task;
-  std::size_t position = 0;  // among the tasks asked for
+  std::size_t position = 0;  // index in the input
 };
 
 std::vector<Entry> sorted_entries(std::span<const RankedTask> tasks, PolicyKind policy) {

@@ -44,7 +44,7 @@ void Precedence::add_dag(const Dag &dag, std::span<const TaskId> ids) {
   }
 }
 
-// What is left is written down anew, so that storage does not grow with what has gone.
+// Compacts the edge arrays so that removed tasks cost no storage.
 void Precedence::forget(std::span<const TaskId> tasks) {
   for (const TaskId task : tasks) {
     Node &node = nodes_[task.value];
@@ -86,7 +86,7 @@ void Precedence::set_period(TaskId task, Duration period) {
   for (Node &node : nodes_) static_cast<void>(count_fresh(node));
 }
 
-// Whether all are.
+// Recounts the edges with fresh data; returns true if all have it.
 bool Precedence::count_fresh(Node &node) {
   node.fresh = 0;
   for (std::uint32_t i = node.first_edge; i < node.last_edge; ++i) node.fresh += serves(edges_[i], node) ? 1U : 0U;

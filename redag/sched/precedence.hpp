@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Precedence inside DAGs: which predecessor's data a task has not consumed yet. Knows edges and nothing of jobs' lives,
-// workers or priorities.
+// Tracks precedence inside DAGs: which data of its predecessors a task has not consumed yet. It knows edges, and
+// nothing of job states, workers or priorities. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -16,35 +16,34 @@ namespace redag::sched {
 
 class Precedence {
  public:
-  /// Adds the DAG's tasks, which are new or forgotten ones, and its edges; `ids` in the order of its tasks. Allocates.
+  /// Adds a DAG's tasks and edges. `ids` are the tasks' ids in their order, each new or forgotten. Allocates.
   void add_dag(const Dag &dag, std::span<const TaskId> ids);
   /// Adds a task without edges. Allocates.
   void add_task(const Task &task, TaskId id) { add_node(task, id); }
-  /// Takes away tasks, and the edges into and out of them: their ids can be added again. Linear in all edges.
+  /// Removes tasks with their incoming and outgoing edges. Their ids can be added again. Linear in all edges.
   void forget(std::span<const TaskId> tasks);
-  /// Which edges join tasks of one period and offset is found anew; data that came keeps its state. Linear in all
-  /// edges.
+  /// Changes a task's period and finds again which edges are aligned. Data that has arrived keeps its state. Linear in
+  /// all edges.
   void set_period(TaskId task, Duration period);
 
-  /// `task` has a new job, released at `release`.
-  /// Returns whether all its predecessors have fresh data.
+  /// Records a new job of `task`, released at `release`. Returns true if all its predecessors have fresh data.
   bool on_release(TaskId task, Time release);
 
   struct Data {
-    Time origin = 0;    // the earliest
-    Time complete = 0;  // when the last of it was there; threads can report the end of an earlier job later
+    Time origin = 0;    // the earliest origin of the data
+    Time complete = 0;  // the latest finish of all predecessors; threads can report an earlier finish later
   };
-  /// The waiting or newly released job of `task` takes its predecessors' data. Requires at least one predecessor.
+  /// The waiting or newly released job of `task` consumes its predecessors' data. Requires at least one predecessor.
   Data consume(TaskId task);
 
-  /// The job that consumed last was skipped before it started: its data is fresh again.
+  /// Makes the consumed data fresh again: the job that consumed it was skipped before it started.
   void give_back(TaskId task);
 
-  /// Data that `task` has not consumed is forgotten.
+  /// Discards the data that `task` has not consumed.
   void discard(TaskId task);
 
-  /// A job of `task`, released at `release` with data from `origin`, completed at `finish`. Calls on_fresh(successor)
-  /// for each successor all of whose predecessors now have fresh data.
+  /// Records that a job of `task`, released at `release` with data from `origin`, completed at `finish`. Calls
+  /// on_fresh(successor) for each successor whose predecessors now all have fresh data.
   template <class OnFresh>
   void on_complete(TaskId task, Time release, Time origin, Time finish, OnFresh on_fresh) {
     const Node node = nodes_[task.value];
@@ -69,26 +68,26 @@ class Precedence {
 
  private:
   struct Edge {
-    TaskId to;                                        // none: forgotten
+    TaskId to;                                        // the successor; invalid: the edge is forgotten
     bool aligned = false;                             // timer to timer, same period and offset: job k waits for job k
-    bool fresh = false;                               // completed since `to` last consumed
-    Time release = std::numeric_limits<Time>::min();  // of the newest job of the predecessor that completed: its data
+    bool fresh = false;                               // the predecessor completed since `to` last consumed
+    Time release = std::numeric_limits<Time>::min();  // of the predecessor's newest completed job: its data
     Time origin = 0;                                  // of that data
-    Time finish = 0;                                  // of the job that completed last
+    Time finish = 0;                                  // of the job whose end was reported last
   };
   struct Node {
     std::uint32_t first_edge = 0;  // edges into the task: [first_edge, last_edge)
     std::uint32_t last_edge = 0;
     std::uint32_t first_successor = 0;  // edges out of it: successors_[first_successor .. last_successor)
     std::uint32_t last_successor = 0;
-    std::uint32_t fresh = 0;  // edges into the task with fresh data for its last job
+    std::uint32_t fresh = 0;  // number of incoming edges with fresh data for its last job
     Time last_release = 0;    // of that job
     Duration period = 0;
     Duration offset = 0;
     bool timer = true;
   };
 
-  /// Is there data for the successor's last job?
+  /// Returns true if the edge has data for the successor's last job.
   [[nodiscard]] static bool serves(const Edge &edge, const Node &successor) {
     return edge.fresh && (!edge.aligned || edge.release == successor.last_release);
   }

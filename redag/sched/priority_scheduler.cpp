@@ -39,8 +39,8 @@ Step PriorityScheduler::dispatch(Time now, std::uint32_t most) {
   return step();
 }
 
-// No more jobs may start: looks past this one for jobs that have started. Those are in the queue with full preemption
-// only.
+// No more jobs may start. Holds this job back and lets dispatch() look past it for started jobs. Only full preemption
+// keeps those in the ready queue.
 bool PriorityScheduler::set_aside(std::uint32_t slot) {
   if (config_.preemption != Preemption::Full) return false;
   remove(slot);
@@ -76,7 +76,7 @@ bool PriorityScheduler::outranked(JobSlot job) const {
   return config_.preemption == Preemption::Cooperative && top() != kNil && outranks(jobs_[top()], jobs_[job.value]);
 }
 
-// Where could `job`, the first in the ready queue, run now?
+// Finds where `job`, the first in the ready queue, could run now. Returns false if there is no place.
 bool PriorityScheduler::find_place(const Job &job, Place &place) const {
   if (!free_workers_.empty()) {
     const bool last_is_free = job.worker.valid() && workers_[job.worker.value].stack == kNil;
@@ -90,7 +90,8 @@ bool PriorityScheduler::find_place(const Job &job, Place &place) const {
   return true;
 }
 
-// The job that would give way first: of all running ones (Full), or of those on top of an open worker (Cooperative).
+// Returns the job that would lose its worker first: of all running jobs (Full), or of those on top of an open worker
+// (Cooperative).
 std::uint32_t PriorityScheduler::least_urgent_running() const {
   std::uint32_t least = kNil;
   const auto consider = [&](std::uint32_t slot) {
@@ -138,12 +139,12 @@ void PriorityScheduler::make_way(const Place &place) {
     free_workers_.clear(place.worker.value);
     return;
   }
-  // A job under an ended one (Cooperative) is suspended already.
+  // Cooperative: a job under one that has ended is already suspended.
   if (jobs_[place.victim].state == JobState::Running) suspend(place.victim);
   if (config_.preemption == Preemption::Full) push(place.victim);
 }
 
-// Workers where a decision was due and no other job came on top: a suspended job goes on.
+// Resumes the suspended job on each open worker that no other job took.
 void PriorityScheduler::close_open_workers() {
   for (const std::uint32_t w : open_workers_) {
     Worker &worker = workers_[w];
@@ -156,7 +157,7 @@ void PriorityScheduler::close_open_workers() {
   open_workers_.clear();
 }
 
-// A job that is parked waits for one that has started.
+// Parked jobs need no check: each waits for a job that has started.
 void PriorityScheduler::restore_if_idle() {
   if (top() != kNil) return;
   for (const Worker &worker : workers_) {
@@ -167,7 +168,8 @@ void PriorityScheduler::restore_if_idle() {
 
 // ---- eligibility ----
 
-// The job could have a worker: does it find a gate full? The gates are tried in the order task, DAG, group, threads.
+// A worker is available to the job. Parks the job if one of its gates is full. Tries the gates in the order task, DAG,
+// group, threads.
 bool PriorityScheduler::park_if_not_eligible(std::uint32_t slot) {
   Job &job = jobs_[slot];
   if (job.started()) return false;
@@ -190,13 +192,13 @@ bool PriorityScheduler::park_if_not_eligible(std::uint32_t slot) {
   if (kind == GateKind::Dag) defer(slot);
   if (kind == GateKind::Threads) ++thread_waits_;
   if (kind == GateKind::Group) inherit(gate.holder, job);
-  // Others may now use what this job would have used elsewhere.
+  // Other jobs may now use the places that this job would have used at its other gates.
   for_gates_of(job, [this](Gate &other) { promote_one(other); });
   return true;
 }
 
-// Priority inheritance (Sha, Rajkumar, Lehoczky, IEEE TC 39(9), 1990). One step is enough: a job that holds waits for
-// none.
+// Priority inheritance (Sha, Rajkumar, Lehoczky, IEEE TC 39(9), 1990). One step is enough, because a job that holds a
+// group waits for none.
 void PriorityScheduler::inherit(std::uint32_t holder_slot, const Job &waiter) {
   Job &holder = jobs_[holder_slot];
   if (config_.policy == PolicyKind::Fifo || waiter.key >= holder.key) return;
@@ -209,8 +211,8 @@ void PriorityScheduler::inherit(std::uint32_t holder_slot, const Job &waiter) {
   tell_level(holder_slot, old_level);
 }
 
-// Full: the operating system schedules suspended jobs too, by the level that it was told last. Cooperative: a suspended
-// job is under others on its worker until the scheduler resumes it.
+// Full: the operating system also schedules suspended jobs, by the last level that it was told. Cooperative: a
+// suspended job stays under others on its worker until the scheduler resumes it.
 void PriorityScheduler::tell_level(std::uint32_t slot, std::uint32_t old_level) {
   const Job &job = jobs_[slot];
   const bool is_scheduled = job.state == JobState::Running || config_.preemption == Preemption::Full;
@@ -226,8 +228,8 @@ void PriorityScheduler::on_lowered(std::uint32_t slot) {
   job.priority_of = job.task;
   if (is_queued) push(slot);
   tell_level(slot, old_level);
-  // Jobs that wait for its group are looked at again, and it inherits from those that are left. Among them are jobs
-  // that wait for a thread: the group comes first when they are looked at.
+  // Puts jobs that wait for the group back into the ready queue, so that the job can inherit from those that remain.
+  // Some of them are parked for a thread: when tried again, they find the gate of their group first.
   if (task_of(job).group == kNil) return;
   const TaskGates &held = task_gates_[job.task.value];
   for (std::uint32_t i = 0; i < held.count; ++i) {
@@ -258,7 +260,7 @@ void PriorityScheduler::on_end(std::uint32_t slot) {
   const Job &job = jobs_[slot];
   Worker &worker = workers_[job.worker.value];
   if (job.state == JobState::Suspended) {
-    // Threads: the operating system ran it although we counted it as preempted.
+    // On threads, the operating system ran the job although the scheduler counted it as preempted.
     REDAG_CHECK(config_.preemption == Preemption::Full, "a job ended that is suspended under another");
     remove(slot);
   } else {
@@ -283,8 +285,8 @@ void PriorityScheduler::open(std::uint32_t worker) {
   open_workers_.push_back(worker);
 }
 
-// Where there is room, the most urgent parked job goes back to the ready queue. Called once for each place that becomes
-// free, and for each queued job that could have used it and is gone.
+// If the gate has room, its most urgent parked job goes back to the ready queue. Called once for each place that
+// becomes free, and for each queued job that is gone and could have used one.
 void PriorityScheduler::promote_one(Gate &gate) {
   const std::uint32_t slot = gate.parked.top();
   if (slot == kNil || gate.used == gate.capacity) return;
@@ -295,8 +297,8 @@ void PriorityScheduler::promote_one(Gate &gate) {
 
 // ---- the ready queue ----
 
-// A list for the started jobs of each level, then one for each of its tiers: the operating system goes on with a thread
-// that it preempted before it runs a new one of the same level (SCHED_FIFO), and so does the scheduler.
+// Each level has a list for its started jobs, then one for each of its tiers. SCHED_FIFO continues a preempted thread
+// before it runs a new one of the same level, and the scheduler does the same.
 std::uint32_t PriorityScheduler::list_of(const Job &job) const {
   const auto key = static_cast<std::uint32_t>(job.key);
   const std::uint32_t level = level_of(job);
@@ -316,7 +318,7 @@ void PriorityScheduler::remove(std::uint32_t slot) {
 void PriorityScheduler::assign_levels() {
   if (config_.levels == 0) return;
   const std::uint32_t tiers = tier_count();
-  level_of_key_.assign(2 * std::size_t{tiers}, config_.levels);  // of demoted jobs: below all others
+  level_of_key_.assign(2 * std::size_t{tiers}, config_.levels);  // demoted jobs: below all others
   for (const TaskState &task : tasks_) {
     if (task.life != TaskLife::Gone) level_of_key_[task.tier] = task.level;
   }
@@ -327,7 +329,7 @@ void PriorityScheduler::assign_levels() {
   }
 }
 
-// Gates, levels and the ready queue are built anew; parked jobs go back to the ready queue and find their gates again.
+// Rebuilds gates, levels and the ready queue. Parked jobs go back to the ready queue and are parked again when tried.
 void PriorityScheduler::on_reconfigured() {
   assign_levels();
   const std::size_t lowest = config_.levels > 0 ? config_.levels : tier_count();

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // ReDAG-RT's scheduler: one global order over all ready jobs of all DAGs (eqs. rm_priority and dispatch), per-DAG
-// bounds, exclusive groups, preemption. Semantics: docs/model.md. A value: no thread, no clock, no I/O; not
-// thread-safe.
+// bounds, exclusive groups, and preemption. docs/model.md defines the semantics. A value without thread, clock or I/O.
+// Not thread-safe.
 //
-// Each decision costs O(1) for static policies (O(log n) for edf and fifo), plus O(m) where a victim must be found.
+// A decision costs O(1) under static policies and O(log n) under edf and fifo, plus O(m) if it must find a victim.
 #pragma once
 
 #include <array>
@@ -19,8 +19,8 @@ namespace redag::sched {
 
 class PriorityScheduler final : public Lifecycle {
  public:
-  /// Requires config.workers > 0, valid DAGs with periods and deadlines set (inherit_periods), and a static policy
-  /// where levels are limited.
+  /// Requires config.workers > 0 and valid DAGs with periods and deadlines set (inherit_periods). Limited levels also
+  /// require a static policy.
   PriorityScheduler(const Workload &workload, const Config &config);
 
   void preemption_point(JobSlot job, Time now) override;
@@ -29,32 +29,32 @@ class PriorityScheduler final : public Lifecycle {
   [[nodiscard]] std::uint64_t thread_waits() const override { return thread_waits_; }
 
  private:
-  // What a job must pass to start, and holds until it ends: its task, its DAG, its group, and the platform's threads. A
-  // job that finds a gate full is parked there, out of the ready queue. Invariant: of all ready jobs that need the
-  // gate, the (capacity - used) most urgent ones are not parked there.
+  // A job must pass its gates to start and holds them until it ends: its task, its DAG, its group, and the platform's
+  // threads. A job that finds a gate full is parked there, outside the ready queue. Invariant: of all ready jobs that
+  // need the gate, the (capacity - used) most urgent ones are not parked there.
   struct Gate {
     std::uint32_t capacity = 1;
     std::uint32_t used = 0;       // jobs started and unfinished
-    std::uint32_t holder = kNil;  // group: the job that holds it
+    std::uint32_t holder = kNil;  // group: the job that holds the group
     HeapQueue parked;
   };
   enum class GateKind : std::uint8_t { Task, Dag, Group, Threads };
-  // The gates of one task, in the order in which they are tried: its own, and those that it shares with others. All
-  // that most tasks ever need is within a cache line.
+  // The gates of one task in the order in which they are tried: its own gate, then those that it shares with others.
+  // The alignment keeps them within one cache line.
   struct alignas(32) TaskGates {
     Gate own;
     std::array<std::uint32_t, 3> shared{};  // positions in shared_gates_
     std::array<GateKind, 3> kinds{};
-    std::uint8_t count = 0;  // of those shared
+    std::uint8_t count = 0;  // number of shared gates
   };
   struct Worker {
-    std::uint32_t running = kNil;  // the job that executes; kNil while the worker is free or awaits a decision
+    std::uint32_t running = kNil;  // the executing job; kNil while the worker is free or waits for a decision
     std::uint32_t stack = kNil;    // Cooperative: the topmost started job, running or suspended
-    bool open = false;  // Cooperative: a decision is due: a nested job ended, or a preemption point was reached
+    bool open = false;  // Cooperative: a nested job ended or a preemption point was reached, and a decision is due
   };
   struct Place {
     WorkerId worker;
-    std::uint32_t victim = kNil;  // the job that must give way
+    std::uint32_t victim = kNil;  // the job that loses the worker
   };
 
   void on_ready(std::uint32_t slot) override;
@@ -84,7 +84,8 @@ class PriorityScheduler final : public Lifecycle {
   void remove(std::uint32_t slot);
   [[nodiscard]] std::uint32_t top() const { return static_ ? levels_.top() : heap_.top(); }
   void promote_one(Gate &gate);
-  /// The gate that Job::parked_at says: a task's own has the number of the task, the shared ones follow.
+  /// Returns the gate of Job::parked_at. Positions below the number of tasks are the tasks' own gates; the shared ones
+  /// follow.
   [[nodiscard]] Gate &gate_at(std::uint32_t position) {
     return position < task_gates_.size() ? task_gates_[position].own : shared_gates_[position - task_gates_.size()];
   }
@@ -94,7 +95,7 @@ class PriorityScheduler final : public Lifecycle {
     f(gates.own);
     for (std::uint32_t i = 0; i < gates.count; ++i) f(shared_gates_[gates.shared[i]]);
   }
-  /// A started job holds its gates, up to its end.
+  /// A started job holds its gates until it ends.
   void hold_gates(std::uint32_t slot) {
     for_gates_of(jobs_[slot], [slot](Gate &gate) {
       ++gate.used;
@@ -106,7 +107,7 @@ class PriorityScheduler final : public Lifecycle {
   bool static_;
   LevelQueue levels_;  // the ready queue of static policies; otherwise heap_
   HeapQueue heap_;
-  // Limited levels, by key: the level, and the first key that has it. Empty: each tier is a level.
+  // Where levels are limited: the level of each key, and the first key of that level. Empty: each tier is a level.
   std::vector<std::uint32_t> level_of_key_;
   std::vector<std::uint32_t> first_of_level_;
   std::vector<TaskGates> task_gates_;  // by TaskId
@@ -115,7 +116,7 @@ class PriorityScheduler final : public Lifecycle {
   LevelBitmap free_workers_;
   std::vector<std::uint32_t> open_workers_;
   std::uint64_t thread_waits_ = 0;
-  std::uint32_t aside_ = kNil;  // during dispatch(): jobs that may not start, out of the queue; linked by Job::next
+  std::uint32_t aside_ = kNil;  // during dispatch(): held-back jobs, linked by Job::next; they may not start
 };
 
 }  // namespace redag::sched

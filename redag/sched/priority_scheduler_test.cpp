@@ -71,7 +71,7 @@ TEST(PriorityScheduler, ATiedLevelDoesNotPreempt) {
       workload.ties = ties;
       ManualWorkers workers = drive(workload, Preemption::Full, levels);
       workers.release("first").decide();
-      workers.at(1).release("second").decide();  // earlier in the order of tasks, of the same period
+      workers.at(1).release("second").decide();  // same period, but first in the order of tasks
       EXPECT_EQ(workers.running(), ties == Ties::Fixed && levels == 0 ? "second" : "first");
     }
   }
@@ -89,7 +89,7 @@ TEST(PriorityScheduler, OfEqualsTheEarlierReleaseGoesFirst) {
   }
 }
 
-// Also if it is seen later, and of one instant the order of tasks decides.
+// The turn is the nominal release even if the release is seen later. At one instant the order of tasks decides.
 TEST(PriorityScheduler, ATurnIsTheNominalRelease) {
   const Workload workload = make_workload({make_dag("a", {{"one", 10}, {"two", 10}, {"three", 10}, {"busy", 30}})}, 1);
   ManualWorkers workers = drive(workload, Preemption::None);
@@ -101,7 +101,7 @@ TEST(PriorityScheduler, ATurnIsTheNominalRelease) {
   EXPECT_EQ(workers.running(), "three");
 }
 
-// One that takes the place of a job keeps its turn, or with `overrun: skip` a busy equal would go first for ever.
+// A job that replaces another keeps its turn. Otherwise, with `overrun: skip`, a busy equal would go first for ever.
 TEST(PriorityScheduler, AJobThatTakesAPlaceHasItsTurn) {
   const Workload workload = make_workload({make_dag("a", {{"heavy", 20, 25}, {"light", 20}})}, 1);
   ManualWorkers workers = drive(workload, Preemption::None);
@@ -112,7 +112,7 @@ TEST(PriorityScheduler, AJobThatTakesAPlaceHasItsTurn) {
   EXPECT_EQ(workers.running(), "light");
 }
 
-// A job that waits for its predecessor is replaced, too.
+// A job that waits for its predecessor is replaced, too, and passes on its turn.
 TEST(PriorityScheduler, ATurnIsKeptWhileAJobWaitsForData) {
   const Workload workload = make_workload({make_dag("a", {{"heavy", 20, 25}, {"p", 20}, {"q", 20, 1, {1}}})}, 1);
   ManualWorkers workers = drive(workload, Preemption::None);
@@ -124,11 +124,11 @@ TEST(PriorityScheduler, ATurnIsKeptWhileAJobWaitsForData) {
   EXPECT_EQ(workers.running(), "q") << "before the second heavy";
 }
 
-// SCHED_FIFO goes on with a thread that it preempted before it runs a new one of its level.
+// SCHED_FIFO continues a thread that it preempted before it runs a new one of the same level.
 TEST(PriorityScheduler, APreemptedJobGoesOnBeforeItsEquals) {
   const Workload workload =
       make_workload({make_dag("a", {{"top", 5}, {"high", 10}, {"one", 20}, {"two", 20}, {"other", 30}})}, 1);
-  for (const std::uint32_t levels : {0U, 2U}) {  // two levels: `other` shares that of the two
+  for (const std::uint32_t levels : {0U, 2U}) {  // with two levels, `other` shares the level of `one` and `two`
     for (const char *preempted : {"two", "other"}) {
       if (levels == 0 && preempted == std::string("other")) continue;
       ManualWorkers workers = drive(workload, Preemption::Full, levels);
@@ -161,7 +161,7 @@ TEST(PriorityScheduler, EqualDeadlinesTakeTurns) {
     workload.ties = ties;
     ManualWorkers workers = drive(workload, Preemption::Full);
     workers.release("three").decide();
-    workers.at(5 * kMillisecond).release("two").decide();  // both by 15 ms
+    workers.at(5 * kMillisecond).release("two").decide();  // both have their deadline at 15 ms
     EXPECT_EQ(workers.running(), ties == Ties::Share ? "three" : "two");
   }
 }
@@ -187,8 +187,8 @@ TEST(PriorityScheduler, APreemptedJobGoesBackToItsWorkerIfThatIsFree) {
   EXPECT_EQ(workers.running(), "- low");
 }
 
-// The holder takes the waiting job's place in the total order, not its deadline alone: `second`, of the same deadline
-// as the waiting job and ahead of it, is ahead of the holder too.
+// The holder takes the waiting job's place in the total order, not only its deadline. `second` has the same deadline as
+// the waiting job and comes before it. It therefore comes before the holder, too.
 TEST(PriorityScheduler, InheritanceTakesTheWholePlaceInTheOrder) {
   const Workload workload = make_workload({make_dag("a", {{"holder", 40, 1, {}, "g"}, {"filler", 40}}),
                                            make_dag("b", {{"first", 20}, {"second", 20}, {"waiting", 20, 1, {}, "g"}})},
@@ -261,13 +261,13 @@ TEST(PriorityScheduler, DataOfAJobThatNeverStartedIsFreshAgain) {
   workers.release("source").release("sink").decide();
   workers.at(1).release("hog").finish("source").decide();
   EXPECT_EQ(workers.running(), "hog");
-  workers.at(20 * kMillisecond).release("sink").decide();  // the ready job of `sink` is skipped, its data is not lost
+  workers.at(20 * kMillisecond).release("sink").decide();  // the ready job of `sink` is skipped; its data is kept
   workers.at(21 * kMillisecond).finish("hog").decide();
   EXPECT_EQ(workers.running(), "sink");
   EXPECT_EQ(workers.accounting("sink").skipped, 1U);
 }
 
-// Threads stamp the end of a job before they get to report it.
+// Threads stamp the end of a job before they report it.
 TEST(PriorityScheduler, ADataJobIsReleasedWhenTheLastOfItsDataIsThere) {
   Workload workload = make_workload({make_dag("a", {{"p", 10}, {"q", 10}, {"both", 10}})}, 2);
   workload.dags[0].tasks[2].activation = Activation::Data;
@@ -316,7 +316,7 @@ TEST(PriorityScheduler, ADeferralIsCountedOnceAJob) {
   EXPECT_EQ(workers.accounting("y").deferred, 1U);
 }
 
-// The job that waits for a group must not keep the place of its DAG from another job.
+// A job that waits for a group must not take a place of its DAG from another job.
 TEST(PriorityScheduler, AJobThatWaitsHoldsNothing) {
   const Workload workload = make_workload(
       {make_dag("a", {{"x", 10, 1, {}, "g"}, {"y", 20}}, 1), make_dag("b", {{"holder", 30, 1, {}, "g"}})}, 2);
@@ -373,8 +373,8 @@ TEST(PriorityScheduler, EdfAndFifoOrderJobs) {
   }
 }
 
-// After construction nothing is allocated, whatever happens: thousands of random events, bounds, groups, queues,
-// preemption.
+// The scheduler allocates nothing after construction. The test has thousands of random events with bounds, groups,
+// queues and preemption.
 TEST(PriorityScheduler, AllocatesNothingInSteadyState) {
   for (const Preemption preemption : {Preemption::None, Preemption::Cooperative, Preemption::Full}) {
     for (const PolicyKind policy : {PolicyKind::RateMonotonic, PolicyKind::Edf, PolicyKind::Fifo}) {
@@ -411,7 +411,7 @@ TEST(PriorityScheduler, AllocatesNothingInSteadyState) {
   }
 }
 
-// A timer that woke late reports the releases of a task which it missed, all at once.
+// A timer that wakes late reports all releases of a task that it missed at one instant.
 TEST(PriorityScheduler, ManyReleasesOfATaskAtOnceAllocateNothing) {
   PriorityScheduler scheduler(make_workload({make_dag("d", {{"a", 1}})}, 1), {1, Preemption::None});
   for (Time now = 0; now < 3; ++now) {
@@ -435,7 +435,7 @@ TEST(PriorityScheduler, CountsJobsThatWaitForAThread) {
   EXPECT_EQ(scheduler.thread_waits(), 1U);
   scheduler.complete(low, 2, Outcome::Finished);
   scheduler.dispatch(2);
-  scheduler.release(TaskId(1), 3, 3);  // less urgent: it waits for the worker, and not for the thread
+  scheduler.release(TaskId(1), 3, 3);  // less urgent: it waits for the worker, not for the thread
   scheduler.dispatch(3);
   EXPECT_EQ(scheduler.thread_waits(), 1U);
 }
@@ -447,7 +447,7 @@ Task lone_task(Duration period) {
   return task;
 }
 
-// Tasks and DAGs, with edges and groups, come and go for ever while jobs run: storage grows to what is there at a time.
+// Tasks and DAGs with edges and groups come and go while jobs run. Memory grows only to what exists at one time.
 TEST(PriorityScheduler, ReusedIdsKeepMemoryFlat) {
   Rng rng(7);
   Config config{2, Preemption::Full, PolicyKind::RateMonotonic, 0, 0};
@@ -509,7 +509,7 @@ TEST(PriorityScheduler, WithoutReuseAnIdNamesOneTaskForEver) {
   }
 }
 
-// The operating system schedules suspended jobs too: a driver that does not hear of their levels inverts priorities.
+// The operating system also schedules suspended jobs. A driver that is not told of their levels inverts priorities.
 TEST(PriorityScheduler, TheLevelOfASuspendedJobIsTold) {
   const Workload workload = make_workload({make_dag("a", {{"slow", 100}, {"fast", 50}})}, 1);
   PriorityScheduler scheduler(workload, {1, Preemption::Full, PolicyKind::RateMonotonic, 0, 0});
@@ -518,8 +518,7 @@ TEST(PriorityScheduler, TheLevelOfASuspendedJobIsTold) {
   scheduler.release(TaskId(1), 1, 1);
   EXPECT_EQ(scheduler.dispatch(1).dispatches[0].over, slow);
   scheduler.add_dag(make_dag("b", {{"x", 1}, {"y", 2}}), 2);
-  scheduler.set_timing(TaskId(1), 40 * kMillisecond, 40 * kMillisecond,
-                       2);  // what is told twice in one step counts once
+  scheduler.set_timing(TaskId(1), 40 * kMillisecond, 40 * kMillisecond, 2);  // two changes of one step count once
   const Step step = scheduler.dispatch(2);
   ASSERT_EQ(step.dispatches.size(), 2U);
   EXPECT_TRUE(step.events.empty());

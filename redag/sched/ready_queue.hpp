@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Ready queues: the jobs that could run, most urgent first. Two of them behind one set of operations: LevelQueue for
-// static priorities, O(1) by a bitmap; HeapQueue for any order, O(log n) amortised. Both are intrusive (links live in
-// Job), so nothing is allocated after construction. They hold slots; the jobs themselves are passed in.
+// Ready queues: the jobs that could run, most urgent first. Two queues share one set of operations. LevelQueue serves
+// static priorities in O(1) by a bitmap; HeapQueue serves any order in O(log n) amortised. Both are intrusive (the
+// links live in Job) and never allocate after construction. They hold slots; the caller passes in the jobs. Not
+// thread-safe.
 #pragma once
 
 #include <bit>
@@ -16,7 +17,7 @@
 
 namespace redag::sched {
 
-/// A set of small integers with an O(1) minimum: 64-ary tree of words, three levels for 262,144 members.
+/// A set of small integers with an O(1) minimum: a 64-ary tree of words. Three levels hold 262,144 members.
 class LevelBitmap {
  public:
   explicit LevelBitmap(std::size_t size = 0) {
@@ -57,16 +58,16 @@ class LevelBitmap {
   }
 
  private:
-  std::vector<std::vector<std::uint64_t>> words_;  // [0] the leaves, last the root
+  std::vector<std::vector<std::uint64_t>> words_;  // [0]: the leaves; the last one: the root
 };
 
-/// Lists in order of urgency, a bitmap over them.
+/// One list of jobs for each urgency, and a bitmap of the lists that are not empty.
 class LevelQueue {
  public:
   explicit LevelQueue(std::size_t lists = 0) : bitmap_(lists), lists_(lists) {}
 
-  /// O(1) where the job comes last in its list, as jobs of one tier do that become ready in the order of their
-  /// releases; otherwise as many steps as jobs of the list come after it.
+  /// O(1) if the job comes last in its list, as it does if jobs of a tier become ready in the order of their releases.
+  /// Otherwise takes one step for each job of the list that comes after it.
   void push(std::span<Job> jobs, std::uint32_t slot, std::uint32_t to) {
     Job &job = jobs[slot];
     List &list = lists_[to];
@@ -89,7 +90,7 @@ class LevelQueue {
     job.child = job.next = job.previous = kNil;
   }
 
-  /// The first job's slot, or kNil.
+  /// Returns the first job's slot, or kNil.
   [[nodiscard]] std::uint32_t top() const { return bitmap_.empty() ? kNil : lists_[bitmap_.first()].head; }
 
  private:
@@ -101,7 +102,7 @@ class LevelQueue {
   std::vector<List> lists_;
 };
 
-/// Pairing heap by before(). Fredman, Sedgewick, Sleator, Tarjan, Algorithmica 1 (1986).
+/// A pairing heap ordered by before(). Fredman, Sedgewick, Sleator, Tarjan, Algorithmica 1 (1986).
 class HeapQueue {
  public:
   void push(std::span<Job> jobs, std::uint32_t slot) {
@@ -127,7 +128,7 @@ class HeapQueue {
   [[nodiscard]] std::uint32_t top() const { return root_; }
 
  private:
-  // Both are roots without siblings; the one that comes later becomes the other's first child.
+  // Melds two roots without siblings: the later one becomes the first child of the other.
   static std::uint32_t meld(std::span<Job> jobs, std::uint32_t a, std::uint32_t b) {
     if (before(jobs[b], jobs[a])) std::swap(a, b);
     jobs[b].next = jobs[a].child;
@@ -137,7 +138,7 @@ class HeapQueue {
     return a;
   }
 
-  // Two passes: siblings are melded in pairs from the left, the pairs from the right.
+  // Two passes: siblings are melded in pairs from the left, then the pairs from the right.
   static std::uint32_t merge_pairs(std::span<Job> jobs, std::uint32_t first) {
     std::uint32_t pairs = kNil;  // stack of melded pairs, linked by `previous`
     while (first != kNil) {

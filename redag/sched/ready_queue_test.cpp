@@ -14,7 +14,7 @@
 namespace redag::sched {
 namespace {
 
-// Both queues against an ordered set of the same jobs, under random pushes, removals of any job, and of the first.
+// Compares both queues with an ordered set of the same jobs: random pushes, removals of any job, removals of the first.
 template <class Queue>
 Queue make_queue(std::size_t levels);
 template <>

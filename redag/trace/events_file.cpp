@@ -22,8 +22,8 @@ namespace {
 
 constexpr std::string_view kFormat = "redag.events/1";
 
-// One event: [time,"kind",task,job,worker,value,"reason"]; worker -1: none. Millions of lines are read, so this form is
-// read by hand; it is JSON all the same.
+// Reads one event: [time,"kind",task,job,worker,value,"reason"]; worker -1: none. It is JSON, but a JSON parser would
+// be slow for millions of lines.
 class LineReader {
  public:
   explicit LineReader(std::string_view line) : rest_(line) {}
@@ -153,7 +153,7 @@ Result<Trace> parse_trace(std::string_view text, const std::string &file) {
       if (!info) return tl::unexpected<Diagnostics>(std::move(info.error()));
       trace.info = std::move(*info);
       task_count = trace.info.workload.task_count();
-      trace.events.reserve(text.size() / 48);  // a typical line
+      trace.events.reserve(text.size() / 48);  // length of a typical line
       continue;
     }
     if (footer) return file_error(file, number, "there is something after the last line");

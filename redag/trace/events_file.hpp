@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// events.jsonl, the lossless form of a trace: a line for the run, a line an event, a last line that proves that nothing
-// is missing. See docs/results_format.md. Not thread-safe.
+// events.jsonl, the lossless form of a trace: a line for the run, a line for each event, and a last line that proves
+// that no line is missing. See docs/results_format.md. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace redag::trace {
 
-/// Writes events as they come, for runs too long to be kept in memory.
+/// Writes events as they arrive, for runs that are too long to be kept in memory.
 class EventsWriter {
  public:
   /// `info.end` and `info.lost_events` may still be unknown. Errors: an invalid workload, an unwritable place.
@@ -23,7 +23,7 @@ class EventsWriter {
 
   void add(std::span<const JobEvent> events);
 
-  /// Completes the file; until then it does not exist.
+  /// Completes the file. Until then it does not exist.
   [[nodiscard]] Result<void> commit(Time end, std::uint64_t lost_events);
 
  private:
@@ -35,10 +35,10 @@ class EventsWriter {
 
 [[nodiscard]] Result<void> write_trace(const std::string &path, const Trace &trace);
 
-/// Errors name file and line. A file without its last line (cut off while being copied) is an error.
+/// Reads a trace. Errors name file and line. A file without its last line (an incomplete copy) is an error.
 [[nodiscard]] Result<Trace> read_trace(const std::string &path);
 
-/// The same for text in memory; `file` is what the errors call it.
+/// The same for text in memory; `file` is its name in errors.
 [[nodiscard]] Result<Trace> parse_trace(std::string_view text, const std::string &file);
 
 }  // namespace redag::trace

@@ -170,7 +170,7 @@ TEST_F(EventsFile, WrongHeadersAreErrors) {
   EXPECT_FALSE(parse_trace(no_workers, "f"));
 }
 
-// Cut anywhere, or with any byte changed: an error or another valid trace, never a crash.
+// A file that is cut anywhere, or has any byte changed, gives an error or another valid trace, never a crash.
 TEST_F(EventsFile, SurvivesDamage) {
   Trace small = example();
   small.events.resize(20);
@@ -202,7 +202,7 @@ TEST(ThisMachine, IsDescribed) {
   EXPECT_NE(machine.kernel, "");
 }
 
-// A file of before equals took turns was recorded in a fixed order.
+// Files from before equals took turns were recorded in a fixed order.
 TEST_F(EventsFile, WithoutAnOrderOfTiesItWasFixed) {
   const RunInfo info = example().info;
   std::string text = run_info_to_json(info);

@@ -37,15 +37,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kFormat = "redag.flight/1";
-constexpr std::size_t kBlockBytes = 4096;  // a page: a killed process leaves it as it was or as it was to be
+constexpr std::size_t kBlockBytes = 4096;  // a page: if the process is killed, it is either the old or the new one
 constexpr std::uint64_t kMaxInfoBytes = std::uint64_t{1} << 30U;
 
 struct BlockHeader {
-  std::uint32_t crc = 0;       // of all that follows in the block
-  std::uint32_t count = 0;     // of its events
-  std::uint64_t sequence = 0;  // of the block, from 1
-  std::uint64_t first = 0;     // events before this block
-  std::uint64_t lost = 0;      // events that the rings had lost by then
+  std::uint32_t crc = 0;       // of all later bytes in the block
+  std::uint32_t count = 0;     // number of its events
+  std::uint64_t sequence = 0;  // number of the block, from 1
+  std::uint64_t first = 0;     // number of events before this block
+  std::uint64_t lost = 0;      // number of events that the rings had lost by then
 };
 static_assert(sizeof(BlockHeader) == sizeof(JobEvent));
 
@@ -58,7 +58,7 @@ struct Block {
 static_assert(sizeof(Block) == kBlockBytes);
 
 std::uint32_t checksum(const Block &block) {
-  // The layout is the file's: all bytes behind the checksum.
+  // The layout is the file's: covers all bytes after the checksum.
   std::array<unsigned char, kBlockBytes> bytes;
   std::memcpy(bytes.data(), &block, bytes.size());
   constexpr std::size_t kSkipped = sizeof(BlockHeader::crc);
@@ -89,7 +89,7 @@ void sync_path(const std::string &path) {
   ::close(descriptor);
 }
 
-// Closes with its scope.
+// Closes the descriptor at the end of its scope.
 class Descriptor {
  public:
   explicit Descriptor(int value) : value_(value) {}
@@ -153,7 +153,7 @@ class FlightRecorder::Impl {
   }
 
  private:
-  // Blocks that lie beside each other in one call: the place of a block is its sequence number, modulo the capacity.
+  // Writes adjacent blocks in one call. The place of a block is (its sequence number - 1) modulo the capacity.
   Result<void> write_blocks() {
     std::uint64_t sequence = sequence_ - blocks_.size() + 1;
     for (std::span<const Block> rest = blocks_; !rest.empty();) {
@@ -195,7 +195,7 @@ class FlightRecorder::Impl {
     return std::thread([this] { keep_in_sync(); });
   }
 
-  // The disk can take long: whoever appends must not wait for it.
+  // The disk can take long, and the appending thread must not wait for it.
   void keep_in_sync() {
     for (;;) {
       bool with_info = false;
@@ -220,10 +220,10 @@ class FlightRecorder::Impl {
 
   std::string folder_;
   Descriptor file_;
-  std::uint64_t capacity_;  // blocks
+  std::uint64_t capacity_;  // in blocks
   Duration sync_every_;
-  std::uint64_t sequence_ = 0;  // of the last block
-  std::uint64_t first_ = 0;     // events so far
+  std::uint64_t sequence_ = 0;  // number of the last block
+  std::uint64_t first_ = 0;     // number of events so far
   std::uint64_t lost_ = 0;
   std::vector<Block> blocks_;
   bool broken_ = false;
@@ -231,9 +231,9 @@ class FlightRecorder::Impl {
   Mutex lock_;
   std::condition_variable_any changed_;
   bool stop_ REDAG_GUARDED_BY(lock_) = false;
-  bool news_ REDAG_GUARDED_BY(lock_) = true;       // not yet on the disk
-  bool info_news_ REDAG_GUARDED_BY(lock_) = true;  // so is the description of the run
-  std::thread syncer_;                             // last: it uses what is above
+  bool news_ REDAG_GUARDED_BY(lock_) = true;       // there are blocks that are not on the disk yet
+  bool info_news_ REDAG_GUARDED_BY(lock_) = true;  // the description of the run is not on the disk yet
+  std::thread syncer_;                             // last: it uses the members above
 };
 
 Result<FlightRecorder> FlightRecorder::create(const std::string &folder, const RunInfo &info,
@@ -251,7 +251,7 @@ Result<FlightRecorder> FlightRecorder::create(const std::string &folder, const R
   const std::string path = events_path(folder);
   Descriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
   if (file.get() < 0) return system_error(path, "cannot write", errno);
-  // While this process lives nobody takes the record for that of a run which has ended.
+  // While this process lives, no other process can take the record for that of an ended run.
   if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0) return system_error(path, "cannot lock", errno);
   try {
     return FlightRecorder(std::make_unique<Impl>(folder, std::move(file), options));
@@ -278,7 +278,7 @@ namespace {
 
 struct Description {
   RunInfo info;
-  std::vector<std::uint32_t> positions;  // of tasks, by the ids of the events; empty: they are the same
+  std::vector<std::uint32_t> positions;  // of tasks, by the events' ids; empty: ids are positions
 };
 
 Result<Description> read_info(const std::string &folder) {
@@ -309,7 +309,7 @@ Result<Description> read_info(const std::string &folder) {
   return found;
 }
 
-// All whole blocks of the file, in the order in which they were written; `damaged` counts the others.
+// Returns all whole blocks of the file in the order in which they were written. `damaged` counts the others.
 Result<std::vector<Block>> read_blocks(const std::string &path, std::uint64_t &damaged) {
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.get() < 0) return system_error(path, "cannot open", errno);
@@ -330,7 +330,7 @@ Result<std::vector<Block>> read_blocks(const std::string &path, std::uint64_t &d
   return blocks;
 }
 
-// In the workload's words, or nothing if it cannot be one of this run.
+// Returns the event with the workload's task id, or nothing if it cannot belong to this run.
 std::optional<JobEvent> read_event(JobEvent event, const Description &run, std::size_t tasks, Time not_before) {
   if (!run.positions.empty()) {
     if (event.task.value >= run.positions.size()) return std::nullopt;
@@ -352,7 +352,7 @@ Result<Recovered> recover(const std::string &folder) {
   const Result<std::vector<Block>> blocks = read_blocks(events_path(folder), found.damaged);
   if (!blocks) return tl::unexpected<Diagnostics>(blocks.error());
 
-  // A gap ends the record: without what is missing nobody can judge what follows.
+  // A gap ends the record, because later events cannot be judged without the missing ones.
   std::vector<JobEvent> &events = found.trace.events;
   const std::size_t tasks = found.trace.info.workload.task_count();
   std::uint64_t lost = 0;
@@ -372,7 +372,7 @@ Result<Recovered> recover(const std::string &folder) {
       events.push_back(*event);
     }
   }
-  // The last instant may be there in part.
+  // The last instant may be incomplete.
   if (!events.empty()) {
     const Time end = events.back().time;
     found.trace.info.end = end;

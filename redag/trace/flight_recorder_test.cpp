@@ -33,7 +33,7 @@ RunInfo example() {
   return info;
 }
 
-// One instant each.
+// Events at one instant each.
 std::vector<JobEvent> events(std::size_t from, std::size_t count) {
   std::vector<JobEvent> made(count);
   for (std::size_t i = 0; i < count; ++i) {
@@ -58,7 +58,7 @@ class FlightRecord : public ::testing::Test {
     EXPECT_TRUE(found) << (found ? "" : to_string(found.error()));
     return found ? std::move(*found) : Recovered{};
   }
-  // `bytes` over the record's from `offset` on.
+  // Writes `bytes` over those of the record, from `offset` on.
   void overwrite(std::size_t offset, const std::string &bytes) const {
     std::fstream file(folder_ + "/events.bin", std::ios::in | std::ios::out | std::ios::binary);
     file.seekp(static_cast<std::streamoff>(offset));
@@ -124,7 +124,7 @@ TEST_F(FlightRecord, NewEventsReplaceTheOldest) {
     for (std::size_t i = 0; i < 10; ++i) {
       ASSERT_TRUE(recorder.append(events(i * kBlockEvents, kBlockEvents), 0));
     }
-    // More than there is room for in one call, across the end of the file.
+    // Exceeds the capacity in one call, across the end of the file.
     ASSERT_TRUE(recorder.append(events(10 * kBlockEvents, 3 * kBlockEvents), 0));
   }
   EXPECT_EQ(fs::file_size(folder_ + "/events.bin"), kBlocks * kBlockBytes);
@@ -134,7 +134,7 @@ TEST_F(FlightRecord, NewEventsReplaceTheOldest) {
   EXPECT_EQ(found.trace.info.lost_events, 9 * kBlockEvents) << "the trace has a hole at its beginning";
 }
 
-// A machine that loses power leaves some blocks as they were before, or half.
+// A machine that loses power leaves some blocks with their old content, or half written.
 TEST_F(FlightRecord, EndsBeforeTheFirstBlockThatIsNotWhole) {
   {
     FlightRecorder recorder = create();
@@ -169,7 +169,7 @@ TEST_F(FlightRecord, AnotherDescriptionReplacesTheFirst) {
   EXPECT_EQ(recovered().trace.events.size(), 2U);
 }
 
-// A driver whose tasks come and go numbers them otherwise than the workload that describes them in the end.
+// A driver whose tasks come and go uses other ids than the workload that describes the run at its end.
 TEST_F(FlightRecord, IdsOfTheDriverBecomePositions) {
   FlightRecorder recorder = create();
   ASSERT_TRUE(recorder.describe(example(), std::vector<std::uint32_t>{1, 0, 1}));
@@ -215,7 +215,7 @@ TEST_F(FlightRecord, EventsOfAnotherRunAreAnError) {
 TEST_F(FlightRecord, AFullDiskIsToldOnce) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full";
   FlightRecorder recorder = create();
-  // The recorder's file becomes one that takes nothing.
+  // Replaces the recorder's file by one that fails every write.
   for (const fs::directory_entry &entry : fs::directory_iterator("/proc/self/fd")) {
     std::error_code ignored;
     if (fs::read_symlink(entry.path(), ignored) != fs::path(folder_) / "events.bin") continue;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A file that appears whole or not at all: written under a temporary name beside its place and renamed by commit().
-// Every error (unwritable directory, full disk) is kept and reported by commit(). Not thread-safe.
+// A file that appears completely or not at all: written under a temporary name in the same directory, and renamed by
+// commit(). Every error (unwritable directory, full disk) is kept and reported by commit(). Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -15,20 +15,20 @@ namespace redag::trace {
 
 class OutputFile {
  public:
-  /// Opens "<path>.tmp.<pid>"; the directory must exist.
+  /// Opens "<path>.tmp.<pid>". The directory must exist.
   [[nodiscard]] static Result<OutputFile> create(std::string path);
 
   OutputFile(OutputFile &&other) noexcept;
   OutputFile &operator=(OutputFile &&) = delete;
   OutputFile(const OutputFile &) = delete;
   OutputFile &operator=(const OutputFile &) = delete;
-  /// Without commit() the temporary file is removed and `path` is as it was.
+  /// Without commit(), removes the temporary file and leaves `path` as it was.
   ~OutputFile();
 
-  /// Appends, buffered. After an error does nothing.
+  /// Appends, buffered. Does nothing after an error.
   void write(std::string_view text);
 
-  /// Flushes and takes the final name, replacing what was there.
+  /// Flushes and renames the file to its final name, replacing an existing file.
   [[nodiscard]] Result<void> commit();
 
  private:
@@ -43,13 +43,13 @@ class OutputFile {
   std::string buffer_;
 };
 
-/// The largest file that is read: what has no end (a device, a pipe) must not take all memory.
+/// The largest file that is read: an endless one (a device, a pipe) must not use all memory.
 inline constexpr std::size_t kMaxFileBytes = std::size_t{8} << 30U;
 
-/// The whole of a file, for readers of our formats. Errors name the file.
+/// Reads a whole file, for readers of our formats. Errors name the file.
 [[nodiscard]] Result<std::string> read_file(const std::string &path, std::size_t most = kMaxFileBytes);
 
-/// One error at a line of a file.
+/// Makes one error at a line of a file.
 [[nodiscard]] tl::unexpected<Diagnostics> file_error(const std::string &file, int line, std::string message,
                                                      std::string hint = {});
 

@@ -79,7 +79,7 @@ TEST_F(OutputFileTest, FailedRenameIsReportedAndCleansUp) {
 }
 
 TEST(OutputFile, FullDiskIsReported) {
-  // /dev/full fails every write, but cannot be renamed over: write to it through a link under the temporary's name.
+  // /dev/full fails every write, but cannot be renamed over. Writes to it through a link with the temporary's name.
   const fs::path directory = fs::path(testing::TempDir()) / ("redag_full." + std::to_string(::getpid()));
   fs::create_directories(directory);
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
@@ -99,7 +99,7 @@ TEST(ReadFile, DevicesAndLongFilesAreErrors) {
   const auto device = read_file("/dev/zero");
   ASSERT_FALSE(device);
   EXPECT_EQ(device.error().front().message, "is a device, not a file");
-  // Whatever it says its size is.
+  // The limit holds for any reported size.
   const auto kernel = read_file("/proc/self/maps", 16);
   ASSERT_FALSE(kernel);
   EXPECT_EQ(kernel.error().front().message, "longer than 0 MiB");

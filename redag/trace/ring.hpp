@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A ring of JobEvents from one writing thread to one reading thread. Owns its storage, which is allocated once; push()
-// never blocks, allocates or fails loudly: what does not fit is dropped and counted. Threads: push() from one thread,
-// pop() from one other; capacity(), pushed() and dropped() from any.
+// A ring of JobEvents from one writing thread to one reading thread. Owns its storage, which is allocated once. push()
+// never blocks or allocates; an event that does not fit is dropped and counted. Threads: push() from one thread, pop()
+// and drain() from one other; capacity(), pushed() and dropped() from any.
 #pragma once
 
 #include <algorithm>
@@ -20,18 +20,18 @@ namespace redag::trace {
 
 class Ring {
  public:
-  /// Room for at least `capacity` events (rounded up to a power of two, >= 2).
+  /// Makes room for at least `capacity` events (rounded up to a power of two, >= 2).
   explicit Ring(std::size_t capacity)
       : slots_(std::bit_ceil(std::max<std::size_t>(capacity, 2))), mask_(slots_.size() - 1) {}
 
   Ring(const Ring &) = delete;
   Ring &operator=(const Ring &) = delete;
 
-  /// Producer only. False if the ring was full and the event is lost.
+  /// Producer only. Returns false if the ring was full and the event is lost.
   bool push(const JobEvent &event) noexcept {
     const std::uint64_t tail = producer_.index.load(std::memory_order_relaxed);
     if (tail - producer_.other >= slots_.size()) {
-      // The reader's index is read only when the last known one says "full": no cache line bounces in steady state.
+      // Reads the reader's index only when the last known one says "full": no cache line bounces in steady state.
       producer_.other = consumer_.index.load(std::memory_order_acquire);
       if (tail - producer_.other >= slots_.size()) {
         dropped_.store(dropped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
@@ -53,7 +53,7 @@ class Ring {
     return count;
   }
 
-  /// Consumer only. Appends everything there is to `out`; returns how many.
+  /// Consumer only. Appends all available events to `out`; returns how many.
   std::size_t drain(std::vector<JobEvent> &out) {
     const std::uint64_t head = consumer_.index.load(std::memory_order_relaxed);
     const std::size_t count = producer_.index.load(std::memory_order_acquire) - head;
@@ -64,17 +64,17 @@ class Ring {
 
   [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
 
-  /// Events lost so far because the reader was behind.
+  /// Number of events lost so far because the reader was behind.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
-  /// Events accepted so far.
+  /// Number of events accepted so far.
   [[nodiscard]] std::uint64_t pushed() const noexcept { return producer_.index.load(std::memory_order_acquire); }
 
  private:
   // std::hardware_destructive_interference_size changes with compiler flags; 64 is right for x86-64 and most of ARM.
   static constexpr std::size_t kCacheLine = 64;
 
-  // An end of the ring: its own index, which the other end reads, and what it last saw of the other end's.
+  // One end of the ring: its own index, which the other end reads, and the last known index of the other end.
   struct alignas(kCacheLine) End {
     Atomic<std::uint64_t> index{0};
     std::uint64_t other = 0;

@@ -61,8 +61,8 @@ TEST(Ring, PopTakesAtMostWhatFits) {
   EXPECT_EQ(rest.front(), numbered(2));
 }
 
-// Everything accepted arrives, once, whole and in order, whatever the reader's pace; under TSan this also shows that
-// the slots are handed over by the indices alone.
+// Every accepted event arrives once, complete and in order, at any pace of the reader. Under TSan this also shows that
+// the indices alone hand over the slots.
 TEST(Ring, TwoThreadsLoseNothingThatWasAccepted) {
   constexpr std::uint32_t kCount = 200'000;
   Ring ring(256);

@@ -25,7 +25,7 @@ constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::Deadlin
 constexpr std::array kPreemptions = {sched::Preemption::None, sched::Preemption::Cooperative, sched::Preemption::Full};
 constexpr std::array kDrivers = {Driver::Simulator, Driver::Threads, Driver::Ros, Driver::RosNodes};
 
-// Thrown inside this file only; run_info_from_json() turns it into a Diagnostic.
+// Thrown only inside this file. run_info_from_json() turns it into a Diagnostic.
 struct BadValue : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -79,7 +79,7 @@ sched::Config config_from(const Json &json) {
   config.preemption = one_of(kPreemptions, preemption_name, text_of(json, "preemption"), "preemption");
   config.policy = one_of(
       kPolicies, [](PolicyKind p) { return to_string(p); }, text_of(json, "policy"), "policy");
-  // Before ties were shared, every order was fixed, and the file says nothing.
+  // Files from before ties were shared do not state them; their order was fixed.
   constexpr std::array kTies = {Ties::Share, Ties::Fixed};
   config.ties = Ties::Fixed;
   if (json.contains("ties")) {

@@ -10,7 +10,7 @@
 namespace redag::trace {
 namespace {
 
-// The first "model name" of /proc/cpuinfo; empty where there is none (most ARM kernels).
+// The first "model name" of /proc/cpuinfo; empty if there is none (most ARM kernels).
 std::string processor_name() {
   std::ifstream file("/proc/cpuinfo");
   std::string line;
@@ -25,7 +25,7 @@ std::string processor_name() {
 }  // namespace
 
 bool has_valid_times(const JobEvent &event) {
-  // A deadline lies behind the end of the longest run at most by the longest deadline there is.
+  // A deadline lies after the end of the longest run by at most the longest deadline.
   constexpr Time kMaxValue = kMaxTraceTime + kMaxDuration;
   return event.time >= -kMaxTraceTime && event.time <= kMaxTraceTime && event.value >= -kMaxValue &&
          event.value <= kMaxValue;

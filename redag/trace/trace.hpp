@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A run, as it is kept: what happened (events, in decision order) and what a reader must know to judge it (RunInfo).
-// Plain values; see events_file.hpp for the text form and docs/results_format.md for the files.
+// A recorded run: its events in decision order, and what a reader must know to judge them (RunInfo). Plain values; see
+// events_file.hpp for the text form and docs/results_format.md for the files.
 #pragma once
 
 #include <cstdint>
@@ -17,16 +17,16 @@
 
 namespace redag::trace {
 
-/// What moved time forward, and who saw it. All but the simulator have a real clock: stamps have noise, and decisions
-/// follow each other within nanoseconds.
+/// What drove the run, and who recorded it. All drivers but the simulator use a real clock: times have noise, and
+/// decisions of one instant are some nanoseconds apart.
 enum class Driver : std::uint8_t {
   Simulator,  // virtual time: exact, and equal for equal seeds
   Threads,    // the threaded runtime
-  Ros,        // our executor under rclcpp: timers have no common grid, and messages release
-  RosNodes,   // callbacks of ROS 2 nodes on any executor: they see when they begin and end, but no decision
+  Ros,        // our executor under rclcpp: timers have no common grid, and messages release jobs
+  RosNodes,   // callbacks of ROS 2 nodes on any executor: starts and ends are recorded, but no decisions
 };
 
-/// The machine of a real-time run; defaults where nobody looked.
+/// The machine of a real-time run; default values if unknown.
 struct Machine {
   std::uint32_t cpus = 0;  // processors the run could use; 0: unknown
   std::string kernel;      // "Linux 6.1.0-rt7 x86_64"
@@ -35,16 +35,16 @@ struct Machine {
   friend bool operator==(const Machine &, const Machine &) = default;
 };
 
-/// Times of a trace are at most this far from 0 (73 years), so that no difference of two overflows, nor one with the
-/// latest deadline.
+/// Times of a trace are at most this far from 0 (73 years). No difference of two times, or of a time and the latest
+/// deadline, overflows.
 inline constexpr Time kMaxTraceTime = kMaxDuration / 2;
 
 struct RunInfo {
-  Workload workload;           // task ids of the events index this
+  Workload workload;           // task ids of the events are indices in it
   std::string executor;        // "redag", "mte", "ste", ...
-  sched::Config config;        // what the scheduler was told
-  std::string preemption;      // mode that really ran: "none", "cooperative", "os", "full"
-  std::string preemption_why;  // why that one; empty: it was asked for
+  sched::Config config;        // the scheduler's configuration
+  std::string preemption;      // the mode that really ran: "none", "cooperative", "os", "full"
+  std::string preemption_why;  // why this mode; empty: it was asked for
   Driver driver = Driver::Simulator;
   std::uint64_t seed = 0;
   Time start = 0;                 // origin of the release grid: job k of a timer is released at start + offset + k * T
@@ -52,9 +52,9 @@ struct RunInfo {
   Duration warm_up = 0;           // jobs released before start + warm_up are not counted
   bool stepped = false;           // at times no job could start, or one at a time: a free worker proves nothing
   std::uint64_t lost_events = 0;  // dropped by full rings: the stream has holes if > 0
-  std::string overheads;          // what the driver added to execution; empty: nothing (the model's ideal machine)
+  std::string overheads;  // overheads that the driver added to execution; empty: none (the model's ideal machine)
   Machine machine;
-  Provenance provenance;  // of the program that ran it; unknown in files of before there was such a block
+  Provenance provenance;  // of the program that ran it; unknown in files from before this block existed
 };
 
 struct Trace {
@@ -62,16 +62,16 @@ struct Trace {
   std::vector<JobEvent> events;
 };
 
-/// Can differences of its times be taken? What a reader has to ask of an event.
+/// Returns true if differences of the event's times cannot overflow. Readers must check it.
 [[nodiscard]] bool has_valid_times(const JobEvent &event);
 
 [[nodiscard]] const char *to_string(Driver driver);
 [[nodiscard]] const char *preemption_name(sched::Preemption mode);
 
-/// This machine's Machine, as far as the operating system tells.
+/// Describes this machine, as far as the operating system allows.
 [[nodiscard]] Machine this_machine();
 
-/// "control.ekf": DAG and task by name; "task 17" if there is no such task.
+/// For example "control.ekf" (DAG and task); "task 17" if there is no such task.
 [[nodiscard]] std::string task_name(const Workload &workload, TaskId task);
 
 }  // namespace redag::trace

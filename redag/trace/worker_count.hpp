@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// How many jobs could run at the same time, whatever the driver counts as workers.
+// How many jobs of a run could execute at the same time, for any driver. A pure function.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace redag::trace {
 
-/// Workers of the run. ROS 2 nodes see the threads that executed their callbacks (config.workers): with preemption `os`
-/// more than ran at the same time, and not the same number in each repetition.
+/// Returns the workers of the run. For ROS 2 nodes, config.workers counts the threads that executed callbacks. With
+/// preemption `os` these are more than ran at the same time, and their number differs between repetitions.
 [[nodiscard]] inline std::uint32_t worker_count(const RunInfo &info) {
   return info.driver == Driver::RosNodes ? info.workload.platform.workers : info.config.workers;
 }
