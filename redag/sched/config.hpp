@@ -17,8 +17,8 @@ enum class Preemption : std::uint8_t {
   Full,         // a job can be preempted at any time and resumed on any worker
 };
 
-/// Returns the preemption that a mode asks of the platform. `Auto` counts as `Os`: a driver that may get less resolves it
-/// first.
+/// Returns the preemption that a mode asks of the platform. `Auto` counts as `Os`: a driver that may get less resolves
+/// it first.
 [[nodiscard]] constexpr Preemption preemption_of(PreemptionMode mode) {
   switch (mode) {
     case PreemptionMode::None: return Preemption::None;
