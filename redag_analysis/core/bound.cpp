@@ -76,7 +76,7 @@ Bound from_units(const System &system, std::vector<ResponseBound> units) {
   for (std::size_t d = 0; d < system.dags.size(); ++d) {
     const std::vector<std::uint32_t> &own = system.dags[d].units;
     if (own.empty()) continue;
-    // The unit that ends last speaks for the DAG; one without a bound leaves it without.
+    // The DAG takes the bound of the unit that ends last. If any unit has no bound, neither has the DAG.
     const auto last = *std::max_element(own.begin(), own.end(), [&](std::uint32_t a, std::uint32_t b) {
       return units[a].response.value_or(kNever) < units[b].response.value_or(kNever);
     });

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a schedulability analysis is and what it answers. A method is a pure function of a System; it answers with a
-// bound or says why it does not apply, and it says no when in doubt. Response times run from the nominal release.
+// The interface of the schedulability methods. A method is a pure function of a System. It answers with a bound or says
+// why it does not apply; in doubt it says no. Response times run from the nominal release.
 #pragma once
 
 #include <cstdint>
@@ -17,35 +17,35 @@
 
 namespace redag::analysis {
 
-/// One share of a response time, so that a user sees what to change.
+/// One part of a response time. The terms show a user what to change.
 struct Term {
   enum class Kind : std::uint8_t {
-    Own,       // the task's, or its unit's, own execution
-    Earlier,   // earlier jobs of the same task in the busy period, less the time since they were released (<= 0 too)
-    Blocking,  // by less urgent work that cannot be preempted, or that holds the group
-    Interference,  // by more urgent work
-    Jitter,        // the release seen late
-    Wait,          // for data of predecessors of other rates; of a DAG, also the age of that data
-    Overhead,      // the platform's, for this job; overheads of others are part of their terms
-    Waiting,       // for workers, predecessors and releases together, where nobody's share can be told
+    Own,           // own execution of the task or of its unit
+    Earlier,       // earlier jobs of the task in the busy period, less the time since their release; can be <= 0
+    Blocking,      // less urgent work that cannot be preempted, or that holds the group
+    Interference,  // more urgent work
+    Jitter,        // the time by which the release is seen late
+    Wait,          // waiting for data of predecessors of other rates; for a DAG, also the age of that data
+    Overhead,      // the platform's overhead for this job; the terms of others include their own
+    Waiting,       // waiting for workers, predecessors and releases together, where it cannot be attributed
   };
   Kind kind = Kind::Own;
-  TaskId task;  // whose; neither: nobody in particular
-  DagId dag;    // whose, where a unit of several tasks is meant
+  TaskId task;  // the task that causes it; neither `task` nor `dag`: no single cause
+  DagId dag;    // the DAG that causes it, where a unit of several tasks does
   Duration amount = 0;
-  std::int64_t jobs = 0;  // how many jobs it stands for, 0 where that has no meaning
+  std::int64_t jobs = 0;  // number of jobs that it stands for; 0 where a number has no meaning
 
   friend bool operator==(const Term &, const Term &) = default;
 };
 
-/// Bound on the response time of every job of a task, or of every instance of a DAG. Invariant: with a response, the
-/// terms add up to it; there are none where it was not to be itemised (effort.hpp).
+/// A bound on the response time of every job of a task, or of every instance of a DAG. If there is a response, the
+/// terms add up to it; there are no terms if the caller did not ask to itemise this bound (effort.hpp).
 struct ResponseBound {
-  std::optional<Duration> response;  // nothing: no bound, see `absent`
-  std::string_view absent;           // why there is none: a sentence without a period
+  std::optional<Duration> response;  // empty: no bound, see `absent`
+  std::string_view absent;           // why there is no bound: a sentence without a period
   std::vector<Term> terms;
-  /// From readiness (the release as seen) to the finish, where a method finds that to be more than `response` less
-  /// jitter.
+  /// The longest time from readiness (the release as seen) to the finish. Only a method that finds more than `response`
+  /// less jitter sets it.
   Duration from_ready = 0;
 
   [[nodiscard]] Duration sum(Term::Kind kind) const;
@@ -53,25 +53,26 @@ struct ResponseBound {
 
 struct NotApplicable {
   std::string reason;
-  bool gave_up = false;  // it would apply, and was ended at a limit or by the caller
+  bool gave_up = false;  // the method applies, but a limit or the caller ended it
 };
 
-/// What a task answers within in each mode (amc_rtb); nothing: no bound, or none is given in that mode.
+/// The response times of a task in each mode (amc_rtb). An empty value means that there is no bound, or none for that
+/// mode.
 struct ModeResponses {
-  std::optional<Duration> low;     // a job that ends in LO mode
-  std::optional<Duration> high;    // one that is released in HI mode
-  std::optional<Duration> change;  // one that sees HI mode begin
+  std::optional<Duration> low;     // of jobs that end in LO mode
+  std::optional<Duration> high;    // of jobs that are released in HI mode
+  std::optional<Duration> change;  // of jobs during which HI mode begins
 };
 
 struct Bound {
-  std::vector<ResponseBound> tasks;  // by TaskId; empty: the method bounds no response times
+  std::vector<ResponseBound> tasks;  // by TaskId; empty if the method bounds no response times
   std::vector<ResponseBound> dags;   // by DagId, from the source's release to the finish of the last task; or empty
-  std::vector<ModeResponses> modes;  // by TaskId, of methods that know modes
-  /// Tests that answer yes or no for all tasks together. True: every deadline is met. False: nothing is known.
+  std::vector<ModeResponses> modes;  // by TaskId; only from methods that know modes
+  /// The answer of a test for all tasks together. True: every deadline is met. False: the test shows nothing.
   std::optional<bool> accepts;
-  /// What the test compared, for people: "U = 0.812, limit 0.780".
+  /// What the test compared, as text for a reader: "U = 0.812, limit 0.780".
   std::string figures;
-  /// Why these numbers must not be trusted here (only of methods labelled `paper`); empty: the bound is sound.
+  /// Why these numbers must not be trusted here. Only methods labelled `paper` set it; empty: the bound is sound.
   std::string unsound;
 };
 
@@ -85,12 +86,12 @@ enum class Subject : std::uint8_t { Task, Dag, System };
 struct Method {
   std::string_view name{};  // as in "--method rta_preemptive"
   Subject subject = Subject::Task;
-  std::string_view cite{};         // authors, title, where, year
-  std::string_view assumptions{};  // when it applies, in words
+  std::string_view cite{};         // authors, title, place of publication, year
+  std::string_view assumptions{};  // when the method applies, in words
   std::string_view complexity{};
-  std::string_view sound_only_if{};  // of the paper's own equations; empty: sound wherever it applies
-  bool quick = false;                // about linear in the tasks: worth asking first
-  bool knows_modes = false;          // applies where there is a HI mode (System::has_modes)
+  std::string_view sound_only_if{};  // what the paper's own equations need to be sound; empty: nothing more
+  bool quick = false;                // its time is about linear in the tasks, so it is worth asking first
+  bool knows_modes = false;          // it applies where there is a HI mode (System::has_modes)
   std::function<Outcome(const System &system)> apply{};
 
   [[nodiscard]] bool is_paper() const { return !sound_only_if.empty(); }
@@ -100,22 +101,22 @@ enum class Verdict : std::uint8_t { Schedulable, NotShown };
 
 [[nodiscard]] const char *to_string(Verdict verdict);
 
-/// A job of the task meets its deadline and none is skipped.
+/// True if every job of the task meets its deadline and none is skipped.
 [[nodiscard]] bool meets_deadline(const SystemTask &task, const ResponseBound &bound);
-/// Schedulable where the bound covers every task (and every DAG with a deadline) and each is met, or the test accepts.
-/// Says nothing of `unsound`.
+/// Schedulable if the test accepts, or if the bound covers every task and every DAG with a deadline and each deadline
+/// is met. The verdict ignores `unsound`.
 [[nodiscard]] Verdict verdict(const System &system, const Bound &bound);
 
-/// The bound, or none where its response is kUnbounded.
+/// Returns the bound, or one without a response if its response is kUnbounded.
 [[nodiscard]] ResponseBound if_bounded(ResponseBound bound);
 
-/// Responses of units (by unit) as those of their tasks and DAGs: a task answers no later than its unit, a DAG with
-/// its last unit.
+/// Turns the responses of units (by unit) into those of their tasks and DAGs. A task answers no later than its unit,
+/// and a DAG with its last unit.
 [[nodiscard]] Bound from_units(const System &system, std::vector<ResponseBound> units);
 
-/// Every method known, in the order in which a report shows them. Adding one: a file pair and a line in methods.cpp.
+/// Every method, in the order in which a report shows them. To add one, add a file pair and a line in methods.cpp.
 [[nodiscard]] const std::vector<Method> &methods();
-/// Of methods(); null for an unknown name.
+/// Finds a method of methods() by name; null for an unknown name.
 [[nodiscard]] const Method *find_method(std::string_view name);
 
 }  // namespace redag::analysis

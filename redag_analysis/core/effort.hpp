@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What an analysis may cost, and whether it itemises its bounds: set by the caller for the current thread, looked at by
-// the loops of the methods, so that every method is bounded in time and none needs a parameter for it. Outside any
-// scope a method itemises all bounds and runs to its end.
+// What an analysis may cost, and whether it itemises its bounds. The caller sets both for the current thread, and the
+// loops of the methods check them. Every method is thus bounded in time without a parameter for it. Outside any scope a
+// method itemises all bounds and runs to its end.
 #pragma once
 
 #include <cstdint>
@@ -13,17 +13,17 @@
 
 namespace redag::analysis {
 
-/// Steps that a method may take by default, a few seconds: one step looks at one other task in one evaluation.
+/// The default limit on the steps of a method, a few seconds. One step looks at one other task in one evaluation.
 inline constexpr std::uint64_t kUsualEffort = 500'000'000;
 
-/// Whose bounds are itemised: terms of all n tasks are n^2 terms.
+/// Selects the bounds that are itemised. The terms of all n tasks would be n^2 terms.
 struct Itemised {
   enum class Which : std::uint8_t { None, Units, All };
   Which which = Which::All;
   std::vector<std::uint32_t> units;  // positions in System::units, for Units
 };
 
-/// How far the method at work is, for people.
+/// The progress of the running method, to show to a reader.
 struct EffortAt {
   std::uint64_t steps = 0;
   double done = 0;  // in [0, 1]; 0 where the method cannot tell
@@ -33,35 +33,35 @@ class Effort {
  public:
   struct Limits {
     std::uint64_t steps = 0;  // 0: no limit
-    /// Asked every few milliseconds. A reason ends the method.
+    /// Called after every million steps. A non-empty reason ends the method.
     std::function<std::string(const EffortAt &)> stop;
     Itemised itemised;
   };
 
-  /// Thrown out of spend(), caught by whoever made `scope`.
+  /// Thrown by spend(), and caught by the code that created `scope`.
   struct GaveUp {
     const Effort *scope;
     std::string why;  // a clause without a period
   };
 
-  /// Until it is destroyed: on this thread, inside the scope that is there already. `limits` must outlive it.
+  /// Opens a scope on this thread until it is destroyed, inside the scope that is open already. `limits` must outlive
+  /// it.
   explicit Effort(const Limits &limits) : limits_(limits), outer_(current) { current = this; }
   ~Effort() { current = outer_; }
   Effort(const Effort &) = delete;
   Effort &operator=(const Effort &) = delete;
 
-  /// Counted so far.
   [[nodiscard]] std::uint64_t steps() const { return at_.steps + unseen_; }
 
-  /// Counts steps; throws GaveUp at a limit of any scope. Cheap.
+  /// Counts steps, and throws GaveUp when they exceed a limit of any open scope. Cheap.
   static void spend(std::uint64_t steps) {
     if (current == nullptr) return;
     current->unseen_ += steps;
     if (current->unseen_ >= kLookEvery) look();
   }
-  /// `part` of `whole` units are done, each dearer than the one before by the same amount.
+  /// Reports that `part` of `whole` units are done. Assumes that the cost of a unit grows linearly with its position.
   static void reached(std::size_t part, std::size_t whole);
-  /// Are the bounds of this unit to be itemised?
+  /// True if the bounds of this unit are to be itemised.
   [[nodiscard]] static bool itemises(std::uint32_t unit);
 
  private:

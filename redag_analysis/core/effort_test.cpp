@@ -20,7 +20,7 @@ namespace {
 using testing::BoundCase;
 using testing::BoundCaseLimits;
 
-// Independent tasks of three periods; half of the workers are used.
+// Independent tasks of three periods that use half of the workers.
 System many_tasks(std::size_t count, std::uint32_t workers, Ties ties = Ties::Share) {
   Workload workload;
   workload.ties = ties;
@@ -114,7 +114,7 @@ TEST(Effort, AScopeOfTheCallerEndsWhatIsInside) {
   }
 }
 
-// What an analysis holds grows with the tasks, not with their pairs.
+// The size of an answer grows with the tasks, not with their pairs.
 TEST(Effort, TermsAreMadeOnDemandAlone) {
   for (const std::uint32_t workers : {1U, 2U}) {
     const System system = many_tasks(150, workers);
@@ -150,7 +150,7 @@ TEST(Effort, ABoundItemisedAloneIsTheSameAsAmongAll) {
   EXPECT_GT(compared, 300U);
 }
 
-// On one worker the tasks of one period count together: with few periods the steps are linear in the tasks.
+// On one worker the tasks of one period are evaluated together. With few periods the steps are linear in the tasks.
 TEST(Effort, OneWorkerTakesLinearStepsInTasksOfFewPeriods) {
   const std::uint64_t few = steps_of(rta_preemptive(), many_tasks(300, 1));
   const std::uint64_t many = steps_of(rta_preemptive(), many_tasks(3000, 1));
@@ -158,7 +158,7 @@ TEST(Effort, OneWorkerTakesLinearStepsInTasksOfFewPeriods) {
   EXPECT_LE(many, 20 * few);
 }
 
-// Of several, each task looks at all that are more urgent in each of a few evaluations.
+// On several workers each task looks at all more urgent ones, in each of a few evaluations.
 TEST(Effort, SeveralWorkersTakeQuadraticStepsAtMost) {
   const std::uint64_t few = steps_of(bertogna_cirinei(), many_tasks(300, 2));
   const std::uint64_t many = steps_of(bertogna_cirinei(), many_tasks(3000, 2));

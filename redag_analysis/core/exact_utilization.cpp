@@ -14,10 +14,10 @@ namespace {
 
 constexpr Uint128 kOne = Uint128{1} << 60U;
 constexpr Uint128 kMuch = Uint128{1} << 100U;  // sums stop here, far above every limit
-constexpr Int128 kRounding = 1024;             // of liu_layland_limit()
+constexpr Int128 kRounding = 1024;             // the rounding error of liu_layland_limit(), in units of 2^-60
 constexpr std::size_t kMostBits = 1U << 18U;
 
-// A whole number of any length, not negative: limbs of 32 bits, the lowest first, the highest not 0.
+// A non-negative whole number of any length. Limbs have 32 bits, the lowest first; the highest is not 0.
 class Natural {
  public:
   explicit Natural(Uint128 value) {
@@ -53,7 +53,7 @@ class Natural {
     return result;
   }
 
-  // Quotient and remainder.
+  // Returns the quotient and sets `remainder`.
   [[nodiscard]] Natural divided_by(std::uint64_t divisor, std::uint64_t &remainder) const {
     Natural result(0);
     result.limbs_.assign(limbs_.size(), 0);
@@ -106,7 +106,7 @@ struct Fraction {
   Natural denominator{1};
 };
 
-// Over the least common multiple of the periods; nothing if that is too long.
+// The sum over the least common multiple of the periods; empty if that number is too long.
 std::optional<Fraction> fraction_of(std::span<const Share> shares) {
   Fraction sum;
   for (const Share &share : shares) {
@@ -135,7 +135,7 @@ void Shares::push(const Share &share) {
   const ShareRange each = range_of(share);
   const ShareRange sum = sums_.back();
   ShareRange product = products_.back();
-  // Once a product is above 2, how far does not matter; below that both factors are below 2^63.
+  // Above 2 the exact product does not matter. Below the cut both factors are below 2^63, and their product fits.
   constexpr Uint128 kMost = 4 * kOne;
   if (each.high > kMost || product.high > kMost) {
     product = {each.low > kMost || product.low > kMost ? 8 * kOne : product.low, 8 * kOne};
@@ -156,7 +156,7 @@ void Shares::pop() {
 
 Int128 liu_layland_limit(std::size_t n) {
   if (n <= 1) return static_cast<Int128>(kOne);
-  // long double has 64 bits, its functions are right to a few of the last.
+  // long double has 64 bits, and its functions are correct to a few of the last ones.
   const auto count = static_cast<long double>(n);
   const long double limit = count * std::expm1(std::log(2.0L) / count);
   return static_cast<Int128>(limit * static_cast<long double>(kOne)) - kRounding;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Comparisons of utilizations with the limits of the tests, as rational numbers: nothing is accepted or refused by
-// rounding. Decided by intervals of 2^-60, and where these do not tell, by whole numbers of any length. Pure functions.
+// Compares utilizations with the limits of the tests, as rational numbers: rounding neither accepts nor refuses a set.
+// Intervals of 2^-60 decide; where they do not, whole numbers of any length do. Pure functions.
 #pragma once
 
 #include <cstddef>
@@ -15,19 +15,19 @@
 
 namespace redag::analysis {
 
-/// amount / period.
+/// A utilization: amount / period.
 struct Share {
   Uint128 amount = 0;  // below 2^80
   Duration period = 1;
 };
 
-/// Between two multiples of 2^-60, as numerators.
+/// An interval between two multiples of 2^-60, stored as their numerators.
 struct ShareRange {
   Uint128 low = 0;
   Uint128 high = 0;
 };
 
-/// Shares, with what they come to.
+/// A stack of shares, with their sum and product.
 class Shares {
  public:
   void push(const Share &share);
@@ -41,26 +41,26 @@ class Shares {
   static constexpr ShareRange kOnes = {Uint128{1} << 60U, Uint128{1} << 60U};
 
   std::vector<Share> all_;
-  std::vector<ShareRange> sums_ = {ShareRange{}};  // of the first 0, 1, ...
+  std::vector<ShareRange> sums_ = {ShareRange{}};  // of the first 0, 1, ... shares
   std::vector<ShareRange> products_ = {kOnes};
 };
 
-// Where intervals do not tell and the numbers have more than 2^18 bits (thousands of different, unrelated periods), the
-// answer is no.
+// The comparisons below answer no if intervals do not decide and the numbers have more than 2^18 bits. This takes
+// thousands of different, unrelated periods.
 
-/// sum <= limit / of.
+/// True if sum <= limit / of.
 [[nodiscard]] bool is_sum_within(const Shares &shares, std::uint64_t limit, std::uint64_t of);
 
-/// sum <= n (2^(1/n) - 1), that is (1 + sum / n)^n <= 2. n = 0: as n = 1.
+/// True if sum <= n (2^(1/n) - 1), that is (1 + sum / n)^n <= 2. n = 0 counts as n = 1.
 [[nodiscard]] bool is_within_liu_layland(const Shares &shares, std::size_t n);
 
-/// prod (1 + share) <= 2.
+/// True if prod (1 + share) <= 2.
 [[nodiscard]] bool is_within_hyperbolic(const Shares &shares);
 
-/// a < b.
+/// True if a < b.
 [[nodiscard]] bool is_smaller(const Share &a, const Share &b);
 
-/// n (2^(1/n) - 1) in units of 2^-60, rounded down by at most 2^-50.
+/// Returns n (2^(1/n) - 1) in units of 2^-60, rounded down by at most 2^-50.
 [[nodiscard]] Int128 liu_layland_limit(std::size_t n);
 
 }  // namespace redag::analysis

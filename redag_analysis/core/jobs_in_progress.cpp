@@ -14,8 +14,8 @@ namespace redag::analysis {
 namespace {
 
 // The largest antichain of a grid's tasks is as large as the least number of chains that cover them (R. Dilworth,
-// Annals of Mathematics 51(1), 1950): those that a maximum matching between tasks and tasks that follow them leaves
-// (Kuhn).
+// Annals of Mathematics 51(1), 1950). A maximum matching between tasks and the tasks that follow them leaves that many
+// chains (Kuhn).
 class Antichain {
  public:
   Antichain(const System &system, const std::vector<std::uint32_t> &tasks)
@@ -62,7 +62,7 @@ class Antichain {
 
   std::size_t count_;
   std::vector<std::vector<bool>> follows_;
-  std::vector<std::size_t> next_;  // by task: the one before it in its chain
+  std::vector<std::size_t> next_;  // by task: its predecessor in its chain
   std::vector<bool> visited_;
 };
 

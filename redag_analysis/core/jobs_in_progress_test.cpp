@@ -25,7 +25,7 @@ TEST(JobsInProgress, TasksThatFollowEachOtherAreNeverInProgressTogether) {
   EXPECT_EQ(most({{.name = "a", .period_ms = 10}, {.name = "b", .period_ms = 10}}), 2U) << "no edge";
 }
 
-// a -> {b, c} -> d and b -> e: b and c, or c, e; d follows b and c but not e.
+// The graph a -> {b, c} -> d and b -> e. The largest antichains are {b, c} and {c, e}; d follows b and c but not e.
 TEST(JobsInProgress, TheWidthOfAGraph) {
   const std::vector<TestTask> graph = {{.name = "a", .period_ms = 10},
                                        {.name = "b", .after = {0}},
@@ -38,7 +38,7 @@ TEST(JobsInProgress, TheWidthOfAGraph) {
   EXPECT_EQ(most(wider), 3U);
 }
 
-// What is fused has the grid of its slowest predecessor, which it follows; another offset is another grid.
+// A fused task has the grid of its slowest predecessor, which it follows. Another offset is another grid.
 TEST(JobsInProgress, OneChainAGrid) {
   EXPECT_EQ(most({{.name = "fast", .period_ms = 5}, {.name = "slow", .period_ms = 20}, {.name = "f", .after = {0, 1}}}),
             2U);

@@ -24,21 +24,22 @@ constexpr std::string_view kFewThreads = "fewer threads than tasks are known to 
 
 constexpr int kMaxRounds = 1000;
 
-// What a unit that waits is told of a predecessor: data of job k comes within [offset + k period, ... + response].
+// What a waiting unit knows of a predecessor: data of its job k arrive within [offset + k period, ... + response].
 struct Data {
   Duration period = 0;
   Duration offset = 0;
   Duration response = 0;
 };
 
-// How late the first task of a unit can become ready after the point of its grid; docs/analysis.md has the cases.
-// `seen`: of data on its own grid, and of its own timer, the latest. `others`: of other grids, none of a larger period.
-// Completions of one instant have an order: the next datum of a task can come when another is taken.
+// The latest that the first task of a unit can become ready after its grid point; docs/analysis.md has the cases.
+// `seen` is the latest arrival of data on its own grid and of its own timer. `others` are predecessors on other grids,
+// none of a larger period. Completions of one instant have an order: a task's next datum can arrive at the instant at
+// which another is taken.
 std::optional<Duration> wait_for(const Unit &unit, Duration seen, const std::vector<Data> &others) {
   if (others.empty()) return seen;
   const Duration period = unit.period;
-  Duration first = seen;  // of the first job, which finds no data from before
-  Duration between = 0;   // two data of another grid
+  Duration first = seen;  // of the first job, which finds no earlier data
+  Duration between = 0;   // the longest time between two data of another grid
   for (const Data &data : others) {
     first = std::max(first, data.offset - unit.offset + data.response);
     between = std::max(between, add(data.period, data.response) - 1);
@@ -105,10 +106,10 @@ class Resolver {
     }
   }
 
-  // Waits that the latest responses imply; false if no more than those assumed. Waits only grow, and a unit that once
-  // has none never gets one.
+  // Recomputes the waits from the latest responses; false if none exceeds the assumed one. Waits only grow, and a unit
+  // that has lost its wait never regains one.
   bool update_waits(int round) {
-    bool changed = round == 0;  // not asked yet
+    bool changed = round == 0;  // the method has not been applied yet
     for (std::uint32_t u = 0; u < system_.units.size(); ++u) {
       const Unit &unit = system_.units[u];
       if (unit.awaits.empty() || !absent_[u].empty()) continue;
@@ -126,7 +127,7 @@ class Resolver {
     return changed;
   }
 
-  // Sets absent_ where there is none.
+  // Returns the wait of a unit; sets absent_ if there is none.
   std::optional<Duration> wait_of(std::uint32_t u) {
     const Unit &unit = system_.units[u];
     const SystemTask &first = system_.tasks[unit.tasks.front()];
@@ -152,14 +153,14 @@ class Resolver {
     return wait_for(unit, seen, others);
   }
 
-  // Jitter that explains how many jobs become ready in any interval, whatever the responses are. Not below the period.
+  // The jitter that explains how many jobs become ready in any interval, for any responses. It is at least the period.
   Duration jitter_of_number(std::uint32_t u) const {
     const Unit &unit = system_.units[u];
     const SystemTask &first = system_.tasks[unit.tasks.front()];
-    // A timer's job is ready before the next release is seen, or skipped.
+    // A timer's job becomes ready before the next release is seen, or is skipped.
     if (!first.data) return add(unit.period, unit.jitter);
-    // Each job takes a datum of every predecessor, one of which can be from before the interval. Data in an interval:
-    // of jobs that became ready in it, that were ready before, and of one that had started.
+    // Each job takes a datum of every predecessor, of which one can be from before the interval. The jobs that complete
+    // in the interval became ready in it, were ready before, or had started.
     Duration least = kUnbounded;
     for (const std::uint32_t p : unit.awaits) {
       const SystemTask &before = system_.tasks[p];
@@ -200,8 +201,8 @@ class Resolver {
     return from_units(system_, std::vector<ResponseBound>(system_.units.size(), none));
   }
 
-  // From the first task's readiness to the end of the unit. Further timers of the unit can be seen later than that, so
-  // that the unit's window need not have begun.
+  // The longest time from the first task's readiness to the end of the unit. Further timers of the unit can be seen
+  // later than that task; the unit's window then need not have begun at its readiness.
   [[nodiscard]] Duration from_ready(std::uint32_t u) const {
     const ResponseBound &bound = of_unit(u);
     const std::vector<std::uint32_t> &tasks = system_.units[u].tasks;
@@ -209,11 +210,12 @@ class Resolver {
       return !system_.tasks[t].data && system_.tasks[t].jitter > 0;
     });
     if (is_seen_later) return *bound.response;
-    // The jitter of a timer counts what the machine can take during the response, too.
+    // A timer's jitter also counts the time that the machine can take during the response.
     return add(std::max(bound.from_ready, *bound.response - alone_.units[u].jitter), system_.frozen);
   }
 
-  // The unit's bound, with all that goes by before it is ready replaced by a term that makes it `response`.
+  // Returns the unit's bound for the given `response`: one Wait term replaces the jitter and covers the time before
+  // readiness.
   [[nodiscard]] ResponseBound with_wait(std::uint32_t u, Duration response) const {
     ResponseBound bound = of_unit(u);
     std::erase_if(bound.terms, [](const Term &term) { return term.kind == Term::Kind::Jitter; });
@@ -237,7 +239,7 @@ class Resolver {
     }
   }
 
-  // How much earlier than the point of its grid the data of a unit's job can have been released.
+  // How long before its grid point the data of a unit's job can have been released.
   Duration age_of(std::uint32_t u) {
     if (ages_[u]) return *ages_[u];
     const Unit &unit = system_.units[u];
@@ -256,7 +258,7 @@ class Resolver {
     return before.period == system_.units[u].period && before.offset == system_.units[u].offset;
   }
 
-  // Of a datum that is the latest when it is taken: the next one comes later, or at the same instant after it.
+  // The greatest age of a predecessor's latest datum. The next one arrives later, or at the same instant after it.
   [[nodiscard]] Duration oldest(std::uint32_t u) const { return add(system_.units[u].period, *responses_[u]); }
 
   ResponseBound end_to_end(std::uint32_t dag) {
@@ -284,9 +286,9 @@ class Resolver {
   }
 
   const System &system_;
-  System alone_;  // without rate edges; the jitter of a unit that waits includes its wait
+  System alone_;  // without rate edges; the jitter of a waiting unit includes its wait
   Outcome (*apply_)(const System &);
-  std::vector<bool> conditional_;                   // by DagId: its max_active was taken away
+  std::vector<bool> conditional_;                   // by DagId: its max_active was removed
   std::vector<std::optional<Duration>> responses_;  // by unit
   std::vector<std::string_view> absent_;            // by unit: why it has no wait
   std::vector<std::optional<Duration>> ages_;

@@ -39,7 +39,7 @@ BoundCaseLimits rates(sched::Preemption preemption, std::uint32_t workers) {
   return limits;
 }
 
-// Threads for fewer jobs than tasks.
+// Draws a number of threads that is below the number of tasks.
 testing::BoundGenerator few_threads(const BoundCaseLimits &limits) {
   return [limits](Rng &rng) {
     BoundCase bound_case = testing::random_bound_case(rng, limits);
@@ -158,8 +158,8 @@ std::optional<Duration> milliseconds(const ResponseBound &bound) {
   return *bound.response / kMillisecond;
 }
 
-// Camera every 10 ms (R = 1), lidar every 40 ms (R = 5), fused: ready as soon as the lidar's data are there, because
-// a picture comes within 10 + 1 of the last, so the first wait counts alone.
+// A camera every 10 ms (R = 1) and a lidar every 40 ms (R = 5) are fused. A picture comes within 10 + 1 of the last
+// one, and therefore only the first wait counts: the fusion is ready as soon as the lidar's data are there.
 TEST(RateEdges, DataOfAFastPredecessorAreThereWhenTheSlowOneEnds) {
   Workload workload =
       make_workload({make_dag("d", {{.name = "camera", .period_ms = 10},
@@ -172,27 +172,28 @@ TEST(RateEdges, DataOfAFastPredecessorAreThereWhenTheSlowOneEnds) {
   const Bound bound = bound_of(rta_preemptive(), system);
   EXPECT_EQ(milliseconds(bound.tasks[0]), 1);
   EXPECT_EQ(milliseconds(bound.tasks[1]), 5);
-  // Camera and lidar can come while it executes: from its own release, 3 + 1 + 4.
+  // Camera and lidar can arrive while it executes; from its own release, R = 3 + 1 + 4.
   EXPECT_EQ(milliseconds(bound.tasks[2]), 8);
   EXPECT_FALSE(meets_deadline(system.tasks[2], bound.tasks[2]));
-  // The picture it takes is the latest: the next comes at most 10 + 1 after that one's release.
+  // It takes the latest picture: the next one comes at most 10 + 1 after the release of that one.
   EXPECT_EQ(milliseconds(bound.dags[0]), 8 + 11);
   EXPECT_EQ(bound.dags[0].sum(Term::Kind::Wait), 11 * kMillisecond);
 }
 
-// Released 3 before its predecessor, which answers after 2: it waits 5 in its first period, and so in all.
+// b is released 3 before its predecessor, which answers after 2. It waits 5 in its first period, and thus in all.
 TEST(RateEdges, ATimerWaitsForDataOfAnotherOffset) {
   Workload workload = make_workload({make_dag("d", {{.name = "a", .period_ms = 20, .wcet_ms = 2, .offset_ms = 3},
                                                     {.name = "b", .period_ms = 20, .wcet_ms = 4, .after = {0}}})},
                                     1);
-  workload.ties = Ties::Fixed;  // or b would also delay a
+  workload.ties = Ties::Fixed;  // with shared ties b would also delay a
   const System system = compiled(workload);
   const Bound bound = bound_of(rta_preemptive(), system);
   EXPECT_EQ(milliseconds(bound.tasks[1]), 5 + 4 + 2);
   EXPECT_EQ(bound.tasks[1].sum(Term::Kind::Wait), 5 * kMillisecond);
 }
 
-// It is skipped for lack of data by design; others are bounded with as many jobs of it as can become ready.
+// The fast timer's jobs are skipped for lack of data by design. The others are bounded with as many of its jobs as can
+// become ready.
 TEST(RateEdges, ATimerThatIsFasterThanItsDataIsNotBoundedAndOthersAre) {
   const System system =
       compiled(make_workload({make_dag("d", {{.name = "a", .period_ms = 20, .wcet_ms = 2},
@@ -207,7 +208,7 @@ TEST(RateEdges, ATimerThatIsFasterThanItsDataIsNotBoundedAndOthersAre) {
   EXPECT_EQ(verdict(system, bound), Verdict::NotShown);
 }
 
-// Two chains of one job in progress each: two threads, or a max_active of two, are enough if all is bounded.
+// Two chains with one job in progress each: two threads, or a max_active of two, suffice if all tasks are bounded.
 TEST(RateEdges, WhatCannotBindIsNoObstacle) {
   const auto workload = [](std::uint32_t max_active) {
     return make_workload({make_dag("d",

@@ -58,19 +58,21 @@ class Compiler {
     if (system_.not_analysable.empty()) system_.not_analysable = std::move(reason);
   }
 
-  // With several workers who resumes pays in its own time, which no interference divided by m covers: as if nothing ran
-  // meanwhile. The same holds for stalls and for the release timer.
+  // True if preemptions count as time in which nothing runs, as stalls and the release timer do. On several workers the
+  // resumed job pays in its own time, which no interference divided by m covers.
   [[nodiscard]] bool preemptions_freeze() const {
     return system_.platform.workers > 1 && system_.mode != sched::Preemption::None &&
            system_.platform.preempt_overhead > 0;
   }
 
-  // Time in which nothing is assumed to run. Sound: each loss on one processor is one on all.
+  // Finds the time in which the bounds assume that nothing runs. It is sound to count each loss on one processor as one
+  // on all.
   void find_losses() {
     const AnalysisPlatform &platform = system_.platform;
     lost_.longest = multiply(platform.stall.longest, platform.workers);
     lost_.per_second = multiply(platform.stall.per_second, platform.workers);
-    // `each` for every release of a task; `more`: releases within a window besides those that its length explains.
+    // `each` is the loss for every release of a task. `more` counts the releases in a window beyond those that its
+    // length explains.
     const auto add_releases = [this](Duration each, const Task &task, Duration more) {
       lost_.longest = add(lost_.longest, multiply(each, more));
       const Int128 rate = (Int128{each} * kSecond + task.period - 1) / std::max<Duration>(task.period, 1);
@@ -80,8 +82,8 @@ class Compiler {
       for (const Task &task : dag.tasks) {
         const Duration late = ceil_div(add(task.jitter, platform.lateness), std::max<Duration>(task.period, 1));
         if (task.activation == Activation::Timer) add_releases(platform.timer_overhead, task, late + 1);
-        // A job preempts at most once, when it becomes eligible: also one that was released before the window. One that
-        // waits for its group can make the holder preempt, too.
+        // A job preempts at most once, when it becomes eligible; this includes jobs released before the window. A job
+        // that waits for its group can make the holder preempt, too.
         const Duration waiting = task.overrun == Overrun::Queue ? task.queue_depth : 1;
         const Duration times = task.group.empty() ? 1 : 2;
         if (preemptions_freeze()) add_releases(multiply(platform.preempt_overhead, times), task, late + waiting + 2);
@@ -90,7 +92,7 @@ class Compiler {
     system_.frozen = lost_.per_second < kSecond ? lengthened(lost_.longest) : 0;
   }
 
-  // An execution with the share of the processor that is lost all the time.
+  // Lengthens an execution by the share of the processor that is permanently lost.
   [[nodiscard]] Duration lengthened(Duration execution) const {
     if (lost_.per_second == 0 || lost_.per_second >= kSecond) return execution;
     const Duration left = kSecond - lost_.per_second;
@@ -98,7 +100,7 @@ class Compiler {
     return static_cast<Duration>(std::min(all, Int128{kUnbounded}));
   }
 
-  // So that the bounds can add up what tasks execute without looking at each sum.
+  // Limits the sums. The bounds can then add up what tasks execute without checking each sum.
   void check_sums() {
     Int128 sum = 0;
     for (const SystemTask &task : system_.tasks) sum += Int128{task.wcet} + task.jitter;
@@ -145,7 +147,7 @@ class Compiler {
     SystemTask compiled;
     compiled.name = dag.name + "/" + task.name;
     compiled.dag = DagId(system_.dags.size());
-    // Who preempts pays for the resumption; a job preempts at most once, when it starts.
+    // The job that preempts pays for the resumption; a job preempts at most once, when it starts.
     const Duration lead = add(platform.release_overhead, platform.dispatch_overhead);
     const bool pays = system_.mode != sched::Preemption::None && !preemptions_freeze();
     const Duration overhead = pays ? add(lead, platform.preempt_overhead) : lead;
@@ -171,7 +173,7 @@ class Compiler {
     } else if (system_.mode == sched::Preemption::Cooperative) {
       const bool whole = task.region == 0 || task.region >= task.wcet;
       compiled.region = whole ? compiled.wcet : lengthened(add(task.region, overhead));
-      // Preemption points are at multiples of the region that lie strictly inside the job.
+      // Preemption points are at multiples of the region, strictly inside the job.
       compiled.last_region = whole ? add(task.wcet, lead) : (task.wcet - 1) % task.region + 1;
     }
     if (task.concurrency > 1) {
@@ -215,7 +217,7 @@ class Compiler {
     }
   }
 
-  // The tasks of a DAG, one list a unit, in topological order.
+  // Splits a DAG into units: one list of tasks per unit, in topological order.
   std::vector<std::vector<std::uint32_t>> split(std::uint32_t dag) const {
     std::vector<std::uint32_t> order = system_.dags[dag].tasks;
     if (order.empty()) return {};
@@ -240,7 +242,7 @@ class Compiler {
     return lists;
   }
 
-  // Joined by edges other than rate edges.
+  // Finds the parts that edges other than rate edges connect.
   [[nodiscard]] std::vector<std::vector<std::uint32_t>> connected_parts(const std::vector<std::uint32_t> &order) const {
     const std::uint32_t first = *std::min_element(order.begin(), order.end());
     std::vector<std::uint32_t> part(order.size());  // each task points at a representative
@@ -268,15 +270,15 @@ class Compiler {
     });
   }
 
-  // A part without rate edges is released together; one with them, if all of it follows the one task that waits.
+  // True if the part is released as a whole: it has no rate edges, or all of it follows the one task that waits.
   [[nodiscard]] bool is_unit(const std::vector<std::uint32_t> &part) const {
     if (std::none_of(part.begin(), part.end(), [&](std::uint32_t t) { return joins_rates(t); })) return true;
     return std::all_of(part.begin() + 1, part.end(),
                        [&](std::uint32_t t) { return !joins_rates(t) && !system_.tasks[t].predecessors.empty(); });
   }
 
-  // The grid of a task: a timer's own; a data task's is that of its predecessor with the largest period, of several the
-  // latest. In topological order.
+  // Sets the grids of a DAG's tasks, in topological order. A timer has its own grid. A data task has that of its
+  // predecessor with the largest period; of several, the one with the latest offset.
   void find_grids(std::uint32_t dag) {
     const std::uint32_t first = system_.dags[dag].tasks.empty() ? 0 : system_.dags[dag].tasks.front();
     const std::vector<std::uint32_t> ranks = topological_ranks(workload_.dags[dag]);

@@ -1,10 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the bounds see: a workload on a platform, compiled once into numbers. Execution times are charged with the
-// platform's overheads, priorities are those of sched::assign_priorities, and tasks of one rate joined by edges form
-// one unit.
-// Plain values, immutable once compiled; safe to share among threads.
+// The input of the bounds: a workload on a platform, compiled once into numbers. Execution times include the platform's
+// overheads. Priorities are those of sched::assign_priorities. Tasks of one rate that edges join form one unit. Plain
+// values, immutable once compiled; safe to share among threads.
 #pragma once
 
 #include <cstdint>
@@ -19,33 +18,33 @@
 
 namespace redag::analysis {
 
-/// The platform as it really runs: what `auto` and `os` came to. Overheads are those of sim::Overheads.
+/// The platform as it really runs, with `auto` and `os` resolved. Overheads are those of sim::Overheads.
 struct AnalysisPlatform {
   std::uint32_t workers = 1;
   sched::Preemption preemption = sched::Preemption::Full;
-  std::uint32_t levels = 0;       // distinct priority levels; 0: as many as it takes (sched::Config::levels)
+  std::uint32_t levels = 0;       // distinct priority levels; 0: as many as needed (sched::Config::levels)
   std::uint32_t max_started = 0;  // jobs started and unfinished at once; 0: no bound (sched::Config::max_started)
-  Duration release_overhead = 0;  // each job, before its body
+  Duration release_overhead = 0;  // of each job, before its body
   Duration dispatch_overhead = 0;
-  Duration preempt_overhead = 0;  // each resumption; charged to the job that preempted, on several workers to all
-  // What a real machine does besides: charge().
-  Duration lateness = 0;        // a timer's release is seen up to so much late
-  Duration timer_overhead = 0;  // processor time that the release timer takes from some job, for each release
+  Duration preempt_overhead = 0;  // of each resumption; charged to the job that preempted, on several workers to all
+  // Further costs of a real machine, set by charge().
+  Duration lateness = 0;        // the most by which a timer's release is seen late
+  Duration timer_overhead = 0;  // processor time that the release timer takes from some job, per release
   Loss stall;                   // of each processor
 
   friend bool operator==(const AnalysisPlatform &, const AnalysisPlatform &) = default;
 };
 
-/// `platform` with what was measured of a machine (docs/calibration.md, "What is charged").
+/// Returns `platform` with the measured overheads of a machine (docs/calibration.md, "What is charged").
 [[nodiscard]] AnalysisPlatform charge(AnalysisPlatform platform, const Overheads &overheads);
 
-/// What the scheduler is told whose schedules of `workload` the bounds on `platform` hold for.
+/// Returns the scheduler's configuration whose schedules of `workload` the bounds on `platform` hold for.
 [[nodiscard]] sched::Config config_of(const AnalysisPlatform &platform, const Workload &workload);
 
-/// What a scheduler was told, no overheads.
+/// The platform that a scheduler was configured for, without overheads.
 [[nodiscard]] AnalysisPlatform platform_of(const sched::Config &config);
 
-/// As the simulator runs the workload: `os` and `auto` mean full preemption, no overheads.
+/// The platform on which the simulator runs the workload: `os` and `auto` mean full preemption; no overheads.
 [[nodiscard]] AnalysisPlatform platform_of(const Workload &workload);
 
 inline constexpr std::uint32_t kNoGroup = 0xffffffff;
@@ -55,19 +54,19 @@ struct SystemTask {
   std::string name;  // "dag/task"
   DagId dag;
   std::uint32_t unit = 0;
-  Duration wcet = 0;      // C as charged: overheads included
-  Duration wcet_low = 0;  // C(LO) as charged; with modes, wcet is C(HI). The same as wcet where there is none
-  Duration bcet = 0;      // as charged, > 0; bounds hold for shorter executions too, only the exploration reads it
+  Duration wcet = 0;      // C with overheads
+  Duration wcet_low = 0;  // C(LO) with overheads, while wcet is C(HI); equal to wcet if the task has no `wcet_low`
+  Duration bcet = 0;      // with overheads, > 0; only the exploration reads it: bounds hold for shorter executions
   Duration overhead = 0;  // the part of `wcet` that is overhead
   Duration period = 0;    // T, least distance of two nominal releases of the unit
-  Duration offset = 0;    // of a timer; of a data task that of its grid, see Unit. Bounds of units without rate edges
-                          // hold for all offsets
+  Duration offset = 0;    // a timer's own; a data task's is that of its grid (see Unit). Bounds of units without rate
+                          // edges hold for all offsets
   Duration deadline = 0;  // D, from the task's own release
   Duration jitter = 0;    // J
   Duration limit = 0;     // response up to which no job of the task is skipped (T, or T * queue_depth)
   Duration region = 0;    // longest stretch without a preemption point, overheads included; 0 with full preemption
-  Duration last_region = 0;        // stretch after the last preemption point when it executes for its wcet; 0 likewise
-  std::uint32_t rank = 0;          // place in the order of tasks, 0 the most urgent
+  Duration last_region = 0;        // stretch after the last preemption point of a job of length wcet; 0 likewise
+  std::uint32_t rank = 0;          // place in the order of tasks; 0 is the most urgent
   std::uint32_t tier = 0;          // tasks of one tier take turns: any of them can go first
   std::uint32_t level = 0;         // tasks of one level do not preempt each other
   std::uint32_t group = kNoGroup;  // only groups that two or more tasks share
@@ -76,23 +75,23 @@ struct SystemTask {
   std::vector<std::uint32_t> successors;    // TaskIds
 };
 
-/// What is released as a whole: a task without edges, or tasks joined by edges, all of one rate and released together.
-/// A DAG with edges and one rate is one unit; otherwise each connected part of a DAG is one, cut at *rate edges*: those
-/// into a task with a predecessor of another period or offset. The response time of a unit runs from its nominal
-/// release to the finish of its last task. That of a unit behind rate edges is the point of its grid, `offset` + k
-/// `period`: the timer's own, or that of the predecessor with the largest period (rate_edges.hpp).
+/// A unit is what is released as a whole: a task without edges, or tasks of one rate that edges join. A DAG with edges
+/// and one rate is one unit. Otherwise each connected part of a DAG is one, cut at *rate edges*: those into a task with
+/// a predecessor of another period or offset. The response time of a unit runs from its nominal release to the finish
+/// of its last task. The nominal release of a unit behind rate edges is the point of its grid, `offset` + k `period`.
+/// That grid is the timer's own, or that of the predecessor with the largest period (rate_edges.hpp).
 struct Unit {
   DagId dag;
   std::vector<std::uint32_t> tasks;   // TaskIds in topological order
   std::vector<std::uint32_t> awaits;  // TaskIds of other units whose data its first task waits for: rate edges
   Duration period = 0;
   Duration offset = 0;
-  Duration deadline = 0;         // least of its tasks and the DAG's end-to-end one: met, all of these are met
-  Duration jitter = 0;           // largest of its tasks
-  Duration limit = 0;            // least of its tasks; with edges never above the period
+  Duration deadline = 0;         // the least of its tasks' and the DAG's end-to-end one; if it is met, all of these are
+  Duration jitter = 0;           // the largest of its tasks
+  Duration limit = 0;            // the least of its tasks; with edges never above the period
   Duration volume = 0;           // sum of wcet
   Duration length = 0;           // longest path
-  std::uint32_t first_rank = 0;  // most and least urgent of its tasks
+  std::uint32_t first_rank = 0;  // the most urgent of its tasks; last_rank: the least urgent
   std::uint32_t last_rank = 0;
   bool has_edges = false;
 };
@@ -101,7 +100,7 @@ struct SystemDag {
   std::string name;
   std::vector<std::uint32_t> units;
   std::vector<std::uint32_t> tasks;  // TaskIds
-  std::uint32_t max_active = 0;      // 0: no bound; never more than it has tasks
+  std::uint32_t max_active = 0;      // 0: no bound; otherwise below the number of its tasks
   Duration deadline = 0;             // end to end; 0: none
   bool high = false;                 // of high criticality: never degraded
 };
@@ -115,30 +114,30 @@ struct System {
   std::vector<SystemDag> dags;
   std::vector<std::uint32_t> by_rank;              // TaskIds, most urgent first
   std::vector<std::vector<std::uint32_t>> groups;  // TaskIds of each group
-  double utilization = 0;                          // sum of wcet / period, overheads included; for people
-  /// Features that no bound covers (a budget below the wcet, a queue too small, ...): every method answers
-  /// NotApplicable with this.
+  double utilization = 0;                          // sum of wcet / period, overheads included; only to be shown
+  /// Features that no bound covers, such as a budget below the wcet or a queue that is too small. Every method then
+  /// answers NotApplicable with this reason.
   std::string not_analysable;
-  /// Fewer threads than tasks, which is enough as long as every response is within its period (jobs_in_progress.hpp).
+  /// There are fewer threads than tasks, but enough if every response is within its period (jobs_in_progress.hpp).
   bool threads_suffice_if_bounded = false;
-  /// Some wcet_low is below its wcet, so that there is a HI mode, and that is all that not_analysable is about: methods
-  /// that know modes (Method::knows_modes) apply.
+  /// Some wcet_low is below its wcet: there is a HI mode, and not_analysable has no other reason. Methods that know
+  /// modes (Method::knows_modes) apply.
   bool has_modes = false;
 
-  /// Time in which the machine can leave all jobs without a processor during any response time, besides a share that
-  /// lengthens executions. It is part of the timers' jitter: that a window begins late and that it lasts longer is the
-  /// same (docs/analysis.md, "Stalls"). Responses from another point than the nominal release have to add it.
+  /// Time in which the machine can leave all jobs without a processor during any response time, besides the share that
+  /// lengthens executions. The timers' jitter contains it, because a late and a longer window are equivalent
+  /// (docs/analysis.md, "Stalls"). Responses from another point than the nominal release have to add it.
   Duration frozen = 0;
 
-  /// The platform's mode, or None where it is cooperative and no task has a preemption point.
+  /// The platform's mode; None if it is cooperative and no task has a preemption point.
   sched::Preemption mode = sched::Preemption::Full;
 
-  [[nodiscard]] bool has_edges() const;       // some unit has
+  [[nodiscard]] bool has_edges() const;       // some unit has edges
   [[nodiscard]] bool has_rate_edges() const;  // some unit awaits data of another
 };
 
-/// Errors: what validate() calls an error (periods of data tasks must be set: inherit_periods()), a platform without
-/// workers or with negative overheads. O(n log n + edges).
+/// Compiles a workload. Fails where validate() finds an error (set the periods of data tasks first: inherit_periods()),
+/// and for a platform without workers or with negative overheads. O(n log n + edges).
 [[nodiscard]] Result<System> compile(const Workload &workload, const AnalysisPlatform &platform);
 
 }  // namespace redag::analysis

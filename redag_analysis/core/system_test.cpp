@@ -20,7 +20,7 @@ using redag::testing::make_workload;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// a -> b, a -> c at 20 ms; x alone at 5 ms.
+// Two DAGs: a -> b, a -> c at 20 ms; x alone at 5 ms.
 Workload two_dags() {
   return make_workload({make_dag("graph", {{.name = "a", .period_ms = 20, .wcet_ms = 2},
                                            {.name = "b", .wcet_ms = 3, .after = {0}},
@@ -73,7 +73,7 @@ TEST(System, RatesThatNoEdgeJoinsAreUnitsOfTheirOwn) {
   EXPECT_THAT(system.dags[0].units, ElementsAre(0, 1));
 }
 
-// What follows the one task that waits goes with it; it waits for data of others.
+// The tasks that follow the one waiting task belong to its unit, which waits for data of others.
 TEST(System, UnitsAreCutAtRateEdges) {
   const Workload workload = make_workload({make_dag("d", {{.name = "fast", .period_ms = 5},
                                                           {.name = "slow", .period_ms = 20, .offset_ms = 3},
@@ -95,7 +95,7 @@ TEST(System, UnitsAreCutAtRateEdges) {
   EXPECT_FALSE(compiled(two_dags(), mode(sched::Preemption::Full)).has_rate_edges());
 }
 
-// One of them brings a second task that waits, so that none of the part is released together.
+// `join` brings a second waiting task into the part; therefore the part is not released as a whole.
 TEST(System, SeveralTasksThatWaitAreUnitsOfTheirOwn) {
   const Workload workload = make_workload({make_dag("d", {{.name = "fast", .period_ms = 5},
                                                           {.name = "slow", .period_ms = 20},
@@ -182,7 +182,8 @@ TEST(NotApplicable, OneWorkerBounds) {
   EXPECT_THAT(refusal(edf_demand(), edf, full), HasSubstr("predecessors"));
 }
 
-// A bound is not inherited: while a task of the DAG is preempted, one that is more urgent than all others can wait.
+// A DAG's bound is not inherited. While a task of the DAG is preempted, one that is more urgent than all others can
+// wait.
 TEST(NotApplicable, MaxActiveOverSeveralUnits) {
   const auto workload = [](std::uint32_t max_active) {
     return make_workload({make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 50}}, max_active),
