@@ -43,7 +43,7 @@ void Activity::add(const JobEvent &event) {
   }
 }
 
-// Decisions of one instant belong together: only what is left of an inversion when time moves on has a length.
+// Decisions of one instant belong together. Only an inversion that remains when time moves on has a length.
 void Activity::end_of_instant() {
   const bool inverted = is_inverted();
   if (inverted && inverted_since_ == kNever) inverted_since_ = time_;
@@ -57,7 +57,7 @@ bool Activity::is_inverted() const {
     if (job != nullptr && (least == nullptr || *least < job->own)) least = &job->own;
   }
   if (least == nullptr) return false;
-  // A job that only lacks a thread waits for a less urgent one, too.
+  // A job that lacks only a thread also waits for a less urgent one.
   const auto &waiting = replay_.eligible_but_for_threads();
   if (!waiting.empty() && waiting.begin()->urgency.key < least->key) return true;
   return std::any_of(replay_.suspended().begin(), replay_.suspended().end(), [&](const Replay::JobRef &ref) {

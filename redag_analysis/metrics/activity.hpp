@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What can only be seen across jobs: how many of a DAG are in progress, how busy workers are, priority inversion.
+// Figures that span jobs: how many jobs of a DAG are in progress, how busy workers are, and priority inversion.
 // Incremental, one pass over the events. Not thread-safe.
 #pragma once
 
@@ -13,8 +13,9 @@
 
 namespace redag::metrics {
 
-/// Times at which an eligible (or preempted) job waited while one of lower priority ran, each by its own: inherited
-/// priority does not hide an inversion, nor does a lack of threads, and equals have the same. Overlapping ones are one.
+/// Times at which an eligible or preempted job waited while one of lower priority ran. Each job counts with its own
+/// priority. Neither inheritance nor a lack of threads hides an inversion, and equals have the same priority.
+/// Overlapping inversions count as one.
 struct Inversions {
   std::uint64_t count = 0;
   Duration total = 0;
@@ -25,7 +26,7 @@ struct Inversions {
 
 /// Time in HI mode.
 struct HighModeTime {
-  std::uint64_t count = 0;  // how often it began, or was on at the begin
+  std::uint64_t count = 0;  // the number of times that it began, or was on at the beginning
   Duration total = 0;
 
   friend bool operator==(const HighModeTime &, const HighModeTime &) = default;
@@ -33,18 +34,19 @@ struct HighModeTime {
 
 class Activity {
  public:
-  /// Workers and inversions are measured from `begin` on; peaks from the first event. `workload` must outlive this.
+  /// Measures workers and inversions from `begin` on, and peaks from the first event. `workload` must outlive this
+  /// object.
   Activity(const Workload &workload, const sched::Config &config, Time begin);
 
   void add(std::span<const JobEvent> events);
-  /// Closes what is open at the end of the run. Call once.
+  /// Closes what is open when the run ends. Call once.
   void finish(Time end);
 
-  /// Most jobs of the DAG started and unfinished at any time.
+  /// The most jobs of the DAG that were started and unfinished at any time.
   [[nodiscard]] std::uint32_t peak_active(DagId dag) const { return peaks_[dag.value]; }
-  /// Jobs that started while another of their group was started and unfinished.
+  /// The number of jobs that started while another job of their group was started and unfinished.
   [[nodiscard]] std::uint64_t group_overlaps() const { return group_overlaps_; }
-  /// Time during which each worker held a job.
+  /// The time during which each worker held a job.
   [[nodiscard]] const std::vector<Duration> &busy() const { return busy_; }
   [[nodiscard]] Time last_time() const { return time_; }
   [[nodiscard]] const Inversions &inversions() const { return inversions_; }

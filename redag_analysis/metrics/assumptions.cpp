@@ -15,13 +15,12 @@
 namespace redag::metrics {
 namespace {
 
-// A job that follows another on its thread is charged for the decision between the two, and one that is over within
-// CpuMeter::kShort for all the time since it began, the dispatch included.
+// A job that follows another on its thread is charged for the decision between the two. A job that ends within
+// CpuMeter::kShort is charged for all the time since it began, the dispatch included.
 constexpr Duration kDecision = 10 * kMicrosecond;
 constexpr Duration kShort = 10 * kMicrosecond;
 
-// A single execution that is further out than any noise that was seen may be the first of its kind: twice as far is
-// none any more.
+// A single execution beyond all measured noise may be the first of its kind. At twice that distance it is no noise.
 constexpr Duration kMargin = 2;
 
 Duration slack_of(const JobRecord &job, const Overheads &allowed) {
@@ -83,7 +82,7 @@ class Checker {
     }
   }
 
-  // Releases that came later than the machine was seen to be late.
+  // Collects the releases that came later than the calibrated lateness.
   void find_late_releases() {
     for (const JobRecord &job : jobs_) {
       const bool is_timer = refs_[job.task.value].task->activation == Activation::Timer;
@@ -93,8 +92,8 @@ class Checker {
     std::sort(late_.begin(), late_.end());
   }
 
-  // How late the release timer was while the job ran. No job holds it up: if it was late by most of what the job used
-  // too much, the machine stood still, although the kernel charged the job for that.
+  // Returns how late the release timer was while the job ran. No job delays the timer. If it was late by most of the
+  // job's excess, the machine stood still, and the kernel charged that time to the job.
   [[nodiscard]] Duration lateness_during(const JobRecord &job) const {
     Duration latest = 0;
     auto late = std::lower_bound(late_.begin(), late_.end(), std::pair(job.start, Duration{0}));
@@ -102,7 +101,8 @@ class Checker {
     return latest;
   }
 
-  // Looks at what happened between the job's release and its finish: of what exceeds what was charged, the largest.
+  // Compares what happened between the job's release and its finish with what was charged, and names the largest
+  // excess.
   void explain(const JobRecord &worst, ResponseCheck &response) const {
     const Overheads charged = calibrated_.value_or(Overheads());
     Duration wcet = 0;
@@ -148,15 +148,15 @@ class Checker {
   Duration workers_;
   std::optional<Overheads> calibrated_;
   std::span<const JobRecord> jobs_;
-  std::vector<std::pair<Time, Duration>> late_;  // nominal release, lateness; by the first
+  std::vector<std::pair<Time, Duration>> late_;  // nominal release and lateness, ordered by release
   AssumptionCheck check_;
 };
 
-// Do `count` of `jobs` executions meet more noise than an execution can be expected to meet?
+// True if `count` of `jobs` executions meet more noise than can be expected.
 bool is_too_often(std::uint64_t count, std::uint64_t jobs, Duration excess, Duration wcet, const Loss &noise) {
   const auto expected = static_cast<double>(noise.in(wcet)-noise.longest);
   const double mean = static_cast<double>(jobs) * std::min(1.0, expected / static_cast<double>(excess));
-  // Five standard deviations, and four that any run may have.
+  // Allows five standard deviations, plus four executions in any run.
   return static_cast<double>(count) > mean + 5 * std::sqrt(mean) + 4;
 }
 
@@ -246,7 +246,7 @@ bool is_beyond_noise(const ExecutionPercentiles &executions, Duration wcet,
   const Duration slack = allowed.clock + kDecision + (wcet <= kShort ? allowed.dispatch : 0);
   if (executions.longest - wcet - slack > most_noise(wcet, allowed.noise)) return true;
   const auto has_excess = [&](Duration percentile, std::uint64_t executions_from_it) {
-    // A histogram's percentile is at most 1/8 above the true one.
+    // A percentile of the histogram is at most 1/8 above the true one.
     const Duration excess = percentile - percentile / 9 - wcet - slack;
     return excess > 0 && is_too_often(executions_from_it, executions.jobs, excess, wcet, allowed.noise);
   };

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a bound assumes of a run on threads, against what the run was: executions within the wcet (as processor time),
-// releases on time, a platform that takes no more than was charged. The one place that decides what is an alarm and
-// what is the noise of the machine. Pure functions.
+// Checks what a bound assumes of a run on threads: executions within the wcet (as processor time), releases on time,
+// and a platform that takes no more than was charged. Only this file decides what is an alarm and what is the noise of
+// the machine. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -19,30 +19,30 @@
 
 namespace redag::metrics {
 
-/// Executions of a task against its wcet.
+/// The executions of a task compared with its wcet.
 struct ExecutionCheck {
-  std::uint64_t jobs = 0;   // whose processor time is known
-  std::uint64_t above = 0;  // by more than reading the clock explains
+  std::uint64_t jobs = 0;   // jobs whose processor time is known
+  std::uint64_t above = 0;  // jobs above the wcet by more than reading the clock explains
   Duration longest = 0;
-  bool is_exceeded = false;  // further or more often than the machine's noise explains
+  bool is_exceeded = false;  // further above, or more often, than the machine's noise explains
 };
 
-/// Which assumption broke, as far as that can be told.
+/// The assumption that broke, as far as the run shows it.
 enum class Broken : std::uint8_t {
-  Nothing,   // that was seen
-  Wcet,      // of `task`, which used `amount` of processor time
-  Release,   // came `amount` late
-  Platform,  // took processors from jobs that held them, for `amount` in all
+  Nothing,   // no broken assumption was seen
+  Wcet,      // `task` used `amount` of processor time
+  Release,   // a release came `amount` late
+  Platform,  // the platform took processors from jobs that held them, for `amount` in all
 };
 
 struct ResponseCheck {
   Duration bound = 0;               // 0: none
-  std::uint64_t exceeded = 0;       // responses above it
-  Duration worst = 0;               // of these
-  Broken broken = Broken::Nothing;  // behind the worst
+  std::uint64_t exceeded = 0;       // number of responses above the bound
+  Duration worst = 0;               // the largest of these
+  Broken broken = Broken::Nothing;  // the cause of the worst one
   TaskId task;
   Duration amount = 0;
-  bool is_alarm = false;  // false: less than a machine that was not calibrated may take
+  bool is_alarm = false;  // false: the excess is within what an uncalibrated machine may take
 };
 
 struct TaskCheck {
@@ -52,32 +52,34 @@ struct TaskCheck {
 };
 
 struct AssumptionCheck {
-  bool is_calibrated = false;  // the bounds count what the machine costs
-  Overheads allowed;           // calibrated, or plausible_overheads()
+  bool is_calibrated = false;  // the bounds include the costs of the machine
+  Overheads allowed;           // the calibrated overheads, or plausible_overheads()
   std::uint32_t workers = 1;
   std::vector<TaskCheck> tasks;  // by TaskId
 
   [[nodiscard]] bool has_alarms() const;
-  /// What a machine may add to a response before it is worth an alarm: nothing where its overheads were charged.
+  /// The excess over a bound that is not yet worth an alarm; 0 where the machine's overheads were charged.
   [[nodiscard]] Duration unalarming(Duration response) const;
-  /// Another run of the same workload: counts are added, of the rest the worst is kept.
+  /// Merges another run of the same workload: adds the counts, and keeps the worst of everything else.
   void add(const AssumptionCheck &other);
 };
 
-/// The bound on a task's response time, from its nominal release; 0: none.
+/// The bound on a task's response time, from its nominal release; 0: no bound.
 using BoundOf = std::function<Duration(TaskId)>;
 
-/// Of all jobs that finished, those of the warm-up included. `run.overheads` says whether the bounds are calibrated.
+/// Checks all jobs that finished, including those of the warm-up. `run.overheads` says whether the bounds are
+/// calibrated.
 [[nodiscard]] AssumptionCheck check_assumptions(const trace::RunInfo &run, std::span<const JobEvent> events,
                                                 const BoundOf &bound_of);
 
-/// The same by their parts, for who has them otherwise.
+/// The same check for callers that have its inputs separately.
 [[nodiscard]] AssumptionCheck check_assumptions(const Workload &workload, std::uint32_t workers,
                                                 const std::optional<Overheads> &calibrated,
                                                 std::span<const JobRecord> jobs, const BoundOf &bound_of);
 
-/// Are `excess` (times above the wcet, of `jobs` executions) more than a machine with this noise explains? Markov: of
-/// all executions at most a share E/x meets noise of x or more, where E is the noise expected in one.
+/// True if `excess` is more than a machine with this noise explains. `excess` holds the times above the wcet among
+/// `jobs` executions. By Markov's inequality, at most a share E/x of all executions meets noise of x or more, where E
+/// is the noise expected in one.
 [[nodiscard]] bool is_beyond_noise(std::vector<Duration> excess, std::uint64_t jobs, Duration wcet, const Loss &noise);
 
 /// What a Histogram knows of a task's executions, as processor time.
@@ -88,7 +90,7 @@ struct ExecutionPercentiles {
   Duration longest = 0;
 };
 
-/// The same where the single executions are not kept. `calibrated`: nothing is plausible_overheads().
+/// The same test for executions that are not kept one by one. `calibrated`: if empty, plausible_overheads().
 [[nodiscard]] bool is_beyond_noise(const ExecutionPercentiles &executions, Duration wcet,
                                    const std::optional<Overheads> &calibrated);
 
@@ -98,10 +100,10 @@ struct Remark {
   std::string text;  // "control.imu: ...", without a period
 };
 
-/// What is to be said, alarms first.
+/// Returns the remarks to show, alarms first.
 [[nodiscard]] std::vector<Remark> remarks(const AssumptionCheck &check, const Workload &workload);
 
-/// What to add to bounds that do not count what the machine costs.
+/// Says what the user should add to bounds that do not include the machine's costs.
 [[nodiscard]] const char *not_calibrated_hint();
 
 }  // namespace redag::metrics

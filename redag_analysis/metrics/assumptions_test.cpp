@@ -25,7 +25,7 @@ Workload two_tasks() {
                        1, PreemptionMode::Os);
 }
 
-// What a quiet machine was measured to cost.
+// The measured overheads of a quiet machine.
 Overheads quiet() {
   return {.timer = 5 * kUs,
           .dispatch = 50 * kUs,
@@ -128,7 +128,7 @@ TEST(Execution, AFewThatStallsExplainAreANote) {
             "more than stalls of the machine explain");
 }
 
-// The hypervisor stopped the machine, and the kernel charged the job for it: the release timer was late as well.
+// The hypervisor stopped the machine, and the kernel charged the job for that time. The release timer was late as well.
 TEST(Execution, WhileTheTimerStoodStillIsThePlatform) {
   Jobs stopped;
   stopped.add(100, 0, {}).add(0, {.on_worker = 90 * kMs, .processor = 89 * kMs, .response = 90 * kMs});

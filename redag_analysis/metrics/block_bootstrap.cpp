@@ -31,8 +31,8 @@ std::size_t block_count(const BlockedRuns &runs) {
   return count;
 }
 
-// Values at which the distributions are compared: every one where there are few, else some ranks of both sides pooled,
-// half of them in the upper tenth.
+// Returns the values at which the distributions are compared. These are all values if there are few; otherwise ranks of
+// both sides pooled, half of them in the upper tenth.
 std::vector<Duration> grid_of(std::vector<Duration> values) {
   std::sort(values.begin(), values.end());
   std::vector<Duration> distinct = values;
@@ -53,7 +53,7 @@ std::vector<Duration> grid_of(std::vector<Duration> values) {
   return grid;
 }
 
-// One side, counted once so that a replicate only adds: and no more than a binary search looks at.
+// One side, counted once. A replicate then only adds counts, and only those that a binary search visits.
 class Side {
  public:
   Side(const BlockedRuns &runs, const std::vector<Duration> &grid) : grid_(grid) {
@@ -78,7 +78,8 @@ class Side {
     const auto pick = [&rng](const auto &from) -> const auto & {
       return from[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(from.size()) - 1))];
     };
-    // One fewer than there are: as many would make the spread too small, by half where there are two runs.
+    // Draws one fewer than there are. Drawing as many would make the spread too small, by half where there are two
+    // runs.
     for (std::size_t r = 0; r < std::max<std::size_t>(1, runs_.size() - 1); ++r) {
       const std::vector<Counted> &run = pick(runs_);
       for (std::size_t i = 0; i < std::max<std::size_t>(1, run.size() - 1); ++i) {
@@ -100,7 +101,7 @@ class Side {
     std::uint64_t released = 0;
     std::uint64_t missed = 0;
     std::uint64_t finished = 0;
-    std::vector<std::uint32_t> up_to;  // responses of at most grid[i]
+    std::vector<std::uint32_t> up_to;  // the number of responses of at most grid[i]
   };
 
   Counted count(const Block &block) const {
@@ -177,7 +178,7 @@ double miss_ratio(const BlockedRuns &runs) {
   return released == 0 ? 0 : static_cast<double>(missed) / static_cast<double>(released);
 }
 
-// Lag-1 correlation of a value of the blocks, over all runs, each around its own mean.
+// Lag-1 correlation of a value of the blocks, over all runs; each run varies around its own mean.
 template <class Value>
 double correlation(const BlockedRuns &runs, Value value) {
   double products = 0;
@@ -197,7 +198,7 @@ double correlation(const BlockedRuns &runs, Value value) {
       if (i > 0) products += (values[i] - mean) * (values[i - 1] - mean);
     }
   }
-  // Of what does not vary only rounding is left.
+  // A value that does not vary leaves only rounding errors.
   return squares > 1e-18 * scale ? products / squares : 0;
 }
 

@@ -12,10 +12,10 @@
 namespace redag::metrics {
 namespace {
 
-// Jobs of a run in which misses come in bursts: once one is missed the next one is likely to be, too.
+// Jobs of a run in which misses come in bursts: after a missed job the next one is likely to miss, too.
 struct Bursts {
-  double begin = 0.005;  // a burst begins
-  double end = 0.05;     // it ends: 20 jobs on average
+  double begin = 0.005;  // probability that a burst begins
+  double end = 0.05;     // probability that it ends: 20 jobs on average
   Duration slow = 0;     // added to every response
 };
 
@@ -48,7 +48,7 @@ BootstrapOptions quick() {
   return options;
 }
 
-// Jobs taken for independent: what a test must not do. Two-sided normal test of two proportions.
+// A two-sided normal test of two proportions that takes jobs for independent: the mistake that the bootstrap avoids.
 double naive_p(const BlockedRuns &a, const BlockedRuns &b) {
   const auto counts = [](const BlockedRuns &side) {
     std::pair<double, double> sum{0, 0};
@@ -81,7 +81,7 @@ TEST(BlockBootstrap, OfTheSameThingFindsDifferencesAboutAsOftenAsItSays) {
     naive += naive_p(a, b) <= 0.05 ? 1 : 0;
   }
   EXPECT_GT(naive, kTrials / 2) << "the bursts are too short to show anything";
-  // 5 % are meant; thirty blocks with three short bursts each give 9 %.
+  // The nominal rate is 5 %; thirty blocks with three short bursts each give 9 %.
   EXPECT_LE(misses, kTrials * 15 / 100);
   EXPECT_LE(tails, kTrials * 15 / 100);
   EXPECT_GE(misses, 2) << "a test that never speaks";
@@ -158,7 +158,7 @@ TEST(BlockBootstrap, TooFewAreNotTested) {
 }
 
 TEST(BlockBootstrap, LongMemoryShows) {
-  // Bursts that last longer than blocks.
+  // The bursts last longer than the blocks.
   const BlockedRuns slow = {bursty_run({0.002, 0.002, 0}, 5, 60, 50)};
   const RowDifference row = compare_blocks(slow, slow, quick());
   EXPECT_GT(row.block_correlation, row.correlation_limit);
@@ -176,7 +176,7 @@ TEST(BlockBootstrap, IsDeterministic) {
 TEST(DiscoveryThreshold, IsThatOfBenjaminiAndHochberg) {
   EXPECT_EQ(discovery_threshold({}), 0);
   EXPECT_EQ(discovery_threshold({0.06, 0.5}), 0);
-  EXPECT_EQ(discovery_threshold({0.04, 0.5}), 0);  // 0.025 would be needed
+  EXPECT_EQ(discovery_threshold({0.04, 0.5}), 0);  // a discovery would need 0.025
   EXPECT_EQ(discovery_threshold({0.5, 0.01, 0.03}), 0.03);
   EXPECT_EQ(discovery_threshold({0.05, 0.05, 0.05}), 0.05);
 }

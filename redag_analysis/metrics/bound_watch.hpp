@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Which responses of a run exceeded what was proven for them. Follows a stream of events, in pieces if need be; knows
-// tasks by id alone. Not thread-safe.
+// Finds the responses of a run that exceeded their proven bound. Takes the stream of events in pieces of any size, and
+// knows tasks by id alone. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -14,25 +14,25 @@
 
 namespace redag::metrics {
 
-/// What was seen of one task against its bound.
+/// The responses of one task compared with its bound.
 struct BoundCount {
   Duration bound = 0;
-  std::uint64_t exceeded = 0;  // responses above it
-  Duration worst = 0;          // of these
+  std::uint64_t exceeded = 0;  // number of responses above it
+  Duration worst = 0;          // the largest of these
 };
 
 class BoundWatch {
  public:
-  /// The bound on a task's response time, from its nominal release; 0: none. Asked once a task.
+  /// The bound on a task's response time, from its nominal release; 0: no bound. Called once per task.
   using BoundOf = std::function<Duration(TaskId)>;
 
-  /// Called for each response above its bound, with what has been counted of the task so far.
+  /// Called for each response above its bound, with the counts of the task up to then.
   using Exceeded = std::function<void(TaskId, const BoundCount &)>;
 
-  /// A response is f - r as measured. Jobs released before the first event are not judged.
+  /// Adds events. A response is f - r as measured. Jobs released before the first event are not judged.
   void add(std::span<const JobEvent> events, const BoundOf &bound_of, const Exceeded &exceeded = {});
 
-  /// Null for a task of which nothing was seen, or that has no bound.
+  /// Returns null for a task without a bound, or of which no job was seen.
   [[nodiscard]] const BoundCount *of(TaskId task) const;
 
  private:

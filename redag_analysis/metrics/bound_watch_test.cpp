@@ -32,7 +32,7 @@ TEST(BoundWatch, CountsResponsesAboveTheBound) {
     told.push_back(count);
   };
   const std::vector<JobEvent> first = {
-      event(JobEventKind::Finished, 0, 0, 90),  // released before anybody looked
+      event(JobEventKind::Finished, 0, 0, 90),  // released before the watch began
       event(JobEventKind::Released, 0, 1, 100), event(JobEventKind::Released, 1, 0, 100),
       event(JobEventKind::Finished, 0, 1, 110), event(JobEventKind::Released, 0, 2, 120)};
   const std::vector<JobEvent> second = {

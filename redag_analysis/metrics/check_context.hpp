@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Shared by the parts of the trace checker: what they look at, and where they report. Internal to metrics/.
+// What the parts of the trace checker share: the state that they look at, and the report. Internal to metrics/.
 #pragma once
 
 #include <string>
@@ -21,15 +21,15 @@ class CheckContext {
   const trace::RunInfo &info;
   const Replay &replay;
 
-  /// Where the checker is.
+  /// Sets the checker's position in the trace.
   void at(std::size_t event, Time time) {
     event_ = event;
     time_ = time;
   }
   [[nodiscard]] Time now() const { return time_; }
 
-  /// Counts one test of `rule`; unless `holds`, reports a violation. `explain` is called only then and returns a
-  /// string.
+  /// Counts one test of `rule`, and reports a violation unless `holds`. `explain` returns a string, and is called only
+  /// for a violation.
   template <class Explain>
   void expect(Rule rule, bool holds, TaskId task, std::uint32_t number, Explain explain) {
     if (!rules_.contains(rule)) return;

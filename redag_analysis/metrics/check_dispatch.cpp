@@ -77,7 +77,7 @@ void DispatchRules::check_bounds(const JobEvent &event) {
   }
 }
 
-// Cooperative: on a free worker, or on top of a suspended job that it outranks if no worker is free.
+// Cooperative: a job starts on a free worker. If none is free, it starts on top of a suspended job that it outranks.
 void DispatchRules::check_place(const JobEvent &event, const LiveJob &job) {
   const Replay &replay = context_.replay;
   if (mode() != Preemption::Cooperative || event.worker >= replay.worker_count()) return;
@@ -91,8 +91,9 @@ void DispatchRules::check_place(const JobEvent &event, const LiveJob &job) {
                   [&] { return "it runs on top of " + name(stack.back()) + " although a worker is free"; });
 }
 
-// Full: whoever gets the worker of a preempted job must outrank that job. Judged here and not when time moves on, since
-// threads decide more than once at what their clocks call one instant: what the job inherits later takes nothing back.
+// Full: the job that gets the worker of a preempted job must outrank that job. The check happens here and not when time
+// moves on, because threads decide more than once at one instant of their clocks. What the preempted job inherits later
+// does not make the preemption wrong.
 void DispatchRules::check_eviction(const JobEvent &event, const LiveJob &by) {
   const auto eviction = std::find_if(evictions_.begin(), evictions_.end(),
                                      [&](const Eviction &one) { return one.worker == event.worker; });
@@ -102,15 +103,15 @@ void DispatchRules::check_eviction(const JobEvent &event, const LiveJob &by) {
   const Replay &replay = context_.replay;
   const LiveJob *job = replay.find(evicted.task, evicted.number);
   if (job == nullptr) return;
-  // Where levels are shared, the job may inherit from one that was looked at only after the preemption: so its own
-  // level decides, and what it inherits only in the order of priorities.
+  // Where levels are shared, the job may inherit from one that was looked at only after the preemption. Its own level
+  // therefore decides; what it inherits counts only in the order of priorities.
   const bool outranked = replay.preempts(by.raised, job->own) && by.raised.key <= urgency_of(*job, by.raised).key;
   context_.expect(Rule::Preemption, outranked, evicted.task, evicted.number, [&] {
     return "preempted by " + context_.job_name(by.task, by.number) + ", which does not outrank it";
   });
 }
 
-// Whoever gets a worker must be the most urgent of those who could.
+// The job that gets a worker must be the most urgent of those that could.
 void DispatchRules::check_choice(const LiveJob &chosen, const Urgency &urgency) {
   const Replay &replay = context_.replay;
   const auto complain = [&](const Replay::JobRef &waiting) {
@@ -118,9 +119,9 @@ void DispatchRules::check_choice(const LiveJob &chosen, const Urgency &urgency) 
   };
   context_.expect(Rule::Priority, true, chosen.task, chosen.number, [] { return std::string(); });
   const auto &eligible = replay.eligible();
-  // A resumed job (Cooperative) keeps its worker unless it is outranked by level.
+  // A resumed job (Cooperative) keeps its worker unless another outranks it by level.
   const bool goes_on = mode() == Preemption::Cooperative && chosen.state == State::Suspended;
-  // A job that goes on where none may start passes by those that are eligible.
+  // A job that continues while no job may start passes the eligible ones.
   const bool none_may_start = context_.info.stepped && chosen.state == State::Suspended;
   if (!eligible.empty() && !none_may_start) {
     const Replay::Waiter &best = *eligible.begin();
@@ -194,7 +195,7 @@ void DispatchRules::ended(const JobEvent &event, const LiveJob &job) {
   });
 }
 
-// In virtual time what ends at one instant ends in the static order of tasks, jobs of one task in that of release.
+// In virtual time, jobs that end at one instant end in the static order of tasks, those of one task in release order.
 void DispatchRules::check_order_of_ends(const JobEvent &event) {
   if (context_.info.driver != trace::Driver::Simulator) return;
   const Ended ended{event.time, places_[event.task.value], Replay::JobRef{event.task, event.job}};
@@ -224,7 +225,7 @@ void DispatchRules::end_of_instant() {
   if (mode() == Preemption::Full) check_running();
 }
 
-// A simulated job that runs when the run ends must have something left to do.
+// A simulated job that still runs when the run ends must have work left.
 void DispatchRules::end_of_trace() {
   if (!exact()) return;
   for (std::uint32_t w = 0; w < context_.replay.worker_count(); ++w) {
@@ -265,7 +266,7 @@ void DispatchRules::check_free_workers() {
   });
 }
 
-// Full: nobody who waits outranks anybody who runs.
+// Full: no waiting job outranks a running one.
 void DispatchRules::check_running() {
   const Replay &replay = context_.replay;
   const LiveJob *least = nullptr;
@@ -286,13 +287,13 @@ void DispatchRules::check_running() {
   if (suspended != nullptr) judge(urgency_of(*suspended), suspended->task, suspended->number);
 }
 
-// With what a started job inherits from those that wait for its group. Where jobs were held back, those may not have
-// been looked at: only its own is sure.
+// Returns the urgency with what a started job inherits from those that wait for its group. In a stepped run those may
+// not have been looked at, and only its own urgency is certain.
 Urgency DispatchRules::urgency_of(const LiveJob &job) const {
   return context_.info.stepped ? job.own : context_.replay.inherited(job);
 }
 
-// As it is when a job of that urgency is looked at.
+// The same at the time when a job of urgency `looked_at` is looked at.
 Urgency DispatchRules::urgency_of(const LiveJob &job, const Urgency &looked_at) const {
   return context_.info.stepped ? job.own : context_.replay.inherited(job, looked_at);
 }

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The checker's rules about decisions: bounds, groups, workers, preemption, priority, work conservation, deferral and
-// execution. Sees each event before the replay applies it. Internal to metrics/.
+// execution. They see each event before the replay applies it. Internal to metrics/.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +19,13 @@ class DispatchRules {
   explicit DispatchRules(CheckContext &context);
 
   void before(const JobEvent &event);
-  /// Time is about to move on.
+  /// Called before time moves on.
   void end_of_instant();
   void end_of_trace();
 
  private:
-  // `waiting` was eligible when `chosen` got a worker that it outranked it for. Void if it starts in the same instant.
+  // `waiting` was eligible when `chosen`, which it outranks, got a worker. Void if `waiting` starts in the same
+  // instant.
   struct Complaint {
     Replay::JobRef waiting;
     Replay::JobRef chosen;

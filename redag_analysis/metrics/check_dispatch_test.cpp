@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Preemption and inheritance: traces that keep their rules and, for each rule, one that breaks it, written by hand.
+// Preemption and inheritance: for each rule a hand-written trace that keeps it and one that breaks it.
 #include "redag_analysis/metrics/check_dispatch.hpp"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ using testing::make_dag;
 using testing::make_workload;
 using testing::TraceBuilder;
 
-// lo runs from 0; hi comes at 5 (offset).
+// lo runs from 0; hi arrives at 5 (its offset).
 TraceBuilder preemptive(PreemptionMode mode, Duration region_ms = 0) {
   Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "", 5}}), make_dag("b", {{"lo", 20, 8}})}, 1, mode);
   w.dags[1].tasks[0].region = region_ms * kMillisecond;
@@ -166,7 +166,7 @@ TEST(CheckTrace, CooperativePrefersAFreeWorker) {
   expect_broken(t.preempted("lo", 0, 0).dispatched("hi", 0, 0, 15).until(6), Rule::Priority);
 }
 
-// lo holds the group that hi wants; mid must not run in between (one worker, full preemption).
+// lo holds the group that hi needs; mid must not run in between (one worker, full preemption).
 TEST(CheckTrace, PriorityIsInherited) {
   const Workload w =
       make_workload({make_dag("a", {{"hi", 10, 1, {}, "g", 1}}), make_dag("b", {{"mid", 15, 3, {}, "", 2}}),
@@ -179,7 +179,7 @@ TEST(CheckTrace, PriorityIsInherited) {
   expect_kept(good.until(6), Rule::Priority);
   expect_broken(t.preempted("lo", 0, 0).dispatched("mid", 0, 0, 17).until(3), Rule::Priority);
 
-  // mid comes first: lo takes the worker back when hi waits for it, and not before.
+  // mid arrives first: lo takes the worker back only when hi waits for lo's group.
   Workload late = w;
   late.dags[0].tasks[0].offset = 3 * kMillisecond;
   TraceBuilder back(late);
@@ -191,10 +191,11 @@ TEST(CheckTrace, PriorityIsInherited) {
   expect_broken(back.preempted("mid", 0, 0).resumed("lo", 0, 0).until(4), Rule::Preemption);
 }
 
-// Threads decide more than once at what their clocks call one instant: what lo inherits after mid took its worker takes
-// nothing back, where lo cannot return at once (cooperative; a level that it shares with mid).
-// Two equals come together, and one of them waits for the group of the job that runs. If the other one is looked at
-// first, nothing has been inherited yet; and if not, it is of the holder's level.
+// Threads decide more than once at one instant of their clocks. What lo inherits after mid took its worker does not
+// undo that step where lo cannot return at once (cooperative; a level that it shares with mid).
+//
+// Two equals arrive together, and one of them waits for the group of the running job. If the other one is looked at
+// first, the holder has inherited nothing yet. Otherwise the other one is of the holder's level.
 TEST(CheckTrace, AJobInheritsWhenTheOneThatWaitsIsLookedAt) {
   for (const bool waits_first : {false, true}) {
     const redag::testing::TestTask waits{"waits", 10, 2, {}, "g", 5};

@@ -62,7 +62,7 @@ void OverloadRules::low_mode(const JobEvent &event) {
                   [&] { return "HI mode did not begin at " + format_duration(event.value); });
 }
 
-// Whoever used a limit must have been told to have done so.
+// A job that used a limit must have been told.
 void OverloadRules::ended(const JobEvent &event, const LiveJob &job) {
   if (!exact()) return;
   const Task &task = context_.replay.task(event.task);

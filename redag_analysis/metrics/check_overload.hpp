@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The checker's rules about budgets and modes: who has used what, and when HI mode begins and ends. What is skipped for
-// it is ReleaseRules' business, who is demoted Replay's. Sees each event before the replay applies it. Internal to
-// metrics/.
+// The checker's rules about budgets and modes: which job has used its limit, and when HI mode begins and ends.
+// ReleaseRules checks the skips that follow, and Replay the demotions. The rules see each event before the replay
+// applies it. Internal to metrics/.
 #pragma once
 
 #include "redag_analysis/metrics/check_context.hpp"
@@ -15,7 +15,7 @@ class OverloadRules {
   explicit OverloadRules(CheckContext &context) : context_(context) {}
 
   void before(const JobEvent &event);
-  /// Time is about to move on.
+  /// Called before time moves on.
   void end_of_instant();
 
  private:

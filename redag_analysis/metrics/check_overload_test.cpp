@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Budgets and HI mode: traces that keep their rules and, for each rule, one that breaks it, written by hand.
+// Budgets and HI mode: for each rule a hand-written trace that keeps it and one that breaks it.
 #include "redag_analysis/metrics/check_overload.hpp"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ using testing::make_dag;
 using testing::make_workload;
 using testing::TraceBuilder;
 
-// hi: T 10, C 1; lo: T 20, C 4, budget 2. One worker; lo starts at 1.
+// hi: T 10, C 1. lo: T 20, C 4, budget 2. One worker; lo starts at 1.
 TraceBuilder budget_run(OnBudget on_budget = OnBudget::Log) {
   Workload workload =
       make_workload({make_dag("a", {{"hi", 10, 1}}), make_dag("b", {{"lo", 20, 4}})}, 1, PreemptionMode::None);
@@ -64,7 +64,7 @@ TEST(CheckBudgets, OnlyWhatHasABudgetUsesIt) {
       .started("hi", 1, 0)
       .finished("hi", 1, 0);
   trace::Trace trace = t.until(12);
-  trace.info.driver = trace::Driver::Threads;  // which knows of no times that were used
+  trace.info.driver = trace::Driver::Threads;  // threads do not know the exact times that jobs used
   expect_broken(trace, Rule::Budget);
 }
 
@@ -79,7 +79,7 @@ TEST(CheckBudgets, AJobThatRunsUsesItsBudgetOnce) {
   expect_broken(waits.until(1), Rule::Life);
 }
 
-// h: T 20, C 9, 2 in LO mode, of high criticality; l: T 10, C 3. One worker; h starts at 3, and has used its 2 at 5.
+// h: T 20, C 9, C(LO) 2, high criticality. l: T 10, C 3. One worker; h starts at 3, and has used its 2 at 5.
 Workload two_criticalities() {
   Workload workload =
       make_workload({make_dag("hi", {{"h", 20, 9}}), make_dag("lo", {{"l", 10, 3}})}, 1, PreemptionMode::Os);
@@ -125,7 +125,7 @@ TEST(CheckHighMode, IsBegunByAStartedJobOfHighCriticality) {
   without_limit.at(10).arrives("l", 1).preempted("h", 0, 0).dispatched("l", 1, 0, 20);
   expect_broken(without_limit.at(12).high_mode("l", 1).until(13), Rule::Budget);
   Workload low = two_criticalities();
-  low.dags[1].tasks[0].wcet_low = 2 * kMillisecond;  // which no file can say
+  low.dags[1].tasks[0].wcet_low = 2 * kMillisecond;  // no file can express this
   TraceBuilder by_low(low);
   by_low.at(0)
       .arrives("h", 0)

@@ -82,12 +82,12 @@ void ReleaseRules::released(const JobEvent &event) {
 
 void ReleaseRules::check_grid(const JobEvent &event) {
   const Task &task = context_.replay.task(event.task);
-  // Wide enough for any number that a damaged trace can hold.
+  // Int128 holds the result for any number that a damaged trace can contain.
   const Int128 exact_nominal = Int128{context_.info.start} + task.offset + Int128{event.job} * task.period;
   const Time nominal = static_cast<Time>(std::min(exact_nominal, Int128{kNever}));
   context_.expect(Rule::Grid, event.value == nominal, event.task, event.job,
                   [&] { return expected_and_got("its release", nominal, event.value); });
-  // Only the simulator keeps to the jitter it was given; a real timer can be as late as the machine likes.
+  // Only the simulator keeps to the given jitter; a real timer can be late by any time.
   const bool exact = context_.info.driver == trace::Driver::Simulator;
   const bool in_time = event.time >= event.value && (!exact || event.time <= event.value + task.jitter);
   context_.expect(Rule::Grid, in_time, event.task, event.job, [&] {
@@ -115,7 +115,8 @@ void ReleaseRules::check_data_release(const JobEvent &event) {
   task.data_origin = consume(task);
 }
 
-// docs/model.md, "Overrun and admission", in its order. The skips must follow within the instant.
+// Applies the rules of docs/model.md, "Overrun and admission", in their order. The skips must follow within the
+// instant.
 void ReleaseRules::expect_skips(const JobEvent &event) {
   if (const Reason reason = refusal(event); reason != Reason::None) {
     expected_skips_.push_back(ExpectedSkip{event.task, event.job, reason});
@@ -144,7 +145,7 @@ void ReleaseRules::expect_skips(const JobEvent &event) {
   }
 }
 
-// Why this release is not taken, whatever the task's other jobs do; None: it is.
+// Returns the reason for which this release is refused regardless of the task's other jobs; None if it is taken.
 Reason ReleaseRules::refusal(const JobEvent &event) {
   TaskState &task = tasks_[event.task.value];
   Refusals &refusals = task.refusals;
@@ -162,7 +163,7 @@ Reason ReleaseRules::refusal(const JobEvent &event) {
   return Reason::None;
 }
 
-// Tasks that edges join decide together, where their releases are on one grid; the others each by itself.
+// Tasks of a DAG that have edges decide together if their releases are on one grid; each other task decides alone.
 bool ReleaseRules::is_let_through(const JobEvent &event) const {
   const Replay &replay = context_.replay;
   const Task &task = replay.task(event.task);
@@ -193,7 +194,7 @@ void ReleaseRules::exceeded(const JobEvent &event) {
   if (!removed_[context_.replay.dag_of(event.task).value]) tasks_[event.task.value].refusals.skips_next = true;
 }
 
-// What has not started of DAGs of lower criticality is skipped.
+// Jobs of DAGs of lower criticality that have not started are to be skipped.
 void ReleaseRules::mode_begins() {
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     const TaskId id(t);
@@ -205,7 +206,7 @@ void ReleaseRules::mode_begins() {
   }
 }
 
-// They begin afresh: what waits for data is skipped, and data of before is forgotten.
+// The degraded DAGs begin afresh: jobs that wait for data are to be skipped, and earlier data is discarded.
 void ReleaseRules::mode_ends() {
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     const TaskId id(t);
@@ -238,8 +239,9 @@ void ReleaseRules::ready(const JobEvent &event, const LiveJob &job) {
                   [&] { return expected_and_got("its origin", origin, event.value); });
 }
 
-// A release that the driver skips itself, without a look at the task's other jobs: a period slept through (overrun), a
-// message overwritten (queue_full). No job of the model is skipped as `overrun` right after its own release.
+// True for a release that the driver skips itself, regardless of the task's other jobs. The reason is `overrun` for a
+// period slept through and `queue_full` for an overwritten message. The model itself skips no job as `overrun` right
+// after its own release.
 bool ReleaseRules::is_miss(const JobEvent &event) const {
   if (context_.info.driver == trace::Driver::Simulator) return false;
   if (event.task != just_released_.task || event.job != just_released_.number) return false;
@@ -254,7 +256,7 @@ void ReleaseRules::skipped(const JobEvent &event, const LiveJob *job) {
   if (event.reason == Reason::Removed) removed_[context_.replay.dag_of(event.task).value] = true;
   TaskState &task = tasks_[event.task.value];
   if (job != nullptr && job->state == LiveJob::State::Ready && task.timer) {
-    // Nobody used its data.
+    // No job used its data.
     for (const std::uint32_t edge : task.in) edges_[edge].fresh = true;
     touch(event.task);
   }
@@ -303,7 +305,7 @@ void ReleaseRules::end_of_instant() {
   touched_.clear();
 }
 
-// A job that could be released (data) or ready (waiting) must be so in the same instant.
+// A data job that could be released, or a waiting job that could be ready, must be so in the same instant.
 void ReleaseRules::check_nothing_is_owed(TaskId id) {
   TaskState &task = tasks_[id.value];
   if (!task.timer) {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The checker's rules about releases: the timer grid, precedence, overrun and admission. Sees each event before the
+// The checker's rules about releases: the timer grid, precedence, overrun and admission. They see each event before the
 // replay applies it. Internal to metrics/.
 #pragma once
 
@@ -18,7 +18,7 @@ class ReleaseRules {
   explicit ReleaseRules(CheckContext &context);
 
   void before(const JobEvent &event);
-  /// Time is about to move on.
+  /// Called before time moves on.
   void end_of_instant();
   void end_of_trace();
 
@@ -27,16 +27,17 @@ class ReleaseRules {
     TaskId from;
     TaskId to;
     bool aligned = false;  // timer to timer, same period and offset: only data of the same period counts
-    bool fresh = false;    // completed since `to` last consumed
-    Time release = std::numeric_limits<Time>::min();  // of the newest job that completed: its data
+    bool fresh = false;    // a job completed since `to` last consumed
+    Time release = std::numeric_limits<Time>::min();  // of the newest job that completed, whose data this is
     Time origin = 0;                                  // of that data
     Time finish = 0;                                  // of the job that completed last, as measured
-    Time finish_decided = 0;                          // when the scheduler heard of it
+    Time finish_decided = 0;                          // when the scheduler learned of it
   };
-  // Releases of the task that are not taken (docs/model.md, "Budgets" and "Criticality").
+  // State of the task's releases that are refused (docs/model.md, "Budgets" and "Criticality").
   struct Refusals {
     bool skips_next = false;
-    Time let_through = std::numeric_limits<Time>::min();  // HI mode: its newest release that was taken; min(): none
+    Time let_through = std::numeric_limits<Time>::min();  // HI mode: the newest release of the task that was taken;
+                                                          // min(): none
   };
   struct TaskState {
     bool timer = true;
@@ -45,7 +46,7 @@ class ReleaseRules {
     std::vector<std::uint32_t> in;   // edges
     std::vector<std::uint32_t> out;  // edges
     std::uint32_t next_number = 0;
-    Time data_origin = 0;  // of the data job released last
+    Time data_origin = 0;  // of the data job that was released last
     bool touched = false;
     Refusals refusals;
   };
@@ -74,7 +75,7 @@ class ReleaseRules {
   [[nodiscard]] bool is_fresh(const Edge &edge, Time release) const {
     return edge.fresh && (!edge.aligned || edge.release == release);
   }
-  /// The first predecessor without fresh data for a job released at `release`; none() if there is no such.
+  /// Returns the first predecessor without fresh data for a job released at `release`; none() if every one has it.
   [[nodiscard]] TaskId missing(const TaskState &task, Time release) const;
   Time consume(const TaskState &task);
 
@@ -83,7 +84,7 @@ class ReleaseRules {
   std::vector<TaskState> tasks_;
   std::vector<bool> removed_;  // per DAG
   std::vector<ExpectedSkip> expected_skips_;
-  ExpectedSkip just_released_;  // by the last event; no task: that was another event
+  ExpectedSkip just_released_;  // by the last event; no task: the last event was no release
   std::vector<TaskId> touched_;
 };
 

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the trace checker found: violations by rule, and how often each rule was put to the test (a rule that was never
-// tested proves nothing). Plain values.
+// The findings of the trace checker: violations by rule, and the number of tests of each rule. A rule without tests
+// proves nothing. Plain values.
 #pragma once
 
 #include <array>
@@ -16,38 +16,38 @@
 
 namespace redag::metrics {
 
-/// The rules of docs/model.md that a trace can be held to.
+/// The rules of docs/model.md that the checker can hold a trace to.
 enum class Rule : std::uint8_t {
   Stream,            // times never decrease, ids exist, nothing is lost
   Life,              // state transitions, numbers from 0 upwards, no job twice
   Conservation,      // released = finished + skipped + aborted + in flight, for every task
   Grid,              // timer job k is released for start + offset + k * T, and none is left out
   Precedence,        // ready exactly when every predecessor has fresh data; data jobs released then
-  Admission,         // skipped exactly when, and for the reason that, the model says
+  Admission,         // jobs are skipped exactly when, and for the reason that, the model says
   Deadline,          // absolute deadline = r + D
-  TaskOverlap,       // jobs of one task never overlap and start in order of release
-  MaxActive,         // a DAG has at most max_active jobs started and unfinished; all together max_started
+  TaskOverlap,       // jobs of one task never overlap beyond its concurrency, and start in order of release
+  MaxActive,         // a DAG has at most max_active jobs started and unfinished; all together at most max_started
   Group,             // jobs of one group never overlap
-  Worker,            // a worker runs one job at a time; suspended jobs go on in LIFO order (cooperative)
+  Worker,            // a worker runs one job at a time; suspended jobs continue in LIFO order (cooperative)
   Preemption,        // only in modes that have it, at preemption points, by more urgent jobs
   Priority,          // no eligible job waits while a less urgent one is chosen or (full) runs
   WorkConservation,  // no worker is free while an eligible job waits
-  Deferral,          // deferred exactly when max_active alone kept the job from a worker that it could have had
-  Budget,            // jobs are told to have used their budget when they did; HI mode begins and ends by its rules
+  Deferral,          // deferred exactly when max_active alone kept the job from an available worker
+  Budget,            // a job that used its budget is told so; HI mode begins and ends by its rules
   Execution,         // simulator: a job held a worker for exactly its execution time
-  Start,             // threads, full: a dispatched job's body begins before less urgent bodies go on for long
+  Start,             // threads, full: a dispatched job's body begins before less urgent bodies run for long
 };
 inline constexpr std::size_t kRuleCount = 18;
 
 [[nodiscard]] const char *to_string(Rule rule);
 
-/// Which rules a trace is held to.
+/// The rules that a trace is held to.
 class RuleSet {
  public:
-  /// Everything: ReDAG-RT's own executors.
+  /// All rules, for ReDAG-RT's own executors.
   [[nodiscard]] static RuleSet all();
-  /// rclcpp's executors and their models: without Priority, WorkConservation, Deferral, Preemption, MaxActive and
-  /// Budget, which those do not have.
+  /// The rules for rclcpp's executors and their models. Priority, WorkConservation, Deferral, Preemption, MaxActive and
+  /// Budget are left out, because those executors do not have them.
   [[nodiscard]] static RuleSet rclcpp();
 
   [[nodiscard]] RuleSet without(Rule rule) const;
@@ -60,7 +60,7 @@ class RuleSet {
 struct Violation {
   Rule rule = Rule::Stream;
   Time time = 0;
-  std::size_t event = 0;  // index of the event at which it was seen
+  std::size_t event = 0;  // index of the event at which it was found
   std::string job;        // "control.ekf#12"
   std::string text;
 
@@ -69,7 +69,7 @@ struct Violation {
 };
 
 struct CheckReport {
-  /// Violations kept with their text; the others are only counted.
+  /// The number of violations whose text is kept; the others are only counted.
   static constexpr std::size_t kMaxKept = 200;
 
   std::vector<Violation> violations;
@@ -80,7 +80,7 @@ struct CheckReport {
   [[nodiscard]] bool ok() const { return violation_count == 0; }
   [[nodiscard]] std::uint64_t checks(Rule rule) const { return checks_by_rule[static_cast<std::size_t>(rule)]; }
   [[nodiscard]] std::uint64_t violated(Rule rule) const { return violations_by_rule[static_cast<std::size_t>(rule)]; }
-  /// The first `at_most` violations, one a line, and how many more there are.
+  /// The first `at_most` violations, one a line, and the number of further ones.
   [[nodiscard]] std::string to_string(std::size_t at_most = 10) const;
 };
 

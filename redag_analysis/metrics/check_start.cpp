@@ -32,7 +32,7 @@ void StartRules::before(const JobEvent &event) {
   }
 }
 
-// The job's thread was on a processor at that time.
+// Records that the job's thread was on a processor at time `at`.
 void StartRules::ran(const LiveJob &job, Time at) {
   for (Unbegun &waiting : unbegun_) {
     if (waiting.overtaken != kNever || at - waiting.dispatched <= kLateStart) continue;
@@ -43,7 +43,7 @@ void StartRules::ran(const LiveJob &job, Time at) {
   }
 }
 
-// Where jobs of lower criticality bear the throttling, they are ordinary threads for a while.
+// Jobs of lower criticality that bear the throttling are ordinary threads for a while.
 bool StartRules::may_overtake(const LiveJob &job, const LiveJob &waiting) const {
   const Replay &replay = context_.replay;
   const bool is_spared = !replay.is_degradable(job.task) && replay.is_degradable(waiting.task);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The checker's rule about bodies: a job that was dispatched is only a decision, until a thread begins its body. Sees
+// The checker's rule about bodies: a dispatch is only a decision until a thread begins the job's body. The rule sees
 // each event before the replay applies it. Internal to metrics/.
 #pragma once
 
@@ -12,12 +12,12 @@
 
 namespace redag::metrics {
 
-/// A thread may be late by that much: real-time throttling takes 50 ms in a second, and a hypervisor takes processors
-/// one by one.
+/// The time by which a thread may be late. Real-time throttling takes 50 ms in a second, and a hypervisor takes
+/// processors one by one.
 inline constexpr Duration kLateStart = 100 * kMillisecond;
 
-/// Real threads, full preemption: no body of a strictly less urgent job begins or ends more than kLateStart after a job
-/// was dispatched whose own body has not begun. (Only its begin and its end prove that a body runs.)
+/// Real threads, full preemption: after a dispatch, no strictly less urgent body may begin or end more than kLateStart
+/// later while the dispatched job's own body has not begun. Only the begin and the end of a body prove that it runs.
 class StartRules {
  public:
   explicit StartRules(CheckContext &context) : context_(context) {}
@@ -29,7 +29,7 @@ class StartRules {
   struct Unbegun {
     Replay::JobRef job;
     Time dispatched = 0;
-    Time overtaken = kNever;  // when a less urgent body was first seen to run, too late
+    Time overtaken = kNever;  // when a less urgent body was first seen to run too late
     Replay::JobRef by;
   };
 
@@ -40,7 +40,7 @@ class StartRules {
   [[nodiscard]] bool may_overtake(const LiveJob &job, const LiveJob &waiting) const;
 
   CheckContext &context_;
-  std::vector<Unbegun> unbegun_;  // dispatched, and no thread has begun it
+  std::vector<Unbegun> unbegun_;  // dispatched jobs whose body no thread has begun
 };
 
 }  // namespace redag::metrics

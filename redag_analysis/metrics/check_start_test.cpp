@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Whether a dispatched job's body begins: traces of real threads, written by hand.
+// Whether a dispatched job's body begins, on hand-written traces of real threads.
 #include "redag_analysis/metrics/check_start.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ Workload two_rates(PreemptionMode mode = PreemptionMode::Os) {
   return make_workload({make_dag("a", {{"hi", 1000, 1}}), make_dag("b", {{"lo", 2000, 400}})}, 2, mode);
 }
 
-// Both have a worker from 0; lo's body begins soon.
+// Both jobs have a worker from 0; lo's body begins soon.
 TraceBuilder both(const Workload &workload) {
   TraceBuilder t(workload);
   t.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("hi", 0, 0, 1000).dispatched("lo", 0, 1, 2000);
@@ -47,7 +47,7 @@ TEST(CheckStart, ABodyThatBeginsWithinTheToleranceIsLawful) {
 TEST(CheckStart, ALessUrgentBodyThatEndsTooLateIsSeen) {
   TraceBuilder t = both(two_rates());
   t.at(kLate + 1).finished("lo", 0, 1);
-  expect_broken(on_threads(t.until(kLate + 2)), Rule::Start);  // it never began
+  expect_broken(on_threads(t.until(kLate + 2)), Rule::Start);  // hi never began
   t.at(kLate + 2).started("hi", 0, 0).at(kLate + 3).finished("hi", 0, 0);
   expect_broken(on_threads(t.until(kLate + 4)), Rule::Start);
   EXPECT_EQ(check_trace(t.until(kLate + 4)).violated(Rule::Start), 0U)
@@ -61,14 +61,14 @@ TEST(CheckStart, SoIsOneThatBeginsTooLate) {
   expect_broken(on_threads(t.until(kLate + 2)), Rule::Start);
 }
 
-// Only the stamps of bodies prove that one ran: the scheduler alone says nothing.
+// Only the stamps of a body prove that it ran; the scheduler's events alone show nothing.
 TEST(CheckStart, ALessUrgentJobWhoseBodyIsNotSeenToRunProvesNothing) {
   TraceBuilder t = both(two_rates());
   t.at(2 * kLate).started("hi", 0, 0).at(2 * kLate + 1).finished("hi", 0, 0).finished("lo", 0, 1);
   expect_kept(on_threads(t.until(3 * kLate)), Rule::Start);
 }
 
-// The stamp of the begin can reach the trace after events that are later.
+// The stamp of a begin can reach the trace after later events.
 TEST(CheckStart, TheTimeOfTheBeginCountsAndNotWhenItWasTold) {
   TraceBuilder t = both(two_rates());
   t.at(2 * kLate).finished("lo", 0, 1).started("hi", 0, 0).at(2 * kLate + 1).finished("hi", 0, 0);
@@ -91,7 +91,7 @@ TEST(CheckStart, AsUrgentOrMoreUrgentBodiesMayRun) {
   EXPECT_EQ(check_trace(shared).violated(Rule::Start), 0U);
 }
 
-// Real-time throttling: jobs of lower criticality are ordinary threads for a while.
+// Under real-time throttling, jobs of lower criticality are ordinary threads for a while.
 TEST(CheckStart, JobsOfHighCriticalityMayGoFirst) {
   Workload workload = two_rates();
   workload.dags[1].criticality = Criticality::High;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Follows the jobs of a stream of events and judges each (miss.hpp) when it ends, or when the run does: for callers
-// that need no summary. Not thread-safe.
+// Follows the jobs of a stream of events and judges each (miss.hpp) when it or the run ends, for callers that need no
+// summary. Not thread-safe.
 #pragma once
 
 #include <optional>
@@ -15,11 +15,11 @@
 
 namespace redag::metrics {
 
-/// A job at its end; one that is still in flight when the run ends has answered after at least these.
+/// A job at its end. For a job that is in flight when the run ends, the response times are lower bounds.
 struct JudgedJob {
   const JobRecord &record;
-  std::optional<Duration> response;    // f - r; not of lost jobs
-  std::optional<Duration> end_to_end;  // f - origin; not of lost jobs, nor of those that never carried data
+  std::optional<Duration> response;    // f - r; empty for lost jobs
+  std::optional<Duration> end_to_end;  // f - origin; empty for lost jobs and for those that never carried data
   Miss miss = Miss::None;
 };
 
@@ -27,14 +27,14 @@ class DeadlineWatch {
  public:
   explicit DeadlineWatch(const Workload &workload);
 
-  /// Goes on where the last call stopped; calls see(const JudgedJob &) for each job that ended.
+  /// Continues from the last call, and calls see(const JudgedJob &) for each job that ended.
   template <class See>
   void add(std::span<const JobEvent> events, See &&see) {
     folder_.add(events);
     folder_.drain_ended([&](const JobRecord &record) { see(judge(record, record.finish)); });
   }
 
-  /// The run is over: the same for the jobs in flight, in order of release.
+  /// Ends the run: judges the jobs in flight, in order of release.
   template <class See>
   void finish(Time end, See &&see) const {
     for (const JobRecord &record : folder_.in_flight()) see(judge(record, end));

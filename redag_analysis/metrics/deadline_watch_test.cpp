@@ -24,7 +24,7 @@ Workload pipeline() {
   return workload;
 }
 
-// What was seen, a word for each job in order: "sense#0 none 1ms/1ms".
+// The judged jobs in order, each as "sense#0 none 1ms/1ms".
 std::string seen(const TraceBuilder &builder, Time end_ms) {
   const trace::Trace trace = builder.until(end_ms);
   std::string text;

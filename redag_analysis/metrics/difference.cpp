@@ -25,8 +25,8 @@ Duration longest_period(const Workload &workload) {
   return longest;
 }
 
-// Whole multiples of the longest period, so that every block sees the same releases: two of them or more, and 30 blocks
-// at most.
+// Returns a multiple of the longest period, at least two of them and long enough for at most 30 blocks. Every block
+// then sees the same releases.
 Duration block_length(Duration run, Duration period) {
   return period * std::max<Duration>(2, (run + kMostBlocks * period - 1) / (kMostBlocks * period));
 }

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Two sides of runs beside each other, row by row (each task, each DAG, all jobs): figures, intervals, and what is more
-// than chance (block_bootstrap.hpp). Rows are matched by name. Parallel, the same answer for any number of processors.
+// Compares two sides of runs row by row (each task, each DAG, all jobs): figures, intervals, and which differences
+// exceed chance (block_bootstrap.hpp). Rows are matched by name. Runs in parallel; the answer is the same for any
+// number of processors.
 #pragma once
 
 #include <optional>
@@ -15,24 +16,24 @@
 
 namespace redag::metrics {
 
-/// The runs of one side. All have the same tasks by name.
+/// The runs of one side. All runs have the same task names.
 class DifferenceSide {
  public:
-  /// Counts the jobs of one run. The first run says which tasks there are: requires the same ones of the others.
+  /// Counts the jobs of one run. The first run determines the tasks; all other runs must have the same ones.
   void add(const trace::Trace &trace);
 
   [[nodiscard]] const std::vector<trace::RunInfo> &runs() const { return runs_; }
 
   struct Row {
-    std::string dag;   // empty: of all DAGs together
-    std::string task;  // empty: of the DAG
+    std::string dag;   // empty: all DAGs together
+    std::string task;  // empty: the whole DAG
     std::uint64_t released = 0;
     std::uint64_t late = 0;
-    std::uint64_t lost = 0;  // skipped, or aborted though they had data
-    /// Of a task f - r, of a DAG with one sink f - origin there: end to end. 0 if none finished, and always of what has
-    /// no response of its own: all DAGs together, a DAG with several sinks.
+    std::uint64_t lost = 0;  // skipped, or aborted although they had data
+    /// For a task the largest f - r; for a DAG with one sink the largest f - origin there (end to end). It is 0 if none
+    /// finished, and for rows without a response of their own: all DAGs together, or a DAG with several sinks.
     Duration max = 0;
-    BlockedRuns runs;  // with those responses
+    BlockedRuns runs;  // with the responses that `max` refers to
 
     [[nodiscard]] std::uint64_t missed() const { return late + lost; }
     [[nodiscard]] bool has_responses() const;
@@ -44,7 +45,7 @@ class DifferenceSide {
   struct Places {
     std::size_t dag = 0;
     std::size_t task = 0;
-    std::optional<std::size_t> end_to_end;  // the row of its DAG, if it is the only sink
+    std::optional<std::size_t> end_to_end;  // the row of its DAG, if the task is its only sink
   };
 
   void make_rows(const Workload &workload);
@@ -55,7 +56,7 @@ class DifferenceSide {
 };
 
 enum class Verdict : std::uint8_t {
-  Same,    // cannot be told apart
+  Same,    // indistinguishable
   Better,  // B misses less, or is faster
   Worse,
   NotTested,  // too few jobs, or too short runs
@@ -79,15 +80,15 @@ struct DifferenceRow {
 };
 
 struct Difference {
-  std::vector<DifferenceRow> rows;   // of what both have, in the order of A
-  std::vector<std::string> missing;  // rows that only one has
+  std::vector<DifferenceRow> rows;   // rows that both sides have, in the order of A
+  std::vector<std::string> missing;  // rows that only one side has
   std::size_t tests = 0;
-  double threshold = 0;  // largest p-value that counts, of all tests together
+  double threshold = 0;  // the largest p-value that counts, over all tests together
 
   [[nodiscard]] bool is_any(Verdict verdict) const;
 };
 
-/// Refers to `a` and `b`. Requires a run on each side.
+/// Compares the sides. The result refers to `a` and `b`. Requires at least one run on each side.
 [[nodiscard]] Difference compare_sides(const DifferenceSide &a, const DifferenceSide &b,
                                        const BootstrapOptions &options);
 

@@ -17,7 +17,7 @@ using ::testing::ElementsAre;
 using testing::make_dag;
 using testing::make_workload;
 
-// A fast task that a slow one delays unless it is preempted; execution times vary with the seed.
+// A fast task, and a slow one that delays it unless it is preempted. Execution times vary with the seed.
 Workload contention(const char *second = "b") {
   Workload workload =
       make_workload({make_dag("a", {{"fast", 10, 2}}), make_dag(second, {{"slow", 100, 24}, {"after", 0, 6, {0}}})}, 1);
@@ -81,7 +81,7 @@ TEST(Difference, CountsAsTheSummaryDoes) {
   std::uint64_t missed = 0;
   for (const Block &block : a.rows()[2].runs[0]) missed += block.missed;
   EXPECT_EQ(missed, a.rows()[2].late + a.rows()[2].lost);
-  EXPECT_GT(missed, 100U);  // 24 ms without preemption under a task of 10 ms
+  EXPECT_GT(missed, 100U);  // without preemption, 24 ms delay a task with a period of 10 ms
 }
 
 TEST(Difference, ADagAnswersEndToEndAndAllJobsTogetherDoNot) {

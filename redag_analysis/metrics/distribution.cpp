@@ -12,7 +12,7 @@ namespace redag::metrics {
 
 std::uint64_t nearest_rank(double percent, std::uint64_t count) {
   REDAG_CHECK(count > 0 && percent > 0 && percent <= 100, "a percentile needs values and a rank");
-  // 1e-9: 95 % of 20 is 19, although 95.0 / 100.0 * 20 may come out a little above.
+  // 1e-9 absorbs rounding: 95 % of 20 is 19, although 95.0 / 100.0 * 20 may come out slightly larger.
   const double rank = std::ceil(percent * static_cast<double>(count) / 100.0 - 1e-9);
   return std::min(static_cast<std::uint64_t>(std::max(1.0, rank)), count);
 }

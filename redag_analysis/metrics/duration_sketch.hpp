@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Any number of durations in bounded memory: exact up to a given number of values, then counts in buckets that are at
-// most 1/128 of their values wide (redag/base/log_buckets.hpp). Percentiles are then wrong by at most kRelativeError;
-// count, minimum, mean and maximum stay exact. Sketches of parts merge to that of the whole. Not thread-safe.
+// Any number of durations in bounded memory. Values are exact up to a given number; beyond it they are counted in
+// buckets at most 1/128 of their values wide (redag/base/log_buckets.hpp). Percentiles are then wrong by at most
+// kRelativeError; count, minimum, mean and maximum stay exact. Merging the sketches of parts gives the sketch of the
+// whole. Not thread-safe.
 #pragma once
 
 #include <array>
@@ -21,16 +22,16 @@ namespace redag::metrics {
 class DurationSketch {
  public:
   using Buckets = LogBuckets<7>;
-  /// Half a bucket: a percentile is the middle of its bucket.
+  /// Half a bucket, because a percentile is the middle of its bucket.
   static constexpr double kRelativeError = 1.0 / 256;
 
-  /// `most_exact`: values that are kept as they are, 8 bytes each. Beyond, a page of 16 buckets takes 136 bytes, and
-  /// those of an octave are 8 pages.
+  /// `most_exact` is the number of values that are kept as they are, 8 bytes each. Beyond it a page of 16 buckets takes
+  /// 136 bytes, and an octave takes 8 pages.
   explicit DurationSketch(std::size_t most_exact) : most_exact_(most_exact) {}
 
-  /// A value below 0 counts as 0 in the percentiles.
+  /// Adds a value. A value below 0 counts as 0 in the percentiles.
   void add(Duration value);
-  /// Exact if both are, however many values that makes; so a whole is exact where all its parts are.
+  /// Merges another sketch. The result is exact if both are, whatever the number of values.
   void merge(const DurationSketch &other);
 
   [[nodiscard]] Distribution distribution() const;
@@ -41,7 +42,7 @@ class DurationSketch {
  private:
   static constexpr std::size_t kPageSize = 16;
   struct Page {
-    std::size_t first = 0;  // bucket
+    std::size_t first = 0;  // its first bucket
     std::array<std::uint64_t, kPageSize> counts{};
   };
 
@@ -52,9 +53,9 @@ class DurationSketch {
 
   std::size_t most_exact_;
   std::vector<Duration> values_;  // while exact
-  std::vector<Page> pages_;       // by `first`; not empty once not exact
-  std::size_t last_page_ = 0;     // values come in clusters
-  // Of the values in `pages_`.
+  std::vector<Page> pages_;       // by `first`; empty while exact
+  std::size_t last_page_ = 0;     // the last one used, as values come in clusters
+  // Figures of the values in `pages_`.
   std::uint64_t count_ = 0;
   Int128 sum_ = 0;
   Duration min_ = kNever;

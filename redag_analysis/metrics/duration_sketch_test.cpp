@@ -22,7 +22,7 @@ void expect_close(const Distribution &found, const Distribution &exact) {
   }
 }
 
-// From nanoseconds to minutes.
+// Durations from nanoseconds to minutes.
 std::vector<Duration> random_durations(std::size_t count, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<Duration> values;
@@ -86,7 +86,7 @@ TEST(DurationSketch, PartsMergeToTheWhole) {
     }
     DurationSketch merged(limit);
     for (const DurationSketch &part : parts) merged.merge(part);
-    // A whole of exact parts stays exact, although it is beyond the limit of one.
+    // A whole of exact parts stays exact, even beyond the limit of a single sketch.
     if (merged.is_exact() == whole.is_exact()) {
       EXPECT_EQ(merged.distribution(), whole.distribution()) << limit;
     }
@@ -94,7 +94,7 @@ TEST(DurationSketch, PartsMergeToTheWhole) {
   }
 }
 
-// What a long run costs: the buckets that its values fall into, however many there are.
+// A long run costs only the buckets that its values fall into.
 TEST(DurationSketch, MemoryDoesNotGrowWithTheNumberOfValues) {
   DurationSketch sketch(1000);
   const auto add = [&sketch](std::size_t count, std::uint64_t seed) {

@@ -68,13 +68,13 @@ void JobFolder::add(const JobEvent &event) {
       break;
     case JobEventKind::Deferred: record.deferred = true; break;
     case JobEventKind::Dispatched:
-      // Started may have overtaken it, coming from another thread's ring.
+      // Started comes from another thread's ring, and may have arrived before Dispatched.
       if (!record.has_started()) record.start = event.time;
       record.worker = event.worker;
       record.deadline = event.value;
       found->on_worker_since = event.time;
       break;
-    case JobEventKind::Started: record.start = event.value; break;  // exact, where the time had to wait for its turn
+    case JobEventKind::Started: record.start = event.value; break;  // exact, even if the event was delivered late
     case JobEventKind::Preempted:
       ++record.preemptions;
       if (found->on_worker_since != kNever) record.on_worker += event.time - found->on_worker_since;

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Jobs out of events: one JobRecord per job, as docs/model.md ("What is measured") means it. Incremental: a long run's
-// events need not be kept. Tolerant: judges nothing (trace_checker.hpp does), and events of unknown jobs are counted
-// and ignored. Not thread-safe.
+// Folds events into one JobRecord per job, as docs/model.md, "What is measured", defines it. Incremental: a long run's
+// events need not be kept. Tolerant: it judges nothing (trace_checker.hpp does), and counts and ignores events of
+// unknown jobs. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -19,29 +19,29 @@ enum class JobOutcome : std::uint8_t { InFlight, Finished, Skipped, Aborted };
 
 [[nodiscard]] const char *to_string(JobOutcome outcome);
 
-/// Times are kNever where the job did not come that far.
+/// The record of one job. A time is kNever if the job did not get that far.
 struct JobRecord {
-  std::uint64_t sequence = 0;  // how many jobs of the whole run were released before it
+  std::uint64_t sequence = 0;  // number of jobs of the whole run that were released before it
   TaskId task;
   std::uint32_t number = 0;
-  std::uint32_t worker = WorkerId::kNoneValue;  // where it started
+  std::uint32_t worker = WorkerId::kNoneValue;  // the worker on which it started
   Time release = kNever;                        // r, nominal
   Time ready = kNever;
-  Time start = kNever;     // its body began (Started), or else the decision to start it (Dispatched)
-  Time finish = kNever;    // f as measured; of aborted jobs: when they ended; of skipped ones: when they were skipped
-  Time deadline = kNever;  // absolute, r + D
-  Time origin = kNever;    // earliest source release whose data it carries
-  Duration on_worker = 0;  // time it held a worker; its execution time where the driver is exact
+  Time start = kNever;          // when its body began (Started), or else the decision to start it (Dispatched)
+  Time finish = kNever;         // f as measured; for an aborted job its end, for a skipped one when it was skipped
+  Time deadline = kNever;       // absolute, r + D
+  Time origin = kNever;         // earliest source release whose data it carries
+  Duration on_worker = 0;       // time that it held a worker; its execution time where the driver is exact
   Duration processor = kNever;  // processor time that its body used; not in jobs.csv
-  Time seen = kNever;           // when the scheduler was told of the release; not in jobs.csv
+  Time seen = kNever;           // when the scheduler learned of the release; not in jobs.csv
   std::uint32_t preemptions = 0;
   bool deferred = false;
-  bool exceeded = false;  // used its budget and went on; not in jobs.csv
+  bool exceeded = false;  // used its budget and continued; not in jobs.csv
   JobOutcome outcome = JobOutcome::InFlight;
   Reason reason = Reason::None;
 
   [[nodiscard]] bool has_started() const { return start != kNever; }
-  /// f - r and f - ready. Requires a finished job.
+  /// f - r and f - ready. Both require a finished job.
   [[nodiscard]] Duration response() const { return finish - release; }
   [[nodiscard]] Duration response_from_ready() const { return finish - ready; }
   /// L = f - (r + D). Requires a finished job.
@@ -54,23 +54,23 @@ class JobFolder {
  public:
   explicit JobFolder(const Workload &workload);
 
-  /// Goes on where the last call stopped.
+  /// Continues from the last call.
   void add(std::span<const JobEvent> events);
 
-  /// Jobs that ended since the last call, in order of their end; moved out.
+  /// Moves out the jobs that ended since the last call, in order of their end.
   [[nodiscard]] std::vector<JobRecord> take_ended();
 
-  /// The same, one by one to visit(const JobRecord &), without an allocation.
+  /// Passes the same jobs one by one to visit(const JobRecord &), without an allocation.
   template <class Visit>
   void drain_ended(Visit &&visit) {
     for (const JobRecord &record : ended_) visit(record);
     ended_.clear();
   }
 
-  /// Jobs that have not ended, in order of release.
+  /// Returns the jobs that have not ended, in order of release.
   [[nodiscard]] std::vector<JobRecord> in_flight() const;
 
-  /// Events that named a task or a job that is not there.
+  /// The number of events that named an unknown task or job.
   [[nodiscard]] std::uint64_t ignored_events() const { return ignored_; }
 
  private:
@@ -80,7 +80,7 @@ class JobFolder {
   };
   struct TaskJobs {
     Duration deadline = 0;
-    std::vector<Live> live;  // in order of release; two or three at most, unless the task queues
+    std::vector<Live> live;  // in order of release; at most two or three, unless the task queues
   };
 
   void add(const JobEvent &event);
@@ -92,7 +92,7 @@ class JobFolder {
   std::uint64_t ignored_ = 0;
 };
 
-/// All jobs of a complete stream, in order of release.
+/// Returns all jobs of a complete stream, in order of release.
 [[nodiscard]] std::vector<JobRecord> fold_jobs(const Workload &workload, std::span<const JobEvent> events);
 
 }  // namespace redag::metrics

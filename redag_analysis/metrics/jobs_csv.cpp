@@ -23,7 +23,7 @@ constexpr std::string_view kHeader =
     "preemptions,deferred,outcome,reason,response_ns,response_from_ready_ns,lateness_ns";
 constexpr std::size_t kColumns = 19;
 
-// RFC 4180: a field with a comma, a quote or a line break stands in quotes, with its quotes doubled.
+// Quotes a field by RFC 4180: one with a comma, a quote or a line break is put in quotes, and its quotes are doubled.
 std::string quoted(const std::string &text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string result = "\"";
@@ -36,7 +36,7 @@ std::string quoted(const std::string &text) {
 
 std::string time_field(Time time) { return time == kNever ? std::string() : std::to_string(time); }
 
-// Takes the next record off `text`; false if a quote is not closed.
+// Takes the next record off `text`; returns false if a quote is not closed.
 bool take_record(std::string_view &text, std::vector<std::string> &fields, int &lines) {
   fields.assign(1, {});
   bool in_quotes = false;
@@ -84,7 +84,7 @@ bool read_name(const std::string &field, Enum &value, Enum last) {
   return false;
 }
 
-// Null, or the name of the column that cannot be read. DAG and task are left to the caller.
+// Parses a row except DAG and task, which the caller handles. Returns null, or the name of the unreadable column.
 const char *read_row(const std::vector<std::string> &fields, JobRecord &job) {
   if (!read(fields[0], job.sequence)) return "sequence";
   if (!read(fields[3], job.number)) return "job";

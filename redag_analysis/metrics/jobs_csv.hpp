@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// jobs.csv: a row per job, for spreadsheets and data frames. Columns: docs/results_format.md. Pure but for the file.
+// Writes and reads jobs.csv: a row per job, for spreadsheets and data frames. Columns: docs/results_format.md. Pure
+// except for the file.
 #pragma once
 
 #include <span>
@@ -21,11 +22,11 @@ namespace redag::metrics {
 [[nodiscard]] Result<void> write_jobs_csv(const std::string &path, const Workload &workload,
                                           std::span<const JobRecord> jobs);
 
-/// Reads what write_jobs_csv() wrote; DAGs and tasks are looked up by name in `workload`. The derived columns are not
-/// read. Errors name file and line.
+/// Reads what write_jobs_csv() wrote, and looks up DAGs and tasks by name in `workload`. Derived columns are ignored.
+/// Errors name file and line.
 [[nodiscard]] Result<std::vector<JobRecord>> read_jobs_csv(const std::string &path, const Workload &workload);
 
-/// The same for text in memory; `file` is what the errors call it.
+/// Parses text in memory in the same way; errors call it `file`.
 [[nodiscard]] Result<std::vector<JobRecord>> parse_jobs_csv(std::string_view text, const std::string &file,
                                                             const Workload &workload);
 

@@ -23,7 +23,7 @@ using testing::make_workload;
 using testing::TraceBuilder;
 constexpr Duration kMs = kMillisecond;
 
-// lo starts, is preempted by hi, and ends late; hi#1 is skipped, hi#2 aborted, lo#1 in flight.
+// lo starts, is preempted by hi, and ends late. hi#1 is skipped, hi#2 aborted, and lo#1 is in flight.
 TraceBuilder example() {
   Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "", 2}}), make_dag("b", {{"lo", 20, 4, {}, "", 0, 5}})},
                              1, PreemptionMode::Os);
@@ -105,7 +105,7 @@ TEST(JobsCsv, ReadsBackWhatItWrote) {
   ASSERT_TRUE(write_jobs_csv(path, trace.info.workload, jobs));
   const auto read = read_jobs_csv(path, trace.info.workload);
   ASSERT_TRUE(read) << to_string(read.error());
-  for (JobRecord &job : jobs) job.seen = kNever;  // is not in the file
+  for (JobRecord &job : jobs) job.seen = kNever;  // it is not in the file
   EXPECT_EQ(*read, jobs);
   const std::string text = trace::read_file(path).value();
   EXPECT_NE(text.find("\n0,b,lo,0,0,0,1000000,7000000,5000000,0,0,4000000,1,0,finished,none,7000000,7000000,2000000\n"),

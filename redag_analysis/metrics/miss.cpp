@@ -6,7 +6,7 @@
 namespace redag::metrics {
 namespace {
 
-// When the job answered, at the earliest.
+// The earliest time at which the job can have answered.
 Time answered(const JobRecord &job, Time end) { return job.outcome == JobOutcome::InFlight ? end : job.finish; }
 
 bool has_no_response(const JobRecord &job) {

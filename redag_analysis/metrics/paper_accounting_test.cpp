@@ -33,7 +33,8 @@ JobRecord job(std::uint32_t number, JobOutcome outcome, Time finish) {
 }
 
 TEST(PaperAccounting, ItsClockFallsBehindWithEveryDroppedRelease) {
-  // On time all of them, but the second release was dropped: to the paper's program the third is the second, and late.
+  // All are on time, but the second release was dropped. The paper's program takes the third for the second, and thus
+  // for late.
   const std::vector<JobRecord> jobs = {job(0, JobOutcome::Finished, 5), job(1, JobOutcome::Skipped, 20),
                                        job(2, JobOutcome::Finished, 25), job(3, JobOutcome::Finished, 35)};
   const PaperCount count = paper_count(one_timer(), jobs, 0);
@@ -49,7 +50,7 @@ TEST(PaperAccounting, AnEpochBeforeStartUpMakesJobsLate) {
   EXPECT_EQ(paper_count(one_timer(), jobs, 7).late, 2U);
 }
 
-// Timers of ROS 2 begin when their nodes are made.
+// Timers of ROS 2 begin when their nodes are created.
 TEST(PaperAccounting, TheGridBeginsWithTheFirstRelease) {
   std::vector<JobRecord> jobs = {job(0, JobOutcome::Finished, 1005), job(1, JobOutcome::Finished, 1015)};
   for (JobRecord &one : jobs) one.release += 1000;

@@ -22,7 +22,7 @@ namespace {
 constexpr int kWorkersProcess = 1;
 constexpr int kFirstDagProcess = 2;
 
-// A JSON text with its quotes.
+// A JSON string with its quotes.
 std::string json_text(const std::string &text) {
   return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
@@ -114,7 +114,7 @@ class PerfettoWriter::Impl {
     return nullptr;
   }
 
-  // Microseconds from the start of the run, to the nanosecond.
+  // Formats the time since the start of the run in microseconds, to the nanosecond.
   [[nodiscard]] std::string stamp(Time time) const { return duration(time - run_.start); }
   static std::string duration(Duration time) {
     const Duration size = time < 0 ? -time : time;
@@ -174,7 +174,7 @@ class PerfettoWriter::Impl {
     job.since = event.time;
     job.worker = event.worker;
     for (const Slice &source : job.sources) {
-      // An arrow binds to the slice that encloses its stamp; the last nanosecond of the source is inside it.
+      // An arrow binds to the slice that encloses its stamp; the last nanosecond of the source lies inside it.
       ++flow_;
       write(fmt::format(R"({{"ph":"s","id":{},"name":"data","cat":"data","pid":{},"tid":{},"ts":{}}})", flow_,
                         kWorkersProcess, source.worker, stamp(std::max(source.from, source.to - 1))));
@@ -205,7 +205,7 @@ class PerfettoWriter::Impl {
     std::erase_if(task.live, [&](const Live &other) { return other.number == number; });
   }
 
-  // The job's slices on its workers, and its span from release to end.
+  // Writes the job's slices on its workers, and its span from release to end.
   void write_job(const JobRecord &record, const Live &job, Time end, Time now) {
     const TaskState &task = tasks_[record.task.value];
     std::string args = fmt::format(R"("job":{},"outcome":"{}","release_us":{})", record.number,

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// trace.json for ui.perfetto.dev and chrome://tracing: a track per worker with the jobs' slices, and a process per DAG
-// with every job from release to end, misses and skips. Written as the events are read; memory does not grow with the
-// run. Format: "Trace Event Format", Chromium project.
+// Writes trace.json for ui.perfetto.dev and chrome://tracing. Each worker has a track with the jobs' slices; each DAG
+// is a process with every job from release to end, misses and skips. Events are written as they are read, and memory
+// does not grow with the run. Format: "Trace Event Format", Chromium project.
 #pragma once
 
 #include <memory>
@@ -21,7 +21,7 @@ struct PerfettoOptions {
 
 class PerfettoWriter {
  public:
-  /// `run` must outlive this; its `end` is not used.
+  /// Opens the file. `run` must outlive this object; its `end` is not used.
   [[nodiscard]] static Result<PerfettoWriter> create(const std::string &path, const trace::RunInfo &run,
                                                      const PerfettoOptions &options = {});
   PerfettoWriter(PerfettoWriter &&) noexcept;

@@ -157,14 +157,14 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
   return "unknown kind of event";
 }
 
-// A job that takes the place of one that has not started has its turn, too.
+// A job that replaces one that has not started also takes its turn.
 void Replay::hand_turn_on(const LiveJob &skipped, Reason reason) {
   if (reason != Reason::Overrun && reason != Reason::Precedence) return;
   LiveJob &newest = tasks_[skipped.task.value].live.back();
   if (newest.number != skipped.number && newest.state == State::Waiting) newest.turn = skipped.turn;
 }
 
-// Started jobs of lower criticality go on below everything else; the others are to be skipped.
+// Demotes started jobs of lower criticality; the others are to be skipped.
 const char *Replay::change_mode(const JobEvent &event) {
   const bool begins = event.kind == JobEventKind::HighMode;
   if (begins == high_mode()) return begins ? "it was HI mode before" : "it was LO mode before";
@@ -179,7 +179,7 @@ const char *Replay::change_mode(const JobEvent &event) {
   return nullptr;
 }
 
-// It loses what it inherited, and inherits from those that still wait for its group.
+// The job loses what it inherited, and inherits from jobs that still wait for its group.
 void Replay::demote(LiveJob &job) {
   if (job.demoted) return;
   job.demoted = true;
@@ -199,14 +199,16 @@ std::int64_t Replay::demoted_key(TaskId task) const {
                                    : std::numeric_limits<std::int64_t>::max();
 }
 
-// Puts the job on the event's worker; a resumed one leaves where it waited.
+// Puts the job on the event's worker; a resumed job leaves the suspended ones.
 const char *Replay::take_worker(LiveJob &job, const JobEvent &event) {
   const JobRef ref{job.task, job.number};
   std::erase(suspended_, ref);
   job.on_worker_since = event.time;
   if (event.worker >= workers_.size()) return "there is no such worker";
   std::vector<JobRef> &stack = workers_[event.worker];
-  if (job.state == State::Suspended && !stack.empty() && stack.back() == ref) return nullptr;  // Cooperative: goes on
+  if (job.state == State::Suspended && !stack.empty() && stack.back() == ref)
+    return nullptr;  // Cooperative: it
+                     // continues
 
   const char *problem = nullptr;
   if (job.state == State::Suspended && config_.preemption == sched::Preemption::Cooperative) {
@@ -235,7 +237,7 @@ const char *Replay::leave_worker(const LiveJob &job) {
   return nullptr;
 }
 
-// All counts follow the state; nothing else changes them.
+// Changes the state and updates all counts; no other code changes them.
 void Replay::move_to(LiveJob &job, State state) {
   const bool was_started = job.started();
   const bool was_ended = job.state == State::Ended;
@@ -298,7 +300,7 @@ void Replay::refresh(TaskId id) {
   }
 }
 
-// A job started or ended: what its task, DAG and group keep waiting may have changed.
+// Updates the sharers when a job starts or ends: the gates of its task, DAG and group may have changed.
 void Replay::refresh_sharers(TaskId id) {
   refresh(id);
   const TaskState &task = tasks_[id.value];
@@ -363,7 +365,7 @@ bool Replay::preempts(const Urgency &urgency, const Urgency &running) const {
     case PolicyKind::Edf:
       if (config_.ties == Ties::Share) return urgency.key < running.key;
       return urgency < running && urgency.key != demoted_key(TaskId(0));
-    case PolicyKind::Fifo: return false;  // who became ready later never preempts
+    case PolicyKind::Fifo: return false;  // a job that became ready later never preempts
     default: return level_of(urgency) < level_of(running);
   }
 }

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The state of a run as its events tell it: which job is where, what each worker does, which ready jobs are eligible
-// and how urgent they are (docs/model.md). Written from the model, not from the scheduler, so that the trace checker
-// does not repeat the scheduler's mistakes. Policy ranks come from sched::assign_priorities. Not thread-safe.
+// The state of a run as its events tell it: where each job is, what each worker does, which ready jobs are eligible and
+// how urgent they are (docs/model.md). Written from the model and not from the scheduler, lest the trace checker repeat
+// the scheduler's mistakes. Policy ranks come from sched::assign_priorities. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -19,11 +19,11 @@
 
 namespace redag::metrics {
 
-/// Place in the total order of jobs; smaller is more urgent. `key`: tier of the task (static policies), absolute
-/// deadline (edf), order of readiness (fifo). A job that inherits gets another key, and nothing else.
+/// The place in the total order of jobs; smaller is more urgent. `key` is the tier of the task (static policies), the
+/// absolute deadline (edf) or the order of readiness (fifo). Inheritance changes the key alone.
 struct Urgency {
   std::int64_t key = 0;
-  Time turn = 0;  // Ties::Share: release, or that of the job whose place it took
+  Time turn = 0;  // Ties::Share: the job's release, or the turn of the job that it replaced
   std::uint32_t rank = 0;
   std::uint64_t sequence = 0;  // order of readiness
 
@@ -41,16 +41,16 @@ struct LiveJob {
   bool body_began = false;     // a Started event was seen
   bool executed_seen = false;  // an Executed event was seen
   bool exceeded = false;       // an Exceeded event was seen
-  bool demoted = false;        // below everything else, save for what it inherits
+  bool demoted = false;        // below everything else, except for what it inherits
   std::uint32_t worker = WorkerId::kNoneValue;
   Time release = 0;
   Time deadline = 0;
   Time origin = 0;
   Time turn = 0;
   Urgency own;
-  Urgency raised;  // own, with the key of the most urgent job that ever waited for its group while it held it
+  Urgency raised;  // own, with the key of the most urgent job that waited for its group while it held it
   Time on_worker_since = 0;
-  Duration executed = 0;  // until the last event that changed its state
+  Duration executed = 0;  // up to the last event that changed its state
 
   [[nodiscard]] bool started() const { return state == State::Running || state == State::Suspended; }
 };
@@ -73,8 +73,8 @@ class Replay {
   /// `workload` must outlive the replay.
   Replay(const Workload &workload, const sched::Config &config);
 
-  /// Moves on by one event. Returns null, or what is wrong with it; the state then follows the event as far as that
-  /// makes sense, so that one mistake is not reported for ever. Requires a task of the workload.
+  /// Applies one event. Returns null, or the problem with the event. The state then follows the event as far as
+  /// possible, because one mistake should not be reported forever. Requires a task of the workload.
   const char *apply(const JobEvent &event);
 
   [[nodiscard]] const LiveJob *find(TaskId task, std::uint32_t number) const;
@@ -85,7 +85,7 @@ class Replay {
   [[nodiscard]] std::uint32_t group_of(TaskId id) const { return tasks_[id.value].group; }
   [[nodiscard]] std::size_t task_count() const { return tasks_.size(); }
 
-  // Jobs started and unfinished; pending: released and not started.
+  // Numbers of jobs: active ones are started and unfinished, pending ones are released and not started.
   [[nodiscard]] std::uint32_t active(DagId dag) const { return dags_[dag.value].active; }
   [[nodiscard]] std::uint32_t pending(DagId dag) const { return dags_[dag.value].pending; }
   [[nodiscard]] std::uint32_t task_active(TaskId id) const { return tasks_[id.value].active; }
@@ -93,36 +93,36 @@ class Replay {
   [[nodiscard]] std::uint32_t started() const { return started_; }
 
   [[nodiscard]] bool high_mode() const { return high_since_ != kNever; }
-  /// kNever in LO mode.
+  /// The time at which HI mode began; kNever in LO mode.
   [[nodiscard]] Time high_since() const { return high_since_; }
-  /// Is the task's DAG of lower criticality, so that HI mode degrades it?
+  /// True if the task's DAG is of lower criticality: HI mode degrades it.
   [[nodiscard]] bool is_degradable(TaskId id) const { return dags_[dag_of(id).value].degradable; }
 
-  /// Jobs on a worker, the suspended ones (Cooperative) below.
+  /// The jobs on a worker, with the suspended ones (Cooperative) below.
   [[nodiscard]] std::span<const JobRef> stack(std::uint32_t worker) const { return workers_[worker]; }
   [[nodiscard]] std::uint32_t worker_count() const { return static_cast<std::uint32_t>(workers_.size()); }
   [[nodiscard]] std::uint32_t free_workers() const { return free_workers_; }
-  /// The job that executes on a worker; null if none.
+  /// The job that executes on a worker; null if there is none.
   [[nodiscard]] const LiveJob *running(std::uint32_t worker) const;
   /// Full preemption: started jobs that have no worker.
   [[nodiscard]] std::span<const JobRef> suspended() const { return suspended_; }
 
-  /// Eligible jobs, most urgent first; of each task its first ready one. Empty while `max_started` jobs have started.
+  /// Eligible jobs, most urgent first; of each task its first ready one. Empty while `max_started` jobs are started.
   [[nodiscard]] const std::set<Waiter> &eligible() const { return at_thread_limit() ? none_ : eligible_; }
-  /// The same, also while `max_started` jobs have started: jobs that may then wait for a thread alone.
+  /// The same, regardless of `max_started`: some of these jobs may lack only a thread.
   [[nodiscard]] const std::set<Waiter> &eligible_but_for_threads() const { return eligible_; }
   /// Tasks whose first ready job waits for its DAG's max_active alone and has not been counted as deferred.
   [[nodiscard]] const std::set<TaskId> &owed_deferral() const { return owed_deferral_; }
 
-  /// Urgency with what the job inherits from those that wait for its group now.
+  /// The urgency with what the job now inherits from those that wait for its group.
   [[nodiscard]] Urgency inherited(const LiveJob &job) const;
-  /// The same, from those alone that come before `looked_at`: jobs are looked at in their order, and others have not
-  /// handed on their priority when that one is.
+  /// The same, but only from waiting jobs that come before `looked_at`. Jobs are looked at in their order; those after
+  /// `looked_at` have not yet handed on their priority.
   [[nodiscard]] Urgency inherited(const LiveJob &job, const Urgency &looked_at) const;
-  /// May a job this urgent take the worker of one that is `running` so urgent?
+  /// True if a job of this urgency may take the worker of one that runs with urgency `running`.
   [[nodiscard]] bool preempts(const Urgency &urgency, const Urgency &running) const;
-  /// Is a worker that is free for both given to the first: the more urgent one, but of one level (full preemption) the
-  /// one that has started?
+  /// True if a worker that is free for both goes to the first job. The more urgent job goes first; within a level (full
+  /// preemption) the started one does.
   [[nodiscard]] bool goes_first(const Urgency &urgency, bool started, const Urgency &other, bool other_started) const;
 
  private:
@@ -134,7 +134,7 @@ class Replay {
     std::uint32_t active = 0;
     std::vector<LiveJob> live;
     Gate gate = Gate::NoJob;  // what keeps the first ready job from being eligible
-    Waiter waiter;            // that job, where gate is not NoJob
+    Waiter waiter;            // the first ready job, unless gate is NoJob
   };
   struct Shared {  // a DAG or a group
     std::uint32_t active = 0;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The checker and our scheduler against each other, over random workloads; and the checker against damage: whatever
-// event of a good trace is dropped, doubled or shifted, it must notice.
+// Tests the checker and our scheduler against each other on random workloads. Also tests the checker against damage: it
+// must notice if any event of a good trace is dropped, doubled or shifted.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -33,7 +33,7 @@ GenerateOptions random_options(Rng &rng) {
   options.workers = pick(rng, 1, 3);
   options.preemption = kModes[pick(rng, 0, 2)];
   options.policy = static_cast<PolicyKind>(rng.uniform(0, 5));
-  // Overload included, but never more than the fewest tasks can have.
+  // Overload is included, but never more than the smallest number of tasks can have.
   options.utilization = std::min(options.workers * (0.3 + rng.uniform01()), 0.9 * options.dags);
   options.period_max = 50 * kMillisecond;
   options.rates = coin(rng) ? RateScope::PerDag : RateScope::PerTask;
@@ -49,7 +49,7 @@ GenerateOptions random_options(Rng &rng) {
   return options;
 }
 
-// What the generator does not draw.
+// Adds features that the generator does not draw.
 void add_details(Workload &workload, Rng &rng) {
   for (Dag &dag : workload.dags) {
     if (coin(rng)) dag.max_pending = pick(rng, 1, 4);
@@ -120,7 +120,7 @@ RC_GTEST_PROP(SimulatedTraces, OfPeersKeepTheRulesThatPeersHave, ()) {
   }
 }
 
-// Only the events executor keeps every release of a timer, and the checker knows.
+// Only the events executor keeps every release of a timer, and the checker relies on that.
 TEST(SimulatedTraces, AnExecutorThatLosesPeriodsIsNotTheEventsExecutor) {
   Task task;
   task.name = "often";
@@ -179,7 +179,7 @@ std::string name_of(const trace::Trace &trace, std::size_t i) {
          std::to_string(event.job) + ", event " + std::to_string(i);
 }
 
-// Every event in turn: dropped, doubled, moved by a nanosecond, given to the next job.
+// Each event in turn is dropped, doubled, moved by a nanosecond, or given to the next job.
 TEST_P(DamagedTraces, AreNoticed) {
   const trace::Trace good = simulated(drawn(static_cast<std::uint64_t>(GetParam())), 60 * kMillisecond);
   ASSERT_FALSE(notices(good));
@@ -194,13 +194,13 @@ TEST_P(DamagedTraces, AreNoticed) {
     ++damaged.events[i].job;
     EXPECT_TRUE(notices(damaged)) << "renumbered: " << name_of(good, i);
 
-    if (kind != JobEventKind::Deferred) {  // where no worker is free, nothing else tells of a deferral
+    if (kind != JobEventKind::Deferred) {  // while no worker is free, nothing else shows a deferral
       damaged = good;
       damaged.events.erase(damaged.events.begin() + at);
       EXPECT_TRUE(notices(damaged)) << "dropped: " << name_of(good, i);
     }
 
-    // Moved, if that changes no order. A release may move within its jitter.
+    // Moves the event if that changes no order. A release may move within its jitter.
     const Time next = i + 1 < good.events.size() ? good.events[i + 1].time : kNever;
     if (kind == JobEventKind::Released || kind == JobEventKind::Deferred || next <= good.events[i].time) continue;
     damaged = good;

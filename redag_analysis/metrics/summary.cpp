@@ -16,12 +16,12 @@ double ratio(std::uint64_t part, std::uint64_t whole) {
 }
 
 std::size_t exact_jobs_of(std::size_t tasks) {
-  constexpr std::size_t kLeast = 16;  // cheaper than a sketch
+  constexpr std::size_t kLeast = 16;  // below this, exact values are cheaper than a sketch
   return std::max(kLeast, kExactJobs / std::max<std::size_t>(1, tasks));
 }
 
-// By task of a DAG: how many of its jobs the releases of its sources ask for. A timer is released by itself, a data
-// task once all its predecessors have ended: as often as the rarest of them, at most.
+// Returns, by task of a DAG, how many of its jobs the releases of its sources ask for. A timer is released by itself. A
+// data task is released once all its predecessors have ended: at most as often as the rarest of them.
 std::vector<std::uint64_t> answers_due(const Dag &dag, std::span<const JobStats> stats) {
   const std::vector<std::uint32_t> ranks = topological_ranks(dag);
   std::vector<std::size_t> order(ranks.size());
@@ -189,7 +189,7 @@ Summary Summarizer::finish(Time end) {
   summary.high_mode = activity_.high_mode();
   summary.group_overlaps = activity_.group_overlaps();
   if (summary.group_overlaps > 0) summary.all_enforced = false;
-  // Jobs in progress at the end may have run on.
+  // Jobs in progress at the end may have continued.
   const Time last = std::max(end, activity_.last_time());
   const double length = static_cast<double>(std::max<Duration>(1, last - begin_));
   for (const Duration busy : activity_.busy()) summary.worker_busy.push_back(static_cast<double>(busy) / length);

@@ -22,7 +22,7 @@ Json to_json(const Distribution &distribution) {
   return json;
 }
 
-// Lost jobs by reason; reasons that did not occur are left out.
+// Lost jobs by reason; reasons that did not occur are omitted.
 Json reasons_to_json(const JobCounts &stats) {
   Json json = Json::object();
   for (std::size_t i = 0; i < kReasonCount; ++i) {

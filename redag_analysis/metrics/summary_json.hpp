@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// summary.json ("redag.summary/2"): everything in a Summary and the description of its run. Keys:
-// docs/results_format.md. Pure but for the file.
+// Writes summary.json ("redag.summary/2"): everything in a Summary and the description of its run. Keys:
+// docs/results_format.md. Pure except for the file.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@
 
 namespace redag::metrics {
 
-/// Indented by two, ends with a line break; equal inputs give equal bytes.
+/// The text is indented by two and ends with a line break; equal inputs give equal bytes.
 [[nodiscard]] std::string summary_to_json(const Summary &summary, const trace::RunInfo &run);
 
 [[nodiscard]] Result<void> write_summary(const std::string &path, const Summary &summary, const trace::RunInfo &run);

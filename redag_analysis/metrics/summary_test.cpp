@@ -58,7 +58,7 @@ TEST(Distribution, OfFewValues) {
   EXPECT_EQ(distribution_of({}), Distribution{});
 }
 
-// src -> sink (data) with end-to-end deadline 4 ms, bound 1; lo beside them on the same worker, without preemption.
+// src -> sink (data), end-to-end deadline 4 ms, max_active 1. lo shares their worker, without preemption.
 trace::Trace example() {
   Dag chain = make_dag("chain", {{"src", 10, 1}, {"sink", 0, 2, {0}}}, 1);
   chain.deadline = 4 * kMs;
@@ -106,7 +106,7 @@ TEST(Summary, CountsPerTaskDagAndTotal) {
   EXPECT_DOUBLE_EQ(s.total.miss_ratio(), 2.0 / 8.0);
 }
 
-// A job that found nothing to do is aborted, and neither a miss nor a response.
+// A job that found no data is aborted, and is neither a miss nor a response.
 TEST(Summary, AJobWithoutDataIsNoMiss) {
   TraceBuilder t(make_workload({make_dag("a", {{"t", 10, 1}})}, 1));
   t.at(0).arrives("t", 0).at(1).dispatched("t", 0, 0, 10).at(2).aborted("t", 0, 0, Reason::NoData);
@@ -129,10 +129,10 @@ TEST(Summary, EndToEndGoesBackToTheSource) {
   EXPECT_EQ(s.dags[1].end_to_end.late, 0U);  // no deadline
   ASSERT_EQ(chain.sinks.size(), 1U);
   EXPECT_EQ(chain.sinks[0].task, TaskId(std::size_t{1}));
-  EXPECT_EQ(chain.sinks[0].due, 4U);  // releases of the source, whatever became of them
+  EXPECT_EQ(chain.sinks[0].due, 4U);  // all releases of the source, however they ended
 }
 
-// Two sinks: `near` answers after 1 ms or 4 ms, `far` after 2 ms both times.
+// Two sinks: `near` answers after 1 ms, then 4 ms; `far` after 2 ms both times.
 TEST(Summary, OfSeveralSinksEachFigureIsThatOfTheWorstOne) {
   Dag fork = make_dag("fork", {{"src", 10, 1}, {"near", 0, 1, {0}}, {"far", 0, 1, {0}}});
   TraceBuilder t(make_workload({fork}, 2));
@@ -185,7 +185,7 @@ TEST(Summary, BusyWorkersPeaksAndInversions) {
   EXPECT_EQ(s.inversions, (Inversions{1, 1 * kMs, 1 * kMs}));
 }
 
-// hi waits for the only thread, which lo holds: no decision of the scheduler is wrong, and yet.
+// hi waits for the only thread, which lo holds. This counts although no decision of the scheduler is wrong.
 TEST(Summary, AJobThatLacksAThreadIsInverted) {
   TraceBuilder t(make_workload({make_dag("a", {{"hi", 10, 1, {}, "", 2}}), make_dag("b", {{"lo", 20, 5}})}, 1,
                                PreemptionMode::Os));
@@ -244,7 +244,7 @@ TEST(SummaryJson, UnwritablePlaceIsAnError) {
   EXPECT_FALSE(write_perfetto("/nonexistent/trace.json", trace));
 }
 
-// What ui.perfetto.dev needs: valid JSON, slices that never overlap on a worker, spans that open and close.
+// The needs of ui.perfetto.dev: valid JSON, slices that never overlap on a worker, spans that open and close.
 TEST(Perfetto, SlicesSpansAndMarkers) {
   const trace::Trace trace = example();
   const std::string path =

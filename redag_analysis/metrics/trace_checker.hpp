@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Holds a trace to docs/model.md: replays the events and reports every place where they say something that the model
-// forbids. Independent of the scheduler's code; near-linear in the number of events. Pure function.
+// Holds a trace to docs/model.md: replays the events and reports each one that contradicts the model. Near-linear in
+// the number of events. Pure function. Only sched::assign_priorities, sched::is_static and the table of executors are
+// shared with the scheduler; all other rules are written again from the model.
 //
-// Simultaneous events: several decisions can share one time. A choice against an eligible job counts as a violation
-// only if that job has still not started when time moves on; states (free workers, priorities) are judged when time
-// moves on, preemptions when the more urgent job gets the worker.
+// Several decisions can share one time. A choice against an eligible job is a violation only if that job has still not
+// started when time moves on. States (free workers, priorities) are judged when time moves on, and preemptions when the
+// more urgent job gets the worker.
 #pragma once
 
 #include "redag/trace/trace.hpp"
@@ -14,12 +15,12 @@
 
 namespace redag::metrics {
 
-/// The rules that a run's trace can be held to. Those of rclcpp's executors and their models follow no priorities. What
-/// is between a release and a body (threads, messages under way) the nodes of a ROS 2 workload do not see, so that
-/// nothing is said about priorities or idle workers there.
+/// Returns the rules for a run. Those for rclcpp's executors and their models contain no priorities. The nodes of a ROS
+/// 2 workload do not see what is between a release and a body (threads, messages under way). Their rules therefore do
+/// not cover priorities or idle workers.
 [[nodiscard]] RuleSet rules_for(const trace::RunInfo &info);
 
-/// A trace with lost events has holes: that is its one violation, and nothing else is checked.
+/// Checks a trace. For a trace with lost events this is the one violation, and nothing else is checked.
 [[nodiscard]] CheckReport check_trace(const trace::Trace &trace, const RuleSet &rules = RuleSet::all());
 
 }  // namespace redag::metrics

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Every rule with a trace that keeps it and at least one that breaks it, written by hand; those of preemption and of
-// overload in check_dispatch_test.cpp and check_overload_test.cpp.
+// Every rule with at least one hand-written trace that keeps it and one that breaks it. check_dispatch_test.cpp has
+// those of preemption, check_overload_test.cpp those of overload.
 #include "redag_analysis/metrics/trace_checker.hpp"
 
 #include <gtest/gtest.h>
@@ -106,7 +106,7 @@ TEST(CheckTrace, GridOfTimers) {
   off_grid.at(2).released("hi", 0);
   expect_broken(off_grid.until(3), Rule::Grid);
 
-  TraceBuilder late(two_tasks());  // for the right time, but later than its jitter
+  TraceBuilder late(two_tasks());  // for the right time, but later than its jitter allows
   late.at(2).released_for("hi", 0, 0).ready("hi", 0, 0).dispatched("hi", 0, 0, 10);
   expect_broken(late.until(3), Rule::Grid);
   trace::Trace real = late.until(3);
@@ -192,7 +192,7 @@ TEST(CheckTrace, PrecedenceKeepsTheNewestData) {
   EXPECT_TRUE(check(t).ok()) << check(t).to_string();
 }
 
-// src#0 throws: aligned#0 waits for it in vain, and not for src#1.
+// src#0 throws: aligned#0 never gets its data, and must not take that of src#1.
 TEST(CheckTrace, PrecedenceIsOfTheSamePeriod) {
   Workload w = make_workload({make_dag("d", {{"src", 10}, {"aligned", 10, 1, {0}}})}, 1);
   w.dags[0].tasks[1].jitter = 5 * kMillisecond;
@@ -241,7 +241,7 @@ TEST(CheckTrace, PrecedenceAbortedJobsReleaseNobody) {
   expect_broken(t.released("data", 0).ready("data", 0, 0).dispatched("data", 0, 0, 11).until(2), Rule::Precedence);
 }
 
-// blocker: T 100, C 25, more urgent by its DAG's policy; victim: T 10.
+// blocker: T 100, C 25, more urgent by its DAG's policy. victim: T 10.
 TraceBuilder overrun_run() {
   Workload w = make_workload({make_dag("a", {{"blocker", 100, 25}}), make_dag("b", {{"victim", 10, 1, {}, "", 1}})}, 1);
   TraceBuilder t(w);
@@ -286,7 +286,7 @@ TEST(CheckTrace, AdmissionQueues) {
   expect_kept(good.skipped("q", 2, Reason::QueueFull).until(30), Rule::Admission);
   TraceBuilder too_many = t;
   expect_broken(too_many.ready("q", 2, 21).until(30), Rule::Admission);
-  TraceBuilder early = t;  // one fewer waits than the queue holds
+  TraceBuilder early = t;  // fewer jobs wait than the queue holds
   early.skipped("q", 2, Reason::QueueFull).at(31).released("q", 3).skipped("q", 0, Reason::Overrun);
   expect_broken(early.until(40), Rule::Admission);
 }
@@ -386,7 +386,7 @@ TEST(CheckTrace, PriorityOfTheChosen) {
 }
 
 TEST(CheckTrace, PriorityFollowsThePolicy) {
-  // hi has the smaller period, lo the earlier deadline and, at 2 ms, was ready first.
+  // hi has the smaller period. lo has the earlier deadline and, at 2 ms, was ready first.
   Workload w = make_workload({make_dag("a", {{"hi", 10, 1, {}, "", 2}}), make_dag("b", {{"lo", 20, 1, {}, "", 1, 5}}),
                               make_dag("c", {{"first", 50, 3}})},
                              1);
@@ -450,7 +450,7 @@ TEST(CheckReport, CountsWhatItDoesNotKeep) {
   for (int i = 0; i < 1000; ++i) trace.events.push_back(trace.events.back());
   const CheckReport report = check_trace(trace);
   EXPECT_EQ(report.violations.size(), CheckReport::kMaxKept);
-  EXPECT_EQ(report.violation_count, 1001U);  // and, once, conservation
+  EXPECT_EQ(report.violation_count, 1001U);  // 1000 of them and one of conservation
   EXPECT_NE(report.to_string(2).find("and 999 more"), std::string::npos);
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 std::string jobs_text(std::uint64_t count) { return format_count(count) + (count == 1 ? " job" : " jobs"); }
 
-// "3 late, 2 skipped": only what there was.
+// Lists only what occurred: "3 late, 2 skipped".
 std::string how_missed(const JobCounts &jobs) {
   std::vector<std::string> parts;
   if (jobs.late > 0) parts.push_back(format_count(jobs.late) + " late");
@@ -23,7 +23,7 @@ std::string how_missed(const JobCounts &jobs) {
   return join(parts);
 }
 
-// "control 12.0 %, b 0.0043 % (1 of 23 326) and 3 other DAGs, the other one none".
+// An example: "control 12.0 %, b 0.0043 % (1 of 23 326) and 3 other DAGs, the other one none".
 std::string by_dag(std::span<const DagSummary> dags) {
   std::vector<std::string> where;
   std::size_t clean = 0;
@@ -44,7 +44,7 @@ std::string by_dag(std::span<const DagSummary> dags) {
   return join(where) + (clean == 1 ? ", the other one none" : fmt::format(", the other {} none", clean));
 }
 
-// " End to end, control was late 5 times of 1 000 (2ms)."
+// An example: " End to end, control was late 5 times of 1 000 (2ms)."
 std::string late_end_to_end(std::span<const DagSummary> dags) {
   std::vector<std::string> parts;
   for (const DagSummary &dag : dags) {
