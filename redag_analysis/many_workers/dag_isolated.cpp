@@ -18,7 +18,7 @@ namespace {
 
 using global::GlobalUnit;
 
-// The tasks of the heaviest path over what is left of the tasks' weights, which is taken away.
+// Returns the tasks of the heaviest path by the weights that are left, and removes their weights.
 std::vector<std::uint32_t> take_heaviest_path(const System &system, const Unit &unit,
                                               std::map<std::uint32_t, Duration> &left) {
   struct Step {
@@ -58,7 +58,7 @@ std::optional<std::string> why_not_alone(const System &system) {
   return std::nullopt;
 }
 
-// `response` from the release as seen.
+// Builds the bound; `response` counts from the release as seen.
 ResponseBound bound_of(const System &system, const GlobalUnit &unit, Duration response) {
   ResponseBound bound;
   if (add(response, unit.jitter) > unit.limit) {
@@ -91,19 +91,19 @@ Outcome apply_long_paths(const System &system) {
       system, [&](const Unit &unit, std::uint32_t workers) { return long_paths_response(system, unit, workers); });
 }
 
-// Jobs of the DAG that can be started and unfinished at once.
+// The most jobs of the DAG that can be started and unfinished at once.
 std::uint32_t most_started(const SystemDag &dag) {
   return dag.max_active > 0 ? dag.max_active : static_cast<std::uint32_t>(dag.tasks.size());
 }
 
-// True where a job that starts more urgent takes a worker from any less urgent one at once.
+// True if a job that starts takes a worker from any less urgent job at once.
 bool preempts_at_once(const System &system) {
   const auto has_own_level = [](const SystemTask &task) { return task.level == task.tier; };
   return system.mode == sched::Preemption::Full && is_static(system.policy) &&
          std::all_of(system.tasks.begin(), system.tasks.end(), has_own_level);
 }
 
-// Workers that nothing else can keep from the DAG: as many as it can use, or all, or 0.
+// The number of workers that no other DAG can keep from this one: as many as it can use, or all, or 0.
 std::uint32_t own_workers(const System &system, std::size_t dag) {
   std::uint32_t last_tier = 0;
   for (const std::uint32_t t : system.dags[dag].tasks) last_tier = std::max(last_tier, system.tasks[t].tier);
@@ -119,7 +119,7 @@ std::uint32_t own_workers(const System &system, std::size_t dag) {
   const std::uint32_t wanted = most_started(system.dags[dag]);
   const std::uint32_t workers = system.platform.workers;
   if (others + wanted <= workers) return wanted;
-  // Below its own bound it would compete with others for workers; with nobody else there is nothing to compete for.
+  // With fewer workers than its own bound it would compete with others for them; a DAG without others does not.
   const bool alone = others == 0 && system.dags[dag].units.size() == 1 && system.mode != sched::Preemption::Cooperative;
   return alone ? workers : 0;
 }

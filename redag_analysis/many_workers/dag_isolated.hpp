@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Response times of DAGs that nothing else delays: alone on the platform, or because the max_active of all that could
-// interfere leave them workers enough. And the max_active that make a system so (federated scheduling). Pure functions.
+// Response times of DAGs that nothing else delays. Such a DAG is alone on the platform, or the max_active of all that
+// could interfere leave it enough workers. Also finds the max_active that make a system so (federated scheduling). Pure
+// functions.
 #pragma once
 
 #include <cstdint>
@@ -13,32 +14,33 @@
 
 namespace redag::analysis {
 
-/// Which path disjoint_paths() takes next. That with the most tasks does not change with execution times.
+/// The order in which disjoint_paths() takes paths. The path with the most tasks does not change with execution times.
 enum class Heaviest : std::uint8_t { Longest, MostTasks };
 
-/// Lengths of at most `count` paths that share no task: the heaviest, then the heaviest in what is left, and so on; a
-/// path leads through tasks of earlier ones without counting them. O(count (tasks + edges)).
+/// Returns the lengths of at most `count` paths that share no task: the heaviest, then the heaviest in the rest, and so
+/// on. A path may lead through tasks of earlier ones without counting them. O(count (tasks + edges)).
 [[nodiscard]] std::vector<Duration> disjoint_paths(const System &system, const Unit &unit, std::size_t count,
                                                    Heaviest heaviest);
 
-/// A DAG on `workers` of its own: min over j of len(l_0) + floor((vol - sum_{i <= j} len(l_i)) / (workers - j)), l_0
-/// the longest path and l_i the longest in what is left without l_0 .. l_{i-1}. Q. He, N. Guan, M. Lv, X. Jiang, W.
-/// Chang, RTSS 2022, theorem 1; j = 0 is R. Graham's of 1969. O(workers (tasks + edges)).
+/// Bounds the response of a DAG on `workers` of its own: min over j of len(l_0) + floor((vol - sum_{i <= j} len(l_i)) /
+/// (workers - j)). l_0 is the longest path, and l_i the longest in what is left without l_0 .. l_{i-1}. Q. He, N. Guan,
+/// M. Lv, X. Jiang, W. Chang, RTSS 2022, theorem 1; j = 0 is the bound of R. Graham, 1969. O(workers (tasks + edges)).
 [[nodiscard]] Duration long_paths_response(const System &system, const Unit &unit, std::uint32_t workers);
 
-/// R = len + floor((vol - len) / m) of the only DAG. R. Graham, SIAM J. Applied Math. 17(2), 1969.
+/// R = len + floor((vol - len) / m) for the only DAG. R. Graham, SIAM J. Applied Math. 17(2), 1969.
 [[nodiscard]] Method graham();
 
 /// long_paths_response() of the only DAG.
 [[nodiscard]] Method long_paths();
 
-/// Of every DAG whose max_active and those of the more urgent (of all, where jobs are not preempted at once) sum up to
-/// at most m, or that no other can take a worker from. Proof: docs/analysis.md, "Isolation".
+/// Bounds every DAG from which no other can take a worker, or whose max_active and those of the more urgent DAGs sum up
+/// to at most m. Where jobs are not preempted at once, the sum is over all DAGs. Proof: docs/analysis.md, "Isolation".
 [[nodiscard]] Method isolated();
 
-/// max_active for each DAG with which isolated() bounds it within its deadline, n_k = ceil((vol - len) / (D - len)) for
-/// one that needs several workers, or nothing if they do not suffice. J. Li, J. Chen, K. Agrawal, C. Lu, C. Gill, A.
-/// Saifullah, ECRTS 2014 (D = T); S. Baruah, DATE 2015 (D <= T). DAGs of several parts get as many as they have tasks.
+/// Finds a max_active for each DAG with which isolated() bounds it within its deadline; empty if the workers do not
+/// suffice. A DAG that needs several workers gets n_k = ceil((vol - len) / (D - len)). J. Li, J. Chen, K. Agrawal, C.
+/// Lu, C. Gill, A. Saifullah, ECRTS 2014 (D = T); S. Baruah, DATE 2015 (D <= T). DAGs of several parts get as many as
+/// they have tasks.
 [[nodiscard]] std::optional<std::vector<std::uint32_t>> federated_bounds(const System &system);
 
 }  // namespace redag::analysis

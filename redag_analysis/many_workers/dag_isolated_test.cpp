@@ -42,7 +42,7 @@ TEST(BoundProperty, LongPaths) {
   expect_bound_holds(long_paths(), cases(graphs(sched::Preemption::None)), {.workloads = 1000});
 }
 
-// Few workers would hardly ever be enough for what the generator draws: small DAGs, bounds of one or two.
+// Small DAGs with bounds of one or two. For what the generator otherwise draws, few workers would hardly ever suffice.
 testing::BoundGenerator isolated_cases(sched::Preemption preemption) {
   BoundCaseLimits limits = graphs(preemption);
   limits.max_dags = 4;
@@ -74,7 +74,7 @@ Task make_task(std::string name, Duration wcet, std::vector<std::uint32_t> after
   return task;
 }
 
-// A source, three parallel tasks, a sink.
+// A source, three parallel tasks, and a sink.
 Dag fork_join(std::string name, Duration period = 100) {
   Dag dag;
   dag.name = std::move(name);
@@ -101,7 +101,7 @@ std::optional<Duration> dag_response(const Method &method, const System &system,
 }
 
 TEST(DagIsolated, LongPathsCountWhatRunsBesideThem) {
-  // len 15, vol 32; paths of 15, 9 and 8. On three workers nothing waits; on two j = 1 leaves 8 for one.
+  // len 15, vol 32; paths of 15, 9 and 8. On three workers nothing waits; on two, j = 1 leaves 8 for one worker.
   const System three = compiled(3, {fork_join("d")}, sched::Preemption::Full);
   EXPECT_EQ(dag_response(graham(), three, 0), 15 + 17 / 3);
   EXPECT_EQ(dag_response(long_paths(), three, 0), 15);
@@ -131,13 +131,13 @@ TEST(DagIsolated, BoundsThatSumUpToTheWorkersShareNothing) {
   EXPECT_EQ(dag_response(isolated(), enough, 0), 15 + 8);
   EXPECT_EQ(dag_response(isolated(), enough, 1), 32);
 
-  // Two workers are enough for the first only where it takes them from the second.
+  // Two workers suffice for the first DAG only if it can take them from the second.
   const System preemptive = compiled(2, {first, second}, sched::Preemption::Full);
   EXPECT_EQ(dag_response(isolated(), preemptive, 0), 15 + 8);
   EXPECT_FALSE(dag_response(isolated(), preemptive, 1));
   const System nonpreemptive = compiled(2, {first, second}, sched::Preemption::None);
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(isolated().apply(nonpreemptive)));
-  // Nor where the second takes turns with it.
+  // They do not suffice if the second takes turns with it.
   const System equals = compiled(2, {first, fork_join("second")}, sched::Preemption::Full);
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(isolated().apply(equals)));
 }

@@ -17,9 +17,10 @@ namespace redag::analysis {
 namespace global {
 
 Shape::Shape(const System &system, const Unit &unit, std::uint32_t workers) {
-  // All tasks as early as they can be, with workers without number: each from `start` to `end`.
+  // Each task runs from `start` to `end`: as early as possible on an unlimited number of workers.
   std::map<std::uint32_t, Duration> end;
-  std::map<Duration, Duration> steps;  // before the end of the DAG: change of how many tasks execute, going back
+  std::map<Duration, Duration> steps;  // by the time before the DAG's end, going back: change in the number of
+                                       // executing tasks
   for (const std::uint32_t t : unit.tasks) {
     Duration start = 0;
     for (const std::uint32_t p : system.tasks[t].predecessors) {
@@ -38,7 +39,7 @@ Shape::Shape(const System &system, const Unit &unit, std::uint32_t workers) {
   }
   left_ = limited(left, workers);
 
-  // Paths that do not depend on execution times, so that more execution is never less work.
+  // The choice of paths does not depend on execution times. More execution is thus never less work.
   std::vector<Duration> paths = disjoint_paths(system, unit, unit.tasks.size(), Heaviest::MostTasks);
   std::sort(paths.begin(), paths.end());
   Points done = {{0, 0}};
@@ -59,7 +60,8 @@ Duration Shape::at(const Points &points, Duration time) {
   return work + (time - before) * ((after->second - work) / (after->first - before));
 }
 
-// No more than `workers` an instant: the smaller of the points and workers * time, with the instants beside a crossing.
+// Limits the work to `workers` per instant: the smaller of the points and workers * time. Adds the instants beside a
+// crossing.
 Shape::Points Shape::limited(const Points &points, std::uint32_t workers) {
   const auto m = static_cast<Duration>(workers);
   const auto smaller = [&](Duration time) { return std::min(m * time, at(points, time)); };
@@ -71,7 +73,7 @@ Shape::Points Shape::limited(const Points &points, std::uint32_t workers) {
     const auto &[begin, work] = points[i];
     const auto &[end, more] = points[i + 1];
     const Duration slope = (more - work) / (end - begin);
-    const Duration ahead = work - m * begin;  // of workers * time
+    const Duration ahead = work - m * begin;  // relative to workers * time
     if (slope != m && (ahead < 0) != (more - m * end < 0)) {
       const Duration crossing = begin + std::max<Duration>(0, ahead / (m - slope));
       add_point(std::min(crossing, end));
@@ -87,17 +89,17 @@ Shape::Points Shape::limited(const Points &points, std::uint32_t workers) {
 }
 
 Duration Shape::work(Duration x, Duration response, Duration period) const {
-  // The first job's response ends `first` after the window begins, in [1, period]; each later one comes a period after
-  // the one before, and all but the last of them can be done.
+  // The first job's response ends `first` after the window begins, in [1, period]. Each later job comes a period after
+  // the one before, and all but the last can do their whole volume.
   const Duration volume = left_.back().second;
-  const Duration within = done(x);  // of one job
+  const Duration within = done(x);  // by one job
   const auto placed = [&](Duration first) {
     const Duration rest = x + response - first - period;  // of the window, when the second job comes
     const Duration later = rest > 0 ? rest / period * volume + done(rest % period) : 0;
     return std::min(left(first), within) + later;
   };
-  // Between the places where a slope changes the sum is straight. Once the first job can have done all, later is worse;
-  // nor is its first instant alone ever better than all other places (docs/analysis.md, "Shapes of DAGs").
+  // Between changes of a slope the sum is straight. Once the first job can have done all its work, a later place is
+  // worse. Nor is its first instant alone ever better than all other places (docs/analysis.md, "Shapes of DAGs").
   const Duration last = std::clamp<Duration>(left_.back().first, 1, period);
   Duration most = placed(last);
   for (const auto &[time, work] : left_) {
@@ -122,8 +124,8 @@ Duration least_window(const GlobalUnit &unit, std::uint32_t workers) {
   return unit.length + (unit.volume - unit.length) / static_cast<Duration>(workers);
 }
 
-// Fills in `response` of units[k] given those of units[0 .. k), and `work` of these. False: above its limit, or too
-// many steps. `shapes`: by position in System::units. `start`: below which there is no fixed point.
+// Sets `response` of units[k], given those of units[0 .. k), and `work` of these. Returns false above its limit, or
+// after too many steps. `shapes` is by position in System::units. Below `start` there is no fixed point.
 bool respond(std::span<GlobalUnit> units, std::span<const global::Shape> shapes, std::size_t k, std::uint32_t workers,
              Duration start) {
   GlobalUnit &own = units[k];
@@ -158,7 +160,7 @@ ResponseBound explain(const System &system, std::span<const GlobalUnit> units, s
 }
 
 Outcome apply_shapes(const System &system) {
-  // Without edges no DAG has a shape, and bertogna_cirinei() is never above this, and quicker.
+  // Without edges no DAG has a shape; bertogna_cirinei() is then never above this bound, and quicker.
   if (!system.has_edges()) return NotApplicable{"no task has predecessors: see the bounds for independent tasks"};
   global::Units view = global::units_of(system, {.equals = true});
   if (view.reason) return NotApplicable{*view.reason};

@@ -38,7 +38,7 @@ BoundCaseLimits graphs() {
 
 TEST(BoundProperty, DagShapes) { expect_bound_holds(dag_shapes(), cases(graphs()), {.workloads = 2000}); }
 
-// Short periods and two workers, from many offsets: a job that is carried in or cut off matters.
+// Short periods and two workers, from many offsets, where a job that is carried in or cut off matters.
 TEST(BoundProperty, DagShapesAtTheEndsOfWindows) {
   BoundCaseLimits limits = graphs();
   limits.min_workers = limits.max_workers = 2;
@@ -70,7 +70,7 @@ Task make_task(std::string name, Duration wcet, std::vector<std::uint32_t> after
   return task;
 }
 
-// 1, then 4 and 2 in parallel, then 1.
+// Tasks of 1, then 4 and 2 in parallel, then 1.
 Workload fork_and_join(std::uint32_t workers) {
   Workload workload;
   workload.name = "w";
@@ -87,9 +87,9 @@ TEST(Shape, IsThatOfTheDag) {
   const Workload workload = fork_and_join(2);
   const System system = compile(workload, platform_of(workload)).value();
   const Shape shape(system, system.units[0], 2);
-  // Going back from the end: the join, left alone for two, both for two, the fork.
+  // Going back from the end: the join, the longer branch alone for two, both branches for two, the fork.
   const Duration left[] = {0, 1, 2, 3, 5, 7, 8, 8, 8};
-  // Paths of 6 and of 2.
+  // Two paths, of 6 and of 2.
   const Duration done[] = {0, 2, 4, 5, 6, 7, 8, 8, 8};
   for (Duration time = 0; time < 9; ++time) {
     EXPECT_EQ(shape.left(time), left[time]) << time;
@@ -107,7 +107,7 @@ TEST(Shape, OneWorkerDoesOneThingAtATime) {
   }
 }
 
-// One task, `wide` in parallel, all of them before one more: wider than the workers.
+// One task, then `parallel` tasks side by side, then one more: wider than the workers.
 Workload wide(std::uint32_t parallel, Duration wcet, std::uint32_t workers) {
   Workload workload;
   workload.name = "w";
@@ -125,9 +125,9 @@ Workload wide(std::uint32_t parallel, Duration wcet, std::uint32_t workers) {
   return workload;
 }
 
-// By their definitions, instant by instant.
+// Compares both functions with their definitions, instant by instant.
 void expect_shape_is_right(const System &system, const Unit &unit, std::uint32_t m) {
-  std::map<std::uint32_t, std::pair<Duration, Duration>> times;  // as early as they can be
+  std::map<std::uint32_t, std::pair<Duration, Duration>> times;  // as early as possible
   for (const std::uint32_t t : unit.tasks) {
     Duration start = 0;
     for (const std::uint32_t p : system.tasks[t].predecessors) start = std::max(start, times[p].second);
@@ -163,7 +163,7 @@ TEST(Shape, IsWhatItSaysAtEveryInstant) {
   });
 }
 
-// Where slopes change is enough to look at: the same as all placements of the first job.
+// Placements of the first job where slopes change suffice: they give the same as all placements.
 TEST(Shape, WorkIsTheMostOverAllPlacements) {
   std::uint64_t checked = 0;
   std::uint64_t single = 0;
@@ -215,7 +215,7 @@ TEST(DagShapes, AreNeverAboveMelani) {
   EXPECT_GT(smaller, 100U);
 }
 
-// Neither is always the smaller: dag_bounded() cuts each DAG's work at its width while a path waits.
+// Neither bound is always the smaller: dag_bounded() limits each DAG's work to its width while a path waits.
 TEST(DagShapes, AndWidthsAreIncomparable) {
   std::uint64_t smaller = 0;
   std::uint64_t larger = 0;

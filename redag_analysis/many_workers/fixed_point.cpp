@@ -11,7 +11,7 @@
 namespace redag::analysis::global {
 namespace {
 
-constexpr int kMaxRounds = 1000;  // of all values; ordinary systems need about ten
+constexpr int kMaxRounds = 1000;  // of all values together; ordinary systems need about ten
 
 }  // namespace
 
@@ -32,7 +32,7 @@ std::string_view agree(std::span<Duration *const> values, std::string_view excee
 
 namespace {
 
-// Units[k] as the last of its peers.
+// Calls f with units[k] as the last of its peers.
 template <class F>
 auto as_last(std::vector<GlobalUnit> &units, Peers peers, std::size_t k, F f) {
   std::swap(units[k], units[peers.end - 1]);
@@ -77,7 +77,7 @@ Bound from_most_urgent(const System &system, std::vector<GlobalUnit> &units,
         continue;
       }
       response = as_last(units, peers, k, [&](std::size_t last) {
-        if (!alone && Effort::itemises(units[last].unit)) (void)respond(last, false);  // what explain() looks at
+        if (!alone && Effort::itemises(units[last].unit)) (void)respond(last, false);  // sets what explain() looks at
         return explain(last);
       });
     }

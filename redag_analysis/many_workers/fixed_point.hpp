@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Fixed points of the bounds for several workers: of one window, and of responses that rely on each other. Every
-// function iterated is monotone: larger windows and larger responses assumed of others never give less.
+// iterated function is monotone: larger windows, and larger assumed responses of others, never give a smaller result.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +16,10 @@
 
 namespace redag::analysis::global {
 
-/// Fixed point of a monotone `next`, from a `value` below the least one on. False above `stop`. The last call of `next`
-/// was with the `value` found, so that what it leaves behind is of that one. It is the least, unless that takes more
-/// than kMaxSteps: then one from farther ahead, by doubling the way and bisection, if there is one where that looks.
+/// Finds a fixed point of a monotone `next`, from a `value` at or below the least one. Returns false if it is above
+/// `stop`. The last call of `next` was with the `value` found, and its side effects are those of that value. The result
+/// is the least fixed point unless the search takes more than kMaxSteps. Then it is one from farther ahead, found by
+/// doubling the distance and bisection, if there is one where these look.
 template <class Next>
 [[nodiscard]] bool least_fixed_point(Duration stop, Duration &value, Next next) {
   const Duration begin = value;
@@ -27,7 +28,8 @@ template <class Next>
     if (grown <= value) return true;
     value = grown;
   }
-  // next(value) > value; where it is not, all between holds a fixed point: the first such place after the last other.
+  // next(value) > value here. Goes ahead to the first place with next(above) <= above; bisection finds a fixed point
+  // between it and the place before.
   for (Duration ahead = value - begin; value < stop; ahead *= 2) {
     Duration above = ahead < stop - value ? value + ahead : stop;
     if (next(above) > above) {
@@ -44,24 +46,24 @@ template <class Next>
   return false;
 }
 
-/// Sets responses (or latest arrivals) that rely on each other to the least that agree: each is what evaluate(k) makes
-/// of the others. evaluate(k) sets the k-th value from all of them, and answers false above its limit; it must be
-/// monotone. Values start at or below the least that agree. Empty, or why there are none: `exceeds` if one is above its
-/// limit.
+/// Sets responses (or latest arrivals) that rely on each other to the least values that agree: each is what evaluate(k)
+/// computes from the others. evaluate(k) sets the k-th value from all of them, and returns false above its limit; it
+/// must be monotone. Values start at or below the least that agree. Returns an empty text, or why no values agree:
+/// `exceeds` if one is above its limit.
 [[nodiscard]] std::string_view agree(std::span<Duration *const> values, std::string_view exceeds,
                                      const std::function<bool(std::size_t k)> &evaluate);
 
-/// Bounds of `units` from the most urgent to the least. respond(k, alone) sets units[k].response from those of units[0
-/// .. k), and answers false above its limit; explain(k) follows a call of it. Peers (peers_of()) are each taken as the
-/// last of them, and not alone: their responses are the least that agree, from those that start() sets, or none has
-/// one.
+/// Bounds `units` from the most urgent to the least. respond(k, alone) sets units[k].response from those of units[0 ..
+/// k), and returns false above its limit; explain(k) follows a call of it. Each of several peers (peers_of()) is
+/// treated as the last of them, with `alone` false. Their responses are the least that agree, beginning with those that
+/// start() sets; otherwise none of them has one.
 [[nodiscard]] Bound from_most_urgent(const System &system, std::vector<GlobalUnit> &units,
                                      const std::function<void(GlobalUnit &unit)> &start,
                                      const std::function<bool(std::size_t k, bool alone)> &respond,
                                      const std::function<ResponseBound(std::size_t k)> &explain);
 
-/// agree() of the responses of `units`, which respond(k) sets: all have the bound that explain(k) then gives, or none;
-/// none either where one is hopeless.
+/// Applies agree() to the responses of `units`, which respond(k) sets. All units have the bound that explain(k) gives,
+/// or none has; none has if one unit is hopeless.
 [[nodiscard]] Bound all_that_agree(const System &system, std::vector<GlobalUnit> &units, std::string_view exceeds,
                                    const std::function<bool(std::size_t k)> &respond,
                                    const std::function<ResponseBound(std::size_t k)> &explain);

@@ -38,7 +38,8 @@ TEST(LeastFixedPoint, IsTheLeast) {
   EXPECT_FALSE(least_fixed_point(7, value, next));
 }
 
-// A nanosecond a step, up to a goal far away; beyond it steps, each a fixed point at its top.
+// A function that grows by a nanosecond a step up to a distant goal. Beyond the goal it has steps, each a fixed point
+// at its top.
 TEST(LeastFixedPoint, IsFoundFarAwayInFewSteps) {
   for (const Duration goal : {Duration{20'000}, kMillisecond, kSecond}) {
     int calls = 0;
@@ -50,7 +51,7 @@ TEST(LeastFixedPoint, IsFoundFarAwayInFewSteps) {
     };
     Duration value = 5;
     EXPECT_TRUE(least_fixed_point(2 * goal, value, next));
-    EXPECT_EQ(last, value);  // what it leaves behind is of that one
+    EXPECT_EQ(last, value);  // the side effects are those of the value found
     EXPECT_EQ(next(value), value);
     EXPECT_GE(value, goal);
     EXPECT_LT(calls, 11'000);
@@ -64,7 +65,7 @@ TEST(LeastFixedPoint, IsFoundFarAwayInFewSteps) {
 
 TEST(Agree, FindsTheLeast) {
   Two two{{1, 1}, 100};
-  // x = 3 + y / 2, y = 4 + x / 3; also much larger ones would do.
+  // x = 3 + y / 2, y = 4 + x / 3; much larger values would agree, too.
   EXPECT_TRUE(two.agree([](std::size_t k, const auto &v) { return k == 0 ? 3 + v[1] / 2 : 4 + v[0] / 3; }).empty());
   EXPECT_EQ(two.values, (std::array<Duration, 2>{5, 5}));
   EXPECT_LT(two.evaluations, 20);

@@ -26,7 +26,7 @@ std::optional<std::string> why_not_mode(const System &system, const Needs &needs
              : "for jobs that run to completion; here they can be preempted";
 }
 
-// A max_active that the DAG's tasks reach only if its instances overlap is none where R <= T.
+// True if the max_active can bind while R <= T. One that the DAG's tasks reach only if its instances overlap cannot.
 bool can_bind(const System &system, DagId id) {
   const SystemDag &dag = system.dags[id.value];
   if (dag.max_active == 0) return false;
@@ -46,7 +46,7 @@ std::optional<std::string> why_not_structure(const System &system, const Needs &
   return std::nullopt;
 }
 
-// What the two share if they are to go first by turns.
+// The place that two tasks share if either can go before the other: the level under full preemption, else the tier.
 std::uint32_t shared_place(const System &system, std::uint32_t rank) {
   const SystemTask &task = system.tasks[system.by_rank[rank]];
   return system.mode == sched::Preemption::Full ? task.level : task.tier;
@@ -73,7 +73,7 @@ std::optional<std::string> why_not_order(const System &system, const std::vector
   return std::nullopt;
 }
 
-// Times so small that no sum of workloads wraps and divide() is exact.
+// True if all times are small enough that no sum of workloads wraps and divide() is exact.
 bool fits(const std::vector<GlobalUnit> &units, std::uint32_t workers) {
   Duration longest = 1;
   for (const GlobalUnit &unit : units) longest = std::max({longest, unit.period, ceil_div(unit.volume, workers)});
@@ -81,7 +81,7 @@ bool fits(const std::vector<GlobalUnit> &units, std::uint32_t workers) {
   return Int128{longest} * workers < (Int128{1} << 50U) && sum < (Int128{1} << 62U);
 }
 
-// The longest path's overhead, and the most tasks on any path.
+// Sets the overhead of the longest path, and the most tasks on any path.
 void measure_paths(const System &system, const Unit &unit, GlobalUnit &result) {
   if (unit.tasks.size() == 1) {
     result.path_overhead = system.tasks[unit.tasks.front()].overhead;
@@ -202,7 +202,7 @@ void SharedTerms::add_share(Term::Kind kind, const GlobalUnit &whose, Duration n
   const Int128 common = Int128{denominator_} * denominator;
   const Int128 sum = Int128{remainder_} * denominator + Int128{numerator} * denominator_;
   const auto whole = static_cast<Duration>(sum / common);
-  // Kept small: at most two denominators meet, a max_active and the number of workers.
+  // The denominator stays small: at most a max_active and the number of workers meet.
   const auto rest = static_cast<Duration>(sum % common);
   const Duration divisor = std::gcd(rest, static_cast<Duration>(common));
   remainder_ = rest / divisor;

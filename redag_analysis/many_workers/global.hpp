@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // What the bounds for several workers share: when global scheduling by whole units applies, each unit in numbers, and
-// exact shares of a divided sum. Values only; pure functions. The bounds themselves are in files of their own.
+// exact shares of a divided sum. Values and pure functions only. The bounds themselves have their own files.
 #pragma once
 
 #include <cstdint>
@@ -16,39 +16,39 @@
 
 namespace redag::analysis::global {
 
-/// A unit as the bounds see it. Times of a window are measured from the release as seen, responses from the nominal
-/// one.
+/// A unit as the bounds see it. Times within a window count from the release as seen, and responses from the nominal
+/// release.
 struct GlobalUnit {
   Duration volume = 0;
   Duration length = 0;
   Duration period = 0;
   Duration jitter = 0;
-  Duration limit = 0;     // responses above it count as none; never above the period
-  Duration response = 0;  // of the bound at work, once known
-  Duration work = 0;      // in the window at hand, and with a job from before: scratch of the fixed points
+  Duration limit = 0;     // a response above it counts as none; never above the period
+  Duration response = 0;  // of the current bound, once known
+  Duration work = 0;      // in the current window, and (`carried`) with an earlier job; scratch of the fixed points
   Duration carried = 0;
   Duration turn = 0;             // width * period, see divide()
   double rate = 0;               // 1 / turn
-  std::uint32_t width = 1;       // jobs of it that can execute at once, never above the workers
-  std::uint32_t bound = 0;       // max_active where it binds, or 0
-  std::uint32_t tasks = 1;       // how many
+  std::uint32_t width = 1;       // its jobs that can execute at once, never above the workers
+  std::uint32_t bound = 0;       // max_active if it can bind, else 0
+  std::uint32_t tasks = 1;       // their number
   std::uint32_t path_tasks = 1;  // most tasks on a path
-  Duration path_overhead = 0;    // platform's part of `length`
+  Duration path_overhead = 0;    // the platform's part of `length`
   std::uint32_t unit = 0;        // position in System::units
 };
 
-/// Which systems a bound is for.
+/// The systems that a bound accepts.
 struct Needs {
   sched::Preemption mode = sched::Preemption::Full;
-  bool edges = true;        // also units of several tasks
-  bool bounds = false;      // also max_active, of DAGs that are one unit
-  bool groups = false;      // also exclusive groups
-  bool equals = false;      // also units that share a level, of which any can go first: see peers_of()
-  bool any_policy = false;  // also policies whose priorities are not static; then the order means nothing
+  bool edges = true;        // units of several tasks
+  bool bounds = false;      // max_active, of DAGs that are one unit
+  bool groups = false;      // exclusive groups
+  bool equals = false;      // units that share a level, of which any can go first: see peers_of()
+  bool any_policy = false;  // policies whose priorities are not static; the order of units is then meaningless
 };
 
-/// The units most urgent first, or why the bound does not apply. Beyond `Needs`: the priorities of two units are not
-/// interleaved, and no sum of workloads exceeds an integer.
+/// The units, most urgent first, or why the bound does not apply. Beyond `Needs`, the priorities of two units must not
+/// interleave, and sums of workloads must fit into an integer.
 struct Units {
   std::optional<std::string> reason;
   std::vector<GlobalUnit> units;
@@ -56,25 +56,26 @@ struct Units {
 };
 [[nodiscard]] Units units_of(const System &system, const Needs &needs);
 
-/// Where the units of which units[k] is one share levels: any of them can go before any other. By level where jobs can
-/// be preempted, else by tier: what has started then counts as blocking. Nearly always units[k] alone.
+/// The range of units that share levels with units[k]: any of them can go before any other. Where jobs can be preempted
+/// levels count, else tiers, because a job that has started then counts as blocking. Nearly always units[k] alone.
 struct Peers {
   std::size_t begin = 0;
   std::size_t end = 0;
 };
 [[nodiscard]] Peers peers_of(const System &system, const std::vector<GlobalUnit> &units, std::size_t k);
 
-/// One unit alone; its order among the others is not looked at.
+/// One unit alone; its place among the others is not determined.
 [[nodiscard]] GlobalUnit unit_of(const System &system, std::uint32_t unit);
 
-/// No response is within its limit: more work than the workers can do until then. With such a unit sums can wrap.
+/// True if no response is within the limit: there is more work than the workers can do until then. Sums of such a unit
+/// can wrap.
 [[nodiscard]] bool is_hopeless(const GlobalUnit &unit, std::uint32_t workers);
 [[nodiscard]] bool is_any_hopeless(std::span<const GlobalUnit> units, std::uint32_t workers);
 
 /// Lets at most `width` jobs of the unit execute at once.
 void set_width(GlobalUnit &unit, std::uint32_t width);
 
-/// Quotient and remainder by `turn` without a division instruction. Requires 0 <= value < 2^52, exact then.
+/// Quotient and remainder by `turn` without a division instruction. Exact; requires 0 <= value < 2^52.
 struct Division {
   Duration quotient = 0;
   Duration remainder = 0;
@@ -92,18 +93,18 @@ struct Division {
   return {quotient, remainder};
 }
 
-/// Terms of a response out of shares of a sum that is divided by the workers and rounded down once: they add up to it.
-/// None where the unit is not to be itemised (effort.hpp).
+/// Builds the terms of a response from shares of a sum that is divided by the workers and rounded down once; the terms
+/// add up to the response. There are none if the unit is not itemised (effort.hpp).
 class SharedTerms {
  public:
   SharedTerms(const System &system, const GlobalUnit &unit);
 
-  /// Time of its own: `length` of the longest path, `overhead` of it the platform's, and the release seen late.
+  /// Adds the unit's own time: `length` of the longest path, of which the platform's overhead is a term of its own.
   void add_path();
   void add_jitter();
   void add(Term::Kind kind, const GlobalUnit &whose, Duration amount, std::int64_t jobs = 0);
   void add(const Term &term);
-  /// `numerator` / `denominator` more; what has been added so far is always rounded down once.
+  /// Adds `numerator` / `denominator`. The sum of all shares so far is rounded down once.
   void add_share(Term::Kind kind, const GlobalUnit &whose, Duration numerator, Duration denominator,
                  std::int64_t jobs = 0);
   [[nodiscard]] std::vector<Term> take() { return std::move(terms_); }
@@ -120,8 +121,8 @@ class SharedTerms {
   Duration denominator_ = 1;
 };
 
-/// The sum of the `count` largest less urgent jobs' remaining times when they are in the way of something that
-/// became ready later ("- 1": they started at an instant strictly before), at most `width` of a unit.
+/// Sums the `count` largest remaining times of less urgent jobs that block something that became ready later, at most
+/// `width` of a unit. Each counts with "- 1", because it started at an instant strictly before.
 [[nodiscard]] Duration largest_remaining(const System &system, const std::vector<GlobalUnit> &units, std::size_t from,
                                          std::uint32_t count);
 
@@ -131,7 +132,7 @@ inline constexpr std::string_view kPeer = "something of the same priority has no
 inline constexpr std::string_view kNoFixedPoint =
     "no fixed point within its limit, above which jobs would be skipped, in the steps allowed";
 
-/// Evaluations of one fixed point; ordinary systems need tens.
+/// Limits the evaluations of one fixed point; ordinary systems need tens.
 inline constexpr int kMaxSteps = 10'000;
 
 }  // namespace redag::analysis::global

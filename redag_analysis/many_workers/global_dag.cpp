@@ -14,7 +14,7 @@ namespace redag::analysis {
 namespace global {
 namespace {
 
-// How often the waiting time of one window is tightened; every round gives a valid one.
+// How many times the waiting time of one window is tightened; every round gives a valid one.
 constexpr int kRounds = 8;
 
 // floor(a / b + c / d) for small divisors.
@@ -28,9 +28,10 @@ class Window {
   Window(std::span<const GlobalUnit> more_urgent, const GlobalUnit &own, std::uint32_t workers, Duration blocking,
          std::span<Duration> works)
       : more_urgent_(more_urgent), own_(own), workers_(workers), blocking_(blocking), works_(works) {
-    // Others of its own that execute while the critical path waits and max_active is not reached.
+    // Its other tasks that can execute while the critical path waits and max_active is not reached.
     own_width_ = own.bound > 0 ? own.bound - 1 : own.tasks - 1;
-    // The critical path need not be the longest one; with max_active that could matter, so all of the volume counts.
+    // The critical path need not be the longest one. With max_active a shorter one could matter, and all of the volume
+    // counts.
     own_work_ = own.bound > 0 ? own.volume : own.volume - own.length;
   }
 
@@ -46,7 +47,7 @@ class Window {
   [[nodiscard]] Duration busy() const { return busy_; }
 
  private:
-  // Work of others in so many instants: no DAG does more than its width in each.
+  // The work of others in `busy` instants: in each, no DAG does more than its width.
   [[nodiscard]] Duration others_in(Duration busy) const {
     Effort::spend(works_.size() + 1);
     Duration sum = busy > 0 ? blocking_ : 0;
@@ -56,7 +57,7 @@ class Window {
     return sum;
   }
 
-  // At least the largest y with m y <= min(V, r y) + sum min(W_j, c_j y) + B.
+  // Returns at least the largest y with m y <= min(V, r y) + sum min(W_j, c_j y) + B.
   [[nodiscard]] Duration busy_instants() const {
     Duration busy = (own_work_ + sum_ + blocking_) / workers_;
     for (int round = 0; round < kRounds && busy > 0; ++round) {
@@ -125,7 +126,7 @@ namespace {
 using global::GlobalUnit;
 using global::SharedTerms;
 
-// Not above any response that is found, and enough for dag_work().
+// Sets a response at or below any that is found, and large enough for dag_work().
 void start_low(GlobalUnit &unit, std::uint32_t workers) {
   const Duration more = unit.bound > 0         ? (unit.volume - unit.length) / unit.bound
                         : unit.tasks > workers ? (unit.volume - unit.length) / static_cast<Duration>(workers)
@@ -133,7 +134,7 @@ void start_low(GlobalUnit &unit, std::uint32_t workers) {
   unit.response = unit.length + more + unit.jitter;
 }
 
-// `respond(k, start)`, `explain(k, terms)`.
+// Expects `respond(k, start)` and `explain(k, terms)`.
 template <class Respond, class Explain>
 Bound from_most_urgent(const System &system, global::Units &view, Respond respond, Explain explain) {
   return global::from_most_urgent(
@@ -168,8 +169,8 @@ Outcome apply_melani(const System &system) {
       });
 }
 
-// Shares of `waiting.busy` or, with max_active, of the sum that made the response; what tightening took away is taken
-// from the terms in their order, so that they add up.
+// Adds shares of `waiting.busy` or, with max_active, of the sum that made the response. The tightening is taken from
+// the terms in their order, such that they add up.
 void explain_bounded(std::span<const GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration blocking,
                      const global::Waiting &waiting, SharedTerms &terms) {
   const GlobalUnit &own = units[k];
@@ -207,7 +208,7 @@ Outcome apply_bounded(const System &system, sched::Preemption mode) {
       [&](std::size_t k, SharedTerms &terms) { explain_bounded(units, k, view.workers, blocking, waiting, terms); });
 }
 
-// Units[k] below all others: what it is bounded by if nothing is known of their order.
+// Bounds units[k] below all others: the bound if nothing is known of their order.
 class AgainstAll {
  public:
   AgainstAll(const System &system, std::vector<GlobalUnit> &units, std::uint32_t workers)
@@ -223,7 +224,7 @@ class AgainstAll {
     return found;
   }
 
-  // Once all responses agree.
+  // Called once all responses agree.
   ResponseBound explain(std::size_t k) {
     ResponseBound bound;
     bound.response = units_[k].response;
@@ -250,7 +251,7 @@ class AgainstAll {
 };
 
 Outcome apply_any(const System &system) {
-  // A critical path waits only while all workers execute, or as many of its own tasks as max_active lets.
+  // A critical path waits only while all workers execute, or as many of its own tasks as max_active allows.
   const auto mode = system.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
   global::Units view = global::units_of(system, {.mode = mode, .bounds = true, .any_policy = true});
   if (view.reason) return NotApplicable{*view.reason};

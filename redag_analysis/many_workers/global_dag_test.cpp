@@ -81,7 +81,7 @@ TEST(DagAny, KnowsNoOrderOfDags) {
   EXPECT_GT(compared, 300U);
 }
 
-// Every policy, shared levels, priorities of DAGs that are interleaved; with max_active too.
+// Every policy, shared levels, and interleaved priorities of DAGs; also with max_active.
 TEST(BoundProperty, DagAnyOrder) {
   for (const auto mode : {sched::Preemption::Full, sched::Preemption::None}) {
     BoundCaseLimits limits = graphs(mode);
@@ -105,8 +105,8 @@ Task make_task(std::string name, Duration wcet, Duration period, std::vector<std
   return task;
 }
 
-// Five stages of one task and two parallel ones, and below it a wide DAG whose tasks start whenever the upper DAG is
-// narrow. Counting blocking only once per preemption gives 44; the schedule takes 52.
+// Five stages of one task and two parallel ones, above a wide DAG whose tasks start whenever the upper DAG is narrow.
+// If blocking counted only once per preemption, the bound would be 44; the schedule takes 52.
 Workload narrow_and_wide() {
   Workload workload;
   workload.name = "narrow_and_wide";
@@ -143,7 +143,7 @@ ResponseBound dag_response(const Method &method, const System &system, std::size
   return std::get<Bound>(method.apply(system)).dags[dag];
 }
 
-// DAGs that are narrow and wide in turn above a wide one with longer tasks: what random graphs hardly ever are.
+// DAGs that are narrow and wide in turn, above a wide one with longer tasks. Random graphs hardly ever look like this.
 testing::BoundCase narrow_and_wide_case(Rng &rng, sched::Preemption preemption, bool bounds) {
   testing::BoundCase result;
   result.platform.workers = static_cast<std::uint32_t>(rng.uniform(2, 4));
@@ -306,7 +306,7 @@ TEST(GlobalDag, MoreExecutionNeverShrinksABound) {
   EXPECT_GT(compared, 300U);
 }
 
-// What is known of the order helps where jobs are preempted.
+// Knowledge of the order helps where jobs are preempted.
 TEST(GlobalDag, AnyOrderIsNeverBelowBounded) {
   std::uint64_t larger = 0;
   const auto compared =

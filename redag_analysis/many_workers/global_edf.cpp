@@ -23,8 +23,8 @@ Duration deadline_of(const System &system, const GlobalUnit &unit) {
   return system.tasks[system.units[unit.unit].tasks.front()].deadline;
 }
 
-// Work after the release of a job, by jobs of `task` whose deadlines are `later` or more before its own: the last one
-// has just that deadline and all are as late as they can be.
+// The work after a job's release by jobs of `task` whose deadlines are `later` or more before that job's deadline. The
+// last of them has exactly that deadline, and all execute as late as they can.
 Duration due_work(const GlobalUnit &task, Duration later) {
   const Division jobs = global::divide(std::max<Duration>(0, later + task.response), task);
   return jobs.quotient * task.volume + std::min(task.volume, jobs.remainder);
@@ -51,7 +51,7 @@ class Edf {
     return found;
   }
 
-  // Once all responses agree.
+  // Called once all responses agree.
   ResponseBound explain(std::size_t k) {
     if (!Effort::itemises(units_[k].unit)) {
       ResponseBound bound;
@@ -82,19 +82,20 @@ class Edf {
   }
 
  private:
-  // How much later the deadline of units_[k] is. From its own period on that makes no difference: the window is not
-  // longer.
+  // How much later the deadline of units_[k] is than that of units_[i]. Values above its own period are cut: the window
+  // is not longer than the period.
   [[nodiscard]] Duration later(std::size_t k, std::size_t i) const {
     return std::min(deadlines_[k] - deadlines_[i], units_[k].period);
   }
 
-  // least_window() of all others; leaves each one's work in `work`, and in `carried` what of it has a deadline in time.
+  // Applies least_window() to all others. Leaves each one's work in `work`, and in `carried` the part with a deadline
+  // in time.
   Duration window(std::size_t k, Duration d) {
     Effort::spend(units_.size());
     const bool preempts = system_.mode == sched::Preemption::Full;
     const GlobalUnit &own = units_[k];
     const std::uint32_t workers = system_.platform.workers;
-    // A job that can be preempted waits in d instants before it has executed for C - 1; another one before it starts.
+    // A preemptable job waits in d instants before it has executed for C - 1; any other job waits before it starts.
     const Duration length = preempts ? d + own.volume - 1 : d;
     Largest blockers(preempts ? 0 : workers);
     for (std::size_t i = 0; i < units_.size(); ++i) {
@@ -102,7 +103,8 @@ class Edf {
       if (i == k) continue;
       const Duration any = global::sequential_work(other, length);
       other.work = other.carried = std::min(any, due_work(other, later(k, i)));
-      // In the way with a later deadline, of a job that had started. Where jobs of it are due in time it is no more.
+      // The additional work of a job that had started, with a later deadline. If jobs of its task are due in time, it
+      // adds no more than these leave.
       blockers.offer(std::min({any, other.volume - 1, d}) - std::min(other.carried, d), i);
     }
     for (const Largest::Entry &entry : blockers.entries()) {

@@ -49,7 +49,7 @@ TEST(BoundProperty, EdfGlobalResponseNonpreemptive) {
   expect_bound_holds(edf_global_response(), cases(limits), {.workloads = 1500});
 }
 
-// Few long tasks on two workers, looked at from many offsets.
+// Few long tasks on two workers, simulated from many offsets.
 TEST(BoundProperty, EdfGlobalResponseOfFewTasks) {
   for (const auto mode : {sched::Preemption::Full, sched::Preemption::None}) {
     BoundCaseLimits limits;
@@ -102,26 +102,27 @@ std::vector<std::optional<Duration>> responses(const Method &method, const Syste
 
 using Responses = std::vector<std::optional<Duration>>;
 
-// Exactly on the limit, and above it.
+// Systems exactly on the limit and above it.
 TEST(EdfGlobalDensity, LeavesRoomForTheLargest) {
   const auto full = sched::Preemption::Full;
   const Outcome three = edf_global_density().apply(edf_system(2, {{2, 4}, {2, 4}, {2, 4}}, full));
   EXPECT_EQ(std::get<Bound>(three).accepts, true) << "1.5 <= 2 - 0.5";
   const Outcome four = edf_global_density().apply(edf_system(2, {{2, 4}, {2, 4}, {2, 4}, {1, 100}}, full));
   EXPECT_EQ(std::get<Bound>(four).accepts, false);
-  // S. Dhall, C. Liu, Operations Research 26(1), 1978: little work, and one task that needs nearly all of a worker.
+  // S. Dhall, C. Liu, Operations Research 26(1), 1978: little work, and one task that needs nearly a whole worker.
   const Outcome dhall = edf_global_density().apply(edf_system(2, {{1, 9}, {1, 9}, {10, 10}}, full));
   EXPECT_EQ(std::get<Bound>(dhall).accepts, false);
 }
 
-// A job that is due later does not count: the other's next one, which a bound for any order has to count.
+// A job with a later deadline does not count. Here this is the other task's next job, which a bound for any order must
+// count.
 TEST(EdfGlobalResponse, CountsWhatIsDueInTime) {
   const System system = edf_system(1, {{2, 5}, {2, 5}}, sched::Preemption::Full);
   EXPECT_EQ(responses(edf_global_response(), system), (Responses{4, 4}));
   EXPECT_EQ(responses(bertogna_cirinei_any(), system), (Responses{std::nullopt, std::nullopt}));
 }
 
-// The short one waits for 19 of the long one, which waits for one job of the short one.
+// The short task waits for 19 of the long one, which waits for one job of the short one.
 TEST(EdfGlobalResponse, BlockingWithoutPreemption) {
   EXPECT_EQ(responses(edf_global_response(), edf_system(1, {{1, 100}, {20, 200}}, sched::Preemption::None)),
             (Responses{20, 21}));
@@ -129,7 +130,7 @@ TEST(EdfGlobalResponse, BlockingWithoutPreemption) {
             (Responses{1, 20}));
 }
 
-// One that asks for ten days of every second: what it would do in ten days is more than a time can hold.
+// One task needs ten days of every second: its work within ten days is more than a duration can hold.
 TEST(EdfGlobalResponse, ThereIsNoneBesideATaskFarBeyondItsLimit) {
   const Duration second = kSecond;
   const System system =
@@ -154,7 +155,7 @@ TEST(EdfGlobalResponse, IsNeverAboveThatForAnyOrder) {
         const auto better = std::get<Bound>(edf).tasks[t].response;
         if (!worse) continue;
         ASSERT_TRUE(better);
-        // Without preemption the other one lets a job wait to its last tick.
+        // Without preemption the other task makes a job wait until its last tick.
         ASSERT_LE(*better, *worse);
         ++compared;
         if (*better < *worse) ++smaller;
@@ -165,7 +166,7 @@ TEST(EdfGlobalResponse, IsNeverAboveThatForAnyOrder) {
   EXPECT_GT(smaller, 100U);
 }
 
-// On one worker the demand bound is exact for sporadic tasks: nobody accepts more.
+// On one worker the demand bound is exact for sporadic tasks: no sound test accepts more.
 TEST(EdfGlobal, AcceptsNothingThatTheDemandOfOneWorkerRefuses) {
   BoundCaseLimits limits = several_workers(sched::Preemption::Full);
   limits.max_workers = 1;

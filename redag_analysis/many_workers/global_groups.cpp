@@ -28,8 +28,8 @@ constexpr std::string_view kBinds =
     "instances overlap, so that its max_active binds: with groups and an overhead of preemption that is not covered";
 constexpr int kMostRounds = 1000;
 
-// Whether a task may answer after its next release. Without preemption, and where other bounds rely on whole units
-// that answer within their period, it may not.
+// Whether a task may answer after its next release. It may not without preemption, nor where other bounds rely on whole
+// units that answer within their period.
 enum class Beyond : bool { Never, Allowed };
 
 class Analysis {
@@ -81,7 +81,7 @@ class Analysis {
   }
 
  private:
-  // The window that a task's response comes from.
+  // The window that gave a task's response.
   struct Answer {
     std::uint32_t instances = 1;
     Duration repeated = 0;  // the largest response of a job that waits for its task's previous one
@@ -98,7 +98,7 @@ class Analysis {
     return beyond_ == Beyond::Allowed ? multiply(unit.period, groups::kMostInstances) : unit.limit;
   }
 
-  // Responses that rely on each other: the least that agree. Empty, or why there are none.
+  // Finds the least responses that agree with each other. Returns an empty text, or why there are none.
   std::string_view solve(std::size_t b, std::size_t &culprit) {
     const groups::Block &block = windows_.blocks()[b];
     for (std::size_t k = block.begin; k < block.end; ++k) windows_.start(k);
@@ -125,7 +125,7 @@ class Analysis {
     changed_ = true;
   }
 
-  // False: beyond what counts as bounded.
+  // Returns false if a response is beyond what counts as bounded.
   bool respond(std::size_t b, std::size_t k) {
     const GlobalUnit &unit = view_.units[k];
     if (unit.volume > multiply(unit.period, view_.workers)) return false;
@@ -138,7 +138,7 @@ class Analysis {
       if (!wait) return false;
       raise(windows_.of(t).wait, *wait);
     }
-    // A chain of one more instance begins where a task of it can be late for its next job.
+    // A chain with one more instance begins only if one of its tasks can be late for its next job.
     std::vector<bool> late(tasks.size(), true);
     for (std::uint32_t instances = 1;; ++instances) {
       std::vector<bool> late_again(tasks.size(), false);
@@ -170,7 +170,7 @@ class Analysis {
     return false;
   }
 
-  // Instances of one unit that are in progress together: does anything that the proof needs break?
+  // Returns why overlapping instances of the unit would break the proof; empty if they do not.
   std::string_view why_overlap_harms(std::size_t b, std::size_t k) {
     const GlobalUnit &unit = view_.units[k];
     if (longest_of(k) <= unit.limit) return {};
@@ -185,7 +185,7 @@ class Analysis {
     return {};
   }
 
-  // A max_active that one instance cannot reach, but several that overlap can: from now on it counts.
+  // True if overlapping instances can reach a max_active that one instance cannot. From then on the max_active counts.
   bool binds_now(std::size_t k) {
     GlobalUnit &unit = view_.units[k];
     const DagId dag = system_.units[unit.unit].dag;
@@ -200,7 +200,7 @@ class Analysis {
 
   [[nodiscard]] Duration longest_of(std::size_t k) const { return windows_.bound_of(last_of(k)).response; }
 
-  // Each job starts before the release that would skip it.
+  // True if each job starts before the release that would skip it.
   bool starts_in_time(std::size_t b, std::size_t k, std::uint32_t task) {
     const GlobalUnit &unit = view_.units[k];
     const Duration limit = system_.tasks[task].limit - unit.jitter;
@@ -213,7 +213,7 @@ class Analysis {
     return true;
   }
 
-  // A data task's response runs from its own release.
+  // True if a data task has its own bound from readiness; a data task's response runs from its own release.
   [[nodiscard]] bool answers_readiness(std::uint32_t t) const {
     return answers_[t].from_ready > 0 && answers_[t].from_ready < windows_.bound_of(t).response;
   }
@@ -222,7 +222,7 @@ class Analysis {
     if (beyond_ == Beyond::Never || !system_.tasks[t].data) return;
     const auto window =
         windows_.window_of(b, windows_.chain_of(b, k, {.task = t, .from_ready = true}), windows_.bound_of(t).response);
-    // What the machine takes in the window is part of the jitter of releases, and of nothing here.
+    // The jitter of releases contains what the machine takes in the window; a window from readiness does not.
     if (window && *window > answers_[t].repeated) answers_[t].from_ready = add(*window, system_.frozen);
   }
 
@@ -277,7 +277,7 @@ class Analysis {
   global::Units view_;
   groups::Windows windows_;
   std::vector<Answer> answers_;           // by TaskId
-  std::vector<std::uint32_t> instances_;  // by position: most on a chain
+  std::vector<std::uint32_t> instances_;  // by position: the most on a chain
   bool changed_ = false;                  // in this round
 };
 
@@ -294,7 +294,7 @@ Outcome apply_units(const System &system) { return apply(system, Beyond::Never);
 
 Outcome apply_groups(const System &system) {
   if (system.groups.empty()) return NotApplicable{"no exclusive group is shared: see the bounds without"};
-  // Who inherits can preempt once more than when it started: one worker has no charge for that.
+  // A job that inherits can preempt once more than when it started. On one worker no charge covers this.
   if (system.platform.preempt_overhead > 0 && system.platform.workers == 1) {
     return NotApplicable{"groups together with an overhead of preemption, on one worker"};
   }

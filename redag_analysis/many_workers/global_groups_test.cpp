@@ -20,7 +20,7 @@ BoundCaseLimits with_groups(bool edges) {
   limits.max_workers = 4;
   limits.edges = edges;
   limits.groups = true;
-  limits.caps = edges;  // those that cannot bind
+  limits.caps = edges;  // bounds that cannot bind
   limits.max_dags = edges ? 4 : 7;
   limits.max_tasks = 6;
   limits.jitter = limits.overheads = true;
@@ -52,7 +52,7 @@ TEST(BoundProperty, DagGroupsPreemptiveOfIndependentTasks) {
   expect_bound_holds(dag_groups(), cases(preempted(with_groups(false))), {.workloads = 2000});
 }
 
-// Few tasks on two workers, crowded: a holder that inherits is often in the way of somebody outside its group.
+// Few tasks crowded onto two workers: a holder that inherits often delays tasks outside its group.
 TEST(BoundProperty, DagGroupsPreemptiveCrowded) {
   BoundCaseLimits limits = preempted(with_groups(false));
   limits.min_workers = limits.max_workers = 2;
@@ -152,7 +152,7 @@ Bound bound_of(const Workload &workload, sched::Preemption preemption) {
   return std::get<Bound>(dag_groups().apply(compile(workload, platform).value()));
 }
 
-// The workers do not help, so the least urgent waits for both others in full.
+// More workers do not help a group: the least urgent task waits for both others in full.
 TEST(GlobalGroups, AGroupIsOneWorker) {
   for (const sched::Preemption preemption : {sched::Preemption::None, sched::Preemption::Full}) {
     const Bound bound = bound_of(three_of_a_group(), preemption);
@@ -171,7 +171,7 @@ TEST(GlobalGroups, AHolderThatInheritsIsInTheWayOfOthers) {
   dag.name = "between";
   dag.tasks.push_back(other);
   workload.dags.push_back(dag);
-  // By itself it waits for no group; the most urgent one and its holder of C - 1 take both workers.
+  // The task waits for no group. The most urgent task and its holder, of C - 1, take both workers.
   EXPECT_EQ(bound_of(workload, sched::Preemption::Full).tasks[2].response, 5 + (10 + 9) / 2);
   EXPECT_EQ(bound_of(workload, sched::Preemption::Full).tasks[0].response, 10 + 9);
   workload.dags[1].tasks[0].group.clear();
@@ -180,7 +180,7 @@ TEST(GlobalGroups, AHolderThatInheritsIsInTheWayOfOthers) {
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(dag_groups().apply(system)));
 }
 
-// The properties above do meet what they are about.
+// The properties above cover the cases that they are meant for.
 TEST(GlobalGroups, ResponsesAboveThePeriodAreBounded) {
   std::uint32_t beyond = 0;
   std::uint32_t binding = 0;

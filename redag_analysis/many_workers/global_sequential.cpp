@@ -15,8 +15,8 @@ namespace redag::analysis {
 namespace global {
 namespace {
 
-// A task's work in a window that starts when an instant with an idle worker ends: without a job from before, and with
-// one. A job from before has executed for at least a tick, unless jitter can hide its release.
+// A task's work in a window that starts when an instant with an idle worker ends, without an earlier job and with one.
+// An earlier job has executed for at least a tick, unless jitter can hide its release.
 struct Work {
   Duration fresh = 0;
   Duration carried = 0;
@@ -35,7 +35,7 @@ Work guan_work(const GlobalUnit &task, Duration x) {
   return Work{fresh, std::max({fresh, carried, wcet})};
 }
 
-// least_window() for the m - 1 tasks that carry in most at `d`.
+// least_window() if the m - 1 tasks with the largest carried work at `d` carry it in.
 Duration guan_window(std::span<GlobalUnit> more_urgent, Duration x, Duration d, std::uint32_t workers) {
   Effort::spend(more_urgent.size() + 1);
   const std::size_t carrying = workers - 1;
@@ -55,12 +55,12 @@ Duration guan_window(std::span<GlobalUnit> more_urgent, Duration x, Duration d, 
   Duration sum = 0;
   for (const GlobalUnit &other : more_urgent) {
     sum += other.work;
-    if (other.work >= d) largest.offer(other.work);  // no window below d comes of this: less work is never cut
+    if (other.work >= d) largest.offer(other.work);  // smaller work is never cut: the result is at least d
   }
   return least_window(sum, largest.entries(), workers);
 }
 
-// least_window() if no task carried work in: not above guan_window(), and cheaper.
+// least_window() if no task carries work in: not above guan_window(), and cheaper.
 Duration fresh_window(std::span<const GlobalUnit> more_urgent, Duration x, Duration d, std::uint32_t workers) {
   Effort::spend(more_urgent.size() + 1);
   Largest largest(workers - 1);
@@ -74,7 +74,7 @@ Duration fresh_window(std::span<const GlobalUnit> more_urgent, Duration x, Durat
   return least_window(sum, largest.entries(), workers);
 }
 
-// least_window() with sequential_work() of all but `skip`, and `rest`.
+// least_window() with `rest` and the sequential_work() of all units but `skip`.
 Duration carrying_window(std::span<GlobalUnit> others, std::size_t skip, Duration x, Duration d, Duration rest,
                          std::uint32_t workers) {
   Effort::spend(others.size() + 1);
@@ -91,7 +91,7 @@ Duration carrying_window(std::span<GlobalUnit> others, std::size_t skip, Duratio
 
 constexpr std::size_t kNobody = SIZE_MAX;
 
-// Each other executes for min(C, d) at least in a window of d and more.
+// The length from which to search: each other executes for at least min(C, d) in a window of d or more.
 Duration first_window(std::span<const GlobalUnit> others, std::size_t skip, Duration rest, std::uint32_t workers) {
   FirstWindow first(workers, rest);
   for (std::size_t i = 0; i < others.size(); ++i) {
@@ -165,7 +165,7 @@ namespace {
 using global::GlobalUnit;
 using global::SharedTerms;
 
-// Interference terms of one fixed point, whose last step left the work of each more urgent task in `work`.
+// Lists the interference terms of one fixed point, whose last step left the work of each more urgent task in `work`.
 ResponseBound itemise(const System &system, std::span<const GlobalUnit> units, std::size_t k, std::uint32_t workers,
                       Duration remaining) {
   const GlobalUnit &own = units[k];
@@ -190,8 +190,8 @@ ResponseBound itemise(const System &system, std::span<const GlobalUnit> units, s
   return bound;
 }
 
-// `respond(units, k, alone, remaining)` says whether units[k] has a response; `remaining` is its less urgent work, 0 by
-// default.
+// `respond(units, k, alone, remaining)` says whether units[k] has a response, and may set `remaining`, its less urgent
+// work (0 by default).
 template <class Respond>
 Outcome from_most_urgent(const System &system, const global::Needs &needs, Respond respond) {
   global::Units view = global::units_of(system, needs);
@@ -211,7 +211,8 @@ Outcome apply_bertogna_cirinei(const System &system) {
       });
 }
 
-// An earlier job of the task itself can keep a worker from its equals, so that more of them carry work in: no equals.
+// An earlier job of the task itself can keep a worker from its equals, and more of them then carry work in. Therefore
+// guan() takes no equals.
 Outcome apply_guan(const System &system) {
   return from_most_urgent(system, {.edges = false}, [](global::Units &view, std::size_t k, bool, Duration &) {
     return global::guan_response(view.units, k, view.workers, global::start_after(view.units, k));
@@ -245,8 +246,9 @@ Outcome apply_any(const System &system) {
   const auto mode = system.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
   global::Units view = global::units_of(system, {.mode = mode, .edges = false, .any_policy = true});
   if (view.reason) return NotApplicable{*view.reason};
-  // As if every task kept its limit. If the first round confirms that for all, it is so, and each further round may
-  // rely on what the last one found: the first job ever to break a bound would have to come after another such job.
+  // At first every task is assumed to keep its limit. If the first round confirms this for all, it holds, and each
+  // further round may rely on the last one. The first job ever to break a bound would have to come after another such
+  // job.
   for (GlobalUnit &unit : view.units) unit.response = unit.limit;
   constexpr int kRounds = 50;
   bool possible = !global::is_any_hopeless(view.units, view.workers);

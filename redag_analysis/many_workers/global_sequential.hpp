@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Response times of independent tasks under global scheduling on m workers: three fixed points and their methods.
+// Response times of independent tasks under global scheduling on m workers: the fixed points and their methods.
 // Responses must stay within the period. Pure functions; the fixed points allocate nothing.
 #pragma once
 
@@ -14,30 +14,29 @@ namespace redag::analysis {
 
 namespace global {
 
-/// Work of a sequential task in any window of length x when each job executes within `response` of its release:
-/// N C + min(C, x + R - C - N T), N = floor((x + R - C) / T), and never more than x. Bertogna, Cirinei, RTSS 2007,
-/// eq. 4.
+/// The work of a sequential task in any window of length x if each job executes within `response` of its release: N C +
+/// min(C, x + R - C - N T), N = floor((x + R - C) / T), and never more than x. Bertogna, Cirinei, RTSS 2007, eq. 4.
 [[nodiscard]] inline Duration sequential_work(const GlobalUnit &task, Duration x) {
   const Division jobs = divide(std::max<Duration>(0, x + task.response - task.volume), task);
   return jobs.quotient * task.volume + std::min(task.volume, jobs.remainder);
 }
 
-/// Where the two bounds for full preemption may begin for units[k] if the same one gave the responses of all before it:
-/// what delays a more urgent task delays this one, too, and in a window that is not shorter if that one's wcet is not
-/// longer.
+/// Where the two bounds for full preemption may begin for units[k], if the same bound gave the responses of all units
+/// before it. What delays a more urgent task also delays this one. The window is no shorter if the other task's wcet is
+/// no longer.
 [[nodiscard]] Duration start_after(std::span<const GlobalUnit> units, std::size_t k);
 
-/// Each fills in `response` of units[k] given those of the more urgent ones, units[0 .. k). False: above its limit, or
-/// `steps` ran out. `start`: below which there is no fixed point.
+/// Each of these sets `response` of units[k], given those of the more urgent units[0 .. k). Returns false above its
+/// limit, or after too many steps. Below `start` there is no fixed point.
 [[nodiscard]] bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
                                              Duration start = 0);
 [[nodiscard]] bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration start = 0);
-/// `remaining`: sum of the m largest C - 1 of less urgent tasks.
+/// `remaining` is the sum of the m largest C - 1 of less urgent tasks.
 [[nodiscard]] bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
                                                      Duration remaining, Duration start = 0);
-/// Where the next fixed point may begin that others with larger responses give units[k]: at the last one.
+/// Where the next fixed point of the unit may begin when others have larger responses: at its last one.
 [[nodiscard]] Duration start_again(const GlobalUnit &unit);
-/// Lowers `response` of units[k] given those of all others, in any work-conserving order.
+/// Lowers `response` of units[k], given those of all others, for any work-conserving order.
 [[nodiscard]] bool any_order_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers);
 
 }  // namespace global

@@ -51,7 +51,7 @@ TEST(BoundProperty, Guan) {
   expect_bound_holds(guan(), cases(several_workers(sched::Preemption::Full)), {.workloads = 2000});
 }
 
-// Few long tasks on two workers, looked at from many offsets: where a task that carries work in matters.
+// Few long tasks on two workers, simulated from many offsets, where a task that carries work in matters.
 TEST(BoundProperty, GuanWithCarriedWork) {
   BoundCaseLimits limits;
   limits.min_workers = limits.max_workers = 2;
@@ -105,15 +105,15 @@ std::vector<std::optional<Duration>> responses(const Method &method, const Syste
   return result;
 }
 
-// Two tasks in phase leave both workers idle for 2 of 4 ticks, and the third can use only one of them: 7 takes
-// until 15. (That a longer T_1 can hurt: B. Andersson, J. Jonsson, 2000.)
+// Two tasks in phase leave both workers idle for 2 of 4 ticks, and the third can use only one of them: its 7 take until
+// 15. (A longer T_1 can hurt: B. Andersson, J. Jonsson, 2000.)
 TEST(GlobalSequential, TasksInPhaseWasteWorkers) {
   const System system = compiled(independent(2, {{2, 4}, {2, 4}, {7, 100}}), sched::Preemption::Full);
   for (const Method &method : {guan(), bertogna_cirinei()}) EXPECT_GE(responses(method, system)[2].value(), 15);
 }
 
-// What a job from before carries in is all of it but a tick: with less the last response would be 8. Worked out apart
-// from this code, from the formula of the paper.
+// An earlier job carries in all of its work but a tick; with less the last response would be 8. The values were
+// computed from the paper's formula, without this code.
 TEST(GlobalSequential, WhatIsCarriedInIsCutByOneTickOnly) {
   const System system = compiled(independent(2, {{2, 3}, {1, 3}, {4, 6}, {1, 9}}), sched::Preemption::Full);
   EXPECT_EQ(responses(guan(), system), (std::vector<std::optional<Duration>>{2, 1, 6, 9}));
@@ -130,15 +130,15 @@ TEST(GlobalSequential, TheMostUrgentOfEachWorkerNeverWait) {
   }
 }
 
-// Two of one priority on two workers, beside a more urgent one: each can wait for the other, and for no less urgent
-// one. Guan's argument needs that the others preempt the task itself.
+// Two equals on two workers, below a more urgent task: each can wait for the other, and for no less urgent task. Guan's
+// argument needs that the others preempt the task itself.
 TEST(GlobalSequential, EqualsRelyOnEachOther) {
   Workload workload = independent(2, {{2, 10}, {3, 20}, {4, 20}, {5, 40}});
   workload.dags[2].tasks[0].priority = workload.dags[1].tasks[0].priority;
   const System shared = compiled(workload, sched::Preemption::Full);
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(guan().apply(shared)));
   const auto found = responses(bertogna_cirinei(), shared);
-  // As if each were the last of the two in a fixed order.
+  // The reference: each of the two is last in a fixed order.
   std::swap(workload.dags[1].tasks[0].wcet, workload.dags[2].tasks[0].wcet);
   std::swap(workload.dags[1].tasks[0].bcet, workload.dags[2].tasks[0].bcet);
   workload.ties = Ties::Fixed;
@@ -149,7 +149,7 @@ TEST(GlobalSequential, EqualsRelyOnEachOther) {
   const System none = compiled(workload, sched::Preemption::None);
   EXPECT_TRUE(responses(sequential_nonpreemptive(), none)[3]);
 
-  // None for one of them is none for either.
+  // If one of them has no bound, neither has the other.
   workload = independent(2, {{6, 10}, {6, 10}, {9, 10}});
   for (Dag &dag : workload.dags) dag.tasks[0].priority = 0;
   for (const auto &response : responses(bertogna_cirinei(), compiled(workload, sched::Preemption::Full))) {
@@ -157,11 +157,11 @@ TEST(GlobalSequential, EqualsRelyOnEachOther) {
   }
 }
 
-// Without preemption even the most urgent wait for a job that has just started: m = 2, (1, 10), 2 x (20, 200).
+// Without preemption even the most urgent tasks wait for a job that has just started: m = 2, (1, 10), 2 x (20, 200).
 TEST(GlobalSequential, NonpreemptiveBlockingReachesTheMostUrgent) {
   const System system = compiled(independent(2, {{1, 100}, {20, 200}, {20, 200}}), sched::Preemption::None);
   const auto found = responses(sequential_nonpreemptive(), system);
-  EXPECT_EQ(found[0], 20);  // 19 left of either, then its own 1
+  EXPECT_EQ(found[0], 20);  // either has 19 left, then its own 1
   const System short_period = compiled(independent(2, {{1, 10}, {20, 200}, {20, 200}}), sched::Preemption::None);
   EXPECT_FALSE(responses(sequential_nonpreemptive(), short_period)[0]);
 }
@@ -198,7 +198,7 @@ TEST(GlobalSequential, GuanIsNeverAboveBertognaCirinei) {
   EXPECT_GT(smaller, 100U);
 }
 
-// Fixed points that begin at a more urgent task's are the least ones all the same.
+// Fixed points that begin at a more urgent task's are still the least ones.
 TEST(GlobalSequential, WhereTheWindowsBeginDoesNotShow) {
   using Respond = bool (*)(std::span<global::GlobalUnit>, std::size_t, std::uint32_t, Duration);
   std::uint64_t later = 0;

@@ -18,8 +18,8 @@ using global::GlobalUnit;
 
 constexpr std::size_t kMostPrecise = 64;  // tasks of a unit; with more, all own work off the chain counts
 
-// Work in any window of length x of something that does `volume` every `period`, at most `width` at a time, and ends
-// within `response`: the first instance as late as it can, the others as early.
+// The work in any window of length x of something that does `volume` every `period`, at most `width` at a time, and
+// ends within `response`. The first instance executes as late as it can, the others as early.
 Duration most_work(Duration volume, Duration period, Duration response, Duration width, Duration x) {
   if (volume == 0) return 0;
   const Duration ends = std::max(response, ceil_div(volume, width));
@@ -106,8 +106,8 @@ Windows::Windows(const System &system, std::vector<GlobalUnit> &units)
   }
 }
 
-// An own task that is less urgent than all of the chain does not keep it waiting, unless it holds a group: not without
-// preemption, nor where it has a place of their max_active.
+// True if an own task that is less urgent than all of the chain does not keep the chain waiting, unless it holds a
+// group. Without preemption, or with a place of the unit's max_active, it can.
 bool Windows::obeys_levels(std::size_t unit) const {
   return preempts_ && is_static(system_.policy) && units_[unit].bound == 0;
 }
@@ -126,7 +126,7 @@ void Windows::start(std::size_t unit) {
   }
 }
 
-// ---- what can delay a chain, whatever the window is ----
+// ---- what can delay a chain, for any window ----
 
 // The least urgent level on the chain: own tasks below it go first only as holders that inherit.
 std::uint32_t Windows::threshold(std::size_t unit, const Question &question) const {
@@ -188,7 +188,7 @@ void Windows::add_own(std::size_t unit, std::uint32_t threshold, Chain &chain) c
   if (question.first_tick) chain.own -= system_.tasks[question.task].wcet - 1;
 }
 
-// Where a job of a chain could start, the earlier jobs of its task have ended: these are in the way of others only.
+// True if the earlier jobs of the task have ended where a job of the chain could start; they then delay only others.
 bool Windows::is_earlier_done(std::size_t unit, const Question &question, std::uint32_t task) const {
   const bool is_self = task == question.task;
   if (question.from_ready) return is_self || follows(unit, task, question.task);
@@ -200,7 +200,7 @@ bool Windows::is_earlier_done(std::size_t unit, const Question &question, std::u
   });
 }
 
-// Whether the task's job can execute while one of the same instance that is on a chain to the question's waits.
+// True if the task's job can execute while a job of the same instance waits that is on a chain to the question's.
 bool Windows::is_beside(std::size_t unit, const Question &question, std::uint32_t task) const {
   const auto keeps = [&](std::uint32_t other) {
     if (other == task || follows(unit, other, task) || follows(unit, task, other)) return false;
@@ -218,8 +218,8 @@ void Windows::take_longer(std::uint32_t task, std::optional<std::uint32_t> &long
   if (!longest || system_.tasks[task].wcet > system_.tasks[*longest].wcet) longest = task;
 }
 
-// The path to the task that makes the window longest: what executes beside other paths counts less off it. And the
-// longest path with its longest job repeated for each further instance.
+// Computes the path to the task that makes the window longest; work that could execute beside other paths counts less
+// on the path. Also computes the longest path with its longest job repeated for each further instance.
 void Windows::add_length(std::size_t unit, Chain &chain) const {
   const Question &question = chain.question;
   const SystemTask &last = system_.tasks[question.task];
@@ -228,15 +228,15 @@ void Windows::add_length(std::size_t unit, Chain &chain) const {
   chain.overhead = last.overhead;
   chain.length = chain.longest = multiply(question.instances, last.wcet);
   const bool is_alone = question.from_ready || reachable_[unit].empty();
-  // Several instances, or a max_active: anything off the chain can be beside it.
+  // With several instances, or a max_active, anything off the chain can execute beside it.
   const bool is_precise = question.instances == 1 && units_[unit].bound == 0 && tasks.size() <= kMostPrecise;
   if (!is_alone) {
     struct Path {
       Duration length = 0;
       Duration overhead = 0;
-      Duration longest = 0;   // whatever is beside it
-      Duration repeated = 0;  // that, and its longest job for each further instance
-      Duration beside = 0;    // work of its tasks that would count, by its share, off it
+      Duration longest = 0;   // regardless of what is beside it
+      Duration repeated = 0;  // the same, with its longest job repeated for each further instance
+      Duration beside = 0;    // work of its tasks that would count, by its share, if they were off the path
     };
     const auto m = static_cast<Duration>(system_.platform.workers);
     std::vector<Path> paths(tasks.size());
@@ -291,7 +291,7 @@ Chain Windows::chain_of(std::size_t block, std::size_t unit, const Question &que
     if (group.waiters.empty()) continue;
     group.found = static_cast<Duration>(group.waiters.size());
     group.own_waiting -= std::min(group.own_waiting, group.found);
-    // Each end of an own job can let one in that waited for the max_active, while another took the group.
+    // Each end of an own job can admit one that waited for the max_active, while another took the group.
     if (units_[unit].bound > 0) group.found += chain.own_jobs;
     chain.holders = add(chain.holders, multiply(group.found, group.held));
     if (group.own_tasks == 1) continue;
@@ -303,7 +303,7 @@ Chain Windows::chain_of(std::size_t block, std::size_t unit, const Question &que
   return chain;
 }
 
-// ---- what delays it in a window ----
+// ---- what delays the chain in a window ----
 
 Duration Windows::work(std::size_t unit, Duration x) const {
   const GlobalUnit &other = units_[unit];
@@ -328,12 +328,13 @@ Duration Windows::jobs_in_progress(const Part &part, Duration x) const {
   const auto in_window = [&](std::uint32_t t) { return ceil_div(x + bounds_[t].response, unit.period); };
   for (const std::uint32_t t : part.tasks) jobs += in_window(t);
   if (unit.bound == 0) return jobs;
-  // Those that find a holder, once when they come and once for each end that gives a place of the max_active.
+  // Adds the jobs that find a holder: once when they arrive, and once for each end that gives a place of the
+  // max_active.
   for (const std::uint32_t t : system_.units[unit.unit].tasks) jobs += in_window(t);
   return jobs;
 }
 
-// Two ways to bound own work, by what can be beside the chain and by all there is; the smaller counts.
+// Bounds own work in two ways, by what can execute beside the chain and by all there is; the smaller counts.
 void Windows::share_own(const Chain &chain, Duration together) {
   const Duration all = std::min(add(chain.longest, chain.own_serial), chain.own);
   const Duration rest = chain.own - all;
@@ -363,7 +364,7 @@ Duration Windows::evaluate(std::size_t block, const Chain &chain, Duration x) {
       if (group.held > 0 || !preempts_) waiting += jobs_in_progress(part, x);
       if (!is_waited_for) continue;
       Duration serial = serial_work(part, x);
-      // No more than while its jobs wait for the group: unless that is the question.
+      // At most what fits while its jobs wait for the group, except where that wait is itself the question.
       if (preempts_ && !(chain.question.from_ready && chain.question.first_tick)) {
         Duration sum = 0;
         Duration most = 0;
@@ -396,8 +397,8 @@ Duration Windows::evaluate(std::size_t block, const Chain &chain, Duration x) {
   return add(serial, saturate(others / (Int128{m} * together)));
 }
 
-// Not above the least window that holds, so that steps of a nanosecond are few: each of the others does at least
-// min(volume, x), and at least one job in each group that the chain waits for.
+// Returns a start at or below the least window that holds, which avoids steps of a nanosecond. Each of the others does
+// at least min(volume, x), and at least one job in each group that the chain waits for.
 Duration Windows::least_window(std::size_t block, const Chain &chain) {
   const std::size_t end = blocks_[block].end;
   const Duration m = system_.platform.workers;

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// How long a job whose task shares exclusive groups can take: the window from its release, or from its readiness, to
-// its end or its first tick of execution, given the responses of all that can go first. docs/analysis.md, "Exclusive
-// groups", has the proof. Values and pure functions; not thread-safe (scratch).
+// How long a job whose task shares exclusive groups can take, given the responses of all that can go first. The window
+// runs from its release or its readiness to its end or its first tick of execution. Proof: docs/analysis.md, "Exclusive
+// groups". Values and pure functions; not thread-safe (scratch).
 #pragma once
 
 #include <cstdint>
@@ -18,43 +18,44 @@ namespace redag::analysis::groups {
 /// More instances of a unit in one window, or a longer response in periods, count as no bound.
 inline constexpr std::uint32_t kMostInstances = 16;
 
-/// Units that share a priority level, or whose priorities are interleaved, rely on each other: any of them can go
+/// Units that share a priority level, or whose priorities are interleaved. They rely on each other: any of them can go
 /// first.
 struct Block {
   std::size_t begin = 0;  // positions in global::Units::units
   std::size_t end = 0;
 };
 
-/// In order of priority; one block of all units where priorities are not static.
+/// Returns the blocks in order of priority; a single block of all units if priorities are not static.
 [[nodiscard]] std::vector<Block> blocks_of(const System &system, const std::vector<global::GlobalUnit> &units);
 
 /// What is known of a task.
 struct TaskBound {
   Duration response = 0;  // from its unit's nominal release to its end
-  Duration wait = 0;      // from when a job of it could start to its first tick, that included
+  Duration wait = 0;      // from when a job of it could start to its first tick, inclusive
 };
 
 /// One question: when does a job of `task` end?
 struct Question {
   std::uint32_t task = 0;
-  std::uint32_t instances = 1;  // of the unit on the chain: one more than times a job waits for its task's previous one
-  bool from_ready = false;      // instead of from the release of the chain's first job
-  bool first_tick = false;      // instead of to its end
-  Duration until = 0;           // no later than this after its release is asked for; 0: its response
+  std::uint32_t instances = 1;  // of the unit on the chain; one more than the times that a job waits for its task's
+                                // previous one
+  bool from_ready = false;      // count from readiness, not from the release of the chain's first job
+  bool first_tick = false;      // count to the first tick, not to the end
+  Duration until = 0;           // the latest instant after its release that matters; 0: its response
 };
 
-/// The chain that answers it, and what can delay the chain whatever the window is.
+/// The chain that answers a question, and what can delay the chain in any window.
 struct Chain {
   struct Group {
     std::uint32_t group = 0;
     std::vector<std::uint32_t> waiters = {};             // tasks of the chain: each can find one less urgent holder
     Duration found = 0;                                  // less urgent holders that the chain finds
     Duration own_waiting = 0;                            // further own jobs that can find one
-    std::uint32_t own_tasks = 0;                         // that go first
-    Duration own_work = 0;                               // of those, in the window
+    std::uint32_t own_tasks = 0;                         // own tasks that go first
+    Duration own_work = 0;                               // their work in the window
     std::optional<std::uint32_t> holder = std::nullopt;  // the longest less urgent member
     Duration held = 0;                                   // what is left of it once it has started
-    Duration below = 0;                                  // the same, if it is of a less urgent unit
+    Duration below = 0;                                  // the same, if it belongs to a less urgent unit
     Duration own_holding = 0;                            // work of own less urgent members in the window
   };
   Question question;
@@ -62,22 +63,22 @@ struct Chain {
   Duration path = 0;          // the longest path of one instance
   Duration overhead = 0;      // the platform's part of it
   Duration length = 0;        // the chain: that path, and a repeated task for each further instance
-  Duration own_jobs = 0;      // that are in progress in the window
-  Duration longest = 0;       // at most this long, if all other own work counts
-  Duration own = 0;           // all own work that can execute in the window, the chain's included
-  Duration beside = 0;        // of that, what can execute while the chain waits for workers
-  Duration own_serial = 0;    // of that, what the chain can wait for in groups
+  Duration own_jobs = 0;      // own jobs in progress in the window
+  Duration longest = 0;       // the chain's longest length if all other own work counts
+  Duration own = 0;           // all own work that can execute in the window, including the chain's
+  Duration beside = 0;        // the part of `own` that can execute while the chain waits for workers
+  Duration own_serial = 0;    // the part of `own` that the chain can wait for in groups
   Duration holders = 0;       // less urgent jobs that the chain waits for
   std::vector<Group> groups;  // those with a waiter, or with a less urgent member
 };
 
-/// Where the time of a window goes; `shared` sums are still to be divided by the workers.
+/// How the time of a window is spent; `shared` sums are still to be divided by the workers.
 struct Shares {
   Duration executes = 0;  // the chain, and own jobs that it waits for
   Duration own_shared = 0;
   std::vector<Duration> serial;  // by position of the more urgent unit
   std::vector<Duration> shared;
-  Duration less_urgent = 0;  // jobs that inherited, or that were started and run to completion; shared
+  Duration less_urgent = 0;  // jobs that inherited, or that had started and run to completion; shared
 };
 
 class Windows {
@@ -87,17 +88,17 @@ class Windows {
   [[nodiscard]] const std::vector<Block> &blocks() const { return blocks_; }
   [[nodiscard]] TaskBound &of(std::uint32_t task) { return bounds_[task]; }
   [[nodiscard]] const TaskBound &bound_of(std::uint32_t task) const { return bounds_[task]; }
-  /// Bounds to begin with, below all that agree.
+  /// Sets bounds to begin with, at or below all that agree.
   void start(std::size_t unit);
   [[nodiscard]] bool follows(std::size_t unit, std::uint32_t before, std::uint32_t after) const;
 
   [[nodiscard]] Chain chain_of(std::size_t block, std::size_t unit, const Question &question) const;
-  /// The least window that holds, or nothing above `stop`. Leaves its shares in shares().
+  /// Returns the least window that holds, or nothing if it is above `stop`. Leaves its shares in shares().
   [[nodiscard]] std::optional<Duration> window_of(std::size_t block, const Chain &chain, Duration stop);
   [[nodiscard]] const Shares &shares() const { return shares_; }
 
  private:
-  // What a unit's tasks do in a group.
+  // The tasks of a unit that are members of one group.
   struct Part {
     std::size_t unit = 0;
     Duration volume = 0;
@@ -124,11 +125,14 @@ class Windows {
   std::vector<Block> blocks_;
   bool preempts_;
   std::vector<TaskBound> bounds_;                                         // by TaskId
-  std::vector<std::vector<std::vector<bool>>> reachable_;                 // by position: place in Unit::tasks, twice
+  std::vector<std::vector<std::vector<bool>>> reachable_;                 // by position: from and to places in
+                                                                          // Unit::tasks
   std::vector<std::uint32_t> place_;                                      // by TaskId
   std::vector<std::vector<Part>> parts_;                                  // by group, in order of position
-  std::vector<std::vector<std::optional<std::uint32_t>>> longest_below_;  // by block, then group: less urgent member
-  std::vector<Duration> first_blocking_;                                  // by block: to run to completion
+  std::vector<std::vector<std::optional<std::uint32_t>>> longest_below_;  // by block, then group: the longest less
+                                                                          // urgent member
+  std::vector<Duration> first_blocking_;                                  // by block: first blocking by jobs that run
+                                                                          // to completion
   std::vector<Duration> later_blocking_;
   Shares shares_;
   std::vector<Duration> volumes_;  // scratch of least_window()

@@ -15,7 +15,7 @@
 
 namespace redag::analysis::global {
 
-// The `kept` largest of the values offered, with what they belong to; a few workers need a few.
+// Keeps the `kept` largest of the values offered, with their owners.
 class Largest {
  public:
   explicit Largest(std::size_t kept) : kept_(std::min(kept, kMost)) { std::fill_n(entries_.begin(), kept_, Entry{}); }
@@ -37,12 +37,12 @@ class Largest {
 
  private:
   std::size_t kept_;
-  std::array<Entry, kMost> entries_;  // of which kept_ have values: to clear all of them takes longer than a bound
+  std::array<Entry, kMost> entries_;  // only kept_ are set: clearing all of them would take longer than a bound
 };
 
-// Least d with sum_i min(w_i, d) + rest < m d, where `all` is the sum of the w_i and rest, and `largest` holds the m -
-// 1 largest w_i. The j largest count for d each: d = floor((all - their sum) / (m - j)) + 1 for the j that makes it
-// least. (With fewer than m - 1 values kept d can be larger than the least one; it keeps the inequality.)
+// Returns the least d with sum_i min(w_i, d) + rest < m d, where `all` is the sum of the w_i and rest, and `largest`
+// holds the m - 1 largest w_i. The j largest count for d each: d = floor((all - their sum) / (m - j)) + 1 for the j
+// that makes it least. (With fewer than m - 1 values kept, d can exceed the least one; the inequality still holds.)
 [[nodiscard]] inline Duration least_window(Duration all, std::span<const Largest::Entry> largest,
                                            std::uint32_t workers) {
   auto share = static_cast<Duration>(workers);
@@ -56,12 +56,13 @@ class Largest {
   return least;
 }
 
-// The least d with sum_i min(W_i(d), d) + rest < m d is sought by steps of least_window() (fixed_point.hpp): work grows
-// with the window, so no d that one of them skips can do. That a job waits in d instants would take m d of work, so it
-// waits in less. Plain iteration instead creeps, a nanosecond a step, while m tasks interfere in every instant.
+// Bounds the search for the least d with sum_i min(W_i(d), d) + rest < m d, which takes steps of least_window()
+// (fixed_point.hpp). Work grows with the window, and no skipped d can satisfy the inequality. A job that waits in d
+// instants would need m d of work, and therefore waits in less. Plain iteration would advance by a nanosecond a step
+// while m tasks interfere in every instant.
 //
-// This says where to begin if each of the others does at least min(least_i, d) in the window: no smaller d does. From 1
-// on, where work grows as fast as the window, one step a nanosecond would be all that as many others as workers allow.
+// FirstWindow gives the start if each of the others does at least min(least_i, d) in the window: no smaller d can do. A
+// search from 1 could advance by a nanosecond a step, because work grows as fast as the window there.
 class FirstWindow {
  public:
   FirstWindow(std::uint32_t workers, Duration rest) : workers_(workers), sum_(rest), largest_(workers - 1) {}

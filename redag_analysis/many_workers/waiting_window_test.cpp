@@ -13,7 +13,7 @@
 namespace redag::analysis::global {
 namespace {
 
-// Looked for instant by instant: the least d with sum_i min(least_i, d) + rest < m d.
+// Searches instant by instant for the least d with sum_i min(least_i, d) + rest < m d.
 Duration first_window(const std::vector<Duration> &least, Duration rest, std::uint32_t workers) {
   for (Duration d = 1;; ++d) {
     Duration sum = rest;
