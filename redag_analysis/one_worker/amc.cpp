@@ -19,8 +19,8 @@ using one_worker::View;
 
 constexpr std::string_view kOnlyInLowMode = "HI mode degrades it: bounded in LO mode only";
 
-// HI mode can end between the releases of one instance, of which the first were skipped: jobs that wait for these are
-// then late, or skipped, in LO mode.
+// True if HI mode can end between the releases of one instance whose first jobs were skipped. The jobs that wait for
+// those are then late, or skipped, in LO mode.
 bool can_be_torn(const System &system) {
   return std::any_of(system.units.begin(), system.units.end(), [&](const Unit &unit) {
     return unit.tasks.size() > 1 && unit.jitter > 0 && !system.dags[unit.dag.value].high;
@@ -43,7 +43,7 @@ std::optional<std::string> why_not(const System &system) {
   return std::nullopt;
 }
 
-// What a unit executes for in LO mode.
+// The time that a unit executes in LO mode.
 Duration low_volume(const System &system, const Unit &unit) {
   Duration sum = 0;
   for (const std::uint32_t t : unit.tasks) sum = add(sum, system.tasks[t].wcet_low);
@@ -55,7 +55,7 @@ Own own_of(const Unit &unit, Duration volume, Duration blocking) {
   return Own{volume, unit.period, unit.jitter, std::min(unit.limit, unit.period), blocking, 0};
 }
 
-// Who is more urgent than a unit, in each mode.
+// The units that are more urgent than a unit, in each mode.
 struct Others {
   std::vector<Interferer> low;       // all of them, with C(LO)
   std::vector<Interferer> high;      // those of high criticality, with C(HI)
@@ -74,7 +74,7 @@ Others others_of(const System &system, const std::vector<std::uint32_t> &more_ur
   return others;
 }
 
-// Terms of the bound across the change: lower criticality interferes only until HI mode begins.
+// Lists the terms of the bound across the change. Lower criticality interferes only until HI mode begins.
 std::vector<Term> terms_of(const System &system, const Unit &unit, const View &view, const Others &others,
                            Duration low_window, Duration window) {
   const TaskId self = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
@@ -94,8 +94,8 @@ std::vector<Term> terms_of(const System &system, const Unit &unit, const View &v
   return terms;
 }
 
-// HI mode begins at most R(LO) after the start of a busy period in which the unit has a job: in LO mode that would have
-// ended by then. So from lower criticality there are the releases of R(LO), and no more.
+// HI mode begins at most R(LO) after the start of a busy period in which the unit has a job; in LO mode the period
+// would be over by then. Lower criticality thus contributes only the releases within R(LO).
 void bound_unit(const System &system, one_worker::Views &views, std::uint32_t u, ResponseBound &bound,
                 ModeResponses &modes) {
   const Unit &unit = system.units[u];

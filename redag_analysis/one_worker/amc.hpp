@@ -10,8 +10,8 @@
 namespace redag::analysis {
 
 /// S. Baruah, A. Burns, R. Davis, Response-time analysis for mixed criticality systems, RTSS 2011, section IV.A. Tasks
-/// of high criticality get a response that holds for every job; the others only Bound::modes' `low`, for jobs that end
-/// in LO mode. Requires executions of at most wcet, or an `abort` budget that sees to it.
+/// of high criticality get a response that holds for every job. The others get only `low` of Bound::modes, for jobs
+/// that end in LO mode. Requires executions of at most wcet, or an `abort` budget that enforces this.
 [[nodiscard]] Method amc_rtb();
 
 }  // namespace redag::analysis

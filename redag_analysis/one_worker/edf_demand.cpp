@@ -14,12 +14,12 @@ namespace {
 
 constexpr int kMaxSteps = 1'000'000;
 
-// As the demand sees a task: its deadline counts from its release as seen, which jitter delays.
+// A task as the demand sees it. Its deadline counts from its release as seen, which jitter delays.
 struct Demand {
   Duration wcet = 0;
   Duration period = 0;
   Duration deadline = 0;  // D - J
-  Duration blocking = 0;  // its longest stretch without a preemption point, less one
+  Duration blocking = 0;  // its longest stretch without a preemption point, minus one
   Duration nominal_deadline = 0;
 };
 
@@ -64,7 +64,7 @@ Duration demand_until(const std::vector<Demand> &demands, Duration t) {
   return saturate(sum);
 }
 
-// Length of the longest busy period, blocking included; nothing where the steps run out. T + J: releases as seen.
+// The length of the longest busy period, blocking included; empty if the steps run out. T + J: releases as seen.
 std::optional<Duration> busy_period(const std::vector<Demand> &demands, Duration blocking) {
   Duration length = 1;
   for (int step = 0; step < kMaxSteps && length < kUnbounded; ++step) {
@@ -112,7 +112,7 @@ Bound accept() {
   return bound;
 }
 
-// QPA: from the end of the busy period backwards, as far as the demand itself reaches.
+// QPA: steps backwards from the end of the busy period, each time as far as the demand itself reaches.
 Outcome apply_preemptive(const System &system) {
   if (auto reason = why_not(system)) return NotApplicable{*reason};
   if (system.mode != sched::Preemption::Full) return NotApplicable{"for full preemption"};
@@ -124,7 +124,7 @@ Outcome apply_preemptive(const System &system) {
     if (step == kMaxSteps) return NotApplicable{"gave up: too many intervals to examine"};
     const Duration demand = demand_until(demands, t);
     if (demand > t) return refuse(t, demand);
-    // Between the demand and t nothing can be missed; at equality the next deadline decides.
+    // Between the demand and t no deadline can be missed; at equality the next deadline decides.
     t = deadline_below(demands, demand < t ? demand + 1 : t);
   }
   return accept();
@@ -138,7 +138,7 @@ Outcome apply_nonpreemptive(const System &system) {
   for (const Demand &task : demands) longest = std::max(longest, task.blocking);
   const auto length = busy_period(demands, longest);
   if (!length) return refuse_overload();
-  // Blocking falls with t, so that the demand cannot be followed backwards: every deadline is examined.
+  // Blocking falls with t. The demand can therefore not be followed backwards, and every deadline is examined.
   int step = 0;
   for (Duration t = deadline_below(demands, add(*length, 1)); t > 0; t = deadline_below(demands, t)) {
     if (++step > kMaxSteps) return NotApplicable{"gave up: too many intervals to examine"};

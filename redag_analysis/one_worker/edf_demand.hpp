@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Processor demand on one worker under EDF: every interval [0, t] must hold the work that is released and due in it,
-// h(t) = sum max(0, floor((t + J_i - D_i) / T_i) + 1) C_i <= t. Preemptive jobs are tested by QPA; jobs that keep the
-// worker (or reach a preemption point late) block once: h(t) + max_{D_l > t} (region_l - 1) <= t.
+// Processor demand on one worker under EDF. Every interval [0, t] must hold the work that is released and due in it:
+// h(t) = sum max(0, floor((t + J_i - D_i) / T_i) + 1) C_i <= t. Preemptive jobs are tested by QPA. A job that keeps the
+// worker, or reaches a preemption point late, blocks once: h(t) + max_{D_l > t} (region_l - 1) <= t.
 #pragma once
 
 #include "redag_analysis/core/bound.hpp"

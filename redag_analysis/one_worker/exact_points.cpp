@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMaxPoints = 1'000'000;
 
-// P_{i-1}(deadline) over `more_urgent`, most urgent first; empty where it is too large.
+// Returns P_{i-1}(deadline) over `more_urgent`, most urgent first; empty if it is too large.
 std::vector<Duration> points(Duration deadline, const std::vector<one_worker::Interferer> &more_urgent) {
   std::vector<Duration> found = {deadline};
   for (auto task = more_urgent.rbegin(); task != more_urgent.rend(); ++task) {

@@ -12,7 +12,7 @@
 namespace redag::analysis {
 namespace {
 
-// Utilizations in units of 2^-40, durations in the numerator in units of 2^-16: all products stay below 2^126 for
+// Utilizations have units of 2^-40, durations in the numerator units of 2^-16. All products then stay below 2^126 for
 // execution times up to 2^50 ns (13 days).
 constexpr int kShareBits = 40;
 constexpr int kTimeBits = 16;
@@ -34,7 +34,7 @@ struct Line {
   }
 };
 
-// `above`: of all units of its level and above, itself among them.
+// `above` holds the sums of all units of its level and above, including itself.
 ResponseBound bound_unit(const System &system, const one_worker::Views &views, std::uint32_t u, Line above) {
   const Unit &unit = system.units[u];
   above.add(unit, -1);
@@ -48,7 +48,7 @@ ResponseBound bound_unit(const System &system, const one_worker::Views &views, s
     return bound;
   }
   const Int128 fixed = (Int128{blocking} + unit.volume) << kTimeBits;
-  const Int128 rest = kOne - utilization;  // > 0: the unit's own share is
+  const Int128 rest = kOne - utilization;  // > 0, because the unit's own share is
   const Duration response = saturate(((fixed + slopes) << (kShareBits - kTimeBits)) / rest);
   if (response > unit.limit) {
     bound.absent = one_worker::kExceedsLimit;
@@ -65,7 +65,7 @@ ResponseBound bound_unit(const System &system, const one_worker::Views &views, s
     const DagId dag = system.tasks[blocker.task].dag;
     bound.terms.push_back(Term{Term::Kind::Blocking, TaskId(blocker.task), dag, blocker.amount, 1});
   }
-  // The formula mixes what the others do; it has no share for each.
+  // The formula has no separate share for each of the others.
   const Duration interference = response - unit.volume - blocking;
   if (interference > 0) bound.terms.push_back(Term{Term::Kind::Interference, TaskId(), DagId(), interference, 0});
   return bound;

@@ -16,8 +16,8 @@
 namespace redag::analysis::one_worker {
 namespace {
 
-// Evaluations of the right-hand side for one task. Only busy periods with a utilization within a few millionths of one,
-// or periods many orders of magnitude apart, need more.
+// Limits the evaluations of the right-hand side for one task. Only busy periods with a utilization within a few
+// millionths of one, or with periods many orders of magnitude apart, need more.
 constexpr int kMaxSteps = 1'000'000;
 
 template <class Count>
@@ -27,8 +27,8 @@ Duration demand(Int128 start, std::span<const Interferer> more_urgent, Count cou
   return saturate(sum);
 }
 
-// The least w >= `w` with w = start + sum, or nothing where it exceeds `stop`, or what a time can hold, or the steps
-// run out.
+// Finds the least w >= `w` with w = start + sum. Returns false if it exceeds `stop` or what a duration can hold, or if
+// the steps run out.
 template <bool kDeferred>
 bool fixed_point(Int128 start, std::span<const Interferer> more_urgent, Duration stop, Duration &w, int &steps) {
   while (w <= stop && w < kUnbounded) {
@@ -46,7 +46,7 @@ bool fixed_point(Int128 start, std::span<const Interferer> more_urgent, Duration
 
 FixedPoint none(int steps) { return FixedPoint{std::nullopt, steps > kMaxSteps ? kGaveUp : kExceedsLimit}; }
 
-// Window in which job q must end so that its response is within the limit.
+// The window in which job q must end for its response to be within the limit.
 Duration stop_of(const Own &own, std::int64_t q) {
   return saturate(Int128{own.limit} - own.jitter + Int128{q} * own.period);
 }
@@ -77,7 +77,7 @@ std::vector<Term> terms_of(const System &system, const Unit &unit, const View &v
   return terms;
 }
 
-// Any of its last tasks can be the one that ends the unit; the shortest stretch is the worst.
+// Any sink of the unit can end it; the shortest last stretch is the worst.
 Duration last_region_of(const System &system, const Unit &unit) {
   Duration shortest = kUnbounded;
   for (const std::uint32_t t : unit.tasks) {
@@ -129,7 +129,7 @@ Views::Views(const System &system) : system_(system), by_first_rank_(system.unit
 
 void Views::close_levels() {
   const auto ranks = static_cast<std::uint32_t>(system_.by_rank.size());
-  std::vector<std::uint32_t> reach(ranks);  // by rank: the least urgent task of units that begin at it or above
+  std::vector<std::uint32_t> reach(ranks);  // by rank: the least urgent task of units that begin at this rank or above
   std::iota(reach.begin(), reach.end(), 0);
   for (const Unit &unit : system_.units) reach[unit.first_rank] = std::max(reach[unit.first_rank], unit.last_rank);
   // Any task of a tier can go before any other of it.
@@ -165,14 +165,14 @@ std::vector<std::uint32_t> Views::more_urgent(std::uint32_t unit) const {
   return units;
 }
 
-// Less urgent jobs that hold up the level although it has work: what was started before the busy period and cannot be
-// preempted. "- 1": it started at an instant strictly before, and times are integers.
+// Less urgent jobs that delay the level: they were started before the busy period and cannot be preempted. "- 1": they
+// started at an instant strictly before, and times are integers.
 std::vector<Blocker> Views::blockers(std::uint32_t unit) const {
   const std::uint32_t last = level(unit);
   const std::uint32_t platform_level = system_.tasks[system_.by_rank[last]].level;
   Blocker longest = longest_[last + 1];
   if (system_.mode != sched::Preemption::None) {
-    // Tasks of one platform level are neighbours in the order, and keep the worker from each other.
+    // Tasks of one platform level are neighbours in the order, and do not preempt each other.
     for (std::uint32_t rank = last + 1; rank < system_.by_rank.size(); ++rank) {
       const std::uint32_t t = system_.by_rank[rank];
       if (system_.tasks[t].level != platform_level) break;
@@ -186,7 +186,7 @@ std::vector<Blocker> Views::blockers(std::uint32_t unit) const {
   if (system_.mode == sched::Preemption::Full) {
     for (const std::vector<std::uint32_t> &group : system_.groups) {
       Effort::spend(group.size());
-      // While it holds the group for a task of this platform level or above, no task of the level preempts it.
+      // While a job holds the group for a task of this platform level or above, no task of the level preempts it.
       bool is_needed = false;
       Blocker holder;
       for (const std::uint32_t t : group) {
@@ -261,7 +261,7 @@ FixedPoint deferred_response(const Own &own, std::span<const Interferer> more_ur
   int steps = 0;
   Response worst;
   Duration w = 0;
-  // The busy period ends where all work that arrived before is done; jobs of this task arrive until then.
+  // The busy period ends when all work that arrived before is done; jobs of this task arrive until then.
   Duration length = 0;
   for (std::int64_t q = 0;; ++q) {
     const Int128 start = Int128{own.blocking} + (Int128{q} + 1) * own.wcet - own.last_region;
@@ -273,7 +273,7 @@ FixedPoint deferred_response(const Own &own, std::span<const Interferer> more_ur
     const Duration longest = std::max(worst.from_ready, from_ready);
     if (response > worst.response) worst = Response{response, w, q, 0};
     worst.from_ready = longest;
-    // With q + 1 jobs of its own, does the busy period end before the next one arrives?
+    // Tests whether the busy period with q + 1 own jobs ends before the next one arrives.
     const Int128 all = Int128{own.blocking} + (Int128{q} + 1) * own.wcet;
     const Duration next_arrival = saturate((Int128{q} + 1) * own.period - own.jitter);
     length = std::max({length, saturate(all), w});

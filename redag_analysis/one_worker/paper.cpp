@@ -20,7 +20,7 @@ namespace {
 
 constexpr int kMaxSteps = 1'000'000;
 
-// What every equation of the paper takes for granted; the first that does not hold here, or empty.
+// Returns the first assumption of the paper's equations that does not hold here; empty if all hold.
 std::string broken_assumption(const System &system, bool with_blocking) {
   if (system.policy != PolicyKind::RateMonotonic) return "the policy is not rate_monotonic";
   if (auto reason = one_worker::why_not(system)) return *reason;
@@ -43,7 +43,7 @@ std::string broken_assumption(const System &system, bool with_blocking) {
   return {};
 }
 
-// hp(i) of the paper: strictly smaller periods.
+// hp(i) of the paper: the tasks with strictly smaller periods.
 std::vector<std::uint32_t> more_urgent(const System &system, const SystemTask &task) {
   std::vector<std::uint32_t> found;
   for (std::uint32_t j = 0; j < system.tasks.size(); ++j) {
@@ -52,7 +52,7 @@ std::vector<std::uint32_t> more_urgent(const System &system, const SystemTask &t
   return found;
 }
 
-// Callbacks of one period, together.
+// The callbacks of one period together.
 struct Rate {
   Duration period = 0;
   Duration wcet = 0;
@@ -111,7 +111,7 @@ ResponseBound itemise(const System &system, std::uint32_t t, std::optional<Durat
   return bound;
 }
 
-// DAGs of independent tasks answer with their last one; of others the paper says nothing.
+// A DAG of independent tasks answers with its last one; for other DAGs the paper gives no bound.
 void fill_dags(const System &system, Bound &bound) {
   bound.dags.resize(system.dags.size());
   for (std::size_t d = 0; d < system.dags.size(); ++d) {
@@ -138,7 +138,8 @@ Outcome apply_rm_bound(const System &system) {
   std::snprintf(text, sizeof text, "U = %.4f, limit %.4f for %zu callbacks", system.utilization, limit,
                 system.tasks.size());
   bound.figures = text;
-  // N callbacks are at least as many as tasks or DAGs, and the limit falls with N: sound where Liu and Layland's is.
+  // N callbacks are at least as many as tasks or DAGs, and the limit falls with N. The test is thus sound where Liu and
+  // Layland's is.
   const Outcome proper = liu_layland().apply(system);
   if (const auto *reason = std::get_if<NotApplicable>(&proper)) bound.unsound = reason->reason;
   return bound;

@@ -34,7 +34,7 @@ TEST(BoundProperty, PaperWhereSound) {
   expect_bound_holds(paper_rta_blocking(), cases(sched::Preemption::None, true), kFew);
 }
 
-// Where they do not, simulations exceed them: the label is deserved.
+// Where the hypotheses do not hold, simulations exceed the numbers: the label `unsound` is justified.
 TEST(BoundProperty, PaperWhereUnsound) {
   const testing::BoundPropertyOptions all{.workloads = 250, .include_unsound = true};
   EXPECT_GT(check_bound(paper_interference(), cases(sched::Preemption::Full, true), all).violations, 0U);

@@ -44,7 +44,8 @@ Outcome dags_full(const System &system) {
 
 Outcome dags_deferred(const System &system) {
   const auto mode =
-      system.mode == sched::Preemption::Full ? sched::Preemption::None : system.mode;  // None or Cooperative will do
+      system.mode == sched::Preemption::Full ? sched::Preemption::None : system.mode;  // both None and Cooperative are
+                                                                                       // accepted
   if (auto reason = why_not(system, mode, true)) return NotApplicable{*reason};
   return one_worker::bound_units(system, true);
 }

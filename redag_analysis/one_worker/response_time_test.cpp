@@ -65,7 +65,7 @@ TEST(BoundProperty, DagOneWorkerCooperative) {
   expect_bound_holds(dag_one_worker_deferred(), cases(limits), kFew);
 }
 
-// Any of equals can go first: what was released an instant before.
+// Any of several equals can go first: the one that was released an instant before.
 TEST(ResponseTime, EqualsInterfereBothWays) {
   Workload workload;
   for (const Duration wcet : {3, 4}) {
@@ -86,7 +86,7 @@ TEST(ResponseTime, EqualsInterfereBothWays) {
       const Outcome outcome = (mode == sched::Preemption::Full ? rta_preemptive() : rta_nonpreemptive())
                                   .apply(compile(workload, platform).value());
       const Bound &bound = std::get<Bound>(outcome);
-      // In the fixed order the first waits for the second only where that cannot be preempted, and not for all of it.
+      // In the fixed order the first waits for the second only if that cannot be preempted, and not for all of it.
       const Duration first = ties == Ties::Share ? 7 : mode == sched::Preemption::Full ? 3 : 6;
       EXPECT_EQ(bound.tasks[0].response, first);
       EXPECT_EQ(bound.tasks[1].response, 7);

@@ -18,7 +18,7 @@
 namespace redag::analysis {
 namespace {
 
-constexpr Int128 kOne = Int128{1} << 60;  // for figures: utilizations in units of 2^-60
+constexpr Int128 kOne = Int128{1} << 60;  // utilizations in units of 2^-60, to be shown
 
 Int128 rounded(const ShareRange &range) { return static_cast<Int128>(range.low); }
 
@@ -37,10 +37,10 @@ Bound answer(bool accepts, std::string figures) {
   return bound;
 }
 
-// Units from the most urgent to the least, or nothing where their priorities are interleaved.
+// Returns the units from the most urgent to the least; empty if their priorities are interleaved.
 std::optional<std::vector<std::uint32_t>> units_by_rank(const System &system) {
   std::vector<std::uint32_t> order;
-  std::uint32_t end = 0;  // ranks below are covered by whole units
+  std::uint32_t end = 0;  // the ranks below it are covered by whole units
   for (const std::uint32_t t : system.by_rank) {
     const std::uint32_t u = system.tasks[t].unit;
     if (system.units[u].first_rank != system.tasks[t].rank) continue;
@@ -51,13 +51,14 @@ std::optional<std::vector<std::uint32_t>> units_by_rank(const System &system) {
   return order;
 }
 
-// Units of one tier can each go before the other.
+// True if the units share a tier: each can go before the other.
 bool take_turns(const System &system, const Unit &upper, const Unit &lower) {
   return system.tasks[system.by_rank[upper.last_rank]].tier == system.tasks[system.by_rank[lower.first_rank]].tier;
 }
 
-// Utilizations know nothing of jitter, of deadlines below the period, or of another order than by rate. Equals of one
-// period are no other order: whichever goes first, each waits for no more than the last one in a fixed order does.
+// Returns why a test by utilizations does not apply: jitter, deadlines below the period, or another order than by rate.
+// Equals of one period are allowed. Whichever goes first, each waits for no more than the last one in a fixed order
+// does.
 std::optional<std::string> why_not_by_rate(const System &system, const std::vector<std::uint32_t> &order) {
   Duration last = 0;
   for (std::size_t i = 0; i < order.size(); ++i) {
@@ -123,8 +124,8 @@ Outcome apply_hyperbolic(const System &system) {
   return answer(is_within_hyperbolic(shares), figures("prod (U_i + 1)", rounded(shares.product()), 2 * kOne));
 }
 
-// A matching of maximum size between periods and their multiples (Kuhn); what is not matched starts a chain. Units of
-// one period are always in one chain, so that only different periods matter.
+// A maximum matching between periods and their multiples (Kuhn); each unmatched period starts a chain. Units of one
+// period are always in one chain, and therefore only different periods matter.
 class ChainCover {
  public:
   explicit ChainCover(const System &system) {
@@ -143,7 +144,7 @@ class ChainCover {
  private:
   static constexpr std::size_t kNone = SIZE_MAX;
 
-  // Breadth first from the unmatched `root`; true if an augmenting path was found.
+  // Searches breadth first from the unmatched `root`; returns true if it found an augmenting path.
   bool extend(std::size_t root) {
     std::vector<std::size_t> reached_by(periods_.size(), kNone);  // by longer period
     std::vector<std::size_t> waiting = {root};
@@ -179,8 +180,8 @@ class ChainCover {
     return static_cast<std::size_t>(std::find(next_.begin(), next_.end(), u) - next_.begin());
   }
 
-  std::vector<Duration> periods_;  // different ones, ascending
-  std::vector<std::size_t> next_;  // by longer period: the shorter one before it in its chain
+  std::vector<Duration> periods_;  // different values, ascending
+  std::vector<std::size_t> next_;  // by longer period: its predecessor in its chain
 };
 
 Outcome apply_harmonic_chains(const System &system) {
@@ -192,7 +193,7 @@ Outcome apply_harmonic_chains(const System &system) {
                                                            ", " + std::to_string(chains) + " harmonic chains");
 }
 
-// Level by level, each with its blocking; the first that is above its limit is told.
+// Tests level by level, each with its blocking; the answer names the first level above its limit.
 template <class Within, class Figures>
 Outcome apply_by_level(const System &system, Within is_within, Figures figures_of) {
   Prepared prepared;
@@ -224,10 +225,11 @@ Outcome apply_hyperbolic_blocking(const System &system) {
       [](const Shares &shares) { return figures("product", rounded(shares.product()), 2 * kOne); });
 }
 
-// m workers, full preemption, independent tasks, nothing that holds up a started or ready job but priority.
+// Returns why a global test does not apply. It needs m workers, full preemption and independent tasks, and that only
+// priority delays a job.
 std::optional<std::string> why_not_global(const System &system) {
   if (auto reason = why_not_directly(system)) return reason;
-  // With m = 1 the limits would be 1 and more, which no fixed priorities reach.
+  // With m = 1 the limits would be 1 or more, which fixed priorities do not reach.
   if (system.platform.workers < 2) return "for two workers or more";
   if (!is_static(system.policy)) {
     return std::string("for rate-monotonic priorities; the policy is ") + to_string(system.policy);
@@ -246,7 +248,7 @@ std::optional<std::string> why_not_global(const System &system) {
   return why_not_by_rate(system, *units_by_rank(system));
 }
 
-// Alone.
+// The largest share alone.
 Shares largest(const Shares &shares) {
   Shares one;
   const auto found = std::max_element(shares.all().begin(), shares.all().end(), is_smaller);

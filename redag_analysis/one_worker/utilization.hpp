@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Tests that compare utilizations with a limit: O(n) or nearly so, and sufficient only. Those for one worker take a DAG
-// of one rate as one task with C = its volume. Nothing is accepted or refused by rounding (exact_utilization.hpp).
+// of one rate as one task with C = its volume. Rounding neither accepts nor refuses a set (exact_utilization.hpp).
 #pragma once
 
 #include "redag_analysis/core/bound.hpp"
@@ -15,15 +15,15 @@ namespace redag::analysis {
 /// prod (U_i + 1) <= 2. E. Bini, G. Buttazzo, G. Buttazzo, IEEE Transactions on Computers 52(7), 2003.
 [[nodiscard]] Method hyperbolic();
 
-/// As liu_layland with n replaced by the least number of chains of periods that divide each other.
-/// T.-W. Kuo, A. Mok, RTSS 1991.
+/// As liu_layland with n replaced by the least number of chains of periods that divide each other. T.-W. Kuo, A. Mok,
+/// RTSS 1991.
 [[nodiscard]] Method harmonic_chains();
 
 /// For each i: sum_{j <= i} U_j + B_i / T_i <= i (2^(1/i) - 1). L. Sha, R. Rajkumar, J. Lehoczky, IEEE Transactions on
-/// Computers 39(9), 1990. For jobs that cannot be preempted, too: docs/analysis.md.
+/// Computers 39(9), 1990. Holds also for jobs that cannot be preempted: docs/analysis.md, "Utilization".
 [[nodiscard]] Method liu_layland_blocking();
 
-/// For each i: prod_{j < i} (U_j + 1) (U_i + B_i / T_i + 1) <= 2; likewise.
+/// For each i: prod_{j < i} (U_j + 1) (U_i + B_i / T_i + 1) <= 2. Holds also for jobs that cannot be preempted.
 [[nodiscard]] Method hyperbolic_blocking();
 
 /// m >= 2 workers: U <= m^2 / (3m - 2) and max U_i <= m / (3m - 2). B. Andersson, S. Baruah, J. Jonsson, RTSS 2001.

@@ -56,7 +56,7 @@ TEST(BoundProperty, Hyperbolic) {
   expect_bound_holds(hyperbolic(), cases(rate_monotonic(sched::Preemption::Full)), kFew);
 }
 
-// Equals of one period and of several.
+// Equals of one period, and of several.
 TEST(BoundProperty, UtilizationOfEquals) {
   for (const sched::Preemption mode : {sched::Preemption::Full, sched::Preemption::None}) {
     BoundCaseLimits limits = rate_monotonic(mode);
@@ -110,7 +110,7 @@ TEST(BoundProperty, GlobalRateMonotonic) {
   expect_bound_holds(global_rm_utilization(), cases(limits), kFew);
 }
 
-// ---- exactly at, just below and just above ----
+// ---- exactly at the limit, just below it and just above it ----
 
 struct Load {
   Duration wcet;
@@ -143,7 +143,8 @@ bool accepts(const Method &method, const System &system) {
 
 // (1 + 1/3) (1 + 1/5) (1 + 1/4) = 2; no share but the last is a multiple of a power of two.
 TEST(ExactUtilization, HyperbolicAtTwo) {
-  constexpr Duration kTick = 1'000'000'007;  // so that one nanosecond is far below 2^-60 of what rounding could tell
+  constexpr Duration kTick = 1'000'000'007;  // makes one nanosecond far smaller than the 2^-60 that rounding could
+                                             // resolve
   const auto loads = [](Duration more) {
     return std::vector<Load>{{kTick, 3 * kTick}, {kTick, 4 * kTick}, {kTick + more, 5 * kTick}};
   };
@@ -174,16 +175,17 @@ TEST(ExactUtilization, OneWholeOfSharesThatHaveNoEnd) {
   EXPECT_TRUE(accepts(liu_layland_blocking(), independent({{7, 7}})));
 }
 
-// The limit of two is 2 sqrt(2) - 2: the nearest fractions on both sides, of the continued fraction of sqrt(2).
+// The limit of two tasks is 2 sqrt(2) - 2. The test takes the nearest fractions on both sides, from the continued
+// fraction of sqrt(2).
 TEST(ExactUtilization, LiuLaylandBesideAnIrrationalLimit) {
-  // p / q below sqrt(2) and p' / q' above, with p^2 - 2 q^2 = -1 and 1.
+  // p / q is below sqrt(2) or above it, with p^2 - 2 q^2 = -1 or 1.
   Int128 p = 1;
   Int128 q = 1;
   int below = 0;
   int above = 0;
   for (; q < Int128{1} << 58; std::tie(p, q) = std::pair(p + 2 * q, p + q)) {
     if (q < 1000) continue;
-    // U = 2 p / q - 2 as two equal shares of p / q - 1.
+    // U = 2 p / q - 2, as two equal shares of p / q - 1.
     const auto wcet = static_cast<Duration>(p - q);
     const auto period = static_cast<Duration>(q);
     const bool is_below = p * p < 2 * q * q;
@@ -200,7 +202,7 @@ TEST(ExactUtilization, SeveralWorkers) {
   EXPECT_FALSE(accepts(global_rm_light(), independent({{1, 3}, {2, 6}, {5, 12}}, 2)));
   EXPECT_TRUE(accepts(global_rm_light(), independent({{50, 100}, {51, 102}}, 2)));
   EXPECT_FALSE(accepts(global_rm_light(), independent({{50, 100}, {52, 102}}, 2)));
-  // m = 2: U <= 1 whatever u is; m = 3: U <= 3/2 - u/2.
+  // m = 2: U <= 1 for any u; m = 3: U <= 3/2 - u/2.
   EXPECT_TRUE(accepts(global_rm_utilization(), independent({{1, 3}, {2, 6}, {4, 12}}, 2)));
   EXPECT_FALSE(accepts(global_rm_utilization(), independent({{1, 3}, {2, 6}, {5, 12}}, 2)));
   const std::vector<Load> three = {{1, 3}, {2, 6}, {3, 9}, {4, 12}};  // U = 4/3 = 3/2 - 1/6
@@ -210,7 +212,7 @@ TEST(ExactUtilization, SeveralWorkers) {
   EXPECT_FALSE(accepts(global_rm_utilization(), independent(more, 3)));
 }
 
-// Nothing but exact arithmetic on the one side, the bounds' own on the other.
+// Compares plain exact arithmetic with the arithmetic of the bounds.
 TEST(ExactUtilization, AsLongDivisionSays) {
   Rng rng(7);
   std::uint32_t equal = 0;
