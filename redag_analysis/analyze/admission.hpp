@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Is there time for another DAG? For whoever adds some at run time. Pure function; its cost is that of analyze().
+// Decides whether another DAG can be added at run time without a missed deadline. Pure function; its cost is that of
+// analyze().
 #pragma once
 
 #include "redag/base/result.hpp"
@@ -10,8 +11,8 @@
 
 namespace redag::analysis {
 
-/// No error: a sound method shows that every deadline of `workload` is met under `config`. An error says of which tasks
-/// that is not known. Fits runtime::ExecutorOptions::admission; to be warned only, wrap it and answer {}.
+/// Succeeds if a sound method shows that every deadline of `workload` is met under `config`. The error names the tasks
+/// for which nothing shows it. Fits runtime::ExecutorOptions::admission; for a mere warning, wrap it and return {}.
 [[nodiscard]] Result<void> admit_by_bounds(const Workload &workload, const sched::Config &config);
 
 }  // namespace redag::analysis

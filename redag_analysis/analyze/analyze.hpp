@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Every method on one system: which apply, why the others do not, and the tightest sound bound of each task and DAG
-// with the method that gave it. A pure function.
+// Applies every method to one system: which apply, why the others do not, and the tightest sound bound of each task and
+// DAG with the method that gave it. A pure function.
 #pragma once
 
 #include <memory>
@@ -18,7 +18,7 @@ struct MethodReport {
   const Method *method = nullptr;
   Outcome outcome;
   Verdict verdict = Verdict::NotShown;
-  bool trusted = false;  // it applies and its numbers are sound here
+  bool trusted = false;  // the method applies and its numbers are sound here
 
   [[nodiscard]] const Bound *bound() const { return std::get_if<Bound>(&outcome); }
   [[nodiscard]] bool gave_up() const { return bound() == nullptr && std::get<NotApplicable>(outcome).gave_up; }
@@ -36,9 +36,11 @@ struct Report {
   std::vector<Tightest> tasks;  // by TaskId
   std::vector<Tightest> dags;   // by DagId
   Verdict verdict = Verdict::NotShown;
-  /// Who says so: methods that accept all, or those that gave the tightest bounds. Empty when NotShown.
+  /// The methods behind the verdict: those that accept all, or those that gave the tightest bounds. Empty when
+  /// NotShown.
   std::vector<const Method *> by;
-  /// What the pointers to methods above point into, unless that is methods(): good as long as a copy of the report is.
+  /// Owns the methods that the pointers above refer to, unless these are methods(). The pointers stay valid as long as
+  /// some copy of the report exists.
   std::shared_ptr<const std::vector<Method>> owned;
 };
 
@@ -51,27 +53,29 @@ struct AnalysisProgress {
 
 struct AnalyzeOptions {
   std::uint64_t effort = kUsualEffort;  // steps of one method; 0: no limit
-  /// Asked now and then while a method works: a reason, a clause without a period, ends the method. Null: never.
+  /// Called regularly while a method works. A non-empty reason, a clause without a period, ends the method. Null:
+  /// never.
   std::function<std::string(const AnalysisProgress &progress)> stop;
-  /// n^2 terms in all: of few tasks, or else one at a time with itemised().
+  /// Itemises all bounds, n^2 terms in all. Use it for few tasks only; otherwise itemise one bound at a time with
+  /// itemised().
   bool itemise = false;
 };
 
-/// Runs methods(). Memory is linear in the size of the system unless it itemises. A method that is ended is
-/// NotApplicable with `gave_up`; the others say what they say.
+/// Runs methods(). Memory is linear in the size of the system unless it itemises. A method that is ended counts as
+/// NotApplicable with `gave_up`; this does not affect the others.
 [[nodiscard]] Report analyze(const System &system, const AnalyzeOptions &options = {});
-/// These methods alone; the report keeps them.
+/// Runs these methods alone; the report keeps them.
 [[nodiscard]] Report analyze(const System &system, std::vector<Method> methods, const AnalyzeOptions &options = {});
 
-/// The same bound with its terms: runs the method again. Requires one with a method.
+/// Runs the method again, and returns the same bound with its terms. Requires a bound with a method.
 [[nodiscard]] ResponseBound itemised(const System &system, const Tightest &tightest, TaskId task);
 [[nodiscard]] ResponseBound itemised(const System &system, const Tightest &tightest, DagId dag);
 
-/// The tightest bounds together, as if one method had given them.
+/// Combines the tightest bounds, as if one method had given them.
 [[nodiscard]] Bound tightest_of(const Report &report);
 
-/// Is analyze(system).verdict Schedulable? Asks tests that answer at once first, and stops at the first method that
-/// says so: for those who ask it often. Throws Effort::GaveUp where a scope of the caller's ends it.
+/// True if analyze(system).verdict is Schedulable. For frequent calls: it runs the quick tests first, and stops at the
+/// first method that shows it. Throws Effort::GaveUp if a scope of the caller ends it.
 [[nodiscard]] bool is_shown_schedulable(const System &system);
 
 }  // namespace redag::analysis

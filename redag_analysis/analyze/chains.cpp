@@ -18,7 +18,8 @@ bool hands_over(const System &system, TaskId from, TaskId to) {
          std::find(before.begin(), before.end(), from.value) != before.end();
 }
 
-// From the unit's release: a task of a larger unit may be bounded from its own release only, its DAG is not.
+// The response from the unit's release. A task of a larger unit may be bounded only from its own release, but its DAG
+// is bounded from the unit's.
 const ResponseBound *response_of(const System &system, TaskId task, const Bound &bound) {
   const SystemTask &compiled = system.tasks[task.value];
   const bool single = system.units[compiled.unit].tasks.size() == 1;
@@ -27,8 +28,8 @@ const ResponseBound *response_of(const System &system, TaskId task, const Bound 
   return position < responses.size() && responses[position].response ? &responses[position] : nullptr;
 }
 
-// True where a job of `from` that is released no later than one of `to` always ends before that one starts: it is ready
-// when released, nothing but its priority decides, and nothing runs beside it.
+// True if a job of `from` that is released no later than one of `to` always ends before that one starts. It must be
+// ready when released, only its priority may decide, and no job may run beside it.
 bool goes_first(const System &system, const ChainSegment &from, const ChainSegment &to) {
   const SystemTask &producer = system.tasks[from.last.value];
   const SystemTask &consumer = system.tasks[to.first.value];
@@ -96,7 +97,7 @@ std::optional<Duration> let_reaction(std::span<const LetTask> chain, std::int64_
   Duration longest = 0;
   const Time begin = at_or_after(first, latest);
   for (Time read = begin; read < begin + static_cast<Duration>(hyperperiod); read += first.period) {
-    // The input comes right after `read`: the next job of the first task is the one that sees it.
+    // The input comes right after `read`; the next job of the first task sees it.
     Time written = read + first.period + first.deadline;
     for (const LetTask &task : chain.subspan(1)) written = at_or_after(task, written) + task.deadline;
     longest = std::max(longest, written - read);

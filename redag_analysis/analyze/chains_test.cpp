@@ -18,7 +18,7 @@
 namespace redag::analysis {
 namespace {
 
-// When the jobs of a simulation started and ended, by task; job number by position.
+// When the jobs of a simulation started and ended, by task; the position is the job's number.
 struct Job {
   Time start = kNever;
   Time finish = kNever;
@@ -44,8 +44,8 @@ Schedule simulated(const Workload &workload, const AnalysisPlatform &platform, D
   return schedule;
 }
 
-// Longest from right after a read of the first task to the end of the first job of the last that has seen what came
-// then.
+// The longest time from right after a read of the first task to the end of the last task's first job that has seen the
+// next input.
 Duration observed_reaction(const Schedule &schedule, const std::vector<TaskId> &chain) {
   Duration longest = 0;
   const std::vector<Job> &sources = schedule[chain.front().value];
@@ -62,7 +62,7 @@ Duration observed_reaction(const Schedule &schedule, const std::vector<TaskId> &
   return longest;
 }
 
-// Longest from a read of the first task to the end of the job of the last that replaces the output it led to.
+// The longest time from a read of the first task to the end of the last task's job that replaces the resulting output.
 Duration observed_age(const Schedule &schedule, const std::vector<TaskId> &chain) {
   Duration longest = 0;
   const std::vector<Job> &outputs = schedule[chain.back().value];
@@ -96,7 +96,7 @@ void check_chain(const testing::BoundCase &bound_case, const Method &method, Rng
   std::vector<TaskId> chain;
   const auto length = static_cast<std::size_t>(rng.uniform(1, 5));
   for (std::size_t i = 0; i < length; ++i) {
-    // Follow an edge, or go anywhere.
+    // Follows an edge, or goes anywhere.
     const auto &next = chain.empty() ? system.tasks[0].predecessors : system.tasks[chain.back().value].successors;
     const bool follow = !next.empty() && rng.uniform(0, 2) > 0;
     const auto last = static_cast<std::int64_t>(follow ? next.size() : system.tasks.size()) - 1;
@@ -207,7 +207,7 @@ Workload producer_and_consumer(std::uint32_t workers) {
   return workload;
 }
 
-// The discount for a more urgent producer says 21; on two workers the consumer, 8 later, starts beside it: 29.
+// The discount for a more urgent producer gives 21. On two workers the consumer, 8 later, starts beside it: 29.
 TEST(Chain, ThePriorityDiscountNeedsOneWorker) {
   const Workload workload = producer_and_consumer(2);
   const std::vector<TaskId> chain{TaskId(0U), TaskId(1U)};
@@ -249,14 +249,14 @@ TEST(Chain, WithoutABoundThereIsNone) {
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(chain_bound(system, {}, Bound{})));
 }
 
-// Every instant tried as the arrival of an input.
+// Tries every instant as the arrival of an input.
 Duration let_by_force(const std::vector<LetTask> &chain, Time from, Time until) {
   Duration longest = 0;
   for (Time input = from; input < until; ++input) {
     Time shown = 0;
     for (std::size_t i = 0; i < chain.size(); ++i) {
       Time release = chain[i].offset;
-      // The first task reads what came strictly before; the others what was written at the same instant, too.
+      // The first task reads what came strictly before; the others also read what was written at the same instant.
       while (i == 0 ? release <= input : release < shown) release += chain[i].period;
       shown = release + chain[i].deadline;
     }
@@ -274,7 +274,7 @@ TEST(Chain, LetIsExact) {
       task.offset = rng.uniform(0, task.period);
       task.deadline = rng.uniform(1, task.period);
     }
-    // Periods up to 8: a hyperperiod of at most 840.
+    // Periods up to 8 have a hyperperiod of at most 840.
     EXPECT_EQ(let_reaction(chain), let_by_force(chain, 10, 10 + 2 * 840)) << seed;
   }
   EXPECT_FALSE(let_reaction({}));

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Published examples and hand-made ones, with the numbers that their authors give.
+// Published examples with the numbers of their authors, and hand-made ones.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -100,13 +100,13 @@ TEST(Examples, LehoczkyArbitraryDeadlines) {
   EXPECT_EQ(bound.sum(Term::Kind::Earlier), 4 * (62 - 100)) << "the fifth job of the busy period";
   EXPECT_EQ(bound.sum(Term::Kind::Interference), 26 * 8);
 
-  // With `skip` the fifth job is not reached: the response passes the period, which is as far as the bound goes.
+  // With `skip` the fifth job is not reached: the response exceeds the period, where the bound ends.
   workload.dags[0].tasks[1].overrun = Overrun::Skip;
   EXPECT_EQ(responses(rta_preemptive(), compiled(workload, kFull)), (Durations{26, -1}));
 }
 
 // R. Davis, A. Burns, R. Bril, J. Lukkien, RTS 35(3), 2007: the flaw of the old CAN analysis. R = 2, 3, 3.5 in dense
-// time; in units of 1/1000 blocking is one unit less, as its cause starts at an instant strictly before.
+// time. In units of 1/1000 blocking is one unit less, because its cause starts at an instant strictly before.
 TEST(Examples, DavisBurnsBrilLukkien) {
   const std::vector<Numbers> tasks = {{1000, 2500, 2500}, {1000, 3500, 3250}, {1000, 3500, 3250}};
   Workload workload = independent(tasks);
@@ -164,7 +164,7 @@ TEST(Examples, ThePapersEquationsAreOptimistic) {
   EXPECT_NE(std::get<Bound>(paper_rta().apply(ties)).unsound, "");
 }
 
-// U = 1 fits; 13 units due within 12 do not. And a blocking job that is one unit too long.
+// U = 1 fits; 13 units due within 12 do not, nor does a blocking job that is one unit too long.
 TEST(Examples, EdfDemand) {
   EXPECT_TRUE(accepts(edf_demand(), compiled(independent({{2, 4}, {7, 14}}, PolicyKind::Edf), kFull)));
   EXPECT_FALSE(accepts(edf_demand(), compiled(independent({{2, 4}, {7, 14, 12}}, PolicyKind::Edf), kFull)));
@@ -172,7 +172,7 @@ TEST(Examples, EdfDemand) {
   EXPECT_FALSE(accepts(edf_demand_nonpreemptive(), compiled(independent({{1, 2}, {3, 10}}, PolicyKind::Edf), kNone)));
 }
 
-// Groups: the holder finishes at the priority of the one that waits, and holds up what stands between.
+// Groups: the holder finishes at the priority of the waiting task, and delays the tasks between the two.
 TEST(Examples, BlockingByAGroupReachesTheTasksBetween) {
   Workload workload = independent({{1, 20}, {2, 40}, {6, 80}});
   workload.dags[0].tasks[0].group = workload.dags[0].tasks[2].group = "shared";

@@ -24,7 +24,7 @@ const std::vector<Method> &methods_of(const sched::ExecutorKind &executor) {
     return all;
   }();
   if (executor.ours) return methods();
-  // The static executor has windows too, but walks through them in another order than these bounds count on.
+  // The static executor has windows, too, but walks through them in another order than these bounds assume.
   return executor.name == "ste" || executor.name == "mte" ? kWaitSet : kAnyOrder;
 }
 

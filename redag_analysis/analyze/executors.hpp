@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Which bounds hold under which executor: ours, or a model of one of rclcpp's (sched/models). The one place that
-// `redag analyze`, reports and runs ask. Pure functions.
+// Selects the bounds that hold under an executor: ours, or a model of one of rclcpp's (redag_analysis/executors).
+// `redag analyze`, reports and runs all ask here. Pure functions.
 #pragma once
 
 #include "redag_analysis/core/bound.hpp"
@@ -10,17 +10,17 @@
 
 namespace redag::analysis {
 
-/// The baselines: those for rclcpp's single- and multi-threaded executors and nothing else.
+/// The bounds that hold only for rclcpp's single- and multi-threaded executors: the baselines.
 [[nodiscard]] const std::vector<Method> &executor_methods();
 
-/// methods() for ours. For a peer those that hold for any work-conserving order without preemption, as all of them keep
-/// it, and what is known of its own. Proofs: docs/analysis.md, "rclcpp's executors".
+/// Returns methods() for our executor. A peer gets the bounds for any work-conserving order without preemption, which
+/// all peers have, and those known for it alone. Proofs: docs/analysis.md, "rclcpp's executors".
 [[nodiscard]] const std::vector<Method> &methods_of(const sched::ExecutorKind &executor);
 
 /// The platform that the executor makes of `platform`: sched::effective_config().
 [[nodiscard]] AnalysisPlatform effective_platform(const sched::ExecutorKind &executor, AnalysisPlatform platform);
 
-/// What the executor sees: peers do not know max_active. Errors: compile().
+/// Compiles what the executor sees: peers do not know max_active. Errors: those of compile().
 [[nodiscard]] Result<System> compile_for(const sched::ExecutorKind &executor, const Workload &workload,
                                          const AnalysisPlatform &platform);
 

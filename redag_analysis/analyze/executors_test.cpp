@@ -24,7 +24,7 @@ bool has_method(const sched::ExecutorKind &kind, std::string_view name) {
   return std::any_of(methods.begin(), methods.end(), [name](const Method &method) { return method.name == name; });
 }
 
-// Under every executor that is not ours, with max_active, which none of them knows.
+// Tests the bound under every executor but ours, with max_active, which none of them knows.
 void expect_holds(const Method &method, testing::BoundCaseLimits limits) {
   limits.policies = {PolicyKind::RateMonotonic};
   limits.preemption = sched::Preemption::None;
@@ -53,10 +53,10 @@ TEST(Executors, OursHasAllMethodsAndPeersHaveTheirs) {
   for (const Method &method : executor_methods()) {
     EXPECT_TRUE(has_method(executor("ste"), method.name) && has_method(executor("mte"), method.name)) << method.name;
     EXPECT_FALSE(has_method(executor("redag"), method.name)) << method.name;
-    // Windows are walked through in another order, or there are none.
+    // These executors walk through windows in another order, or have none.
     for (const char *name : {"static", "events", "cbg"}) EXPECT_FALSE(has_method(executor(name), method.name)) << name;
   }
-  // What relies on priorities is for none of them.
+  // No peer gets a bound that relies on priorities.
   for (const char *name : {"ste", "mte", "static", "events", "cbg"}) {
     EXPECT_FALSE(has_method(executor(name), "rta_nonpreemptive")) << name;
     EXPECT_FALSE(has_method(executor(name), "sequential_nonpreemptive")) << name;

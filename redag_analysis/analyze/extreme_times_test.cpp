@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Every method on systems whose times lie anywhere between a nanosecond and the longest there is: no bound may come of
-// a sum or product that wrapped. UndefinedBehaviorSanitizer (make asan) sees what wraps; here only what comes of it.
+// Every method on systems with times between a nanosecond and the longest duration: no bound may result from a sum or
+// product that wrapped. UndefinedBehaviorSanitizer (make asan) finds the wrap itself; these tests see only its results.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ auto any_of(Rng &rng, const Values &values) {
   return values[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(std::size(values)) - 1))];
 }
 
-// From a nanosecond to the longest, all magnitudes alike; or at an end.
+// A time from a nanosecond to the longest, all magnitudes equally likely, or one of the extremes.
 Duration any_time(Rng &rng) {
   constexpr std::array kEnds{Duration{1}, Duration{2}, kMaxDuration / 16, kMaxDuration / 2, kMaxDuration};
   if (rng.uniform(0, 2) == 0) return any_of(rng, kEnds);
@@ -58,7 +58,7 @@ testing::BoundCaseLimits any_limits(Rng &rng) {
   return limits;
 }
 
-// All times longer by one factor, as far as they can, and some of them anything.
+// Multiplies all times by one factor, as far as they can grow, and replaces some by any time.
 void stretch(Rng &rng, testing::BoundCase &drawn) {
   Duration longest = 1;
   for (const Dag &dag : drawn.workload.dags) {
@@ -137,7 +137,7 @@ TEST(ExtremeTimes, WhatSaturatedIsNoBound) {
   EXPECT_FALSE(if_bounded(bound).absent.empty());
 }
 
-// Those that analyse again and again, with other times and orders, and the one that looks at every schedule.
+// The searches that analyse repeatedly with other times and orders, and the exploration of every schedule.
 TEST(ExtremeTimes, NoSearchWraps) {
   const std::uint64_t cases = std::max<std::uint64_t>(10, cases_to_try() / 30);
   std::uint64_t searched = 0;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a machine takes from jobs (AnalysisPlatform::stall, lateness, preempt_overhead on several workers), charged by
-// compile() as jitter: no simulated response with such losses exceeds a bound that counts them.
+// What a machine takes from jobs (AnalysisPlatform::stall, lateness, preempt_overhead on several workers) is charged by
+// compile() as jitter. No simulated response with such losses exceeds a bound that includes them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,7 +34,7 @@ BoundCaseLimits limits_for(std::uint32_t workers) {
   return limits;
 }
 
-// Stalls, late releases and preemptions that cost something, on top of random cases.
+// Adds stalls, late releases and costs of preemption to random cases.
 BoundGenerator with_losses(const BoundCaseLimits &limits) {
   return [limits](Rng &rng) {
     BoundCase bound_case = testing::random_bound_case(rng, limits);
@@ -75,7 +75,7 @@ TEST(Losses, SeveralWorkersRateEdges) {
   testing::expect_bound_holds(dag_shapes(), with_losses(limits));
 }
 
-// A job that waits for its group can make the holder preempt, and preempt when it starts itself.
+// A job that waits for its group can make the holder preempt, and can preempt when it starts itself.
 TEST(Losses, SeveralWorkersGroups) {
   BoundCaseLimits limits = limits_for(3);
   limits.min_workers = 2;
@@ -109,8 +109,8 @@ TEST(Losses, WhatIsCharged) {
   const Result<System> system = compile(one_task(), platform);
   ASSERT_TRUE(system);
   EXPECT_EQ(system->not_analysable, "");
-  // 2 stalls; 2 releases: that of its period and the one that jitter brings; 4 preemptions: one before, one waiting
-  // more. Of 1 s the timer takes 700 ns, preemptions 100 us.
+  // 2 stalls. 2 releases: that of its period and one due to jitter. 4 preemptions: two more, by a job before and by a
+  // waiting one. Of 1 s the timer takes 700 ns, preemptions take 100 us.
   EXPECT_EQ(system->frozen, 44'019) << "ceil((2 * 20'000 + 2 * 7 + 4 * 1000) / (1 - 100'700 / 1e9))";
   EXPECT_EQ(system->tasks[0].jitter, 5 + 100 + system->frozen);
   EXPECT_EQ(system->tasks[0].wcet, 2'000'202) << "ceil(2 ms / (1 - 100'700 / 1e9))";

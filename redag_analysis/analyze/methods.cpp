@@ -58,7 +58,7 @@ const std::vector<Method> &methods() {
       hyperbolic_blocking(),
       global_rm_light(),
       global_rm_utilization(),
-      // The paper's own
+      // The equations of the paper
       paper_rm_bound(),
       paper_interference(),
       paper_rta(),

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What theory says of the bounds among themselves, on random workloads.
+// Relations between bounds that theory predicts, on random workloads.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -41,7 +41,7 @@ BoundCaseLimits blocked() {
   return limits;
 }
 
-// The exact test and the response-time analysis are the same question where priorities are all that counts.
+// The exact test and the response-time analysis agree if only priorities decide.
 TEST(Relations, ExactPointsIsResponseTimeWithinDeadline) {
   std::uint32_t schedulable = 0;
   for_cases(cases(blocked()), kCases, [&](const BoundCase &, const System &system, Rng &) {
@@ -170,8 +170,8 @@ TEST(Relations, TermsAddUpToTheResponse) {
   EXPECT_GT(checked, 1000U);
 }
 
-// The critical instant of Liu and Layland: all released at once, each for its wcet. The bound is what happens, in a
-// fixed order: equals that take turns have other critical instants each.
+// The critical instant of Liu and Layland: all tasks are released at once, and each executes for its wcet. In a fixed
+// order the bound is attained. Equals that take turns each have another critical instant.
 TEST(Relations, ResponseTimeIsReachedAtTheCriticalInstant) {
   std::size_t compared = 0;
   for_cases(cases(BoundCaseLimits{}), kCases, [&](const BoundCase &any, const System &, Rng &) {
@@ -193,7 +193,7 @@ TEST(Relations, ResponseTimeIsReachedAtTheCriticalInstant) {
     });
     for (const std::uint32_t t : system.by_rank) {
       const auto &response = bound_of(outcome)->tasks[t].response;
-      if (!response) break;  // its jobs are skipped, and those below it see less of them than the bound counts
+      if (!response) break;  // its jobs are skipped, and the tasks below see fewer of them than the bound counts
       EXPECT_EQ(first[t], *response) << system.tasks[t].name;
       ++compared;
     }
@@ -215,7 +215,7 @@ TEST(Report, TrustsNoUnsoundEquationAndNamesWhoSpoke) {
         EXPECT_EQ(method.trusted, method.bound()->unsound.empty());
       }
     }
-    // On one worker, preemptive, independent: nobody is below the exact analysis.
+    // On one worker, preemptive, independent: no bound is below the exact analysis.
     const Outcome outcome = rta_preemptive().apply(system);
     for (std::size_t t = 0; t < system.tasks.size(); ++t) {
       EXPECT_EQ(report.tasks[t].response, bound_of(outcome)->tasks[t].response);
@@ -227,7 +227,7 @@ TEST(Report, TrustsNoUnsoundEquationAndNamesWhoSpoke) {
   EXPECT_GT(by_response, 1000U);
 }
 
-// A report outlives the methods it was asked with, and so does a copy of it.
+// A report, and a copy of it, stay valid after the caller's methods are gone.
 TEST(Report, KeepsTheMethodsItWasGiven) {
   std::size_t named = 0;
   for_cases(cases(BoundCaseLimits{}), kCases, [&](const BoundCase &, const System &system, Rng &) {

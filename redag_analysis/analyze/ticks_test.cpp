@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Bounds are computed in nanoseconds. The other tests draw times of a few ticks, where an iteration that goes a tick a
-// step ends soon: here the same workloads with a tick of 100 ns, and of a millisecond; and with ticks so long that sums
-// come near what a time can hold.
+// Bounds are computed in nanoseconds. The other tests draw times of a few ticks, where an iteration of one tick a step
+// ends soon. Here the same workloads have a tick of 100 ns or a millisecond, or ticks so long that sums approach the
+// longest duration.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -70,7 +70,7 @@ void count(const testing::BoundCaseLimits &limits, std::map<std::string, Count> 
   }
 }
 
-// Few tasks and workers: as many others as workers is where steps are shortest.
+// Few tasks and workers: steps are shortest where the other tasks are as many as the workers.
 TEST(FinerClock, LosesFewBounds) {
   std::map<std::string, Count> counts;
   for (const auto preemption : {sched::Preemption::Full, sched::Preemption::None}) {
@@ -93,13 +93,13 @@ TEST(FinerClock, LosesFewBounds) {
   for (const auto &[name, of] : counts) {
     if (of.coarse < 20) continue;
     ++compared;
-    // Not none: with coarse ticks more is lost where a sum is divided by the workers and rounded down.
+    // Some bounds are lost: with coarse ticks, more is lost where a sum is divided by the workers and rounded down.
     EXPECT_GE(of.fine * 100, of.coarse * 98) << name << ": " << of.fine << " of " << of.coarse;
   }
   EXPECT_GE(compared, 15U);
 }
 
-// A quarter of an hour, and eleven days.
+// Ticks of a quarter of an hour, and of eleven days.
 class CoarserClock : public ::testing::TestWithParam<const Method *> {};
 
 TEST_P(CoarserClock, NoBoundIsBroken) {
@@ -124,7 +124,7 @@ TEST_P(CoarserClock, NoBoundIsBroken) {
       }
     }
   }
-  // They need criticalities, groups, and many light tasks.
+  // These need criticalities, groups, or many light tasks.
   const std::set<std::string_view> silent = {"amc_rtb", "dag_groups", "global_rm_light"};
   EXPECT_EQ(bounds == 0, silent.count(method.name) == 1) << bounds;
 }
