@@ -14,7 +14,7 @@
 namespace redag::sim {
 namespace {
 
-// The timer tasks' next releases, a binary heap by (time, task). Every timer has exactly one entry at any time.
+// The timer tasks' next releases, a binary heap by (time, task). Every timer always has exactly one entry.
 class ReleaseQueue {
  public:
   struct Entry {
@@ -91,19 +91,19 @@ class Simulation {
   // A job's progress, by slot; valid while the job is started.
   struct Progress {
     Duration left = 0;      // processor time until it ends, overheads included
-    Duration executed = 0;  // so far
-    Duration lead = 0;      // overheads, which come before the body and hold no preemption point
+    Duration executed = 0;  // up to its last loss of the processor
+    Duration lead = 0;      // overheads; they come before the body and hold no preemption point
     Duration region = 0;
     std::uint32_t place = 0;   // of its task in the static order
     std::uint32_t number = 0;  // within its task
-    bool cut_off = false;      // ends at its budget
-    // Processor time of the body at which these are used up; kNever: not watched, or reported.
+    bool cut_off = false;      // it ends at its budget
+    // Processor time of the body that uses these up; kNever: not watched, or already reported.
     Duration budget = kNever;
     Duration wcet_low = kNever;
   };
   struct Processor {
     JobSlot job;
-    Time since = 0;        // when the job got (or regained) the processor
+    Time since = 0;        // when the job last got the processor
     Time finish = kNever;  // if nothing intervenes
     Time point = kNever;   // the next preemption point that matters, or the next limit
   };
@@ -114,7 +114,7 @@ class Simulation {
     return next;
   }
 
-  // DAG by DAG, in topological order: by TaskId.
+  // Returns the static order by TaskId: DAG by DAG, in topological order.
   static std::vector<std::uint32_t> places_of(const Workload &workload) {
     std::vector<std::uint32_t> places;
     for (const Dag &dag : workload.dags) {
@@ -124,8 +124,8 @@ class Simulation {
     return places;
   }
 
-  // What happens at one instant is told in the static order of tasks, whatever the processors: what they are given
-  // depends on tasks that have nothing to do with these.
+  // Reports what happens at one instant in the static order of tasks. The order of processors depends on unrelated
+  // tasks and must not matter.
   template <class Predicate, class Tell>
   void tell_in_order(Predicate which, Tell tell) {
     at_once_.clear();
@@ -162,19 +162,19 @@ class Simulation {
       const std::uint32_t number = released.number + 1;
       const Duration gap = options_.gap ? options_.gap(task, released.task, number) : 0;
       const Time nominal = released.nominal + task.period + gap;
-      // A job never overtakes the one before it, however large the jitter.
+      // A job never overtakes its predecessor, however large the jitter.
       const Time seen = std::max(now_, nominal + jitter(task, released.task, number));
       releases_.replace_top({nominal < options_.horizon ? seen : kNever, nominal, released.task, number});
     }
   }
 
-  // Processor time of the body so far; negative during the overheads before it.
+  // Processor time of the body up to now; negative during the overheads before it.
   [[nodiscard]] Duration body_of(const Processor &processor) const {
     const Progress &progress = progress_[processor.job.value];
     return progress.executed + (now_ - processor.since) - progress.lead;
   }
 
-  // Jobs that go on although they have used their budget or their wcet_low.
+  // Reports jobs that have used their budget or their wcet_low and continue.
   void reach_limits() {
     const auto reaches_one = [this](const Processor &processor) {
       if (!processor.job.valid()) return false;
@@ -195,7 +195,7 @@ class Simulation {
     });
   }
 
-  // Jobs that stand at a multiple of their region, where that matters.
+  // Reports jobs at a multiple of their region, if another job outranks them.
   void reach_preemption_points() {
     for (Processor &processor : processors_) {
       if (!processor.job.valid() || !scheduler_.outranked(processor.job)) continue;
@@ -227,7 +227,7 @@ class Simulation {
   }
 
   void give_processor(const sched::Dispatch &dispatch) {
-    if (dispatch.kind == sched::DispatchKind::Level) return;  // who runs is told apart
+    if (dispatch.kind == sched::DispatchKind::Level) return;  // other dispatches tell which jobs run
     Processor &processor = processors_[dispatch.worker.value];
     REDAG_CHECK(!processor.job.valid(), "the scheduler gave a processor to two jobs");
     if (dispatch.job.value >= progress_.size()) progress_.resize(dispatch.job.value + 1);
@@ -260,7 +260,7 @@ class Simulation {
     return progress;
   }
 
-  // Only a job that another one outranks has a preemption point worth an event.
+  // Only a job that another one outranks needs an event at its preemption point.
   void plan_points() {
     for (Processor &processor : processors_) {
       processor.point = kNever;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Driver 1: a scheduler in virtual time. Discrete events in integer nanoseconds; the same workload, options and seed
-// give the same events, bit for bit, on every machine. Works with any sched::Scheduler. Single-threaded.
+// Runs a scheduler in virtual time. Discrete events in integer nanoseconds; the same workload, options and seed give
+// the same events, bit for bit, on every machine. Works with any sched::Scheduler. Single-threaded.
 #pragma once
 
 #include <cstdint>
@@ -17,14 +17,14 @@
 
 namespace redag::sim {
 
-/// Processor time that the platform takes, charged to the job it is spent for. Default: none.
+/// Processor time that the platform takes, charged to the job that causes it. Default: none.
 struct Overheads {
   Duration release = 0;   // handling a release: added to the released job's demand
   Duration dispatch = 0;  // starting a job: spent on its worker before the body
-  Duration preempt = 0;   // each resumption after a preemption: spent on the worker before going on
+  Duration preempt = 0;   // each resumption after a preemption: spent on the worker before the job continues
 };
 
-/// Those of a machine, as far as the simulator has them: it knows no stalls and no late releases.
+/// A machine's overheads, as far as the simulator has them: it knows no stalls and no late releases.
 [[nodiscard]] Overheads overheads_of(const redag::Overheads &machine);
 
 struct Options {
@@ -33,24 +33,24 @@ struct Options {
   Overheads overheads;
   /// Execution time of a job, before overheads; default: execution_time() of redag/model/demand.hpp.
   std::function<Duration(const Task &, TaskId, std::uint32_t number)> demand;
-  /// Release of a job of a timer task after its nominal time; default: release_jitter().
+  /// Delay of a timer task's release after its nominal time; default: release_jitter().
   std::function<Duration(const Task &, TaskId, std::uint32_t number)> jitter;
   /// Gap added to the period before the next release, for sporadic tasks (>= 0); default: none, strictly periodic.
   std::function<Duration(const Task &, TaskId, std::uint32_t number)> gap;
 };
 
-/// Receives the events in decision order, a batch an instant. Return false to end the simulation.
+/// Receives the events in decision order, one batch per instant. Returns false to end the simulation.
 using EventSink = std::function<bool(std::span<const JobEvent>)>;
 
 struct Result {
   std::uint64_t released = 0;
   std::uint64_t finished = 0;
-  Time end = 0;  // the horizon, or where the sink ended the simulation
+  Time end = 0;  // the horizon, or when the sink ended the simulation
 };
 
-/// Simulates `workload` under `scheduler`, which must be fresh and built from the same workload.
-/// Order within one instant: completions by worker, limits by worker, releases by TaskId, preemption points by worker,
-/// then the decisions.
+/// Simulates `workload` under `scheduler`, which must be fresh and built from the same workload. Order within one
+/// instant: completions in the static order of tasks, limits in the same order, releases by TaskId, preemption points
+/// by worker, then the decisions.
 Result simulate(const Workload &workload, sched::Scheduler &scheduler, std::uint32_t workers, const Options &options,
                 const EventSink &sink);
 

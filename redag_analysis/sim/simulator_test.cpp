@@ -24,7 +24,7 @@ using redag::testing::simulate_events;
 using redag::testing::timeline;
 constexpr Duration kMs = kMillisecond;
 
-// Liu & Layland, JACM 20(1), 1973: with simultaneous releases (the critical instant) the response of the lowest
+// Liu & Layland, JACM 20(1), 1973: after simultaneous releases (the critical instant) the response of the lowest
 // priority is largest. Periods 4, 6, 12; C 1, 2, 3: R3 = 3 + ceil(10/4) 1 + ceil(10/6) 2 = 10.
 TEST(GoldenSchedule, CriticalInstantOfRateMonotonic) {
   const Workload workload =
@@ -49,7 +49,7 @@ TEST(GoldenSchedule, WithoutPreemptionALongJobBlocks) {
             "hi#0 skipped overrun 5\n");
 }
 
-// Dhall & Liu, Operations Research 26(1), 1978: m light tasks of high rate and one heavy one; at U barely above 1 the
+// Dhall & Liu, Operations Research 26(1), 1978: m light tasks of high rate and a heavy one. At U barely above 1 the
 // heavy one misses although m - 1 processors are nearly idle. m = 2: two (C=1, T=10), one (C=11, T=11).
 TEST(GoldenSchedule, DhallEffect) {
   const Workload workload = make_workload(
@@ -107,7 +107,7 @@ TEST(GoldenSchedule, CapCountsPreemptedJobs) {
   const Workload workload = make_workload({make_dag("capped", {{"slow", 100, 6}, {"fast", 50, 1, {}, "", 2}}, 1),
                                            make_dag("other", {{"mid", 60, 2, {}, "", 1}})},
                                           1, PreemptionMode::Os);
-  // `fast` is more urgent than both, but its DAG's only place is taken by `slow`, which `mid` preempts.
+  // `fast` is more urgent than both, but `slow`, which `mid` preempts, has the only place of its DAG.
   EXPECT_EQ(timeline(workload, simulate_events(workload, 20 * kMs)),
             "slow#0 w0 0-1 w0 3-8\n"
             "mid#0 w0 1-3\n"
@@ -119,7 +119,7 @@ TEST(GoldenSchedule, GroupBlocksAndInheritsPriority) {
       make_workload({make_dag("a", {{"hi", 50, 1, {}, "bus", 2}}), make_dag("b", {{"mid", 60, 4, {}, "", 3}}),
                      make_dag("c", {{"lo", 100, 5, {}, "bus"}})},
                     1, PreemptionMode::Os);
-  // From 2 on `lo` runs at `hi`'s priority, so that `mid` cannot delay `hi` through it.
+  // From 2 on `lo` runs at `hi`'s priority; `mid` thus cannot delay `hi` through it.
   EXPECT_EQ(timeline(workload, simulate_events(workload, 20 * kMs)),
             "lo#0 w0 0-5\n"
             "hi#0 w0 5-6\n"
@@ -191,8 +191,8 @@ std::uint64_t finished(const std::vector<JobEvent> &events, TaskId task) {
   }));
 }
 
-// rclcpp#2912: two timers of 20 ms, one whose body takes 25 ms and one that takes nearly nothing. In a fixed order the
-// second one gets nothing. Of releases of one instant the heavy one goes first, as it does in the file.
+// rclcpp#2912: two timers of 20 ms, one whose body takes 25 ms and one that takes almost no time. In a fixed order the
+// second one never runs. Of simultaneous releases the heavy one goes first, as it does in the file.
 TEST(EqualRates, ALightTimerGetsItsTurnBesideAHeavyOne) {
   Workload workload = make_workload({make_dag("a", {{"heavy", 20, 25}}), make_dag("b", {{"light", 20}})}, 1);
   workload.dags[1].tasks[0].wcet = workload.dags[1].tasks[0].bcet = kMicrosecond;
@@ -205,7 +205,7 @@ TEST(EqualRates, ALightTimerGetsItsTurnBesideAHeavyOne) {
   EXPECT_EQ(finished(events, TaskId(1)), 0U);
 }
 
-// rclcpp#2360: two timers of 100 ms in one mutually exclusive group, whose bodies take longer than that.
+// rclcpp#2360: two timers of 100 ms in one mutually exclusive group; each body takes longer than the period.
 TEST(EqualRates, TimersOfOneGroupTakeTurns) {
   for (const PreemptionMode mode : {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os}) {
     for (const std::uint32_t workers : {1U, 2U}) {
@@ -230,7 +230,7 @@ TEST(EqualRates, AChainTakesTurnsWithATimer) {
   for (const std::uint32_t task : {0U, 1U, 2U}) EXPECT_GE(finished(events, TaskId(task)), 35U) << task;
 }
 
-// Which worker a job has depends on tasks that have nothing to do with it; what another one reads must not.
+// The worker of a job depends on unrelated tasks; the data that another job reads must not.
 class CompletionsOfOneInstant : public ::testing::Test {
  protected:
   static Task timer(const char *name, Duration wcet, Duration period, Time offset) {
@@ -285,7 +285,7 @@ TEST_F(CompletionsOfOneInstant, AreToldInTopologicalOrderWithinADag) {
   EXPECT_EQ(ended, (std::vector<TaskId>{TaskId(1), TaskId(0)}));
 }
 
-// With a worker for everybody nothing is ever delayed, and so nothing that is added changes what any job reads.
+// With enough workers nothing is ever delayed, and added tasks do not change what any job reads.
 TEST_F(CompletionsOfOneInstant, UnrelatedTasksChangeNoDataWhereNobodyWaits) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     Rng rng(seed);
