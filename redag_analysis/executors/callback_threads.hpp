@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the models of rclcpp's executors share: threads that run one callback after the other, each to its end, and know
-// neither priorities nor budgets. Which one is next, the model says. Not thread-safe.
+// What the models of rclcpp's executors share: threads that run one callback after the other, each to its end, without
+// priorities or budgets. The model decides which callback is next. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,10 @@
 
 namespace redag::sched {
 
-/// A job's life is Lifecycle's.
+/// Runs callbacks to completion; Lifecycle keeps the state of the jobs.
 class CallbackThreads : public Lifecycle {
  public:
-  /// Nothing: these executors know neither budgets nor criticality.
+  /// Does nothing: these executors know neither budgets nor criticality.
   void exceed(JobSlot /*job*/, Limit /*limit*/, Time /*now*/) final {}
   void preemption_point(JobSlot job, Time now) final;
   Step dispatch(Time now, std::uint32_t most = kNoLimit) final;
@@ -25,18 +25,18 @@ class CallbackThreads : public Lifecycle {
   /// Requires config.workers > 0 and Preemption::None.
   explicit CallbackThreads(const Config &config, TimerReleases timer_releases = TimerReleases::AsTheTaskSays);
 
-  /// The ready job that a free thread runs next, which is then no longer ready; kNil if there is none for it.
+  /// Removes and returns the ready job that a free thread runs next; kNil if there is none for it.
   virtual std::uint32_t take() = 0;
-  /// Before the free threads take their jobs.
+  /// Called before the free threads take their jobs.
   virtual void before_taking() {}
-  /// A started job has ended; its thread is free.
+  /// Called when a started job has ended and its thread is free.
   virtual void on_over(std::uint32_t slot) = 0;
 
  private:
   void on_end(std::uint32_t slot) final;
   void on_lowered(std::uint32_t /*slot*/) final {}
 
-  std::vector<bool> working_;  // threads
+  std::vector<bool> working_;  // by thread
 };
 
 }  // namespace redag::sched

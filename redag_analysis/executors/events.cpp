@@ -17,20 +17,20 @@ EventsScheduler::EventsScheduler(const Workload &workload, const Config &config,
   load(workload);
 }
 
-// FirstInFirstOutScheduler::get_next_ready_entity.
+// Models FirstInFirstOutScheduler::get_next_ready_entity.
 std::uint32_t EventsScheduler::take() {
   while (!ready_groups_.empty()) {
     const std::uint32_t group = ready_groups_.front();
     ready_groups_.pop_front();
     const std::uint32_t slot = take_from(groups_[group]);
     if (slot != kNil) return slot;
-    give_back(group);  // it had no event but one of a message that is gone: the turn is over at once
+    give_back(group);  // its only events were of messages that are gone: the turn is over at once
   }
   return kNil;
 }
 
-// FirstInFirstOutCallbackGroupHandle::get_next_ready_entity. An event of a timer that has nothing to run, or of what
-// was removed, is passed over; that of a message that is gone makes a turn.
+// Models FirstInFirstOutCallbackGroupHandle::get_next_ready_entity. An event of a timer without a job, or of a removed
+// task, is passed over. An event of a message that is gone uses up the turn.
 std::uint32_t EventsScheduler::take_from(Group &group) {
   while (!group.events.empty()) {
     const TaskId task = group.events.front();
@@ -60,16 +60,17 @@ void EventsScheduler::on_ready(std::uint32_t slot) {
   enqueue(task);
 }
 
-// Its event stays.
+// The queued event is kept, as in rclcpp; it will find nothing to run.
 void EventsScheduler::on_withdrawn(std::uint32_t slot) { entities_[jobs_[slot].task.value].ready.remove(jobs_, slot); }
 
-// Its messages come before its group goes back: they were published during the callback, and are reported next.
+// The job's messages are queued before its group goes back: they were published during the callback, and are reported
+// next.
 void EventsScheduler::on_over(std::uint32_t slot) {
   give_back_groups();
   ended_.push_back(jobs_[slot].task);
 }
 
-// CallbackGroupHandle::mark_as_executed; then the timers' thread sees what expired during the callback.
+// Models CallbackGroupHandle::mark_as_executed. Afterwards the timers' thread sees what expired during the callback.
 void EventsScheduler::give_back_groups() {
   for (const TaskId task : ended_) {
     Entity &entity = entities_[task.value];
@@ -87,8 +88,8 @@ void EventsScheduler::give_back(std::uint32_t position) {
   if (!group.idle) ready_groups_.push_back(position);
 }
 
-// Positions last as long as tasks and named groups do: even ones for tasks alone in their group, odd ones for named
-// groups. What is left of events has a job: an id may be another task's now.
+// Positions are valid as long as their tasks and named groups: even for tasks alone in their group, odd for named
+// groups. Events without a job are removed, because an id may now be another task's.
 void EventsScheduler::on_reconfigured() {
   give_back_groups();
   entities_.resize(tasks_.size());

@@ -48,7 +48,7 @@ TEST(Events, NoPeriodOfATimerIsLost) {
   EXPECT_EQ(executor.accounting("fast").skipped, 0U);
 }
 
-// The event of the message that was overwritten takes the newer one; the newer one's event finds nothing.
+// The event of the overwritten message takes the newer one; the newer one's event finds nothing.
 TEST(Events, AnEventTakesTheNewestMessage) {
   NamedExecutor executor = events({{timer("source"), subscription("sink", {0})}, {timer("other")}});
   EXPECT_EQ(executor.release_and_dispatch({"source", "source", "other"}), Names{"source"});
@@ -74,7 +74,7 @@ TEST(EventsCbg, ATimerExpiresAgainOnlyAfterItsCallback) {
   executor.release("fast");
   executor.release("fast");
   executor.release("slow");
-  EXPECT_EQ(executor.end("fast"), Names{"slow"});  // the timer's next event is queued after its callback only
+  EXPECT_EQ(executor.end("fast"), Names{"slow"});  // the timer's next event is queued only after its callback
   EXPECT_EQ(executor.end("slow"), Names{"fast"});
   EXPECT_EQ(executor.end("fast"), Names{});
   EXPECT_EQ(executor.accounting("fast").skipped, 1U);
@@ -95,12 +95,12 @@ TEST(EventsCbg, GroupsTakeTurns) {
   for (Task &task : driver) task.group = "driver";
   NamedExecutor executor = cbg({driver, {timer("other")}});
   EXPECT_EQ(executor.release_and_dispatch({"a", "b", "c", "other"}), Names{"a"});
-  EXPECT_EQ(executor.end("a"), Names{"other"});  // although it came last
+  EXPECT_EQ(executor.end("a"), Names{"other"});  // although it arrived last
   EXPECT_EQ(executor.end("other"), Names{"b"});
   EXPECT_EQ(executor.end("b"), Names{"c"});
 }
 
-// Its message was sent before its group went back to the end of the queue.
+// The message was sent before the sender's group went to the end of the queue.
 TEST(EventsCbg, AMessageIsQueuedBeforeTheSendersNextTurn) {
   std::vector<Task> dag = {timer("source"), timer("twin"), subscription("sink", {0})};
   dag[0].group = dag[1].group = "sensors";
@@ -129,8 +129,8 @@ TEST(EventsCbg, JobsOfAReentrantTaskDoNotOverlap) {
   EXPECT_EQ(executor.end("often"), Names{"often"});
 }
 
-// On random workloads and events: a group never runs twice, no job is forgotten, and no worker idles while there is
-// one.
+// On random workloads and events, a group never runs twice at once, no job is forgotten, and no worker idles while a
+// job is ready.
 void keeps_groups_apart_and_workers_busy(std::string_view executor, std::uint64_t seed) {
   Rng rng(seed);
   const Workload workload = testing::random_workload(rng);

@@ -39,7 +39,7 @@ TEST(Executors, AModelOfRclcppDoesNotPreempt) {
   EXPECT_EQ(effective_config(*find_executor("redag"), config).preemption, Preemption::Full);
 }
 
-// The faster of two timers is the second one: only ours looks at the rates.
+// The faster of two timers is the second one: only our executor considers the rates.
 TEST(Executors, MakeSchedulersThatDifferInWhoIsFirst) {
   for (const ExecutorKind &kind : executors()) {
     const auto scheduler = make_scheduler(kind.name, two_timers(), Config{});

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The ready jobs of one task, oldest first: a list through Job::task_next. What models of rclcpp's executors have for
+// The ready jobs of one task, oldest first: a list through Job::task_next. Models of rclcpp's executors have one for
 // each timer and subscription.
 #pragma once
 
@@ -24,7 +24,7 @@ struct ReadyJobs {
     last = slot;
   }
 
-  /// Takes the oldest one out. Requires !empty().
+  /// Removes and returns the oldest job. Requires !empty().
   std::uint32_t pop(std::vector<Job> &jobs) {
     const std::uint32_t slot = first;
     remove(jobs, slot);

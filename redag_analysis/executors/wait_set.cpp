@@ -10,14 +10,14 @@ WaitSetScheduler::WaitSetScheduler(const Workload &workload, const Config &confi
   load(workload);
 }
 
-// Executor::get_next_executable, by one free thread after the other: from the window, or else from a new one.
+// Models Executor::get_next_executable: one free thread after the other takes from the window, or else from a new one.
 std::uint32_t WaitSetScheduler::take() {
   const std::uint32_t slot = take_from_window();
   return slot == kNil && wait() ? take_from_window() : slot;
 }
 
-// get_next_ready_executable: the first entity of the window whose group is free leaves the window. An entity whose job
-// was skipped meanwhile has nothing to take and leaves it too.
+// Models get_next_ready_executable: the first entity of the window whose group is free leaves the window. An entity
+// whose job was skipped meanwhile has nothing to take, and leaves it, too.
 std::uint32_t WaitSetScheduler::take_from_window() {
   for (const std::uint32_t task : registration_) {
     Entity &entity = entities_[task];
@@ -30,8 +30,8 @@ std::uint32_t WaitSetScheduler::take_from_window() {
   return kNil;
 }
 
-// wait_for_work: forgets the old window; the new one holds the ready entities of groups that are free. Returns whether
-// there are any; if not, the thread goes on waiting.
+// Models wait_for_work: forgets the old window, and fills the new one with the ready entities of free groups. Returns
+// false if there are none; the thread then continues to wait.
 bool WaitSetScheduler::wait() {
   bool any = false;
   for (Entity &entity : entities_) {
@@ -47,7 +47,7 @@ void WaitSetScheduler::on_withdrawn(std::uint32_t slot) { entities_[jobs_[slot].
 
 void WaitSetScheduler::on_over(std::uint32_t slot) { ++room_[entities_[jobs_[slot].task.value].group]; }
 
-// Entities keep their jobs and their place in the window; the groups are numbered anew.
+// Entities keep their jobs and their place in the window; the groups are renumbered.
 void WaitSetScheduler::on_reconfigured() {
   entities_.resize(tasks_.size());
   registration_.clear();
@@ -62,7 +62,7 @@ void WaitSetScheduler::on_reconfigured() {
     Entity &entity = entities_[t];
     entity.group = named == kNil ? t : static_cast<std::uint32_t>(tasks_.size()) + named;
     if (named == kNil) room_[t] = tasks_[t].concurrency;
-    if (entity.ready.empty()) entity.in_window = false;  // it may be another task of this id
+    if (entity.ready.empty()) entity.in_window = false;  // this id may now be another task's
   }
   for (const Job &job : jobs_) {
     if (job.started()) --room_[entities_[job.task.value].group];

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Model of rclcpp's executors that wait for a set of entities, as of ROS 2 Humble: SingleThreadedExecutor,
-// MultiThreadedExecutor, StaticSingleThreadedExecutor. Owns which ready job runs next. Not thread-safe. What is
-// modelled and what is not: at the class.
+// Models rclcpp's executors that wait for a set of entities, as of ROS 2 Humble: SingleThreadedExecutor,
+// MultiThreadedExecutor, StaticSingleThreadedExecutor. Decides which ready job runs next. The class says what is
+// modelled and what is not. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -16,27 +16,30 @@ namespace redag::sched {
 
 /// Modelled (rclcpp/src/rclcpp/executor.cpp and allocator_memory_strategy.hpp):
 /// - A wait returns the set of ready entities (Executor::wait_for_work, collect_entities, remove_null_handles).
-///   Entities of an exclusive group that is busy are left out. This set is used up before the next wait: what becomes
-///   ready meanwhile is not seen (the processing window of Casini, Blass, Luetkebohle, Brandenburg, ECRTS 2019).
-/// - From the set: timers first, then subscriptions (get_next_ready_executable_from_map), in the order of registration,
-///   each once; those whose group is busy are passed over and stay (get_next_timer, get_next_subscription).
-/// - StaticSingleThreadedExecutor walks through the set in the same way, but subscriptions first, then timers
+///   Entities of an exclusive group that is busy are left out. This set is used up before the next wait, and what
+///   becomes ready meanwhile is not seen. This is the processing window of Casini, Blass, Luetkebohle, Brandenburg,
+///   ECRTS 2019.
+/// - From the set timers go first, then subscriptions (get_next_ready_executable_from_map), in the order of
+///   registration, each once. Those whose group is busy are passed over and stay (get_next_timer,
+///   get_next_subscription).
+/// - StaticSingleThreadedExecutor walks through the set in the same way, but takes subscriptions first, then timers
 ///   (rclcpp/src/rclcpp/executors/static_single_threaded_executor.cpp, execute_ready_executables).
 /// - MultiThreadedExecutor::run: the threads take one entity each under a lock; a group is busy until its job ends.
-/// Not modelled: what rcl_wait, the lock and waking a thread cost; services, clients, waitables; that groups are walked
-/// in the order of their addresses, which is arbitrary (here: order of DAGs and tasks). Of the static executor:
-/// messages within the process, which it takes last, even if they came during the walk; and Jazzy's, which waits again
-/// after each callback, so that a ready subscription always goes before every timer.
 ///
-/// A timer task is a timer, a data task a subscription. `group` is the callback group; a task without one is alone in a
-/// group of its own, whereas in ROS 2 all callbacks of a node share its default group unless told otherwise. Bounds of
-/// DAGs (max_active), priorities and preemption are unknown to these executors.
+/// Not modelled: the cost of rcl_wait, of the lock and of waking a thread; services, clients and waitables. ROS 2 walks
+/// through groups in the arbitrary order of their addresses (here: the order of DAGs and tasks). The static executor
+/// takes messages within the process last, even if they came during the walk. Jazzy's static executor waits again after
+/// each callback; a ready subscription thus always goes before every timer.
+///
+/// A timer task is a timer, a data task a subscription. `group` is the callback group. A task without one is alone in a
+/// group of its own, whereas in ROS 2 all callbacks of a node share its default group unless the node says
+/// otherwise. These executors do not know max_active, priorities and preemption.
 class WaitSetScheduler final : public CallbackThreads {
  public:
   enum class Order : std::uint8_t { TimersFirst, SubscriptionsFirst };
 
-  /// Requires config.workers > 0 and Preemption::None; 1 worker is the SingleThreadedExecutor, or, with subscriptions
-  /// first, the static one.
+  /// Requires config.workers > 0 and Preemption::None. With 1 worker it is the SingleThreadedExecutor or, with
+  /// subscriptions first, the static one.
   WaitSetScheduler(const Workload &workload, const Config &config, Order order);
 
  private:
@@ -59,7 +62,8 @@ class WaitSetScheduler final : public CallbackThreads {
   Order order_;
   std::vector<Entity> entities_;             // by TaskId
   std::vector<std::uint32_t> registration_;  // tasks in the order in which a window is searched
-  std::vector<std::uint32_t> room_;          // jobs that groups can start: one group for each task, then the named ones
+  std::vector<std::uint32_t> room_;          // number of jobs that a group can start: one group for each task, then the
+                                             // named ones
 };
 
 }  // namespace redag::sched

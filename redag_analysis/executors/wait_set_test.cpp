@@ -46,7 +46,7 @@ TEST(SingleThreaded, TimersGoBeforeSubscriptionsAndBothInTheOrderOfRegistration)
   EXPECT_EQ(ste.release_and_dispatch({"source"}), Names{"source"});
   ste.release("fast");
   ste.release("slow");
-  EXPECT_EQ(ste.end("source"), Names{"slow"});  // neither the rate nor who came first counts
+  EXPECT_EQ(ste.end("source"), Names{"slow"});  // neither the rate nor the order of arrival counts
   EXPECT_EQ(ste.end("slow"), Names{"fast"});
   EXPECT_EQ(ste.end("fast"), Names{"first"});
   EXPECT_EQ(ste.end("first"), Names{"second"});
@@ -75,7 +75,7 @@ TEST(SingleThreaded, AnEntityIsTakenOnceAWindowSoNobodyStarves) {
   EXPECT_EQ(ste.end("often"), Names{"other"});
   EXPECT_EQ(ste.end("other"), Names{"often"});
   ste.release("other");
-  EXPECT_EQ(ste.end("often"), Names{"often"});  // "other" came during the window of one; both are in the next one
+  EXPECT_EQ(ste.end("often"), Names{"often"});  // "other" arrived during the window of one; both are in the next one
   EXPECT_EQ(ste.end("often"), Names{"other"});
 }
 
@@ -126,12 +126,12 @@ TEST(MultiThreaded, AWaitForgetsWhatABusyGroupLeft) {
   a.group = b.group = "driver";
   NamedExecutor mte = multi_threaded({{timer("late")}, {a}, {b}, {timer("c")}});
   EXPECT_EQ(mte.release_and_dispatch({"a", "b", "c"}), (Names{"a", "c"}));
-  EXPECT_EQ(mte.end("c"), Names{});  // nothing to take but b: the window is given up
+  EXPECT_EQ(mte.end("c"), Names{});  // only b could be taken: the window is given up
   EXPECT_EQ(mte.release_and_dispatch({"late"}), Names{"late"});
   mte.release("c");
   EXPECT_EQ(mte.end("late"), Names{"c"});
   mte.release("late");
-  EXPECT_EQ(mte.end("a"), Names{"late"});  // b starts anew among the ready ones
+  EXPECT_EQ(mte.end("a"), Names{"late"});  // b competes again with all ready entities
   EXPECT_EQ(mte.end("c"), Names{"b"});
 }
 
@@ -146,11 +146,11 @@ TEST(StaticSingleThreaded, SubscriptionsGoBeforeTimers) {
 TEST(StaticSingleThreaded, WhatBecomesReadyDuringAWindowIsSeenAfterIt) {
   NamedExecutor executor = static_single_threaded({{timer("source"), subscription("sink", {0})}, {timer("other")}});
   EXPECT_EQ(executor.release_and_dispatch({"source", "other"}), Names{"source"});
-  EXPECT_EQ(executor.end("source"), Names{"other"});  // the message is there, but the set was made before
+  EXPECT_EQ(executor.end("source"), Names{"other"});  // the message has arrived, but the set was made before
   EXPECT_EQ(executor.end("other"), Names{"sink"});
 }
 
-// On random workloads and events: a group never runs twice, and no worker idles while a job could be taken.
+// On random workloads and events, a group never runs twice at once, and no worker idles while a job could be taken.
 RC_GTEST_PROP(WaitSet, KeepsGroupsApartAndWorkersBusy, (std::uint64_t seed)) {
   Rng rng(seed);
   const Workload workload = testing::random_workload(rng);
