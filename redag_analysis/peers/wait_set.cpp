@@ -13,7 +13,7 @@
 namespace redag::analysis {
 namespace {
 
-// From readiness to finish, by TaskId.
+// The responses from readiness to finish, by TaskId.
 std::vector<Duration> responses_from_ready(const System &system) {
   Duration all = 0;
   for (const SystemTask &task : system.tasks) all = add(all, task.wcet);
@@ -31,7 +31,8 @@ std::vector<Duration> responses_from_ready(const System &system) {
 }
 
 ResponseBound bound_of(const System &system, const Unit &unit, const std::vector<Duration> &from_ready) {
-  std::vector<Duration> paths(system.tasks.size(), 0);  // longest sum that ends with a task, and its own execution
+  std::vector<Duration> paths(system.tasks.size(), 0);  // the longest sum that ends with a task; `own`: its executions
+                                                        // alone
   std::vector<Duration> own(system.tasks.size(), 0);
   std::uint32_t last = unit.tasks.front();
   for (const std::uint32_t t : unit.tasks) {

@@ -19,7 +19,7 @@
 namespace redag::analysis {
 namespace {
 
-// From a task's arrival to its finish: C + the shares of others + what its own earlier jobs add (or take away).
+// From a task's arrival to its finish: C, the shares of others, and what its own earlier jobs add (or take away).
 struct FromReady {
   Duration response = 0;
   Duration earlier = 0;
@@ -38,10 +38,10 @@ Duration arrivals(const Callback &callback, Duration length) {
   return length <= 0 ? 0 : ceil_div(add(length, callback.ready), callback.period);
 }
 
-// All callbacks of an executor, with what is known of them so far. Responses only ever grow.
+// All callbacks of an executor, with what is known of them so far. Responses only grow.
 class Executor {
  public:
-  /// Of one callback, given `callbacks`; nothing: more than `limit`, or no end was found.
+  /// Computes the response of one callback, given `callbacks`; empty if it is above `limit` or no end was found.
   using Respond =
       std::function<std::optional<FromReady>(const std::vector<Callback> &callbacks, std::size_t i, Duration limit)>;
 
@@ -70,7 +70,7 @@ class Executor {
   }
 
  private:
-  // Of each callback, units in their order and tasks in that of their edges: when it arrives, and its response.
+  // Computes arrival and response of each callback, units in their order and tasks in that of their edges.
   std::string_view solve() {
     std::vector<Duration *> values;
     std::vector<std::uint32_t> whose;
@@ -112,7 +112,7 @@ class Executor {
     return latest;
   }
 
-  // Back from the task that ends last to the one that it waited for, and so on: sum of all they take.
+  // Goes back from the task that ends last to the one that it waited for, and so on, and sums up what all take.
   [[nodiscard]] ResponseBound explain(const Unit &unit) const {
     const auto end = [&](std::uint32_t t) { return callbacks_[t].ready + callbacks_[t].response; };
     std::uint32_t at = *std::max_element(unit.tasks.begin(), unit.tasks.end(),
@@ -169,8 +169,8 @@ std::optional<std::string> why_not_one_thread(const System &system) {
   return why_not(system);
 }
 
-// The published busy window holds one job of each callback where all keep J + R <= T (docs/analysis.md, "rclcpp's
-// executors"), so that nothing of it is left but the sum of all.
+// Where all keep J + R <= T, the published busy window holds one job of each callback (docs/analysis.md, "rclcpp's
+// executors"). Its result is then the sum of all executions.
 std::optional<FromReady> casini_response(const std::vector<Callback> &callbacks, std::size_t i, Duration /*limit*/) {
   FromReady found;
   for (const Callback &callback : callbacks) {
@@ -181,7 +181,7 @@ std::optional<FromReady> casini_response(const std::vector<Callback> &callbacks,
   return found;
 }
 
-// 1 where j is registered before i.
+// Returns 1 if j is registered before i, else 0.
 Duration before(const std::vector<Callback> &callbacks, std::size_t j, std::size_t i) {
   return callbacks[j].place < callbacks[i].place ? 1 : 0;
 }
@@ -210,7 +210,7 @@ std::optional<FromReady> blass_response(const std::vector<Callback> &callbacks, 
   return found;
 }
 
-// In any window of length x, by jobs that execute one after the other, within J + R of their releases.
+// The work in any window of length x by jobs that execute one after the other, within J + R of their releases.
 Duration work_of(const Callback &callback, Duration x) {
   const Duration until = add(x, callback.ready + callback.response - callback.wcet);
   return add(multiply(until / callback.period, callback.wcet), std::min(callback.wcet, until % callback.period));
@@ -239,7 +239,7 @@ std::optional<FromReady> rates_response(const std::vector<Callback> &callbacks, 
   });
   if (!found) return std::nullopt;
   FromReady result{d - 1 + own.wcet, 0, std::vector<Duration>(callbacks.size(), 0)};
-  // Shares of a sum that is divided once: they add up to d - 1, what very many threads leave open at the last one.
+  // Shares of a sum that is divided once: they add up to d - 1. With very many threads the last one takes what remains.
   const auto m = static_cast<Duration>(threads);
   Duration sum = 0;
   for (std::size_t j = 0; j < callbacks.size(); ++j) {

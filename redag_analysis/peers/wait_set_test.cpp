@@ -30,7 +30,7 @@ testing::BoundGenerator callbacks(std::uint32_t workers, double utilization, boo
   return testing::cases(limits);
 }
 
-// Under the model of the executor of so many threads.
+// Tests the bound under the model of the executor with this number of threads.
 void expect_holds(const Method &method, std::uint32_t workers, double utilization) {
   for (const bool edges : {true, false}) {
     const testing::BoundPropertyOptions options{.workloads = 700, .executor = workers == 1 ? "ste" : "mte"};
@@ -78,16 +78,16 @@ TEST(WaitSetBound, EveryOtherCallbackOnceAndThoseBeforeTwice) {
   }
 }
 
-// Rates: the long one comes once while the short one waits, not again before it.
+// With rates, the long callback arrives once while the short one waits, and not again before it.
 TEST(WaitSetBound, ACallbackThatSeldomComesCountsOnce) {
   Workload workload = three_timers(1);
   const System system = compile(workload, platform_of(workload)).value();
-  // Registered 3, 5, 7: by windows 3 + 5 + 7, 5 + 2 * 3 + 7, 7 + 2 * (3 + 5); within 100 each comes only once.
+  // Registered 3, 5, 7. By windows: 3 + 5 + 7, 5 + 2 * 3 + 7, 7 + 2 * (3 + 5); within 100 each arrives only once.
   for (const Method &method : {casini(), blass(), wait_set_rates()}) {
     const Outcome outcome = method.apply(system);
     for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) EXPECT_EQ(bound.response, 15) << method.name;
   }
-  // Every 15 the first comes twice in a busy window, but can only delay the last one twice by its window.
+  // With a period of 15 the first arrives twice in a busy window, and windows let it delay the last one twice at most.
   workload.dags[0].tasks[0].period = workload.dags[0].tasks[0].deadline = 15;
   const System faster = compile(workload, platform_of(workload)).value();
   const auto last = [&](const Method &method) {
@@ -124,8 +124,8 @@ void expect_never_above(const Method &tight, const Method &loose, std::uint32_t 
   EXPECT_GT(smaller, 100U) << tight.name << " never below " << loose.name;
 }
 
-// With jitter 6 and a response of 14 the first job of the other can end as late as 20 after its nominal release: the
-// next one, 20 after that, follows on it.
+// With jitter 6 and a response of 14 the other task's first job can end as late as 20 after its nominal release. The
+// next job, released 20 after that release, follows on it directly.
 TEST(WaitSetBound, WorkComesCloserWithJitter) {
   const auto second = [](Duration jitter) {
     Workload workload = three_timers(1);
