@@ -12,7 +12,7 @@
 namespace redag::analysis {
 namespace {
 
-// Own execution, and all that keeps it waiting: what that was differs from schedule to schedule.
+// Splits the response into own execution and waiting. The causes of the wait differ from schedule to schedule.
 ResponseBound bound_of(const SystemTask &task, std::uint32_t t, Duration response) {
   ResponseBound bound;
   bound.response = response;

@@ -12,7 +12,7 @@
 namespace redag::analysis {
 namespace {
 
-// A unit is released as a whole: with the offset of its timers.
+// A unit is released as a whole, with the offset of its timers.
 Time offset_of(const System &system, const Unit &unit) {
   for (const std::uint32_t t : unit.tasks) {
     if (!system.tasks[t].data) return system.tasks[t].offset;
@@ -60,8 +60,8 @@ class Builder {
     model_.round_hash += added.hash * added.jobs;
   }
 
-  // Where a state keeps what. One worker is free whenever a decision is due, with it all gates, and what has been
-  // dispatched before has ended: its interval is the state.
+  // Assigns the places of a state. With one worker, a free worker means that all gates are free and that all dispatched
+  // jobs have ended: the worker's interval is the whole state.
   void layout() {
     model_.width = model_.workers;
     if (model_.workers == 1) return;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The exploration against the scheduler that runs for real: on tiny systems with every release jitter and execution
-// time there is, on larger ones with random ones, and against the bounds, which hold for more than it does.
+// Compares the exploration with the scheduler that runs for real: on tiny systems with every release jitter and
+// execution time, on larger ones with random ones. Also compares it with the bounds, which hold for more than it does.
 #include "redag_analysis/explore/exploration.hpp"
 
 #include <gtest/gtest.h>
@@ -36,10 +36,10 @@ System compiled(const BoundCase &bound_case) {
 struct Limits {
   std::uint32_t workers = 1;
   std::uint32_t max_dags = 3;
-  std::uint32_t max_tasks = 3;  // of a DAG with edges
+  std::uint32_t max_tasks = 3;  // in a DAG with edges
   Duration max_wcet = 3;
-  Duration scale = 1;  // of all times
-  bool rich = false;   // more jitter and spread of execution times than can be enumerated
+  Duration scale = 1;  // a factor on all times
+  bool rich = false;   // more jitter and more varied execution times than can be enumerated
 };
 
 BoundCase random_case(Rng &rng, const Limits &limits) {
@@ -99,7 +99,7 @@ using Demands = std::vector<std::vector<Demand>>;  // by TaskId, by job number
 
 struct Seen {
   std::vector<std::vector<ResponseRange>> responses;  // as Exploration::responses
-  bool overrun = false;                               // a job was skipped or answered after its period
+  bool overrun = false;                               // a job was skipped, or answered after its period
 };
 
 void simulate(const BoundCase &bound_case, const System &system, const Demands &demands, Time horizon, Seen &seen) {
@@ -112,7 +112,7 @@ void simulate(const BoundCase &bound_case, const System &system, const Demands &
   options.jitter = [&](const Task &, TaskId id, std::uint32_t number) {
     return number < demands[id.value].size() ? demands[id.value][number].jitter : 0;
   };
-  std::vector<Duration> finished(system.tasks.size());  // jobs
+  std::vector<Duration> finished(system.tasks.size());  // number of jobs
   sim::simulate(bound_case.workload, scheduler, config.workers, options, [&](std::span<const JobEvent> events) {
     for (const JobEvent &event : events) {
       if (event.kind == JobEventKind::Skipped) seen.overrun = true;
@@ -129,7 +129,7 @@ void simulate(const BoundCase &bound_case, const System &system, const Demands &
     }
     return !seen.overrun;
   });
-  // Nothing happens to a job that waits for ever.
+  // A job that waits forever causes no event: count the jobs that finished.
   for (std::size_t t = 0; t < finished.size() && !seen.overrun; ++t) {
     const Unit &unit = system.units[system.tasks[t].unit];
     seen.overrun = system.tasks[unit.tasks.front()].offset + (finished[t] + 1) * unit.period < horizon;
@@ -142,7 +142,7 @@ Seen nothing_seen(const Exploration &exploration) {
   return seen;
 }
 
-// A job of each task for every period that begins before the horizon.
+// Returns one job of each task for every period that begins before the horizon.
 std::vector<std::size_t> job_counts(const System &system, Time horizon) {
   std::vector<std::size_t> counts(system.tasks.size());
   for (const Unit &unit : system.units) {
@@ -153,8 +153,8 @@ std::vector<std::size_t> job_counts(const System &system, Time horizon) {
   return counts;
 }
 
-// Every combination of jitters and execution times of the jobs released before the horizon; nothing if there are more
-// than `most`.
+// Simulates every combination of jitters and execution times of the jobs released before the horizon; empty if there
+// are more than `most`.
 std::optional<Seen> enumerate(const BoundCase &bound_case, const System &system, const Exploration &exploration,
                               Time horizon, std::uint64_t most) {
   struct Choice {
@@ -206,7 +206,7 @@ std::string compare(const Exploration &exploration, const Seen &seen, bool exact
     for (std::size_t k = 0; k < seen.responses[t].size(); ++k) {
       const ResponseRange &range = seen.responses[t][k];
       const ResponseRange &bound = exploration.responses[t][k];
-      if (range.worst == 0 && !exactly) continue;  // not seen
+      if (range.worst == 0 && !exactly) continue;  // never simulated
       const bool is_within = bound.best <= range.best && range.worst <= bound.worst;
       if (is_within && (!exactly || bound == range)) continue;
       wrong += fmt::format("task {} job {}: seen [{}, {}], explored [{}, {}]\n", t, k, range.best, range.worst,
@@ -216,7 +216,7 @@ std::string compare(const Exploration &exploration, const Seen &seen, bool exact
   return wrong;
 }
 
-// Tiny systems: what was explored, and what all schedules do.
+// Tiny systems: compares what was explored with what all schedules do.
 template <class Judge>
 void enumerate_systems(const Limits &limits, std::uint64_t systems, Judge judge) {
   std::uint64_t compared = 0;
@@ -230,7 +230,7 @@ void enumerate_systems(const Limits &limits, std::uint64_t systems, Judge judge)
     const bool overruns = exploration.end == Exploration::End::Overrun;
     ASSERT_TRUE(overruns || exploration.end == Exploration::End::Complete) << "seed " << seed << "\n"
                                                                            << describe(bound_case);
-    // Long enough for what is new in each hyperperiod, with the offsets before it; and for a late job to end.
+    // Long enough for what is new in each hyperperiod, with the offsets before it, and for a late job to end.
     const std::uint32_t rounds = exploration.hyperperiods + (overruns ? 2 : 0);
     const Time horizon = last_offset(system) + exploration.hyperperiod * rounds;
     const std::optional<Seen> seen = enumerate(bound_case, system, exploration, horizon, 4000);
@@ -245,7 +245,8 @@ void enumerate_systems(const Limits &limits, std::uint64_t systems, Judge judge)
   EXPECT_LT(late, compared);
 }
 
-// Unless the order of a data task and an equal was not sure somewhere: then safe, and it says so.
+// The ranges are exact unless the order of a data task and an equal was uncertain; then they are safe, and `exact` is
+// false.
 TEST(ExplorationProperty, OneWorkerIsExact) {
   std::uint64_t exact = 0;
   std::uint64_t safe = 0;
@@ -293,7 +294,7 @@ TEST(ExplorationProperty, SeveralWorkersAreSafe) {
   EXPECT_GT(tight * 100, ranges * 98);
 }
 
-// Longer times, more jobs: at random, for several hyperperiods.
+// Longer times and more jobs, at random, for several hyperperiods.
 TEST(ExplorationProperty, NoSimulatedResponseIsOutside) {
   std::uint64_t complete = 0;
   const std::uint64_t systems = testing::how_many(1000);
@@ -339,7 +340,7 @@ TEST(ExplorationProperty, NoSimulatedResponseIsOutside) {
   EXPECT_GT(complete, systems / 5);
 }
 
-// The bounds for one worker hold for all offsets and gaps: nothing explored exceeds them.
+// The bounds for one worker hold for all offsets and gaps: no explored response exceeds them.
 TEST(ExplorationProperty, OneWorkerIsNeverAboveTheBounds) {
   std::uint64_t compared = 0;
   for (std::uint64_t seed = 1; seed <= testing::how_many(500); ++seed) {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// explore(): breadth first, a level for each number of jobs dispatched.
+// explore(): breadth first, with a level for each number of dispatched jobs.
 #include <algorithm>
 #include <limits>
 
@@ -34,7 +34,7 @@ class Explorer {
         tasks_(model_.tasks) {
     result_.hyperperiod = model_.hyperperiod;
     result_.jobs = model_.jobs;
-    result_.exact = workers_ == 1;  // until the order of two equals is not sure
+    result_.exact = workers_ == 1;  // until the order of two equals is uncertain
     for (const ExploredTask &task : tasks_) result_.responses.emplace_back(task.jobs);
     before_.assign(tasks_.size(), -1);
     for (std::uint32_t t = 0; t < tasks_.size(); ++t) (void)find_before(t);
@@ -65,16 +65,16 @@ class Explorer {
   }
 
  private:
-  // The next job of a task, all of whose predecessors have been dispatched.
+  // The next job of a task whose predecessors' jobs have all been dispatched.
   struct Candidate {
     std::uint32_t task = 0;
     std::uint32_t number = 0;
     Time nominal = 0;
-    Interval ready;            // as far as its release goes
-    bool waits = false;        // for predecessors or gates as well: `ready` depends on the state
-    bool data = false;         // its turn depends on the state
-    bool is_unsure = false;    // so does its order among its equals
-    std::int64_t urgency = 0;  // tier, or absolute deadline (edf): equals take turns
+    Interval ready;            // considering its release alone
+    bool waits = false;        // also for predecessors or gates: `ready` depends on the state
+    bool data = false;         // a data task: its turn depends on the state
+    bool is_unsure = false;    // its order among its equals depends on the state, too
+    std::int64_t urgency = 0;  // tier, or absolute deadline (edf); equals take turns
     std::uint32_t rank = 0;
   };
 
@@ -102,7 +102,7 @@ class Explorer {
     return true;
   }
 
-  // Nothing is dispatched before it after `counts_`.
+  // No job that can follow `counts_` is dispatched before this time.
   [[nodiscard]] Time earliest_release() const {
     Time earliest = kNever;
     for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
@@ -112,7 +112,7 @@ class Explorer {
     return earliest;
   }
 
-  // What happens before `time` might as well happen then: nothing is decided in between.
+  // Moves what happens before `time` to `time`. No decision is taken in between.
   static void raise(Time time, std::vector<Interval> &row) {
     for (Interval &interval : row) {
       if (interval == kForgotten) continue;
@@ -121,7 +121,7 @@ class Explorer {
     }
   }
 
-  // All ways in which the schedules of a node go on. False: the exploration ends.
+  // Follows the schedules of a node in all ways in which they can continue. Returns false if the exploration ends.
   bool follow(const StateSet &states, std::uint32_t node, StateSet &next) {
     const auto counts = states.counts(node);
     counts_.assign(counts.begin(), counts.end());
@@ -133,7 +133,7 @@ class Explorer {
     return goes_on;
   }
 
-  // Most urgent first; of equals, timers in the order of their turns.
+  // Sorts most urgent first; among equals, timers are in the order of their turns.
   void find_candidates() {
     candidates_.clear();
     for (const std::uint32_t t : system_.by_rank) {
@@ -174,8 +174,8 @@ class Explorer {
     }
   }
 
-  // The turn of a timer's job is its nominal release, that of a data task's the finish of the predecessor that ended
-  // last. When that was at the earliest the state does not say (see raise()), but the executions before it do.
+  // The turn of a timer's job is its nominal release; that of a data task's job is the finish of its last predecessor.
+  // The state does not hold the earliest value of that finish (see raise()), but the executions before it give one.
   [[nodiscard]] Interval turn_of(const Candidate &candidate, std::span<const Interval> state) const {
     if (!candidate.data) return {candidate.nominal, candidate.nominal};
     const Time earliest = candidate.nominal + before_[candidate.task];
@@ -195,8 +195,8 @@ class Explorer {
     return before_[t] = least;
   }
 
-  // Whether candidates_[x], which is not less urgent, surely goes before candidates_[c]. If neither surely does, both
-  // orders are followed.
+  // True if candidates_[x], which is not less urgent, certainly goes before candidates_[c]. If neither certainly does,
+  // both orders are followed.
   [[nodiscard]] bool surely_first(std::size_t x, std::size_t c, std::span<const Interval> state) const {
     const Candidate &a = candidates_[x];
     const Candidate &b = candidates_[c];
@@ -209,7 +209,7 @@ class Explorer {
     return latest < earliest || (latest == earliest && a.rank < b.rank);
   }
 
-  // Not to end after the next release.
+  // The latest start with which the job need not end after the next release.
   [[nodiscard]] Time latest_start(const Candidate &candidate) const {
     const ExploredTask &task = tasks_[candidate.task];
     return candidate.nominal + task.period - task.bcet;
@@ -221,7 +221,7 @@ class Explorer {
     return false;
   }
 
-  // When the candidate is eligible but for the workers.
+  // When the candidate is eligible, regardless of the workers.
   [[nodiscard]] Interval eligible(const Candidate &candidate, std::span<const Interval> state) const {
     const ExploredTask &task = tasks_[candidate.task];
     Interval result = candidate.ready;
@@ -234,9 +234,10 @@ class Explorer {
     return result;
   }
 
-  // From when on the candidate is surely eligible if a worker is free and `other` eligible. Of what it waits for that
-  // need not count which has ended by then: what a job that has started, or `other`, waited for, too; and what ends
-  // before two workers can be free, as it ended before the last start or leaves the worker that is free first.
+  // The time from which the candidate is certainly eligible, if a worker is free and `other` is eligible. Conditions
+  // that have ended by then do not count. These are the ones that a started job, or `other`, also waited for.
+  // Conditions that end before two workers can be free do not count either: they ended before the last start, or leave
+  // the worker that is free first.
   [[nodiscard]] Time eligible_beside(const Candidate &candidate, const ExploredTask &other,
                                      std::span<const Interval> state) const {
     const ExploredTask &task = tasks_[candidate.task];
@@ -253,7 +254,7 @@ class Explorer {
     return result;
   }
 
-  // The latest start of the candidate for which every more urgent one can be without something that it waits for.
+  // The latest start of the candidate at which every more urgent one can still lack something that it waits for.
   [[nodiscard]] Time before_more_urgent(std::size_t c, std::span<const Interval> state) const {
     const ExploredTask &task = tasks_[candidates_[c].task];
     Time until = kNever;
@@ -270,19 +271,19 @@ class Explorer {
     return std::any_of(successors.begin(), successors.end(), [&](std::uint32_t s) { return counts_[s] == counts_[t]; });
   }
 
-  // Which candidates can be the next to start, and when: with a worker free and the job eligible; not after an instant
-  // at which a worker is surely free and some job surely eligible (work conserving); before any more urgent one surely
-  // is (priority).
+  // Determines which candidates can start next, and when. A worker must be free and the job eligible. The start is not
+  // after an instant at which a worker is certainly free and some job certainly eligible (work conserving). It is
+  // before any more urgent job is certainly eligible (priority).
   bool dispatch(std::uint64_t hash, std::span<const Interval> state, StateSet &next) {
     Time surely_eligible = kNever;
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       if (candidates_[c].waits) ready_[c] = eligible(candidates_[c], state);
       surely_eligible = std::min(surely_eligible, ready_[c].latest);
     }
-    // A job that waits for ever is never dispatched: it is late as soon as the rest leaves it no time.
+    // A job that waits forever is never dispatched. It is late as soon as the others leave it no time.
     if (state[0].earliest > latest_start(candidates_[starved_])) return overrun(candidates_[starved_].task);
     const Time work_conserving = std::max(state[0].latest, surely_eligible);
-    Time more_urgent = kNever;  // one of them surely is eligible from then on
+    Time more_urgent = kNever;  // from then on one of them is certainly eligible
     std::size_t first_equal = 0;
     for (std::size_t c = 0; c < candidates_.size() && more_urgent > state[0].earliest; ++c) {
       const Candidate &candidate = candidates_[c];
@@ -300,7 +301,7 @@ class Explorer {
     return true;
   }
 
-  // The latest start of the candidate before any equal that surely goes first is eligible.
+  // The latest start of the candidate before any equal that certainly goes first is eligible.
   Time before_equals(std::size_t c, std::size_t first, std::span<const Interval> state) {
     Time until = kNever;
     for (std::size_t x = first; x < candidates_.size() && candidates_[x].urgency == candidates_[c].urgency; ++x) {
@@ -328,7 +329,7 @@ class Explorer {
     range.worst = std::max(range.worst, finish.latest - candidate.nominal);
     if (finish.latest - candidate.nominal > task.period) return overrun(candidate.task);
 
-    // Nothing starts before this job does.
+    // No job starts before this one.
     row_.assign(state.begin(), state.end());
     raise(start.earliest, row_);
     take(Gate{0, workers_}, finish);
@@ -348,7 +349,7 @@ class Explorer {
     return true;
   }
 
-  // The job takes the first place that is free, and gives it back when it ends.
+  // The job takes the first place that is free, and returns it when it ends.
   void take(const Gate &gate, Interval finish) {
     Interval *places = row_.data() + gate.first;
     std::uint32_t at = 0;
@@ -362,7 +363,7 @@ class Explorer {
     places[at].latest = finish.latest;
   }
 
-  // When a job ends counts until its successors have started; when the first of them starts, it has ended.
+  // The end of a job counts until its successors have started. When the first of them starts, the job has ended.
   void remember(std::uint32_t t, Interval start, Interval finish) {
     const ExploredTask &task = tasks_[t];
     if (task.finish != kNowhere) row_[task.finish] = finish;
@@ -375,7 +376,7 @@ class Explorer {
     }
   }
 
-  // The node that `counts_` leads to; once all tasks are a hyperperiod further, time starts anew.
+  // Returns the node that `counts_` leads to. Once all tasks are a hyperperiod further, time starts again.
   std::uint32_t child_of(std::size_t c, std::uint64_t hash, StateSet &next) {
     const std::uint32_t t = candidates_[c].task;
     const bool wraps = counts_[t] == tasks_[t].jobs && is_round_over();
@@ -406,7 +407,7 @@ class Explorer {
     return true;
   }
 
-  // What starts a hyperperiod as another one did goes on as that one did.
+  // Drops states that start a hyperperiod as an earlier one did, because they continue in the same way.
   static void forget_covered(StateSet &states, StateSet &seen) {
     states.remove_if([&](std::uint32_t node, std::span<const Interval> state) {
       return seen.covers(states.counts(node), states.hash(node), state);
@@ -425,13 +426,13 @@ class Explorer {
   Exploration result_;
   std::vector<Duration> before_;  // by task: see find_before()
 
-  // Of the node that is followed, and of those it leads to.
+  // Data of the node that is followed, and of those that it leads to.
   std::vector<std::uint32_t> counts_;
   std::vector<std::uint32_t> saved_counts_;
   std::vector<Candidate> candidates_;
   std::vector<Interval> ready_;          // by candidate
-  std::size_t starved_ = 0;              // candidate that must start first
-  std::vector<std::uint32_t> children_;  // by candidate: node of the next set
+  std::size_t starved_ = 0;              // the candidate that must start first
+  std::vector<std::uint32_t> children_;  // by candidate: its node in the next set
   std::vector<Time> next_earliest_;      // by node of the next set
   std::vector<Interval> row_;
 };

@@ -71,7 +71,7 @@ bool StateSet::add(std::uint32_t node, std::span<const Interval> state) {
       scratch_[i].latest = std::max(scratch_[i].latest, row[i].latest);
     }
     if (is_within) return false;
-    // The union may touch what neither part did: it looks at all again.
+    // The union may touch states that neither part touched; all are compared again.
     *link = next_[other];
     next_[other] = unused_;
     unused_ = other;

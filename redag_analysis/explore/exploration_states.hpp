@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What exploration.hpp keeps of the schedules that it has not followed to their end: for each set of jobs dispatched so
-// far a node, for each node the states in which that can leave the platform. Knows nothing of tasks or priorities.
+// The partial schedules that the exploration keeps. Each set of jobs dispatched up to now has a node, and each node has
+// the states in which these jobs can leave the platform. Independent of tasks and priorities.
 #pragma once
 
 #include <cstdint>
@@ -21,29 +21,29 @@ struct Interval {
   friend bool operator==(const Interval &, const Interval &) = default;
 };
 
-/// Nodes and their states. A state is a row of intervals of one width, the first `workers` of which say when one, two,
+/// Nodes and their states. A state is a row of intervals of one width. The first `workers` intervals say when one, two,
 /// ... workers are free. Not thread-safe.
 class StateSet {
  public:
   StateSet(std::size_t tasks, std::size_t width, std::size_t workers);
 
-  /// The node of the jobs dispatched (`counts`: how many of each task), added where there is none. The hash depends on
-  /// the counts alone.
+  /// Returns the node of the dispatched jobs, and adds it if it is missing. `counts` is their number by task. The hash
+  /// depends on the counts alone.
   std::uint32_t find_or_add(std::span<const std::uint32_t> counts, std::uint64_t hash);
 
-  /// Adds the state, or widens one of the node's that it touches in every interval of its workers. With one worker a
-  /// row is one interval and nothing is lost by that; with more, what results can stand for more than its parts did.
-  /// False: it went up in another.
+  /// Adds the state, or widens a state of the node that it touches in every interval of its workers. With one worker a
+  /// row is one interval, and nothing is lost. With several, the result can stand for more schedules than its parts
+  /// did. Returns false if the state was merged into another.
   bool add(std::uint32_t node, std::span<const Interval> state);
 
-  /// Adds the state as it is: what it covers was really followed.
+  /// Adds the state unchanged: exactly this state was followed.
   void keep(std::uint32_t node, std::span<const Interval> state);
 
-  /// Does a state of the same node, of the other set, include this one?
+  /// True if a state of the same node in this set includes the given one.
   [[nodiscard]] bool covers(std::span<const std::uint32_t> counts, std::uint64_t hash,
                             std::span<const Interval> state) const;
 
-  /// Takes away the states for which drop(node, state) is true.
+  /// Removes the states for which drop(node, state) is true.
   template <class Drop>
   void remove_if(Drop drop) {
     for (std::uint32_t node = 0; node < size(); ++node) {
@@ -73,7 +73,7 @@ class StateSet {
   static constexpr std::uint32_t kNone = 0xffffffff;
   struct Node {
     std::uint64_t hash = 0;
-    std::uint32_t first = kNone;  // state
+    std::uint32_t first = kNone;  // a state
   };
 
   [[nodiscard]] std::uint32_t find(std::span<const std::uint32_t> counts, std::uint64_t hash, std::size_t &place) const;
@@ -85,12 +85,12 @@ class StateSet {
   std::size_t width_;
   std::size_t workers_;
   std::vector<Node> nodes_;
-  std::vector<std::uint32_t> counts_;  // tasks_ a node
-  std::vector<Interval> rows_;         // width_ a state
-  std::vector<std::uint32_t> next_;    // state of the same node
-  std::vector<std::uint32_t> table_;   // open addressing by hash: nodes
+  std::vector<std::uint32_t> counts_;  // tasks_ values per node
+  std::vector<Interval> rows_;         // width_ intervals per state
+  std::vector<std::uint32_t> next_;    // the next state of the same node
+  std::vector<std::uint32_t> table_;   // nodes, by open addressing on the hash
   std::vector<Interval> scratch_;
-  std::uint32_t unused_ = kNone;  // states taken away, by next_
+  std::uint32_t unused_ = kNone;  // first of the removed states, linked by next_
 };
 
 }  // namespace redag::analysis

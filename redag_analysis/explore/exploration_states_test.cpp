@@ -44,7 +44,7 @@ TEST(StateSet, OneWorkerApartKeepsStatesApart) {
   EXPECT_EQ(states_of(states, node), (std::vector<Row>{{{1, 3}, {4, 5}, {0, 8}}, {{1, 2}, {7, 9}, {0, 0}}}));
 }
 
-// What lies in no state that was followed was not followed, though it lies in the union of two.
+// A state that lies only in the union of two followed states was not followed.
 TEST(StateSet, OnlyWhatWasKeptIsCovered) {
   StateSet seen(2, 2, 2);
   const std::uint32_t node = seen.find_or_add(kCounts, kHash);
@@ -60,7 +60,7 @@ TEST(StateSet, OnlyWhatWasKeptIsCovered) {
 TEST(StateSet, NodesAreFoundAgain) {
   StateSet states(2, 1, 1);
   for (std::uint32_t i = 0; i < 1000; ++i) {
-    // Few hashes: equal ones must not make equal nodes.
+    // There are few hashes, and equal ones must not lead to equal nodes.
     EXPECT_EQ(states.find_or_add(std::array<std::uint32_t, 2>{i, i + 1}, i % 10), i);
   }
   for (std::uint32_t i = 0; i < 1000; ++i) {

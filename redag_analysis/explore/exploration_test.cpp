@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The exploration on systems small enough for a pencil; exploration_property_test.cpp holds it to the scheduler.
+// The exploration on systems that can be solved by hand; exploration_property_test.cpp compares it with the scheduler.
 #include "redag_analysis/explore/exploration.hpp"
 
 #include <gtest/gtest.h>
@@ -45,13 +45,13 @@ BoundCase one_dag(std::uint32_t workers, std::vector<Task> tasks, std::uint32_t 
   return result;
 }
 
-// The short execution of `a` lets `b` start before `c` comes: an anomaly that the worst case of each job misses.
+// The short execution of `a` lets `b` start before `c` arrives: an anomaly that the worst case of each job misses.
 TEST(Exploration, FindsAnomalies) {
   const BoundCase bound_case = one_dag(1, {timer("a", 2, 3, 20), timer("c", 4, 4, 20, 0, 3), timer("b", 9, 9, 40)});
   const System system = compiled(bound_case);
   const Exploration exploration = explore(system);
   ASSERT_EQ(exploration.end, Exploration::End::Complete);
-  // a in 3: c from 3 to 7, b from 7 to 16. a in 2: b from 2 to 11, c from 11 to 15.
+  // a takes 3: c from 3 to 7, b from 7 to 16. a takes 2: b from 2 to 11, c from 11 to 15.
   EXPECT_EQ(exploration.responses[1][0], (ResponseRange{4, 12}));
   EXPECT_EQ(exploration.responses[2][0], (ResponseRange{11, 16}));
   EXPECT_EQ(exploration.responses[1][1], (ResponseRange{4, 4})) << "no b then";
@@ -74,7 +74,7 @@ TEST(Exploration, HoldsMaxActiveAndGroups) {
   EXPECT_EQ(worst(grouped), 6);
 }
 
-// Offsets beyond the hyperperiod: what a second one does differently is found, too.
+// With offsets beyond the hyperperiod, the differences of a second hyperperiod are found, too.
 TEST(Exploration, FollowsUntilItRepeats) {
   const BoundCase bound_case = one_dag(1, {timer("a", 2, 2, 10, 0, 25), timer("b", 4, 4, 10)});
   const System system = compiled(bound_case);
@@ -104,7 +104,7 @@ TEST(Exploration, SaysWhenItEndsEarly) {
   EXPECT_EQ(bound.figures, fmt::format("gave up at {} states", options.max_states));
   EXPECT_EQ(verdict(system, bound), Verdict::NotShown);
   EXPECT_FALSE(bound.tasks[0].response);
-  options.max_states = 10;  // fewer than jobs in a hyperperiod
+  options.max_states = 10;  // fewer than the jobs of a hyperperiod
   EXPECT_EQ(to_bound(system, explore(system, options)).figures, "gave up at 0 states: 41 jobs in a hyperperiod");
 
   options.max_states = 1'000'000;
@@ -147,7 +147,7 @@ TEST(Exploration, SaysWhereThereIsNothingToExplore) {
   EXPECT_TRUE(why_not_explore(compiled(bound_case)));
 }
 
-// As any other method: in analyze(), with terms that add up.
+// Like any other method: it works in analyze(), and its terms add up.
 TEST(Exploration, IsAMethod) {
   const BoundCase bound_case = one_dag(2, {timer("a", 1, 6, 20, 5), timer("b", 1, 6, 30, 5), timer("c", 1, 6, 60, 5)});
   const System system = compiled(bound_case);
