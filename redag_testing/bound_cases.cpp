@@ -133,7 +133,7 @@ class CaseGenerator {
     workload.dags.push_back(std::move(dag));
   }
 
-  // A few periods and offsets, so that tasks of one grid meet too; data tasks, and timers that wait.
+  // Draws a few periods and offsets, for tasks of one grid to meet, and both data tasks and timers that wait.
   void add_rates(Workload &workload, double utilization) {
     Dag dag = named_dag(workload);
     const std::vector<Duration> periods = related_periods();
@@ -168,7 +168,7 @@ class CaseGenerator {
     workload.dags.push_back(std::move(dag));
   }
 
-  // Multiples of each other or not.
+  // Draws periods that are multiples of each other, or unrelated.
   std::vector<Duration> related_periods() {
     std::vector<Duration> periods = {period()};
     const bool harmonic = chance(rng_, 0.5);

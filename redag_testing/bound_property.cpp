@@ -21,12 +21,12 @@
 namespace redag::testing {
 namespace {
 
-// How the jobs of one simulation come and how long they execute.
+// How the jobs of one simulation are released, and how long they execute.
 struct Run {
   std::uint64_t seed = 0;
   std::vector<Duration> offsets;  // by unit
   double full_demand = 1.0;       // share of jobs that execute for their wcet
-  double gap = 0.0;               // share of releases that come later than the period after the last
+  double gap = 0.0;               // share of releases that come later than one period after the last
   enum class Jitter : std::uint8_t { None, First, Largest, Random } jitter = Jitter::None;
 };
 
@@ -41,7 +41,8 @@ Run draw_run(const analysis::System &system, std::uint32_t index, Rng &rng) {
       run.offsets.assign(system.units.size(), 0);
       run.jitter = Run::Jitter::First;
       break;
-    case 1: {  // less urgent jobs start an instant before one and all above it come, each as late as it may
+    case 1: {  // less urgent jobs start an instant before one task and all above it are released, each as late as
+               // allowed
       const auto pivot = static_cast<std::uint32_t>(rng.uniform(0, static_cast<int>(system.tasks.size()) - 1));
       Duration largest = 0;
       for (const analysis::Unit &unit : system.units) largest = std::max(largest, unit.jitter);
@@ -71,7 +72,7 @@ Run draw_run(const analysis::System &system, std::uint32_t index, Rng &rng) {
   return run;
 }
 
-// What a simulation showed.
+// The observations of a simulation.
 struct Observed {
   std::vector<Duration> tasks;      // largest response, by TaskId
   std::vector<Duration> dags;       // largest f - origin, by DagId
@@ -89,8 +90,8 @@ void observe(const metrics::JudgedJob &job, const analysis::System &system, Obse
   if (job.end_to_end) dag = std::max(dag, *job.end_to_end);
 }
 
-// Stalls as the analysis means them: on each worker a job above all others, `stall.longest` long, as often as
-// `stall.per_second` allows. Requires a policy and a preemption mode with which they are above all others.
+// Adds stalls as the analysis defines them: on each worker a job above all others, `stall.longest` long and as frequent
+// as `stall.per_second` allows. Requires a policy and a preemption mode that put these jobs above all others.
 Duration add_stalls(Workload &workload, const analysis::AnalysisPlatform &platform, const Run &run) {
   if (platform.stall.longest == 0) return 0;
   for (std::uint32_t w = 0; w < platform.workers; ++w) {
@@ -102,7 +103,7 @@ Duration add_stalls(Workload &workload, const analysis::AnalysisPlatform &platfo
     workload.dags.back().name = task.name;
     workload.dags.back().tasks.push_back(std::move(task));
   }
-  if (platform.stall.per_second == 0) return kMaxDuration / 4;  // one alone
+  if (platform.stall.per_second == 0) return kMaxDuration / 4;  // a single stall
   return (platform.stall.longest * kSecond + platform.stall.per_second - 1) / platform.stall.per_second;
 }
 
@@ -120,7 +121,7 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
       unit_of.push_back(system.tasks[unit_of.size()].unit);
       can_pause.push_back(!joins_rates);
       if (joins_rates) {
-        // Its offsets are part of what is analysed: they move together.
+        // The analysis uses these offsets; they move together.
         if (task.activation == Activation::Timer) task.offset += run.offsets[units.front()];
       } else if (task.activation == Activation::Timer) {
         task.offset = run.offsets[unit_of.back()];
@@ -173,14 +174,14 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
   watch.finish(result.end, see);
 }
 
-// One workload against one bound.
+// Compares one workload with one bound.
 class Judge {
  public:
   Judge(const analysis::System &system, const analysis::Bound &bound, BoundPropertyResult &result,
         std::vector<double> &ratios)
       : system_(system), bound_(bound), result_(result), ratios_(ratios) {}
 
-  // Empty, or what is broken.
+  // Returns what is broken, or an empty text.
   std::string judge(const Observed &observed) {
     if (bound_.accepts) return judge_accepted(observed);
     std::string broken;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What every driver owes every workload, under every policy and preemption mode: the trace passes the checker.
+// The requirement on every driver: for every workload, policy and preemption mode the trace passes the checker.
 #include <cstdlib>
 
 #include <gtest/gtest.h>
@@ -16,13 +16,14 @@
 namespace redag::testing {
 namespace {
 
-// REDAG_SEED=<n>: the first seed, to replay a failure; REDAG_WORKLOADS=<n>: how many for each test, for a long run.
+// REDAG_SEED=<n> is the first seed, to replay a failure. REDAG_WORKLOADS=<n> is the number for each test, for a long
+// run.
 std::uint64_t from_environment(const char *name, std::uint64_t otherwise) {
   const char *text = std::getenv(name);
   return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
 }
 
-// Small workloads with much contention, that use every feature of the model.
+// Small workloads with much contention that use every feature of the model.
 Workload random_workload(std::uint64_t seed) {
   Rng rng(seed);
   GenerateOptions options;
@@ -95,7 +96,7 @@ class Conformance : public ::testing::TestWithParam<Combination> {
   }
 };
 
-// Real time is dear: few workloads, by default; together they still meet every feature.
+// Real time is expensive: by default there are few workloads. Together they still cover every feature.
 TEST_P(Conformance, Threads) {
   const bool os = GetParam().preemption == sched::Preemption::Full;
   if (os && !is_static(GetParam().policy)) GTEST_SKIP() << "os preemption needs a static policy";

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A degraded DAG stays in step: of tasks that edges join, HI mode lets through the same periods, whatever each of them
-// saw first after it began. For the scheduler and the reference scheduler alike, which would agree on a common mistake.
+// A degraded DAG stays in step: HI mode lets through the same periods of all tasks that edges join, whichever release
+// each saw first. The tests run on the scheduler and on the reference scheduler, because both could share a mistake.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -76,8 +76,8 @@ std::unique_ptr<sched::Scheduler> make(Which which, const Workload &workload) {
   return std::make_unique<ReferenceScheduler>(workload, config);
 }
 
-// Task 0 is of high criticality and keeps a worker while HI mode is on; the others are of a DAG that skips every second
-// period, and end as soon as they begin. Times are milliseconds.
+// Task 0 is of high criticality and keeps a worker while HI mode is on. The others belong to a DAG that skips every
+// second period, and end as soon as they begin. Times are in milliseconds.
 class Degradation : public ::testing::TestWithParam<Which> {
  public:
   void begin(const std::vector<TestTask> &tasks) {
@@ -103,7 +103,7 @@ class Degradation : public ::testing::TestWithParam<Which> {
   void release(std::uint32_t task, Time nominal, Time seen) {
     scheduler->release(TaskId(task), nominal * kMillisecond, seen * kMillisecond);
     decide(seen);
-    decide(seen);  // what the job that ended has made ready
+    decide(seen);  // jobs that the completion made ready
   }
 
   std::string ended;  // " a10": the job of a that was released at 10
@@ -129,8 +129,9 @@ class Degradation : public ::testing::TestWithParam<Which> {
   std::vector<std::string> names_;
 };
 
-// The source's release of 10 is seen before HI mode begins, the sink's after it. By itself each would go on with every
-// second release that it sees: the source at 20 and 40, the sink at 10 and 30, so that no job of the sink has data.
+// The source's release of 10 is seen before HI mode begins, and the sink's after it. Counting alone, each task would
+// continue with every second release that it sees: the source at 20 and 40, the sink at 10 and 30. No job of the sink
+// would have data.
 TEST_P(Degradation, TasksThatSawDifferentReleasesFirstStayInStep) {
   begin({{"a", 10}, {"b", 10, 1, {0}}});
   release(1, 10, 10);
@@ -175,7 +176,7 @@ TEST_P(Degradation, EveryHighModeCountsAnew) {
   EXPECT_EQ(ended, " a10 a20");
 }
 
-// Of one grid: a DAG of 2 to 5 tasks, edges at random, and none alone.
+// A random DAG of 2 to 5 tasks on one grid, all joined by edges.
 Dag random_joined_dag(Rng &rng) {
   std::vector<TestTask> tasks;
   const auto count = static_cast<std::uint32_t>(rng.uniform(2, 5));
@@ -195,7 +196,7 @@ Duration cycle_of(const Dag &dag) {
   return 10 * kMillisecond * (skips ? dag.degrade.skip + 1 : static_cast<Duration>(std::ceil(dag.degrade.stretch)));
 }
 
-// HI mode from some instant to the end; one worker for it, and enough for the others.
+// HI mode lasts from some instant to the end. One worker serves its cause, and there are enough for the other tasks.
 TEST(DegradationProperty, JoinedTasksAreLetThroughInTheSamePeriodsAndNoneStarves) {
   for (std::uint64_t seed = 1; seed <= 500; ++seed) {
     Rng rng(seed);
@@ -229,7 +230,9 @@ TEST(DegradationProperty, JoinedTasksAreLetThroughInTheSamePeriodsAndNoneStarves
         phase = its_phase;
       }
       ASSERT_GE(taken, static_cast<std::size_t>(9 * kSecond / 10 / cycle)) << "seed " << seed;
-      if (cycle == 10 * kMillisecond) continue;  // the next release can come before the data: skipped as in LO mode
+      if (cycle == 10 * kMillisecond)
+        continue;  // the next release can come before the data, and is then skipped as in
+                   // LO mode
       ASSERT_GE(finished[task] + 3, taken) << "seed " << seed << " task " << task.value;
     }
   }

@@ -35,7 +35,7 @@ std::optional<std::string> find_difference(const Case &c) {
   return find_difference(tested, expected, c.workload, c.config, c.script);
 }
 
-/// Takes out of the script, step by step, what the difference does not need.
+/// Removes steps from the script that the difference does not need.
 void shrink(Case &c) {
   for (bool progress = true; progress;) {
     progress = false;
@@ -61,7 +61,7 @@ Case make_case(PolicyKind policy, Preemption preemption, std::uint64_t seed) {
   return c;
 }
 
-/// Empty, or all that is needed to see the difference again.
+/// Returns an empty text, or everything needed to reproduce the difference.
 std::string report_difference(Case c, const std::string &replay) {
   if (!find_difference(c)) return {};
   shrink(c);
@@ -75,7 +75,7 @@ std::uint64_t from_environment(const char *name, std::uint64_t fallback) {
 
 class Differential : public ::testing::TestWithParam<std::tuple<PolicyKind, Preemption>> {};
 
-// REDAG_DIFFERENTIAL_SEED and REDAG_DIFFERENTIAL_COUNT choose other workloads than the committed ones.
+// REDAG_DIFFERENTIAL_SEED and REDAG_DIFFERENTIAL_COUNT choose other workloads than the default ones.
 TEST_P(Differential, DecidesAsTheReferenceDoes) {
   const auto [policy, preemption] = GetParam();
   const std::uint64_t first = from_environment("REDAG_DIFFERENTIAL_SEED", 1);
@@ -102,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(
                        ::testing::Values(Preemption::None, Preemption::Cooperative, Preemption::Full)),
     name_of);
 
-// The same with sequences that RapidCheck makes, and shrinks.
+// The same with sequences that RapidCheck makes and shrinks.
 RC_GTEST_PROP(DifferentialProperty, AnySequenceOfEventsIsDecidedAlike, (std::uint64_t seed)) {
   const auto policy = *rc::gen::element(PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed,
                                         PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::ChainAware);
@@ -126,7 +126,7 @@ RC_GTEST_PROP(DifferentialProperty, AnySequenceOfEventsIsDecidedAlike, (std::uin
   if (difference) RC_FAIL(describe(c.workload, c.config) + describe(c.script) + "\n" + *difference);
 }
 
-// assign_priorities() against a sort by the table of docs/model.md, written down as such.
+// Compares assign_priorities() with a sort by the table of docs/model.md, written out here.
 bool comes_before(PolicyKind policy, const Workload &w, const TaskRef &a, const TaskRef &b) {
   const Dag &da = w.dags[a.dag.value];
   const Dag &db = w.dags[b.dag.value];
@@ -152,7 +152,7 @@ bool comes_before(PolicyKind policy, const Workload &w, const TaskRef &a, const 
   return a.dag != b.dag ? a.dag < b.dag : ta < tb;
 }
 
-// All that the policy looks at. chain_aware looks at the DAG and the place in it, which differ.
+// Compares all that the policy looks at. chain_aware looks at the DAG and the place in it, which always differ.
 bool are_equal(PolicyKind policy, const Task &a, const Task &b) {
   if (policy == PolicyKind::RateMonotonic) return a.period == b.period;
   if (policy == PolicyKind::DeadlineMonotonic) return a.deadline == b.deadline;
@@ -183,7 +183,7 @@ RC_GTEST_PROP(Priorities, AreThePlacesInTheOrderOfThePolicy, (std::uint64_t seed
         RC_ASSERT(!enough || priorities[i].level == priorities[i].tier);
         RC_ASSERT(priorities[i].rank > priorities[j].rank || priorities[i].tier <= priorities[j].tier);
         RC_ASSERT(priorities[i].tier > priorities[j].tier || priorities[i].level <= priorities[j].level);
-        // Equal rates share before different ones do.
+        // Equal rates share a level before different ones do.
         if (!enough && policy == PolicyKind::RateMonotonic && tasks[i].task->period == tasks[j].task->period) {
           RC_ASSERT(priorities[i].level == priorities[j].level);
         }

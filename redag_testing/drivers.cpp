@@ -30,7 +30,7 @@ trace::Trace empty_trace(const RunSpec &spec, trace::Driver driver) {
   return trace;
 }
 
-// The timer tasks' grid points before the horizon, in order of when they are seen.
+// The timer tasks' grid points before the horizon, in the order in which they are seen.
 struct Arrival {
   Time seen = 0;
   Time nominal = 0;
@@ -54,7 +54,7 @@ std::vector<Arrival> arrivals(const RunSpec &spec) {
   return found;
 }
 
-// Jobs that a driver has started, and what can happen to one of them at random.
+// The jobs that a driver has started, and random events on them.
 class RandomJobs {
  public:
   RandomJobs(const Workload &workload, sched::Scheduler &scheduler, sched::Preemption preemption, std::uint64_t seed)
@@ -76,7 +76,7 @@ class RandomJobs {
     }
   }
 
-  /// Ends a job, or brings one to a preemption point, or does nothing.
+  /// Ends a job, brings one to a preemption point, or does nothing.
   void something_happens(Time now) {
     if (started_.empty()) return;
     const auto choice = static_cast<std::size_t>(rng_.uniform(0, static_cast<std::int64_t>(started_.size()) - 1));
@@ -107,7 +107,7 @@ class RandomJobs {
     bool used_wcet_low = false;
   };
 
-  // Uses one of its limits, if there is one left.
+  // Makes the job use up one of its limits, if any is left.
   bool exceed(Started &job, Time now) {
     const Task &task = *tasks_[job.task.value].task;
     if (task.wcet_low > 0 && !job.used_wcet_low) {
@@ -128,8 +128,8 @@ class RandomJobs {
   std::vector<Started> started_;
 };
 
-// The last task of a workload, where it could as well be added while running: it has no edges, and does not give its
-// DAG another place (chain_aware).
+// True if the last task of a workload could also be added while running. It then has no edges, and does not change the
+// place of its DAG (chain_aware).
 bool last_task_is_alone(const Workload &workload) {
   const Dag &dag = workload.dags.back();
   const auto last = static_cast<std::uint32_t>(dag.tasks.size() - 1);
@@ -144,8 +144,8 @@ bool last_task_is_alone(const Workload &workload) {
   });
 }
 
-// Adds that task as the others stand without it: among equal ranks it is the last, and chain_aware turns the ranks
-// round. It gets its timing when it is there.
+// Adds that task at the place that it has among the others. Among equal ranks it is the last, and chain_aware reverses
+// the ranks. It gets its timing afterwards.
 void add_last_task(sched::Scheduler &scheduler, const Dag &whole, DagId dag, PolicyKind policy, Time now) {
   const std::uint32_t rank = topological_ranks(whole).back();
   REDAG_CHECK(rank > 0, "another source stands before it");
@@ -195,13 +195,13 @@ trace::Trace ManualDriver::run(const RunSpec &spec) {
     trace.events.insert(trace.events.end(), step.events.begin(), step.events.end());
   };
   Time now = 0;
-  // What happens at one instant is decided together, before time moves on.
+  // Everything that happens at one instant is decided together, before time moves on.
   const auto move_to = [&](Time later) {
     if (later > now) decide(now);
     now = later;
   };
   for (const Arrival &arrival : arrivals(spec)) {
-    // On average two things happen to jobs between two releases.
+    // On average two events happen to jobs between two releases.
     while (jobs.rng().uniform01() < 0.67) {
       move_to(now + jobs.rng().uniform(0, std::max<Duration>(0, arrival.seen - now) / 2));
       jobs.something_happens(now);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The drivers behind one interface, for suites that run the same workload on each of them.
+// All drivers behind one interface, for suites that run the same workload on each of them.
 #pragma once
 
 #include <cstdint>
@@ -20,20 +20,20 @@ struct RunSpec {
   std::uint64_t seed = 1;
 };
 
-/// Virtual time, redag_analysis/sim.
+/// Virtual time: redag_analysis/sim.
 struct SimulatorDriver {
   static trace::Trace run(const RunSpec &spec);
 };
 
-/// Virtual time in which jobs end, and reach preemption points, at random and not when their execution time is over;
-/// with full preemption also while they count as preempted, as on a real machine. Releases are on the grid, some seen
-/// late, some missed. Every other run is stepped: jobs are held back at times, and started one by one. The last task is
-/// added while running where that is possible.
+/// Virtual time in which jobs end, and reach preemption points, at random times. With full preemption they can do so
+/// while they count as preempted, as on a real machine. Releases are on the grid; some are seen late, and some are
+/// missed. Every other run is stepped: jobs are sometimes held back and started one by one. The last task is added
+/// while running if possible.
 struct ManualDriver {
   static trace::Trace run(const RunSpec &spec);
 };
 
-/// Real threads, redag/runtime. Full preemption needs real-time rights.
+/// Real threads: redag/runtime. Full preemption needs real-time rights.
 struct ThreadsDriver {
   static trace::Trace run(const RunSpec &spec);
 };

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a test expects of the trace checker. A failure prints the report.
+// Expectations on the trace checker. A failure prints the report.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,13 +10,13 @@
 
 namespace redag::testing {
 
-/// The trace breaks `rule`; what else it breaks as a consequence does not matter.
+/// Expects that the trace breaks `rule`. It may break other rules as a consequence.
 inline void expect_broken(const trace::Trace &trace, metrics::Rule rule) {
   const metrics::CheckReport report = metrics::check_trace(trace);
   EXPECT_GT(report.violated(rule), 0U) << "expected: " << to_string(rule) << "\n" << report.to_string();
 }
 
-/// The trace breaks nothing, and `rule` was put to the test.
+/// Expects that the trace breaks no rule, and that `rule` was tested.
 inline void expect_kept(const trace::Trace &trace, metrics::Rule rule) {
   const metrics::CheckReport report = metrics::check_trace(trace);
   EXPECT_TRUE(report.ok()) << report.to_string();

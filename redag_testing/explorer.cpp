@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The search: which of the fibers goes on, and what other orders are to be tried.
+// The search: which fiber continues, and which other orders must be tried.
 #include "redag_testing/explorer.hpp"
 
 #include <cstdlib>
@@ -39,7 +39,7 @@ bool Explorer::enabled(std::uint32_t thread) const {
   return false;
 }
 
-// Chooses who executes the operation that it stands before, and goes there.
+// Chooses the fiber that executes its pending operation, and switches to it.
 void Explorer::schedule() {
   Mask can = 0;
   Mask awake = 0;
@@ -61,7 +61,7 @@ void Explorer::schedule() {
   switch_to(next);
 }
 
-// False: all that could be done here is done elsewhere.
+// Returns false if everything possible here was or will be done elsewhere.
 bool Explorer::choose(std::uint32_t &thread, Mask can) {
   const std::size_t depth = events_.size();
   if (depth < nodes_.size()) {
@@ -92,7 +92,7 @@ bool Explorer::choose(std::uint32_t &thread, Mask can) {
   return true;
 }
 
-// What made it possible that `fiber` goes on came before.
+// Joins the clocks of what enabled `fiber` to continue.
 void Explorer::synchronise(Fiber &fiber) {
   switch (fiber.state) {
     case State::Locking: fiber.clock.join(objects_[fiber.target].unlocked); break;
@@ -104,7 +104,7 @@ void Explorer::synchronise(Fiber &fiber) {
   }
 }
 
-// Thread `thread` executes its operation now.
+// Records that `thread` now executes its operation.
 void Explorer::record(std::uint32_t thread) {
   Fiber &fiber = fibers_[thread];
   const Operation operation = fiber.pending;
@@ -130,12 +130,13 @@ void Explorer::record(std::uint32_t thread) {
   }
 }
 
-// The events that the last one could have come before: those it depends on, with nothing in between that forces the
-// order. `before`: what its thread knew of.
+// Finds the events before which the last one could have come. It depends on them, and nothing in between forces the
+// order. `before` is the clock that its thread had.
 void Explorer::find_races(const Clock &before) {
   const Event &last = events_.back();
   Clock known = before;
-  std::array<std::size_t, 2> left{};  // of the events of each of its objects, the older ones not looked at yet
+  std::array<std::size_t, 2> left{};  // number of events of each of its objects that were not yet looked at, the oldest
+                                      // ones
   for (std::size_t i = 0; i < 2; ++i) {
     if (last.operation.objects[i] != kNoObject) left[i] = objects_[last.operation.objects[i]].events.size();
   }
@@ -152,10 +153,10 @@ void Explorer::find_races(const Clock &before) {
   }
 }
 
-// The last event should also be tried before `event`, with whatever came in between and does not need `event`: whoever
-// can begin with that is to be tried there. Not always the thread of the last event itself: something in between that
-// it depends on may be what has not been tried in this order (`source sets': Abdulla, Aronis, Jonsson, Sagonas, POPL
-// 2014).
+// The last event should also be tried before `event`, together with the events in between that do not need `event`. A
+// thread that can begin this sequence is to be tried there. That is not always the thread of the last event: it may
+// depend on an event in between that was not tried in this order (`source sets': Abdulla, Aronis, Jonsson, Sagonas,
+// POPL 2014).
 void Explorer::add_backtrack(std::uint32_t event) {
   Node &node = nodes_[event];
   const std::uint32_t reversed = events_[event].thread;
@@ -184,7 +185,7 @@ void Explorer::add_backtrack(std::uint32_t event) {
   }
 }
 
-// Goes back to the last state where something is left to try. False: nowhere.
+// Goes back to the last state with an untried choice; returns false if there is none.
 bool Explorer::next_run() {
   while (!nodes_.empty()) {
     Node &node = nodes_.back();

@@ -18,7 +18,7 @@ EhGlobals *eh_globals() { return reinterpret_cast<EhGlobals *>(abi::__cxa_get_gl
 
 }  // namespace
 
-// Until all threads have ended, or one failed.
+// Runs until all threads have ended, or one has failed.
 void Explorer::run_fibers() {
   const EhGlobals eh = *eh_globals();
   swapcontext(&home_, &fibers_[0].context);
@@ -26,7 +26,7 @@ void Explorer::run_fibers() {
   if (thread_state_.set != nullptr) thread_state_.set(nullptr);
 }
 
-// After a failure they are left where they stood: what they own cannot be destroyed any more.
+// After a failure the fibers stay where they are: what they own can no longer be destroyed.
 void Explorer::abandon_fibers() {
   for (Fiber &fiber : fibers_) {
     static_cast<void>(fiber.stack.release());
@@ -57,7 +57,7 @@ void Explorer::switch_to(std::uint32_t thread) {
   swapcontext(&from.context, &to.context);
 }
 
-// The calling fiber has ended.
+// Called when the calling fiber has ended.
 void Explorer::leave() {
   if (!local_callers_.empty()) {
     const std::uint32_t back = local_callers_.back();
@@ -87,13 +87,13 @@ std::uint32_t Explorer::spawn(std::function<void()> body) {
   return thread;
 }
 
-// What a thread does up to its next operation nobody can notice: it is done at once.
+// Runs the thread to its next operation at once, because no other thread can notice what it does until then.
 void Explorer::run_until_visible(std::uint32_t thread) {
   local_callers_.push_back(current_);
   switch_to(thread);
 }
 
-// The calling fiber has come to its next operation.
+// Called when the calling fiber has reached its next operation.
 void Explorer::stop_at(State state, const Operation &operation, std::uint32_t target) {
   Fiber &fiber = fibers_[current_];
   fiber.state = state;

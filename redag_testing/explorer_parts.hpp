@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The explorer's own types: fibers, what they are about to do, and the tree of what was tried. For explorer*.cpp only.
+// The explorer's own types: fibers, their pending operations, and the tree of tried choices. For explorer*.cpp only.
 #pragma once
 
 #include <ucontext.h>
@@ -21,11 +21,11 @@ namespace redag::testing::exploring {
 
 inline constexpr std::uint32_t kMaxThreads = 10;
 inline constexpr ObjectId kClock = 0;
-inline constexpr ObjectId kSpurious = 1;  // the wake-ups for no reason that are left
+inline constexpr ObjectId kSpurious = 1;  // the remaining wake-ups without a cause
 using Mask = std::uint32_t;
 inline constexpr Mask bit(std::uint32_t thread) { return Mask{1} << thread; }
 
-// Which event of each thread, counted from 1 over all of a run, is known to have come before.
+// The last event of each thread that is known to have come before. Events are counted from 1 over all of a run.
 struct Clock {
   std::array<std::uint32_t, kMaxThreads> at{};
   void join(const Clock &other) {
@@ -33,8 +33,8 @@ struct Clock {
   }
 };
 
-// A visible operation: up to two objects, read or written. Operations of two threads depend on each other if they share
-// an object and one of them writes it.
+// A visible operation: up to two objects, each read or written. Operations of two threads depend on each other if they
+// share an object and one of them writes it.
 struct Operation {
   const char *what = "";
   std::array<ObjectId, 2> objects{kNoObject, kNoObject};
@@ -54,8 +54,8 @@ inline bool dependent(const Operation &a, const Operation &b) {
 struct Object {
   Clock written;
   Clock read;
-  std::vector<std::uint32_t> events;  // that touched it, in order
-  // Of a mutex.
+  std::vector<std::uint32_t> events;  // that touched the object, in order
+  // For a mutex.
   bool locked = false;
   Clock unlocked;
 };
@@ -65,13 +65,13 @@ enum class State : std::uint8_t {
   Ready,     // its operation can be executed
   Locking,   // ready once the mutex is free
   Joining,   // ready once the thread has ended
-  Settling,  // ready once nobody else is
+  Settling,  // ready once no other thread is
   Sleeping,  // in a futex wait that only a wake ends
-  Dozing,    // in a futex wait that can also end otherwise: that is its operation
+  Dozing,    // in a futex wait that can also end without a wake; that end is its operation
   Ended,
 };
 
-// The exceptions of a thread that are being handled: each fiber has its own.
+// The state of a thread's exception handling: each fiber has its own.
 struct EhGlobals {
   void *caught = nullptr;
   unsigned int uncaught = 0;
@@ -86,7 +86,7 @@ struct Fiber {
   EhGlobals eh;
   State state = State::Ended;
   Operation pending;
-  std::uint32_t target = 0;  // Joining: whom; Locking: the mutex; Sleeping, Dozing: the word
+  std::uint32_t target = 0;  // Joining: the thread; Locking: the mutex; Sleeping, Dozing: the word
   std::int64_t deadline = 0;
   bool woken = false;
   std::uint64_t queued = 0;  // order of falling asleep
@@ -96,11 +96,11 @@ struct Fiber {
 struct Event {
   std::uint32_t thread = 0;
   Operation operation;
-  Clock clock;  // this event and all that came before it
+  Clock clock;  // of this event and all that came before it
   [[nodiscard]] bool after(std::uint32_t whose, std::uint32_t index) const { return clock.at[whose] > index; }
 };
 
-// A state that a run passed, and what has been and what is to be tried there.
+// A state that a run passed, with the choices tried there and those still to be tried.
 struct Node {
   Mask enabled = 0;
   Mask backtrack = 0;
@@ -151,13 +151,13 @@ class Explorer {
   void switch_to(std::uint32_t thread);
   void leave();
   [[nodiscard]] bool enabled(std::uint32_t thread) const;
-  // Nobody woke it: it could only time out, or wake for no reason.
+  // True if no wake reached the thread: it could only time out, or wake without a cause.
   [[nodiscard]] bool dozes(std::uint32_t thread) const {
     return fibers_[thread].state == State::Dozing && !fibers_[thread].woken;
   }
   void schedule();
   bool choose(std::uint32_t &thread, Mask can);
-  // Who is on its way goes on: as few changes of thread as can be.
+  // Prefers the current thread; this keeps changes of thread few.
   [[nodiscard]] std::uint32_t first_of(Mask threads) const {
     return (threads & bit(current_)) != 0 ? current_ : static_cast<std::uint32_t>(__builtin_ctz(threads));
   }
@@ -177,18 +177,18 @@ class Explorer {
   ObjectId object_count_ = 0;
   std::vector<Event> events_;
   std::array<Fiber, kMaxThreads> fibers_;
-  std::uint32_t count_ = 0;                   // of fibers in this run
+  std::uint32_t count_ = 0;                   // number of fibers in this run
   std::uint32_t current_ = 0;                 // the fiber that executes
-  std::vector<std::uint32_t> local_callers_;  // who waits until current_ reaches its next operation
+  std::vector<std::uint32_t> local_callers_;  // fibers that wait until current_ reaches its next operation
   ucontext_t home_{};
   std::uint32_t steps_ = 0;
   bool calm_ = false;
-  bool redundant_ = false;  // this run repeats another: to be finished somehow
+  bool redundant_ = false;  // this run repeats another; it only has to finish
   bool failed_ = false;
   std::uint64_t queue_ = 0;
   std::uint32_t spurious_left_ = 0;
 };
 
-extern Explorer *explorer;  // the one that runs, or null
+extern Explorer *explorer;  // the running one, or null
 
 }  // namespace redag::testing::exploring

@@ -35,11 +35,11 @@ class Judge {
 
   struct Job {
     std::uint32_t level = 0;
-    bool settled = false;  // what was decided of it has been carried out
+    bool settled = false;  // the decision about it has been carried out
     bool begun = false;
     pid_t thread = kUnknown;
     Time inverted_since = kNever;
-    std::vector<std::uint64_t> beats;  // of each processor by then
+    std::vector<std::uint64_t> beats;  // of each processor at that time
     bool reported = false;
   };
   struct Point {
@@ -69,11 +69,11 @@ class Judge {
     }
   }
 
-  // One decision at a time: the next one begins when this has been carried out.
+  // Takes one decision at a time. A new decision means that the previous one has been carried out.
   void decide(const Decision &decision) {
     settle();
     for (const Decision::Change &change : decision.changes) {
-      // The body of one that has started may have ended, and its thread not yet said so.
+      // The body of a started job may have ended before its thread reported it.
       if (!change.starts && jobs_.count(change.job) == 0) continue;
       Job &job = jobs_[change.job];
       job.level = change.level;
@@ -143,7 +143,7 @@ class Judge {
     return found != waits_.end() && found->second && !runs(job.thread);
   }
 
-  // Looks at all jobs in progress.
+  // Judges all jobs in progress.
   void look(Time now) {
     if (jobs_.empty()) return;
     ++verdict_.instants;
@@ -198,7 +198,7 @@ class Judge {
   std::map<JobKey, Job> jobs_;  // started and not ended
   std::map<pid_t, bool> waits_;
   std::vector<std::uint64_t> beats_;  // by processor
-  std::vector<pid_t> runs_;           // by processor: its thread
+  std::vector<pid_t> runs_;           // by processor: the thread that it runs
   const Decision *pending_ = nullptr;
   std::uint32_t pending_beats_ = 0;
 };

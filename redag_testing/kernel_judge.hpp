@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Judges what the kernel ran by what was decided: at every instant the processors belong to the most urgent started
-// jobs. Levels come from a scheduler that was told the same (RecordingScheduler), what ran from the kernel's record, so
-// that neither the engine nor its trace has a say. A pure function.
+// Judges what the kernel ran against the decisions: at every instant the processors belong to the most urgent started
+// jobs. Levels come from a scheduler that got the same calls (RecordingScheduler), and what ran from the kernel's
+// record. Neither the engine nor its trace is consulted. A pure function.
 //
-// A job waits while it could run (it was preempted, or dispatched and not begun) and has no processor. That is a
-// violation if a job of a strictly less urgent level runs meanwhile, or a processor idles, while each processor serves
-// its timer kBeats times. Wall-clock time has no say: a processor that the hypervisor took serves no timer.
+// A job waits while it could run (preempted, or dispatched and not begun) and has no processor. This is a violation if,
+// while each processor serves its timer kBeats times, a strictly less urgent job runs or a processor idles. Wall-clock
+// time does not count: a processor that the hypervisor took serves no timer.
 #pragma once
 
 #include <sys/types.h>
@@ -23,31 +23,31 @@
 namespace redag::testing {
 
 inline constexpr Duration kBeat = 500 * kMicrosecond;
-inline constexpr std::uint32_t kBeats = 8;  // 4 ms, where nobody takes the processors away
+inline constexpr std::uint32_t kBeats = 8;  // 4 ms, unless the processors are taken away
 
-/// A body as it saw itself. It must not wait for anything but the engine.
+/// A body as its own thread saw it. It must wait for nothing but the engine.
 struct BodyRun {
   JobKey job;
   pid_t thread = 0;
   Time begin = 0;
-  Time end = kNever;  // kNever: it had not ended
+  Time end = kNever;  // kNever: it has not ended
 };
 
 struct KernelRun {
   std::vector<SwitchEvent> events;  // by time
   std::vector<BodyRun> bodies;
   std::vector<Decision> decisions;  // by time
-  std::vector<int> cpus;            // those of the jobs: all in `events`
-  Time end = kNever;                // nothing is judged from here on
-  /// Whose waiting counts; empty: everybody's.
+  std::vector<int> cpus;            // the processors of the jobs; `events` has all of them
+  Time end = kNever;                // nothing is judged from then on
+  /// The tasks whose waiting counts; empty: all tasks.
   std::function<bool(std::uint32_t task)> judged;
 };
 
 struct KernelVerdict {
-  std::uint64_t instants = 0;   // changes of what ran or was to run, with jobs in progress
-  std::uint64_t contended = 0;  // of them, with a job that waited
+  std::uint64_t instants = 0;   // changes of what ran or had to run, with jobs in progress
+  std::uint64_t contended = 0;  // those instants with a waiting job
   std::uint64_t violation_count = 0;
-  std::vector<std::string> violations;  // the first ones
+  std::vector<std::string> violations;  // only the first ones
 };
 
 [[nodiscard]] KernelVerdict judge(const KernelRun &run);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The judge itself, by records written by hand: one processor or two, and a beat of each at every millisecond.
+// Tests the judge with hand-written records: one or two processors, each with a beat at every millisecond.
 #include "redag_testing/kernel_judge.hpp"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ class Record {
     run_.events.push_back({now_, kind, cpu, thread});
     return *this;
   }
-  /// The timer's thread decides, and sleeps: what it decided is done.
+  /// The timer's thread decides and then sleeps, which shows that its decision was carried out.
   Record &decided(std::vector<Decision::Change> changes) {
     run_.decisions.push_back({now_, kTimer, std::move(changes)});
     return kernel(Kind::Slept, 0, kTimer);
@@ -41,7 +41,7 @@ class Record {
     run_.bodies.push_back({job, thread, begin_ms * kMillisecond, end_ms * kMillisecond});
     return *this;
   }
-  /// Beats of a processor at each millisecond of [from, to), while `thread` runs there.
+  /// Adds beats of a processor at each millisecond of [from, to), while `thread` runs there.
   Record &beats(int cpu, pid_t thread, Time from, Time to) {
     for (Time ms = from; ms < to; ++ms) run_.events.push_back({ms * kMillisecond, Kind::Beat, cpu, thread});
     return *this;
@@ -58,7 +58,7 @@ class Record {
   Time now_ = 0;
 };
 
-// The slow job runs from 1 to 41 ms; the urgent one begins at 5, is preempted at 6 and waits until 40.
+// The slow job runs from 1 to 41 ms. The urgent one begins at 5, is preempted at 6 and waits until 40.
 Record inverted(Time beats_until) {
   Record record(1);
   record.at(0).decided({{kSlow, true, 5}}).at(1).kernel(Kind::In, 0, kSlowThread);
@@ -78,7 +78,7 @@ TEST(KernelJudge, AnUrgentJobThatWaitsForALessUrgentOneIsSeen) {
   EXPECT_NE(verdict.violations[0].find("job 0 of task 1 of level 5 runs"), std::string::npos) << verdict.violations[0];
 }
 
-// The hypervisor took the processor: time passes, and nothing was executed.
+// The hypervisor took the processor: time passes without any execution.
 TEST(KernelJudge, TimeAloneIsNoViolation) {
   const KernelVerdict verdict = inverted(7 + kBeats - 1).judged();
   EXPECT_EQ(verdict.violation_count, 0U);
@@ -88,7 +88,7 @@ TEST(KernelJudge, TimeAloneIsNoViolation) {
 
 TEST(KernelJudge, EachProcessorHasToServeItsTimer) {
   Record record = inverted(100);
-  record.run().cpus.push_back(1);  // which is not there for as long
+  record.run().cpus.push_back(1);  // a processor without beats
   EXPECT_EQ(record.judged().violation_count, 0U);
   record.beats(1, 77, 7, 100);
   EXPECT_EQ(record.judged().violation_count, 1U);
@@ -114,12 +114,12 @@ TEST(KernelJudge, ALevelOfAJobWhoseBodyHasEndedMeansNothing) {
   EXPECT_EQ(record.judged().violation_count, 0U);
 }
 
-// Whoever decided has not come to carry it out.
+// The thread that decided has not yet carried out its decision.
 TEST(KernelJudge, WhatIsNotCarriedOutYetIsNotJudged) {
   Record record = inverted(100);
   record.run().decisions.push_back({10 * kMillisecond, 99, {{kSlow, false, 6}}});
   EXPECT_EQ(record.judged().violation_count, 0U);
-  record.run().bodies.push_back({{7, 7}, 99, 60 * kMillisecond, 61 * kMillisecond});  // it goes on, too late
+  record.run().bodies.push_back({{7, 7}, 99, 60 * kMillisecond, 61 * kMillisecond});  // it continues, too late
   record.run().decisions.push_back({59 * kMillisecond, 99, {{{7, 7}, true, 0}}});
   EXPECT_EQ(record.judged().violation_count, 0U);
 }

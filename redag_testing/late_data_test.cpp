@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A task of which two jobs can be in progress may end them in the other order: what its successors then get. For the
-// scheduler and for the reference scheduler alike, which would agree on a common mistake.
+// A task of which two jobs can be in progress may end them in reverse order; the tests show what its successors get.
+// They run on the scheduler and on the reference scheduler, because both could share a mistake.
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,8 +20,8 @@ constexpr TaskId kSource(0);
 constexpr TaskId kOther(1);
 constexpr TaskId kSink(2);
 
-// Times are milliseconds; source#0 begins at 0 and source#1 at 10; source#1 ends at 11 and source#0 at 12, or with no
-// output at 1, while a job of the sink waits.
+// Times are in milliseconds. source#0 begins at 0 and source#1 at 10, which ends at 11. source#0 ends at 12; or it ends
+// at 1 without output, and a job of the sink waits from 0 on.
 class LateData : public ::testing::TestWithParam<bool> {
  public:
   void run(TestTask sink, Duration other_period, sched::Outcome first_outcome = sched::Outcome::Finished) {
@@ -52,12 +52,12 @@ class LateData : public ::testing::TestWithParam<bool> {
     return decide(now);
   }
 
-  /// What happened to the sink: "12 released 12, 12 ready 10": when, what, and the event's value.
+  /// The events of the sink as time, kind and value: "12 released 12, 12 ready 10".
   std::string told;
   std::unique_ptr<sched::Scheduler> scheduler;
 
  private:
-  // The job that was started last.
+  // Returns the job that was started last.
   JobSlot decide(Time now) {
     const sched::Step step = scheduler->dispatch(now * kMillisecond);
     for (const JobEvent &event : step.events) {
@@ -92,7 +92,7 @@ TEST_P(LateData, DoesNotReplaceNewerDataOfAJoin) {
   EXPECT_EQ(told, "14 released 14, 14 ready 10");
 }
 
-// source#0 had no output: sink#0 is not what source#1 is for, although it waits when that ends.
+// source#0 had no output. sink#0 must not take the data of source#1, although it waits when source#1 ends.
 TEST_P(LateData, OfTheNextPeriodIsKeptForTheNextJob) {
   run({"sink", 10, 1, {0}}, 10, sched::Outcome::Threw);
   EXPECT_EQ(told, "0 released 0");
@@ -100,7 +100,7 @@ TEST_P(LateData, OfTheNextPeriodIsKeptForTheNextJob) {
   EXPECT_EQ(told, "0 released 0, 13 released 10, 13 ready 10");
 }
 
-// Every completion counts, and none is lost: the second job has nothing newer than what the first one had.
+// Every completion counts, and none is lost: the second job has no newer data than the first one.
 TEST_P(LateData, ReleasesADataTaskAsAnyOther) {
   run({"sink", 0, 1, {0}}, 20);
   EXPECT_EQ(told, "11 released 11, 11 ready 10, 12 released 12, 12 ready 10");

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A day of scheduler time in the simulator, for random systems: what a long run could wear out. REDAG_LONG_RUN=<n>: so
-// many systems (24), each for 24 hours (otherwise for 2); REDAG_LONG_RUN_SEED=<s>: the first one's seed (1).
+// A day of scheduler time in the simulator, for random systems, to find what a long run could wear out.
+// REDAG_LONG_RUN=<n> runs n systems (24 by default), each for 24 hours (otherwise for 2). REDAG_LONG_RUN_SEED=<s> is
+// the first seed (default 1).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +28,8 @@ namespace {
 
 constexpr Duration kHour = 3600 * kSecond;
 
-// From far below what the workers can do to a little beyond it, with everything that keeps jobs waiting.
+// A random system with a load from far below the workers' capacity to slightly above it, and everything that makes jobs
+// wait.
 Workload random_system(std::uint64_t seed) {
   Rng rng(seed);
   GenerateOptions options;
@@ -62,7 +64,7 @@ struct Figures {
   double largest_ratio = 0;   // observed / bound
 };
 
-// Looks at the events as they come.
+// Checks the events as they arrive.
 class Day {
  public:
   Day(const Workload &workload, const analysis::Report &report)
@@ -146,7 +148,7 @@ void run_a_day(std::uint64_t seed, Duration length, Figures &figures) {
   sim::Options options;
   options.horizon = length;
   options.seed = seed;
-  // Of the simulator and the scheduler alone: between the end of one call of the sink and the next.
+  // Counts allocations of the simulator and the scheduler alone: those between one call of the sink and the next.
   std::uint64_t allocations = 0;
   std::uint64_t seen = allocation_count();
   const sim::Result result =

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A driver whose every step a test takes by hand: no clock, no threads. Keeps what each worker runs, as a real driver
-// would, and collects the events.
+// A driver whose every step a test takes by hand, without a clock or threads. Keeps what each worker runs, as a real
+// driver would, and collects the events.
 #pragma once
 
 #include <memory>
@@ -18,7 +18,7 @@ class ManualWorkers {
  public:
   ManualWorkers(const Workload &workload, std::unique_ptr<sched::Scheduler> scheduler, std::uint32_t workers);
 
-  /// Reports what happened at now(); decisions are taken by decide(). Tasks are named; names must be unique.
+  /// These report what happens at now(); decide() takes the decisions. Tasks are given by name; names must be unique.
   ManualWorkers &release(std::string_view task, Time nominal);
   ManualWorkers &release(std::string_view task) { return release(task, now_); }
   ManualWorkers &finish(std::string_view task, sched::Outcome outcome = sched::Outcome::Finished);
@@ -26,7 +26,7 @@ class ManualWorkers {
   ManualWorkers &decide();
   ManualWorkers &at(Time now);
 
-  /// What runs where: "a b -" for task a on worker 0, b on 1, nothing on 2.
+  /// The jobs by worker: "a b -" for task a on worker 0, b on 1, nothing on 2.
   [[nodiscard]] std::string running() const;
   /// Started jobs that are not running, by task name, sorted.
   [[nodiscard]] std::string suspended() const;

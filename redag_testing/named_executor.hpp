@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Drives a scheduler by the names of tasks, for tests of who runs next.
+// Drives a scheduler by the names of tasks, for tests of which job runs next.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ inline Task subscription(std::string name, std::vector<std::uint32_t> after) {
   return task;
 }
 
-/// Drives an executor by the names of tasks. Time is 0: only the order of events matters.
+/// Drives an executor by the names of tasks. Time is always 0: only the order of events matters.
 class NamedExecutor {
  public:
   using Names = std::vector<std::string>;
@@ -40,7 +40,7 @@ class NamedExecutor {
     for (std::vector<Task> &tasks : dags) {
       Dag dag;
       dag.tasks = std::move(tasks);
-      dag.max_active = 1;  // which these executors do not know
+      dag.max_active = 1;  // these executors do not know it
       inherit_periods(dag);
       workload_.dags.push_back(dag);
     }
@@ -56,7 +56,7 @@ class NamedExecutor {
     scheduler_->release(task, period * releases_[name]++, 0);
   }
 
-  /// What starts now.
+  /// Dispatches, and returns the tasks whose jobs start.
   Names dispatch() {
     Names started;
     for (const sched::Dispatch &d : scheduler_->dispatch(0).dispatches) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Budgets and modes as people would check them: schedules worked out by hand, and what jobs of high criticality are
-// owed however large the rest of the load is.
+// Budgets and modes as a user would check them: schedules computed by hand, and the guarantees of jobs of high
+// criticality under any further load.
 #include <algorithm>
 #include <functional>
 #include <utility>
@@ -69,7 +69,7 @@ Workload two_criticalities() {
   return workload;
 }
 
-// h has executed 2 ms at 5 and ends at 12, which is idle.
+// h has executed 2 ms at 5. It ends at 12, an idle instant.
 TEST(HighMode, StopsWhatIsLessCriticalUntilAnIdleInstant) {
   const Workload workload = two_criticalities();
   const std::vector<JobEvent> events = simulate_events(workload, 30 * kMillisecond);
@@ -81,7 +81,7 @@ TEST(HighMode, StopsWhatIsLessCriticalUntilAnIdleInstant) {
   EXPECT_EQ(changes, (std::vector<Time>{5 * kMillisecond, 12 * kMillisecond, 25 * kMillisecond}));
 }
 
-// Every second release goes through, below h.
+// Every second release is let through, below h.
 TEST(HighMode, LetsThroughWhatDegradeSays) {
   Workload workload = two_criticalities();
   workload.dags[0].tasks[0] = make_dag("hi", {{"h", 100, 60}}).tasks[0];
@@ -99,7 +99,7 @@ TEST(HighMode, DoesNotBeginForJobsWithinTheirWcetLow) {
   EXPECT_EQ(count(simulate_events(workload, kSecond), JobEventKind::HighMode), 0U);
 }
 
-// When HI mode was on.
+// The time spans in which HI mode was on.
 class HighModeSpans {
  public:
   HighModeSpans(const std::vector<JobEvent> &events, Time end) {
@@ -129,8 +129,8 @@ BoundCase random_criticalities(Rng &rng) {
       continue;
     }
     dag.degrade.kind = static_cast<Degrade::Kind>(rng.uniform(0, 2));
-    // A budget holds it to its wcet, whatever it tries. One that is cut off has no output: not where others wait for
-    // it.
+    // A budget limits a task to its wcet, however long it tries to execute. Tasks with edges have none: a job that is
+    // cut off has no output, for which others would wait.
     for (Task &task : dag.tasks) task.budget = limits.edges ? 0 : task.wcet;
   }
   return drawn;
@@ -168,7 +168,7 @@ std::vector<JobEvent> simulate(const BoundCase &drawn, Duration horizon, std::ui
   return events;
 }
 
-// Tasks of high criticality execute for wcet_low or for anything up to wcet, the others try more than their budget.
+// Tasks of high criticality execute for wcet_low or for anything up to wcet; the others try to exceed their budget.
 std::vector<JobEvent> simulate_overruns(const BoundCase &drawn, Duration horizon, double overruns, std::uint64_t seed) {
   return simulate(drawn, horizon, seed, [&](const Task &task, TaskId task_id, std::uint32_t number) {
     Rng dice = Rng::stream(seed, task_id.value, number);
@@ -178,8 +178,8 @@ std::vector<JobEvent> simulate_overruns(const BoundCase &drawn, Duration horizon
   });
 }
 
-// No job of high criticality answers later than its bound, and no job that ends in LO mode later than its bound there.
-// Where a deadline is not shown met in LO mode, jobs can be skipped, and lower criticality is not judged.
+// No job of high criticality answers later than its bound, and no job that ends in LO mode later than its bound for
+// that mode. If a deadline is not shown met in LO mode, jobs can be skipped, and lower criticality is not judged.
 void check_amc(std::uint64_t seed, std::uint64_t &judged, std::uint64_t &changes) {
   Rng rng(seed);
   BoundCase drawn = random_criticalities(rng);
@@ -224,8 +224,8 @@ TEST(HighMode, AmcBoundsHoldUnderRandomOverruns) {
   EXPECT_GT(changes, wanted) << "HI mode was hardly ever on";
 }
 
-// Every job of lower criticality asks for ten times the platform, whatever its period; a budget of its wcet is what it
-// gets in LO mode. Those of high criticality that amc_rtb shows met in every mode miss nothing.
+// Every job of lower criticality asks for ten times the platform, whatever its period; its budget limits it to its wcet
+// in LO mode. Tasks of high criticality that amc_rtb shows met in every mode miss nothing.
 void check_overload(std::uint64_t seed, std::uint64_t &judged, std::uint64_t &cut_off, std::uint64_t &changes) {
   Rng rng(seed);
   BoundCase drawn = random_criticalities(rng);
@@ -275,8 +275,8 @@ TEST(Overload, WithinAmcRtbHighCriticalityMissesNothingBesideTenTimesTheCapacity
   EXPECT_GT(changes, wanted) << "HI mode was hardly ever on";
 }
 
-// Jobs of high criticality that are shown schedulable on their own miss nothing beside ten times the capacity of the
-// platform, where their DAGs come first. Under chain_aware, which orders by criticality, they do.
+// Jobs of high criticality that are shown schedulable alone miss nothing beside ten times the platform's capacity, if
+// their DAGs come first. Under chain_aware, which orders by criticality, they do.
 TEST(Overload, HighCriticalityMissesNothingBesideTenTimesTheCapacity) {
   std::uint64_t judged = 0;
   std::uint64_t lost = 0;

@@ -19,7 +19,7 @@ std::uint32_t between(Rng &rng, std::uint32_t low, std::uint32_t high) {
   return static_cast<std::uint32_t>(rng.uniform(low, high));
 }
 
-// Few values, so that equal ones are common, and all multiples of one, so that releases coincide.
+// Few values make equal ones common; all are multiples of one value, which makes releases coincide.
 Duration random_period(Rng &rng) {
   constexpr std::array<Duration, 4> kPeriods{10 * kMicrosecond, 20 * kMicrosecond, 40 * kMicrosecond,
                                              50 * kMicrosecond};

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Small workloads that provoke: equal periods and deadlines, edges between rates, AND-joins, groups across DAGs, tight
-// bounds and queues, several tasks a level. For properties of schedulers; generate.hpp makes realistic ones. Pure
-// functions of their generator.
+// Small workloads with difficult features: equal periods and deadlines, edges between rates, AND-joins, groups across
+// DAGs, tight bounds and queues, several tasks a level. For properties of schedulers; generate.hpp makes realistic
+// ones. Pure functions of their generator.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ struct RandomWorkloadLimits {
   bool groups = true;
   bool bounds = true;   // max_active, max_pending, queues
   bool data = true;     // data tasks; otherwise all tasks are timers
-  bool overlap = true;  // jobs of one task that overlap (concurrency above 1)
+  bool overlap = true;  // jobs of one task can overlap (concurrency above 1)
 };
 
 /// A valid workload; times are a few microseconds.
@@ -32,15 +32,15 @@ struct RandomWorkloadLimits {
 /// One more DAG like those of random_workload(), for add_dag.
 [[nodiscard]] Dag random_dag(Rng &rng, const RandomWorkloadLimits &limits = {});
 
-/// 1 to 3 workers; Full with a static policy has limited levels or threads every other time.
+/// Draws 1 to 3 workers. Full preemption with a static policy has limited levels or threads every other time.
 [[nodiscard]] sched::Config random_config(Rng &rng, PolicyKind policy, sched::Preemption preemption,
                                           std::size_t task_count);
 
-/// For people: one line a task.
+/// Describes the workload: one line per task.
 [[nodiscard]] std::string describe(const Workload &workload, const sched::Config &config);
 
-/// random_workload() for RapidCheck; it does not shrink. A property that drives a scheduler rather draws a seed, which
-/// is printed when it fails.
+/// random_workload() for RapidCheck; it does not shrink. A property that drives a scheduler should draw a seed instead,
+/// which is printed when the property fails.
 [[nodiscard]] rc::Gen<Workload> any_workload(const RandomWorkloadLimits &limits = {});
 
 }  // namespace redag::testing

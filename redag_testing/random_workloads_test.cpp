@@ -19,7 +19,7 @@ RC_GTEST_PROP(RandomWorkload, IsValid, ()) {
   if (has_errors(diagnostics)) RC_FAIL(to_string(diagnostics));
 }
 
-// What makes them worth running: each of these shapes comes up within a hundred.
+// Each of the shapes that make these workloads useful occurs within a hundred of them.
 TEST(RandomWorkloads, HaveEveryShape) {
   std::set<std::string> seen;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {

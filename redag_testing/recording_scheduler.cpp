@@ -48,7 +48,7 @@ struct Call {
   Reason reason = Reason::None;
   Outcome outcome = Outcome::Finished;
   Limit limit = Limit::Budget;
-  std::uint32_t number = 0;  // of `most`, of the rank
+  std::uint32_t number = 0;  // of `most`, or of the rank
   std::size_t what = 0;      // position of the DAG or task
   Time time = 0;
   pid_t thread = 0;
@@ -75,7 +75,7 @@ RecordingScheduler::~RecordingScheduler() = default;
 
 std::shared_ptr<RecordingScheduler::Log> RecordingScheduler::make_log() { return std::make_shared<Log>(); }
 
-// ---- what is told ----
+// ---- calls are recorded ----
 
 void RecordingScheduler::release(TaskId task, Time nominal, Time now) {
   log_->calls.push_back({.kind = Call::Kind::Release, .now = now, .task = task, .nominal = nominal});
@@ -147,7 +147,7 @@ void RecordingScheduler::close(Time now) {
   scheduler_->close(now);
 }
 
-// ---- and told again ----
+// ---- and replayed ----
 
 std::vector<Decision> RecordingScheduler::replay(const Log &log, Scheduler &other, std::size_t &differences) {
   std::vector<Decision> decisions;

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A scheduler that notes what it is told, so that another one can be told the same afterwards: then what was decided is
-// known without asking who decided it. Records nothing of cooperative preemption, and ids must not be used again.
+// A scheduler that records its calls, for another one to receive the same calls afterwards. The decisions are then
+// known without asking the scheduler that took them. It does not record cooperative preemption, and ids must not be
+// reused.
 #pragma once
 
 #include <sys/types.h>
@@ -20,28 +21,29 @@ namespace redag::testing {
 
 using JobKey = std::pair<std::uint32_t, std::uint32_t>;  // task, number
 
-/// What was to happen to started jobs from some time on.
+/// What had to happen to started jobs from some time on.
 struct Decision {
   struct Change {
     JobKey job;
-    bool starts = false;      // else it has started before
+    bool starts = false;      // false: it had started before
     std::uint32_t level = 0;  // 0 is the most urgent
   };
-  Time time = 0;     // CLOCK_MONOTONIC: when it was asked for
-  pid_t thread = 0;  // the one that asked, and carries it out
+  Time time = 0;     // CLOCK_MONOTONIC: when the decision was requested
+  pid_t thread = 0;  // the thread that requested it, and carries it out
   std::vector<Change> changes;
 };
 
 class RecordingScheduler final : public sched::Scheduler {
  public:
-  /// Everything that has been told to a scheduler. Outlives it.
+  /// All calls to a scheduler. Outlives it.
   class Log;
 
   RecordingScheduler(std::unique_ptr<sched::Scheduler> scheduler, std::shared_ptr<Log> log);
   ~RecordingScheduler() override;
 
   [[nodiscard]] static std::shared_ptr<Log> make_log();
-  /// What `other`, new, decides when it is told the same. `differences`: jobs that ended without having started there.
+  /// Returns what `other`, a new scheduler, decides on the same calls. `differences` counts jobs that ended without
+  /// having started there.
   [[nodiscard]] static std::vector<Decision> replay(const Log &log, sched::Scheduler &other, std::size_t &differences);
 
   void release(TaskId task, Time nominal, Time now) override;

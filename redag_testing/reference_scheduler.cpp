@@ -74,7 +74,7 @@ bool ReferenceScheduler::more_urgent(const TaskState &a, const TaskState &b) con
   return false;
 }
 
-// And its ties. TaskId last: `tasks_` is in that order.
+// The table with its ties. TaskId is last: `tasks_` is in that order.
 bool ReferenceScheduler::task_before(const TaskState &a, const TaskState &b) const {
   if (more_urgent(a, b) || more_urgent(b, a)) return more_urgent(a, b);
   return std::tuple(a.dag, a.topological, &a - tasks_.data()) < std::tuple(b.dag, b.topological, &b - tasks_.data());
@@ -113,7 +113,7 @@ void ReferenceScheduler::rank_tasks() {
     }
     if (config_.ties == Ties::Fixed) state.tier = state.rank;
   }
-  // An inheritance that is no more than its own is over.
+  // An inheritance that is no higher than the job's own priority is over.
   for (Job &job : jobs_) {
     if (job.heir_of == kNone) continue;
     if (!is_of_higher_priority(own_standing(jobs_[job.heir_of]), own_standing(job))) job.heir_of = kNone;
@@ -153,7 +153,7 @@ std::size_t ReferenceScheduler::new_job(std::size_t task, Time release, Time now
   return job;
 }
 
-// "Overrun and admission", for timer and data tasks alike.
+// Applies "Overrun and admission" to timer and data tasks alike.
 void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, const std::vector<Data> &consumed) {
   TaskState &state = tasks_[task];
   const std::size_t job = new_job(task, release, now);
@@ -162,7 +162,7 @@ void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, co
     return;
   }
   jobs_[job].consumed = consumed;
-  // "Ties": it has the turn of the job whose place it takes; and not one before that of an earlier job of its task.
+  // "Ties": the job has the turn of the job that it replaces, and none before that of an earlier job of its task.
   jobs_[job].turn = release;
   for (const std::size_t other : jobs_of(task, State::Ready)) {
     const bool takes_its_place = state.task.overrun == Overrun::Skip;
@@ -219,7 +219,7 @@ void ReferenceScheduler::skip(std::size_t job, Time now, Reason reason) {
   Job &j = jobs_[job];
   TaskState &state = tasks_[j.task];
   if (j.state == State::Ready && state.task.activation == Activation::Timer) {
-    // Nobody used its data: that, or what has come since, is fresh again.
+    // No job used the data: they, or newer data, are fresh again.
     for (Data &input : state.inputs) input.fresh = true;
   }
   j.state = State::Done;
@@ -257,7 +257,7 @@ void ReferenceScheduler::deliver(std::size_t job, Time now) {
     if (input == state.predecessors.end()) continue;
     Data &newest = state.inputs[static_cast<std::size_t>(input - state.predecessors.begin())];
     if (data.release < newest.release) {
-      newest.fresh = true;  // it completed, but what it says is known better
+      newest.fresh = true;  // it completed, but newer data are already known
     } else {
       newest = data;
     }
@@ -272,8 +272,7 @@ void ReferenceScheduler::deliver(std::size_t job, Time now) {
   }
 }
 
-// ---- "Budgets" and "Criticality"
-// -------------------------------------------------------------------------------------
+// ---- "Budgets" and "Criticality" ------------------------------------------------------------------------------------
 
 void ReferenceScheduler::exceed(JobSlot slot, sched::Limit limit, Time now) {
   const std::size_t job = slot.value;
@@ -307,7 +306,7 @@ Reason ReferenceScheduler::refusal(std::size_t task, Time release) {
   return Reason::None;
 }
 
-// All that was let through of the tasks that count together, its own if it counts alone.
+// Compares with everything let through for the tasks that count together; a task that counts alone uses only its own.
 bool ReferenceScheduler::is_taken(const TaskState &state, Time release) const {
   std::vector<Time> taken = state.let_through;
   for (const TaskState &other : tasks_) {
@@ -332,7 +331,7 @@ void ReferenceScheduler::begin_high_mode(std::size_t cause, Time now) {
   high_mode_ = true;
   mode_cause_ = cause;
   high_since_ = now;
-  // The newest first: of the data that nobody used, the newest is left.
+  // The newest jobs first: of the data that no job used, the newest are kept.
   for (std::size_t job = jobs_.size(); job-- > 0;) {
     const std::size_t heir_of = jobs_[job].heir_of;
     if (heir_of != kNone && is_degradable(jobs_[heir_of].task)) jobs_[job].heir_of = kNone;
@@ -441,7 +440,7 @@ bool ReferenceScheduler::is_before(const Standing &a, const Standing &b) {
          std::tie(b.demoted, b.priority, b.turn, b.rank, b.number);
 }
 
-/// With what it has inherited.
+/// The standing with what the job has inherited.
 ReferenceScheduler::Standing ReferenceScheduler::standing(std::size_t job) const {
   Standing result = own_standing(jobs_[job]);
   const Standing lent = own_standing(effective(job));
@@ -452,7 +451,7 @@ ReferenceScheduler::Standing ReferenceScheduler::standing(std::size_t job) const
   return result;
 }
 
-/// Full preemption by static priorities: what the operating system does, it does by levels.
+/// Full preemption with static priorities: the operating system schedules by levels.
 bool ReferenceScheduler::has_levels() const {
   return config_.preemption == Preemption::Full && is_static(config_.policy);
 }
@@ -466,9 +465,9 @@ std::uint32_t ReferenceScheduler::level_of(std::size_t job) const {
   return std::min(level(jobs_[job]), level(effective(job)));
 }
 
-/// Does `a` take the worker of `b`, which has started?
+/// True if `a` takes the worker of `b`, which has started.
 bool ReferenceScheduler::outranks(std::size_t a, std::size_t b) const {
-  if (config_.policy == PolicyKind::Fifo) return false;  // what runs became ready earlier, or had to wait
+  if (config_.policy == PolicyKind::Fifo) return false;  // a running job became ready earlier, or had to wait
   const Standing by = standing(a);
   const Standing of = standing(b);
   if (by.demoted && of.demoted) return false;  // all on one level
@@ -476,7 +475,7 @@ bool ReferenceScheduler::outranks(std::size_t a, std::size_t b) const {
   return config_.ties == Ties::Share ? is_of_higher_priority(by, of) : is_before(by, of);
 }
 
-/// Who is looked at first: of one level, as in the operating system, who has started.
+/// True if `a` is considered first. Within a level, as in the operating system, a started job is.
 bool ReferenceScheduler::considered_before(std::size_t a, std::size_t b) const {
   if (has_levels()) {
     const auto rank = [this](std::size_t job) { return std::pair(level_of(job), !started(jobs_[job])); };
@@ -489,7 +488,8 @@ bool ReferenceScheduler::considered_before(std::size_t a, std::size_t b) const {
 
 Step ReferenceScheduler::dispatch(Time now, std::uint32_t most) {
   dispatches_.clear();
-  // One decision at a time; each can change the order, because a job that waits for a group hands on its priority.
+  // Takes one decision at a time. Each can change the order, because a job that waits for a group hands on its
+  // priority.
   std::vector<std::size_t> passed_over;
   for (;;) {
     const std::size_t job = first_candidate(passed_over, most > 0);
@@ -524,8 +524,8 @@ std::size_t ReferenceScheduler::first_candidate(const std::vector<std::size_t> &
   return first;
 }
 
-/// The worker that is available to `job`: its own of before, the lowest free one, or that of the least urgent job that
-/// it may interrupt.
+/// The worker that is available to `job`: the one that it had, the lowest free one, or that of the least urgent job
+/// that it may interrupt.
 std::uint32_t ReferenceScheduler::worker_for(std::size_t job) const {
   const std::uint32_t before = jobs_[job].worker;
   if (before != WorkerId::kNoneValue && workers_[before].empty()) return before;
@@ -544,7 +544,7 @@ std::uint32_t ReferenceScheduler::worker_for(std::size_t job) const {
   return best;
 }
 
-/// `job` has a worker to go to. Is it eligible? If not: deferral and inheritance.
+/// `job` has an available worker. Returns whether it is eligible; if not, handles deferral and inheritance.
 bool ReferenceScheduler::can_start(std::size_t job, Time now) {
   Job &j = jobs_[job];
   if (task_busy(j)) return false;
@@ -584,7 +584,7 @@ void ReferenceScheduler::place(std::size_t job, std::uint32_t worker, Time now) 
   dispatches_.push_back(decision);
 }
 
-/// Cooperative: a suspended job with nothing on top of it goes on.
+/// Cooperative: a suspended job with nothing on top of it continues.
 void ReferenceScheduler::resume_uncovered(Time now) {
   for (std::uint32_t w = 0; w < workers_.size(); ++w) {
     if (workers_[w].empty()) continue;
@@ -609,7 +609,7 @@ Dispatch ReferenceScheduler::decision_of(std::size_t job) const {
                   .level = level_of(job)};
 }
 
-/// The driver has to know when a job that it schedules gets another level: with full preemption also a suspended one.
+/// The driver must know each new level of a job that it schedules; with full preemption this includes suspended jobs.
 void ReferenceScheduler::tell_levels() {
   for (std::size_t i = 0; i < jobs_.size(); ++i) {
     Job &j = jobs_[i];

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// docs/model.md written down a second time, as plainly as possible: at each dispatch() every live job is looked at,
-// sorted by the total order and decided. For tests: what PriorityScheduler decides must equal this. It shares with the
-// library's scheduler the interface and assign_priorities() (for levels only), nothing else. Ids are never used again.
-// Not thread-safe.
+// A second implementation of docs/model.md, as plain as possible: each dispatch() looks at every live job, sorts them
+// by the total order and decides. For tests: PriorityScheduler must decide the same. It shares with the library's
+// scheduler only the interface, assign_priorities() (for levels alone), is_static() and topological_ranks(). Ids are
+// never reused. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -47,7 +47,7 @@ class ReferenceScheduler final : public sched::Scheduler {
   /// What a completed job left for one successor.
   struct Data {
     bool fresh = false;
-    Time release = std::numeric_limits<Time>::min();  // r of the job that wrote it: of those that ended, the newest
+    Time release = std::numeric_limits<Time>::min();  // r of the newest job that completed: the data's
     Time origin = 0;
   };
 
@@ -58,14 +58,14 @@ class ReferenceScheduler final : public sched::Scheduler {
     std::uint32_t topological = 0;
     std::vector<Data> inputs;  // one for each predecessor
     bool removed = false;
-    bool gone = false;  // removed, and no job has its priority: not in the order any more
+    bool gone = false;  // removed, and no job has its priority: no longer in the order
     std::uint32_t next_number = 0;
     std::uint32_t rank = 0;
     std::uint32_t tier = 0;  // how many tasks are strictly more urgent; Ties::Fixed: its rank
     std::uint32_t level = 0;
     bool skips_next = false;
     bool has_edges = false;
-    std::vector<Time> let_through;  // HI mode
+    std::vector<Time> let_through;  // releases in HI mode
     sched::Accounting count;
   };
 
@@ -78,7 +78,7 @@ class ReferenceScheduler final : public sched::Scheduler {
   /// Waiting -> Ready -> Running -> Done; Running <-> Suspended; Waiting, Ready -> Done (skipped).
   enum class State : std::uint8_t { Waiting, Ready, Running, Suspended, Done };
 
-  /// Jobs stay in `jobs_` for ever; a slot is a position in it.
+  /// Jobs stay in `jobs_` forever; a slot is a position in it.
   struct Job {
     std::size_t task = 0;
     std::uint32_t number = 0;
@@ -90,17 +90,17 @@ class ReferenceScheduler final : public sched::Scheduler {
     std::uint64_t ready_order = 0;
     std::uint32_t worker = WorkerId::kNoneValue;
     bool deferred = false;
-    std::uint32_t told_level = UINT32_MAX;  // what the driver knows
+    std::uint32_t told_level = UINT32_MAX;  // as last told to the driver
     bool at_point = false;                  // until the next dispatch
-    std::size_t heir_of = kNone;            // job whose priority this one has inherited
+    std::size_t heir_of = kNone;            // the job whose priority this one has inherited
     bool demoted = false;
     std::vector<Data> consumed;  // parallel to the task's predecessors
   };
 
-  /// A job's place in the order. What it inherits is the priority: the first two.
+  /// A job's place in the order. It inherits the priority: the first two members.
   struct Standing {
     bool demoted = false;
-    std::int64_t priority = 0;  // the smaller, the more urgent
+    std::int64_t priority = 0;  // smaller is more urgent
     Time turn = 0;
     std::uint32_t rank = 0;
     std::uint32_t number = 0;

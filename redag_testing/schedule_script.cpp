@@ -37,7 +37,7 @@ std::string describe(const std::vector<JobEvent> &events) {
   return text;
 }
 
-// Neighbours whose order means nothing, in one order.
+// Sorts neighbouring events whose order is not specified.
 std::vector<JobEvent> normalised(const Step &step, const std::set<TaskId> &uncounted) {
   std::vector<JobEvent> events;
   for (const JobEvent &event : step.events) {
@@ -112,7 +112,7 @@ class Run {
     return std::nullopt;
   }
 
-  /// Two dispatches: the second must do nothing.
+  /// Dispatches twice; the second dispatch must do nothing.
   std::optional<std::string> dispatch() {
     if (auto difference = dispatch_once(sched::kNoLimit)) return difference;
     if (!tested_->dispatch(now_).events.empty()) return "a dispatch without an event decided something";
@@ -120,7 +120,7 @@ class Run {
     return std::nullopt;
   }
 
-  /// With a limit, and again with none to start: the second must do nothing.
+  /// Dispatches with a limit, and again with a limit of 0; the second dispatch must do nothing.
   std::optional<std::string> dispatch_some(std::uint8_t choice) {
     if (auto difference = dispatch_once(choice % 3U)) return difference;
     if (!tested_->dispatch(now_, 0).events.empty()) return "a dispatch that may start nothing decided something";
@@ -131,7 +131,7 @@ class Run {
  private:
   enum class State : std::uint8_t { Running, Suspended };
   struct KnownDag {
-    bool bounded = false;  // by max_active
+    bool bounded = false;  // has a max_active
     bool removed = false;
   };
 
@@ -148,7 +148,7 @@ class Run {
     if (dag.bounded && (!task.group.empty() || config_.max_started > 0)) uncounted_.insert(id);
   }
 
-  // One of the timers that are due; a due one that is not chosen is late.
+  // Releases one of the timers that are due; the others are late.
   void release(std::uint8_t choice, bool missed) {
     std::vector<TaskId> due;
     for (const TaskId task : timers_) {
@@ -166,7 +166,8 @@ class Run {
     releases_[task.value] += periods_[task.value];
   }
 
-  // Now and then, with full preemption, one that counts as preempted: the operating system ran it.
+  // Completes a running job; with full preemption sometimes one that counts as preempted, because the operating system
+  // ran it.
   void complete(std::uint8_t choice) {
     const bool any = config_.preemption == Preemption::Full && choice >= 240;
     std::vector<JobKey> jobs;
@@ -225,7 +226,7 @@ class Run {
     expected_->remove_dag(dag, now_);
   }
 
-  // To one of the DAGs that are left, anywhere in its order.
+  // Adds a task to one of the remaining DAGs, anywhere in its order.
   std::optional<std::string> add_task(std::uint8_t choice) {
     std::vector<std::size_t> left;
     for (std::size_t d = 0; d < dags_.size(); ++d) {
@@ -284,7 +285,7 @@ class Run {
     return compare_started();
   }
 
-  // With full preemption the operating system schedules suspended jobs too, by the level that it was told.
+  // With full preemption the operating system also schedules suspended jobs, by the level that it was told.
   std::optional<std::string> compare_started() {
     for (const auto &[key, state] : jobs_) {
       if (state != State::Running && config_.preemption != Preemption::Full) continue;
@@ -293,7 +294,7 @@ class Run {
                            expected_.level(key));
       }
       if (state != State::Running) continue;
-      // outranked() may answer yes too often (it does not look at bounds and groups), never no.
+      // outranked() may answer yes too often, because it ignores bounds and groups; it must never wrongly answer no.
       if (expected_->outranked(expected_.slot(key)) && !tested_->outranked(tested_.slot(key))) {
         return fmt::format("  task {} job {} is outranked and does not know", key.first, key.second);
       }
@@ -315,7 +316,7 @@ class Run {
   std::size_t task_count_ = 0;
   std::vector<TaskId> timers_;
   std::set<TaskId> uncounted_;  // tasks whose deferrals are not compared
-  std::vector<Time> releases_;  // next one of each task
+  std::vector<Time> releases_;  // the next one of each task
   std::vector<Duration> periods_;
   std::map<JobKey, State> jobs_;  // started and unfinished
   std::set<std::pair<JobKey, sched::Limit>> exceeded_;
@@ -345,7 +346,7 @@ const char *name_of(Kind kind) {
 Script random_script(std::uint64_t seed, std::size_t length, bool reconfigure) {
   Rng rng = Rng::stream(seed, 1, 0);
   Script script;
-  // The rates differ from script to script: some starve, some idle.
+  // The rates differ from script to script: some scripts starve the scheduler, some keep it idle.
   const double dispatch = 0.1 + 0.4 * rng.uniform01();
   const double release = 0.3 + 0.5 * rng.uniform01();
   const double point = 0.2 * rng.uniform01();

@@ -25,7 +25,7 @@ constexpr std::size_t kPages = 512;  // of data, a power of two: 40,000 events
 
 }  // namespace
 
-// One processor's events, as perf_event_open(2) lays them out.
+// One processor's events, in the layout of perf_event_open(2).
 class SwitchRecorder::Ring {
  public:
   Ring(int cpu, Duration beat) : cpu_(cpu) {
@@ -63,7 +63,7 @@ class SwitchRecorder::Ring {
 
   [[nodiscard]] int error() const { return error_; }
 
-  // Adds the events so far. False: the kernel dropped some.
+  // Adds the events up to now. Returns false if the kernel dropped some.
   bool read(std::vector<SwitchEvent> &out) {
     ::ioctl(file_, PERF_EVENT_IOC_DISABLE, 0);
     const std::uint64_t end = __atomic_load_n(&page_->data_head, __ATOMIC_ACQUIRE);
@@ -85,7 +85,7 @@ class SwitchRecorder::Ring {
   }
 
  private:
-  // What ends every record (sample_id_all), and is all of a sample.
+  // The end of every record (sample_id_all), and the whole of a sample.
   struct Identity {
     std::uint32_t process = 0;
     std::uint32_t thread = 0;
@@ -151,7 +151,7 @@ Result<std::vector<SwitchEvent>> SwitchRecorder::stop() {
   bool complete = true;
   for (const auto &ring : rings_) complete = ring->read(events) && complete;
   if (!complete) return make_error("the kernel dropped some of its record");
-  // What one processor did at one time is in its order.
+  // Keeps the order of what one processor did at one time.
   std::stable_sort(events.begin(), events.end(),
                    [](const SwitchEvent &a, const SwitchEvent &b) { return a.time < b.time; });
   return events;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the kernel itself says about which thread it ran on which processor: its context switches and its timer's
-// interrupts, by perf_event_open. Needs CAP_PERFMON, or root, or kernel.perf_event_paranoid <= 0. One thread uses it.
+// The kernel's own record of which thread it ran on which processor: context switches and timer interrupts, by
+// perf_event_open. Needs CAP_PERFMON, root, or kernel.perf_event_paranoid <= 0. For use by one thread.
 #pragma once
 
 #include <sys/types.h>
@@ -20,8 +20,8 @@ namespace redag::testing {
 struct SwitchEvent {
   enum class Kind : std::uint8_t {
     In,         // the thread got the processor
-    Preempted,  // it lost it, and could have gone on
-    Slept,      // it gave it up to wait for something
+    Preempted,  // it lost the processor, and could have continued
+    Slept,      // it gave the processor up to wait for something
     Beat,       // the processor served its timer: it executes, and could have switched
   };
   Time time = 0;  // CLOCK_MONOTONIC
@@ -33,13 +33,13 @@ struct SwitchEvent {
 /// The kernel's record of some processors, from its creation to stop().
 class SwitchRecorder {
  public:
-  /// `beat`: how often each processor says that it executes. Error: the kernel does not let us, with a hint.
+  /// Starts recording; every `beat` each processor records that it executes. Error: the kernel refuses, with a hint.
   [[nodiscard]] static Result<SwitchRecorder> start(const std::vector<int> &cpus, Duration beat);
   ~SwitchRecorder();
   SwitchRecorder(SwitchRecorder &&) noexcept;
   SwitchRecorder &operator=(SwitchRecorder &&) noexcept;
 
-  /// All events by time. Error: the kernel dropped some.
+  /// Returns all events by time. Error: the kernel dropped some.
   [[nodiscard]] Result<std::vector<SwitchEvent>> stop();
 
  private:

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Traces written by hand, for tests of what reads them: one call an event, times in milliseconds, tasks by name.
+// Builds traces by hand for tests of their readers: one call per event, times in milliseconds, tasks by name.
 #pragma once
 
 #include <string>
@@ -70,7 +70,7 @@ class TraceBuilder {
     return add(JobEventKind::Skipped, task, job, 0, WorkerId::kNoneValue, reason);
   }
 
-  /// The run ended at `ms`.
+  /// Returns the trace of a run that ended at `ms`.
   [[nodiscard]] trace::Trace until(Time ms) const {
     trace::Trace trace = trace_;
     trace.info.end = ms * kMillisecond;
