@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Measures task sets per second on one worker: n tasks, UUniFast utilizations, log-uniform periods of 10 ms to 1 s, D =
-// T, rate-monotonic. The analysis is rta_preemptive with all its terms.
+// Measures task sets per second on one worker: n tasks, UUniFast utilizations, log-uniform periods of 10 ms to 1 s,
+// D = T, rate-monotonic. The analysis is rta_preemptive with all its terms.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
