@@ -26,8 +26,7 @@ struct PlantSpec {
   Kind kind = Kind::CartPole;
   double length = 0.5;  // m; the pole's length, or the length of the quadrotor's arm
   Duration period = 0;  // of its feedback
-  double push = 0;      // rad/s; largest change of angular velocity by a push (cart-pole: of the pole; quadrotor: of
-                        // the pitch)
+  double push = 0;      // rad/s; largest change of a push to the angular velocity of pole or pitch
 };
 
 /// Returns MuJoCo's model file of one scene with the plants side by side.

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The share of an experiment's units that one of several machines runs. Shard i of n has the units u with u mod n = i -
-// 1. Plain values.
+// The share of an experiment's units that one of several machines runs. Shard i of n has the units u with
+// u mod n = i - 1. Plain values.
 #pragma once
 
 #include <cstdint>

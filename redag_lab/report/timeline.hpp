@@ -21,8 +21,7 @@ struct Timeline {
   std::size_t bins = 0;
   std::vector<std::vector<Duration>> busy;           // by DagId, then by stretch: time on workers, over all workers
   std::vector<std::vector<std::uint64_t>> released;  // jobs by the stretch of their release
-  std::vector<std::vector<std::uint64_t>> missed;    // of these: late, overdue, skipped or aborted (except without
-                                                     // data)
+  std::vector<std::vector<std::uint64_t>> missed;    // of these: late, overdue, skipped or aborted (not without data)
 };
 
 /// Returns at most `most_bins` stretches of whole microseconds (or shorter ones, for very short runs). Requires

@@ -68,8 +68,8 @@ struct AssignmentOptions {
   Objective objective = Objective::Lateness;
   bool priorities = true;  // may change them
   bool caps = true;        // may change max_active
-  /// With at most this many combinations of max_active, all are tried. Otherwise a local search runs from `restarts` +
-  /// 3 starts.
+  /// With at most this many combinations of max_active, all are tried. Otherwise a local search runs from
+  /// `restarts` + 3 starts.
   std::uint64_t exhaustive = 1024;
   std::uint32_t restarts = 8;
   std::uint64_t seed = 1;

@@ -32,7 +32,7 @@ using UnitOrder = std::vector<std::uint32_t>;
 /// jitter and blocking (J. Leung, J. Whitehead, Performance Evaluation 2(4), 1982).
 [[nodiscard]] UnitOrder deadline_order(const System &system);
 
-/// Orders units by D - k L, smallest first, with k = (m - 1 + sqrt(5 m^2 - 6 m + 1)) / (2 m) and L the longest path.
+/// Orders units by D - k L, smallest first, with k = (m - 1 + sqrt(5 m^2 - 6 m + 1)) / (2 m). L is the longest path.
 /// This is a heuristic for several workers: R. Davis, A. Burns, Improved priority assignment for global fixed priority
 /// pre-emptive scheduling in multiprocessor real-time systems, Real-Time Systems 47(1), 2011 (DkC).
 [[nodiscard]] UnitOrder dkc_order(const System &system);

@@ -16,10 +16,10 @@ namespace redag::analysis {
 /// The largest number of tasks for which remedies are tried: every trial is an analysis.
 inline constexpr std::size_t kMostTasksForRemedy = 64;
 
-/// Returns the change of the file, in words, or nothing if no single change that is tried suffices. The changes are
-/// tried in this order: an execution time that has to shrink by a tenth at most, a max_active, the preemption, a task's
-/// group, one more worker, an execution time that has to shrink by more. The execution times of the first six
-/// `suspects` are tried. Requires a valid workload that is not shown to be schedulable.
+/// Returns the change of the file, in words, or nothing if no single change that is tried suffices. An execution time
+/// that has to shrink by a tenth at most comes first. Then follow a max_active, the preemption, a task's group, one
+/// more worker, and an execution time that has to shrink by more. The execution times of the first six `suspects` are
+/// tried. Requires a valid workload that is not shown to be schedulable.
 [[nodiscard]] std::optional<std::string> find_remedy(const Workload &workload, const AnalysisPlatform &platform,
                                                      const std::vector<TaskId> &suspects);
 

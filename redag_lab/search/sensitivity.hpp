@@ -53,14 +53,14 @@ struct SensitivityOptions {
 /// task's own execution exceeds its time, or the utilization exceeds the workers.
 [[nodiscard]] std::optional<std::string> why_impossible(const System &system);
 
-/// Finds the margin of one knob. Returns nothing if `stop` ended it. `workload` must be valid. Needs about probes +
-/// log2(range) tests.
+/// Finds the margin of one knob. Returns nothing if `stop` ended it. `workload` must be valid. Needs about
+/// probes + log2(range) tests.
 [[nodiscard]] std::optional<Margin> margin_of(const Workload &workload, const AnalysisPlatform &platform,
                                               const Knob &knob, const Accepts &accepts = accepted_by_analysis,
                                               const SensitivityOptions &options = {});
 
-/// Returns the knobs of a report, in its order: all wcets and all rates; each task's wcet; each DAG's rate (its period
-/// where it has one); the period of each unit of a DAG with several units.
+/// Returns the knobs of a report, in its order: all wcets, all rates, each task's wcet, and each DAG's rate (its period
+/// where it has one). A DAG with several units also has the period of each unit, after its rate.
 [[nodiscard]] std::vector<Knob> knobs_of(const Workload &workload, const System &system);
 
 }  // namespace redag::analysis

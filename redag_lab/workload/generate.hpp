@@ -24,8 +24,7 @@ enum class UtilizationMethod : std::uint8_t {
 enum class PeriodModel : std::uint8_t {
   LogUniform,  // [period_min, period_max], multiples of period_granularity (Emberson, Stafford, Davis, WATERS 2010)
   Harmonic,    // period_min * 2^k up to period_max, equally likely
-  Automotive,  // 1 to 1000 ms with the shares of Kramer, Ziegenbein, Hamann, WATERS 2015, without angle-synchronous
-               // runnables
+  Automotive,  // 1 to 1000 ms, shares of Kramer, Ziegenbein, Hamann, WATERS 2015, without angle-synchronous ones
   Robot,       // 1 to 1000 Hz, the rates common in ROS; the shares are our choice
 };
 

@@ -14,8 +14,8 @@
 namespace redag::generation {
 
 /// Draws uniformly from {u : sum u = total, 0 <= u_i <= upper_i}: Dirichlet-Rescale, D. Griffin, I. Bate, R. Davis,
-/// "Generating Utilization Vectors for the Systematic Evaluation of Schedulability Tests", RTSS 2020. Requires total >
-/// 0 and total <= sum upper. Returns nothing if rounding defeated every attempt.
+/// "Generating Utilization Vectors for the Systematic Evaluation of Schedulability Tests", RTSS 2020. Requires
+/// total > 0 and total <= sum upper. Returns nothing if rounding defeated every attempt.
 [[nodiscard]] std::optional<std::vector<double>> drs(double total, const std::vector<double> &upper, Rng &rng);
 
 /// Draws uniformly from {u : sum u = total, 0 <= u_i <= bound}: UUniFast (E. Bini, G. Buttazzo, RTS 30, 2005) until a
