@@ -39,7 +39,7 @@ std::optional<std::vector<analysis::Knob>> chosen_knobs(const Analysed &analysed
     console.error("--task: " + row.error().front().message, row.error().front().hint);
     return std::nullopt;
   }
-  // A DAG that is released as a whole has one rate, the DAG's, which the task's row includes.
+  // The rate of a task that is released with its whole DAG is the DAG's rate, and counts as the task's.
   std::vector<std::uint32_t> wanted;
   std::vector<std::uint32_t> released;
   for (std::uint32_t t = 0; t < analysed.system.tasks.size(); ++t) {

@@ -94,8 +94,8 @@ function pictureOf(option, kind, width, height) {
 }
 
 /**
- * A figure: `build(t, width)` returns an ECharts option for theme `t`, or a sentence if there is nothing to draw.
- * `canvas`: many shapes, to be drawn as pixels. `onready(chart)` is called with every new chart.
+ * Returns a figure. `build(t, width)` returns an ECharts option for theme `t`, or a sentence if there is nothing to
+ * draw. `canvas` draws pixels instead of SVG, for many shapes. `onready(chart)` is called with every new chart.
  */
 function figure({name, height, build, caption, canvas = false, label, onready}) {
   const place = element('div', {style: `height:${height}px`, role: 'img', 'aria-label': label});
