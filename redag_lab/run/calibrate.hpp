@@ -53,8 +53,8 @@ struct TraceFigures {
   std::vector<LossSample> preempt;   // from the decision to resume a job until it continues
 };
 
-/// Returns the delay to charge to every job: the 99th percentile. The excess of longer delays counts as stalls and
-/// raises `beyond`, a loss fitted to `watched` time.
+/// Returns the delay to charge to every job: the 99th percentile. The excess of longer delays counts as stalls: sets
+/// `beyond` to the loss that fits it in `watched` time.
 [[nodiscard]] Duration usual_delay(std::span<const LossSample> delays, Duration watched, Loss &beyond);
 
 /// Extracts the delays from a trace. `absences` is indexed by TaskId, in order of time; tasks that do not record theirs
