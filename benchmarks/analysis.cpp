@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Speed of the bounds for several workers. Guan: 20 tasks on 4 workers, bare numbers and as a method with its terms.
-// Melani and its kin: sets of 2-5 DAGs of 3-9 tasks on 4 workers. Rates are task sets a second.
+// Measures the speed of the bounds for several workers, in task sets per second. Guan runs on 20 tasks and 4 workers:
+// once on bare numbers, once as a method with its terms. Melani and related methods run on sets of 2-5 DAGs of 3-9
+// tasks on 4 workers.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -21,7 +22,7 @@ namespace analysis = redag::analysis;
 using analysis::global::GlobalUnit;
 
 constexpr std::uint32_t kWorkers = 4;
-constexpr std::size_t kSets = 256;  // more than fit the branch predictor's memory
+constexpr std::size_t kSets = 256;  // more than the branch predictor can memorize
 
 std::vector<analysis::System> systems(redag::DagShape shape, std::uint32_t percent) {
   const bool graphs = shape != redag::DagShape::Independent;
@@ -49,7 +50,8 @@ std::vector<std::vector<GlobalUnit>> bare(const std::vector<analysis::System> &s
   return result;
 }
 
-// Runs `respond` on all tasks of each set in turn until one has no bound; reports how many sets had one for all.
+// Calls respond() on all tasks of each set in turn until one has no bound. Reports how many sets had a bound for every
+// task.
 template <class Respond>
 void run_bare(benchmark::State &state, std::vector<std::vector<GlobalUnit>> sets, Respond respond) {
   std::size_t next = 0;

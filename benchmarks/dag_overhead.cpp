@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a node of a DAG costs when its body is empty: chains, fan-outs and random graphs of 64 nodes, started anew by
-// their last node. Beside it the flow graph of oneTBB and, where its headers are found, Taskflow: both start nodes in
-// no order of priority and time none of them. cpu_ns/node counts all threads.
+// Measures the cost of a DAG node with an empty body, in chains, fan-outs and random graphs of 64 nodes. The last node
+// starts the graph anew. For comparison, the same graphs run on oneTBB's flow graph and, where its headers are found,
+// on Taskflow. Both ignore priorities and timing. cpu_ns/node counts all threads.
 #include <benchmark/benchmark.h>
 #include <oneapi/tbb/flow_graph.h>
 #include <oneapi/tbb/global_control.h>
@@ -38,7 +38,7 @@ constexpr std::uint32_t kRounds = 1000;
 enum class Shape : std::uint8_t { Chain, FanOut, Random };
 constexpr std::array kShapes = {"chain", "fan_out", "random"};
 
-// Node 0 is the only source and the last one the only sink.
+// Returns the predecessors of each node. Node 0 is the only source, and the last node is the only sink.
 std::vector<std::vector<std::uint32_t>> predecessors_of(Shape shape) {
   std::vector<std::vector<std::uint32_t>> predecessors(kNodes);
   Rng rng(7);

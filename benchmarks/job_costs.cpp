@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a job costs beside its body: processor time with and without tracing, context switches; and what an executor
-// costs that has nothing to do.
+// Measures the cost of a job besides its body: processor time with and without tracing, and context switches. Also
+// measures the cost of an idle executor.
 #include <benchmark/benchmark.h>
 #include <sys/resource.h>
 
@@ -55,7 +55,7 @@ Duration process_cpu_now() {
   return time.tv_sec * kSecond + time.tv_nsec;
 }
 
-// Context switches of all threads but the calling one.
+// Returns the context switches of all threads except the calling one.
 std::int64_t switches_of_others() {
   rusage all{};
   rusage own{};
@@ -64,7 +64,8 @@ std::int64_t switches_of_others() {
   return all.ru_nvcsw + all.ru_nivcsw - own.ru_nvcsw - own.ru_nivcsw;
 }
 
-// Processor time of jobs with empty bodies, each of which releases the next one, and of draining their events.
+// Measures the processor time of jobs with empty bodies, each of which releases the next one, and of draining their
+// events.
 class JobCost {
  public:
   JobCost(const Setup &setup, std::size_t trace_capacity)
@@ -91,7 +92,7 @@ class JobCost {
   [[nodiscard]] double ns_per_job() const { return static_cast<double>(used_) / static_cast<double>(batches_ * kJobs); }
   [[nodiscard]] bool lost_some() const { return engine_->lost_events() > 0; }
 
-  static constexpr std::size_t kRoom = 1U << 17U;  // for the events of a batch
+  static constexpr std::size_t kRoom = 1U << 17U;  // events, enough for one batch
 
  private:
   static constexpr std::uint64_t kJobs = 20'000;
@@ -102,7 +103,7 @@ class JobCost {
   std::vector<JobEvent> events_;
   Duration used_ = 0;
   std::uint64_t batches_ = 0;
-  std::unique_ptr<Engine> engine_;  // last: its threads use the others
+  std::unique_ptr<Engine> engine_;  // last, because its threads use the other members
 };
 
 void trace(benchmark::State &state, const Setup &setup) {
@@ -120,7 +121,7 @@ void trace(benchmark::State &state, const Setup &setup) {
   state.counters["percent_of_100us"] = (on.ns_per_job() - off.ns_per_job()) / (100'000 + off.ns_per_job()) * 100;
 }
 
-// Jobs released one at a time, and eight at a time, on workers that sleep in between.
+// Releases jobs one at a time and eight at a time to workers that sleep in between; reports context switches.
 void switches(benchmark::State &state, const Setup &setup) {
   const auto burst = static_cast<std::uint32_t>(state.range(0));
   constexpr std::uint32_t kBursts = 500;
@@ -148,7 +149,7 @@ void switches(benchmark::State &state, const Setup &setup) {
       static_cast<double>(switches) / static_cast<double>(state.iterations() * kBursts * burst);
 }
 
-// Workers and the release timer, with a task that is due in an hour.
+// Runs the workers and the release timer with one task that is due in an hour.
 void idle(benchmark::State &state, const Setup &setup) {
   ExecutorOptions options;
   options.preemption = setup.mode.mode;

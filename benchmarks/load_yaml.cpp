@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Reading a workload file: DAGs of ten tasks each, as generated.
+// Measures how fast a workload file is read. The workloads are generated, with DAGs of ten tasks each.
 #include <benchmark/benchmark.h>
 
 #include <string>

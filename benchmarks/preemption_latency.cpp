@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// How fast a more urgent job starts when every processor is busy with less urgent ones, in os mode: from release() to
-// the first line of its body. Beside it, sample by sample in the same run, the least that Linux takes for the same
-// thing: a futex wake of a SCHED_FIFO thread that has to preempt one of the same busy threads.
+// Measures how fast a more urgent job starts in os mode when every processor runs less urgent jobs. The latency is from
+// release() to the first line of the job's body. Each sample has a reference from the same run: a futex wake of a
+// SCHED_FIFO thread that has to preempt one of the same busy threads. This is the least that Linux needs.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace {
 using namespace redag;
 using namespace redag::runtime;
 
-// A busy job on every processor, one urgent task, and one urgent bare thread.
+// Runs a busy job on every processor, one urgent task, and one urgent bare thread for reference.
 class Machine {
  public:
   explicit Machine(const PriorityBand &band) : band_(band) {
@@ -54,7 +54,7 @@ class Machine {
     engine_->bind(workload_, std::move(bodies));
     if (!engine_->start()) std::abort();
     bare_ = std::thread([this] { serve(); });
-    (void)set_fifo_priority(pthread_self(), band.timer);  // this thread is the release timer
+    (void)set_fifo_priority(pthread_self(), band.timer);  // this thread acts as the release timer
     for (std::uint32_t t = 1; t <= cpus; ++t) engine_->release(TaskId(t), 0);
     while (busy_ < cpus) pause();
   }
@@ -101,7 +101,7 @@ class Machine {
   Workload workload_;
   std::atomic<std::uint32_t> busy_{0};
   std::atomic<bool> done_{false};
-  Time begun_ = 0;  // handed over by answered_
+  Time begun_ = 0;  // published by answered_
   Parker wake_;
   Parker answered_;
   std::unique_ptr<Engine> engine_;
@@ -122,7 +122,7 @@ void preemption_latency(benchmark::State &state) {
   }
   std::vector<Duration> bare;
   std::vector<Duration> ours;
-  // On a thread of its own, which becomes real-time; the one that runs the benchmarks stays as it is.
+  // The thread becomes real-time, and therefore is not the one that runs the benchmarks.
   std::thread([&] {
     Machine machine(band);
     for (auto iteration : state) {

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The ready queue beside the queues that a user would take instead: each thread takes the most urgent of 1000 items and
-// inserts it again at another of 64 levels. Ordered: ours (by levels, and the heap for dynamic policies),
-// std::priority_queue, tbb::concurrent_priority_queue. Not ordered, for comparison: moodycamel and boost::lockfree,
-// which do less. Ours alone needs no lock where one thread has it; the runtime holds it under a PiMutex.
+// Compares the ready queue with common alternatives. Each thread takes the most urgent of 1000 items and inserts it
+// again at another of 64 levels. Ordered queues: ours (by levels, and the heap for dynamic policies),
+// std::priority_queue and tbb::concurrent_priority_queue. moodycamel and boost::lockfree do not order and do less; they
+// are a reference. Our queue needs no lock within one thread. The runtime holds it under a PiMutex.
 #include <benchmark/benchmark.h>
 #include <concurrentqueue/concurrentqueue.h>
 #include <oneapi/tbb/concurrent_priority_queue.h>
@@ -40,7 +40,7 @@ struct LessUrgent {
   bool operator()(const Item &a, const Item &b) const { return a.level > b.level; }
 };
 
-/// LevelQueue or HeapQueue, as the scheduler has them.
+/// Wraps LevelQueue or HeapQueue, as the scheduler uses them, with a lock.
 template <class Queue, class Lock>
 class Ours {
  public:

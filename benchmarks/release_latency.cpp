@@ -1,11 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// How fast a job starts on a worker that sleeps: from release() to the first line of its body, and from the point on
-// the grid at which the release timer has to release it. Beside it, sample by sample in the same run, the least that
-// Linux takes for the same thing: a futex wake of a thread, and a thread that sleeps until an absolute time. All
-// threads have the priorities and the timer slack that the mode gives the runtime's own. Busy processors:
-// preemption_latency.cpp.
+// Measures how fast a job starts on a sleeping worker: from release() to the first line of its body, and from its
+// instant on the release timer's grid. Each sample has a reference from the same run, the least that Linux needs: a
+// futex wake of a thread, and a thread that sleeps until an absolute time. All threads have the priorities and the
+// timer slack that the mode gives the runtime's threads. preemption_latency.cpp measures busy processors.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -26,7 +25,7 @@ using namespace redag;
 using namespace redag::runtime;
 
 constexpr Duration kPeriod = kMillisecond;
-constexpr int kSamples = 1000;  // an iteration
+constexpr int kSamples = 1000;  // per iteration
 
 void sleep_until(Time monotonic) {
   const timespec until{static_cast<std::time_t>(monotonic / kSecond), static_cast<long>(monotonic % kSecond)};
@@ -84,7 +83,7 @@ struct Samples {
 
 void release(benchmark::State &state, const Setup &setup) {
   Samples samples;
-  Time begun = 0;  // handed over by `answered`
+  Time begun = 0;  // published by `answered`
   Parker answered;
   Parker wake;
   bool over = false;
@@ -146,7 +145,7 @@ void timer(benchmark::State &state, const Setup &setup) {
     constexpr TaskId kOnly(0);
     releases.add(one_task().dags[0], std::span(&kOnly, 1), 0);
     if (!releases.start(origin, kNever, ThreadSetup{"timer", setup.timer_priority(), {}})) std::abort();
-    // Between the releases.
+    // Wakes half a period after each release.
     Result<ThreadHandle> bare = start_thread(ThreadSetup{"bare", setup.timer_priority(), {}}, [&] {
       for (Time at = origin + kPeriod / 2; !done.is_set(); at += kPeriod) {
         sleep_until(at);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Task sets a second on one worker: n tasks, UUniFast utilizations, log-uniform periods of 10 ms to 1 s, D = T,
-// rate-monotonic, analysed by rta_preemptive with all its terms.
+// Measures task sets per second on one worker: n tasks, UUniFast utilizations, log-uniform periods of 10 ms to 1 s,
+// D = T, rate-monotonic. The analysis is rta_preemptive with all its terms.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -40,7 +40,7 @@ std::vector<std::vector<SimpleTask>> task_sets(std::size_t count, double utiliza
   return sets;
 }
 
-// Arguments: tasks, utilization in percent.
+// The arguments are the number of tasks and the utilization in percent.
 void response_times(benchmark::State &state) {
   std::vector<redag::analysis::System> systems;
   for (const auto &set :

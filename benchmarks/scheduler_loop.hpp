@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the benchmarks of the scheduler run: a workload of many independent tasks, and jobs on their way through the
-// scheduler.
+// Shared by the benchmarks of the scheduler: a workload of many independent tasks, and a loop that runs jobs through
+// the scheduler.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@
 
 namespace redag::benchmarks {
 
-// `count` independent timer tasks in DAGs of ten, periods spread over three decades.
+// Returns `count` independent timer tasks in DAGs of ten, with periods from 1 ms to 1 s.
 inline Workload make_workload(std::size_t count, std::uint32_t workers, std::uint32_t max_active) {
   Workload workload;
   workload.platform = {workers, PreemptionMode::Os};
@@ -33,7 +33,7 @@ inline Workload make_workload(std::size_t count, std::uint32_t workers, std::uin
   return workload;
 }
 
-/// Keeps 4 jobs running: each step ends one and releases one. Ready jobs: about half the tasks.
+/// Keeps 4 jobs running. Each step ends one and releases one. About half of the tasks have a ready job.
 class SchedulerLoop {
  public:
   SchedulerLoop(std::size_t tasks, sched::Preemption preemption, std::uint32_t max_active)
@@ -46,7 +46,7 @@ class SchedulerLoop {
     carry_out(scheduler_.dispatch(now_));
   }
 
-  /// A release, a decision, an end, a decision.
+  /// Releases a job and decides, then completes a running job and decides again.
   void step() {
     ++now_;
     scheduler_.release(order_[steps_ % order_.size()], now_, now_);

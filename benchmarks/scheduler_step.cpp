@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What one job costs the scheduler: release + dispatch + complete + dispatch, by number of tasks and DAGs, with and
-// without bounds; and the simulator's speed.
+// Measures the scheduler's cost per job (release, dispatch, complete, dispatch) by number of tasks and DAGs, with and
+// without bounds. Also measures the simulator's speed.
 #include <benchmark/benchmark.h>
 #include <malloc.h>
 
@@ -35,7 +35,7 @@ BENCHMARK(BM_SchedulerStep)->ArgNames({"tasks", "mode", "cap"})->ArgsProduct({{2
 void BM_Simulator(benchmark::State &state) {
   const Workload workload = redag::benchmarks::make_workload(static_cast<std::size_t>(state.range(0)), 4, 0);
   std::uint64_t jobs = 0;
-  std::size_t memory = 0;  // of the scheduler and the simulator
+  std::size_t memory = 0;  // bytes, of the scheduler and the simulator
   const std::size_t before = heap_bytes();
   for (auto _ : state) {
     sched::PriorityScheduler scheduler(workload, redag::sched::config_of(workload));

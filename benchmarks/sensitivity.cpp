@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Speed of what acts on the bounds: the critical scaling factor of all wcets, all knobs, and Audsley's assignment, on
-// sets of 20 independent tasks. Rates are task sets a second.
+// Measures the speed of searches over the bounds, in task sets of 20 independent tasks per second: the critical scaling
+// factor of all wcets, all knobs, and Audsley's assignment.
 #include <benchmark/benchmark.h>
 
 #include <vector>
@@ -32,7 +32,7 @@ std::vector<Workload> sets(std::uint32_t workers) {
   return result;
 }
 
-// Calls run(workload, platform) on the sets in turn.
+// Calls run(workload, platform) on each set in turn.
 template <class Run>
 void on_sets(benchmark::State &state, Run run) {
   const std::vector<Workload> all = sets(static_cast<std::uint32_t>(state.range(0)));

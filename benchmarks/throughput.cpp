@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Jobs a second when there are always more ready jobs than workers: what scheduling costs at most, and whether it
-// collapses with more workers than processors. Each of 64 tasks releases its next job from its body. Beside it oneTBB,
-// which takes its tasks in no order.
+// Measures jobs per second when there are always more ready jobs than workers. The result is the most that scheduling
+// costs, and shows whether throughput collapses with more workers than processors. Each of 64 tasks releases its next
+// job from its body. oneTBB, which runs its tasks in no order, is the reference.
 #include <benchmark/benchmark.h>
 #include <oneapi/tbb/task_arena.h>
 #include <pthread.h>
@@ -65,7 +65,7 @@ void BM_Engine(benchmark::State &state) {
     engine.bind(workload, std::move(bodies));
     engine.set_origin(monotonic_now());
     if (!engine.start()) return state.SkipWithError("threads cannot be started");
-    // As the release timer: busy workers must not keep it from ending the run.
+    // This thread gets the release timer's priority. Otherwise busy workers would keep it from ending the run.
     if (setup->timer_priority() > 0) (void)set_fifo_priority(pthread_self(), setup->timer_priority());
     const Time begin = monotonic_now();
     for (std::uint32_t t = 0; t < kTasks; ++t) engine.release(TaskId(t), 0);

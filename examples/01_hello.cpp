@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The smallest program: one task every 100 ms, and a body that ends the run.
+// The smallest program: one task runs every 100 ms, and its body ends the run.
 #include <cstdio>
 
 #include "redag/runtime/executor.hpp"

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Two rates on one worker: a control chain every 5 ms and a detector that computes for 40 ms. Three runs: without
-// preemption the chain waits for the detector, at preemption points it runs in between, and where the process may use
-// SCHED_FIFO (preemption: os) the detector needs no preemption points at all.
+// Two rates share one worker: a control chain every 5 ms and a detector that computes for 40 ms. The program runs them
+// three times. Without preemption the chain waits for the detector. With preemption points the chain runs in between.
+// With preemption `os`, where the process may use SCHED_FIFO, the detector needs no preemption points at all.
 #include <algorithm>
 #include <cstdio>
 #include <stdexcept>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What happens when a body throws, and when it computes for too long.
+// Shows what happens when a body throws, and when it computes for too long.
 #include <cstdio>
 #include <stdexcept>
 
@@ -20,7 +20,7 @@ int main() {
       std::printf("%s, job %u: %s; going on\n", info.task.c_str(), info.job, error.what());
       return OnException::Continue;
     } catch (...) {
-      return OnException::Stop;  // run() throws it
+      return OnException::Stop;  // run() rethrows the exception
     }
   };
   Executor executor(options);
@@ -28,10 +28,10 @@ int main() {
   DagBuilder sensors("sensors");
   int reads = 0;
   const TaskHandle lidar = sensors.timer("lidar", 50ms, [&] {
-    if (++reads % 3 == 0) throw std::runtime_error("no scan");  // releases no successor
+    if (++reads % 3 == 0) throw std::runtime_error("no scan");  // the job releases no successor
     if (reads == 10) throw std::logic_error("this one is a bug");
   });
-  // A planner that never ends: after 5 ms of processor time its next preemption point ends the job.
+  // This planner would never end. After 5 ms of processor time its next preemption point ends the job.
   sensors.data("plan", {lidar},
                [] {
                  for (;;) redag::preemption_point();

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// DAGs that come and go while others run, and Ctrl-C.
+// Adds and removes DAGs while others run, and stops on Ctrl-C.
 #include <csignal>
 #include <cstdio>
 
@@ -19,7 +19,7 @@ int main() {
   running = &executor;
   std::signal(SIGINT, [](int) { running->request_stop(); });
 
-  redag::DagId inspection;  // of the mode that is switched on and off
+  redag::DagId inspection;  // the DAG of the mode that is switched on and off
   bool inspecting = false;
   int seconds = 0;
   DagBuilder supervisor("supervisor");

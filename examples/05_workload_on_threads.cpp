@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A workload from a file, on real threads, with bodies that use the processor time the file says: what a run would be
-// like before the callbacks are written.
+// Runs a workload file on real threads, with bodies that use the processor time that the file states. It previews a run
+// before the callbacks are written.
 //
 //     example_05_workload_on_threads [WORKLOAD.yaml]
 #include <fmt/format.h>

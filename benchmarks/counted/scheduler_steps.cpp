@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Jobs on their way through the scheduler, for tools/count_instructions to count what that takes.
+// Runs jobs through the scheduler, for tools/count_instructions to count the instructions.
 //
 //   redag_scheduler_steps TASKS PREEMPTION MAX_ACTIVE STEPS       PREEMPTION: 0 none, 1 cooperative, 2 full
 #include <cstdio>

@@ -30,7 +30,7 @@ TEST(Disturbance, EndsWithAllThatItStarted) {
   {
     int out[2] = {-1, -1};
     ASSERT_EQ(pipe(out), 0);
-    // Neither listens to SIGTERM.
+    // The shell and its child both ignore SIGTERM.
     Disturbance disturbance({"sh", "-c", "trap '' TERM; sleep 100 & echo $$ >&" + std::to_string(out[1]) + "; wait"});
     disturbance.expect_running();
     std::array<char, 32> text{};
@@ -40,7 +40,7 @@ TEST(Disturbance, EndsWithAllThatItStarted) {
     close(out[0]);
     close(out[1]);
   }
-  // The shell is reaped here; its child, by whoever got it, soon.
+  // The destructor reaps the shell. The child's new parent reaps the child a little later.
   for (int i = 0; i < 500 && kill(-group, 0) == 0; ++i) usleep(10'000);
   EXPECT_EQ(kill(-group, 0), -1);
   EXPECT_EQ(errno, ESRCH);
@@ -58,7 +58,7 @@ TEST(Disturbance, SaysWhatCannotBeStarted) {
 }
 
 TEST(Lqr, OfOneStateIsTheKnownGain) {
-  // x+ = x + u, Q = R = 1: P = (1 + sqrt 5) / 2, K = P / (1 + P).
+  // With x+ = x + u and Q = R = 1: P = (1 + sqrt 5) / 2, K = P / (1 + P).
   Matrix a(1, 1);
   Matrix b(1, 1);
   a.at(0, 0) = b.at(0, 0) = 1;
@@ -69,11 +69,11 @@ TEST(Lqr, OfOneStateIsTheKnownGain) {
 TEST(Lqr, SaysWhatCannotBeStabilised) {
   Matrix a(1, 1);
   Matrix b(1, 1);
-  a.at(0, 0) = 2;  // grows, and nothing acts on it
+  a.at(0, 0) = 2;  // the state grows, and no input acts on it
   EXPECT_THROW(static_cast<void>(lqr(a, b, {1}, {1})), std::runtime_error);
 }
 
-// Feedback at the plant's own period, each time `delay` late.
+// Runs the feedback at the plant's own period, with each actuation `delay` late.
 Plant controlled(const PlantSpec &spec, Duration delay, Duration length, std::uint64_t seed = 1) {
   Plant plant(spec, seed);
   for (Time t = 0; t < length; t += spec.period) {
@@ -215,7 +215,7 @@ TEST(VirtualTime, SaysWhatTheWorkloadLacks) {
   EXPECT_THROW(static_cast<void>(executor_choice("redagg")), std::runtime_error);
 }
 
-// Nothing about time: only that the loop is closed on threads, too.
+// Checks only that the loop is closed on threads, too; timing depends on the machine.
 TEST(Threads, ClosesTheLoop) {
   RunSetup setup;
   setup.duration = 500 * kMillisecond;

@@ -19,12 +19,12 @@ namespace {
 
 constexpr int kPollEvery = 10'000;  // us
 constexpr int kPatience = 300;      // polls before SIGKILL
-constexpr int kFirstLook = 30;      // polls in which a program that does not like its arguments ends
+constexpr int kFirstLook = 30;      // polls; a program that rejects its arguments ends within them
 
 }  // namespace
 
 std::vector<std::string> stress_ng(const std::string &arguments) {
-  std::vector<std::string> words = {"stress-ng", "--quiet", "--timeout", "0"};  // 0: without end
+  std::vector<std::string> words = {"stress-ng", "--quiet", "--timeout", "0"};  // timeout 0: runs without end
   std::istringstream rest(arguments);
   for (std::string word; rest >> word;) words.push_back(word);
   return words;
@@ -35,13 +35,13 @@ Disturbance::Disturbance(std::vector<std::string> words) : name_(words.at(0)) {
   argv.reserve(words.size() + 1);
   for (std::string &word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
-  int failure[2] = {-1, -1};  // tells of a failed exec; closed by a good one
+  int failure[2] = {-1, -1};  // carries errno of a failed exec; a successful exec closes it
   if (::pipe2(failure, O_CLOEXEC) != 0) throw std::runtime_error(std::string("no pipe: ") + std::strerror(errno));
   const pid_t parent = ::getpid();
   child_ = ::fork();
   if (child_ == 0) {
-    // Only what is safe after a fork in a program with threads.
-    ::setpgid(0, 0);  // Ctrl-C in a terminal is for this program, whose end is then its end
+    // Between fork and exec in a program with threads, only async-signal-safe calls are allowed.
+    ::setpgid(0, 0);  // Ctrl-C in a terminal then reaches this program only, which ends its child
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != parent) ::_exit(1);
     ::execvp(argv[0], argv.data());
@@ -85,7 +85,7 @@ Disturbance::~Disturbance() {
 bool Disturbance::has_ended() {
   if (child_ == 0) return true;
   if (::waitpid(child_, nullptr, WNOHANG) != child_) return false;
-  ::kill(-child_, SIGKILL);  // what it left behind
+  ::kill(-child_, SIGKILL);  // kills the remaining members of the group
   child_ = 0;
   return true;
 }

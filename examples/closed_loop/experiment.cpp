@@ -37,7 +37,7 @@ Snapshot snapshot(const Plant &plant) {
   return Snapshot{plant.time(), plant.position(), plant.height(), plant.angle(), plant.is_down()};
 }
 
-// What the trace says of the jobs, and the plants of themselves.
+// Combines the jobs' figures from the trace with the plants' own figures.
 RunOutcome outcome_of(const Workload &workload, const std::vector<JobEvent> &events, Time end, Loops &loops,
                       std::vector<std::vector<Snapshot>> snapshots) {
   RunOutcome outcome;
@@ -128,7 +128,7 @@ RunOutcome run_in_virtual_time(const Workload &workload, const ExecutorChoice &c
   sim::Options options;
   options.horizon = setup.duration;
   options.seed = setup.seed;
-  // Events come in order of time, so physics of every plant can follow them.
+  // Events come in order of time, and the physics of every plant can follow them.
   sim::simulate(run, *scheduler, sched::effective_config(*kind, config).workers, options,
                 [&](std::span<const JobEvent> batch) {
                   for (const JobEvent &event : batch) {
@@ -164,7 +164,7 @@ RunOutcome run_on_threads(const Workload &workload, const ExecutorChoice &choice
   options.realtime_threads = choice.realtime_threads;
   options.stop = setup.stop;
   options.bodies = [&](std::vector<runtime::Body> synthetic, const runtime::Now &now) {
-    // Around the synthetic body, which takes the processor for as long as the workload says.
+    // Wraps the synthetic body, which takes the processor for as long as the workload says.
     for (std::size_t t = 0; t < synthetic.size(); ++t) {
       const TaskRole role = roles[t];
       if (role.role == Role::None) continue;

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// One executor, one seed, all plants: in virtual time (exact, the same on every machine) or on threads (this machine).
+// Runs one executor with one seed and all plants. A run in virtual time is exact and the same on every machine; a run
+// on threads depends on this machine.
 #pragma once
 
 #include <atomic>
@@ -14,19 +15,19 @@
 
 namespace closed_loop {
 
-/// The five plants of robot.yaml.
+/// Returns the five plants of robot.yaml.
 [[nodiscard]] std::vector<PlantSpec> plants();
 
 struct ExecutorChoice {
-  std::string name;      // as it is written on the command line
-  std::string executor;  // of redag_analysis/executors/executors.hpp
+  std::string name;      // as written on the command line
+  std::string executor;  // a name of redag_analysis/executors/executors.hpp
   redag::PreemptionMode preemption = redag::PreemptionMode::Auto;
-  bool alone = false;             // the feedback without anything else: what no executor can beat
-  bool realtime_threads = false;  // on threads: SCHED_FIFO, as those of redag with preemption os
+  bool alone = false;             // the feedback without other work: the best that any executor can reach
+  bool realtime_threads = false;  // on threads: SCHED_FIFO, as redag's threads have with preemption os
 };
 
-/// alone, redag, redag-cooperative, redag-none, mte, ste, ..., mte-fifo, ste-fifo, ... Throws std::runtime_error for
-/// another name.
+/// Finds alone, redag, redag-cooperative, redag-none, mte, ste, ..., mte-fifo, ste-fifo, ... by name. Throws
+/// std::runtime_error for another name.
 [[nodiscard]] ExecutorChoice executor_choice(const std::string &name);
 
 struct Snapshot {
@@ -41,7 +42,7 @@ struct PlantResult {
   std::string plant;
   double cost = 0;
   std::uint32_t falls = 0;
-  std::uint64_t jobs = 0;    // of its DAG
+  std::uint64_t jobs = 0;    // released, of its DAG
   std::uint64_t missed = 0;  // late or lost
   Duration longest_gap = 0;  // between two actuations
   std::vector<Snapshot> snapshots;
@@ -56,14 +57,14 @@ struct RunSetup {
 
 struct RunOutcome {
   std::vector<PlantResult> plants;
-  std::string mode;  // preemption that ran
+  std::string mode;  // the preemption that ran
   std::uint64_t other_jobs = 0;
   std::uint64_t other_missed = 0;
 };
 
 [[nodiscard]] RunOutcome run_in_virtual_time(const redag::Workload &workload, const ExecutorChoice &choice,
                                              const RunSetup &setup);
-/// Snapshots are taken by the sensors' jobs. Throws std::runtime_error with what the system refused.
+/// The sensors' jobs take the snapshots. Throws std::runtime_error with what the system refused.
 [[nodiscard]] RunOutcome run_on_threads(const redag::Workload &workload, const ExecutorChoice &choice,
                                         const RunSetup &setup);
 

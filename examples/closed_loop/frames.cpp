@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Drawn by MuJoCo itself, in software: OSMesa needs neither screen nor graphics card.
+// Draws with MuJoCo itself, in software: OSMesa needs neither a screen nor a graphics card.
 #include <stdexcept>
 
 #include "pictures.hpp"

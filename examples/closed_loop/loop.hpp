@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Plants in the hands of jobs: which job senses and which actuates, and when its effect begins. The one place where a
-// schedule meets physics, for both worlds: virtual time reports when jobs start and end, threads call from inside them.
+// Connects plants with jobs: which job senses, which actuates, and when its effect begins. This is the one place where
+// a schedule meets physics, in both worlds. Virtual time reports when jobs start and end; threads call from inside the
+// jobs.
 #pragma once
 
 #include <memory>
@@ -15,8 +16,9 @@
 
 namespace closed_loop {
 
-/// The task `sense` samples the state when its job starts. The task `control` takes the newest sample when its job
-/// starts, and its control acts from when the job ends: a late job really acts late, a skipped one not at all.
+/// One plant and its feedback. The task `sense` samples the state when its job starts. The task `control` takes the
+/// newest sample when its job starts, and actuates when the job ends. A late job therefore acts late, and a skipped one
+/// not at all.
 class Loop {
  public:
   Loop(const PlantSpec &spec, std::uint64_t seed) : plant_(spec, seed) {}
@@ -35,7 +37,7 @@ class Loop {
     plant_.advance(now);
     if (input_) plant_.actuate(plant_.feedback(*input_));
   }
-  /// For recording, and at the end.
+  /// Calls look(plant) at `now`, for recording and for the final figures.
   template <class Look>
   void look(Time now, Look look) {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -44,7 +46,7 @@ class Loop {
   }
 
  private:
-  std::mutex mutex_;  // executors that know no max_active may run both tasks at once
+  std::mutex mutex_;  // executors that ignore max_active may run both tasks at once
   Plant plant_;
   std::optional<State> sample_;
   std::optional<State> input_;
@@ -57,12 +59,13 @@ struct TaskRole {
   Loop *loop = nullptr;
 };
 
-/// The plants of one run.
+/// Holds the plants of one run.
 class Loops {
  public:
   Loops(const std::vector<PlantSpec> &plants, std::uint64_t seed);
 
-  /// By TaskId. Throws std::runtime_error if a plant has no DAG of its name with tasks `sense` and `control`.
+  /// Returns the role of each task, by TaskId. Throws std::runtime_error if a plant has no DAG of its name with tasks
+  /// `sense` and `control`.
   [[nodiscard]] std::vector<TaskRole> roles(const redag::Workload &workload) const;
   [[nodiscard]] const std::vector<std::unique_ptr<Loop>> &all() const { return loops_; }
 

@@ -31,7 +31,7 @@ Matrix transposed(const Matrix &x) {
   return result;
 }
 
-// X with left X = right, by Gauss with pivots; left is small and positive definite.
+// Solves left X = right by Gaussian elimination with pivots; left is small and positive definite.
 Matrix solved(Matrix left, Matrix right) {
   const std::size_t n = left.rows;
   for (std::size_t p = 0; p < n; ++p) {
@@ -65,7 +65,7 @@ Matrix lqr(const Matrix &a, const Matrix &b, const std::vector<double> &q, const
     Matrix weight = product(bt, product(p, b));
     for (std::size_t i = 0; i < weight.rows; ++i) weight.at(i, i) += r[i];
     Matrix gain = solved(std::move(weight), product(bt, product(p, a)));
-    // P+ = Q + K'RK + (A - BK)'P(A - BK): this form keeps P symmetric in spite of rounding, the shorter one does not.
+    // P+ = Q + K'RK + (A - BK)'P(A - BK). This form keeps P symmetric in spite of rounding; the shorter form does not.
     Matrix closed = product(b, gain);
     for (std::size_t i = 0; i < closed.values.size(); ++i) closed.values[i] = a.values[i] - closed.values[i];
     Matrix weighted = gain;

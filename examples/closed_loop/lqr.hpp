@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The gain of the linear-quadratic regulator in discrete time, by iterating the Riccati equation: for the handful of
-// states of a plant. Pure.
+// Computes the gain of the linear-quadratic regulator in discrete time by iterating the Riccati equation. It is meant
+// for a plant with a handful of states. Pure.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace closed_loop {
 
-/// Row by row.
+/// A dense matrix, stored row by row.
 struct Matrix {
   std::size_t rows = 0;
   std::size_t columns = 0;
@@ -21,8 +21,8 @@ struct Matrix {
   [[nodiscard]] double at(std::size_t r, std::size_t c) const { return values[r * columns + c]; }
 };
 
-/// K that minimises the sum of x'Qx + u'Ru under x+ = A x + B u, u = -K x; Q and R diagonal. Throws std::runtime_error
-/// if the iteration does not settle: the system cannot be stabilised.
+/// Returns the K that minimises the sum of x'Qx + u'Ru under x+ = A x + B u, u = -K x. Q and R are diagonal. Throws
+/// std::runtime_error if the iteration does not converge; then the system cannot be stabilised.
 [[nodiscard]] Matrix lqr(const Matrix &a, const Matrix &b, const std::vector<double> &q, const std::vector<double> &r);
 
 }  // namespace closed_loop

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Unstable plants under feedback that shares its workers with perception and planning: what an executor's misses do to
-// a robot. README.md beside this file explains it.
+// Unstable plants under feedback that shares its workers with perception and planning. The program shows how an
+// executor's misses affect a robot. README.md beside this file explains it.
 //
 //     example_closed_loop --seeds 10 --out results/closed_loop        virtual time: the same everywhere
 //     example_closed_loop --threads --executors redag,mte             on this machine
@@ -45,7 +45,7 @@ struct Arguments {
   std::string stress;
 };
 
-// The first Ctrl-C ends the run, and with it what was started beside it; the second ends the process.
+// The first Ctrl-C ends the run and the programs started beside it. The second ends the process.
 std::atomic<bool> interrupted{false};
 
 void watch_signals() {
@@ -102,7 +102,7 @@ double median(std::vector<double> values) {
   return n % 2 == 1 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
 }
 
-// A line for each executor and plant, over all seeds.
+// Prints a line for each executor and plant, over all seeds.
 void print(const std::vector<Row> &rows, const std::vector<std::string> &executors) {
   fmt::print("{:<18} {:<10} {:>6} {:>10} {:>22} {:>9} {:>12}\n", "executor", "plant", "falls", "cost",
              "(least..largest)", "missed", "longest gap");
@@ -144,7 +144,8 @@ void print(const std::vector<Row> &rows, const std::vector<std::string> &executo
   }
 }
 
-// Around the first fall under the best of the executors under which something fell: there the others can be compared.
+// Returns instants around a first fall. Among the executors under which a plant fell, it takes the one with the fewest
+// falls: there the executors can be compared.
 std::vector<Time> moments(const std::vector<Recorded> &runs, Time end) {
   Time fall = end / 2;
   std::uint32_t fewest = std::numeric_limits<std::uint32_t>::max();

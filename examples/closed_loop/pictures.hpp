@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a run looked like: angles over time as SVG, and frames of the scene as PNG where MuJoCo can draw without a
-// screen.
+// Draws a run: angles over time as SVG, and frames of the scene as PNG where MuJoCo can draw without a screen.
 #pragma once
 
 #include <string>
@@ -17,15 +16,15 @@ struct Recorded {
   std::vector<PlantResult> plants;  // with snapshots
 };
 
-/// A panel for each plant, a line for each executor.
+/// Draws a panel for each plant with a line for each executor.
 [[nodiscard]] std::string trajectories_svg(const std::vector<Recorded> &runs, const std::string &title,
                                            const std::string &subtitle);
 
-/// Was it built with a renderer?
+/// True if the program was built with a renderer.
 [[nodiscard]] bool can_render();
 
-/// A row for each run, a column for each time: the scene as it was then. Throws std::runtime_error, also where there is
-/// no renderer.
+/// Draws a row for each run and a column for each time, with the scene at that time. Throws std::runtime_error on
+/// failure, and where there is no renderer.
 void write_frames(const std::string &path, const std::vector<Recorded> &runs, const std::vector<Time> &times);
 
 }  // namespace closed_loop

@@ -17,16 +17,16 @@
 namespace closed_loop {
 namespace {
 
-constexpr Duration kStep = 250 * redag::kMicrosecond;       // of physics; the last one up to "now" is shorter
+constexpr Duration kStep = 250 * redag::kMicrosecond;       // of physics; the last step up to "now" is shorter
 constexpr Duration kPushEvery = 500 * redag::kMillisecond;  // on average
 constexpr Duration kDown = 500 * redag::kMillisecond;
 constexpr double kFallenAngle = std::numbers::pi / 4;
 constexpr double kRail = 1.0;      // m, to each side
-constexpr double kAirspace = 1.5;  // m, around where the quadrotor hovers
+constexpr double kAirspace = 1.5;  // m, on each side of the hovering point
 constexpr double kGravity = 9.81;
-constexpr double kBetween = 0.38;  // m, from plant to plant
+constexpr double kBetween = 0.38;  // m, between neighbouring plants
 
-// kg; the quadrotor's thrust has to carry it.
+// Mass in kg, which the quadrotor's thrust has to carry.
 constexpr double kQuadrotorMass = 0.5;
 
 std::string cart_pole(const PlantSpec &spec, double y) {
@@ -137,7 +137,7 @@ Plant::Plant(const PlantSpec &spec, std::uint64_t seed)
   }
   stand_up();
 
-  // One step of physics as long as the period of the feedback, linearised around upright and at rest.
+  // Linearises one step of physics, as long as the feedback's period, around upright and at rest.
   model_->opt.timestep = seconds(spec.period);
   Matrix a(states, states);
   Matrix b(states, inputs);

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The plants: cart-poles with poles of several lengths and a planar quadrotor, as MuJoCo models, and the feedback that
-// keeps them upright. A plant's time is virtual or wall-clock time, whatever calls it: physics is stepped to "now" when
-// somebody senses or actuates, never later than the clock and never ahead of it.
+// keeps them upright. A plant's time is virtual or wall-clock time, as the caller chooses. Each call that senses or
+// actuates steps the physics exactly to "now".
 #pragma once
 
 #include <mujoco/mujoco.h>
@@ -22,14 +22,14 @@ using redag::Time;
 
 struct PlantSpec {
   enum class Kind : std::uint8_t { CartPole, Quadrotor };
-  std::string name;  // of its DAG in the workload
+  std::string name;  // also the name of its DAG in the workload
   Kind kind = Kind::CartPole;
-  double length = 0.5;  // m: of the pole; of the quadrotor's arm
+  double length = 0.5;  // m; the pole's length, or the length of the quadrotor's arm
   Duration period = 0;  // of its feedback
-  double push = 0;      // rad/s (cart-pole: pole; quadrotor: pitch): largest change of angular velocity by a push
+  double push = 0;      // rad/s; largest change of a push to the angular velocity of pole or pitch
 };
 
-/// Models by name in one scene, beside each other.
+/// Returns MuJoCo's model file of one scene with the plants side by side.
 [[nodiscard]] std::string mjcf(const std::vector<PlantSpec> &plants);
 
 struct ModelDeleter {
@@ -39,34 +39,34 @@ struct ModelDeleter {
 using Model = std::unique_ptr<mjModel, ModelDeleter>;
 using Data = std::unique_ptr<mjData, ModelDeleter>;
 
-/// Throws std::runtime_error with MuJoCo's words.
+/// Compiles a model. Throws std::runtime_error with MuJoCo's message.
 [[nodiscard]] Model compile(const std::string &mjcf);
 
 using State = std::vector<double>;  // positions, then velocities, as differences from upright and at rest
 
 class Plant {
  public:
-  /// `seed`: of the pushes, which come at their times whatever the control does.
+  /// `seed` draws the pushes. Their times do not depend on the control.
   Plant(const PlantSpec &spec, std::uint64_t seed);
 
-  /// Moves physics to `now` under the control that was given last; does nothing for times that are past.
+  /// Advances the physics to `now` under the latest control. Does nothing if `now` has passed.
   void advance(Time now);
   [[nodiscard]] State state() const;
-  /// From now on.
+  /// Applies a control from the current time on.
   void actuate(const std::vector<double> &control);
-  /// u = u0 - K x. The gain minimises the sum of x'Qx + u'Ru at the period of the feedback, without delay.
+  /// Returns u = u0 - K x. The gain minimises the sum of x'Qx + u'Ru at the period of the feedback, without delay.
   [[nodiscard]] std::vector<double> feedback(const State &state) const;
 
   [[nodiscard]] const PlantSpec &spec() const { return spec_; }
   [[nodiscard]] Time time() const { return time_; }
-  /// Of the pole, or the quadrotor's pitch; rad.
+  /// The angle of the pole, or the quadrotor's pitch, in rad.
   [[nodiscard]] double angle() const;
-  /// Of the cart, or the quadrotor; m.
+  /// The position of the cart or the quadrotor, in m.
   [[nodiscard]] double position() const;
-  [[nodiscard]] double height() const;  // of the quadrotor above where it hovers
-  /// Mean of x'Qx + u'Ru over the time so far; while down, what it was when it fell.
+  [[nodiscard]] double height() const;  // m, of the quadrotor above its hovering point
+  /// The mean of x'Qx + u'Ru over the time so far. While the plant is down, the value at its fall counts.
   [[nodiscard]] double cost() const;
-  /// How often it left the range from which anybody would pick it up: it then stays down for half a second.
+  /// The number of falls. A plant falls when it leaves its allowed range; it then stays down for half a second.
   [[nodiscard]] std::uint32_t falls() const { return falls_; }
   [[nodiscard]] bool is_down() const { return time_ < down_until_; }
 

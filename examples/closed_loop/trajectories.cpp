@@ -15,13 +15,13 @@
 namespace closed_loop {
 namespace {
 
-// Sizes in pixels; colours as in the plots of redag_lab/experiment: told apart with any colour vision.
+// Sizes are in pixels. The colours are those of the plots of redag_lab/experiment, distinct with any colour vision.
 constexpr double kWidth = 960;
 constexpr double kPanel = 104;
 constexpr double kLeft = 150;
 constexpr double kRight = 16;
 constexpr double kHead = 86;
-constexpr double kDegrees = 48;  // of the axis, to each side: 45 degrees count as a fall
+constexpr double kDegrees = 48;  // half of the axis; 45 degrees count as a fall
 constexpr std::array<std::string_view, 6> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#000000"};
 
 double seconds(Time time) { return static_cast<double>(time) / redag::kSecond; }
@@ -77,12 +77,12 @@ std::string trajectories_svg(const std::vector<Recorded> &runs, const std::strin
       for (const Snapshot &snapshot : runs[r].plants[p].snapshots) {
         const double at_x = x(seconds(snapshot.time));
         const double at_y = y(snapshot.angle * 180 / std::numbers::pi);
-        // What is less than a pixel away adds nothing but bytes.
+        // Points less than a pixel away add nothing but bytes.
         if (!pen_up && !snapshot.down && at_x - last_x < 1.5 && std::abs(at_y - last_y) < 0.6) continue;
         last_x = at_x;
         last_y = at_y;
         put("{}{:.1f} {:.1f}", pen_up ? 'M' : 'L', at_x, at_y);
-        pen_up = snapshot.down;  // picked up: it does not swing back
+        pen_up = snapshot.down;  // the line breaks where a plant is set upright again
       }
       put("'/>\n");
     }

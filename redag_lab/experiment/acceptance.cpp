@@ -31,7 +31,8 @@ char verdict_of(const analysis::MethodReport &report) {
   return report.trusted ? kAccepted : kAcceptedUnsound;
 }
 
-// Tasks joined by edges are one unit of the analysis, which holds the whole DAG to its deadline: so does the workload.
+// Makes the deadlines of DAGs with edges end to end. The analysis treats tasks joined by edges as one unit and holds
+// the whole DAG to its deadline; the workload does the same.
 void make_deadlines_end_to_end(Workload &workload) {
   for (Dag &dag : workload.dags) {
     const auto source = std::find_if(dag.tasks.begin(), dag.tasks.end(),
@@ -97,7 +98,7 @@ Result<std::string> Acceptance::evaluate(std::uint64_t unit) const {
   const Result<analysis::System> system = analysis::compile(*workload, analysis::platform_of(*workload));
   if (!system) return tl::unexpected<Diagnostics>(system.error());
 
-  // `any` needs all of them, in the order of the registry; else the plan's do.
+  // `any` needs all methods, in the order of the registry. Otherwise only the plan's methods run.
   std::vector<analysis::Method> chosen;
   for (const std::size_t index : registered_) {
     if (!any_ && index != kNone) chosen.push_back(analysis::methods()[index]);

@@ -82,7 +82,7 @@ class Checker {
     }
   }
 
-  // How many points there are, without making them; no more than kMostPoints + 1.
+  // Counts the points without creating them, up to kMostPoints + 1.
   [[nodiscard]] std::uint64_t count_points() const {
     std::uint64_t points = 1;
     for (const std::size_t choices : {plan_.dags.size(), plan_.workers.size(), plan_.deadlines.size(),
@@ -93,7 +93,8 @@ class Checker {
     return points;
   }
 
-  // The generator knows what it can make: it is asked at every point, and draws as long as that takes no time.
+  // Only the generator knows which workloads it can make. It checks its options at every point, and draws trial
+  // workloads as long as they take little time.
   void check_points() {
     const std::uint64_t count = count_points();
     if (count > kMostPoints) {
@@ -105,7 +106,7 @@ class Checker {
       say("sets", fmt::format("{} points of {} sets are more than {}", count, plan_.sets, kMostUnits));
       return;
     }
-    std::uint64_t to_draw = 100'000;  // tasks: a third of a second
+    std::uint64_t to_draw = 100'000;  // tasks, about a third of a second of drawing
     for (const AcceptancePoint &point : points_of(plan_)) {
       const GenerateOptions options = generate_options(plan_, point);
       Diagnostics mistakes = redag::find_mistakes(options);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the experiment "acceptance" does: which random workloads are drawn at which points, and who judges them. The
-// text form is docs/experiments.md. Plain values; pure functions.
+// The plan of the experiment "acceptance": which random workloads are drawn at which points, and which methods judge
+// them. docs/experiments.md describes the text form. Plain values; pure functions.
 #pragma once
 
 #include <cstdint>
@@ -21,32 +21,32 @@ enum class DeadlineKind : std::uint8_t {
   Constrained,  // D / T uniform in [0.5, 1], never below C
 };
 
-/// Methods beside those of analysis::methods().
+/// Methods besides those of analysis::methods().
 inline constexpr std::string_view kAnyMethod = "any";                // analysis::analyze(): all sound methods together
-inline constexpr std::string_view kSimulationMethod = "simulation";  // no miss was seen
+inline constexpr std::string_view kSimulationMethod = "simulation";  // accepts where no miss was seen
 
 struct AcceptancePlan {
   std::string name = "acceptance";
   std::uint64_t seed = 1;
   std::uint32_t sets = 100;  // workloads at each point
-  // The points: every combination. Utilization is per worker, in millionths, so that it is the same number everywhere.
+  // The points are all combinations. Utilization is per worker, in millionths, which are exact on every machine.
   std::vector<std::uint32_t> utilization;
   std::vector<std::uint32_t> dags = {10};
   std::vector<std::uint32_t> workers = {4};
   std::vector<DeadlineKind> deadlines = {DeadlineKind::Implicit};
   std::vector<PreemptionMode> preemption = {PreemptionMode::None, PreemptionMode::Os};
   std::vector<std::string> methods = {std::string(kAnyMethod), std::string(kSimulationMethod)};
-  /// What all points share; what the points say is replaced in it.
+  /// Common to all points; a point's own values replace these.
   GenerateOptions workload;
   SimulationEffort simulation;
 
-  /// Default: 0.05 to 1 in steps of 0.05; single-task DAGs.
+  /// The default plan has single-task DAGs and utilizations from 0.05 to 1 in steps of 0.05.
   AcceptancePlan();
 };
 
 inline constexpr std::uint32_t kMillion = 1'000'000;
 
-/// One place of the grid. The order of points is that of nested loops over the plan's lists, in the order of members.
+/// One point of the grid. The order of points is that of nested loops over the plan's lists, in the order of members.
 struct AcceptancePoint {
   std::uint32_t dags = 0;
   std::uint32_t workers = 0;
@@ -57,7 +57,7 @@ struct AcceptancePoint {
 
 [[nodiscard]] std::vector<AcceptancePoint> points_of(const AcceptancePlan &plan);
 
-/// Something wrong with a plan, and the key of the text form that says it.
+/// A mistake in a plan, with the key of the text form that contains it.
 struct PlanMistake {
   std::string key;
   std::string message;
@@ -65,13 +65,13 @@ struct PlanMistake {
 };
 [[nodiscard]] std::vector<PlanMistake> find_mistakes(const AcceptancePlan &plan);
 
-/// Canonical text: equal plans have equal texts, and parse_acceptance_plan() gives the plan back.
+/// Returns the canonical text. Equal plans have equal texts, and parse_acceptance_plan() restores the plan.
 [[nodiscard]] std::string to_yaml(const AcceptancePlan &plan);
 /// Errors: every mistake with its place in `file`.
 [[nodiscard]] Result<AcceptancePlan> parse_acceptance_plan(std::string_view text, const std::string &file);
 [[nodiscard]] Result<AcceptancePlan> load_acceptance_plan(const std::string &path);
 
-/// "0.05:1:0.05" (from:to:step) or "0.1,0.5" in millionths. Error: not of this form.
+/// Parses "0.05:1:0.05" (from:to:step) or "0.1,0.5" into millionths. Error: another form.
 [[nodiscard]] Result<std::vector<std::uint32_t>> parse_utilization(std::string_view text);
 
 [[nodiscard]] const char *to_string(DeadlineKind value);

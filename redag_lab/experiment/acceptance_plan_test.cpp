@@ -87,7 +87,7 @@ TEST(AcceptancePlan, WhatMakesNoSense) {
   EXPECT_THAT(errors_of(head + "preemption: cooperative\n"), HasSubstr("no preemption points"));
   EXPECT_THAT(errors_of(head + "dags: []\n"), HasSubstr("dags has no values"));
   EXPECT_THAT(errors_of(head + "name: a/b\n"), HasSubstr("a name has letters"));
-  // Two tasks cannot use four workers: the generator says so, and the plan where.
+  // Two tasks cannot use four workers. The generator reports the mistake, and the plan reader its place.
   EXPECT_THAT(errors_of(head + "dags: 2\nworkload: {tasks: 1}\n"), HasSubstr("plan.yaml:3:11: error: 2 DAGs"));
   EXPECT_THAT(errors_of("name: x\n"), HasSubstr("experiment is missing"));
   EXPECT_THAT(errors_of("experiment: figure\n"), HasSubstr("unknown experiment 'figure'"));
@@ -96,7 +96,7 @@ TEST(AcceptancePlan, WhatMakesNoSense) {
   EXPECT_THAT(errors_of(""), HasSubstr("there is no plan in it"));
 }
 
-// Counted before they are made, and drawn only where that takes no time.
+// Points are counted before they are created, and workloads are drawn only where this takes little time.
 TEST(AcceptancePlan, WhatWouldNeverEndIsRefusedAtOnce) {
   std::string numbers = "1";
   for (int i = 2; i <= 10'000; ++i) numbers += "," + std::to_string(i);

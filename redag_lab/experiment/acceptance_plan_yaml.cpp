@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The text form of a plan: docs/experiments.md.
+// Reads and writes the text form of a plan, which docs/experiments.md describes.
 #include <array>
 #include <utility>
 

@@ -56,7 +56,7 @@ Json row_json(const Acceptance &acceptance, const AcceptanceRow &row) {
               {"methods", std::move(methods)}};
 }
 
-// What tells the panels apart.
+// Returns the values that distinguish the panels.
 std::string panel_title(const AcceptancePlan &plan, const AcceptancePoint &point) {
   const bool tasks = plan.workload.max_tasks == 1;
   std::string title = fmt::format("{} {}, {} worker{}", point.dags, tasks ? "tasks" : "DAGs", point.workers,
@@ -155,7 +155,7 @@ std::string to_svg(const Acceptance &acceptance, const AcceptanceResults &result
       plot.panels.back().series.resize(plan.methods.size());
     }
     for (std::size_t m = 0; m < row.cells.size(); ++m) {
-      // A method that applies to no workload of a point says nothing about it.
+      // A method that applies to no workload of a point has no value there.
       if (row.sets == 0 || row.cells[m].not_applicable == row.sets) continue;
       const Proportion p = ratio_of(row, row.cells[m]);
       plot.panels.back().series[m].push_back(LinePlot::Value{per_worker(row.point), p.ratio, p.low, p.high});

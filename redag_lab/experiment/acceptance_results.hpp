@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the units of the experiment "acceptance" come to: counts a point and method, as CSV, JSON and a plot. All of it
-// follows from the plan and the units; only the JSON adds who worked on it. Pure functions but for write_results().
+// The results of the experiment "acceptance": counts by point and method, as CSV, JSON and a plot. They follow from the
+// plan and the units alone; only the JSON adds the runs. Pure functions, apart from write_results().
 #pragma once
 
 #include <cstdint>
@@ -16,20 +16,20 @@
 
 namespace redag::experiment {
 
-/// One method at one point.
+/// The counts of one method at one point.
 struct AcceptanceCell {
-  std::uint64_t accepted = 0;        // those of `unsound` included
+  std::uint64_t accepted = 0;        // includes `unsound`
   std::uint64_t unsound = 0;         // accepted by an equation whose hypotheses do not hold
   std::uint64_t not_applicable = 0;  // counted as not accepted
 };
 
 struct AcceptanceRow {
   AcceptancePoint point;
-  std::uint64_t sets = 0;             // finished ones
+  std::uint64_t sets = 0;             // finished workloads
   std::vector<AcceptanceCell> cells;  // by method of the plan
 };
 
-/// A sound method accepted what missed a deadline in the simulation.
+/// A unit that a sound method accepted although the simulation saw a missed deadline.
 struct Violation {
   std::uint64_t unit = 0;
   std::string result;
@@ -45,12 +45,12 @@ struct AcceptanceResults {
   [[nodiscard]] bool complete() const { return done == units; }
 };
 
-/// Counts one unit after the other.
+/// Counts the units one by one.
 class AcceptanceCounter {
  public:
   explicit AcceptanceCounter(const Acceptance &acceptance);
 
-  /// Error: a unit or a result that the plan does not have.
+  /// Adds a unit. Error: a unit or a result that the plan does not have.
   [[nodiscard]] Result<void> add(std::uint64_t unit, const std::string &result);
   [[nodiscard]] const AcceptanceResults &results() const { return results_; }
 
@@ -59,15 +59,16 @@ class AcceptanceCounter {
   AcceptanceResults results_;
 };
 
-/// A row per point and method; the same bytes for the same units. Columns: docs/experiments.md.
+/// Returns a row per point and method; the same bytes for the same units. docs/experiments.md lists the columns.
 [[nodiscard]] std::string to_csv(const Acceptance &acceptance, const AcceptanceResults &results);
-/// `runs`: JSON texts (folder.hpp).
+/// `runs` holds JSON texts (folder.hpp).
 [[nodiscard]] std::string to_json(const Acceptance &acceptance, const AcceptanceResults &results,
                                   const std::vector<std::string> &runs);
-/// A panel for each combination but for the utilization, with a line for each method.
+/// Draws a panel for each combination except the utilization, with a line for each method.
 [[nodiscard]] std::string to_svg(const Acceptance &acceptance, const AcceptanceResults &results);
 
-/// Writes acceptance.csv, .json and .svg, and violation-<unit>.yaml for the first violations. Each appears whole.
+/// Writes acceptance.csv, .json and .svg, and violation-<unit>.yaml for the first violations. Each file is replaced as
+/// a whole.
 [[nodiscard]] Result<void> write_results(const std::string &folder, const Acceptance &acceptance,
                                          const AcceptanceResults &results);
 

@@ -71,7 +71,7 @@ TEST(Acceptance, WorkloadsAreAsThePointSays) {
   }
 }
 
-// So that a grid can be refined or a mode be added without other workloads elsewhere.
+// A grid can be refined, or a mode added, without changing the workloads of other points.
 TEST(Acceptance, WorkloadsDependOnThePointAlone) {
   const AcceptancePlan plan = small_plan();
   AcceptancePlan other = plan;
@@ -88,7 +88,7 @@ TEST(Acceptance, WorkloadsDependOnThePointAlone) {
   EXPECT_EQ(*draw_workload(plan, point, 3), preemptive);
 }
 
-// A unit's verdicts do not depend on who else is asked.
+// A method's verdict on a unit does not depend on the other methods of the plan.
 TEST(Acceptance, OneMethodOrAll) {
   AcceptancePlan all = small_plan();
   all.methods = {"any"};
@@ -106,7 +106,8 @@ TEST(Acceptance, OneMethodOrAll) {
   EXPECT_NE(result->find(kNotApplicable), std::string::npos);
 }
 
-// What any sound method accepts, the simulation accepts: over DAGs and tasks, all modes, one worker and several.
+// The simulation accepts every workload that a sound method accepts, for DAGs and tasks, all modes, and one or more
+// workers.
 TEST(Acceptance, SoundMethodsAcceptNothingThatMisses) {
   for (const std::uint32_t max_tasks : {1U, 6U}) {
     AcceptancePlan plan = small_plan();
@@ -121,7 +122,7 @@ TEST(Acceptance, SoundMethodsAcceptNothingThatMisses) {
     for (const Violation &violation : results.violations) {
       ADD_FAILURE() << *acceptance.replay(violation.unit, violation.result);
     }
-    // It says something only where both answers occur.
+    // The comparison is meaningful only if both answers occur.
     std::uint64_t accepted = 0;
     std::uint64_t missed = 0;
     for (const AcceptanceRow &row : results.rows) {
@@ -143,7 +144,7 @@ TEST(Acceptance, ViolationsAreFoundAndReplayed) {
   EXPECT_THAT(acceptance.broken_by("1111"), IsEmpty());
   EXPECT_THAT(acceptance.broken_by("0-u0"), IsEmpty());
 
-  // The first unit that misses, as if a method had accepted it.
+  // Finds the first unit that misses and treats it as accepted by a method.
   std::uint64_t unit = 0;
   while (acceptance.evaluate(unit)->front() == kAccepted) ++unit;
   const Result<std::string> text = acceptance.replay(unit, "0100");

@@ -15,7 +15,7 @@ double mean_of(const std::vector<double> &values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-// Mean of the cells' means for each group of cells, by `group_of`.
+// Returns for each group of cells (by `group_of`) the mean of the cells' means.
 template <class GroupOf>
 std::vector<double> group_means(std::size_t groups, const std::vector<EffectCell> &cells,
                                 const std::vector<double> &means, GroupOf group_of) {
@@ -46,7 +46,7 @@ Effects effects_of(const std::vector<std::uint32_t> &counts, const std::vector<E
   Effects effects;
   effects.mean = mean_of(means);
   const auto all = static_cast<double>(cells.size());
-  double total = 0;  // sums of squares, of each run
+  double total = 0;  // sums of squares over all runs
   double noise = 0;
   double between = 0;
   for (std::size_t c = 0; c < cells.size(); ++c) {

@@ -31,7 +31,7 @@ TEST(Effects, OneFactorExplainsEverything) {
 }
 
 TEST(Effects, AnInteractionIsNotAMainEffect) {
-  // Exclusive or of the first two: neither says anything alone.
+  // The result is the exclusive or of the first two factors; neither explains anything alone.
   const Effects effects = effects_of({2, 2, 3}, cells(2, 2, 3, [](std::uint32_t i, std::uint32_t j, std::uint32_t) {
                                        return std::vector<double>{static_cast<double>(i != j)};
                                      }));

@@ -80,7 +80,7 @@ std::optional<std::size_t> Factorial::ideal_of(std::size_t point) const {
     for (std::size_t f = 0; f + 1 < kFactorCount; ++f) {  // all but the executor
       const std::uint32_t level = points_[ideal].level[f];
       const std::uint32_t here = points_[point].level[f];
-      same = same && (level == here || level == kNoLevel);  // the ideal has neither a choice of bounds nor of policies
+      same = same && (level == here || level == kNoLevel);  // the ideal depends neither on bounds nor on policies
     }
     if (same) return ideal;
   }

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The experiment "factorial": every executor on every combination of the factors' levels. A unit is one run. Knows what
-// is to be run, not how: the caller brings the driver. Pure functions, but for the driver.
+// The experiment "factorial": every executor on every combination of the factors' levels. A unit is one run. The class
+// plans the runs and the caller provides the driver that executes them. Pure functions, apart from the driver.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ namespace redag::experiment {
 /// A run, ready for a driver.
 struct PlannedRun {
   Workload workload;
-  std::string executor;  // as drivers name it
+  std::string executor;  // the name that drivers use
   World world = World::Simulator;
   std::uint64_t seed = 0;
   Duration duration = 0;
@@ -30,7 +30,7 @@ struct PlannedRun {
   sim::Overheads overheads;
 };
 
-/// Any number of threads at once in the simulator's world. Error: the run could not be made.
+/// Executes a run. In the simulator's world several threads may call it at once. Error: the run failed to execute.
 using Drive = std::function<Result<FinishedRun>(const PlannedRun &run)>;
 
 class Factorial {
@@ -41,19 +41,19 @@ class Factorial {
   [[nodiscard]] const FactorialPlan &plan() const { return plan_; }
   [[nodiscard]] const std::vector<Factor> &factors() const { return factors_; }
   [[nodiscard]] const std::vector<FactorialPoint> &points() const { return points_; }
-  /// The point of `ideal` with the same jobs and workers; nothing if the plan has none.
+  /// Returns the point of `ideal` with the same jobs and workers; nothing if the plan has none.
   [[nodiscard]] std::optional<std::size_t> ideal_of(std::size_t point) const;
   [[nodiscard]] std::uint64_t unit_count() const { return points_.size() * plan_.repetitions; }
 
-  /// Units are numbered repetition by repetition, so that what an interrupted run has done covers all points.
+  /// Units are numbered repetition by repetition. An interrupted run has therefore covered all points evenly.
   [[nodiscard]] std::size_t point_of(std::uint64_t unit) const { return unit % points_.size(); }
   [[nodiscard]] std::uint64_t repetition_of(std::uint64_t unit) const { return unit / points_.size(); }
 
-  /// The jobs of a repetition are the same at all points with this workload and demand: differences are the points'.
-  /// Errors: those of generate(); a workload without mean execution time to scale.
+  /// Prepares a unit's run. A repetition has the same jobs at all points with one workload and demand; differences are
+  /// due to the points. Errors: those of generate(), and a workload without mean execution time to scale.
   [[nodiscard]] Result<PlannedRun> planned_run(std::uint64_t unit) const;
 
-  /// The unit's result, one line.
+  /// Returns the unit's result, one line.
   [[nodiscard]] Result<std::string> evaluate(std::uint64_t unit) const;
 
  private:
@@ -63,10 +63,10 @@ class Factorial {
   Drive drive_;
   std::vector<Factor> factors_;
   std::vector<FactorialPoint> points_;
-  std::vector<std::size_t> ideals_;  // points of `ideal`
+  std::vector<std::size_t> ideals_;  // indices of the points of `ideal`
 };
 
-/// Sum over tasks of mean execution time / period: what the paper calls U.
+/// Returns the sum over tasks of mean execution time / period, the U of the paper.
 [[nodiscard]] double mean_utilization(const Workload &workload);
 
 }  // namespace redag::experiment

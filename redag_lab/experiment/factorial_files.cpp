@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The JSON document of factorial_results.hpp, and the files.
+// Writes the JSON document of factorial_results.hpp and the files.
 #include <set>
 #include <utility>
 

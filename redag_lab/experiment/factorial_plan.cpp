@@ -40,7 +40,7 @@ std::string bounds_text(const std::vector<std::uint32_t> &bounds) {
 
 constexpr std::array kWorlds = {World::Simulator, World::Threads, World::Ros2};
 
-// "redag" of "ros2/redag-none".
+// Returns the family of an executor: "redag" for "ros2/redag-none".
 std::string_view family_of(std::string_view executor) {
   executor.remove_prefix(executor.find('/') + 1);  // npos + 1 is 0
   return executor.substr(0, executor.find('-'));
@@ -48,7 +48,7 @@ std::string_view family_of(std::string_view executor) {
 
 bool is_redag(std::string_view executor) { return family_of(executor) == "redag"; }
 
-// Does this factor change anything for this executor?
+// True if this factor affects this executor.
 bool applies(const FactorialPlan &plan, FactorKind kind, std::string_view executor) {
   const std::string_view family = family_of(executor);
   const sched::ExecutorKind *kind_of = sched::find_executor(family);
@@ -56,7 +56,7 @@ bool applies(const FactorialPlan &plan, FactorKind kind, std::string_view execut
   switch (kind) {
     case FactorKind::Policy:
     case FactorKind::MaxActive: return is_redag(executor);
-    // The demand of a utilization per worker depends on the workers, whoever uses them.
+    // With utilization per worker, the demand depends on the number of workers for every executor.
     case FactorKind::Workers: return has_workers || !plan.utilization.empty();
     default: return true;
   }
@@ -91,7 +91,7 @@ class Checker {
   }
 
  private:
-  // Counted before they are made: lists that a file can hold have more combinations than memory.
+  // Counts combinations before creating them: the lists of a small file can have more combinations than fit in memory.
   [[nodiscard]] bool has_too_many_combinations() const {
     std::uint64_t combinations = 1;
     for (const Factor &factor : factors_of(plan_)) {
@@ -227,7 +227,7 @@ std::vector<FactorialPoint> points_of(const FactorialPlan &plan) {
     if (!factors[f].levels.empty()) point.level[f] = 0;
   }
   while (true) {
-    // Of combinations that differ only in what means nothing to the executor, the first stands for all.
+    // Combinations that differ only in factors without effect on the executor are equal; the first one represents them.
     FactorialPoint clean = point;
     bool is_first = true;
     for (std::size_t f = 0; f < kFactorCount; ++f) {
@@ -236,7 +236,7 @@ std::vector<FactorialPoint> points_of(const FactorialPlan &plan) {
       clean.level[f] = kNoLevel;
     }
     if (is_first) points.push_back(std::move(clean));
-    std::size_t f = kFactorCount;  // the next combination: the last factor turns fastest
+    std::size_t f = kFactorCount;  // advances to the next combination; the last factor changes fastest
     while (f > 0) {
       --f;
       if (point.level[f] == kNoLevel) continue;

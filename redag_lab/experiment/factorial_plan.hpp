@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the experiment "factorial" does: every executor on every combination of the factors' levels, repeated. The text
-// form is docs/experiments.md. Plain values; pure functions, but for the files that load_factorial_plan() reads.
+// The plan of the experiment "factorial": every executor on every combination of the factors' levels, repeated.
+// docs/experiments.md describes the text form. Plain values; pure functions, apart from the files that
+// load_factorial_plan() reads.
 #pragma once
 
 #include <cstdint>
@@ -21,29 +22,29 @@
 
 namespace redag::experiment {
 
-/// Where the runs happen.
+/// Where a run happens.
 enum class World : std::uint8_t {
   Simulator,
   Threads,
   Ros2,  // nodes on rclcpp's executors or ours: run_workload of redag_rclcpp
 };
 
-/// The executors that a world has.
+/// Returns the executors of a world.
 using ExecutorNames = std::function<std::vector<std::string>(World)>;
 
-/// Executors beside those of the drivers, always simulated and without overheads. `ideal`: ReDAG-RT, fully preemptive,
-/// no max_active. `unlimited`: the same with a worker for every job, so that nobody ever waits.
+/// Executors besides those of the drivers, always simulated and without overheads. `ideal` is ReDAG-RT, fully
+/// preemptive, without max_active. `unlimited` is the same with a worker for every job; no job ever waits for a worker.
 inline constexpr std::string_view kIdeal = "ideal";
 inline constexpr std::string_view kUnlimited = "unlimited";
 
-/// A workload as it was written, or how to draw another one for each repetition.
+/// A fixed workload, or the options from which each repetition draws another one.
 struct WorkloadSource {
   std::string name;
   Workload workload;
   std::optional<GenerateOptions> random;
 };
 
-/// Numbers with a fraction are in millionths (kMillion is 1). An empty list: what the workload says.
+/// Numbers with a fraction are in millionths (kMillion is 1). An empty list means the workload's own value.
 struct FactorialPlan {
   std::string name = "factorial";
   World world = World::Simulator;
@@ -51,28 +52,28 @@ struct FactorialPlan {
   std::uint32_t repetitions = 1;
   Duration duration = 10 * kSecond;
   Duration warm_up = 0;
-  sim::Overheads overheads;                    // simulator; not of ideal and unlimited
+  sim::Overheads overheads;                    // simulator; ideal and unlimited have none
   Duration paper_startup = 15 * kMillisecond;  // metrics/paper_accounting.hpp
-  bool quantiles = false;                      // keep the distribution of response times
+  bool quantiles = false;                      // keeps the distribution of response times
   // The factors, in the order of the columns.
   std::vector<WorkloadSource> workloads;
   std::vector<std::string> executors;
   std::vector<PolicyKind> policies;
   std::vector<std::uint32_t> workers;
-  std::vector<std::uint32_t> utilization;     // per worker, of mean execution times: these are scaled to it
-  std::vector<std::uint32_t> demand_scale;    // on execution times
-  std::vector<std::uint32_t> deadline_scale;  // on relative deadlines
-  /// By DAG, 0: no bound; one number stands for all DAGs.
+  std::vector<std::uint32_t> utilization;     // per worker, of mean execution times, which are scaled to it
+  std::vector<std::uint32_t> demand_scale;    // factors on execution times
+  std::vector<std::uint32_t> deadline_scale;  // factors on relative deadlines
+  /// By DAG; 0: no bound. A single number applies to all DAGs.
   std::vector<std::vector<std::uint32_t>> max_active;
 };
 
-/// An executor as plans write it: "mte", in the plan's world, or "ros2/mte", in that one.
+/// An executor as plans write it: "mte" runs in the plan's world, "ros2/mte" in the world ros2.
 struct ExecutorPlace {
   World world = World::Simulator;
   std::string name;
 };
 [[nodiscard]] ExecutorPlace place_of(const FactorialPlan &plan, const std::string &executor);
-/// Does any of the plan's executors really run, so that only one can at a time?
+/// True if some executor of the plan runs in real time, and only one run at a time is possible.
 [[nodiscard]] bool needs_machine(const FactorialPlan &plan);
 
 enum class FactorKind : std::uint8_t {
@@ -90,15 +91,15 @@ inline constexpr std::size_t kFactorCount = 8;
 
 struct Factor {
   FactorKind kind = FactorKind::Workload;
-  std::vector<std::string> levels;  // as people write them
+  std::vector<std::string> levels;  // as displayed
   bool numeric = false;
 };
 
-/// By FactorKind. A factor that the plan does not vary has no levels.
+/// Returns the factors by FactorKind. A factor that the plan does not vary has no levels.
 [[nodiscard]] std::vector<Factor> factors_of(const FactorialPlan &plan);
 
-/// One combination: a level of each factor, by FactorKind; kNoLevel where the plan does not vary it, or where it means
-/// nothing to the executor (rclcpp's know neither policies nor max_active).
+/// One combination: a level of each factor, by FactorKind. It is kNoLevel where the plan does not vary the factor, or
+/// where the factor does not affect the executor (rclcpp's ignore policies and max_active).
 inline constexpr std::uint32_t kNoLevel = std::numeric_limits<std::uint32_t>::max();
 struct FactorialPoint {
   std::vector<std::uint32_t> level;
@@ -107,19 +108,20 @@ struct FactorialPoint {
   friend bool operator==(const FactorialPoint &, const FactorialPoint &) = default;
 };
 
-/// Every combination once: nested loops in the order of FactorKind, the executor innermost, so that on a real machine
-/// executors that are compared take turns.
+/// Returns every combination once, as nested loops in the order of FactorKind. The executor is innermost: on a real
+/// machine the compared executors then take turns.
 [[nodiscard]] std::vector<FactorialPoint> points_of(const FactorialPlan &plan);
 
-/// "workers 4, executor mte": for messages.
+/// Describes a point for messages: "workers 4, executor mte".
 [[nodiscard]] std::string describe(const FactorialPlan &plan, const FactorialPoint &point);
 
 [[nodiscard]] std::vector<PlanMistake> find_mistakes(const FactorialPlan &plan, const ExecutorNames &executors);
 
-/// Canonical text, which holds the workloads themselves: equal plans have equal texts, and parsing gives the plan back.
+/// Returns the canonical text, which contains the workloads. Equal plans have equal texts, and parsing restores the
+/// plan.
 [[nodiscard]] std::string to_yaml(const FactorialPlan &plan);
-/// Workloads that are named by files are read; relative names are relative to the folder of `file`. Errors: every
-/// mistake with its place.
+/// Parses a plan and reads the workload files that it names. Relative names are relative to the folder of `file`.
+/// Errors: every mistake with its place.
 [[nodiscard]] Result<FactorialPlan> parse_factorial_plan(std::string_view text, const std::string &file,
                                                          const ExecutorNames &executors);
 [[nodiscard]] Result<FactorialPlan> load_factorial_plan(const std::string &path, const ExecutorNames &executors);

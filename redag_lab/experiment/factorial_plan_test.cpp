@@ -97,7 +97,7 @@ TEST(FactorialPlan, WorkloadFilesLieBesideThePlan) {
   std::filesystem::remove_all(folder);
 }
 
-// A factor that means nothing to an executor does not multiply its runs.
+// A factor that does not affect an executor does not multiply its runs.
 TEST(FactorialPlan, PointsAreTheCombinationsThatDiffer) {
   const FactorialPlan plan = parsed(
       std::string("experiment: factorial\nworkers: [1, 2, 4]\nmax_active: [unbounded, 1]\npolicies: [edf, fifo]\n"
@@ -112,7 +112,7 @@ TEST(FactorialPlan, PointsAreTheCombinationsThatDiffer) {
             "workload cart, policy fifo, workers 4, deadline_scale 1.2, max_active 1, executor redag");
 }
 
-// The demand at a utilization per worker depends on the number of workers, also for who uses only one.
+// The demand at a utilization per worker depends on the number of workers, also for executors with one worker.
 TEST(FactorialPlan, WorkersMatterToAllWhereTheyMakeTheDemand) {
   const FactorialPlan plan =
       parsed(std::string("experiment: factorial\nworkers: [1, 2]\nutilization: [0.5, 1]\nexecutors: [ste]") + kCart);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The text form of a plan: docs/experiments.md.
+// Reads and writes the text form of a plan, which docs/experiments.md describes.
 #include <array>
 #include <filesystem>
 #include <iterator>
@@ -97,7 +97,7 @@ class Reader : private PlanReader {
     Result<LoadedWorkload> loaded = load_workload(path);
     if (!loaded) {
       error(node, fmt::format("the workload '{}' cannot be used", *given), "its own mistakes are below");
-      // The reader's list is about one file: these name another one.
+      // Their places are in the workload's file. The reader's own error() would place them in the plan.
       std::copy(loaded.error().begin(), loaded.error().end(), std::back_inserter(diagnostics_));
       return std::nullopt;
     }
@@ -133,7 +133,7 @@ class Reader : private PlanReader {
     return source;
   }
 
-  // unbounded, 3 (all DAGs), [2, 3] (by DAG), {from: 2, to: 5} (of two DAGs, all pairs).
+  // Reads unbounded, 3 (all DAGs), [2, 3] (by DAG), or {from: 2, to: 5} (all pairs of two DAGs).
   void read_max_active() {
     const Node *node = find(root_, "max_active");
     if (node == nullptr) return;
@@ -178,7 +178,7 @@ class Reader : private PlanReader {
   FactorialPlan plan_;
 };
 
-// A block scalar, which keeps the text as it is.
+// Returns a block scalar, which keeps the text unchanged.
 std::string block(std::string_view text, std::string_view indentation) {
   std::string indented;
   while (!text.empty()) {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The plots of factorial_results.hpp.
+// Draws the plots of factorial_results.hpp.
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kMostPanels = 12;
 
-// The next round number: an axis should not end at 0.0273.
+// Returns the next round number; an axis should not end at 0.0273.
 double round_up(double value) {
   if (!(value > 0)) return 0.01;
   const double decade = std::pow(10, std::floor(std::log10(value)));
@@ -29,7 +29,7 @@ double round_up(double value) {
   return 10 * decade;
 }
 
-// Mean of the medians at a level over all points that have it.
+// Returns the mean of the medians of all points with one level.
 LinePlot::Value mean_at(const std::vector<Median> &medians) {
   LinePlot::Value value;
   const auto n = static_cast<double>(medians.size());
@@ -48,12 +48,12 @@ LinePlot::Panel panel_of(const Factorial &factorial, const FactorialResults &res
   std::replace(panel.x_label.begin(), panel.x_label.end(), '_', ' ');
   if (factor.kind == FactorKind::Utilization) panel.x_label += " per worker";
   panel.series.resize(executors.size());
-  // As many labels as there is room for.
+  // Thins out the labels to the number that fits.
   constexpr std::size_t kRoom = 42;  // characters
   std::size_t characters = 0;
   for (const std::string &level : factor.levels) characters = std::max(characters, level.size() + 1);
   const std::size_t every = std::max<std::size_t>(1, (factor.levels.size() * characters + kRoom - 1) / kRoom);
-  // An axis from 0 is of use only for values that come near it.
+  // The axis starts at 0 only if some values come near 0.
   const bool numeric = factor.numeric && std::stod(factor.levels.front()) <= std::stod(factor.levels.back()) / 2;
   for (std::size_t level = 0; level < factor.levels.size(); ++level) {
     const double x = numeric ? std::stod(factor.levels[level]) : static_cast<double>(level) + 0.5;
@@ -63,7 +63,7 @@ LinePlot::Panel panel_of(const Factorial &factorial, const FactorialResults &res
       for (const FactorialRow &row : results.rows) {
         const FactorialPoint &point = factorial.points()[row.point];
         const std::uint32_t here = point.of(factor.kind);
-        // Where the factor means nothing to the executor its line is flat.
+        // A factor without effect on the executor gives a flat line.
         if (point.of(FactorKind::Executor) != e || (here != level && here != kNoLevel) || row.runs.empty()) continue;
         medians.push_back(*over_runs(factorial, results, row, row.runs.front().dags.size() - 1, Metric::MissRatio));
       }
@@ -78,7 +78,7 @@ LinePlot::Panel panel_of(const Factorial &factorial, const FactorialResults &res
   return panel;
 }
 
-// The panel of that name, a new one at the end if there is none; nothing where there are too many.
+// Returns the panel of that title, and appends a new one if there is none. Returns null if there are too many panels.
 LinePlot::Panel *panel_named(LinePlot &plot, const std::string &title) {
   const auto known = std::find_if(plot.panels.begin(), plot.panels.end(),
                                   [&](const LinePlot::Panel &panel) { return panel.title == title; });
@@ -89,8 +89,7 @@ LinePlot::Panel *panel_named(LinePlot &plot, const std::string &title) {
   return &plot.panels.back();
 }
 
-// Share of the answers that a DAG owed which had come by each time: what was dropped on the way never does. Medians of
-// the runs.
+// Returns the share of the due answers that arrived by each time, as medians of the runs. Dropped answers never arrive.
 std::vector<LinePlot::Value> answered(const FactorialRow &row, std::size_t dag) {
   std::vector<LinePlot::Value> curve;
   for (std::size_t q = 0; q < kQuantiles.size(); ++q) {
@@ -152,7 +151,7 @@ std::optional<std::string> distance_svg(const Factorial &factorial, const Factor
   if (!results.complete()) plot.subtitle = fmt::format("{} of {} runs done", results.done, results.units);
   plot.x_label = "utilization per worker";
   plot.y_label = "missed above the ideal, of all releases";
-  // Of what the rest is measured against nothing is to be seen.
+  // The ideal and the unlimited executor are references and have no line.
   std::copy_if(plan.executors.begin(), plan.executors.end(), std::back_inserter(plot.lines),
                [](const std::string &executor) { return executor != kIdeal && executor != kUnlimited; });
   double largest = 0;
@@ -193,7 +192,7 @@ std::string responses_svg(const Factorial &factorial, const FactorialResults &re
   for (const FactorialRow &row : results.rows) {
     const FactorialPoint &point = factorial.points()[row.point];
     if (row.runs.empty()) continue;
-    // A panel for each DAG of a combination of everything but the executors.
+    // Each DAG has a panel for each combination of the factors other than the executor.
     FactorialPoint place = point;
     place.level.back() = kNoLevel;
     for (std::size_t dag = 0; dag + 1 < row.runs.front().dags.size(); ++dag) {
@@ -206,7 +205,7 @@ std::string responses_svg(const Factorial &factorial, const FactorialResults &re
   for (LinePlot::Panel &panel : plot.panels) {
     double end = 0;
     for (auto &series : panel.series) {
-      if (series.size() == kQuantiles.size()) series.pop_back();  // the maximum would be most of the axis
+      if (series.size() == kQuantiles.size()) series.pop_back();  // the maximum would take up most of the axis
       for (const LinePlot::Value &value : series) end = std::max(end, value.x);
     }
     end = round_up(end);

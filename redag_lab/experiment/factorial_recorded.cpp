@@ -20,13 +20,13 @@ namespace {
 
 Result<FinishedRun> no_driver(const PlannedRun & /*run*/) { return make_error("nothing is run here"); }
 
-// What makes two workloads the same jobs: not what they are called, nor on what they run.
+// Returns the text that identifies a workload's jobs. It ignores names, platform and policy.
 std::string jobs_of(Workload workload) {
   for (Dag &dag : workload.dags) inherit_periods(dag);
   workload.name = "any";
   workload.platform = {};
   workload.policy = {};
-  for (Dag &dag : workload.dags) dag.max_active = 0;  // which rclcpp's executors do not know
+  for (Dag &dag : workload.dags) dag.max_active = 0;  // rclcpp's executors ignore it
   return to_yaml(workload);
 }
 
@@ -70,7 +70,7 @@ Result<FactorialUnits> with_recorded(FactorialUnits units, const std::vector<Rec
     if (std::find(known.begin(), known.end(), executor) == known.end()) known.push_back(executor);
   }
 
-  // New executors are last in the list: levels stay what they were, but points have other numbers.
+  // New executors are last in the list. Levels keep their numbers, but points get others.
   const Factorial before(units.plan, no_driver);
   const Factorial after(all.plan, no_driver);
   std::map<std::vector<std::uint32_t>, std::uint64_t> number;
@@ -84,7 +84,7 @@ Result<FactorialUnits> with_recorded(FactorialUnits units, const std::vector<Rec
     all.units.push_back(std::move(unit));
   }
 
-  std::map<std::uint64_t, std::string> jobs;  // by unit; each is made once
+  std::map<std::uint64_t, std::string> jobs;  // by unit; each is computed once
   for (const RecordedRun &run : runs) {
     const std::string wanted = jobs_of(run.info.workload);
     bool known = false;

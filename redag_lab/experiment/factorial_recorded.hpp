@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Runs that were recorded elsewhere, by `run_workload` on a machine with ROS, as runs of a factorial experiment: each
-// becomes a repetition of the executor "ros2/NAME" at the combination whose workload it ran. Pure functions.
+// Adds runs that `run_workload` recorded, on a machine with ROS, to a factorial experiment. Each becomes a repetition
+// of the executor "ros2/NAME" at the combination whose workload it ran. Pure functions.
 #pragma once
 
 #include <string>
@@ -16,11 +16,11 @@
 
 namespace redag::experiment {
 
-/// What is kept of a recorded run.
+/// The part of a recorded run that the experiment needs.
 struct RecordedRun {
   std::string file;
   trace::RunInfo info;
-  std::string result;  // its observation
+  std::string result;  // its observation, as a line
 };
 [[nodiscard]] RecordedRun record(std::string file, const trace::Trace &trace, const FactorialPlan &plan);
 
@@ -29,9 +29,9 @@ struct FactorialUnits {
   std::vector<FinishedUnit> units;  // by unit
 };
 
-/// The plan with the recorded executors added, all its units, and the recorded runs, in their order. Platforms are not
-/// compared, but for the number of workers where the plan varies it. Errors: a run that is not of nodes, lasted or
-/// warmed up otherwise than the plan says, ran no workload of it, or is one too many for its combination.
+/// Returns the plan with the recorded executors added, all its units, and the recorded runs, in their order. Platforms
+/// are not compared, except the number of workers where the plan varies it. Errors: a run that is not of nodes, has
+/// another length or warm-up than the plan, ran none of its workloads, or exceeds the repetitions of its combination.
 [[nodiscard]] Result<FactorialUnits> with_recorded(FactorialUnits units, const std::vector<RecordedRun> &runs);
 
 }  // namespace redag::experiment

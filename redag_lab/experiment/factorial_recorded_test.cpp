@@ -57,7 +57,7 @@ trace::Trace simulated(Workload workload, const std::string &executor, std::uint
   return trace;
 }
 
-// As if nodes had run it, with double the demand, on another machine's three threads.
+// Returns a run as nodes would record it: with double the demand, on another machine with three workers.
 RecordedRun recorded(std::uint64_t seed, Duration duration = kSecond, Duration wcet = 4 * kMillisecond) {
   Workload workload = parse_workload(kWorkload, "cart.yaml")->workload;
   workload.platform.workers = 3;
@@ -118,7 +118,7 @@ TEST(Recorded, RunsStandBesideTheSimulators) {
   }
 }
 
-// The distance to the ideal is one of the same jobs.
+// The distance to the ideal compares equal jobs only.
 TEST(Recorded, RunsWithOtherJobsHaveNoDistanceToTheIdeal) {
   const Result<FactorialUnits> all = with_recorded(simulated_units(), {recorded(77)});
   ASSERT_TRUE(all) << to_string(all.error());

@@ -26,7 +26,7 @@ double ratio(std::int64_t part, std::int64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-// Nothing: not measured.
+// Returns the metric's value; nothing if it was not measured.
 std::optional<double> value_of(const DagObservation &seen, Metric metric, Duration counted) {
   const auto per_release = [&](Measure measure) { return ratio(seen.of(measure), seen.of(Measure::Released)); };
   const auto plain = [&](Measure measure) -> std::optional<double> {
@@ -59,7 +59,7 @@ std::optional<double> value_of(const DagObservation &seen, Metric metric, Durati
 
 Duration counted_of(const Factorial &factorial) { return factorial.plan().duration - factorial.plan().warm_up; }
 
-// The run of that repetition, if it is finished. Runs come in order of their repetition.
+// Returns the run of that repetition, or null if it is not finished. Runs are in order of their repetition.
 const Observation *run_of(const FactorialRow &row, std::uint64_t repetition) {
   const auto at = std::lower_bound(row.repetition.begin(), row.repetition.end(), repetition);
   if (at == row.repetition.end() || *at != repetition) return nullptr;
@@ -189,7 +189,7 @@ std::vector<FactorialEffects> effects_of(const Factorial &factorial, const Facto
 
 namespace {
 
-// The columns that say where a row belongs.
+// Returns the columns that identify a row.
 std::string factor_columns() {
   std::string text;
   for (std::size_t f = 0; f < kFactorCount; ++f) text += fmt::format("{},", to_string(static_cast<FactorKind>(f)));

@@ -39,7 +39,7 @@ workloads:
   return plan.value_or(FactorialPlan{});
 }
 
-// As the program's driver, without its options.
+// Simulates a run as the program's driver does, without its options.
 Result<FinishedRun> simulate_run(const PlannedRun &planned) {
   Workload workload = planned.workload;
   const std::string name = planned.executor.substr(0, planned.executor.find('-'));
@@ -149,7 +149,7 @@ TEST(Factorial, RandomWorkloadsAreDrawnByRepetition) {
   EXPECT_EQ(planned(factorial, 0).workload, planned(factorial, 1).workload);
   EXPECT_NE(planned(factorial, 0).workload, planned(factorial, 4).workload);
   EXPECT_NEAR(mean_utilization(planned(factorial, 3).workload), 1.8, 1e-5);
-  // Another load, the same tasks.
+  // Another load scales the same tasks.
   EXPECT_EQ(planned(factorial, 0).workload.dags[0].tasks[0].period,
             planned(factorial, 2).workload.dags[0].tasks[0].period);
 }
@@ -175,11 +175,11 @@ TEST(Factorial, ResultsAreMediansWithTheirDistanceToTheIdeal) {
   };
   EXPECT_EQ(miss("ideal", 0, Metric::MissRatio), 0);
   EXPECT_EQ(miss("unlimited", 0, Metric::MissRatio), 0);
-  // The 30 ms of `plan` block the 10 ms of `sense` on one worker: two or three of ten releases.
+  // The 30 ms of `plan` block the 10 ms of `sense` on one worker: two or three of ten releases miss.
   EXPECT_GT(miss("redag-none", 0, Metric::MissRatio), 0.05);
   EXPECT_EQ(miss("redag-none", 1, Metric::MissRatio), 0);
   EXPECT_EQ(miss("redag-none", 0, Metric::ExcessMissRatio), miss("redag-none", 0, Metric::MissRatio));
-  EXPECT_EQ(miss("ste", 0, Metric::ExcessMissRatio), -1);  // on which ideal's workers? It has one, whatever there are
+  EXPECT_EQ(miss("ste", 0, Metric::ExcessMissRatio), -1);  // ste has one worker at every level, which matches no ideal
   EXPECT_GT(miss("ste", 0, Metric::PaperMissRatio), miss("ste", 0, Metric::LateRatio));
 
   const std::string csv = to_csv(factorial, results);
@@ -194,7 +194,7 @@ TEST(Factorial, ResultsAreMediansWithTheirDistanceToTheIdeal) {
   EXPECT_THAT(responses_svg(factorial, results), HasSubstr(">cart, workers 2: slow<"));
 
   const std::vector<FactorialEffects> effects = effects_of(factorial, results);
-  ASSERT_EQ(effects.size(), 2U);  // ideal and redag-none: to the others the number of workers means nothing
+  ASSERT_EQ(effects.size(), 2U);  // ideal and redag-none; the number of workers does not affect the others
   EXPECT_GT(effects[1].effects.terms[0].share, 0.9);
 }
 
@@ -244,7 +244,7 @@ TEST(Observation, TextGivesItBack) {
   EXPECT_EQ(seen->workers, 1U);
 }
 
-// Two runs of one combination whose DAG `slow` answers at most after 20 and 30 ms, and misses 0 and 10 of 100.
+// Two runs of one combination: the DAG `slow` responds within 20 and 30 ms, and misses 0 and 10 of 100.
 TEST(Factorial, MaximaAreOfAllRunsAndAllDagsTogetherHaveNoResponse) {
   const Factorial factorial(plan_of("duration: 1s\nrepetitions: 3\nexecutors: [redag]"), simulate_run);
   FactorialCounter counter(factorial);

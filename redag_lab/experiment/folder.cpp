@@ -35,7 +35,7 @@ std::string plan_file(const std::string &folder) { return folder + "/plan.yaml";
 std::string units_file(const std::string &folder) { return folder + "/units.csv"; }
 std::string runs_file(const std::string &folder) { return folder + "/runs.jsonl"; }
 
-// What the units are results of: the plan, by its FNV-1a hash, and the code that made them.
+// Identifies the origin of the units: the plan, by its FNV-1a hash, and the version of the code.
 std::string subject(const std::string &plan) {
   std::uint64_t hash = 0xcbf29ce484222325ULL;
   for (const char c : plan) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
@@ -61,7 +61,7 @@ Result<void> expect_plan(const std::string &file, const std::string &there, cons
                     "choose another folder, or go on with the plan that lies in this one");
 }
 
-// New names in a folder reach the disk with it.
+// Syncs the folder: the names of new files reach the disk with their folder.
 void sync_folder(const std::string &folder) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;
@@ -148,7 +148,7 @@ std::vector<std::string> read_runs(const std::vector<std::string> &folders) {
     if (!text) continue;
     for (std::string_view rest = *text; !rest.empty();) {
       const std::size_t end = rest.find('\n');
-      if (end == std::string_view::npos) break;  // killed while it was written
+      if (end == std::string_view::npos) break;  // the process was killed while it wrote this line
       const std::string_view line = rest.substr(0, end);
       if (!json_nests_deeper(line) && Json::accept(line)) lines.emplace_back(line);
       rest.remove_prefix(end + 1);

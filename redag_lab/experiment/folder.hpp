@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The folder of an experiment: plan.yaml (what it is), units.csv (what is finished; journal.hpp), runs.jsonl (who
-// worked on it, when and where). All else in it is made of these. Not thread-safe.
+// The folder of an experiment: plan.yaml (the plan), units.csv (the finished units; journal.hpp) and runs.jsonl (the
+// runs: version, machine, time). Its other files are derived from these. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -20,14 +20,15 @@ namespace redag::experiment {
 /// folder that holds another plan, with the first line that differs.
 [[nodiscard]] Result<Journal> open_folder(const std::string &folder, const std::string &plan);
 
-/// The plan of a folder with results.
+/// Reads the plan of a folder with results.
 [[nodiscard]] Result<std::string> read_plan(const std::string &folder);
 
-/// All finished units of several folders, which must hold the same plan, by unit. Errors: as open_folder().
+/// Reads the finished units of several folders, which must hold the same plan, in order of unit. Errors: as
+/// open_folder().
 [[nodiscard]] Result<std::vector<FinishedUnit>> read_folders(const std::vector<std::string> &folders,
                                                              const std::string &plan);
 
-/// Two lines a run in runs.jsonl: one when it begins and one when it ends, unless it was killed.
+/// A run has two lines in runs.jsonl: one at its begin and one at its end. A killed run has only the first.
 struct RunBegin {
   Shard shard;
   std::uint32_t jobs = 1;
@@ -38,12 +39,12 @@ struct RunEnd {
   Duration elapsed = 0;
   bool interrupted = false;
 };
-/// Adds this machine, the version of redag and the time of day.
+/// Appends a line, with this machine, the version of redag and the time of day.
 [[nodiscard]] Result<void> log_run(const std::string &folder, const RunBegin &run);
 [[nodiscard]] Result<void> log_run(const std::string &folder, const RunEnd &run);
-/// The lines of all folders, one after the other; empty where there is no such file.
+/// Returns the lines of all folders in turn; a folder without the file has none.
 [[nodiscard]] std::vector<std::string> read_runs(const std::vector<std::string> &folders);
-/// Adds lines of other folders.
+/// Appends lines of other folders.
 [[nodiscard]] Result<void> add_runs(const std::string &folder, const std::vector<std::string> &lines);
 
 }  // namespace redag::experiment

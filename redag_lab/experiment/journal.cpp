@@ -28,7 +28,7 @@ constexpr std::string_view kColumns = "unit,result\n";
 
 std::string header(std::string_view subject) { return fmt::format("# {} {}\n{}", kFormat, subject, kColumns); }
 
-// A line that was never finished counts for nothing.
+// Returns the text without a last line that was not finished.
 std::string_view whole_lines(std::string_view text) { return text.substr(0, text.rfind('\n') + 1); }
 
 Result<std::vector<FinishedUnit>> parse(std::string_view text, const std::string &path, const std::string &head) {
@@ -116,13 +116,13 @@ Result<Journal> Journal::open(std::string path, std::string_view subject) {
   return journal;
 }
 
-// Keeps what is whole, and starts the file where nothing is.
+// Keeps the whole lines, and writes the header of an empty file.
 Result<void> Journal::begin(std::string_view subject) {
   Result<std::string> text = trace::read_file(path_);
   if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
   const std::size_t whole = whole_lines(*text).size();
   const std::string head = header(subject);
-  if (head.starts_with(whole_lines(*text))) {  // new, or killed while it began
+  if (head.starts_with(whole_lines(*text))) {  // new, or killed while writing the header
     if (::ftruncate(descriptor_, 0) != 0) return failure("cannot cut off");
     buffer_ = head;
     return sync();

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// units.csv: the finished units of an experiment, a line each, only ever appended to, so that a killed run goes on
-// where it was. Lines reach the kernel within kWriteEvery and the disk within kSyncEvery. Of one process at a time
-// (flock); not thread-safe.
+// units.csv: the finished units of an experiment, one per line. The file is only appended to, and a killed run can
+// continue from it. Lines reach the kernel within kWriteEvery and the disk within kSyncEvery. One process at a time
+// uses the file (flock); not thread-safe.
 #pragma once
 
 #include <chrono>
@@ -18,7 +18,7 @@ namespace redag::experiment {
 
 struct FinishedUnit {
   std::uint64_t unit = 0;
-  std::string result;  // what the experiment says of it, without line breaks
+  std::string result;  // the experiment's result text, without line breaks
 
   friend bool operator==(const FinishedUnit &, const FinishedUnit &) = default;
 };
@@ -28,25 +28,25 @@ class Journal {
   static constexpr std::chrono::milliseconds kWriteEvery{200};
   static constexpr std::chrono::seconds kSyncEvery{2};
 
-  /// Opens the file, or makes it. `subject` is what its lines are results of, one line of text: a file of another
-  /// subject is refused. A last line without its end (the process was killed) is cut off. Errors: the file cannot be
-  /// used, another process uses it, a line that is none, a unit with two results. A unit that stands there twice with
-  /// the same result counts once.
+  /// Opens or creates the file. `subject` (one line) identifies the origin of the results; a file of another subject is
+  /// refused. A last line without its end (the process was killed) is cut off. A unit that occurs twice with the same
+  /// result counts once. Errors: the file cannot be used, another process uses it, a malformed line, or a unit with two
+  /// results.
   [[nodiscard]] static Result<Journal> open(std::string path, std::string_view subject);
 
   Journal(Journal &&other) noexcept;
   Journal &operator=(Journal &&) = delete;
   Journal(const Journal &) = delete;
   Journal &operator=(const Journal &) = delete;
-  /// Writes what is left; to see whether that worked call sync().
+  /// Writes the remaining lines. To detect a failure, call sync() first.
   ~Journal();
 
-  /// What was in the file when it was opened, by unit.
+  /// The units in the file when it was opened, by unit.
   [[nodiscard]] const std::vector<FinishedUnit> &found() const { return found_; }
 
-  /// The result must be one line. After an error nothing more is written.
+  /// Appends a result, which must be one line. After an error nothing more is written.
   [[nodiscard]] Result<void> append(std::uint64_t unit, std::string_view result);
-  /// All lines are on the disk.
+  /// Writes all lines to the disk.
   [[nodiscard]] Result<void> sync();
 
  private:
@@ -66,10 +66,10 @@ class Journal {
   std::vector<FinishedUnit> found_;
 };
 
-/// What open() would find, without touching the file: for merging.
+/// Reads what open() would find without changing the file, for merging.
 [[nodiscard]] Result<std::vector<FinishedUnit>> read_journal(const std::string &path, std::string_view subject);
 
-/// Sorts by unit; a unit that stands there twice with the same result is kept once. Error: with two results.
+/// Sorts by unit and keeps one of equal entries. Error: a unit with two results.
 [[nodiscard]] Result<void> sort_and_unite(std::vector<FinishedUnit> &units, const std::string &file);
 
 }  // namespace redag::experiment

@@ -59,7 +59,7 @@ TEST_F(JournalTest, FindsWhatWasAppended) {
   EXPECT_THAT(journal->found(), ElementsAre(FinishedUnit{3, "11"}, FinishedUnit{5, "-u"}, FinishedUnit{7, "01"}));
 }
 
-// Wherever the process was killed, whole lines count and the file goes on.
+// At any cut of the file, whole lines count and the journal continues.
 TEST_F(JournalTest, GoesOnAfterAnyCut) {
   fill({{0, "01"}, {1, "11"}});
   const std::string whole = text();
@@ -111,7 +111,7 @@ TEST_F(JournalTest, IsOfOneProcess) {
   EXPECT_THAT(error(), HasSubstr("another process is writing to it"));
 }
 
-// A limit on the size of files stands for a full disk.
+// A limit on file size acts as a full disk.
 TEST_F(JournalTest, FullDisk) {
   fill({{0, "01"}});
   const auto full = static_cast<rlim_t>(text().size());

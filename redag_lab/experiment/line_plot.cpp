@@ -14,19 +14,19 @@
 namespace redag::experiment {
 namespace {
 
-// Sizes in pixels.
+// Sizes are in pixels.
 constexpr double kPanelWidth = 400;
 constexpr double kPanelHeight = 300;
-constexpr double kLeft = 66;    // of a panel: the y axis
-constexpr double kBottom = 48;  // the x axis
-constexpr double kTop = 30;     // its title
+constexpr double kLeft = 66;    // of a panel, for the y axis
+constexpr double kBottom = 48;  // for the x axis
+constexpr double kTop = 30;     // for a panel's title
 constexpr double kRight = 16;
-constexpr double kHead = 62;  // the plot's title
+constexpr double kHead = 62;  // for the plot's title
 constexpr double kLegendLine = 20;
-constexpr double kCharacter = 7;  // a wide guess, for the legend's width
+constexpr double kCharacter = 7;  // a generous estimate, for the legend's width
 
-// The colours that M. Okabe and K. Ito chose to be told apart with any colour vision, grey for the yellow; where lines
-// outnumber them, the dashes still differ. Dashes also let a line be seen below another.
+// The colours of M. Okabe and K. Ito, distinct with any colour vision, with grey in place of yellow. Where lines
+// outnumber the colours, the dashes differ. Dashes also keep a covered line visible.
 constexpr std::array<std::string_view, 8> kColours = {"#0072b2", "#000000", "#d55e00", "#009e73",
                                                       "#cc79a7", "#e69f00", "#56b4e9", "#808080"};
 constexpr std::array<std::string_view, 4> kDashes = {"", "9 5", "3 4", "10 4 3 4"};
@@ -44,7 +44,7 @@ std::string escaped(std::string_view text) {
   return safe;
 }
 
-// Every line has its marker, so that lines on top of each other are seen.
+// Every line has its own marker, which keeps lines on top of each other visible.
 std::string marker(std::size_t line, double x, double y) {
   const std::string_view colour = kColours[line % kColours.size()];
   switch (line % 4) {
@@ -183,7 +183,7 @@ class Drawing {
   double x_largest_ = 1;
   double x_end_ = 1;  // of the current panel
   std::size_t columns_ = 1;
-  double left_ = 0;  // of the current panel's inside
+  double left_ = 0;  // inner edge of the current panel
   double top_ = 0;
   std::string svg_;
 };

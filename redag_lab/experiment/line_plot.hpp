@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Lines with confidence bands, in panels beside each other, as one self-contained SVG. For the shares that experiments
-// measure; no more than that. Pure.
+// Draws lines with confidence bands, in panels side by side, as one self-contained SVG. It serves the shares that
+// experiments measure. Pure.
 #pragma once
 
 #include <string>
@@ -20,9 +20,9 @@ struct LinePlot {
   };
   struct Panel {
     std::string title;
-    std::vector<std::vector<Value>> series;  // by line; empty where a line has nothing to say
-    std::string x_label;                     // instead of the plot's
-    /// Places on the x axis and what stands below them, which then ends at the last; empty: fifths of it.
+    std::vector<std::vector<Value>> series;  // by line; empty if a line has no values here
+    std::string x_label;                     // replaces the plot's
+    /// Positions on the x axis with their labels; the axis ends at the last. Empty: fifths of the axis.
     std::vector<std::pair<double, std::string>> ticks;
   };
 
@@ -30,13 +30,13 @@ struct LinePlot {
   std::string subtitle;
   std::string x_label;
   std::string y_label;
-  std::vector<std::string> lines;  // names, for the legend; equal styles in all panels
+  std::vector<std::string> lines;  // names for the legend; a line has the same style in all panels
   std::vector<Panel> panels;
   double y_end = 1;
 };
 
-/// y runs from 0 to y_end; x from 0 to the largest value (at least 1) or the last tick. Lines without a value anywhere
-/// are named as such in the legend.
+/// Draws the plot. y runs from 0 to y_end, x from 0 to the last tick or the largest value (at least 1). The legend
+/// marks lines without any value.
 [[nodiscard]] std::string to_svg(const LinePlot &plot);
 
 }  // namespace redag::experiment

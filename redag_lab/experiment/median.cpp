@@ -14,9 +14,9 @@ Median median_of(std::vector<double> values) {
   REDAG_CHECK(!values.empty(), "a median needs values");
   std::sort(values.begin(), values.end());
   const std::size_t n = values.size();
-  // The true median lies outside the k-th value from either end with probability 2 P(B(n, 1/2) < k).
+  // The true median is outside the k-th values from either end with probability 2 P(B(n, 1/2) < k).
   constexpr double kMostOutside = 0.05;
-  double term = std::pow(0.5, static_cast<double>(n));  // P(B = 0); underflows to 0 only where it does not count
+  double term = std::pow(0.5, static_cast<double>(n));  // P(B = 0); underflows for more than 1,074 values
   double below = term;
   std::size_t k = 1;
   double outside = 2 * below;

@@ -18,7 +18,7 @@ std::vector<double> one_to(int n) {
   return values;
 }
 
-// Ranks from tables of the sign test (B. L. van der Parren, Statistica Neerlandica 24, 1970).
+// The ranks are from tables of the sign test (B. L. van der Parren, Statistica Neerlandica 24, 1970).
 TEST(Median, IntervalsAreThoseOfTheTables) {
   const auto ranks = [](int n) { return std::pair(median_of(one_to(n)).low, median_of(one_to(n)).high); };
   EXPECT_EQ(ranks(6), std::pair(1.0, 6.0));
@@ -47,7 +47,7 @@ TEST(Median, CoversTheTrueMedianAsOftenAsItSays) {
     std::vector<double> values;
     for (int i = 0; i < 15; ++i) {
       const double u = static_cast<double>(rng.uniform(0, 1'000'000)) / 1e6;
-      values.push_back(u * u);  // skewed; true median 0.25
+      values.push_back(u * u);  // skewed, with true median 0.25
     }
     const Median m = median_of(values);
     if (m.low <= 0.25 && 0.25 <= m.high) ++covered;

@@ -30,7 +30,7 @@ constexpr std::array<const char *, kMeasureCount> kNames = {
     "response_p99",       "response_max", "peak_active",  "paper_jobs",    "paper_late",     "paper_max_lateness",
     "paper_startup_late", "work",         "answered",     "answers_due",   "end_to_end_late"};
 
-// Of the end-to-end responses, sink by sink; of several sinks the largest, quantile by quantile.
+// Returns quantiles of the end-to-end responses by sink. With several sinks, each quantile is the largest of the sinks.
 std::vector<Duration> quantiles_of(const trace::RunInfo &info, const std::vector<JobRecord> &jobs,
                                    const metrics::EndToEnd &end_to_end) {
   std::vector<Duration> quantiles;
@@ -50,7 +50,7 @@ std::vector<Duration> quantiles_of(const trace::RunInfo &info, const std::vector
   return quantiles;
 }
 
-// The sink with the smallest share of answers; null if none was due.
+// Returns the sink with the smallest share of answers; null if no answer was due.
 const metrics::SinkSummary *rarest(const metrics::EndToEnd &end_to_end) {
   const metrics::SinkSummary *found = nullptr;
   for (const metrics::SinkSummary &sink : end_to_end.sinks) {
@@ -60,12 +60,12 @@ const metrics::SinkSummary *rarest(const metrics::EndToEnd &end_to_end) {
   return found;
 }
 
-// By task: the time that its jobs had a worker while the run counts. Also of jobs that were still running at its end:
-// of long jobs there, finished ones alone would show too little.
+// Returns for each task the time its jobs had a worker during the counted time. Jobs that still run at the end are
+// included: without them, long jobs would seem to use too little.
 std::vector<Duration> work_of(const trace::Trace &trace, std::size_t tasks) {
   const Time begin = trace.info.start + trace.info.warm_up;
   std::vector<Duration> work(tasks, 0);
-  std::map<std::pair<std::uint32_t, std::uint32_t>, Time> running;  // since when, by task and number
+  std::map<std::pair<std::uint32_t, std::uint32_t>, Time> running;  // start of execution, by task and number
   const auto stop = [&](std::uint32_t task, Time since, Time now) {
     work[task] += std::max<Duration>(0, std::min(now, trace.info.end) - std::max(since, begin));
   };

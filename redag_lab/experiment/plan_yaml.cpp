@@ -27,7 +27,7 @@ constexpr std::array kPeriods = {PeriodModel::LogUniform, PeriodModel::Harmonic,
                                  PeriodModel::Robot};
 constexpr std::array kUtilizations = {UtilizationMethod::Drs, UtilizationMethod::UUniFastDiscard};
 
-// A number in millionths, up to the largest number of workers.
+// Parses a number into millionths; numbers above 1000 are refused.
 std::optional<std::uint32_t> millionths(std::string_view text) {
   double value = 0;
   const char *end = text.data() + text.size();

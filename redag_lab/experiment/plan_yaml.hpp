@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the readers and writers of plans share: lists of values, numbers, ranges, and how random workloads are drawn.
-// The text forms are docs/experiments.md. Not thread-safe.
+// Shared by the readers and writers of plans: lists of values, numbers, ranges, and the options of random workloads.
+// docs/experiments.md describes the text forms. Not thread-safe.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ inline constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::
                                          PolicyKind::Fixed,         PolicyKind::Edf,
                                          PolicyKind::Fifo,          PolicyKind::ChainAware};
 
-/// Each take... leaves its target as it is where the key is not given or its value is a mistake, which is reported.
+/// Each take...() leaves its target unchanged if the key is missing or its value is a mistake, which it reports.
 class PlanReader : protected yaml::ValueReader {
  protected:
   using yaml::ValueReader::ValueReader;
@@ -47,7 +47,7 @@ class PlanReader : protected yaml::ValueReader {
          [&](const Node &node, std::string_view name) { return one_of(node, name, std::span<const Enum>(values)); });
   }
 
-  /// One value, or a list of them.
+  /// Takes one value or a list of values.
   template <class Value, class Read>
   void take_list(const Node &map, const char *key, std::vector<Value> &out, Read read) {
     const Node *node = yaml::find(map, key);
@@ -62,11 +62,11 @@ class PlanReader : protected yaml::ValueReader {
     }
   }
   void take_counts(const Node &map, const char *key, std::vector<std::uint32_t> &out);
-  /// Millionths: {from: 0.05, to: 1, step: 0.05}, a list, or as on the command line (parse_range()).
+  /// Takes millionths: {from: 0.05, to: 1, step: 0.05}, a list, or the form of the command line (parse_range()).
   void take_range(const Node &map, const char *key, std::vector<std::uint32_t> &out);
 
-  /// The frame of every plan: a map of `keys`, `experiment` being `kind`. Calls read(), and, where all can be read,
-  /// find_mistakes(), whose mistakes are of keys.
+  /// Checks the parts common to all plans: a map of `keys` whose `experiment` is `kind`. Calls read() and, if it
+  /// reported nothing, find_mistakes(), and places each mistake at its key.
   template <class Plan, class Read, class FindMistakes>
   Result<Plan> read_plan(const Node &root, std::string_view kind, const std::vector<std::string_view> &keys, Plan &plan,
                          Read read, FindMistakes find_mistakes) {
@@ -83,24 +83,24 @@ class PlanReader : protected yaml::ValueReader {
     return std::move(plan);
   }
 
-  /// The keys of take_generation().
+  /// Returns the keys of take_generation().
   [[nodiscard]] static const std::vector<std::string_view> &generation_keys();
-  /// How random workloads are drawn, but for what an experiment varies.
+  /// Takes the options of random workloads, except those that an experiment varies.
   void take_generation(const Node &map, GenerateOptions &out);
 
  private:
-  /// Can it be read? Whether it is of this kind is reported, but does not matter for that.
+  /// True if the root can be read as a plan. A wrong kind is reported, but does not prevent reading.
   bool is_plan(const Node &root, std::string_view kind, const std::vector<std::string_view> &keys);
   void take_tasks(const Node &map, GenerateOptions &out);
 };
 
-/// "0.05:1:0.05" (from:to:step) or "0.1,0.5" in millionths. Error: not of this form.
+/// Parses "0.05:1:0.05" (from:to:step) or "0.1,0.5" into millionths. Error: another form.
 [[nodiscard]] Result<std::vector<std::uint32_t>> parse_range(std::string_view text);
 
-/// What take_generation() reads, a line each.
+/// Writes the keys of take_generation(), one per line.
 [[nodiscard]] std::string generation_yaml(const GenerateOptions &options, std::string_view indentation);
 
-/// "[1, 2]".
+/// Returns the list as "[1, 2]".
 template <class Values, class Text>
 [[nodiscard]] std::string yaml_list(const Values &values, Text text) {
   std::string joined;
@@ -108,7 +108,7 @@ template <class Values, class Text>
   return "[" + joined + "]";
 }
 
-/// The name of an experiment has letters, digits, - and _: is it one?
+/// True if `name` consists of letters, digits, - and _, as the name of an experiment must.
 [[nodiscard]] bool is_plan_name(std::string_view name);
 
 }  // namespace redag::experiment

@@ -13,7 +13,7 @@ namespace redag::experiment {
 Proportion proportion(std::uint64_t hits, std::uint64_t trials) {
   REDAG_CHECK(hits <= trials, "more hits than trials");
   if (trials == 0) return {};
-  constexpr double kZ = 1.959963984540054;  // the normal distribution's 97.5 % quantile
+  constexpr double kZ = 1.959963984540054;  // the 97.5 % quantile of the normal distribution
   const auto n = static_cast<double>(trials);
   const double p = static_cast<double>(hits) / n;
   const double scale = 1 + kZ * kZ / n;

@@ -14,8 +14,9 @@ struct Proportion {
   double high = 1;
 };
 
-/// `hits` of `trials`, with the score interval of E. B. Wilson, JASA 22(158), 1927, which stays within [0, 1] and has a
-/// length also where nothing or everything hit. Requires hits <= trials; without trials the interval is [0, 1].
+/// Returns `hits` / `trials` with the score interval of E. B. Wilson, JASA 22(158), 1927. The interval stays within [0,
+/// 1] and has a length even where no trial or every trial hits. Requires hits <= trials. Without trials the interval is
+/// [0, 1].
 [[nodiscard]] Proportion proportion(std::uint64_t hits, std::uint64_t trials);
 
 }  // namespace redag::experiment

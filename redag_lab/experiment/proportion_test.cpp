@@ -8,7 +8,8 @@
 namespace redag::experiment {
 namespace {
 
-// R. Newcombe, Statistics in Medicine 17(8), 1998, table I, method 3: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
+// Published values for 81 of 263, 15 of 148, 0 of 20 and 1 of 29: R. Newcombe, Statistics in Medicine 17(8), 1998,
+// table I, method 3.
 TEST(Proportion, PublishedIntervals) {
   const Proportion a = proportion(81, 263);
   EXPECT_NEAR(a.low, 0.2553, 5e-5);

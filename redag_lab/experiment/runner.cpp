@@ -18,7 +18,8 @@ struct Item {
   Result<std::string> result;
 };
 
-// A slow unit holds up the hand-over, not the others, until this many a job are waiting behind it.
+// The number of units per job that may wait behind a slow unit, which delays the hand-over. Beyond it, other units wait
+// too.
 constexpr std::size_t kItemsPerJob = 64;
 
 }  // namespace
@@ -27,10 +28,10 @@ Result<std::uint64_t> run_units(std::span<const std::uint64_t> units, const Runn
                                 const Evaluate &evaluate, const Accept &accept) {
   namespace tbb = oneapi::tbb;
   const std::uint32_t jobs = std::max<std::uint32_t>(1, options.jobs);
-  std::size_t next = 0;             // of the first stage
-  std::uint64_t accepted = 0;       // of the last stage
-  Diagnostics failure;              // of the last stage
-  std::atomic<bool> failed{false};  // tells the first stage of it
+  std::size_t next = 0;             // used by the first stage only
+  std::uint64_t accepted = 0;       // used by the last stage only
+  Diagnostics failure;              // used by the last stage only
+  std::atomic<bool> failed{false};  // tells the first stage to stop
 
   const auto feed = [&](tbb::flow_control &control) -> std::uint64_t {
     const bool stopped = options.stop != nullptr && options.stop->load(std::memory_order_relaxed);

@@ -19,7 +19,7 @@ std::vector<std::uint64_t> first(std::uint64_t count) {
   return units;
 }
 
-// Early units take longest, so that later ones finish before them.
+// Early units take longest, and later ones finish before them.
 Result<std::string> slow_at_first(std::uint64_t unit) {
   if (unit < 4) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   return std::to_string(unit * unit);
@@ -44,7 +44,7 @@ TEST(Runner, EvaluatesOnSeveralThreads) {
   std::atomic<bool> met{false};
   const auto meet = [&](std::uint64_t) -> Result<std::string> {
     ++inside;
-    // Waits for another, however long that takes to come; a runner with one thread never ends this.
+    // Waits until another unit has begun. A runner with one thread never gets there, and the test fails.
     for (int i = 0; i < 5000 && inside < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     if (inside >= 2) met = true;
     return "";

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Seeds of the units of an experiment: each unit draws from a seed of its own, which depends on what the unit is and
-// not on how many others there are. Pure.
+// Seeds of the units of an experiment. Each unit has a seed of its own, derived from the unit's definition and not from
+// the number of other units. Pure.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace redag::experiment {
 
-/// The seed of what `coordinates` name, in this order: another seed for other coordinates.
+/// Derives the seed of the coordinates, in this order. Other coordinates have another seed.
 [[nodiscard]] constexpr std::uint64_t derive_seed(std::uint64_t seed,
                                                   std::initializer_list<std::uint64_t> coordinates) {
   std::uint64_t derived = mix(seed);

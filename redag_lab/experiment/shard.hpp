@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A share of the units of an experiment, for one of several machines: shard i of n has the units u with
+// The share of an experiment's units that one of several machines runs. Shard i of n has the units u with
 // u mod n = i - 1. Plain values.
 #pragma once
 
@@ -21,7 +21,7 @@ struct Shard {
   friend bool operator==(const Shard &, const Shard &) = default;
 };
 
-/// "2/4". Error: not of this form, or not 1 <= i <= n.
+/// Parses "2/4". Error: another form, or not 1 <= i <= n.
 [[nodiscard]] Result<Shard> parse_shard(std::string_view text);
 [[nodiscard]] std::string to_string(const Shard &shard);
 

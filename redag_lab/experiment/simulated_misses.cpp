@@ -20,7 +20,7 @@
 namespace redag::experiment {
 namespace {
 
-// "b.t: job 3 answered after at least 12ms, its deadline is 10ms"
+// Describes a miss: "b.t: job 3 answered after at least 12ms, its deadline is 10ms".
 std::string words_of(const metrics::JudgedJob &job, const Workload &workload, const analysis::System &system) {
   const metrics::JobRecord &record = job.record;
   const std::string name = fmt::format("{}: job {}", trace::task_name(workload, record.task), record.number);
@@ -38,7 +38,7 @@ std::string words_of(const metrics::JudgedJob &job, const Workload &workload, co
   return {};
 }
 
-// What the runs have in common: every job takes its wcet, and none is released before time 0.
+// Returns the workload of all runs: every job takes its wcet, and none is released before time 0.
 Workload at_worst(const Workload &workload) {
   Workload worst = workload;
   for (Dag &dag : worst.dags) {
@@ -51,7 +51,7 @@ Workload at_worst(const Workload &workload) {
   return worst;
 }
 
-// Tasks of one unit are released together.
+// Draws an offset for each unit; its tasks are released together.
 void draw_offsets(Workload &workload, const analysis::System &system, Rng &rng) {
   std::vector<Duration> offsets;
   for (const analysis::Unit &unit : system.units) offsets.push_back(rng.uniform(0, unit.period - 1));

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A necessary test by simulation: a workload in which a deadline miss was seen is not schedulable; one in which none
-// was seen may be. It ends at the first miss. Pure functions.
+// A necessary test by simulation. A workload with an observed deadline miss is not schedulable; one without may be. The
+// test ends at the first miss. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@
 namespace redag::experiment {
 
 struct SimulationEffort {
-  std::uint32_t offsets = 5;  // runs with random offsets, beside the one in which all is released together
-  std::uint32_t periods = 5;  // length of a run in periods of the slowest task
+  std::uint32_t offsets = 5;  // runs with random offsets, besides the one in which all tasks are released together
+  std::uint32_t periods = 5;  // length of a run, in periods of the slowest task
 
   friend bool operator==(const SimulationEffort &, const SimulationEffort &) = default;
 };
 
-/// A run with a miss, as it can be run again: `redag simulate`, with this duration and seed.
+/// A run with a miss, for `redag simulate` to repeat with this duration and seed.
 struct SeenMiss {
   Workload workload;
   Duration duration = 0;
@@ -29,8 +29,8 @@ struct SeenMiss {
   std::string what;  // "dag0.t1: job 3 answered after 12ms, its deadline is 10ms"
 };
 
-/// Every job executes for its wcet. A miss: a response above the deadline, a DAG's instance above its end-to-end
-/// deadline, or a job that was skipped. `system` is `workload` compiled on the platform that it states.
+/// Searches for a miss; every job executes for its wcet. A miss is a response above the deadline, a DAG's instance
+/// above its end-to-end deadline, or a skipped job. `system` is `workload` compiled on the platform that it states.
 [[nodiscard]] std::optional<SeenMiss> find_miss(const Workload &workload, const analysis::System &system,
                                                 const SimulationEffort &effort, std::uint64_t seed);
 

@@ -55,7 +55,7 @@ TEST(SimulatedMisses, SkippedJob) {
   EXPECT_THAT(miss->what, HasSubstr("b.t: job"));
 }
 
-// Released together, the urgent task is first, and nothing goes wrong: only other offsets show it.
+// Released together, the urgent task runs first and no job misses. Only other offsets reveal the miss.
 TEST(SimulatedMisses, RandomOffsetsSeeMore) {
   const std::string text = workload(
       "  - {name: a, tasks: [{name: t, wcet: 60ms, period: 100ms}]}\n"
@@ -82,7 +82,7 @@ TEST(SimulatedMisses, EndToEndDeadline) {
 }
 
 TEST(SimulatedMisses, UnfinishedAtTheEnd) {
-  // One period long: the job that is late has not ended when the run does.
+  // The run lasts one period, and the late job has not ended by then.
   const auto miss = miss_of(workload("  - {name: a, tasks: [{name: t, wcet: 9ms, period: 10ms}]}\n"
                                      "  - {name: b, tasks: [{name: t, wcet: 8ms, period: 40ms, deadline: 10ms}]}\n"),
                             {0, 1});

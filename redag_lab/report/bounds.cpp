@@ -15,10 +15,11 @@
 namespace redag::report {
 namespace {
 
-// Beyond, the dearest methods take longer than reading a report should.
+// With more tasks, the costliest methods take longer than a report is worth.
 constexpr std::size_t kMostTasks = 1000;
 
-// "release 2us, dispatch 1us, preempt 0", as the simulator notes it, or those of a machine. False: something else.
+// Reads "release 2us, dispatch 1us, preempt 0", as the simulator records them, or the overheads of a machine. Returns
+// false for any other text.
 bool read_overheads(std::string_view text, analysis::AnalysisPlatform &platform) {
   if (const std::optional<Overheads> machine = parse_overheads(text)) {
     platform = analysis::charge(platform, *machine);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the analysis says of a run that was recorded: its workload on the platform and under the executor that really
-// ran, so that a measured response stands beside the bound that it must not exceed. Pure functions.
+// Analyses a recorded run: its workload on the platform and under the executor that ran. A measured response then
+// stands beside its bound. Pure functions.
 #pragma once
 
 #include <optional>
@@ -14,21 +14,21 @@
 namespace redag::report {
 
 struct BoundOf {
-  std::optional<Duration> response;  // tightest sound bound; nothing: none
-  std::string method;                // that gave it
+  std::optional<Duration> response;  // tightest sound bound, if any
+  std::string method;                // the method of this bound
 };
 
 struct RunBounds {
-  std::vector<BoundOf> tasks;  // by TaskId, on f - r; empty where `absent`
+  std::vector<BoundOf> tasks;  // by TaskId, on f - r; empty if `absent` is set
   std::vector<BoundOf> dags;   // by DagId, from a source's release to the finish of the last task
   bool schedulable = false;    // shown by sound methods
   std::vector<std::string> by;
-  std::string absent;   // why nothing is bounded; empty: something is
-  std::string assumes;  // the platform that was analysed: "2 workers, full preemption, no overheads"
+  std::string absent;   // why no task is bounded; empty if some task is
+  std::string assumes;  // the analysed platform: "2 workers, full preemption, no overheads"
 };
 
-/// Never an error: where a run cannot be analysed (an executor without a bound, execution times that nobody stated,
-/// overheads that cannot be read) `absent` says why.
+/// Never fails. If a run cannot be analysed, `absent` states the reason: an executor without a bound, unknown execution
+/// times, or unreadable overheads.
 [[nodiscard]] RunBounds bounds_of(const trace::RunInfo &run);
 
 }  // namespace redag::report

@@ -12,7 +12,7 @@ namespace redag::report {
 namespace {
 
 constexpr std::size_t kBodyPoints = 60;  // evenly over the first nine tenths
-constexpr double kPointsPerDecade = 20;  // of the share that is still above
+constexpr double kPointsPerDecade = 20;  // of the remaining share
 
 }  // namespace
 
@@ -32,7 +32,7 @@ std::vector<CurvePoint> curve_of(const std::vector<Duration> &sorted) {
   for (const std::size_t rank : ranks) {
     if (rank == 0) continue;
     const Duration value = sorted[rank - 1];
-    // All values equal to this one count.
+    // The count includes all values equal to this one.
     const auto above = std::upper_bound(sorted.begin() + static_cast<std::ptrdiff_t>(rank - 1), sorted.end(), value);
     const CurvePoint point{value, static_cast<std::uint64_t>(above - sorted.begin())};
     if (points.empty() || points.back() != point) points.push_back(point);
@@ -42,7 +42,7 @@ std::vector<CurvePoint> curve_of(const std::vector<Duration> &sorted) {
 
 void LatenessHistogram::add(Duration lateness, Duration deadline) {
   constexpr Int128 kHalf = kClasses / 2;
-  // (L / D + 1) * half, rounded so that L = 0 falls into the class below it.
+  // Computes (L / D + 1) * half, rounded so that L = 0 falls into the class below 0.
   const Int128 scaled = (static_cast<Int128>(lateness) + deadline) * kHalf;
   const Int128 index = scaled <= 0 ? 0 : (scaled - 1) / deadline;
   ++counts[static_cast<std::size_t>(std::min<Int128>(index, kClasses))];

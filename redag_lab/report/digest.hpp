@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A run cut down to what a report shows of it: everything that grows with its length is counted, sampled or cut here,
-// so that the trace itself can be forgotten. Runs of one executor on one workload form a group, whose figures are those
-// of all its jobs together. Not thread-safe.
+// Reduces runs to the data that a report shows. Everything that grows with a run's length is counted, sampled or cut,
+// and the trace can be discarded. Runs of one executor on one workload form a group, whose figures cover all its jobs.
+// Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -25,42 +25,42 @@
 namespace redag::report {
 
 struct DigestOptions {
-  std::size_t most_slices = 20'000;  // of the schedule, all windows together
+  std::size_t most_slices = 20'000;  // of the schedule, in all windows together
   std::size_t most_views = 6;
   std::size_t most_bins = 400;
 };
 
-/// What of a task needs every job: 8 bytes each.
+/// Per-job data of a task, 8 bytes per job.
 struct Samples {
-  std::vector<Duration> response;  // f - r of finished jobs; sorted once the group is finished
-  LatenessHistogram lateness;      // the same jobs
-  Duration execution_max = 0;      // most processor time; time on a worker where the run did not note the other
+  std::vector<Duration> response;  // f - r of finished jobs; sorted by Group::finish()
+  LatenessHistogram lateness;      // of the same jobs
+  Duration execution_max = 0;      // largest processor time; time on a worker where the run did not record it
 };
 
 struct RunDigest {
-  std::string path;  // folder that it was read from
+  std::string path;  // folder of the recorded run
   trace::RunInfo info;
   metrics::Summary summary;
   metrics::CheckReport check;
 };
 
-/// The job with the largest lateness, relative to its deadline.
+/// The job with the largest lateness relative to its deadline.
 struct LatestJob {
   metrics::JobRecord record;
-  std::string path;  // of its run
-  Time since = 0;    // release, from the start of the run
+  std::string path;  // folder of its run
+  Time since = 0;    // its release, from the start of the run
 };
 
 class Group {
  public:
-  /// Without runs; add() the first before anything else.
+  /// Starts without runs. Call add() before any other function.
   Group(std::string label, const DigestOptions &options) : label_(std::move(label)), options_(options) {}
 
-  /// The schedule and the timeline are those of the first run. Requires fits(trace.info).
+  /// Adds a run. The first run provides the schedule and the timeline. Requires fits(trace.info).
   void add(const std::string &path, const trace::Trace &trace);
-  /// The same executor, mode and tasks: its jobs can be counted with the others'.
+  /// True if executor, mode and tasks are those of the group, whose jobs can then be counted together.
   [[nodiscard]] bool fits(const trace::RunInfo &info) const;
-  /// After the last run: sorts, and makes the figures of all runs together.
+  /// Sorts, and computes the figures of all runs together. Call it after the last add().
   void finish();
 
   [[nodiscard]] const std::string &label() const { return label_; }
@@ -73,14 +73,14 @@ class Group {
   [[nodiscard]] const Timeline &timeline() const { return timeline_; }
   [[nodiscard]] const std::optional<LatestJob> &latest() const { return latest_; }
 
-  // Of all jobs of all runs together: counts, and of a task's distributions only `response`.
+  // Figures of all jobs of all runs: counts and, of a task's distributions, only `response`.
   [[nodiscard]] const metrics::JobStats &task(TaskId task) const { return task_stats_[task.value]; }
   [[nodiscard]] const std::vector<metrics::DagSummary> &dags() const { return dags_; }
   [[nodiscard]] const metrics::JobCounts &dag(DagId dag) const { return dags_[dag.value].jobs; }
   [[nodiscard]] const metrics::JobCounts &total() const { return total_; }
   [[nodiscard]] const metrics::EndToEnd &end_to_end(DagId dag) const { return dags_[dag.value].end_to_end; }
   [[nodiscard]] const Samples &samples(TaskId task) const { return samples_[task.value]; }
-  /// Of runs on threads: bounds and wcets against what was measured, all runs together.
+  /// Compares bounds and wcets with measurements, for runs on threads, over all runs.
   [[nodiscard]] const metrics::AssumptionCheck &assumptions() const { return assumptions_; }
 
  private:

@@ -74,7 +74,7 @@ Json to_json(const Sentence &sentence) { return Json{{"tone", to_string(sentence
 
 Json to_json(const Spread &spread) { return Json{{"median", spread.median}, {"min", spread.min}, {"max", spread.max}}; }
 
-// Rows of a table by column: a third of the size of a list of objects.
+// Returns a table stored by column, a third of the size of a list of objects.
 Json columns(std::initializer_list<const char *> names) {
   Json table = Json::object();
   for (const char *name : names) table[name] = Json::array();
@@ -157,7 +157,7 @@ Json to_json(const RunDigest &run) {
               {"violations", std::move(violations)}};
 }
 
-// Distance of the worst job from its deadline, as a share of it; jobs lost are worse than any.
+// Returns the distance of the worst job from its deadline, as a share of the deadline. Lost jobs rank above all others.
 double closeness(const Group &group, const TaskRef &ref) {
   const JobStats &jobs = group.task(ref.id);
   if (jobs.lost() > 0) return 1e9 * jobs.miss_ratio_with_lost();
@@ -254,7 +254,7 @@ class GroupWriter {
   Json tasks() const {
     Json rows = Json::array();
     for (const TaskRef &ref : refs_) {
-      // Every task is named, so that positions are TaskIds; those cut off have nothing else.
+      // Every task has a row with its name, which makes positions TaskIds. Tasks that were cut have nothing else.
       Json row{{"dag", ref.dag.value}, {"name", ref.task->name}};
       if (shown_[ref.id.value]) {
         row["period_ns"] = ref.task->period;
@@ -291,8 +291,8 @@ class GroupWriter {
   std::vector<bool> curves_;
 };
 
-// DAGs that all groups have, and each group's figures over its repetitions: shares and percentiles of each repetition
-// as a spread, counts and the maximum of all of them.
+// Returns the DAGs common to all groups with each group's figures over its repetitions. Shares and percentiles of the
+// repetitions are spreads. Counts and the maximum cover all repetitions.
 Json comparison(std::span<const Group> groups) {
   Json rows = Json::array();
   for (const Dag &dag : groups.front().workload().dags) {
@@ -347,7 +347,7 @@ std::string title_of(std::span<const Group> groups) {
 }
 
 DigestOptions digest_options(std::size_t groups) {
-  // A stretch and its job take 60 to 100 bytes.
+  // A slice and its job take 60 to 100 bytes.
   constexpr std::size_t kMostSlices = 50'000;
   DigestOptions options;
   options.most_slices = std::clamp<std::size_t>(kMostSlices / std::max<std::size_t>(groups, 1), 200, 16'000);

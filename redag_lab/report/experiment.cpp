@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char *kFormat = "redag.experiment.factorial/2";
-// What the page draws, in this order.
+// The metrics that the page draws, in this order.
 constexpr std::array kMetrics = {"miss_ratio",
                                  "drop_ratio",
                                  "excess_miss_ratio",
@@ -31,7 +31,7 @@ constexpr std::array kMetrics = {"miss_ratio",
                                  "finished_per_s",
                                  "work"};
 
-// Four digits are more than anybody sees, and a tenth of the file.
+// Rounds to four digits, which suffice for the page and make the file a tenth of the size.
 double rounded(double value) {
   if (value == 0 || !std::isfinite(value)) return 0;
   const double unit = std::pow(10, std::floor(std::log10(std::abs(value))) - 3);
@@ -65,7 +65,7 @@ Json point_json(const Json &point) {
   Json dags = Json::array();
   for (const Json &dag : point.value("dags", Json::array())) dags.push_back(dag_json(dag));
   return Json{{"at", point.at("factors")},
-              {"worlds", point.value("world", Json::array())},  // none yet where no run is finished
+              {"worlds", point.value("world", Json::array())},  // empty until a run is finished
               {"repetitions", point.at("repetitions")},
               {"dags", std::move(dags)}};
 }

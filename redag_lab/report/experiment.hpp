@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The page of a factorial experiment: of its factorial.json (docs/experiments.md), what the page draws. Pure functions.
+// Extracts the data of an experiment's page from its factorial.json (docs/experiments.md). Pure functions.
 #pragma once
 
 #include <string>
@@ -14,11 +14,12 @@ namespace redag::report {
 
 struct ExperimentDocument {
   std::string title;
-  std::string json;     // for page(); some megabytes at most
+  std::string json;     // for page(); at most a few megabytes
   std::string summary;  // one line for the terminal
 };
 
-/// `text`: of a factorial.json, which `file` names in messages; `provenance`: of the page. Errors: not such a document.
+/// Converts the `text` of a factorial.json. Messages call it `file`, and `provenance` is that of the page. Errors: not
+/// such a document.
 [[nodiscard]] Result<ExperimentDocument> experiment_document(std::string_view text, const std::string &file,
                                                              const Provenance &provenance = {});
 

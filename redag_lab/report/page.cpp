@@ -15,7 +15,7 @@ std::string script_safe(std::string_view json) {
   safe.reserve(json.size());
   for (const char c : json) {
     if (c == '<') {
-      safe += "\\u003c";  // neither "</script>" nor "<!--" can end or change the element
+      safe += "\\u003c";  // prevents "</script>" and "<!--", which would end or change the element
     } else {
       safe += c;
     }
@@ -39,7 +39,7 @@ std::string html_escaped(std::string_view text) {
 }
 
 std::string page(std::string_view document, std::string_view title, PageKind kind) {
-  // In the order in which they stand in the template, so that nothing that was put in is looked at again.
+  // The parts are in the order of the template: an inserted text is never searched for placeholders.
   const std::string safe_title = html_escaped(title);
   const std::string safe_document = script_safe(document);
   const std::string_view script = kind == PageKind::Runs ? assets::kScript : assets::kExperimentScript;

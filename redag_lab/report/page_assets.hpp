@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The files of redag_lab/report/page and third_party/echarts, put into the library when it is built
+// The files of redag_lab/report/page and third_party/echarts, embedded into the library by the build
 // (cmake/embed.cmake).
 #pragma once
 
@@ -12,7 +12,7 @@ namespace redag::report::assets {
 extern const std::string_view kTemplate;
 extern const std::string_view kStyle;
 extern const std::string_view kEcharts;
-extern const std::string_view kScript;            // of recorded runs
-extern const std::string_view kExperimentScript;  // of a factorial experiment
+extern const std::string_view kScript;            // for recorded runs
+extern const std::string_view kExperimentScript;  // for a factorial experiment
 
 }  // namespace redag::report::assets

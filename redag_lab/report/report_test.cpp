@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Runs to document: bounds, verdicts, what is pooled, what is cut.
+// Tests the way from runs to a document: bounds, verdicts, combined figures, and cuts.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -115,7 +115,7 @@ TEST(Verdict, MissesAreCountedNamedAndNotProvenAway) {
   EXPECT_NE(sentences[1].text.find("not shown"), std::string::npos) << sentences[1].text;
 }
 
-// One job of `hi.h`, whose wcet and bound are 2 ms, took 5 ms; `used_ms` of processor time.
+// Returns a run in which one job of `hi.h`, whose wcet and bound are 2 ms, took 5 ms and `used_ms` of processor time.
 trace::Trace late_run(Time used_ms) {
   TraceBuilder run(hi_and_lo(PreemptionMode::Os));
   run.at(0).arrives("h", 0).dispatched("h", 0, 0, 10).started("h", 0, 0);
@@ -199,7 +199,7 @@ TEST(Document, SaysWhatTheRunsWere) {
   EXPECT_EQ(to_json(all), to_json(all));
 }
 
-// A chain a -> b; job k of b ends `ends[k]` ms after the k-th release of a, each released every 10 ms.
+// Returns a run of a chain a -> b released every 10 ms. Job k of b ends `ends[k]` ms after the k-th release of a.
 trace::Trace chain_run(const std::vector<Time> &ends) {
   Workload workload = testing::make_workload({testing::make_dag("chain", {{"a", 10, 1}, {"b", 0, 1, {0}}})}, 1);
   workload.dags[0].deadline = 4 * kMillisecond;
@@ -263,7 +263,7 @@ TEST(Document, SaysWhatItCut) {
   const std::vector<Group> all =
       groups(group_of("redag", {simulated(hi_and_lo(PreemptionMode::Os), 10 * kSecond)}, few));
   DocumentOptions options;
-  options.most_tasks = 1;  // never less than 10 a group: nothing to cut here
+  options.most_tasks = 1;  // raised to 10 per group: nothing is cut here
   const json document = json::parse(to_json(all, options));
   ASSERT_EQ(document["cuts"].size(), 1U);
   EXPECT_NE(document["cuts"][0].get<std::string>().find("the schedule shows"), std::string::npos);

@@ -12,7 +12,7 @@ namespace {
 using metrics::JobOutcome;
 using metrics::JobRecord;
 
-// Jobs on workers, as the events tell.
+// Folds the events of a trace into slices: jobs on workers.
 class SliceFolder {
  public:
   explicit SliceFolder(const trace::Trace &trace) : open_(trace.info.workload.task_count()) {
@@ -48,7 +48,7 @@ class SliceFolder {
   void begin(const JobEvent &event) {
     std::vector<Slice> &task = open_[event.task.value];
     const auto same = [&](const Slice &slice) { return slice.job == event.job; };
-    // Dispatched, then Started: the decision and the body are one stretch.
+    // Dispatched is followed by Started; the decision and the body form one slice.
     if (std::any_of(task.begin(), task.end(), same)) return;
     task.push_back(Slice{event.time, event.time, event.task, event.job, event.worker, Slice::End::Open});
   }
@@ -84,7 +84,7 @@ class Chooser {
     schedule.slices_in_all = slices_.size();
     const std::vector<const JobRecord *> worst = worst_of_each_dag(most_views);
     const bool whole = slices_.size() <= most_ && jobs_.size() <= 2 * most_;
-    // The beginning, and a share for each of the others.
+    // The first window is the beginning; each worst job gets an equal share.
     const std::size_t share = std::max<std::size_t>(1, most_ / (worst.size() + 1));
     schedule.windows.push_back(whole ? window(begin_, end_, most_) : window_at(0, share, share));
     const Window &first = schedule.windows.front();
@@ -96,7 +96,7 @@ class Chooser {
         schedule.windows.push_back(window_around(*job, share));
       }
       const Window &seen = schedule.windows[view.window];
-      // The job with as much again before and after it.
+      // The view adds the job's length before and after the job.
       const Duration length = std::max<Duration>(job->finish - job->release, job->deadline - job->release);
       view.begin = std::max(seen.begin, job->release - length);
       view.end = std::min(seen.end, std::max(job->finish, job->deadline) + length);
@@ -107,7 +107,7 @@ class Chooser {
   }
 
  private:
-  // The finished job of each DAG with the largest lateness, as a share of the relative deadline.
+  // Returns the finished job of each DAG with the largest lateness, as a share of the relative deadline.
   std::vector<const JobRecord *> worst_of_each_dag(std::size_t most_views) const {
     struct Worst {
       const JobRecord *job = nullptr;
@@ -131,7 +131,7 @@ class Chooser {
     return jobs;
   }
 
-  // From slice `first` on, `count` of them.
+  // Returns the window of `count` slices from slice `first` on.
   Window window_at(std::size_t first, std::size_t count, std::size_t share) const {
     if (slices_.empty()) return window(begin_, end_, share);
     first = std::min(first, slices_.size() - 1);
@@ -148,7 +148,7 @@ class Chooser {
     return window_at(index > before ? index - before : 0, share, share);
   }
 
-  // What is alive in [begin, end], which is cut short where that is more than a share.
+  // Returns the jobs and slices in [begin, end]. The window is cut short if they exceed a share.
   Window window(Time begin, Time end, std::size_t share) const {
     Window window{begin, end, {}, {}};
     for (const JobRecord &job : jobs_) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The schedule as a picture: which job held which worker when, and, of a run too long to be drawn, the stretches of
-// time worth a look: its beginning, and where each DAG came closest to its deadline or farthest beyond. Pure functions.
+// The schedule as a picture: which job held which worker when. Of a run too long to draw, it keeps the interesting
+// stretches: the beginning, and the job of each DAG closest to its deadline or latest after it. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace redag::report {
 
-/// A job on a worker, without a break.
+/// A job on a worker, without interruption.
 struct Slice {
   enum class End : std::uint8_t { Finished, Aborted, Preempted, Open };  // Open: the trace ends here
 
@@ -28,18 +28,18 @@ struct Slice {
   friend bool operator==(const Slice &, const Slice &) = default;
 };
 
-/// In order of their begin. Events of jobs that were never released are left out.
+/// Returns slices in order of their begin. Events of jobs that were never released are left out.
 [[nodiscard]] std::vector<Slice> slices_of(const trace::Trace &trace);
 
-/// A stretch of the run with all that it takes to draw it.
+/// A stretch of the run with all the data for drawing it.
 struct Window {
   Time begin = 0;
   Time end = 0;
-  std::vector<Slice> slices;             // that reach into it, in order of their begin
-  std::vector<metrics::JobRecord> jobs;  // alive in it, in order of release
+  std::vector<Slice> slices;             // overlapping the window, in order of their begin
+  std::vector<metrics::JobRecord> jobs;  // alive in the window, in order of release
 };
 
-/// Something to look at: a stretch of time in a window, and the job that it is about (none: `task` is invalid).
+/// A stretch of time in a window and the job that it presents (none: `task` is invalid).
 struct View {
   std::size_t window = 0;
   Time begin = 0;
@@ -53,11 +53,11 @@ struct Schedule {
   std::vector<Window> windows;
   std::vector<View> views;  // the first is the beginning of the run
   std::uint64_t slices_in_all = 0;
-  std::uint64_t slices_shown = 0;  // less than all: the windows do not cover the run
+  std::uint64_t slices_shown = 0;  // if less than all, the windows do not cover the run
 };
 
-/// `most` bounds the slices of all windows together, and the jobs to twice as many. `jobs` in order of release. Of the
-/// `most_views` DAGs with the latest jobs, relative to their deadlines, each gets a view.
+/// Makes the schedule. `most` bounds the slices of all windows together, and the jobs to twice as many. `jobs` must be
+/// in order of release. The `most_views` DAGs with the latest jobs, relative to their deadlines, get a view each.
 [[nodiscard]] Schedule schedule_of(const trace::Trace &trace, std::span<const metrics::JobRecord> jobs,
                                    std::size_t most, std::size_t most_views);
 

@@ -126,9 +126,9 @@ TEST(Timeline, MissesStandWhereTheirJobsWereReleased) {
   run.at(0).arrives("h", 0).dispatched("h", 0, 0, 10);
   run.at(15).finished("h", 0, 0);                                                           // late
   run.at(20).arrives("h", 1).skipped("h", 1, Reason::Overrun);                              // lost
-  run.at(40).arrives("h", 2).dispatched("h", 2, 0, 50).aborted("h", 2, 0, Reason::NoData);  // nobody waited for it
+  run.at(40).arrives("h", 2).dispatched("h", 2, 0, 50).aborted("h", 2, 0, Reason::NoData);  // no data was due
   run.at(60).arrives("h", 3).dispatched("h", 3, 0, 70);                                     // overdue at the end
-  run.at(95).arrives("l", 0);                                                               // not yet
+  run.at(95).arrives("l", 0);                                                               // still in time
   const trace::Trace trace = run.until(100);
   const Timeline timeline = timeline_of(trace, slices_of(trace), jobs_of(trace), 10);
   ASSERT_EQ(timeline.bins, 10U);

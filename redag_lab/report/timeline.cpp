@@ -37,7 +37,7 @@ Timeline timeline_of(const trace::Trace &trace, std::span<const Slice> slices, s
   const std::vector<TaskRef> refs = flatten(trace.info.workload);
   for (const Slice &slice : slices) {
     std::vector<Duration> &busy = timeline.busy[refs[slice.task.value].dag.value];
-    // A job in progress at the end may have run on: that is not in the picture.
+    // A job in progress at the end may have run longer, outside the timeline.
     const Time end = std::min(slice.end, trace.info.end);
     Time from = std::max(slice.begin, timeline.begin);
     while (from < end) {

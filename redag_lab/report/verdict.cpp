@@ -56,7 +56,7 @@ Sentence on_bounds(const Group &group) {
     const Duration longest = group.task(TaskId(t)).response.max;
     if (longest <= *bounds.tasks[t].response) continue;
     is_within = false;
-    if (!simulated) continue;  // named with the assumption that broke
+    if (!simulated) continue;  // reported with the assumption that broke
     above.push_back(fmt::format("{} ({}, bound {})", trace::task_name(group.workload(), TaskId(t)),
                                 humanize_duration(longest), humanize_duration(*bounds.tasks[t].response)));
   }
@@ -91,7 +91,7 @@ Sentence on_bounds(const Group &group) {
                                    bounds.assumes, within)};
 }
 
-// Alarms one by one, what may be the machine's noise together.
+// Adds each alarm as a sentence, and one sentence for all deviations that the machine's noise may explain.
 void add_assumptions(const Group &group, std::vector<Sentence> &sentences) {
   constexpr std::size_t kMost = 5;
   std::vector<std::string> alarms;
@@ -179,10 +179,10 @@ std::string ranking(std::span<const Contender> contenders) {
   const Spread least = best->misses;
   std::vector<std::string> alike = {best->name};
   std::vector<std::string> worse;
-  bool none = best->missed == 0;  // of those that are alike
+  bool none = best->missed == 0;  // of the contenders that are alike
   for (const Contender &contender : contenders) {
     if (&contender == &*best) continue;
-    // Ranges that touch say nothing about the next repetition.
+    // Ranges that touch do not predict the next repetition.
     const bool is_worse = contender.misses.min > least.max;
     (is_worse ? worse : alike).push_back(contender.name);
     if (!is_worse) none = none && contender.missed == 0;

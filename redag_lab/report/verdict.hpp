@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A report's first lines: what the runs showed, in sentences that can be quoted. Everything here is also in the tables;
-// nothing is here that they do not say. Pure functions.
+// The first lines of a report: the results of the runs in sentences that can be quoted. They contain nothing beyond the
+// tables. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -26,21 +26,20 @@ struct Sentence {
   std::string text;
 };
 
-/// Of one group: deadlines, bounds, the trace checker, execution times, what disturbs its figures.
+/// Returns the sentences about one group: deadlines, bounds, the trace checker, execution times, disturbances.
 [[nodiscard]] std::vector<Sentence> verdict_of(const Group &group);
 
-/// Is the longest end-to-end response of the DAG above its bound, by more than a machine that was not calibrated may
-/// take?
+/// True if the DAG's longest end-to-end response exceeds its bound by more than an uncalibrated machine may add.
 [[nodiscard]] bool is_above_bound(const Group &group, DagId dag);
 
-/// One number over repetitions.
+/// One number over the repetitions.
 struct Spread {
   double median = 0;
   double min = 0;
   double max = 0;
 };
 
-/// Requires a value.
+/// Requires at least one value.
 [[nodiscard]] Spread spread_of(std::vector<double> values);
 
 struct Contender {
@@ -50,15 +49,15 @@ struct Contender {
   Spread misses;  // share of a repetition's jobs
 };
 
-/// Who misses fewest, and who cannot be told from that: "redag misses fewest". Ranges that touch say nothing about the
-/// next repetition. Requires a contender.
+/// Names the contender that misses fewest and those not clearly different: "redag misses fewest". Ranges that touch do
+/// not predict the next repetition. Requires at least one contender.
 [[nodiscard]] std::string ranking(std::span<const Contender> contenders);
 
-/// "control: redag misses 0.0043 % (1 of 23 326), mte 14.2 %: redag misses fewest"; shares are of all repetitions
-/// together.
+/// Returns "control: redag misses 0.0043 % (1 of 23 326), mte 14.2 %: redag misses fewest". The shares cover all
+/// repetitions together.
 [[nodiscard]] std::string comparison_line(const std::string &dag, std::span<const Contender> contenders);
 
-/// A sentence for each DAG that all groups have; none for a single group.
+/// Returns a sentence for each DAG that all groups have; none for a single group.
 [[nodiscard]] std::vector<Sentence> compare(std::span<const Group> groups);
 
 }  // namespace redag::report

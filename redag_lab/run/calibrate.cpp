@@ -36,7 +36,7 @@ constexpr Duration kLongestSlice = 2 * kSecond;
 constexpr Duration kRegion = 200 * kMicrosecond;
 constexpr const char *kLong = "long";
 
-// ---- what one class of threads showed ----
+// ---- findings of one class of threads ----
 
 std::vector<Duration> lengths_of(std::span<const LossSample> samples) {
   std::vector<Duration> lengths;
@@ -57,8 +57,8 @@ void take_larger(Loss &loss, const Loss &other) {
 struct Findings {
   std::vector<LossSample> dispatch;
   std::vector<LossSample> preempt;
-  Duration ran = 0;                                      // of the clock, with jobs
-  std::map<std::string, std::vector<Duration>> samples;  // by the name of the quantity
+  Duration ran = 0;                                      // wall-clock time of the runs with jobs
+  std::map<std::string, std::vector<Duration>> samples;  // by the quantity's name
   std::vector<WatchedProcessor> processors;
 
   void add(const std::string &name, std::vector<Duration> more) {
@@ -130,9 +130,9 @@ Measured measured(std::string what, const char *threads, const char *load, std::
   return {std::move(what), threads, load, values.size(), at(0.5), at(0.99), at(0.999), values.back()};
 }
 
-// ---- processor time of the release timer, which is this process's ----
+// ---- processor time of the release timer, whose thread is this process's own ----
 
-// Its clock, by the name of the thread; nothing if it is not there.
+// Returns the processor-time clock of the thread of that name; nothing if there is no such thread.
 std::optional<clockid_t> clock_of_thread(const std::string &name) {
   std::error_code ignored;
   for (const auto &entry : std::filesystem::directory_iterator("/proc/self/task", ignored)) {
@@ -140,7 +140,7 @@ std::optional<clockid_t> clock_of_thread(const std::string &name) {
     std::string comm;
     if (!std::getline(stream, comm) || comm != name) continue;
     const auto tid = static_cast<unsigned>(std::stoul(entry.path().filename().string()));
-    constexpr unsigned kPerThread = 4;  // as in the kernel's include/linux/posix-timers.h
+    constexpr unsigned kPerThread = 4;  // bits of a clock id, as in the kernel's include/linux/posix-timers.h
     constexpr unsigned kSchedClock = 2;
     return static_cast<clockid_t>((~tid << 3U) | kPerThread | kSchedClock);
   }
@@ -161,7 +161,7 @@ class TimerWatch {
       if (event.kind == JobEventKind::Released && is_timer_[event.task.value]) ++releases_;
     }
     const Duration used = cpu_now(*clock_);
-    constexpr std::uint64_t kEnough = 20;  // releases, for their mean to say something
+    constexpr std::uint64_t kEnough = 20;  // releases, for a meaningful mean
     if (last_used_ && releases_ >= kEnough) {
       each_.push_back((used - *last_used_) / static_cast<Duration>(releases_));
       releases_ = 0;
@@ -183,7 +183,7 @@ class TimerWatch {
   std::vector<Duration> each_;
 };
 
-// ---- bodies that note when they did not run ----
+// ---- bodies that record when they did not run ----
 
 class Noted {
  public:
@@ -262,7 +262,8 @@ class Calibrating {
 
   [[nodiscard]] bool stopped() const { return options_.stop != nullptr && options_.stop->load(); }
 
-  // Turn by turn, so that a run that is ended early has something of everything.
+  // Measures all slices in turn, several times over. A calibration that is stopped early then has results of each
+  // slice.
   Result<void> measure(std::size_t cpus) {
     std::vector<Slice> slices;
     for (const bool loaded : {false, true}) {
@@ -295,7 +296,7 @@ class Calibrating {
         if (slice.loaded) {
           if (Result<void> started = load.start(cpus); !started) return started;
         }
-        // The first turn is short, so that little is lost where there is no second one.
+        // The first turn is short: a calibration that is stopped early soon has a result of each slice.
         const Duration now = turn == 0 ? std::min(length, kShortestSlice) : length;
         Result<void> done = slice.stalls ? watch_stalls(slice, now) : run_jobs(slice, now);
         if (!done) return done;
@@ -308,7 +309,7 @@ class Calibrating {
   Findings &findings(const Slice &slice) { return findings_[slice.realtime ? 1 : 0][slice.loaded ? 1 : 0]; }
 
   Result<void> watch_stalls(const Slice &slice, Duration length) {
-    // The least urgent of all jobs: what is above it is what can take a processor from one.
+    // The probe has the lowest priority of all jobs. Anything above it can also take a processor from a job.
     return watch_for_stalls({length, slice.realtime ? 1 : 0, options_.stop})
         .map([&](std::vector<WatchedProcessor> watched) { findings(slice).add(std::move(watched)); });
   }
@@ -355,7 +356,7 @@ class Calibrating {
       take_larger(charged.stall, beyond);
       charged.preempt = usual_delay(all.preempt, all.ran, beyond);
       take_larger(charged.stall, beyond);
-      // People read these numbers, and no measurement is good to the nanosecond.
+      // Rounds up, because people read these numbers and no measurement is accurate to the nanosecond.
       for (const std::string_view name : overhead_names()) {
         Duration &value = *overhead_named(charged, name);
         value = round_up(value);
@@ -399,7 +400,7 @@ class Calibrating {
   Workload workload_;
   Duration clock_ = 0;
   std::uint64_t seed_ = 0;
-  std::array<std::array<Findings, 2>, 2> findings_;  // by realtime, by loaded
+  std::array<std::array<Findings, 2>, 2> findings_;  // [realtime][loaded]
   Calibration result_;
 };
 
@@ -440,8 +441,8 @@ TraceFigures figures_of(const Workload &workload, std::span<const JobEvent> even
                         const std::vector<std::vector<Absence>> &absences) {
   TraceFigures figures;
   const std::vector<TaskRef> refs = flatten(workload);
-  std::vector<std::size_t> next(refs.size());                // of its absences, not yet passed
-  std::vector<std::optional<Time>> dispatched(refs.size());  // jobs of a task do not overlap
+  std::vector<std::size_t> next(refs.size());                // index into the task's absences; earlier ones have passed
+  std::vector<std::optional<Time>> dispatched(refs.size());  // the tasks have `concurrency` 1: one job each
   for (const JobEvent &event : events) {
     const std::size_t t = event.task.value;
     REDAG_CHECK(t < refs.size(), "an event of another workload");
@@ -459,7 +460,7 @@ TraceFigures figures_of(const Workload &workload, std::span<const JobEvent> even
       case JobEventKind::Resumed: {
         const std::vector<Absence> &own = absences[t];
         while (next[t] < own.size() && own[next[t]].end < event.time) ++next[t];
-        if (next[t] == own.size() || own[next[t]].begin > event.time) break;  // it had never stopped
+        if (next[t] == own.size() || own[next[t]].begin > event.time) break;  // the job had not stopped
         figures.preempt.push_back({event.time, own[next[t]].end - event.time});
         break;
       }

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Measures what this machine adds to jobs: the runtime itself runs a workload made for it, and its trace tells how late
-// releases, dispatches and resumptions were; stall_probe.hpp tells what the machine takes besides. Blocks for as long
-// as it was told. Nothing else should run meanwhile, unless that is what is to be measured.
+// Measures the overheads that this machine adds to jobs. The runtime runs a workload made for the purpose, and its
+// trace shows how late releases, dispatches and resumptions were. stall_probe.hpp measures the other losses of
+// processor time. Blocks for the requested duration. Meanwhile nothing else should run, unless its effect is to be
+// measured.
 #pragma once
 
 #include <atomic>
@@ -22,38 +23,42 @@ namespace redag::runtime {
 struct CalibrateOptions {
   Duration duration = 30 * kSecond;
   bool loaded = false;                      // half of the time with threads that keep the machine busy
-  const std::atomic<bool> *stop = nullptr;  // ends it early, with what there is
-  /// Between measurements, at least every few seconds: the share that is done, and what comes next.
+  const std::atomic<bool> *stop = nullptr;  // ends the measurement early, with the results so far
+  /// Called between measurements, at least every few seconds, with the share that is done and the next measurement's
+  /// name.
   std::function<void(double done, const char *next)> progress;
 };
 
-/// Without `date`, `host`, `kernel` and `version`, which are the caller's. Not complete if it was stopped; a class of
-/// threads of which something was not measured is left out. Error: threads cannot be made, or nothing was measured.
+/// Measures the overheads. The caller adds `date`, `host`, `kernel` and `version`. The result is not `complete` if the
+/// measurement was stopped. It leaves out a class of threads of which something was not measured. Error: threads cannot
+/// be created, or nothing was measured.
 [[nodiscard]] Result<Calibration> calibrate(const CalibrateOptions &options);
 
-// ---- the parts, for tests ----
+// ---- the parts, exposed for tests ----
 
-/// The workload that is run: short jobs at high rates over long ones that fill half of the workers' time.
+/// Returns the workload that calibrate() runs: short jobs at high rates above long ones that fill half of the workers'
+/// time.
 [[nodiscard]] Workload calibration_workload(std::uint32_t workers);
 
-/// A stretch in which a body did not run.
+/// An interval in which a body did not run.
 struct Absence {
   Time begin = 0;
   Time end = 0;
 };
 
-/// `at`: when the decision was made; in order of it.
+/// Delays found in a trace. `at` is the instant of the decision; samples are in order of it.
 struct TraceFigures {
-  std::vector<Duration> lateness;    // of timers' releases
+  std::vector<Duration> lateness;    // of timer releases
   std::vector<LossSample> dispatch;  // from the decision to the body's first instruction
-  std::vector<LossSample> preempt;   // from the decision to resume a job to its going on
+  std::vector<LossSample> preempt;   // from the decision to resume a job until it continues
 };
 
-/// What is charged to every job for delays like these: their 99th percentile. What one takes beyond it is a stall that
-/// it met, and is charged as such: `beyond`, of so much watched time.
+/// Returns the delay to charge to every job: the 99th percentile. The excess of longer delays counts as stalls: sets
+/// `beyond` to the loss that fits it in `watched` time.
 [[nodiscard]] Duration usual_delay(std::span<const LossSample> delays, Duration watched, Loss &beyond);
 
-/// `absences`: by TaskId, in order of time; of tasks that do not note theirs, none.
+/// Extracts the delays from a trace. `absences` is indexed by TaskId, in order of time; tasks that do not record theirs
+/// have none.
 [[nodiscard]] TraceFigures figures_of(const Workload &workload, std::span<const JobEvent> events,
                                       const std::vector<std::vector<Absence>> &absences);
 

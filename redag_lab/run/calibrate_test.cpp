@@ -17,7 +17,7 @@ namespace {
 constexpr Duration kUs = kMicrosecond;
 constexpr Duration kMs = kMillisecond;
 
-// No window holds more than the bucket says.
+// Expects that no window of the samples exceeds the bucket's bound.
 void expect_fits(const Loss &loss, const std::vector<LossSample> &samples) {
   for (std::size_t from = 0; from < samples.size(); ++from) {
     Duration sum = 0;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// How many jobs of a workload can be in progress at once. Pure functions.
+// Bounds the number of jobs of a workload that can be in progress at once. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@
 
 namespace redag {
 
-/// Jobs that can be started and unfinished at once under full preemption: no more than `concurrency` of a task,
-/// `max_active` of a DAG, and one of a group. Never too small; too large only where tasks of one group are in several
-/// DAGs of which some have a `max_active`.
+/// Returns the number of jobs that can be started and unfinished at once under full preemption. These are at most
+/// `concurrency` of a task, `max_active` of a DAG, and one of a group. The number is never too small. It is too large
+/// only where a group's tasks are in several DAGs, some with a `max_active`.
 [[nodiscard]] std::uint64_t most_started(const Workload &workload);
 
 }  // namespace redag

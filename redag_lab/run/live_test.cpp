@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the engine tells a live page, and that executors make one and take it away.
+// Tests the figures that the engine gives to a live page, and that executors create and remove the page.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -63,7 +63,7 @@ TEST(Figures, SayWhereJobsAre) {
   ASSERT_TRUE(engine->start());
   engine->set_origin(monotonic_now() - 10 * kSecond);
   const Time now = engine->now();
-  engine->release(TaskId(0), now - 5 * kSecond);  // five seconds late, and so beyond its deadline
+  engine->release(TaskId(0), now - 5 * kSecond);  // five seconds late, and therefore past its deadline
   started.wait();
   engine->release(TaskId(1), now);
   engine->release(TaskId(2), now);

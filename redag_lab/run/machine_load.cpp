@@ -28,7 +28,7 @@ Result<void> MachineLoad::start(std::size_t threads) {
 }
 
 void MachineLoad::main() noexcept {
-  // Beyond the caches of a processor, so that jobs find theirs emptied.
+  // The memory exceeds a processor's caches, which evicts the jobs' data.
   std::vector<std::uint64_t> memory(std::size_t{1} << 20U);
   Event never;
   for (std::uint64_t round = 0; !stop_.load(); ++round) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Ordinary threads that keep a machine busy: memory, system calls and wake-ups, as other programs would. Owns its
-// threads; ends them in the destructor.
+// Ordinary threads that keep a machine busy with memory accesses, system calls and wake-ups, as other programs would.
+// Owns its threads; the destructor ends them.
 #pragma once
 
 #include <atomic>
@@ -21,7 +21,7 @@ class MachineLoad {
   MachineLoad(const MachineLoad &) = delete;
   MachineLoad &operator=(const MachineLoad &) = delete;
 
-  /// Once. Error: the threads cannot be made.
+  /// Starts the threads. Call it once. Error: the threads cannot be created.
   [[nodiscard]] Result<void> start(std::size_t threads);
 
  private:

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Alarms of real runs: a body that overruns its wcet is found by its processor time, whatever else the machine does.
+// Tests the alarms of real runs. A body that overruns its wcet is found by its processor time, even on a busy machine.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -43,7 +43,7 @@ TEST(Overrun, AFifthInEveryJobIsAnAlarm) {
   EXPECT_TRUE(check.tasks[0].execution.is_exceeded);
 }
 
-// A machine that stalls can charge some jobs more than they used; most are never above.
+// A stalling machine can charge some jobs more than they used, but most jobs stay within their wcet.
 TEST(Overrun, SyntheticBodiesKeepTheirWcet) {
   const metrics::AssumptionCheck check = run(0);
   for (const metrics::TaskCheck &task : check.tasks) {

@@ -26,7 +26,7 @@ namespace {
 
 constexpr Duration kStartMargin = 20 * kMillisecond;  // from the threads being ready to time 0
 constexpr Duration kCollectEvery = 100 * kMillisecond;
-// Each has a stack and a ring of events, and a decision looks at all of them.
+// Each thread has a stack and a ring of events, and every decision examines all threads.
 constexpr std::uint64_t kMostThreads = 1024;
 
 std::uint32_t pool_size(const Workload &workload, const RunOptions &options) {
@@ -41,7 +41,7 @@ class Run {
   Result<RunResult> execute() {
     const Result<void> started = prepare().and_then([&] { return record(); }).and_then([&] { return start(); });
     if (!started) {
-      // Of a run that never was, there is nothing to keep.
+      // A run that did not start has no record to keep.
       if (flight_) static_cast<void>(trace::remove_flight_record(options_.flight));
       return tl::unexpected<Diagnostics>(started.error());
     }
@@ -173,7 +173,7 @@ class Run {
     return {};
   }
 
-  // All events so far: what is new goes to the record.
+  // Collects all events so far and appends the new ones to the flight record.
   void drain(bool finally) {
     auto &events = result_.trace.events;
     const std::size_t before = events.size();
@@ -183,7 +183,7 @@ class Run {
     if (!kept) result_.warnings.push_back(fmt::format("no flight record from here on: {}", to_string(kept.error())));
   }
 
-  // What was drained goes to the sink, if there is one.
+  // Passes the collected events to the sink, if there is one.
   void hand_over() {
     if (!options_.sink) return;
     options_.sink(result_.trace.info, result_.trace.events);
@@ -209,7 +209,7 @@ class Run {
     }
   }
 
-  // False: there are started jobs left after drain_timeout.
+  // Returns false if started jobs remain after drain_timeout.
   bool wait_idle() {
     const Time give_up = monotonic_now() + options_.drain_timeout;
     for (Time now = monotonic_now();; now = monotonic_now()) {
@@ -237,7 +237,7 @@ class Run {
 
   void finish() {
     end_ = result_.stopped ? std::clamp<Time>(engine_->now(), 0, options_.duration) : options_.duration;
-    timer_->stop();  // reports what was due until now
+    timer_->stop();  // reports releases that were due until now
     timer_->join();
     engine_->halt();
     if (!wait_idle()) {
@@ -292,7 +292,8 @@ class Run {
     }
   }
 
-  // The trace ends where the scheduler stopped deciding: what was started then is in flight, as in the simulator.
+  // The trace ends where the scheduler stopped deciding. Jobs that had started by then are in flight, as in the
+  // simulator.
   void cut() {
     auto &events = result_.trace.events;
     drain(true);
@@ -312,13 +313,13 @@ class Run {
   const RunOptions &options_;
   RunResult result_;
   Mutex notes_lock_;
-  std::vector<std::string> notes_ REDAG_GUARDED_BY(notes_lock_);  // of the watchdog, not yet reported
+  std::vector<std::string> notes_ REDAG_GUARDED_BY(notes_lock_);  // from the watchdog, not yet reported
   std::atomic<bool> give_up_{false};
   std::optional<trace::FlightRecorder> flight_;
   std::unique_ptr<Engine> engine_;
-  std::unique_ptr<ReleaseTimer> timer_;    // after the engine: it ends first
-  std::unique_ptr<Watchdog> watchdog_;     // the same
-  std::unique_ptr<live::Publisher> live_;  // after the engine: it asks for figures until it is gone
+  std::unique_ptr<ReleaseTimer> timer_;    // after the engine: it is destroyed first
+  std::unique_ptr<Watchdog> watchdog_;     // likewise
+  std::unique_ptr<live::Publisher> live_;  // after the engine, whose figures it reads until it is destroyed
   Time origin_ = 0;
   Time end_ = 0;
 };

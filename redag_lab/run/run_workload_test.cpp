@@ -26,7 +26,7 @@ Task timer(std::string name, Duration period, Duration wcet) {
   return task;
 }
 
-// Two DAGs: a fast chain and a slow one whose jobs are longer than the fast period.
+// Returns two DAGs: a fast chain, and a slow one whose jobs are longer than the fast period.
 Workload two_rates(std::uint32_t workers, PreemptionMode mode) {
   Workload workload;
   workload.name = "two rates";
@@ -84,12 +84,12 @@ TEST_P(EveryMode, RunsAsTheModelSays) {
   EXPECT_EQ(result.mode.mode, mode());
   EXPECT_EQ(result.trace.info.lost_events, 0U);
   EXPECT_TRUE(result.unfinished.empty());
-  // 40 grid points of the fast timer lie in [0, 400 ms): each is reported, however late.
+  // The fast timer has 40 grid points in [0, 400 ms). Each is reported, however late.
   const auto released = std::count_if(result.trace.events.begin(), result.trace.events.end(), [](const JobEvent &e) {
     return e.kind == JobEventKind::Released && e.task == TaskId(0);
   });
   EXPECT_EQ(released, 40);
-  // On one worker the long job is in the way of the short ones: preemption shows, or is off.
+  // On one worker the long job delays the short ones. Preemption then occurs exactly in the modes that allow it.
   if (workers() == 1) {
     EXPECT_EQ(has_preemption(result), mode() != PreemptionMode::None);
   }
@@ -124,7 +124,7 @@ TEST(RunWorkload, JobsThatDoNotEndAreNamed) {
   options.duration = 3600 * kSecond;
   options.drain_timeout = kMillisecond;
   options.stop = &stop;
-  std::uint32_t number = 0;  // not the first one where the machine stalls
+  std::uint32_t number = 0;  // not always the first job, where the machine stalls
   options.progress = [&](Time, std::span<const JobEvent> events) {
     for (const JobEvent &event : events) {
       if (event.kind != JobEventKind::Started || event.task != TaskId(2)) continue;
@@ -146,7 +146,7 @@ TEST(RunWorkload, TheWatchdogNamesAJobWhileItRuns) {
   options.drain_timeout = kMillisecond;
   options.stop = &stop;
   options.watchdog = WatchdogOptions{{20 * kMillisecond, 0}, 5 * kMillisecond};
-  // Where the machine stalls, others may be named too, and jobs before it skipped. Nothing else ends the run.
+  // On a stalling machine other jobs may be reported as well, and earlier jobs skipped. Only this report ends the run.
   const auto is_it = [](const std::string &text) {
     return text.starts_with("slow.slow0 #") && text.find(" is overdue") != std::string::npos;
   };
@@ -177,7 +177,7 @@ TEST(RunWorkload, ABudgetCutsAJobOff) {
   EXPECT_EQ(cut->task, TaskId(2));
 }
 
-// Each of two long jobs of one task keeps its thread while it is preempted: a third job needs another.
+// Each of two long jobs of one task keeps its thread while it is preempted. A third job needs another thread.
 TEST(RunWorkload, ThereIsAThreadForEveryJobThatCanBeInProgress) {
   if (probe_priority_band().top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
   Workload workload = two_rates(2, PreemptionMode::Os);
@@ -241,11 +241,11 @@ TEST(RunWorkload, BodiesOfOnesOwn) {
   });
   EXPECT_GT(finished, 0);
   EXPECT_GE(sensed, static_cast<std::uint64_t>(finished));
-  EXPECT_GE(last, 0);  // from the origin of the run, not of the clock
+  EXPECT_GE(last, 0);  // relative to the origin of the run, not of the clock
   EXPECT_LT(last, 10 * kSecond);
 }
 
-// What the record has is the trace up to the last collection, and the folder is the caller's to delete.
+// The record holds the trace up to the last collection, and the caller deletes its folder.
 TEST(RunWorkload, RecordsWhatHappens) {
   const std::string folder = ::testing::TempDir() + "redag_run_flight." + std::to_string(::getpid());
   RunOptions options;

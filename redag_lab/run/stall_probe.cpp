@@ -23,7 +23,7 @@ class Watcher {
  public:
   Watcher(int cpu, const StallOptions &options) : options_(options) {
     result_.cpu = cpu;
-    result_.gaps.resize(kMostGaps);  // its pages are there before it matters
+    result_.gaps.resize(kMostGaps);  // touches the pages before the measurement
   }
 
   Result<void> start() {
@@ -47,7 +47,7 @@ class Watcher {
     Event never;
     for (Time now = monotonic_now(); now < end && !stopped(); now = monotonic_now()) {
       watch(std::min(now + kBurst, end));
-      // Ordinary threads pause as well: others want to run, and would take the time then.
+      // Ordinary threads pause as well, and other threads that want to run do so during the pause.
       never.wait_until(monotonic_now() + kPause);
     }
   }
@@ -100,7 +100,8 @@ Loss fit_loss(std::span<const LossSample> samples, Duration watched) {
   if (samples.empty() || watched <= 0) return loss;
   Int128 sum = 0;
   for (const LossSample &sample : samples) sum += sample.length;
-  // A processor that is lost most of the time has nothing to promise: a bound then says so.
+  // A processor that is lost most of the time guarantees nothing. The rate is capped just below one, and a bound then
+  // reports the failure.
   const Int128 twice = (2 * sum * kSecond + watched - 1) / watched;
   loss.per_second = static_cast<Duration>(std::min<Int128>(twice, kSecond - kMillisecond));
   Duration level = 0;

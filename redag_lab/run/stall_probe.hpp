@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// How long a machine takes a processor away from a thread that wants nothing else: a thread on each processor reads the
-// clock without end and notes the gaps, as Linux's osnoise tracer does. Owns its threads while it runs. Blocks.
+// Measures how long the machine takes a processor away from a thread. A thread on each processor reads the clock
+// without end and records the gaps, as Linux's osnoise tracer does. Owns its threads while it runs. Blocks.
 #pragma once
 
 #include <atomic>
@@ -16,13 +16,13 @@
 
 namespace redag::runtime {
 
-/// Shorter gaps are the loop's own.
+/// Shorter gaps are caused by the loop itself.
 inline constexpr Duration kShortestGap = 2 * kMicrosecond;
 
 struct Gap {
-  Duration at = 0;       // of the time that was watched: when it ended
-  Duration length = 0;   // of the clock
-  Duration charged = 0;  // of the thread's processor time: what the kernel did in its name
+  Duration at = 0;       // end of the gap, in watched time
+  Duration length = 0;   // wall-clock time
+  Duration charged = 0;  // processor time charged to the thread: the kernel's work in its name
 };
 
 struct WatchedProcessor {
@@ -37,18 +37,18 @@ struct StallOptions {
   const std::atomic<bool> *stop = nullptr;
 };
 
-/// All processors that the process may use, at once. SCHED_FIFO threads pause a fifth of the time, so that the kernel
-/// does not throttle them. Error: the threads cannot be made.
+/// Watches all processors that the process may use at the same time. SCHED_FIFO threads pause a fifth of the time to
+/// avoid throttling by the kernel. Error: the threads cannot be created.
 [[nodiscard]] Result<std::vector<WatchedProcessor>> watch_for_stalls(const StallOptions &options);
 
-/// One time at which something was lost.
+/// A loss of `length` at the instant `at`.
 struct LossSample {
   Duration at = 0;
   Duration length = 0;
 };
 
-/// The leaky bucket that all of them fit in: it leaks twice the mean of what was lost in `watched`, and is as large as
-/// the highest level that it came to. In order of time.
+/// Returns a leaky bucket in which all samples fit. It leaks at twice the mean rate of the losses in `watched` time,
+/// and is as large as its highest level. Requires samples in order of time.
 [[nodiscard]] Loss fit_loss(std::span<const LossSample> samples, Duration watched);
 
 }  // namespace redag::runtime

@@ -13,7 +13,7 @@
 namespace redag::runtime {
 namespace {
 
-// What a reading of the thread's clock costs, which is a system call: the least of some.
+// Returns the cost of reading the thread's clock, which is a system call: the least of several readings.
 Duration reading_cost() {
   static const Duration kCost = [] {
     Duration least = kMicrosecond;
@@ -28,7 +28,8 @@ Duration reading_cost() {
   return kCost;
 }
 
-// Spins for `time` on a clock that costs no system call. Being preempted meanwhile ends it early, never late.
+// Spins for `time` on a clock that needs no system call. A preemption shortens the processor time of the spin and
+// never lengthens it.
 void spin_for(Duration time, const std::atomic<bool> &give_up) {
   const Time end = monotonic_now() + time;
   while (monotonic_now() < end && !give_up.load(std::memory_order_relaxed)) relax();
@@ -37,7 +38,7 @@ void spin_for(Duration time, const std::atomic<bool> &give_up) {
 }  // namespace
 
 void burn(Duration demand, Duration region, const std::atomic<bool> &give_up) {
-  // The reading that tells the end, and the engine's own after it, are work of the job as well.
+  // The reading that finds the end and the engine's own reading after it are also charged to the job.
   const Duration enough = demand - 2 * reading_cost();
   Duration next_point = region > 0 ? region : kNever;
   for (Duration used = job_cpu_time(); used < enough; used = job_cpu_time()) {
@@ -52,7 +53,7 @@ void burn(Duration demand, Duration region, const std::atomic<bool> &give_up) {
 }
 
 std::vector<Body> synthetic_bodies(const Workload &workload, std::uint64_t seed, const std::atomic<bool> &give_up) {
-  (void)reading_cost();  // measured here, and not in a job
+  (void)reading_cost();  // measures the cost here rather than in a job
   std::vector<Body> bodies;
   for (const TaskRef &ref : flatten(workload)) {
     bodies.emplace_back([task = ref.task, seed, &give_up](const Job &job) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Bodies that use a given amount of processor time and nothing else: jobs of a workload without its real code. Called
-// on the thread that runs the job.
+// Synthetic bodies, which use a given amount of processor time and do nothing else. They stand for a workload's real
+// code. Called on the thread that runs the job.
 #pragma once
 
 #include <atomic>
@@ -14,12 +14,12 @@
 
 namespace redag::runtime {
 
-/// Uses `demand` of the calling job's own processor time, so that being preempted does not shorten its work: not more,
-/// unless the machine stalls at the end, and less by the cost of two readings of the thread's clock at most. Calls
-/// preemption_point() every `region` (0: never). Ends early once `give_up` is set.
+/// Uses `demand` of the calling job's own processor time; preemption does not shorten the work. It uses more only if
+/// the machine stalls at the end, and less by at most two readings of the thread's clock. Calls preemption_point()
+/// every `region` (0: never). Ends early once `give_up` is set.
 void burn(Duration demand, Duration region, const std::atomic<bool> &give_up);
 
-/// One body a task, in TaskId order. Job k of a task asks for execution_time(task, id, k, seed); it is cut off at the
+/// Returns one body per task, in TaskId order. Job k of a task uses execution_time(task, id, k, seed), at most the
 /// task's budget. `workload` and `give_up` must outlive the bodies.
 [[nodiscard]] std::vector<Body> synthetic_bodies(const Workload &workload, std::uint64_t seed,
                                                  const std::atomic<bool> &give_up);

@@ -34,7 +34,7 @@ class Scorer {
   bool any_ = false;
 };
 
-// The policy itself; priorities that it would ignore go where the workload relied on them.
+// Sets the policy. Drops priorities where the workload relied on them and the new policy would ignore them.
 Workload with_policy(Workload workload, PolicyKind policy) {
   if (workload.policy == PolicyKind::Fixed) {
     for (Dag &dag : workload.dags) {
@@ -91,7 +91,7 @@ class Search {
     candidate.caps = caps;
     const Result<System> system = compile(candidate.workload, platform_);
     ++result_.analyses;
-    if (!system) return candidate;  // assign() has compiled the workload: only its order and caps differ
+    if (!system) return candidate;  // assign() has compiled the workload; only order and caps differ
     candidate.units = present_order(*system);
     candidate.score = score_of(*system);
     return candidate;
@@ -120,7 +120,7 @@ class Search {
     add_order("audsley", with_order(workload_, system, found->order));
   }
 
-  // The best caps under one order. What only lowers the sum of bounds is no reason to change caps that somebody chose.
+  // Finds the best caps under one order. A smaller sum of bounds alone is no reason to change the user's caps.
   void add_order(const std::string &name, const Workload &ordered) {
     if (stopped()) return;
     Candidate start;
@@ -152,7 +152,7 @@ class Search {
   const Workload &workload_;
   const AnalysisPlatform &platform_;
   const AssignmentOptions &options_;
-  SearchSpace space_;  // of max_active, by DAG
+  SearchSpace space_;  // of max_active, one dimension per DAG
   Assignment result_;
 };
 

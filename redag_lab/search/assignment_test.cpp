@@ -46,7 +46,7 @@ Assignment assigned(const Workload &workload, const AssignmentOptions &options =
   return assign(workload, platform_of(workload), options).value();
 }
 
-// One source and `width` tasks after it, all of one period.
+// Returns a source and `width` successors, all with one period.
 Dag fork(const std::string &name, Duration wcet, std::uint32_t width, Duration period) {
   Dag dag = single(name, wcet, period, period);
   for (std::uint32_t i = 0; i < width; ++i) {
@@ -60,7 +60,7 @@ Dag fork(const std::string &name, Duration wcet, std::uint32_t width, Duration p
 }
 
 TEST(Assignment, ShortDeadlinesGoFirst) {
-  // By rate b waits for a and answers after 5; by deadline it answers after 2.
+  // By rate, b waits for a and responds after 5. By deadline, it responds after 2.
   const Assignment result = assigned(workload_of({single("a", 3, 10, 10), single("b", 2, 20, 4)}));
   EXPECT_FALSE(result.present.score.schedulable);
   EXPECT_EQ(result.present.score.worst_lateness, 1);
@@ -71,8 +71,8 @@ TEST(Assignment, ShortDeadlinesGoFirst) {
 }
 
 TEST(Assignment, AudsleyBeatsDeadlinesLongerThanPeriods) {
-  // J. Lehoczky, RTSS 1990: with D > T neither rates nor deadlines decide. (52, 100, D = 110) above (52, 140, D = 154)
-  // lets the second answer after 156; the other way round they answer after 108 and 52.
+  // From J. Lehoczky, RTSS 1990: with D > T, neither rates nor deadlines decide. With (52, 100, D = 110) above (52,
+  // 140, D = 154), the second responds after 156. In the other order the responses are 108 and 52.
   const Assignment result = assigned(workload_of({single("a", 52, 100, 110), single("b", 52, 140, 154)}));
   EXPECT_FALSE(result.present.score.schedulable);
   EXPECT_TRUE(result.audsley_optimal);
@@ -97,7 +97,8 @@ TEST(Assignment, LeavesAloneWhatNothingImproves) {
 }
 
 TEST(Assignment, ObjectivesDiffer) {
-  // (2, 6) above (2, 20): R = 2 and 4, lateness -4 and -16, slack 4/6 and 16/20. The other way round R = 4 and 2: -2.
+  // With (2, 6) above (2, 20): R = 2 and 4, lateness -4 and -16, slack 4/6 and 16/20. In the other order R = 4 and 2,
+  // and the largest lateness is -2.
   const Score high{true, 0, -4, 0.6, 10};
   const Score low{true, 0, -2, 0.9, 9};
   EXPECT_TRUE(is_better(high, low, Objective::Lateness));
@@ -111,8 +112,8 @@ TEST(Assignment, ObjectivesDiffer) {
 }
 
 TEST(Assignment, ABoundOfActiveJobsIsolatesADag) {
-  // Run to completion on 3 workers: "wide" can fill all of them and block "quick" for 40; with at most 2 of it at work
-  // and one task in quick, quick always finds a worker.
+  // On 3 workers, without preemption, "wide" can fill all workers and block "quick" for 40. With at most 2 active jobs
+  // of "wide", "quick" always finds a worker.
   const Workload workload =
       workload_of({single("quick", 2, 20, 20), fork("wide", 40, 4, 400)}, 3, PreemptionMode::None);
   const Assignment result = assigned(workload);
@@ -174,7 +175,7 @@ TEST(Assignment, OfEdfChangesNoOrderThatWorks) {
   EXPECT_EQ(result.best.workload, workload);
 }
 
-// Every response of the order's units under the order-free test, and the largest lateness.
+// Every unit's response under the order-free test fits its deadline, and the largest lateness.
 struct UnderTest {
   bool all_fit = true;
   Duration worst = std::numeric_limits<Duration>::min();
@@ -191,8 +192,8 @@ UnderTest under(const OrderFreeTest &test, const BoundCase &bound_case, const Sy
   return result;
 }
 
-// Where the test is said to suit Audsley's assignment, no order of all n! is better; and what is found is schedulable
-// by analyze() too.
+// Checks tests that are marked optimal for Audsley's assignment: no order of all n! is better. A found order must also
+// be schedulable by analyze().
 void expect_optimal(BoundCaseLimits limits) {
   limits.max_dags = 4;
   limits.min_utilization = limits.max_workers > 1 ? 0.2 : 0.6;
@@ -298,7 +299,7 @@ TEST(AssignmentProperty, NeverWorseAndWhatIsWrittenMeansTheSame) {
       ASSERT_FALSE(is_better(result->present.score, result->best.score, objective) &&
                    improves(result->present.score, result->best.score, objective));
       better += improves(result->best.score, result->present.score, objective) ? 1 : 0;
-      // As written and read again it has the same score, and nothing but order and caps has changed.
+      // Written to YAML and read again, the workload has the same score. Only order and caps have changed.
       const auto read = parse_workload(to_yaml(result->best.workload), "w.yaml");
       ASSERT_TRUE(read) << to_string(read.error());
       ASSERT_EQ(score_of(compile(read->workload, bound_case.platform).value()), result->best.score);

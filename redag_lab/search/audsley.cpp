@@ -37,8 +37,8 @@ const std::vector<Method> &one_worker_methods() {
   return kMethods;
 }
 
-// One worker: fixed points that see of the others only which are more urgent. As a unit moves up past another, at most
-// C - 1 of that one blocks it where at least C interfered before.
+// One worker: the fixed points depend only on the set of more urgent units. A unit that moves up past another is
+// blocked by at most C - 1 of it, and before had at least C of interference from it.
 std::optional<Duration> one_worker_response(const System &system, std::uint32_t unit) {
   std::optional<Duration> best;
   for (const Method &method : one_worker_methods()) {
@@ -51,8 +51,8 @@ std::optional<Duration> one_worker_response(const System &system, std::uint32_t 
   return best;
 }
 
-// Several workers: the same fixed points as the bounds, with every more urgent unit as late as it may be instead of as
-// late as it is: work in a window only grows with it, and the order of the more urgent no longer shows.
+// Several workers: the fixed points of the bounds, with each more urgent unit's deadline in place of its response. Work
+// in a window only grows with a response, and the order among the more urgent units no longer matters.
 std::optional<Duration> global_response(const System &system, std::uint32_t unit) {
   const bool edges = system.has_edges();
   const bool bounds =
@@ -65,7 +65,7 @@ std::optional<Duration> global_response(const System &system, std::uint32_t unit
   const auto k = static_cast<std::size_t>(own - view.units.begin());
   for (std::size_t i = 0; i < k; ++i) {
     GlobalUnit &other = view.units[i];
-    const Duration least = other.jitter + other.volume;  // what the workload formulas need of a response
+    const Duration least = other.jitter + other.volume;  // the least response that the workload formulas allow
     if (least > other.period) return std::nullopt;
     other.response = std::clamp(due_of(system.units[other.unit]), least, other.period);
   }
@@ -87,7 +87,7 @@ std::optional<Duration> global_response(const System &system, std::uint32_t unit
   return units[k].response;
 }
 
-// Compiled with priorities in this order. The workload was compiled before, so this cannot fail.
+// Compiles the workload with priorities in this order. It compiled before and cannot fail now.
 System compiled(const Workload &workload, const AnalysisPlatform &platform, const System &before,
                 const UnitOrder &order) {
   Result<System> system = compile(with_order(workload, before, order), platform);
@@ -136,7 +136,8 @@ TestChoice order_free_test(const Workload &workload, const AnalysisPlatform &pla
   const System system = compiled(workload, platform, *before, deadline_order(*before));
   OrderFreeTest test;
   if (platform.workers == 1) {
-    // Which of them applies does not depend on the order. Where levels are shared, who shares with whom does.
+    // Which method applies does not depend on the order. With shared levels, a bound depends on which units share a
+    // level.
     std::string why;
     for (const Method &method : one_worker_methods()) {
       const Outcome outcome = method.apply(system);
@@ -154,8 +155,8 @@ TestChoice order_free_test(const Workload &workload, const AnalysisPlatform &pla
   }
   const global::Units view = global::units_of(system, {.mode = system.mode, .bounds = true});
   if (view.reason) return {std::nullopt, *view.reason};
-  // With run-to-completion jobs a unit that moves up past a long one can wait longer for it than before: its deadline
-  // may let in less than C - 1 of interference. So nothing is claimed there.
+  // Without preemption, a unit that moves up past a long one can wait longer for it than before: its deadline may let
+  // in less than C - 1 of interference. Optimality is therefore not claimed there.
   const bool edges = system.has_edges();
   test.name = full ? (edges ? "dag_bounded with deadlines for responses" : "guan with deadlines for responses")
                    : (edges ? "dag_nonpreemptive with deadlines for responses"
@@ -178,7 +179,7 @@ std::optional<AudsleyResult> audsley(const Workload &workload, const AnalysisPla
     std::size_t best = open.size() - 1;
     double least = std::numeric_limits<double>::infinity();
     bool fits = false;
-    for (std::size_t i = open.size(); i-- > 0;) {  // longest deadline first: it stays where others are not better
+    for (std::size_t i = open.size(); i-- > 0;) {  // longest deadline first; of equally good units it gets the place
       if (stop && stop()) return std::nullopt;
       UnitOrder order = open;
       order.erase(order.begin() + static_cast<std::ptrdiff_t>(i));

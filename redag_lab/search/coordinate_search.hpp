@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The search that `assign` and `tune` share: one of some values in each dimension. Small spaces are tried as a whole;
-// in larger ones one dimension at a time goes to its best value until nothing helps, from several places. What a point
-// is worth is asked in batches, so that it can be found in parallel; the answer does not depend on how. Pure, but for
-// what it calls.
+// The search shared by `assign` and `tune`, over points with one of several values in each dimension. Small spaces are
+// tried completely. In larger ones, one dimension at a time moves to its best value until nothing improves, from
+// several starts. Points are scored in batches, which can run in parallel without effect on the result. Pure, apart
+// from the callbacks.
 #pragma once
 
 #include <algorithm>
@@ -24,9 +24,9 @@ using Point = std::vector<std::uint32_t>;
 
 struct SearchSpace {
   std::vector<std::vector<std::uint32_t>> values;  // of each dimension; not empty
-  std::vector<Point> starts;                       // of the local search; the first one is the present point
+  std::vector<Point> starts;                       // of the local search; the first is the present point
 
-  /// How many points there are; `limit` + 1 if they are more than `limit`.
+  /// Returns the number of points, or `limit` + 1 if there are more than `limit`.
   [[nodiscard]] std::uint64_t size(std::uint64_t limit) const {
     std::uint64_t product = 1;
     for (const auto &choices : values) {
@@ -38,20 +38,20 @@ struct SearchSpace {
 };
 
 struct SearchEffort {
-  std::uint64_t exhaustive = 1024;  // points up to which all are tried
-  std::uint32_t restarts = 8;       // random places to start from, besides those of the space
+  std::uint64_t exhaustive = 1024;  // spaces of at most this many points are tried completely
+  std::uint32_t restarts = 8;       // random starts, besides those of the space
   std::uint64_t seed = 1;
 };
 
 template <class Score>
 class CoordinateSearch {
  public:
-  /// Scores of points, in their order; fewer than were asked for: stop.
+  /// Returns the scores of the points, in their order. Fewer scores than points end the search.
   using Evaluate = std::function<std::vector<Score>(std::span<const Point>)>;
   using Better = std::function<bool(const Score &, const Score &)>;  // a strict weak order
 
   struct Found {
-    Point best;  // of equally good ones the first that was met
+    Point best;  // the first met of equally good ones
     Score score{};
     std::map<Point, Score> trials;
     bool exhaustive = true;
@@ -60,7 +60,7 @@ class CoordinateSearch {
 
   CoordinateSearch(Evaluate evaluate, Better better) : evaluate_(std::move(evaluate)), better_(std::move(better)) {}
 
-  /// Requires a start. If stopped before its score was known, there are no trials.
+  /// Runs the search. Requires a start. If it is stopped before the start is scored, there are no trials.
   Found run(const SearchSpace &space, const SearchEffort &effort) {
     found_ = {};
     found_.best = space.starts.front();
@@ -78,7 +78,7 @@ class CoordinateSearch {
  private:
   static constexpr std::size_t kBatch = 64;
 
-  // Nothing is asked twice.
+  // Scores the points that have no score yet.
   void try_points(const std::vector<Point> &points) {
     std::vector<Point> unknown;
     for (const Point &point : points) {

@@ -16,7 +16,7 @@ namespace redag::analysis {
 namespace {
 
 constexpr std::size_t kMostSuspects = 6;
-constexpr double kLittle = 0.9;  // an execution time that shrinks to this share has changed little
+constexpr double kLittle = 0.9;  // a remedy that keeps at least this share of an execution time counts as small
 
 class Search {
  public:
@@ -52,7 +52,7 @@ class Search {
     return "?";
   }
 
-  // The one that has to shrink least.
+  // Returns the execution time that has to shrink least.
   [[nodiscard]] std::optional<Shorter> shorten(const std::vector<TaskId> &suspects) const {
     SensitivityOptions options;
     options.probes = 2;

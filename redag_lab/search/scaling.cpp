@@ -19,7 +19,8 @@ Duration scaled_down(Duration value, std::int64_t numerator, std::int64_t denomi
   return saturate(Int128{value} * numerator / denominator);
 }
 
-// `numerator` / `denominator` as long, exactly `wcet` long at most.
+// Scales the execution times by `numerator` / `denominator`. The wcet becomes exactly `wcet`, which also caps the
+// others.
 void scale_execution(Task &task, Duration wcet, std::int64_t numerator, std::int64_t denominator) {
   task.wcet = wcet;
   task.bcet = std::min(wcet, scaled_down(task.bcet, numerator, denominator));
@@ -38,7 +39,7 @@ void set_period(Task &task, Duration period) {
   task.period = period;
 }
 
-// By TaskId.
+// Returns the tasks by TaskId.
 std::vector<Task *> tasks_of(Workload &workload) {
   std::vector<Task *> tasks;
   for (Dag &dag : workload.dags) {

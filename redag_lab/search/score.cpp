@@ -11,7 +11,7 @@
 namespace redag::tune {
 namespace {
 
-// Less than 0: a is better.
+// Returns less than 0 if `a` is better.
 int compare(const ClassScore &a, const ClassScore &b, Objective objective) {
   const auto order = [](auto x, auto y) { return x < y ? -1 : (y < x ? 1 : 0); };
   if (objective == Objective::Misses) return order(a.missed, b.missed);
@@ -33,7 +33,7 @@ void count(const metrics::JudgedJob &job, Duration deadline, Duration end_to_end
   ++score.released;
   if (job.miss != metrics::Miss::None) ++score.missed;
   if (job.miss == metrics::Miss::Lost) ++score.lost;
-  // In flight in time: how late it is going to be is not known.
+  // A job in flight before its deadline has an unknown lateness.
   const bool in_flight = job.record.outcome == metrics::JobOutcome::InFlight;
   if (!job.response || (in_flight && job.miss == metrics::Miss::None)) return;
   const auto see = [&score](Duration response, Duration due) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a workload does in the simulator, over several seeds, in the numbers that `tune` compares; and which of two such
-// results is better. Observations, not bounds: other seeds can be worse. Pure but for `stop`.
+// The figures of a workload in the simulator over several seeds, which `tune` compares, and the comparison of two such
+// results. They are observations, not bounds: other seeds can be worse. Pure, apart from `stop`.
 #pragma once
 
 #include <array>
@@ -19,20 +19,21 @@ namespace redag::tune {
 
 enum class Objective : std::uint8_t {
   Misses,       // fewest jobs late or lost
-  MaxLateness,  // smallest largest f - (r + D); before that fewest lost jobs, which have no f
-  Slack,        // largest least (r + D - f) / D; before that fewest lost jobs
+  MaxLateness,  // smallest maximum of f - (r + D); fewer lost jobs (which have no f) come first
+  Slack,        // largest minimum of (r + D - f) / D; fewer lost jobs come first
 };
 
 [[nodiscard]] const char *to_string(Objective objective);
 
-/// Jobs of one criticality (their DAG's). End-to-end deadlines count as the deadlines of the jobs that carry the data.
+/// Counts of the jobs of one criticality (their DAG's). An end-to-end deadline counts as the deadline of the jobs that
+/// carry the data.
 struct ClassScore {
   std::uint64_t released = 0;
-  std::uint64_t missed = 0;  // lost or late; in flight past the deadline is late
-  std::uint64_t lost = 0;    // skipped, or aborted though there was data
+  std::uint64_t missed = 0;  // lost or late; a job in flight past its deadline is late
+  std::uint64_t lost = 0;    // skipped, or aborted although there was data
   Duration max_lateness = 0;
   double least_slack = 1;
-  bool any = false;  // some job had a response: the two above mean something
+  bool any = false;  // some job had a response, and max_lateness and least_slack are valid
 
   void add(const ClassScore &other);
   friend bool operator==(const ClassScore &, const ClassScore &) = default;
@@ -42,8 +43,8 @@ inline constexpr std::size_t kCriticalities = 3;
 
 struct Score {
   std::array<ClassScore, kCriticalities> of;  // by Criticality
-  bool proven = false;                        // every deadline is shown to hold by a bound
-  std::uint32_t changes = 0;                  // from the workload as it is
+  bool proven = false;                        // bounds show that every deadline is met
+  std::uint32_t changes = 0;                  // number of differences from the present workload
 
   [[nodiscard]] ClassScore all() const;
   friend bool operator==(const Score &, const Score &) = default;
@@ -51,13 +52,13 @@ struct Score {
 
 struct Goal {
   Objective objective = Objective::Misses;
-  /// What a more critical DAG gains counts before all that a less critical one may lose.
+  /// A gain of a more critical DAG outweighs every loss of less critical ones.
   bool per_criticality = false;
 };
 
-/// Proven before not; then the objective. Reason enough to change something.
+/// A proven setting wins, then the objective; true justifies a change.
 [[nodiscard]] bool improves(const Score &a, const Score &b, const Goal &goal);
-/// The same, and of equals the one with more slack, then with fewer changes.
+/// As improves(); equals are decided by more slack, then by fewer changes.
 [[nodiscard]] bool is_better(const Score &a, const Score &b, const Goal &goal);
 
 struct Simulation {
@@ -65,7 +66,7 @@ struct Simulation {
   sim::Overheads overheads;
 };
 
-/// One run with our scheduler. Nothing if `stop` ended it.
+/// Simulates one run with our scheduler. Returns nothing if `stop` ended it.
 [[nodiscard]] std::optional<std::array<ClassScore, kCriticalities>> simulate_once(const Workload &workload,
                                                                                   std::uint64_t seed,
                                                                                   const Simulation &simulation,

@@ -17,10 +17,10 @@
 namespace redag::analysis {
 namespace {
 
-constexpr std::int64_t kSlowest = 1024;                // periods are made at most this much longer,
-constexpr Duration kLongestPeriod = 86'400 * kSecond;  // and at most this long
+constexpr std::int64_t kSlowest = 1024;                // periods grow to at most this multiple,
+constexpr Duration kLongestPeriod = 86'400 * kSecond;  // and to at most this length
 
-// Utilization above the workers, in exact arithmetic rounded in favour of the workload.
+// True if the utilization exceeds the workers. Exact arithmetic, rounded in favour of the workload.
 bool is_overloaded(const System &system) {
   constexpr unsigned kBits = 40;
   Int128 sum = 0;
@@ -28,7 +28,7 @@ bool is_overloaded(const System &system) {
   return sum > Int128{system.platform.workers} << kBits;
 }
 
-// "dag.task", as the commands name it.
+// Returns "dag.task", the form that the commands use.
 std::string label(const System &system, std::uint32_t task) {
   const std::string &dag = system.dags[system.tasks[task].dag.value].name;
   return dag + "." + system.tasks[task].name.substr(dag.size() + 1);
@@ -43,7 +43,7 @@ std::string why_no_bound(const Report &report, std::uint32_t task) {
   return "no method that bounds response times applies";
 }
 
-// What analyze() finds in the way of a workload that it does not accept.
+// Returns the reason why analyze() does not accept the workload.
 std::string obstacle_of(const Workload &workload, const AnalysisPlatform &platform) {
   const Result<System> system = compile(workload, platform);
   if (!system) return system.error().front().message;
@@ -71,7 +71,7 @@ std::string obstacle_of(const Workload &workload, const AnalysisPlatform &platfo
   return "not accepted";
 }
 
-// The search over one knob's positions.
+// Searches the positions of one knob.
 class Search {
  public:
   Search(const Workload &workload, const AnalysisPlatform &platform, const Knob &knob, const Accepts &accepts,
@@ -130,7 +130,8 @@ class Search {
     return !system || why_impossible(*system);
   }
 
-  // More load never makes an impossible workload possible, so bisection is exact here. Requires that `from` is not.
+  // Returns the first impossible position by bisection, which is exact: more load never makes an impossible workload
+  // possible. Requires that `from` is possible.
   [[nodiscard]] std::int64_t first_impossible(std::int64_t from) const {
     std::int64_t low = from;
     std::int64_t high = 0;
@@ -148,7 +149,7 @@ class Search {
     return high;
   }
 
-  // The position of the least load that is looked at.
+  // Returns the lightest position that is tried.
   [[nodiscard]] std::int64_t lightest() const {
     if (margin_.knob.kind == Knob::Kind::Wcet || margin_.knob.kind == Knob::Kind::AllWcets) return 1;
     const std::vector<TaskRef> tasks = flatten(workload_);
@@ -158,12 +159,13 @@ class Search {
     return margin_.knob.kind == Knob::Kind::Period ? margin_.nominal * slower : margin_.nominal / slower;
   }
 
-  // An accepted position below the nominal one: the lightest, or else the lightest of the probes that is.
+  // Returns an accepted position below the nominal one: the lightest position, or else the lightest accepted probe.
   std::optional<std::int64_t> light_start() {
     const std::int64_t least = lightest();
     if (least >= margin_.nominal) return std::nullopt;
     if (accepts(least)) return least;
-    // What is schedulable for its wcets is so for shorter ones: there is nothing to look for.
+    // A workload that is schedulable for its wcets is also schedulable for shorter ones. No lighter position is left to
+    // try.
     if (margin_.knob.kind == Knob::Kind::Wcet || margin_.knob.kind == Knob::Kind::AllWcets) return std::nullopt;
     for (const std::int64_t position : spread(least, margin_.nominal)) {
       if (accepts(position)) return position;
@@ -171,7 +173,7 @@ class Search {
     return std::nullopt;
   }
 
-  // Requires that `low` is accepted and `high` is not.
+  // Narrows the margin. Requires that `low` is accepted and `high` is not.
   void between(std::int64_t low, std::int64_t high) {
     const std::vector<std::int64_t> even = spread(low, high);
     std::set<std::int64_t> positions(even.begin(), even.end());
@@ -196,7 +198,7 @@ class Search {
     margin_.position = low;
   }
 
-  // Evenly spread positions inside (low, high), ascending; of periods, even in the rate.
+  // Returns evenly spread positions inside (low, high), ascending. Periods are spread evenly by rate.
   [[nodiscard]] std::vector<std::int64_t> spread(std::int64_t low, std::int64_t high) const {
     std::vector<std::int64_t> positions;
     const auto count = static_cast<std::int64_t>(options_.probes);
@@ -217,8 +219,9 @@ class Search {
     return positions;
   }
 
-  // Where periods or deadlines decide on priorities, between two neighbouring positions of these the order stays the
-  // same: accepted at the larger load, with bounds that hold for sporadic releases, the smaller ones are safe as well.
+  // Adds the positions at which the order of priorities changes, where periods or deadlines determine it. Between two
+  // such neighbours the order is constant. If the larger load is accepted with bounds for sporadic releases, the
+  // smaller loads between are safe as well.
   void add_changes_of_order(std::int64_t low, std::int64_t high, std::set<std::int64_t> &positions) const {
     const bool is_rate = margin_.knob.kind == Knob::Kind::Period || margin_.knob.kind == Knob::Kind::Rates;
     const bool order_follows = workload_.policy == PolicyKind::RateMonotonic ||
@@ -242,7 +245,7 @@ class Search {
         continue;
       }
       for (const Duration period : own) {
-        // The last factors at which the rounded period is still above, and still equal to, the other one.
+        // Offers the last factors at which the rounded period is still above the other one, and still equal to it.
         for (const Duration edge : {other + 1, other}) {
           const auto last = static_cast<std::int64_t>(saturate(Int128{period} * kFactorUnit / edge));
           offer(last);
@@ -265,7 +268,7 @@ class Search {
 std::optional<std::string> why_impossible(const System &system) {
   for (std::uint32_t t = 0; t < system.tasks.size(); ++t) {
     const SystemTask &task = system.tasks[t];
-    // Jobs of a task that can overlap (concurrency) may take longer than the limit; those are not analysed.
+    // Jobs of a task that can overlap (concurrency) may take longer than the limit; such workloads are not analysed.
     const Duration due = system.not_analysable.empty() ? std::min(task.deadline, task.limit) : task.deadline;
     if (task.wcet > due) return label(system, t) + " alone takes longer than it has";
   }
@@ -280,7 +283,7 @@ std::optional<Margin> margin_of(const Workload &workload, const AnalysisPlatform
 
 namespace {
 
-// The rate of these tasks: their period where they share one.
+// Returns the knob of these tasks' rate: their period if they share one.
 Knob rate_of(const std::vector<TaskRef> &tasks, const std::vector<std::uint32_t> &which) {
   const bool is_one = std::all_of(which.begin(), which.end(), [&](std::uint32_t t) {
     return tasks[t].task->period == tasks[which.front()].task->period;
@@ -298,7 +301,8 @@ std::vector<Knob> knobs_of(const Workload &workload, const System &system) {
   for (const std::uint32_t t : all) knobs.push_back({Knob::Kind::Wcet, {t}});
   for (const SystemDag &dag : system.dags) {
     Knob knob = rate_of(tasks, dag.tasks);
-    const bool is_there = knob.kind == Knob::Kind::Rates && knob.tasks.size() == all.size();  // the only DAG
+    // A workload with one DAG has that DAG's rate as the knob of all rates.
+    const bool is_there = knob.kind == Knob::Kind::Rates && knob.tasks.size() == all.size();
     if (!is_there) knobs.push_back(std::move(knob));
     if (dag.units.size() < 2) continue;
     for (const std::uint32_t unit : dag.units) knobs.push_back(rate_of(tasks, system.units[unit].tasks));

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// How far execution times and rates can grow until the analysis no longer says "schedulable", or how far they have to
-// shrink until it does. Searches positions of knobs (scaling.hpp), exact to one nanosecond or one millionth. Pure
-// functions, but for the hooks of the caller.
+// Finds how far execution times and rates can grow until the analysis no longer says "schedulable", or how far they
+// have to shrink until it does. Searches positions of knobs (scaling.hpp), exact to one nanosecond or one millionth.
+// Pure functions, apart from the caller's hooks.
 #pragma once
 
 #include <cstdint>
@@ -17,48 +17,50 @@
 
 namespace redag::analysis {
 
-/// How far one knob can be turned. Schedulability under bounds, and under schedulers with several workers, need not be
-/// monotone, so this is what the tests show: `position` is accepted, the next one is not, and so is everything tested
-/// below it (from the nominal position on, or, where that is not accepted, from the least load looked at).
+/// The range of one knob, as far as it was tested. Schedulability under bounds, and under schedulers with several
+/// workers, need not be monotone. `position` is accepted and the next position is not. Every tested position below is
+/// accepted too, from the nominal one on or, where that is not accepted, from the least load tried.
 struct Margin {
   Knob knob;
   std::int64_t nominal = 0;
-  std::optional<std::int64_t> position;  // none: not accepted, however little load this knob leaves
-  std::optional<std::int64_t> again;     // a position above it that is accepted too: not monotone
+  std::optional<std::int64_t> position;  // none: not accepted at any load that this knob leaves
+  std::optional<std::int64_t> again;     // an accepted position above `position`: not monotone
   std::uint32_t tested = 0;              // positions
-  std::string obstacle;                  // what stands in the way at the next position: a clause without a period
+  std::string obstacle;                  // what fails at the next position: a clause without a final full stop
 
-  /// Load at `position` over the nominal load. Requires a position.
+  /// The load at `position` divided by the nominal load. Requires a position.
   double factor = 0;
 };
 
-/// Is this workload, compiled for the platform, good enough? Only asked of what why_impossible() lets pass.
+/// True if this workload, compiled for the platform, is acceptable. Called only for workloads that why_impossible()
+/// passes.
 using Accepts = std::function<bool(const Workload &, const System &)>;
 
-/// analyze() calls it schedulable.
+/// Accepts the workloads that analyze() calls schedulable.
 [[nodiscard]] inline bool accepted_by_analysis(const Workload & /*workload*/, const System &system) {
   return is_shown_schedulable(system);
 }
 
 struct SensitivityOptions {
-  /// Positions between the nominal one and the first that cannot be met at all which are tested for monotonicity,
-  /// evenly spread. Where periods decide on priorities, those at which the order changes are tested besides.
+  /// The number of evenly spread positions, tested for monotonicity, between the nominal one and the first impossible
+  /// one. Where periods determine priorities, the positions at which the order changes are tested as well.
   std::uint32_t probes = 16;
-  /// Asked before every test; true ends the search. Null: never.
+  /// Called before every test; true ends the search. Null: never.
   std::function<bool()> stop;
 };
 
-/// No schedule on this platform meets every deadline: some task's own execution is longer than what it has, or the
-/// utilization is above the workers. The first that is so, in words; nothing if neither is.
+/// Returns the first reason why no schedule on this platform meets every deadline; nothing if there is none. Either a
+/// task's own execution exceeds its time, or the utilization exceeds the workers.
 [[nodiscard]] std::optional<std::string> why_impossible(const System &system);
 
-/// One knob. Nothing if `stop` ended it. `workload` must be valid. Cost: about probes + log2(range) tests.
+/// Finds the margin of one knob. Returns nothing if `stop` ended it. `workload` must be valid. Needs about
+/// probes + log2(range) tests.
 [[nodiscard]] std::optional<Margin> margin_of(const Workload &workload, const AnalysisPlatform &platform,
                                               const Knob &knob, const Accepts &accepts = accepted_by_analysis,
                                               const SensitivityOptions &options = {});
 
-/// Every knob of a workload that people ask about, in the order of a report: all wcets, all rates; each task's wcet;
-/// each DAG's rate, as a period where it has one; and the period of each unit of a DAG that has several units.
+/// Returns the knobs of a report, in its order: all wcets, all rates, each task's wcet, and each DAG's rate (its period
+/// where it has one). A DAG with several units also has the period of each unit, after its rate.
 [[nodiscard]] std::vector<Knob> knobs_of(const Workload &workload, const System &system);
 
 }  // namespace redag::analysis

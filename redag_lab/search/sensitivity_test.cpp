@@ -51,7 +51,7 @@ Margin margin(const Workload &workload, const Knob &knob) {
 Margin all_wcets(const Workload &workload) { return margin(workload, {Kind::AllWcets, all_tasks(workload)}); }
 
 TEST(Sensitivity, HarmonicPeriodsUseTheWholeWorker) {
-  // U = 1/4 + 1/8 + 1/8 = 1/2; with rate-monotonic priorities harmonic periods reach U = 1.
+  // U = 1/4 + 1/8 + 1/8 = 1/2. With rate-monotonic priorities, harmonic periods reach U = 1.
   const Workload half =
       workload_of({single("a", kMillisecond, 4 * kMillisecond), single("b", kMillisecond, 8 * kMillisecond),
                    single("c", 2 * kMillisecond, 16 * kMillisecond)});
@@ -61,13 +61,13 @@ TEST(Sensitivity, HarmonicPeriodsUseTheWholeWorker) {
   EXPECT_FALSE(found.again);
   EXPECT_EQ(found.obstacle, "utilization above 1");
   EXPECT_EQ(margin(half, {Kind::Rates, all_tasks(half)}).position, 2 * kFactorUnit);
-  // One task takes all that is left: 1 ms + 1/2 of 8 ms.
+  // One task takes all the remaining time: 1 ms + 1/2 of 8 ms.
   EXPECT_EQ(margin(half, {Kind::Wcet, {1}}).position, 5 * kMillisecond);
 }
 
 TEST(Sensitivity, TheLargestLoadOfTwoTasksOfLiuAndLayland) {
-  // With T2 / T1 = sqrt(2), C1 = T2 - T1 and C2 = 2 T1 - T2 fill the worker at U = 2 (sqrt(2) - 1) = 0.828: not one
-  // nanosecond more. Half of it is a factor of 2.
+  // With T2 / T1 = sqrt(2), C1 = T2 - T1 and C2 = 2 T1 - T2 fill the worker at U = 2 (sqrt(2) - 1) = 0.828. Not one
+  // more nanosecond fits. Halved wcets leave a factor of 2.
   const Duration first = 1'000'000'000;
   const Duration second = 1'414'213'562;
   const Workload full = workload_of({single("a", second - first, first), single("b", 2 * first - second, second)});
@@ -81,7 +81,7 @@ TEST(Sensitivity, TheLargestLoadOfTwoTasksOfLiuAndLayland) {
 }
 
 TEST(Sensitivity, AnOverloadedWorkloadHasToShrink) {
-  // Harmonic, U = 1/2 + 3/4: all fit at 4/5 of it, and each alone has to give up 1/4.
+  // Harmonic periods, U = 1/2 + 3/4. All fit when scaled by 4/5, and each task alone has to give up 1/4.
   const Workload heavy = workload_of({single("a", 4000, 8000), single("b", 12000, 16000)});
   const Margin all = all_wcets(heavy);
   ASSERT_TRUE(all.position);
@@ -89,10 +89,10 @@ TEST(Sensitivity, AnOverloadedWorkloadHasToShrink) {
   EXPECT_EQ(all.position, 800'000);
   EXPECT_EQ(margin(heavy, {Kind::Wcet, {0}}).position, 2000);
   EXPECT_EQ(margin(heavy, {Kind::Wcet, {1}}).position, 8000);
-  // 4/16 + 12/16 = 1, at the same rate as b; and 4/8 + 12/24 = 1.
+  // 4/16 + 12/16 = 1, at the same rate as b, and 4/8 + 12/24 = 1.
   EXPECT_EQ(margin(heavy, {Kind::Period, {0}}).position, -16000);
   EXPECT_EQ(margin(heavy, {Kind::Period, {1}}).position, -24000);
-  // Rounded up to whole nanoseconds, small wcets leave less: 4 and 10 do not fit, 3 and 9 do.
+  // Wcets are rounded up to whole nanoseconds. Small ones therefore leave less: 4 and 10 do not fit, 3 and 9 do.
   EXPECT_EQ(all_wcets(workload_of({single("a", 4, 8), single("b", 12, 16)})).position, 750'000);
 }
 
@@ -107,14 +107,14 @@ TEST(Sensitivity, WhereNoneAloneSufficesItSaysSo) {
 // A period that passes another one changes the order of priorities.
 TEST(Sensitivity, AChangeOfOrderEndsTheRoom) {
   const Workload workload = workload_of({single("a", 5, 20, 6), single("b", 3, 40, 10)});
-  // b at 40: a first (5 <= 6), then b (8 <= 10). At 20 either can be first, and a answers after 8 > 6.
+  // With b at 40, a is first (5 <= 6), then b (8 <= 10). At 20 either can be first, and a responds after 8 > 6.
   const Margin found = margin(workload, {Kind::Period, {1}});
   EXPECT_EQ(found.position, -21);
   EXPECT_EQ(found.obstacle, "bound of a.t above its deadline");
   EXPECT_FALSE(found.again);
 }
 
-// Refused at one period only, that of another task: no spread of probes would meet it.
+// Only the period equal to another task's is refused. Evenly spread probes would not meet it.
 TEST(Sensitivity, EveryChangeOfOrderIsTested) {
   Workload workload = workload_of({single("a", 1, 2003), single("b", 1, 9000)});
   const Accepts not_equal = [](const Workload &candidate, const System &) {
@@ -127,7 +127,7 @@ TEST(Sensitivity, EveryChangeOfOrderIsTested) {
   const auto rate = margin_of(workload, platform, {Kind::Rates, {1}}, not_equal, {0, {}});
   ASSERT_TRUE(rate && rate->position);
   EXPECT_EQ(turned(workload, rate->knob, *rate->position).dags[1].tasks[0].period, 2004);
-  // With fixed priorities the order stays, and nobody looks there.
+  // With fixed priorities the order stays, and this position is not tested.
   workload.policy = PolicyKind::Fixed;
   EXPECT_NE(margin_of(workload, platform, {Kind::Period, {1}}, not_equal, {0, {}})->position, -2004);
 }
@@ -180,7 +180,7 @@ TEST(Sensitivity, TheRatesOfTheOnlyDagAreAllRates) {
   EXPECT_THAT(knobs_of(workload, *of_two), ::testing::Contains(Knob{Kind::Rates, {0, 1}}).Times(1));
 }
 
-// No deadline missed and no job skipped when all start together and run for their wcet.
+// True if no deadline is missed and no job skipped when all tasks start together and run for their wcet.
 bool simulated_without_a_miss(const BoundCase &bound_case, const Workload &workload) {
   const sched::Config config = config_of(bound_case.platform, workload);
   sched::PriorityScheduler scheduler(workload, config);
@@ -212,7 +212,8 @@ bool simulated_without_a_miss(const BoundCase &bound_case, const Workload &workl
   return ok;
 }
 
-// What was found is accepted, the next position is not, and a simulation of what was found misses nothing.
+// Checks that the found position is accepted, the next one is not, and a simulation at the found position misses
+// nothing.
 void expect_consistent(const BoundCaseLimits &limits) {
   const auto cases = static_cast<int>(testing::how_many(200));
   int found_some = 0;
@@ -238,8 +239,8 @@ void expect_consistent(const BoundCaseLimits &limits) {
       EXPECT_TRUE(validate(at).empty() || !has_errors(validate(at)));
       EXPECT_EQ(analyze(compile(at, bound_case.platform).value()).verdict, Verdict::Schedulable);
       EXPECT_TRUE(simulated_without_a_miss(bound_case, at));
-      // Nothing between was tested at random, and all of it holds: bounds cover shorter executions and later releases,
-      // and every change of the order of priorities was looked at.
+      // A random position between was not tested, but must hold too. Bounds cover shorter executions and later
+      // releases, and every change of the order of priorities was tested.
       if (nominal) {
         const std::int64_t between = rng.uniform(result->nominal, *result->position);
         EXPECT_TRUE(simulated_without_a_miss(bound_case, turned(bound_case.workload, knob, between))) << between;

@@ -16,7 +16,7 @@ namespace {
 
 using analysis::Point;
 
-// What the policy orders tasks by; larger is more urgent. Nothing: it orders them by more than one number each.
+// Returns the value by which the policy orders tasks, larger for more urgent; nothing if it uses several values.
 std::optional<std::int64_t> urgency(const Task &task, PolicyKind policy) {
   switch (policy) {
     case PolicyKind::RateMonotonic: return -task.period;
@@ -29,7 +29,7 @@ std::optional<std::int64_t> urgency(const Task &task, PolicyKind policy) {
   return std::nullopt;
 }
 
-// DAGs with a task whose urgency a task of another DAG has, too.
+// Returns the DAGs with a task whose urgency equals that of a task of another DAG.
 std::vector<std::uint32_t> tied_dags(const Workload &workload) {
   std::map<std::int64_t, std::set<std::uint32_t>> dags;
   for (std::uint32_t d = 0; d < workload.dags.size(); ++d) {
@@ -46,7 +46,7 @@ std::vector<std::uint32_t> tied_dags(const Workload &workload) {
   return {tied.begin(), tied.end()};
 }
 
-// One priority for the tasks of a DAG that are equally urgent: they stay equals.
+// Assigns one priority to a DAG's equally urgent tasks, which remain equal.
 void set_priorities(Workload &workload, const std::vector<std::uint32_t> &order) {
   std::vector<std::uint32_t> place(workload.dags.size());
   std::iota(place.begin(), place.end(), 0);
@@ -67,7 +67,7 @@ void set_priorities(Workload &workload, const std::vector<std::uint32_t> &order)
   for (const Key &key : keys) priorities[key] = priority--;
   for (std::uint32_t d = 0; d < workload.dags.size(); ++d) {
     for (Task &task : workload.dags[d].tasks) {
-      task.priority = priorities.at(key_of(d, task));  // its key is that of its own priority alone, before this
+      task.priority = priorities.at(key_of(d, task));  // key_of() reads this task's old priority
     }
   }
 }

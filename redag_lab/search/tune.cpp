@@ -37,7 +37,7 @@ class Tuner {
 
     Tuned tuned;
     tuned.present = candidate(settings_.space().starts.front(), found.trials);
-    // Of what is equal by the goal, the workload stays as it is.
+    // The workload stays as it is unless the goal prefers another one.
     const bool is_improved = improves(found.score, tuned.present.score, options_.goal);
     tuned.found = is_improved ? candidate(found.best, found.trials) : tuned.present;
     tuned.exhaustive = found.exhaustive;
@@ -60,8 +60,8 @@ class Tuner {
     return Candidate{point, settings_.apply(point), trials.at(point), {}, {}};
   }
 
-  // Every workload with every seed, as many at a time as there are processors. Shorter if stopped: whole workloads
-  // only, the first ones.
+  // Simulates every workload with every seed, on all processors of the arena. If stopped, the result holds only the
+  // first workloads, each with all its seeds.
   std::vector<std::vector<Run>> simulate(const std::vector<Workload> &workloads, std::uint64_t first_seed,
                                          std::uint32_t seeds, const std::atomic<bool> *stop) {
     std::vector<std::vector<std::optional<Run>>> runs(workloads.size(), std::vector<std::optional<Run>>(seeds));
@@ -92,7 +92,7 @@ class Tuner {
     return score;
   }
 
-  // Nothing is proven where no bound speaks.
+  // Returns false where no bound applies.
   bool is_proven(const Workload &workload) const {
     analysis::AnalysisPlatform platform = analysis::platform_of(workload);
     platform.release_overhead = options_.simulation.overheads.release;
@@ -116,7 +116,7 @@ class Tuner {
     if (options_.bounds) {
       arena_.execute([&] {
         tbb::parallel_for(std::size_t{0}, scores.size(), [&](std::size_t i) {
-          // What was seen to miss needs no proof that it may.
+          // A workload with observed misses needs no proof.
           scores[i].proven = scores[i].all().missed == 0 && is_proven(workloads[i]);
         });
       });
@@ -131,7 +131,7 @@ class Tuner {
     if (options_.held_out == 0) return;
     std::vector<Workload> workloads = {tuned.present.workload};
     if (tuned.found.point != tuned.present.point) workloads.push_back(tuned.found.workload);
-    // Not stopped: what was found is worth being judged.
+    // Not stoppable: the setting that was found deserves a verdict.
     const auto runs = simulate(workloads, options_.seed + options_.seeds, options_.held_out, nullptr);
     judge(tuned.present, runs.front());
     if (runs.size() > 1) judge(tuned.found, runs.back());

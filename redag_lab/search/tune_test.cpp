@@ -18,7 +18,7 @@ using analysis::Point;
 using testing::make_dag;
 using testing::make_workload;
 
-// Small, and often overloaded: some setting matters.
+// Returns a small and often overloaded workload, for which some setting matters.
 Workload random_workload(std::uint64_t seed) {
   Rng rng(seed);
   std::vector<Dag> dags;
@@ -86,7 +86,7 @@ TEST(Tune, NeverReturnsWorseThanItWasGiven) {
     const auto tuned = tune(workload, options);
     ASSERT_TRUE(tuned);
     EXPECT_EQ(tuned->present.workload, workload);
-    // Judged again, from nothing but the workload that came out.
+    // Computes the scores again from the resulting workload alone.
     const auto judged = [&](const Candidate &candidate, std::uint64_t first, std::uint32_t seeds) {
       Score score = score_of(candidate.workload, options, first, seeds);
       score.proven = candidate.score.proven;
@@ -150,7 +150,7 @@ TEST(Tune, TheSameForEveryNumberOfProcessors) {
   EXPECT_EQ(one->best.held_out_runs, four->best.held_out_runs);
 }
 
-// Two DAGs of one rate on one worker; the second has the shorter deadline and comes second.
+// Returns two DAGs of one rate on one worker. The second one has the shorter deadline.
 Workload tie() {
   return make_workload({make_dag("long", {{"t", 20, 8}}), make_dag("short", {{"t", 20, 4, {}, "", 0, 6}})}, 1,
                        PreemptionMode::Os);
@@ -171,7 +171,7 @@ TEST(Tune, TieOrder) {
   EXPECT_FALSE(tune(tie(), options)->changed());
 }
 
-// Times vary, and yet no job is late with any seed, so that all seeds score the same.
+// Times vary, but no job is late with any seed, and all seeds score the same.
 TEST(Tune, WhatVariesIsDecidedByTheWorkload) {
   Workload workload =
       make_workload({make_dag("a", {{"t", 20, 4}}), make_dag("b", {{"t", 40, 4}})}, 2, PreemptionMode::Os);
@@ -197,11 +197,11 @@ TEST(Tune, WorkersWithinTheLimit) {
   EXPECT_FALSE(tune(workload, options)->changed());
   options.freedom.most_workers = 3;
   const auto tuned = tune(workload, options);
-  EXPECT_EQ(tuned->best.workload.platform.workers, 2U);  // not three: that changes nothing more
+  EXPECT_EQ(tuned->best.workload.platform.workers, 2U);  // not three, which improve nothing further
 }
 
 TEST(Tune, TheMostCriticalFirst) {
-  // One worker, two jobs in 20 ms of which one alone can be in time.
+  // One worker has two jobs in 20 ms, and only one of them can be in time.
   Workload workload = make_workload({make_dag("a", {{"t", 20, 8, {}, "", 0, 9}, {"u", 20, 1, {}, "", 0, 10}}),
                                      make_dag("b", {{"t", 20, 4, {}, "", 0, 6}})},
                                     1);

@@ -26,15 +26,15 @@ struct Share {
   int weight;
 };
 
-// S. Kramer, D. Ziegenbein, A. Hamann, "Real world automotive benchmarks for free", WATERS 2015, in per cent
-// of the runnables. The 15 % that follow the crankshaft have no period and are left out.
+// Periods with their percentage of the runnables, from S. Kramer, D. Ziegenbein, A. Hamann, "Real world automotive
+// benchmarks for free", WATERS 2015. The 15 % that follow the crankshaft have no period and are left out.
 constexpr std::array kAutomotive = {
     Share{1 * kMillisecond, 3},    Share{2 * kMillisecond, 2},   Share{5 * kMillisecond, 2},
     Share{10 * kMillisecond, 25},  Share{20 * kMillisecond, 25}, Share{50 * kMillisecond, 3},
     Share{100 * kMillisecond, 20}, Share{200 * kMillisecond, 1}, Share{1000 * kMillisecond, 4},
 };
 
-// Rates at which ROS nodes commonly publish and their timers run; the weights are our choice, not a measurement.
+// Rates at which ROS nodes commonly publish and their timers run. The weights are our choice, not a measurement.
 constexpr std::array kRobot = {
     Share{kSecond / 1000, 2}, Share{kSecond / 500, 3}, Share{kSecond / 200, 8}, Share{kSecond / 100, 15},
     Share{kSecond / 50, 20},  Share{kSecond / 30, 15}, Share{kSecond / 20, 12}, Share{kSecond / 10, 15},
@@ -58,7 +58,7 @@ std::uint32_t uniform(std::uint32_t low, std::uint32_t high, Rng &rng) {
   return static_cast<std::uint32_t>(rng.uniform(low, high));
 }
 
-/// Builds one workload; what each part draws comes from a stream of its own, so that changing one option (jitter, say)
+/// Builds one workload. Each part draws from a random stream of its own. Changing one option (jitter, say) therefore
 /// leaves everything else as it was.
 class Generator {
  public:
@@ -139,7 +139,8 @@ class Generator {
     }
   }
 
-  // About sqrt(n) tasks a layer. One predecessor is certain, the others of the layer before are drawn.
+  // Draws a layer's width, sqrt(n) tasks on average. Each task gets one predecessor of the previous layer; further ones
+  // are drawn.
   static std::uint32_t layer_width(std::uint32_t count, Rng &rng) {
     const auto mean = static_cast<std::uint32_t>(std::sqrt(static_cast<double>(count)));
     return uniform(std::uint32_t{1}, std::max<std::uint32_t>(1, 2 * mean - 1), rng);
@@ -147,7 +148,7 @@ class Generator {
 
   void draw_layers(Dag &dag, Rng &rng) const {
     const auto count = static_cast<std::uint32_t>(dag.tasks.size());
-    std::uint32_t before = 0;  // the layer before is [before, begin)
+    std::uint32_t before = 0;  // the previous layer is [before, begin)
     std::uint32_t begin = std::min(count, layer_width(count, rng));
     while (begin < count) {
       const std::uint32_t end = std::min(count, begin + layer_width(count, rng));
@@ -181,7 +182,8 @@ class Generator {
       }
       case PeriodModel::LogUniform: break;
     }
-    // Uniform in the logarithm over [min, max + granularity), rounded down, so that the last multiple has its share.
+    // The period is uniform in the logarithm over [min, max + granularity) and rounded down. The last multiple thereby
+    // gets its full share.
     const Duration g = o_.period_granularity;
     const double low = std::log(static_cast<double>(o_.period_min));
     const double high = std::log(static_cast<double>(o_.period_max + g));

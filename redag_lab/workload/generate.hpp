@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Random workloads from a seed: for experiments and as the source of property tests. The same options and seed give
-// the same workload on every machine. Pure functions.
+// Generates random workloads from a seed, for experiments and property tests. The same options and seed give the same
+// workload on every machine. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -14,17 +14,18 @@
 
 namespace redag {
 
-/// How the total utilization is shared among the tasks; both draw uniformly from what the bound allows.
+/// How the total utilization is shared among the tasks. Both methods draw uniformly from the vectors that keep the
+/// bound.
 enum class UtilizationMethod : std::uint8_t {
   Drs,             // Dirichlet-Rescale (Griffin, Bate, Davis, RTSS 2020)
-  UUniFastDiscard  // Davis, Burns, RTSS 2009; fails where almost every draw breaks the bound
+  UUniFastDiscard  // Davis, Burns, RTSS 2009; fails where almost every draw exceeds the bound
 };
 
 enum class PeriodModel : std::uint8_t {
   LogUniform,  // [period_min, period_max], multiples of period_granularity (Emberson, Stafford, Davis, WATERS 2010)
   Harmonic,    // period_min * 2^k up to period_max, equally likely
-  Automotive,  // 1 to 1000 ms with the shares of Kramer, Ziegenbein, Hamann, WATERS 2015, less the angle-synchronous
-  Robot,       // 1000 to 1 Hz, the rates common in ROS; the shares are our choice
+  Automotive,  // 1 to 1000 ms, shares of Kramer, Ziegenbein, Hamann, WATERS 2015, without angle-synchronous ones
+  Robot,       // 1 to 1000 Hz, the rates common in ROS; the shares are our choice
 };
 
 enum class DagShape : std::uint8_t {
@@ -42,7 +43,7 @@ enum class RateScope : std::uint8_t {
 
 inline constexpr std::uint32_t kMaxTasks = 10'000'000;  // of a generated workload
 
-/// Shares and ratios are in [0, 1]; ranges include both ends.
+/// Options of generate(). Shares and ratios are in [0, 1]; ranges include both ends.
 struct GenerateOptions {
   std::uint32_t dags = 2;
   std::uint32_t min_tasks = 3;  // per DAG
@@ -64,28 +65,29 @@ struct GenerateOptions {
   double deadline_max = 1.0;
 
   DagShape shape = DagShape::Layered;
-  double edge_probability = 0.3;  // Layered: of further edges between neighbouring layers; ErdosRenyi: of each edge
+  double edge_probability = 0.3;  // Layered: of each further edge between neighbouring layers; ErdosRenyi: of each edge
   double data_share = 1.0;        // of the tasks with predecessors: activated by data
 
   double bcet_min = 1.0;  // bcet / wcet, uniform; below 1 the execution time is uniform in [bcet, wcet]
   double bcet_max = 1.0;
   double jitter = 0.0;               // of a timer task: uniform in [0, jitter * period]
-  bool offsets = false;              // timer tasks start anywhere in their first period
+  bool offsets = false;              // timer tasks start at random instants in their first period
   std::uint32_t max_active_min = 0;  // of a DAG; 0: no bound
   std::uint32_t max_active_max = 0;
-  std::uint32_t groups = 0;  // exclusive groups across the workload
-  double group_share = 0.0;  // of the tasks: in one of the groups
-  double queue_share = 0.0;  // of the tasks: overrun queue, depth 1 to queue_depth
+  std::uint32_t groups = 0;  // number of exclusive groups in the workload
+  double group_share = 0.0;  // of the tasks that belong to one of the groups
+  double queue_share = 0.0;  // of the tasks with overrun queue, of depth 1 to queue_depth
   std::uint32_t queue_depth = 3;
-  double high_share = 0.0;  // of the DAGs: criticality high
-  double low_share = 0.0;   // of the DAGs: criticality low
+  double high_share = 0.0;  // of the DAGs with criticality high
+  double low_share = 0.0;   // of the DAGs with criticality low
 };
 
-/// What is wrong with the options, each with a message; cheap, where generate() with large options is not.
+/// Returns the mistakes in the options, each with a message. This is cheap, unlike generate() with large options.
 [[nodiscard]] Diagnostics find_mistakes(const GenerateOptions &options);
 
-/// Errors: options out of range, each with a message; UUniFastDiscard that found no vector. The workload passes
-/// validate() without errors; its utilization is the target within rounding (each wcet to a nanosecond, at least 1).
+/// Generates a workload that passes validate() without errors. Its utilization is the target within rounding (each wcet
+/// to a nanosecond, at least 1). Errors: options out of range, each with a message, and a UUniFastDiscard that found no
+/// vector.
 [[nodiscard]] Result<Workload> generate(const GenerateOptions &options, std::uint64_t seed);
 
 [[nodiscard]] const char *to_string(UtilizationMethod value);

@@ -52,7 +52,7 @@ RC_GTEST_PROP(Generate, IsValidAndHasItsUtilization, (std::uint64_t seed)) {
   RC_ASSERT(workload.has_value());
   RC_ASSERT(!has_errors(validate(*workload)));
   RC_ASSERT(workload->dags.size() == options.dags);
-  // Rounding to a nanosecond costs at most one in the shortest period, 1 ms, for each task.
+  // Rounding to a nanosecond costs each task at most one nanosecond in the shortest period, 1 ms.
   const double rounding = 1e-6 * static_cast<double>(workload->task_count()) + 1e-9;
   RC_ASSERT(std::abs(workload->utilization() - options.utilization) <= rounding);
   for (const Dag &dag : workload->dags) {
@@ -178,8 +178,6 @@ TEST(GenerateNames, GoBothWays) {
   EXPECT_EQ(dag_shape_from_string("circle"), std::nullopt);
 }
 
-// --- utilizations ---
-
 RC_GTEST_PROP(Drs, KeepsSumAndBounds, (std::uint64_t seed)) {
   const auto count = *rc::gen::inRange<std::size_t>(1, 60);
   std::vector<double> upper(count);
@@ -193,7 +191,7 @@ RC_GTEST_PROP(Drs, KeepsSumAndBounds, (std::uint64_t seed)) {
   for (std::size_t i = 0; i < count; ++i) RC_ASSERT((*drawn)[i] >= 0 && (*drawn)[i] <= upper[i]);
 }
 
-/// The largest difference between the empirical distributions of two samples (Kolmogorov-Smirnov).
+/// Returns the largest difference between the empirical distributions of two samples (Kolmogorov-Smirnov).
 double largest_difference(std::vector<double> a, std::vector<double> b) {
   std::sort(a.begin(), a.end());
   std::sort(b.begin(), b.end());
@@ -207,8 +205,8 @@ double largest_difference(std::vector<double> a, std::vector<double> b) {
   return largest;
 }
 
-// Both are uniform over the same set, so every coordinate has the same distribution. Covers both ways that drs() takes:
-// 0.9 of 4 bounds of 0.4 is drawn by its slacks, 0.5 of 4 directly.
+// Both methods are uniform over the same set, and every coordinate has the same distribution. The totals cover both
+// ways of drs(): it draws 0.9 of 4 bounds of 0.4 by the slacks and 0.5 of 4 directly.
 class DrsAgainstDiscard : public testing::TestWithParam<double> {};
 
 TEST_P(DrsAgainstDiscard, HasTheSameDistribution) {
@@ -222,7 +220,7 @@ TEST_P(DrsAgainstDiscard, HasTheSameDistribution) {
     by_drs.push_back(generation::drs(total, std::vector<double>(4, kBound), rng).value()[0]);
     by_discarding.push_back(generation::uunifast_discard(4, total, kBound, 100'000, rng).value()[0]);
   }
-  // At the level 0.001 two samples of n differ by 1.95 * sqrt(2 / n) = 0.0195; the seed is fixed.
+  // At the level 0.001, two samples of n differ by 1.95 * sqrt(2 / n) = 0.0195. The seed is fixed.
   EXPECT_LT(largest_difference(by_drs, by_discarding), 0.0195);
 }
 

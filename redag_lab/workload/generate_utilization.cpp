@@ -17,7 +17,7 @@ using Vector = std::vector<double>;
 
 double sum(const Vector &values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
-/// Uniform on the standard simplex: the flat Dirichlet distribution.
+/// Draws a point uniformly on the standard simplex (the flat Dirichlet distribution).
 Vector draw_simplex(std::size_t count, Rng &rng) {
   Vector point(count);
   for (double &x : point) x = -std::log(1.0 - rng.uniform01());
@@ -26,9 +26,9 @@ Vector draw_simplex(std::size_t count, Rng &rng) {
   return point;
 }
 
-/// The points of the simplex with x >= violated form a smaller simplex; this maps it onto the whole, as often as the
-/// point stays inside. One application is x -> (x - v) / (1 - sum v), a dilation about v / sum v, so p of them have a
-/// closed form.
+/// The points of the simplex with x >= violated form a smaller simplex. This maps that simplex onto the whole one,
+/// repeatedly while the point stays inside. One application is x -> (x - v) / (1 - sum v), a dilation about v / sum v.
+/// Its powers therefore have a closed form.
 void expand(Vector &point, const Vector &violated) {
   const double total = sum(violated);
   const double scale = 1.0 - total;
@@ -37,7 +37,7 @@ void expand(Vector &point, const Vector &violated) {
     const double centre = violated[i] / total;
     if (point[i] < centre) power = std::min(power, std::log(1.0 - point[i] / centre) / std::log(scale));
   }
-  // The largest whole power strictly inside; a point that is the centre itself moves nowhere, and one step says so.
+  // Takes the largest whole power strictly inside. A point at the centre moves nowhere; one step shows this.
   power = std::isfinite(power) ? std::max(1.0, std::ceil(power) - 1.0) : 1.0;
   const double factor = std::pow(scale, power);
   for (std::size_t i = 0; i < point.size(); ++i) {
@@ -46,7 +46,8 @@ void expand(Vector &point, const Vector &violated) {
   }
 }
 
-/// Moves `point` until it keeps the limits. False if rounding errors, which every step magnifies, grow too large.
+/// Moves `point` until it keeps the limits. Returns false if rounding errors, which every step magnifies, grow too
+/// large.
 bool rescale(Vector &point, const Vector &limits) {
   constexpr int kMaxRescales = 1000;
   constexpr double kEpsilon = 1e-9;
@@ -79,8 +80,8 @@ std::optional<Vector> drs(double total, const Vector &upper, Rng &rng) {
     for (double &x : limits) x *= total;
     return limits;  // every task at its bound
   }
-  // Where the bounds are tight (sum of limits below 2) the simplex of the slacks limit - x is the smaller one: draw
-  // those.
+  // With tight bounds (sum of limits below 2), the simplex of the slacks limit - x is the smaller one. Then the slacks
+  // are drawn.
   const bool draw_slacks = slack < 1.0;
   Vector bounds = limits;
   if (draw_slacks) {

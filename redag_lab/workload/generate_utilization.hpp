@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Vectors of utilizations with a given sum and a bound for each, for generate.cpp. Pure, given the generator.
+// Draws vectors of utilizations with a given sum and a bound for each value, for generate.cpp. Pure, given the random
+// generator.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +13,14 @@
 
 namespace redag::generation {
 
-/// Uniform over {u : sum u = total, 0 <= u_i <= upper_i}: Dirichlet-Rescale, D. Griffin, I. Bate, R. Davis, "Generating
-/// Utilization Vectors for the Systematic Evaluation of Schedulability Tests", RTSS 2020. Requires total > 0 and
-/// total <= sum upper. Nothing if rounding defeated every attempt.
+/// Draws uniformly from {u : sum u = total, 0 <= u_i <= upper_i}: Dirichlet-Rescale, D. Griffin, I. Bate, R. Davis,
+/// "Generating Utilization Vectors for the Systematic Evaluation of Schedulability Tests", RTSS 2020. Requires
+/// total > 0 and total <= sum upper. Returns nothing if rounding defeated every attempt.
 [[nodiscard]] std::optional<std::vector<double>> drs(double total, const std::vector<double> &upper, Rng &rng);
 
-/// Uniform over {u : sum u = total, 0 <= u_i <= bound}: UUniFast (E. Bini, G. Buttazzo, RTS 30, 2005) until a vector
-/// keeps the bound (R. Davis, A. Burns, RTSS 2009). Nothing after `attempts` without one.
+/// Draws uniformly from {u : sum u = total, 0 <= u_i <= bound}: UUniFast (E. Bini, G. Buttazzo, RTS 30, 2005) until a
+/// vector keeps the bound (R. Davis, A. Burns, RTSS 2009). Returns nothing after `attempts` vectors that break the
+/// bound.
 [[nodiscard]] std::optional<std::vector<double>> uunifast_discard(std::size_t count, double total, double bound,
                                                                   int attempts, Rng &rng);
 

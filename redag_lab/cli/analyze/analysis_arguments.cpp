@@ -11,7 +11,7 @@
 namespace redag::cli {
 namespace {
 
-constexpr std::uint32_t kMaxLevels = 1'000'000;  // of tasks there are hardly more
+constexpr std::uint32_t kMaxLevels = 1'000'000;  // larger than the number of tasks in practice
 
 }  // namespace
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the commands that analyse a workload ask for alike: the workload, and the platform on which it is looked at.
+// Arguments common to the commands that analyse a workload: the workload and the platform of the analysis.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -19,21 +19,22 @@ namespace redag::cli {
 
 struct AnalysisArguments {
   RunArguments run;
-  std::uint32_t levels = 0;  // 0: one a task
+  std::uint32_t levels = 0;  // 0: one per task
   std::uint64_t effort = analysis::kUsualEffort / kEffortUnit;
   std::optional<Duration> time_limit;  // of the whole analysis
 
   static constexpr std::uint64_t kEffortUnit = 1'000'000;  // steps
 };
 
-/// Progress, Ctrl-C and the limits of a command that analyses: made once for all that it does. Not thread-safe.
+/// Progress, Ctrl-C and the limits of a command that analyses. A command creates one for all its analyses. Not
+/// thread-safe.
 class AnalysisWatch {
  public:
   AnalysisWatch(const AnalysisArguments &arguments, Console &console) : arguments_(arguments), progress_(console) {}
 
-  /// Refer to this.
+  /// The options refer to this object, which must outlive them.
   [[nodiscard]] analysis::AnalyzeOptions options();
-  /// Why no more work should be done now, a clause without a period; or empty.
+  /// Returns the reason to stop now, a clause without a final full stop; empty if there is none.
   [[nodiscard]] std::string why_stop() const;
   [[nodiscard]] Progress &progress() { return progress_; }
 
@@ -43,11 +44,11 @@ class AnalysisWatch {
   Stopwatch watch_;
 };
 
-/// --json, --all-tasks, --check (with this help), the limits and everything about the platform. FILE is the command's
-/// own.
+/// Adds --json, --all-tasks, --check (with this help), the limits and everything about the platform. The command adds
+/// FILE itself.
 void add_analysis_arguments(CLI::App &app, AnalysisArguments &arguments, const std::string &check_help);
 
-/// Error: the overheads that were given are not those of such threads.
+/// Error: the given overheads are not those of such threads.
 [[nodiscard]] Result<analysis::AnalysisPlatform> platform_for(const Workload &workload,
                                                               const AnalysisArguments &arguments,
                                                               const std::string &executor = "redag");

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Cause-effect chains that `analyze --chain` asks for: reaction and age end to end, also over several DAGs. Pure
+// Cause-effect chains of `analyze --chain`: reaction time and data age end to end, also over several DAGs. Pure
 // functions.
 #pragma once
 
@@ -18,15 +18,16 @@ namespace redag::cli {
 struct ChainRow {
   std::vector<TaskId> tasks;  // in the order of the data
   std::variant<analysis::NotApplicable, analysis::ChainBound> bound;
-  /// Under logical execution time, reading at the release and writing at the deadline: exact, where all are timers.
+  /// The exact reaction time and age under logical execution time (read at the release, write at the deadline), if all
+  /// tasks are timers.
   std::optional<Duration> let;
 };
 
-/// `chain`: "dag.task,dag.task,...". By the tightest bounds of the tasks and DAGs. Error: a name that is none, or no
-/// task's.
+/// Bounds the chain "dag.task,dag.task,..." with the tightest bounds of the tasks and DAGs. Error: malformed, or a name
+/// without a task.
 [[nodiscard]] Result<ChainRow> find_chain(const Analysed &analysed, const std::string &chain);
 
-/// A table, the segments of each chain, and what the figures mean.
+/// Returns a table, the segments of each chain, and an explanation of the figures.
 [[nodiscard]] std::string describe(const Analysed &analysed, const std::vector<ChainRow> &chains,
                                    const StreamTraits &terminal);
 

@@ -8,7 +8,7 @@
 namespace redag::cli {
 namespace {
 
-// One worker: sensor (T 10, C 3) above a DAG of two (T 20, C 2 and 5), in milliseconds.
+// Returns on one worker a sensor (T 10, C 3) above a DAG of two tasks (T 20, C 2 and 5), in milliseconds.
 Analysed sensor_and_pipeline() {
   const auto timer = [](std::string name, Duration period, Duration wcet) {
     Task task;
@@ -35,12 +35,12 @@ TEST(AnalysisChains, OverSeveralDags) {
   const Result<ChainRow> row = find_chain(analysed, "sensor.read,pipeline.first,pipeline.second");
   ASSERT_TRUE(row) << to_string(row.error());
   const auto &bound = std::get<analysis::ChainBound>(row->bound);
-  ASSERT_EQ(bound.segments.size(), 2U);  // the edge hands over job by job
+  ASSERT_EQ(bound.segments.size(), 2U);  // the edge hands over from job to job
   EXPECT_EQ(bound.segments[1].response, (2 + 5 + 3) * kMillisecond);
   EXPECT_EQ(bound.age(), (10 + 3 + 20 + 10) * kMillisecond);
   // The sensor ends before a pipeline of the same release starts: 10 + max(3, 20) + 10.
   EXPECT_EQ(bound.reaction(), 40 * kMillisecond);
-  EXPECT_FALSE(row->let);  // not a timer, the last one
+  EXPECT_FALSE(row->let);  // the last task is no timer
 
   const std::string text = describe(analysed, {*row}, StreamTraits{});
   EXPECT_NE(text.find("sensor.read > pipeline.first > pipeline.second"), std::string::npos) << text;
@@ -53,7 +53,7 @@ TEST(AnalysisChains, OverSeveralDags) {
 TEST(AnalysisChains, OfTimersLogicalExecutionTimeIsExact) {
   const Result<ChainRow> row = find_chain(sensor_and_pipeline(), "sensor.read,pipeline.first");
   ASSERT_TRUE(row);
-  // Right after 10: read at 20 and written at 30, read at 40 and written at 60.
+  // Data that arrives right after 10 is read at 20 and written at 30, then read at 40 and written at 60.
   EXPECT_EQ(row->let, 50 * kMillisecond);
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 using analysis::Term;
 
-// Whose share it is. A unit of several tasks is called by its DAG.
+// Names the owner of a term. A unit of several tasks has its DAG's name.
 std::string owner(const Analysed &analysed, const Term &term) {
   if (term.task.valid()) return task_name(analysed, term.task);
   if (term.dag.valid()) return analysed.system.dags[term.dag.value].name;
@@ -29,7 +29,7 @@ std::string owner(const Analysed &analysed, const Term &term) {
 
 std::string what(const Term &term) {
   switch (term.kind) {
-    // Of a DAG on several workers: its longest path (one job), and what its other tasks keep that path waiting.
+    // Of a DAG on several workers: its longest path (one job), and the delay of this path by the DAG's other tasks.
     case Term::Kind::Own: return term.jobs == 0 ? "own tasks beside the path" : "own execution";
     case Term::Kind::Earlier: return term.amount < 0 ? "since earlier jobs were released" : "earlier jobs of its own";
     case Term::Kind::Blocking: return "blocking by";
@@ -107,7 +107,7 @@ std::string explain_bound(const Analysed &analysed, const Row &row, const Stream
   return text;
 }
 
-// Why nothing bounds it, what could not be asked, and who uses the workers.
+// Returns the reason why there is no bound, the methods that gave up or do not apply, and the load.
 std::string explain_absence(const Analysed &analysed, const Row &row) {
   std::string text = fmt::format("why there is no bound: {}\n", row.reason);
   if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return text;
@@ -141,7 +141,7 @@ Result<Row> find_row(const Analysed &analysed, const std::string &name) {
       names.push_back(row.name);
     }
   }
-  // The task's own name, without its DAG's, is the likeliest mistake.
+  // A likely mistake is the task's own name without its DAG's.
   for (const std::string &candidate : names) {
     const std::size_t at = candidate.size() > name.size() ? candidate.size() - name.size() - 1 : std::string::npos;
     if (at != std::string::npos && candidate.compare(at, std::string::npos, "." + name) == 0) {

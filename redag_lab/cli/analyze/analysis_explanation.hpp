@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Where a response time comes from, in words: what `analyze --explain` prints. Pure functions.
+// Itemises a response time in words, for `analyze --explain`. Pure functions.
 #pragma once
 
 #include <optional>
@@ -11,10 +11,11 @@
 
 namespace redag::cli {
 
-/// `name` is "dag.task" ("dag/task" too) or a DAG's. Error, with the nearest name, if there is no such task or DAG.
+/// Finds a row by `name`: "dag.task" (or "dag/task"), or a DAG's name. Error, with the nearest name, if there is no
+/// such task or DAG.
 [[nodiscard]] Result<Row> find_row(const Analysed &analysed, const std::string &name);
 
-/// The terms of the bound, largest share first, and what to change; or why there is none.
+/// Returns the terms of the bound, largest share first, and a suggested change; or the reason why there is no bound.
 [[nodiscard]] std::string explain(const Analysed &analysed, const Row &row, const StreamTraits &terminal);
 
 }  // namespace redag::cli

@@ -27,7 +27,8 @@ Analysed look_at(const Workload &workload) {
   return *std::move(analysed);
 }
 
-// One worker: fast.a (T 10, C 3), slow.b (T 20, C 7, with a preemption point every millisecond).
+// Returns two tasks on one worker: fast.a (T 10, C 3) and slow.b (T 20, C 7, with a preemption point every
+// millisecond).
 Analysed two_tasks(PreemptionMode mode) {
   Workload workload = make_workload({make_dag("fast", {{"a", 10, 3}}), make_dag("slow", {{"b", 20, 7}})}, 1, mode);
   workload.dags[1].tasks[0].region = kMillisecond;
@@ -49,7 +50,7 @@ Term term(Kind kind, Duration ms, TaskId task = {}, std::int64_t jobs = 0) {
   return made;
 }
 
-// What is said of slow.b if `largest` is 6 of its 10 ms.
+// Returns the explanation of slow.b if `largest` is 6 of its 10 ms.
 std::string explained(const Term &largest, PreemptionMode mode = PreemptionMode::Os) {
   const Analysed analysed = two_tasks(mode);
   Row row = row_of(analysed, "slow.b");
@@ -60,7 +61,7 @@ std::string explained(const Term &largest, PreemptionMode mode = PreemptionMode:
 
 TEST(Explanation, TermsAddUpAndTheLargestIsNamed) {
   const Analysed analysed = two_tasks(PreemptionMode::None);
-  // Not preempted, a waits for b (7 ms, of which one nanosecond at least is done) and for nothing else.
+  // Without preemption, a waits only for b: 7 ms, of which at least one nanosecond has passed.
   const Row row = row_of(analysed, "fast/a");
   EXPECT_EQ(row.tightest.response, 10 * kMillisecond - 1);
   const std::string text = explain(analysed, row, StreamTraits{});
@@ -69,7 +70,8 @@ TEST(Explanation, TermsAddUpAndTheLargestIsNamed) {
   EXPECT_THAT(text, HasSubstr("slow.b keeps its worker until it ends"));
 }
 
-// 1, then three times 4 side by side, on two workers: the longest path is 5, and L + (V - L) / m = 5 + 8 / 2.
+// A task of 1 precedes three parallel tasks of 4 on two workers. The longest path L is 5, and
+// L + (V - L) / m = 5 + 8 / 2.
 TEST(Explanation, OfADagOnSeveralWorkersTellsThePathFromTheRest) {
   const Dag fork =
       make_dag("fork", {{"first", 10, 1}, {"left", 0, 4, {0}}, {"right", 0, 4, {0}}, {"third", 0, 4, {0}}});

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The document `redag.analysis/1`; docs/cli.md lists its keys.
+// Writes the document `redag.analysis/1`, whose keys docs/cli.md lists.
 #include "redag_lab/cli/analyze/analysis_report.hpp"
 
 namespace redag::cli {
@@ -12,7 +12,7 @@ using analysis::MethodReport;
 
 Json duration_json(const std::optional<Duration> &duration) { return duration ? Json(*duration) : Json(); }
 
-// Null where they were left out: see kMostItemised.
+// Returns null if the terms were left out (kMostItemised).
 Json terms_json(const Analysed &analysed, const analysis::ResponseBound &bound) {
   if (bound.response && bound.terms.empty()) return nullptr;
   Json terms = Json::array();

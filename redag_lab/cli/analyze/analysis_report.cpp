@@ -24,9 +24,9 @@ using analysis::MethodReport;
 using analysis::NotApplicable;
 using analysis::Verdict;
 
-constexpr std::size_t kMostTasks = 50;  // rows before the table is cut to the tightest
+constexpr std::size_t kMostTasks = 50;  // with more tasks, the table shows only this many, the tightest
 
-// A trusted test that answers for all tasks at once, or null.
+// Returns a trusted test that accepts all tasks at once, or null.
 const Method *accepting_test(const Analysed &analysed) {
   for (const MethodReport &method : analysed.report.methods) {
     const analysis::Bound *bound = method.bound();
@@ -35,7 +35,7 @@ const Method *accepting_test(const Analysed &analysed) {
   return nullptr;
 }
 
-// Where something more urgent stands in the way: the most urgent task without a bound, and why that has none.
+// If a more urgent task prevents this bound, returns the most urgent task without a bound and its reason.
 std::string culprit_of(const Analysed &analysed, const analysis::Bound &bound, const analysis::ResponseBound &asked) {
   if (asked.absent != analysis::global::kMoreUrgent && asked.absent != analysis::global::kPeer) return {};
   for (const std::uint32_t t : analysed.system.by_rank) {
@@ -46,7 +46,7 @@ std::string culprit_of(const Analysed &analysed, const analysis::Bound &bound, c
   return {};
 }
 
-// Why the trusted methods that could have bounded this response did not: the first to say so.
+// Returns the first reason that a trusted method states for the missing bound.
 std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_dag) {
   if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return analysed.system.not_analysable;
   for (const MethodReport &method : analysed.report.methods) {
@@ -72,7 +72,7 @@ void judge(const Analysed &analysed, Row &row, std::size_t index, bool is_dag) {
   const Method *test = accepting_test(analysed);
   const bool is_met = row.slack.value_or(-1) >= 0;
   if (!is_met && row.due && test != nullptr) {
-    // A yes-or-no test can accept where the bounds are too coarse: a number above the deadline says nothing then.
+    // A yes-or-no test can accept where the bounds are too coarse. A bound above the deadline is then dropped.
     row.tightest = {};
     row.slack.reset();
     row.reason = fmt::format("{} accepts the workload as a whole, and tells no response times", test->name);
@@ -116,7 +116,7 @@ std::string table_of(const char *title, const std::vector<Row> &rows, const Stre
   return table.render(terminal.width, terminal.colour);
 }
 
-// All, in the workload's order, or those that are nearest to a miss or past it.
+// Returns all rows in the workload's order, or only those nearest to a miss.
 std::vector<Row> shown_rows(std::vector<Row> rows, bool all) {
   if (all || rows.size() <= kMostTasks) return rows;
   const auto urgency = [](const Row &row) {
@@ -128,12 +128,12 @@ std::vector<Row> shown_rows(std::vector<Row> rows, bool all) {
   return rows;
 }
 
-// "2.0 %", down.
+// Formats a share rounded down: "2.0 %".
 std::string format_share(Duration part, Duration whole) {
   return fmt::format("{:.1f} %", std::floor(1000 * static_cast<double>(part) / static_cast<double>(whole)) / 10);
 }
 
-// What a method says in a few words, and how good that is.
+// Summarises a method's answer in a few words.
 Cell answer(const MethodReport &report) {
   if (!report.trusted) return {"not sound here", Tint::Caution};
   if (report.verdict == Verdict::Schedulable) return {"schedulable", Tint::Good};
@@ -158,7 +158,7 @@ std::string method_table(const Analysed &analysed, const StreamTraits &terminal)
     return fmt::format("none of the {} methods applies: {}\n", analysed.report.methods.size(),
                        analysed.system.not_analysable);
   }
-  std::vector<const MethodReport *> order;  // those to be trusted first
+  std::vector<const MethodReport *> order;  // trusted methods first
   for (const bool trusted : {true, false}) {
     for (const MethodReport &report : analysed.report.methods) {
       if (report.bound() != nullptr && report.trusted == trusted) order.push_back(&report);
@@ -174,7 +174,7 @@ std::string method_table(const Analysed &analysed, const StreamTraits &terminal)
          (others.empty() ? "" : "does not apply:\n" + others);
 }
 
-// Over all schedules there are: what a bound does not tell is the best case.
+// Returns the best and worst responses over all schedules. Bounds give no best case.
 std::string exploration_table(const Analysed &analysed, const StreamTraits &terminal, bool all) {
   const analysis::Exploration &exploration = *analysed.exploration;
   Table table({{"explored", false, 9}, {"best", true, 5}, {"worst", true, 5}});
@@ -197,7 +197,7 @@ std::string plural(std::size_t count, const char *noun) {
 std::string headline(const Analysed &analysed) {
   const analysis::AnalysisPlatform &platform = analysed.system.platform;
   const std::string reason = mode_reason(analysed);
-  // What orders the jobs: the policy, or somebody else's executor, which knows none.
+  // The jobs are ordered by the policy, or by another executor, which ignores policies.
   const std::string order =
       analysed.executor->ours ? to_string(analysed.workload.policy) : std::string(analysed.executor->description);
   std::string text = fmt::format("{}: {}, {}, utilization {:.3f}\n", analysed.workload.name, order,
@@ -218,7 +218,7 @@ std::string headline(const Analysed &analysed) {
   return text;
 }
 
-// "a and b", "a, b and 2 more".
+// Returns "a and b" or "a, b and 2 more".
 std::string listed(const std::vector<const Method *> &methods) {
   constexpr std::size_t kMost = 3;
   std::string text;
@@ -230,7 +230,7 @@ std::string listed(const std::vector<const Method *> &methods) {
   return text;
 }
 
-// Error: a name that is none of theirs.
+// Keeps the methods with these names. Error: an unknown name.
 std::optional<Diagnostics> keep_only(const std::vector<std::string> &only, std::vector<Method> &methods) {
   if (only.empty()) return std::nullopt;
   std::vector<std::string> names;
@@ -405,10 +405,11 @@ std::string describe(const Analysed &analysed, const StreamTraits &terminal, boo
   return text;
 }
 
-// Least slack for its deadline; of those without a bound, which all come before, the most urgent.
+// Returns the row with the least slack for its deadline. Rows without a bound precede all others, the most urgent
+// first.
 std::optional<Row> weakest_row(const Analysed &analysed) {
   std::optional<Row> weakest;
-  std::pair<bool, double> least;  // has a bound, then the slack's share; or the rank
+  std::pair<bool, double> least;  // has a bound, then the slack's share or the rank
   const auto consider = [&](Row row, double rank) {
     if (!row.due || (row.standing == Standing::Ok && !row.slack)) return;
     const std::pair<bool, double> key = {
@@ -492,7 +493,7 @@ std::string summarise(const Analysed &analysed, const StreamTraits &terminal) {
 }
 
 std::string methods_that_do_not_apply(const analysis::Report &report, bool tests) {
-  std::vector<std::pair<std::string, std::string>> reasons;  // and which methods say so
+  std::vector<std::pair<std::string, std::string>> reasons;  // each with the methods that state it
   for (const MethodReport &method : report.methods) {
     const auto *reason = std::get_if<NotApplicable>(&method.outcome);
     if (reason == nullptr || reason->gave_up || (!tests && method.method->subject == analysis::Subject::System))

@@ -22,7 +22,8 @@ Dag dag_of(std::string name, std::vector<Task> tasks) {
   return Dag{std::move(name), std::move(tasks), 0, 0, 0, Criticality::Normal, {}};
 }
 
-// One worker: a (T 10, C 3), b (T 20, C 7), in milliseconds. Preempted: 3 and 7 + 3 = 10, as the second a comes then.
+// Returns a (T 10, C 3) and b (T 20, C 7) on one worker, in milliseconds. With preemption the responses are 3 and
+// 7 + 3 = 10, when the second job of a arrives.
 Workload two_tasks(PreemptionMode mode) {
   Workload workload;
   workload.name = "two";
@@ -72,7 +73,7 @@ TEST(AnalysisReport, AnotherExecutorIsItsOwnHeadlineAndMethods) {
   EXPECT_FALSE(analyse(workload, analysis::platform_of(workload), nullptr, "SingleThreadedExecutor"));
 }
 
-// Run to completion, with the offsets as they are: b never comes while a runs, nor a while b does.
+// Without preemption and with fixed offsets, b never arrives while a runs, nor a while b runs.
 TEST(AnalysisReport, AnExplorationIsAMethodAmongOthers) {
   Workload workload = two_tasks(PreemptionMode::None);
   workload.dags[1].tasks[0].offset = 3 * kMillisecond;
@@ -124,7 +125,7 @@ TEST(AnalysisReport, DeadlinesOfDagsCount) {
 TEST(AnalysisReport, ATestWithoutNumbersStillAnswers) {
   Workload workload = two_tasks(PreemptionMode::Auto);
   workload.policy = PolicyKind::Edf;
-  workload.dags[0].tasks[0].wcet = 5 * kMillisecond;  // a full worker: more than the bounds on responses can show
+  workload.dags[0].tasks[0].wcet = 5 * kMillisecond;  // a fully used worker: too much for the bounds
   workload.dags[1].tasks[0].wcet = 10 * kMillisecond;
   const Analysed analysed = look_at(workload);
   const Row row = row_of(analysed, "fast.a");

@@ -28,10 +28,10 @@ struct Options {
   std::string executor = "redag";
   std::string explain;
   std::vector<std::string> chains;
-  std::vector<std::string> only;  // methods
+  std::vector<std::string> only;  // names of methods
   bool methods = false;
   bool all = false;
-  std::uint64_t explore = 0;  // states; 0: not asked for
+  std::uint64_t explore = 0;  // states; 0: not requested
 };
 
 const Choices<std::string> &executor_choices() {
@@ -46,7 +46,7 @@ const Choices<std::string> &executor_choices() {
 constexpr std::uint64_t kUsualStates = 1'000'000;
 constexpr std::uint64_t kMostEffort = 1'000'000'000;
 
-// Nothing if there is no such task; the console was told.
+// Finds the requested chains. Returns nothing, with an error on the console, if a task is unknown.
 std::optional<std::vector<ChainRow>> find_chains(const Analysed &analysed, const Options &options, Console &console) {
   std::vector<ChainRow> rows;
   for (const std::string &chain : options.chains) {
@@ -60,7 +60,7 @@ std::optional<std::vector<ChainRow>> find_chains(const Analysed &analysed, const
   return rows;
 }
 
-// One task or DAG in words, or all of it. False if the one is not there.
+// Reports one task or DAG in words, or the whole analysis. Returns false if that task or DAG is unknown.
 bool report(const Analysed &analysed, const Options &options, Console &console) {
   const std::optional<std::vector<ChainRow>> chains = find_chains(analysed, options, console);
   if (!chains) return false;
@@ -104,7 +104,7 @@ std::string is_states(const std::string &text) {
                   : fmt::format("{} is not a number of states from 1 to {}", in_quotes(text), kMostStates);
 }
 
-// With Ctrl-C, what the other methods say remains.
+// Analyses the workload. After Ctrl-C, the answers of the other methods remain.
 Result<Analysed> analyse_configured(const Workload &workload, const Options &options, Console &console) {
   const Result<analysis::AnalysisPlatform> configured = platform_for(workload, options.analysis, options.executor);
   if (!configured) return tl::unexpected(configured.error());

@@ -60,7 +60,7 @@ int assign_file(const Options &options, Console &console) {
   assigned.options = options.assignment;
   assigned.options.priorities = options.keep != Keep::Priorities;
   assigned.options.caps = options.keep != Keep::MaxActive;
-  const InterruptGuard guard;  // until the results are written
+  const InterruptGuard guard;  // covers writing the results too
   AnalysisWatch watch(options.analysis, console);
   Result<analysis::Assignment> found = search(*workload, assigned.platform, assigned.options, watch);
   if (!found) {

@@ -27,7 +27,7 @@ std::string signed_duration(Duration duration) {
   return duration < 0 ? "-" + humanize_duration(-duration) : humanize_duration(duration);
 }
 
-// Rounded down: no more than there is.
+// Formats a share, rounded down so as not to overstate it.
 std::string percent(double share) { return fmt::format("{:.1f} %", std::floor(share * 1000 + 1e-9) / 10); }
 
 bool has_numbers(const Score &score, const Workload &workload) {
@@ -44,7 +44,7 @@ std::string slack_text(const Score &score, const Workload &workload) {
   return has_numbers(score, workload) ? percent(score.least_slack) : "-";
 }
 
-// Of the DAGs that have a choice: those with more than one task.
+// Lists the bounds of the DAGs with a choice: those with several tasks.
 std::string caps_text(const Workload &workload, const Caps &caps) {
   std::string text;
   for (std::size_t d = 0; d < caps.size(); ++d) {
@@ -89,7 +89,7 @@ std::vector<Trial> ranked(const Assigned &assigned) {
   return trials;
 }
 
-// The concurrency bounds tried, best first.
+// Returns the combinations of max_active that were tried, best first.
 std::string trials_table(const Assigned &assigned, const StreamTraits &terminal, bool all) {
   const std::vector<Trial> trials = ranked(assigned);
   const Workload &workload = assigned.assignment.best.workload;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What `assign` says about an assignment of redag_lab/search: what it would change, what that gains, what else was
-// tried. Pure functions.
+// Presents the result of `assign` (redag_lab/search): the changes, their gain, and the alternatives tried. Pure
+// functions.
 #pragma once
 
 #include <string>
@@ -19,15 +19,15 @@ struct Assigned {
   analysis::AssignmentOptions options;
 };
 
-/// One change a line: "policy: rate_monotonic -> fixed". Empty if nothing is better.
+/// Returns one line per change: "policy: rate_monotonic -> fixed". Empty if no candidate is better.
 [[nodiscard]] std::vector<std::string> changes(const analysis::Assignment &assignment);
 
-/// What is gained, and how sure it is that there is nothing better. Sentences, one a line.
+/// Returns the gain, and how certain it is that no better candidate exists. Sentences, one per line.
 [[nodiscard]] std::string in_words(const Assigned &assigned);
 
 [[nodiscard]] std::string describe(const Assigned &assigned, const StreamTraits &terminal, bool all);
 
-/// `redag.assignment/1`.
+/// Returns `redag.assignment/1`.
 [[nodiscard]] Json to_json(const Assigned &assigned);
 
 }  // namespace redag::cli

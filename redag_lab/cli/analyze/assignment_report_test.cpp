@@ -75,7 +75,7 @@ TEST(SensitivityReport, FactorsAreNeverRoundedUp) {
     sensitivity.results.push_back({analysis::margin_of(workload, platform, knob).value(), {}});
   }
   sensitivity.knobs = sensitivity.results.size();
-  // Harmonic with U = 0.4: 2.5, and for b alone 14 ms of the 20.
+  // Harmonic periods with U = 0.4 leave a factor of 2.5, and 14 ms of 20 for b alone.
   EXPECT_EQ(in_words(sensitivity).find("all execution times together can grow to 2.5000 times"), 0U);
   sensitivity.results[0].margin.factor = 2.49999;
   EXPECT_EQ(in_words(sensitivity).find("all execution times together can grow to 2.4999 times"), 0U);

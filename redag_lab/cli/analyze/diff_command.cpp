@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::uint32_t kFewestReplicates = 100;
 constexpr std::uint32_t kMostReplicates = 1'000'000;
-constexpr double kMostTolerance = 0.99;  // of 1: everything is equal
+constexpr double kMostTolerance = 0.99;  // at 1, all values would be equal
 constexpr std::size_t kMostShown = 10;
 
 struct Options {
@@ -33,7 +33,7 @@ struct Options {
   bool all_tasks = false;
 };
 
-// "a, b, c and 7 more"
+// Returns "a, b, c and 7 more".
 std::string some_of(const std::vector<std::string> &items) {
   std::string text;
   for (std::size_t i = 0; i < std::min(items.size(), kMostShown); ++i) text += (i == 0 ? "" : ", ") + items[i];
@@ -59,7 +59,7 @@ class Diffing {
   }
 
  private:
-  // False: an error was printed.
+  // Reads one side. Returns false after printing an error.
   bool read(const std::string &place, DiffSide &side) {
     const Result<RecordedPlaces> found = find_recorded_runs({place});
     if (!found) {
@@ -103,7 +103,7 @@ class Diffing {
     return true;
   }
 
-  // Why it is no repetition of the runs before, or empty.
+  // Adds a trace. Returns the reason why it is no repetition of the earlier runs, or an empty text.
   static std::string add(const trace::Trace &trace, DiffSide &side) {
     if (!side.jobs.runs().empty()) {
       const trace::RunInfo &first = side.jobs.runs().front();
@@ -118,7 +118,7 @@ class Diffing {
     return {};
   }
 
-  // Only what asks for the same work can be compared: else a difference says nothing of how it was scheduled.
+  // Only workloads with the same demand can be compared. Otherwise a difference does not describe the scheduling.
   bool compare_workloads() {
     diffed_.changes = changes_between(diffed_.a.jobs.runs().front().workload, diffed_.b.jobs.runs().front().workload);
     std::vector<std::string> demand;

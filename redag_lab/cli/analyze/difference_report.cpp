@@ -22,7 +22,7 @@ using metrics::DifferenceSide;
 using metrics::FigureDifference;
 using metrics::Verdict;
 
-constexpr std::size_t kMostTasks = 20;  // shown without a difference
+constexpr std::size_t kMostTasks = 20;  // with more rows, only those with a difference are shown
 
 struct Figure {
   const char *name;
@@ -36,7 +36,7 @@ constexpr std::array<Figure, 4> kFigures = {{{"missed", &metrics::RowDifference:
 
 bool is_miss(const Figure &figure) { return figure.value == &metrics::RowDifference::miss_ratio; }
 
-// A figure of one side: a time of what answered, misses with their count.
+// Returns the text of one side's figure: a response time, or misses with their count.
 std::string value_text(const Figure &figure, const DifferenceSide::Row &side, double value) {
   if (is_miss(figure)) return format_count_and_share(side.missed(), side.released);
   return side.has_responses() ? humanize_duration(static_cast<Duration>(value)) : "-";
@@ -121,7 +121,7 @@ std::string differences_table(const Diffed &diffed, const StreamTraits &terminal
   return text;
 }
 
-// Every figure that differs by more than chance, the worse ones first.
+// Returns every figure that differs by more than chance, worse ones first.
 std::string findings(const Diffed &diffed, const StreamTraits &terminal) {
   std::string text;
   for (const Verdict wanted : {Verdict::Worse, Verdict::Better}) {
@@ -138,7 +138,7 @@ std::string findings(const Diffed &diffed, const StreamTraits &terminal) {
   return text;
 }
 
-// What has no response of its own has none to test.
+// True if a figure of the row was not tested. Response times count only where some job has one.
 bool is_untested(const DifferenceRow &row) {
   const bool has_times = row.a->has_responses() || row.b->has_responses();
   return std::any_of(kFigures.begin(), kFigures.end(), [&](const Figure &figure) {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What `diff` says about two sides: a table, what is more than chance in words, and what to beware of. Pure functions.
+// Presents the result of `diff`: a table, the significant differences in words, and cautions. Pure functions.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@
 
 namespace redag::cli {
 
-/// One of the two places.
+/// One of the two compared places.
 struct DiffSide {
   std::string name;
   metrics::DifferenceSide jobs;
@@ -23,19 +23,19 @@ struct DiffSide {
 struct Diffed {
   DiffSide a;
   DiffSide b;
-  std::vector<Change> changes;  // of the workloads
+  std::vector<Change> changes;  // between the workloads
   metrics::Difference difference;
   metrics::BootstrapOptions options;
   std::vector<std::string> warnings;
 };
 
-/// What makes the figures of two sides less comparable than they look, whatever they are.
+/// Returns reasons why the two sides are less comparable than they look, regardless of the figures.
 [[nodiscard]] std::vector<std::string> caveats(const DiffSide &a, const DiffSide &b);
 
 /// `all`: a row for every task, not only for those with a difference.
 [[nodiscard]] std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool all);
 
-/// `redag.difference/2`.
+/// Returns `redag.difference/2`.
 [[nodiscard]] Json to_json(const Diffed &diffed);
 
 }  // namespace redag::cli

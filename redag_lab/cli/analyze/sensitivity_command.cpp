@@ -20,7 +20,7 @@ namespace redag::cli {
 namespace {
 
 constexpr std::uint32_t kMostProbes = 100'000;
-constexpr Duration kPeriods = 20;  // length of a simulation in longest periods
+constexpr Duration kPeriods = 20;  // length of a simulation, in longest periods
 
 struct Options {
   AnalysisArguments analysis;
@@ -29,7 +29,7 @@ struct Options {
   bool simulate = false;
 };
 
-// Those that turn nothing but the named task or DAG. Nothing, with an error, if there is no such thing.
+// Returns the knobs of the named task or DAG only. Returns nothing, with an error, if there is no such task or DAG.
 std::optional<std::vector<analysis::Knob>> chosen_knobs(const Analysed &analysed, const std::string &name,
                                                         Console &console) {
   std::vector<analysis::Knob> knobs = analysis::knobs_of(analysed.workload, analysed.system);
@@ -39,7 +39,7 @@ std::optional<std::vector<analysis::Knob>> chosen_knobs(const Analysed &analysed
     console.error("--task: " + row.error().front().message, row.error().front().hint);
     return std::nullopt;
   }
-  // A DAG that is released as a whole has its rate as a DAG: the task's row is that.
+  // The rate of a task that is released with its whole DAG is the DAG's rate, and counts as the task's.
   std::vector<std::uint32_t> wanted;
   std::vector<std::uint32_t> released;
   for (std::uint32_t t = 0; t < analysed.system.tasks.size(); ++t) {
@@ -68,7 +68,7 @@ Duration simulated_length(const Workload &workload) {
   return std::min(kMaxDuration / kPeriods, longest) * kPeriods;
 }
 
-// Why it ended early, or empty; what was found so far stays.
+// Searches every knob. Returns the reason for an early end, or an empty text. Results found before the end remain.
 std::string search(Sensitivity &sensitivity, const std::vector<analysis::Knob> &knobs, const Options &options,
                    AnalysisWatch &watch) {
   const analysis::AnalysisPlatform &platform = sensitivity.analysed.system.platform;
@@ -104,7 +104,7 @@ std::string search(Sensitivity &sensitivity, const std::vector<analysis::Knob> &
 int sensitivity_of_file(const Options &options, Console &console) {
   const std::optional<Workload> workload = load_configured(options.analysis.run, console);
   if (!workload) return kExitBad;
-  const InterruptGuard guard;  // until the results are written
+  const InterruptGuard guard;  // covers writing the results too
   AnalysisWatch watch(options.analysis, console);
   Result<Analysed> analysed =
       platform_for(*workload, options.analysis).and_then([&](const analysis::AnalysisPlatform &platform) {

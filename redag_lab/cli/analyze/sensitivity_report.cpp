@@ -31,20 +31,20 @@ bool is_of_all(const Sensitivity &sensitivity, const Knob &knob) {
   return knob.kind == Kind::AllWcets || (knob.kind == Kind::Rates && knob.tasks.size() == tasks);
 }
 
-// Rounded down, so that nobody reads more room than there is.
+// Formats a factor, rounded down so as not to overstate the margin.
 std::string format_factor(double factor) {
   constexpr double kDigits = 1e4;
   return fmt::format("{:.4f}", std::floor(factor * kDigits + 1e-6) / kDigits);
 }
 
-// A single value as people read it; nothing for knobs that turn several.
+// Returns the value of a knob that turns a single value; nothing for other knobs.
 std::optional<Duration> value_at(const Knob &knob, std::int64_t position) {
   if (knob.kind == Kind::Wcet) return position;
   if (knob.kind == Kind::Period) return -position;
   return std::nullopt;
 }
 
-// Rounded towards less load: a wcet down, a period up.
+// Formats a value, rounded towards less load: a wcet down, a period up.
 std::string humanize_safely(const Knob &knob, Duration value) {
   return is_of_rates(knob) ? humanize_up(value) : humanize_down(value);
 }
@@ -55,7 +55,7 @@ std::string limit_text(const Knob &knob, std::optional<std::int64_t> position) {
   return value ? humanize_safely(knob, *value) : "-";
 }
 
-// As the file says it.
+// Formats the nominal value as workload files write it.
 std::string nominal_text(const Knob &knob, std::int64_t position) {
   const std::optional<Duration> value = value_at(knob, position);
   return value ? format_duration(*value) : "-";
@@ -66,7 +66,7 @@ std::string factor_text(const std::optional<Margin> &margin) {
   return margin->position ? format_factor(margin->factor) : "none";
 }
 
-// Where the search of `margin` showed acceptance to come back.
+// Names the position above the margin that is accepted again.
 std::string again_text(const Analysed &analysed, const Margin &margin) {
   const std::optional<Duration> value = value_at(margin.knob, *margin.again);
   return value ? humanize_duration(*value)
@@ -94,7 +94,7 @@ std::string table_of(const Sensitivity &sensitivity, const std::vector<const Kno
   return table.render(terminal.width, terminal.colour);
 }
 
-// All, in order, or those with the least room; what is of all tasks always.
+// Returns all rows in order, or those with the least margin. Rows about all tasks always remain.
 std::vector<const KnobResult *> shown_rows(const Sensitivity &sensitivity, bool all) {
   std::vector<const KnobResult *> rows;
   for (const KnobResult &result : sensitivity.results) rows.push_back(&result);
@@ -108,7 +108,7 @@ std::vector<const KnobResult *> shown_rows(const Sensitivity &sensitivity, bool 
   return rows;
 }
 
-// The one of these that is nearest to its limit (or has to shrink least), of those that have one.
+// Returns the margin nearest to its limit (or that has to shrink least), among those with a limit.
 const Margin *nearest(const Sensitivity &sensitivity, bool rates) {
   const bool yes = is_schedulable(sensitivity);
   const Margin *best = nullptr;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What `sensitivity` says about margins of redag_lab/search: a table, words, JSON. Pure functions.
+// Presents the margins of redag_lab/search for `sensitivity`: a table, words, JSON. Pure functions.
 #pragma once
 
 #include <optional>
@@ -15,26 +15,26 @@ namespace redag::cli {
 
 struct KnobResult {
   analysis::Margin margin;
-  std::optional<analysis::Margin> simulated;  // the same search, answered by the simulator
+  std::optional<analysis::Margin> simulated;  // the same search, judged by the simulator
 };
 
 struct Sensitivity {
   Analysed analysed;
   std::vector<KnobResult> results;
-  std::size_t knobs = 0;  // asked for; more than there are results where it was stopped
+  std::size_t knobs = 0;  // requested; more than `results` if the search was stopped
   std::uint32_t probes = 0;
   Duration simulated_for = 0;  // 0: not simulated
 };
 
-/// "wcet of slow.plan", "all wcets", "period of fast", "rates of fast", "all rates".
+/// Returns "wcet of slow.plan", "all wcets", "period of fast", "rates of fast" or "all rates".
 [[nodiscard]] std::string knob_name(const Analysed &analysed, const analysis::Knob &knob);
 
 [[nodiscard]] std::string describe(const Sensitivity &sensitivity, const StreamTraits &terminal, bool all);
 
-/// What the figures come to: how much room there is, or what has to shrink. Sentences, one a line.
+/// Summarises the margins: how much can grow, or what has to shrink. Sentences, one per line.
 [[nodiscard]] std::string in_words(const Sensitivity &sensitivity);
 
-/// `redag.sensitivity/1`.
+/// Returns `redag.sensitivity/1`.
 [[nodiscard]] Json to_json(const Sensitivity &sensitivity);
 
 }  // namespace redag::cli

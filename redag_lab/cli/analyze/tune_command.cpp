@@ -34,7 +34,7 @@ struct Options {
   bool all_trials = false;
 };
 
-// "workers,max_active": what may change. False: an error was printed.
+// Parses "workers,max_active", the settings that may change. Returns false after printing an error.
 bool parse_vary(const std::string &list, tune::Freedom &freedom, Console &console) {
   freedom.workers = freedom.caps = freedom.ties = false;
   std::size_t begin = 0;
@@ -57,7 +57,7 @@ bool parse_vary(const std::string &list, tune::Freedom &freedom, Console &consol
   return true;
 }
 
-// "2-5". False: an error was printed.
+// Parses "2-5". Returns false after printing an error.
 bool parse_caps(const std::string &text, tune::Freedom &freedom, Console &console) {
   if (text.empty()) return true;
   std::uint32_t low = 0;
@@ -138,7 +138,7 @@ int tune_file(const Options &options, Console &console) {
   }
   tuning.options.simulation.duration = options.run.duration.value_or(sensible_duration(*workload));
 
-  const InterruptGuard guard;  // until the results are written
+  const InterruptGuard guard;  // covers writing the results too
   std::optional<tune::Tuned> tuned = search(*workload, tuning.options, console);
   if (!tuned) {
     console.error("interrupted before the workload as it is was judged: there is nothing to say");

@@ -31,7 +31,7 @@ std::string lateness_text(const ClassScore &score) {
   return score.max_lateness < 0 ? "-" + humanize_duration(-score.max_lateness) : humanize_duration(score.max_lateness);
 }
 
-// Rounded down: no more than there is.
+// Formats the slack, rounded down so as not to overstate it.
 std::string slack_text(const ClassScore &score) {
   return score.any ? fmt::format("{:.1f} %", std::floor(score.least_slack * 1000 + 1e-9) / 10) : "-";
 }
@@ -75,7 +75,7 @@ std::string point_text(const Workload &workload, const Point &point) {
   return text;
 }
 
-// The rest of the point: a Lehmer code that says little; 0s are the order of the file.
+// Formats the tie order of the point, a Lehmer code. Zeros stand for the order of the file.
 std::string ties_text(const Workload &workload, const Point &point) {
   const auto first = point.begin() + 1 + static_cast<std::ptrdiff_t>(workload.dags.size());
   if (std::all_of(first, point.end(), [](std::uint32_t digit) { return digit == 0; })) return "as it is";
@@ -158,7 +158,7 @@ struct Pairs {
   std::size_t worse = 0;
 };
 
-// Seed by seed: both had the same jobs.
+// Compares the two settings seed by seed; both had the same jobs.
 Pairs compare_runs(const Tuning &tuning) {
   Pairs pairs;
   const std::vector<Score> &before = tuning.tuned.present.held_out_runs;

@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What `tune` says: what it would change, what that gains on seeds that the search has not seen, what else was tried.
-// Pure functions.
+// Presents the result of `tune`: the changes, their gain on unseen seeds, and the alternatives tried. Pure functions.
 #pragma once
 
 #include <string>
@@ -19,16 +18,16 @@ struct Tuning {
   tune::Options options;
 };
 
-/// One change a line: "max_active of nav: none -> 2". Empty if nothing is better.
+/// Returns one line per change: "max_active of nav: none -> 2". Empty if no setting is better.
 [[nodiscard]] std::vector<std::string> changes(const tune::Tuned &tuned);
 
-/// Sentences, one a line.
+/// Returns sentences, one per line.
 [[nodiscard]] std::string in_words(const Tuning &tuning);
 
 /// `all`: every combination tried.
 [[nodiscard]] std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool all);
 
-/// `redag.tuning/1`.
+/// Returns `redag.tuning/1`.
 [[nodiscard]] Json to_json(const Tuning &tuning);
 
 }  // namespace redag::cli

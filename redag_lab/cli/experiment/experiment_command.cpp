@@ -24,13 +24,13 @@ struct MergeSettings {
   StudyOutput output;
 };
 
-// Whatever the plan says is wrong with it, one of the readers finds: the one that its first line names.
+// Makes a study of the kind that the plan's first line names. Its reader reports mistakes in the plan.
 std::unique_ptr<Study> make_study(const std::string &plan, const std::string &file, Console &console) {
   if (plan.starts_with("experiment: factorial\n")) return make_factorial(plan, file, console);
   return make_acceptance(plan, file, console);
 }
 
-// With recorded runs: the results of the experiment that they belong to, and they.
+// Merges recorded runs into their experiment's results.
 Result<MergedUnits> add_recorded(MergedUnits merged, const std::vector<std::string> &places) {
   Result<experiment::FactorialPlan> plan =
       experiment::parse_factorial_plan(merged.plan, merged.plan_file, executors_of);
@@ -42,7 +42,7 @@ Result<MergedUnits> add_recorded(MergedUnits merged, const std::vector<std::stri
     for (const std::string &file : *traces) {
       const Result<trace::Trace> trace = trace::read_trace(file);
       if (!trace) return tl::unexpected<Diagnostics>(trace.error());
-      if (trace->info.driver == trace::Driver::Ros) continue;  // the scheduler's own, beside the nodes'
+      if (trace->info.driver == trace::Driver::Ros) continue;  // the scheduler's trace; the nodes' one counts
       runs.push_back(experiment::record(file, *trace, *plan));
     }
   }
@@ -63,7 +63,7 @@ Result<MergedUnits> add_recorded(MergedUnits merged, const std::vector<std::stri
   return merged;
 }
 
-// Folders without a plan hold recorded runs.
+// Merges folders. Those without a plan hold recorded runs.
 int merge(const MergeSettings &settings, Console &console) {
   std::vector<std::string> experiments;
   std::vector<std::string> recorded;

@@ -17,7 +17,7 @@ namespace {
 using experiment::AcceptancePlan;
 using experiment::DeadlineKind;
 
-constexpr std::uint32_t kMaxSets = 1'000'000;  // random workloads at a point, runs of one, periods of a run
+constexpr std::uint32_t kMaxSets = 1'000'000;  // random workloads at a point, runs of one workload, or periods of a run
 
 std::vector<std::string> split(const std::string &text) {
   std::vector<std::string> items(1);
@@ -52,7 +52,7 @@ auto count_within(Range<std::uint32_t> range) {
   return [range](const std::string &name, const std::string &item) { return parse_count(name, item, range); };
 }
 
-// "a,b,c", each read by `read(name, item)`.
+// Adds an option with a list "a,b,c", whose items `read(name, item)` parses.
 template <class Value, class Read>
 CLI::Option *add_list(CLI::App &app, const std::string &name, std::vector<Value> &target, const std::string &help,
                       const std::string &shown, Read read) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The plan of `redag experiment acceptance`: a file, options, or a file with some of it replaced by options. Called
-// while the program starts and right after; no threads.
+// The plan of `redag experiment acceptance`: a file, options, or a file with some values replaced by options. Used on
+// one thread, while the program starts and right after.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -19,10 +19,10 @@ namespace redag::cli {
 
 class PlanOptions {
  public:
-  /// Declares the options; `app` and this must outlive the parsing.
+  /// Declares the options. `app` and this object must outlive the parsing.
   explicit PlanOptions(CLI::App &app);
 
-  /// The plan as given. What is wrong with it is printed, by file and line or by option.
+  /// Returns the plan as given. Prints mistakes by file and line, or by option.
   [[nodiscard]] std::optional<experiment::AcceptancePlan> plan(Console &console) const;
 
  private:
@@ -30,11 +30,11 @@ class PlanOptions {
 
   void add_points(CLI::App &app);
   void add_workloads(CLI::App &app);
-  /// `edit` is made where `option` was given.
+  /// Applies `edit` if `option` was given.
   void on(CLI::Option *option, const std::string &group, Edit edit);
 
   std::string file_;
-  experiment::AcceptancePlan given_;  // what the options say, the defaults elsewhere
+  experiment::AcceptancePlan given_;  // values of the options, and defaults elsewhere
   std::vector<std::pair<const CLI::Option *, Edit>> edits_;
 };
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What `redag experiment` prints for people. Pure functions.
+// Presents the results of `redag experiment acceptance`. Pure functions.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace redag::cli {
 
-/// A table for each combination of the plan: a row a utilization, a column a method.
+/// Returns a table for each combination of the plan, with a row per utilization and a column per method.
 [[nodiscard]] std::string describe(const experiment::Acceptance &acceptance,
                                    const experiment::AcceptanceResults &results, const StreamTraits &traits);
 

@@ -24,14 +24,14 @@ namespace {
 using experiment::FinishedUnit;
 using experiment::Journal;
 
-// Notes what went wrong.
+// Prints the errors of a failed result.
 template <class T>
 bool ok(const Result<T> &result, Console &console) {
   if (!result) console.note(result.error());
   return result.has_value();
 }
 
-// The table or the JSON document, the files, and what must not be overlooked.
+// Writes the files, prints the table or the JSON document, and prints the study's warnings and errors.
 int show(const Study &study, const StudyOutput &output, Console &console) {
   if (!output.folder.empty() && !ok(study.write(output.folder), console)) return kExitBad;
   if (output.json) {
@@ -45,7 +45,7 @@ int show(const Study &study, const StudyOutput &output, Console &console) {
   return study.judge(output.folder, console);
 }
 
-/// One run of a study, from the first unit that is not finished.
+/// One run of a study, which starts with the first unfinished unit.
 class StudyRun {
  public:
   StudyRun(Study &study, const StudySettings &settings, Console &console)
@@ -54,10 +54,10 @@ class StudyRun {
   int run() {
     if (!open()) return kExitBad;
     const std::vector<std::uint64_t> todo = units_to_do();
-    const InterruptGuard guard;  // until the results are written
+    const InterruptGuard guard;  // covers writing the results too
     const bool done = work(todo);
     progress_.clear();
-    // What is done is kept and shown, also where the rest could not be.
+    // Finished units are kept and shown even if the others failed.
     if (InterruptGuard::interrupted()) console_.note("interrupted: " + how_to_go_on() + "\n");
     const int status = show(study_, settings_.output, console_);
     return done ? status : kExitBad;
@@ -85,7 +85,7 @@ class StudyRun {
     std::vector<std::uint64_t> todo;
     const std::vector<FinishedUnit> none;
     const std::vector<FinishedUnit> &found = journal_ ? journal_->found() : none;
-    auto done = found.begin();  // sorted, as the units are
+    auto done = found.begin();  // sorted by unit
     for (std::uint64_t unit = 0; unit < study_.unit_count(); ++unit) {
       while (done != found.end() && done->unit < unit) ++done;
       const bool is_done = done != found.end() && done->unit == unit;
@@ -122,7 +122,7 @@ class StudyRun {
         });
     progress_.clear();
     const Duration elapsed = watch.elapsed();
-    // A unit that Ctrl-C cut short is no result, and no mistake.
+    // A unit that Ctrl-C interrupted has no result, and this is no error.
     bool good = InterruptGuard::interrupted() || ok(ran, console_);
     if (journal_) {
       good = ok(journal_->sync(), console_) && good;

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the experiments share: running units with progress and Ctrl-C, going on after a kill, shards, merging, showing.
+// Shared by all experiments: running units with progress and Ctrl-C, continuing after a kill, shards, merging, and
+// showing results.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -23,35 +24,35 @@ struct StudyOutput {
   bool force = false;
   bool json = false;
 };
-/// Returns the option of the folder.
+/// Adds the options. Returns the option of the folder.
 CLI::Option *add_study_output(CLI::App &app, StudyOutput &output, const std::string &names, const std::string &help);
 
 struct StudySettings {
-  std::uint32_t jobs = 0;  // 0: one a processor
+  std::uint32_t jobs = 0;  // 0: one per processor
   experiment::Shard shard;
   StudyOutput output;
 };
-/// Options of a command that runs a study.
+/// Adds the options of a command that runs a study.
 void add_study_settings(CLI::App &app, StudySettings &settings);
 
-/// Runs what is not finished, and shows the results. Returns the exit status.
+/// Runs the unfinished units and shows the results. Returns the exit status.
 [[nodiscard]] int run_study(Study &study, const StudySettings &settings, Console &console);
 
-/// The study of a plan's text; null with the mistakes noted. `file` is what the messages call it.
+/// Makes the study of a plan's text. Returns null after printing the mistakes, which name the plan as `file`.
 using StudyMaker =
     std::function<std::unique_ptr<Study>(const std::string &plan, const std::string &file, Console &console)>;
 
-/// Finished units of several folders, to become those of a new one.
+/// Finished units of several folders, for a new folder.
 struct MergedUnits {
   std::string plan;
-  std::string plan_file;  // what messages call it
+  std::string plan_file;  // its name in messages
   std::vector<experiment::FinishedUnit> units;
   std::vector<std::string> runs;  // lines of runs.jsonl
 };
-/// Of folders with one plan.
+/// Reads folders that hold one plan.
 [[nodiscard]] Result<MergedUnits> read_merged(const std::vector<std::string> &folders);
 
-/// Writes them into the folder of `output`. Returns the exit status.
+/// Writes the units into the folder of `output`. Returns the exit status.
 [[nodiscard]] int merge_studies(const MergedUnits &merged, const StudyOutput &output, const StudyMaker &make,
                                 Console &console);
 

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The subcommands of `redag experiment` that run a study, and how their plans become studies again, for merging.
+// The subcommands of `redag experiment` that run a study, and the functions that make studies of their plans, for
+// merging.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -20,7 +21,7 @@ namespace redag::cli {
                                                      Console &console);
 
 [[nodiscard]] Action add_factorial(CLI::App &app);
-/// What plans can name (experiment::ExecutorNames).
+/// Returns the executors that plans can name (experiment::ExecutorNames).
 [[nodiscard]] std::vector<std::string> executors_of(experiment::World world);
 [[nodiscard]] std::unique_ptr<Study> make_factorial(const std::string &plan, const std::string &file, Console &console);
 

@@ -26,7 +26,7 @@ using experiment::FinishedRun;
 using experiment::PlannedRun;
 using experiment::World;
 
-/// Every world's drivers; `program` is that of ROS 2.
+/// Executes a run in any world; `program` is the one for ROS 2.
 Result<FinishedRun> drive(const PlannedRun &planned, const std::string &program) {
   if (planned.world == World::Ros2) return run_in_ros2(planned, program, InterruptGuard::flag());
   const Result<Variant> variant = parse_variant(planned.executor);
@@ -60,7 +60,7 @@ class FactorialStudy final : public Study {
   [[nodiscard]] std::uint64_t unit_count() const override { return factorial_.unit_count(); }
   [[nodiscard]] bool takes_turns() const override { return needs_machine(factorial_.plan()); }
 
-  /// On a real machine no executor always comes first, when the machine is coldest or quietest.
+  /// Rotates the executors of a real machine: no executor always runs first, when the machine is coldest or quietest.
   void arrange(std::vector<std::uint64_t> &units) const override {
     if (!takes_turns()) return;
     const std::uint64_t points = factorial_.points().size();

@@ -24,13 +24,13 @@ using experiment::kNoLevel;
 using experiment::Median;
 using experiment::Metric;
 
-constexpr std::size_t kMostRows = 60;  // of combinations; more are read in a file
+constexpr std::size_t kMostRows = 60;  // combinations; more are only in the file
 
 Median total(const Factorial &factorial, const FactorialResults &results, const FactorialRow &row, Metric metric) {
   return *over_runs(factorial, results, row, row.runs.front().dags.size() - 1, metric);
 }
 
-// The median and its interval; where most runs missed nothing, also what all of them missed.
+// Formats the median and its interval. If most runs missed nothing, adds the misses of all runs.
 std::string with_interval(const Median &median, std::uint64_t missed, std::uint64_t released) {
   if (median.median == 0 && missed > 0) {
     return fmt::format("{} of {} in all runs", format_count(missed), format_count(released));
@@ -41,7 +41,7 @@ std::string with_interval(const Median &median, std::uint64_t missed, std::uint6
   return low == high ? middle : fmt::format("{} ({}..{})", middle, low, high);
 }
 
-// Of all jobs of all runs: a miss in one of them is not lost, as in a median.
+// Returns the share over all jobs of all runs. Unlike a median, it shows a miss of a single run.
 double missed_share(const FactorialRow &row) {
   const std::size_t all = row.runs.front().dags.size() - 1;
   const auto released = static_cast<double>(sum_over_runs(row, all, experiment::Measure::Released));
@@ -81,7 +81,7 @@ std::string combination_table(const Factorial &factorial, const FactorialResults
   return table.render(traits.width, traits.colour);
 }
 
-// For each workload and executor: the mean over all combinations, and the best and the worst one.
+// Returns for each workload and executor the mean over all combinations, and the best and the worst one.
 std::string range_table(const Factorial &factorial, const FactorialResults &results, const StreamTraits &traits) {
   Table table({{"workload", false, 100},
                {"executor", false, 1000, true},

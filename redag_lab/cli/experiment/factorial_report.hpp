@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What `redag experiment factorial` prints for people. Pure functions.
+// Presents the results of `redag experiment factorial`. Pure functions.
 #pragma once
 
 #include <string>
@@ -11,8 +11,8 @@
 
 namespace redag::cli {
 
-/// Who misses how much, at which combination most and least; a row for each combination where they are few; what each
-/// factor explains; what the trace checker says.
+/// Returns the misses of each executor with its best and worst combination, the effects of the factors, and the trace
+/// checker's verdict. Adds a row for each combination if there are few.
 [[nodiscard]] std::string describe(const experiment::Factorial &factorial, const experiment::FactorialResults &results,
                                    const StreamTraits &traits);
 

@@ -58,7 +58,7 @@ class Reporting {
   }
 
  private:
-  // False: an error was printed. Stops early, with what was read, when interrupted.
+  // Reads the runs. Returns false after printing an error. When interrupted, stops early and keeps the runs read.
   bool read(const RecordedPlaces &found) {
     const report::DigestOptions sizes = report::digest_options(found.runs.size());
     const std::size_t count = found.traces();
@@ -88,7 +88,7 @@ class Reporting {
       }
       if (any) groups_.push_back(std::move(group));
     }
-    // One alone is named by what it is, not by where it lies.
+    // A single group is labelled by its executor instead of its path.
     if (groups_.size() == 1) groups_.front().set_label(groups_.front().info().executor);
     if (done < count) {
       notes_.push_back(fmt::format("interrupted: {} of {} runs were read", done, count));
@@ -141,7 +141,7 @@ class Reporting {
   std::vector<std::string> notes_;
 };
 
-// The folder of a factorial experiment, which is one page.
+// Reports the folder of a factorial experiment, which becomes one page.
 int report_experiment(const Options &options, const fs::path &file, Console &console) {
   if (options.places.size() > 1) {
     console.error(fmt::format("{}: an experiment has a page of its own", file.string()), "name one folder");

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A run on threads against what was proven before it: responses above their bounds and executions above the wcet, by
-// name, with the assumption that broke (redag_analysis/metrics/assumptions.hpp). Pure.
+// Compares a run on threads with its bounds: responses above their bounds and executions above the wcet, by name, with
+// the assumption that broke (redag_analysis/metrics/assumptions.hpp). Pure.
 #pragma once
 
 #include <cstdint>
@@ -17,17 +17,17 @@
 namespace redag::cli {
 
 struct BoundCheck {
-  metrics::AssumptionCheck assumptions;  // its tasks by TaskId; empty if the workload could not be analysed
+  metrics::AssumptionCheck assumptions;  // tasks by TaskId; empty if the workload could not be analysed
   std::vector<std::string> names;        // by TaskId
   std::vector<Duration> wcets;           // by TaskId
-  std::vector<std::string> methods;      // by TaskId: which gave the bound; empty: none
+  std::vector<std::string> methods;      // by TaskId: the method of the bound; empty: none
   std::vector<metrics::Remark> remarks;  // alarms first
-  std::size_t bounded = 0;               // tasks
-  std::string absent;                    // why some task, or all, have no bound; empty: all have one
+  std::size_t bounded = 0;               // number of tasks with a bound
+  std::string absent;                    // why some or all tasks have no bound; empty: all have one
 };
 
-/// Analyses the workload as it ran, under the executor that ran it, with the overheads that the run notes. Responses
-/// are those of the whole trace, warm-up included.
+/// Analyses the workload as it ran, under its executor, with the overheads that the run recorded. Responses are those
+/// of the whole trace, including the warm-up.
 [[nodiscard]] BoundCheck check_bounds(const Session &session);
 
 [[nodiscard]] std::string describe(const BoundCheck &check, std::size_t tasks, const StreamTraits &terminal);

@@ -16,7 +16,7 @@ using redag::testing::make_workload;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-// 100 ms of it, in virtual time.
+// Simulates 100 ms of the workload.
 Session simulated(const Workload &workload, const std::string &executor = "redag") {
   SessionOptions options;
   options.duration = 100 * kMillisecond;
@@ -58,7 +58,7 @@ TEST(BoundCheck, ChargesTheOverheadsOfTheRun) {
   EXPECT_THAT(text, Not(HasSubstr("not charged")));
 }
 
-// Against what is known of the executor that ran: 20 + 2 ms for both, and nothing that our priorities would promise.
+// The bounds are those of the executor that ran: 20 + 2 ms for both tasks, without regard to our priorities.
 TEST(BoundCheck, ARunOfAnotherExecutor) {
   Workload workload = fast_and_slow();
   workload.dags[0].tasks[0].period = workload.dags[0].tasks[0].deadline = 50 * kMillisecond;
@@ -70,7 +70,7 @@ TEST(BoundCheck, ARunOfAnotherExecutor) {
   }
 }
 
-// Jobs executed for longer than what the bounds are told: both tasks answer too late, the second because of the first.
+// Jobs executed longer than the wcet of the bounds. Both tasks respond late, the second because of the first.
 TEST(BoundCheck, NamesWhatIsBroken) {
   Session session = simulated(fast_and_slow());
   Task &imu = session.info.workload.dags[0].tasks[0];

@@ -112,7 +112,7 @@ int calibrate(const Options &options, Console &console) {
     return kExitBad;
   }
   if (const auto busy = busy_machine_warning()) console.warn(*busy);
-  const InterruptGuard guard;  // until the file is written
+  const InterruptGuard guard;  // covers writing the file too
   Result<Calibration> measured = measure(options, console);
   if (!measured) {
     console.note(measured.error());

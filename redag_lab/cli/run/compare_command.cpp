@@ -46,7 +46,7 @@ class Comparing {
       console_.warn(*busy);
       warnings_.push_back(*busy);
     }
-    const InterruptGuard guard;  // until the results are written
+    const InterruptGuard guard;  // covers writing the results too
     if (!run_all()) return kExitBad;
     progress_.clear();
     const std::size_t done = rounds();
@@ -54,18 +54,18 @@ class Comparing {
       console_.error("interrupted before every executor had run once: there is nothing to compare");
       return kExitBad;
     }
-    // Only whole rounds: every executor has as many repetitions as the others.
+    // Keeps whole rounds only: every executor has the same number of repetitions.
     for (ExecutorResults &results : results_) results.repetitions.resize(done);
     if (done < repetitions_) console_.warn(fmt::format("interrupted: {} of {} repetitions", done, repetitions_));
     return report();
   }
 
  private:
-  // False: an error was printed.
+  // Runs all repetitions. Returns false after printing an error.
   bool run_all() {
     session_.stop = &InterruptGuard::flag();
     for (std::uint32_t repetition = 0; repetition < repetitions_; ++repetition) {
-      // Rotated, so that nobody always runs on the warmest or the quietest machine.
+      // The order rotates: no executor always runs on the warmest or the quietest machine.
       for (std::size_t i = 0; i < results_.size(); ++i) {
         if (!run_one(results_[(i + repetition) % results_.size()], repetition)) return false;
         if (InterruptGuard::interrupted()) return true;
@@ -76,7 +76,7 @@ class Comparing {
 
   bool run_one(ExecutorResults &results, std::uint32_t repetition) {
     SessionOptions options = session_;
-    // Virtual time repeats itself exactly: only other jobs make another repetition.
+    // Virtual time repeats exactly. Only another seed makes another repetition.
     if (options_.simulate) options.seed += repetition;
     progress_.set_label(fmt::format("{} {}/{}", results.variant.name, repetition + 1, repetitions_));
     const Result<Session> session =
@@ -88,7 +88,7 @@ class Comparing {
       }
       return false;
     }
-    if (session->stopped) return true;  // shorter than the others: not comparable
+    if (session->stopped) return true;  // shorter than the others and not comparable
     results.add(*session);
     if (!session->check.ok()) {
       console_.note(fmt::format("{}, repetition {}: {}", results.variant.name, repetition + 1,

@@ -19,7 +19,7 @@ Spread spread_over(const ExecutorResults &results, std::size_t dag, Value value)
   return report::spread_of(std::move(values));
 }
 
-// "13.9..14.8", where repetitions differ.
+// Returns "13.9 % to 14.8 %" if repetitions differ, else an empty text.
 std::string range_text(const Spread &miss) {
   const std::string low = format_percent(miss.min);
   const std::string high = format_percent(miss.max);
@@ -68,7 +68,7 @@ Json row_json(const ExecutorResults &results, const std::string &name, std::size
   return json;
 }
 
-// RFC 4180.
+// Quotes a field of a CSV file (RFC 4180).
 std::string quoted(const std::string &text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string result = "\"";
@@ -109,7 +109,7 @@ std::string comparison_table(const Comparison &comparison, const StreamTraits &t
   return table.render(terminal.width, terminal.colour);
 }
 
-// What the columns of the table are, in words.
+// Explains the columns of the table in words.
 std::string legend(const Comparison &comparison, std::size_t repetitions) {
   std::string text = "missed: late, skipped or aborted, of all jobs";
   if (repetitions > 1) text += " of all repetitions";

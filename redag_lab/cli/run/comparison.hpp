@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Sessions of several executors on the same jobs, put side by side: counts and maxima of all repetitions together,
-// percentiles as medians over repetitions with their spread, and a verdict in words. Pure values and functions.
+// Compares sessions of several executors on the same jobs. Counts and maxima cover all repetitions. Percentiles are
+// medians over repetitions with their spread. A verdict in words follows. Pure values and functions.
 #pragma once
 
 #include <cstdint>
@@ -18,36 +18,37 @@
 
 namespace redag::cli {
 
-/// One DAG in one session; times in ns. "total" is all DAGs together.
+/// One DAG in one session; times are in ns. "total" means all DAGs together.
 struct Observation {
   metrics::JobCounts jobs;
-  metrics::EndToEnd end_to_end;  // nothing of the total
+  metrics::EndToEnd end_to_end;  // empty for the total
 };
 
 using report::Spread;
 
 struct ExecutorResults {
   Variant variant;
-  std::string preemption;                             // mode that ran
+  std::string preemption;                             // the mode that ran
   std::string preemption_why;                         // of the last repetition
   std::vector<std::vector<Observation>> repetitions;  // [repetition][DAG]; the last DAG is the total
   bool realtime = false;                              // on SCHED_FIFO threads
   std::uint64_t check_violations = 0;
-  std::vector<std::string> warnings;  // each once
+  std::vector<std::string> warnings;  // each listed once
 
   void add(const Session &session);
-  /// Share of a repetition's jobs that missed, over the repetitions.
+  /// Returns the share of a repetition's jobs that missed, as a spread over the repetitions.
   [[nodiscard]] Spread miss(std::size_t dag) const;
-  /// The same of those that were late.
+  /// Returns the share of a repetition's jobs that were late, likewise.
   [[nodiscard]] Spread late(std::size_t dag) const;
-  /// A percentile of the end-to-end response over the repetitions in which the DAG answered; nothing if in none.
+  /// Returns a percentile of the end-to-end response over the repetitions in which the DAG answered; nothing if there
+  /// is none.
   [[nodiscard]] std::optional<Spread> end_to_end(std::size_t dag, Duration metrics::Distribution::*percentile) const;
-  /// The largest end-to-end response of all repetitions; nothing if there was none.
+  /// Returns the largest end-to-end response of all repetitions; nothing if there was none.
   [[nodiscard]] std::optional<Duration> longest_end_to_end(std::size_t dag) const;
   [[nodiscard]] std::uint64_t late_end_to_end(std::size_t dag) const;
-  /// Of all repetitions.
+  /// Returns the counts of all repetitions.
   [[nodiscard]] metrics::JobCounts jobs(std::size_t dag) const;
-  /// Was a deadline missed in any repetition, end-to-end deadlines included?
+  /// True if any repetition missed a deadline, including end-to-end deadlines.
   [[nodiscard]] bool has_misses() const;
 };
 
@@ -58,19 +59,19 @@ struct Comparison {
   Duration duration = 0;
   std::uint64_t seed = 1;
   std::uint32_t workers = 1;
-  std::vector<ExecutorResults> executors;  // each with a repetition at least
-  std::vector<std::string> warnings;       // about all of it
+  std::vector<ExecutorResults> executors;  // each with at least one repetition
+  std::vector<std::string> warnings;       // about the whole comparison
 };
 
-/// "control: redag misses none, mte 14.2 %, ste 30.1 %: redag misses fewest"
+/// Returns sentences such as "control: redag misses none, mte 14.2 %, ste 30.1 %: redag misses fewest".
 [[nodiscard]] std::vector<std::string> verdicts(const Comparison &comparison);
 
-/// What makes the comparison less than fair: some executors had real-time threads and others had not. Empty if nothing.
+/// Returns a caution if only some executors had real-time threads; otherwise empty.
 [[nodiscard]] std::string caveat(const Comparison &comparison);
 
 [[nodiscard]] std::string describe(const Comparison &comparison, const StreamTraits &terminal);
 [[nodiscard]] Json to_json(const Comparison &comparison);
-/// A row per executor, DAG and repetition.
+/// Returns a row per executor, DAG and repetition.
 [[nodiscard]] std::string to_csv(const Comparison &comparison);
 
 }  // namespace redag::cli

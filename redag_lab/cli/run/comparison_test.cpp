@@ -11,7 +11,7 @@
 namespace redag::cli {
 namespace {
 
-// An executor whose one DAG misses these shares of 1 000 jobs in its repetitions, and answers after 1 ms.
+// Returns an executor whose one DAG misses these shares of 1 000 jobs in its repetitions, and responds after 1 ms.
 ExecutorResults results(const std::string &name, const std::vector<double> &misses) {
   ExecutorResults made;
   made.variant = *parse_variant(name);
@@ -88,7 +88,7 @@ TEST(Caveat, SaysWhoHadRealTimeThreads) {
   EXPECT_EQ(caveat(comparison), "");
 }
 
-// The row of an executor in the table.
+// Returns the executor's row of the table.
 std::string table_row(const Comparison &comparison, const std::string &executor, bool colour = false) {
   const std::string text = describe(comparison, StreamTraits{.colour = colour, .width = 0});
   const std::size_t name = text.find(executor, text.find("executor"));

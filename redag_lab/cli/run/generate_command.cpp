@@ -27,7 +27,7 @@ struct Options {
 
 constexpr std::uint32_t kMaxCount = 1'000'000;
 constexpr Range<double> kShare = {0, 1};
-constexpr double kLeastShare = 1e-9;  // what must be above 0
+constexpr double kLeastShare = 1e-9;  // minimum of options that must be above 0
 
 template <class Value>
 Choices<Value> choices_of(std::initializer_list<Value> values) {
@@ -100,7 +100,7 @@ void add_platform(CLI::App &app, GenerateOptions &g) {
   add_choice(app, "--policy", g.policy, policy_choices(), "Policy")->default_str(to_string(g.policy))->group(group);
 }
 
-// The command that makes this one workload again, as a comment on top of it.
+// Returns the command that generates this workload again, as a comment for its first line.
 std::string provenance(const CLI::App &app, std::uint64_t seed) {
   std::string line = "# redag generate";
   for (const CLI::Option *option : app.get_options()) {
@@ -115,7 +115,7 @@ std::string provenance(const CLI::App &app, std::uint64_t seed) {
   return line + fmt::format(" --seed {}\n", seed);
 }
 
-// The options of GenerateOptions as they are called here: "period_min" is --period-min.
+// Replaces the names of GenerateOptions in a message by options: "period_min" by --period-min.
 std::string in_options(const CLI::App &app, const std::string &message) {
   std::string text;
   for (std::size_t at = 0; at < message.size();) {

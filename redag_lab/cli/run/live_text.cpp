@@ -19,8 +19,8 @@ using live::Frame;
 using live::TaskFrame;
 using live::page::Figures;
 
-constexpr double kNear = 0.9;      // of what must not be exceeded
-constexpr int kMissedUpdates = 4;  // that make a page old
+constexpr double kNear = 0.9;      // share of the limit that counts as near
+constexpr int kMissedUpdates = 4;  // after which a page is stale
 constexpr Duration kPatience = kSecond;
 
 double rate_of(const Figures &figures, const Frame &frame, bool since_start) {
@@ -61,7 +61,7 @@ Cell count_cell(std::uint64_t count, Tint tint = Tint::Plain) {
   return {format_count(count), count > 0 ? tint : Tint::Faint};
 }
 
-/// The cells that rows of DAGs and of tasks share.
+/// Returns the cells common to the rows of DAGs and tasks.
 std::vector<Cell> row_of(Cell name, const Figures &figures, const Frame &frame, const LiveView &view, Duration deadline,
                          Duration bound, std::uint32_t cap) {
   const Response response = response_of(figures, view.since_start);
@@ -95,7 +95,7 @@ double key_of(const TaskFrame &task, const Frame &frame, const LiveView &view) {
     case LiveOrder::Rate: return rate_of(task.figures, frame, view.since_start);
     case LiveOrder::P99: return static_cast<double>(response.p99);
     case LiveOrder::Longest: return static_cast<double>(response.longest);
-    // Who misses now is before who missed once.
+    // Recent misses outrank earlier ones.
     case LiveOrder::Misses:
       return static_cast<double>(task.figures.recent_misses) * 1e12 + static_cast<double>(task.figures.misses);
     case LiveOrder::Cpu: return cpu_of(task.figures, frame, view.since_start);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A frame of a live page as people and programs read it: lines with a table, or JSON. Pure functions.
+// Formats a frame of a live page: lines with a table for people, JSON for programs. Pure functions.
 #pragma once
 
 #include <optional>
@@ -22,32 +22,33 @@ struct LiveView {
   LiveOrder order = LiveOrder::Dag;  // Dag: each DAG with its tasks below it; otherwise tasks, the largest first
   bool reversed = false;
   bool dags_only = false;
-  bool since_start = false;  // response times and rates of the whole run, and not the recent ones
+  bool since_start = false;  // response times and rates of the whole run instead of the recent ones
 };
 
-/// What is above the table; then the titles of its columns, and a line a row.
+/// The lines above the table, the titles of its columns, and one line per row.
 struct LiveText {
   std::vector<std::string> head;
   std::string titles;
   std::vector<std::string> rows;
 };
 
-/// `now`: CLOCK_MONOTONIC.
+/// `now` is CLOCK_MONOTONIC.
 [[nodiscard]] LiveText describe(const live::Listed &listed, const live::Page &page, const LiveView &view,
                                 const StreamTraits &terminal, Time now);
 
-/// Is a response time an alarm: beyond the deadline or the bound (Bad), or near the lesser of them (Caution)? 0: none.
+/// Rates a response time: Bad above the deadline or the bound, Caution near the lesser of them. A limit of 0 means
+/// none.
 [[nodiscard]] Tint response_tint(Duration response, Duration deadline, Duration bound);
 
-/// How long nobody has written although it was time; nothing while all is well.
+/// Returns the age of a frame that should have been replaced; nothing if it is recent.
 [[nodiscard]] std::optional<Duration> overdue(const live::Frame &frame, Time now);
 
-/// "redag.live/1" (docs/live_page.md).
+/// Returns "redag.live/1" (docs/live_page.md).
 [[nodiscard]] Json to_json(const live::Listed &listed, const live::Page &page, Time now);
-/// "redag.live-list/1".
+/// Returns "redag.live-list/1".
 [[nodiscard]] Json to_json(const std::vector<live::Listed> &pages, Time now);
 
-/// One line an executor.
+/// Returns one line per executor.
 [[nodiscard]] std::string describe(const std::vector<live::Listed> &pages, const StreamTraits &terminal, Time now);
 
 }  // namespace redag::cli

@@ -112,7 +112,7 @@ TEST(LiveText, Tints) {
   EXPECT_EQ(response_tint(90, 100, 0), Tint::Caution);
   EXPECT_EQ(response_tint(100, 100, 0), Tint::Caution);
   EXPECT_EQ(response_tint(101, 100, 0), Tint::Bad);
-  EXPECT_EQ(response_tint(50, 100, 40), Tint::Bad);  // above what was proven
+  EXPECT_EQ(response_tint(50, 100, 40), Tint::Bad);  // above the bound
   EXPECT_EQ(response_tint(39, 100, 40), Tint::Caution);
   EXPECT_EQ(response_tint(95, 100, 200), Tint::Caution);
 
@@ -131,7 +131,7 @@ TEST(LiveText, SaysThatNobodyWrites) {
   EXPECT_EQ(overdue(frame, 25 * kSecond), 5 * kSecond);
   EXPECT_EQ(overdue(frame, 19 * kSecond), std::nullopt);
   live::Frame strange = frame;
-  strange.interval = kMaxDuration;  // nothing overflows
+  strange.interval = kMaxDuration;  // must not overflow
   EXPECT_EQ(overdue(strange, 25 * kSecond), std::nullopt);
   const LiveText text = describe(listed, *listed.page, {}, kPlain, 25 * kSecond);
   EXPECT_THAT(text.head.back(), HasSubstr("no news for 5s"));
@@ -176,7 +176,7 @@ TEST(Keys, OneByOne) {
   EXPECT_EQ(take_key(escape).key, Key::Escape);
   std::string unknown = "\033[99;99Rq";
   EXPECT_EQ(take_key(unknown).key, Key::None);
-  EXPECT_TRUE(unknown.empty());  // its letters were no keys
+  EXPECT_TRUE(unknown.empty());  // its letters are not keys
 }
 
 TEST(Attachment, TheOnlyOneIsTaken) {
@@ -200,7 +200,7 @@ TEST(Attachment, FollowsARestart) {
   EXPECT_TRUE(attachment.is_known());
   const std::vector<live::Listed> after{make_listed(14, "arm"), make_listed(15)};
   EXPECT_EQ(attachment.find(after), &after[1]);
-  // The old number again, another process, which is another executor.
+  // The number is reused by another process, and therefore by another executor.
   const std::vector<live::Listed> reused{make_listed(15, "arm", 2)};
   EXPECT_EQ(attachment.find(reused), nullptr);
 }

@@ -18,7 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What holds the repetitions of a run, or the run's own folder; absolute, so that "." has a name too.
+// Returns the folder that holds a run's repetitions, or the run's own folder. The path is absolute and gives "." a name
+// too.
 fs::path subject_of(const std::string &trace) {
   fs::path folder = fs::absolute(trace).lexically_normal().parent_path();
   if (folder.filename().string().rfind("repetition-", 0) == 0) folder = folder.parent_path();
@@ -35,7 +36,7 @@ std::string last_parts(const fs::path &path, std::size_t count) {
   return text;
 }
 
-// Each subject's shortest end that no other one has.
+// Returns for each subject the shortest end of its path that is unique.
 std::vector<std::string> labels_of(const std::vector<fs::path> &subjects) {
   std::vector<std::string> labels;
   for (const fs::path &subject : subjects) {
@@ -50,10 +51,10 @@ std::vector<std::string> labels_of(const std::vector<fs::path> &subjects) {
   return labels;
 }
 
-// Of this version or the one before: what is read here is the same in both.
+// Accepts this version and the previous one, which share the keys read here.
 bool is_comparison(const Json &format) { return format == "redag.comparison/1" || format == "redag.comparison/2"; }
 
-// What a comparison says of the runs below it: their order, and what to beware of.
+// Reads from a comparison the order of its runs, and its warnings.
 Result<void> read_comparison(const fs::path &file, std::vector<std::string> &order, std::vector<std::string> &notes) {
   std::error_code error;
   if (!fs::exists(file, error)) return {};

@@ -23,7 +23,7 @@ struct Options {
   bool json = false;
 };
 
-// The record itself, or the result folder that it lies in.
+// Returns the flight record at `place`: the record itself, or the one in this result folder.
 std::string record_in(const std::string &place) {
   const std::string below = flight_folder(place);
   std::error_code ignored;

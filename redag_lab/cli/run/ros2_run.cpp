@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder for one run, gone with it.
+/// A temporary folder for one run, removed by the destructor.
 class Scratch {
  public:
   Scratch() : path_((fs::temp_directory_path() / "redag-ros2.XXXXXX").string()) {
@@ -50,7 +50,7 @@ class Scratch {
   bool made_ = false;
 };
 
-// Starts `words` with its output in `log`, and waits. The wait status, or an errno, negative.
+// Starts `words` with its output in `log`, and waits. Returns the wait status, or a negative errno.
 int run_program(std::vector<std::string> words, const std::string &log, const std::atomic<bool> &stop) {
   std::vector<char *> argv;
   argv.reserve(words.size() + 1);
@@ -68,7 +68,7 @@ int run_program(std::vector<std::string> words, const std::string &log, const st
   bool told = false;
   while (::waitpid(child, &status, WNOHANG) == 0) {
     if (stop.load() && !told) {
-      ::kill(child, SIGINT);  // in a terminal it has its own
+      ::kill(child, SIGINT);  // Ctrl-C in a terminal has already reached it
       told = true;
     }
     ::usleep(10'000);
@@ -76,7 +76,7 @@ int run_program(std::vector<std::string> words, const std::string &log, const st
   return status;
 }
 
-// What the program said last that is an error, or just last.
+// Returns the program's last error message, or else its last line.
 std::string last_words(const std::string &log) {
   const Result<std::string> text = trace::read_file(log);
   if (!text || text->empty()) return "nothing";
@@ -117,7 +117,7 @@ Result<experiment::FinishedRun> run_in_ros2(const experiment::PlannedRun &planne
                       "source the workspace with redag_rclcpp, or name the program with --run-workload");
   }
   if (stop.load()) return make_error("interrupted");
-  // 1: it says that the trace breaks a rule, which is looked at below.
+  // Status 1 means that the trace breaks a rule, which is checked below.
   if (!WIFEXITED(status) || WEXITSTATUS(status) > 1) {
     return make_error(fmt::format("'{}' failed; it said: {}", name, last_words(log)));
   }

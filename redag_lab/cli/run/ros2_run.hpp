@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// One run in ROS 2, by the program run_workload of redag_rclcpp in a process of its own: rclcpp's executors, and ours,
-// with real nodes and topics. Blocks until it is over.
+// Executes one run in ROS 2 with the program run_workload of redag_rclcpp, in a process of its own: rclcpp's executors
+// and ours, with real nodes and topics. Blocks until the run is over.
 #pragma once
 
 #include <atomic>
@@ -14,11 +14,11 @@
 
 namespace redag::cli {
 
-/// The executors that run_workload knows.
+/// Returns the executors of run_workload.
 [[nodiscard]] const std::vector<std::string> &ros2_executors();
 
-/// `program`: path of run_workload; empty: `ros2 run redag_rclcpp run_workload`. `stop` ends the run early, which is an
-/// error. Errors: the program cannot be started, or refused, or left no events.
+/// `program` is the path of run_workload; empty: `ros2 run redag_rclcpp run_workload`. `stop` ends the run early with
+/// an error. Errors: the program cannot be started, refused the run, or left no events.
 [[nodiscard]] Result<experiment::FinishedRun> run_in_ros2(const experiment::PlannedRun &planned,
                                                           const std::string &program, const std::atomic<bool> &stop);
 

@@ -114,7 +114,7 @@ std::optional<Workload> load_configured(const RunArguments &arguments, Console &
   if (arguments.ties) workload.ties = *arguments.ties;
   if (arguments.preemption) workload.platform.preemption = *arguments.preemption;
   if (arguments.workers > 0) workload.platform.workers = arguments.workers;
-  // The file was fine; what is wrong now came from the command line and has no line to point at.
+  // The file was valid. Mistakes found now come from the command line and have no line number.
   const Diagnostics mistakes = validate(workload);
   if (!has_errors(mistakes)) return workload;
   for (const Diagnostic &mistake : mistakes) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What `simulate`, `run` and `compare` ask for alike: the workload and changes to it, length, seed, where results go.
-// The steps that they share from there to a session. `analyze` takes the workload's part. Not thread-safe.
+// Arguments common to `simulate`, `run` and `compare`: the workload and changes to it, length, seed, and result folder.
+// Also the shared steps from there to a session. `analyze` uses the workload's part. Not thread-safe.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -41,38 +41,39 @@ struct RunArguments {
   bool live = false;
   bool json = false;
   std::string folder;
-  bool flight = false;  // a record of the run in `folder`, while it goes on
+  bool flight = false;  // records the run in `folder` while it runs
   std::uint32_t flight_mib = static_cast<std::uint32_t>(trace::FlightOptions{}.most_bytes >> 20U);
   bool force = false;
   bool check = false;
   bool all_tasks = false;
 };
 
-/// What replaces the platform and the policy of the workload.
+/// Adds the options that replace the workload's platform and policy.
 void add_platform_arguments(CLI::App &app, RunArguments &arguments);
-/// --overheads FILE, which is read at once.
+/// Adds --overheads FILE, which is read at once.
 CLI::Option *add_calibration_argument(CLI::App &app, RunArguments &arguments, const std::string &group);
-/// The same, and its parts one by one.
+/// Adds --overheads FILE and one option for each overhead.
 void add_overhead_arguments(CLI::App &app, RunArguments &arguments, const std::string &group);
 void add_workload_arguments(CLI::App &app, RunArguments &arguments);
 void add_result_arguments(CLI::App &app, RunArguments &arguments);
 void add_simulator_arguments(CLI::App &app, RunArguments &arguments);
 void add_thread_arguments(CLI::App &app, RunArguments &arguments);
 
-/// The workload of `arguments.file` with what the command line changes; warnings and errors are printed. Nothing if it
-/// cannot be run.
+/// Returns the workload of `arguments.file` with the changes of the command line, and prints warnings and errors.
+/// Returns nothing if the workload cannot be run.
 [[nodiscard]] std::optional<Workload> load_configured(const RunArguments &arguments, Console &console);
 
-/// False, with an error, if the command line asks for a mode, a policy or workers that none of the executors takes.
+/// Returns false, with an error, if the command line requests a mode, a policy or workers that none of the executors
+/// takes.
 [[nodiscard]] bool takes_arguments(const std::vector<Variant> &variants, const RunArguments &arguments,
                                    Console &console);
 
-/// Everything but the driver, which is `driver`, and `stop`. `default_duration` where none is given. Errors are
+/// Returns the options of a session, except `stop`. `default_duration` applies if no duration is given. Errors are
 /// printed.
 [[nodiscard]] std::optional<SessionOptions> session_options(const RunArguments &arguments, trace::Driver driver,
                                                             Duration default_duration, Console &console);
 
-/// Draws `progress` over a session of `duration`: time, and the DAGs with misses.
+/// Draws `progress` over a session of `duration`: the time, and the DAGs with misses.
 [[nodiscard]] ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration);
 
 }  // namespace redag::cli

@@ -20,9 +20,9 @@
 namespace redag::cli {
 namespace {
 
-constexpr std::size_t kMostTasks = 50;  // rows before the table is cut to the worst
+constexpr std::size_t kMostTasks = 50;  // with more tasks, the table shows only this many, the worst
 
-// A duration of something that may not have happened.
+// Formats a duration, or "-" if there is none.
 Cell time_cell(const metrics::Distribution &distribution, Duration metrics::Distribution::*value) {
   return {distribution.count > 0 ? humanize_duration(distribution.*value) : "-"};
 }
@@ -35,7 +35,7 @@ Cell missed_cell(const metrics::JobCounts &jobs) {
   return {format_count_and_share(jobs.missed(), jobs.released), jobs.missed() > 0 ? Tint::Bad : Tint::Good};
 }
 
-// Tasks to show: all, in the workload's order, or the worst.
+// Returns the tasks to show: all in the workload's order, or the worst ones.
 std::vector<std::size_t> shown_tasks(const metrics::Summary &summary, bool all) {
   std::vector<std::size_t> order(summary.tasks.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -130,7 +130,7 @@ std::string verdict_line(const Session &session, const StreamTraits &terminal) {
   return tinted(verdict.text, tint, terminal.colour) + "\n";
 }
 
-// A simulation is held to them by the property tests.
+// Simulations are not compared with bounds here; the property tests do so.
 bool has_bounds(const Session &session) { return session.info.driver == trace::Driver::Threads; }
 
 std::string headline(const Session &session) {

@@ -51,15 +51,15 @@ trace::RunInfo describe_simulation(const Workload &workload, const Variant &vari
   return info;
 }
 
-// The first events of a stream, whole instants of them, and where it was cut off.
+// Keeps the first events of a stream, up to the end of an instant, and the time of the cut.
 class Prefix {
  public:
   Prefix(std::vector<JobEvent> &events, std::size_t limit) : events_(events), limit_(limit) {}
 
   void add(std::span<const JobEvent> events) {
     if (cut_) return;
-    // Between two instants nothing happens: up to the end of that gap, the prefix is the whole trace of a shorter run.
-    // (At its end, a job could be seen that should have finished there.)
+    // Nothing happens between two instants. Cut before the end of that gap, the prefix is the whole trace of a shorter
+    // run. At the end of the gap, a job that should have finished there would be visible.
     for (const JobEvent &event : events) {
       if (events_.size() >= limit_ && event.time - events_.back().time > 1) {
         cut_ = event.time - 1;
@@ -77,29 +77,29 @@ class Prefix {
   std::optional<Time> cut_;
 };
 
-// What a run's events become while it goes on: its summary, and the trace of its first events.
+// Evaluates a run's events as they arrive: the summary, and the trace of the first events.
 class Evaluation {
  public:
-  /// `session` must outlive this.
+  /// `session` must outlive this object.
   Evaluation(Session &session, trace::RunInfo info, std::size_t max_events)
       : session_(session),
         info_(std::move(info)),
         summarizer_(info_),
         kept_(session.trace.events, std::max<std::size_t>(max_events, 1)) {}
 
-  /// In the order of time, whole instants.
+  /// Adds events in order of time, whole instants at once.
   void add(std::span<const JobEvent> events) {
     session_.events += events.size();
     summarizer_.add(events);
     kept_.add(events);
   }
 
-  /// So far, by DAG.
+  /// Misses so far, by DAG.
   [[nodiscard]] const std::vector<std::uint64_t> &missed() const { return summarizer_.missed(); }
 
-  /// `info` is that of the whole run. Call once, at the end.
+  /// `info` is that of the whole run. Call finish() once, at the end.
   void finish(trace::RunInfo info) {
-    info_.lost_events = info.lost_events;  // the rest of it was known before the first event
+    info_.lost_events = info.lost_events;  // the other fields were known before the first event
     session_.summary = summarizer_.finish(info.end);
     session_.info = std::move(info);
     session_.cut_at = kept_.cut();
@@ -129,7 +129,7 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, Sessi
   const auto sink = [&](std::span<const JobEvent> events) {
     evaluation.add(events);
     if (progress) {
-      constexpr std::uint64_t kLookEvery = 256;  // asking the clock each instant would be most of the work
+      constexpr std::uint64_t kLookEvery = 256;  // a clock reading at each instant would be most of the work
       if (++batches % kLookEvery == 0 && !events.empty()) progress(events.back().time, evaluation.missed());
     }
     return options.stop == nullptr || !options.stop->load(std::memory_order_relaxed);
@@ -147,8 +147,8 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, Sessi
   return session;
 }
 
-/// What each task's response time cannot exceed, 0 where nobody knows: for the live view, which need not wait for the
-/// bounds of large workloads.
+/// Returns bounds on response times by task, 0 where there is none, for the live page. Skips large workloads, whose
+/// bounds would delay the start.
 std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant, const sched::Config &config) {
   constexpr std::size_t kMostTasks = 100;
   std::vector<Duration> bounds(workload.task_count(), 0);
@@ -249,14 +249,14 @@ Session session_of(trace::Trace trace) {
 std::optional<std::string> busy_machine_warning() {
   double load = 0;
   const std::size_t cpus = runtime::usable_cpus().size();
-  // Half a processor each: what a desktop does by itself stays below.
+  // Half a processor each; an idle desktop stays below this load.
   if (getloadavg(&load, 1) != 1 || load < 0.5 * static_cast<double>(cpus)) return std::nullopt;
   return fmt::format("load average {:.1f} on {} processor(s): other programs disturb the figures", load, cpus);
 }
 
 Duration sensible_duration(const Workload &workload) {
   constexpr Duration kUsual = 10 * kSecond;
-  constexpr double kMostJobs = 4e6;  // some seconds of work
+  constexpr double kMostJobs = 4e6;  // a few seconds of computation
   double jobs_a_second = 0;
   for (const TaskRef &ref : flatten(workload)) {
     if (ref.task->period > 0) jobs_a_second += static_cast<double>(kSecond) / static_cast<double>(ref.task->period);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// One executor on one workload in one world, simulated or real: the one place where a run becomes a trace, a summary
-// and a verdict of the trace checker. Prints nothing. Blocks until the run is over; one session at a time.
+// Runs one executor on one workload, simulated or on threads. This is the one place where a run becomes a trace, a
+// summary and a verdict of the trace checker. Prints nothing. Blocks until the run is over; one session at a time.
 #pragma once
 
 #include <atomic>
@@ -29,25 +29,24 @@ struct SessionOptions {
   Duration duration = 10 * kSecond;
   Duration warm_up = 0;
   std::uint64_t seed = 1;
-  /// Events kept, 32 bytes each, up to the end of an instant. Later ones are summarized, but neither checked nor
-  /// written.
+  /// Number of events kept, 32 bytes each, up to the end of an instant. Later events enter the summary, but are neither
+  /// checked nor written.
   std::size_t max_events = std::size_t{1} << 22U;
   const std::atomic<bool> *stop = nullptr;  // ends the run early, with the results so far
   sim::Overheads overheads;                 // simulator
-  std::optional<Calibration> calibration;   // the same, of a machine; on threads charged to bounds
-  std::vector<int> cpus;                    // threads, as what follows
+  std::optional<Calibration> calibration;   // overheads of a machine: simulated; on threads, charged to bounds
+  std::vector<int> cpus;                    // threads only, like the members below
   bool lock_memory = false;
   bool realtime_threads = false;
   Duration spin = 0;
-  bool live = false;   // `redag top` sees the run
+  bool live = false;   // publishes a live page for `redag top`
   std::string flight;  // folder for a record of the run that outlives the process; empty: none
   std::uint64_t flight_bytes = trace::FlightOptions{}.most_bytes;
-  Duration watchdog = 0;  // jobs in progress for longer are named, at once to `on_overdue`; 0: none
+  Duration watchdog = 0;  // reports jobs that run for longer to `on_overdue` at once; 0: off
   std::function<void(const std::string &text)> on_overdue;
 };
 
-/// Called now and then while a session runs: where time stands, and by DAG the jobs so far that
-/// ended late or were lost.
+/// Called repeatedly while a session runs, with the time and, by DAG, the number of jobs so far that were late or lost.
 using ProgressHook = std::function<void(Time now, const std::vector<std::uint64_t> &misses)>;
 
 struct Session {
@@ -59,22 +58,22 @@ struct Session {
   bool realtime_threads = false;      // the jobs ran on SCHED_FIFO threads
   std::uint64_t events = 0;           // of the whole run
   Duration elapsed = 0;               // wall-clock time of the run and its evaluation
-  bool stopped = false;               // by `stop`
-  std::vector<std::string> warnings;  // what a reader of the figures should know
+  bool stopped = false;               // ended by `stop`
+  std::vector<std::string> warnings;  // caveats for a reader of the figures
 };
 
-/// `workload` must be valid. Error: what the machine refused.
+/// Runs a session. `workload` must be valid. Error: resources that the machine refused.
 [[nodiscard]] Result<Session> run_session(const Workload &workload, const Variant &variant,
                                           const SessionOptions &options, const ProgressHook &progress = {});
 
-/// A recorded run, evaluated as if it had just ended.
+/// Evaluates a recorded run as if it had just ended.
 [[nodiscard]] Session session_of(trace::Trace trace);
 
-/// What to say of a machine that other programs keep busy before a run on threads; nothing if it is quiet.
+/// Returns a warning if other programs keep the machine busy before a run on threads; nothing if it is quiet.
 [[nodiscard]] std::optional<std::string> busy_machine_warning();
 
-/// A length for a simulation that nobody gave one: some hyperperiods of at least 10 s in all, or of about 4 million
-/// jobs where that is shorter; without hyperperiods where one is longer than six times that.
+/// Returns the default length of a simulation: whole hyperperiods of at least 10 s, or of about 4 million jobs if that
+/// is shorter. A hyperperiod longer than six times this length is ignored.
 [[nodiscard]] Duration sensible_duration(const Workload &workload);
 
 }  // namespace redag::cli

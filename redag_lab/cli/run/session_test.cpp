@@ -18,7 +18,7 @@ Task timer(std::string name, Duration period, Duration wcet) {
   return task;
 }
 
-// One worker; `slow` always makes `fast` miss unless it is preempted.
+// Returns two tasks on one worker; `slow` always makes `fast` miss unless it is preempted.
 Workload fast_and_slow() {
   Workload workload;
   workload.name = "fast and slow";
@@ -48,7 +48,8 @@ TEST(Session, TheVariantDecidesThePreemption) {
   const Session full = run("redag-os", simulated(kSecond));
   EXPECT_EQ(none.info.preemption, "none");
   EXPECT_EQ(full.info.preemption, "os");
-  // Of each 100 ms: fast's job of 20 ms is replaced, that of 30 ms starts late at 31 ms, but is not late.
+  // In each 100 ms, slow runs from 1 to 31 ms. The jobs of fast released at 10 and 20 ms are skipped. The job released
+  // at 30 ms starts at 31 ms and finishes in time.
   EXPECT_GT(none.summary.dags[0].jobs.miss_ratio_with_lost(), 0.0);
   EXPECT_EQ(full.summary.total.miss_ratio_with_lost(), 0.0);
   EXPECT_TRUE(none.check.ok()) << none.check.to_string();
@@ -68,7 +69,7 @@ TEST(Session, ACutTraceIsThatOfAShorterRun) {
   EXPECT_EQ(cut.trace.info.end, *cut.cut_at);
   EXPECT_TRUE(cut.check.ok()) << cut.check.to_string();
   EXPECT_GT(cut.check.checks(metrics::Rule::Grid), 0U);
-  // The summary is of the whole run.
+  // The summary covers the whole run.
   EXPECT_EQ(metrics::summary_to_json(cut.summary, cut.info), metrics::summary_to_json(whole.summary, whole.info));
 }
 
@@ -107,7 +108,7 @@ TEST(Session, ALongRunOnThreadsKeepsItsFirstEventsAndSummarizesAll) {
   EXPECT_LT(cut.trace.events.back().time, *cut.cut_at);
   EXPECT_TRUE(cut.check.ok()) << cut.check.to_string();
   EXPECT_EQ(cut.info.end, options.duration);
-  // Every release of the run is in the summary: of 100 ms, fast has ten and slow has one.
+  // The summary includes every release: in 100 ms, fast has ten and slow has one.
   EXPECT_EQ(cut.summary.total.released, run("redag-none", simulated(500 * kMillisecond)).summary.total.released);
 }
 

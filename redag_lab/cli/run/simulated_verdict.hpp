@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Does a workload miss a deadline in one simulated run? An observation to set beside a bound, never a proof: other
-// offsets or shorter executions can be worse.
+// Tests whether a workload misses a deadline in one simulated run. The result is an observation beside a bound, not a
+// proof: other offsets or shorter executions can be worse.
 #pragma once
 
 #include <atomic>
@@ -12,9 +12,9 @@
 
 namespace redag::cli {
 
-/// Runs `workload` on `platform` for `duration`, offsets as they are, every job for its wcet and without jitter. True
-/// if no job finished late, was skipped or aborted, and no DAG ended after its end-to-end deadline. `stop` ends the
-/// run: the answer is false then. The workload must be valid.
+/// Simulates `workload` on `platform` for `duration`, with its offsets, every job for its wcet, and no jitter. Returns
+/// true if no job finished late, was skipped or aborted, and no DAG exceeded its end-to-end deadline. `stop` ends the
+/// run with the answer false. The workload must be valid.
 [[nodiscard]] bool misses_nothing(const Workload &workload, const analysis::AnalysisPlatform &platform,
                                   Duration duration, const std::atomic<bool> *stop = nullptr);
 

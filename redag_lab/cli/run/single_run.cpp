@@ -52,7 +52,7 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   if (!options) return kExitBad;
 
   if (const auto busy = simulated ? std::nullopt : busy_machine_warning()) console.warn(*busy);
-  const InterruptGuard guard;  // until the results are written
+  const InterruptGuard guard;  // covers writing the results too
   const Result<Session> session = run_interruptibly(*workload, *variant, *options, console);
   if (!session) {
     console.note(session.error());
@@ -67,7 +67,7 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   bool written = true;
   if (!arguments.folder.empty()) {
     Diagnostics problems = write_session(*session, arguments.folder);
-    // As long as results are missing, the record is what there is.
+    // The flight record remains while results are missing.
     if (problems.empty() && !options->flight.empty()) {
       if (const Result<void> removed = trace::remove_flight_record(options->flight); !removed)
         problems = removed.error();

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What `simulate` and `run` share: one session, shown and written. Blocks until it is over or was interrupted.
+// Shared by `simulate` and `run`: executes one session, shows it and writes its files. Blocks until it is over or
+// interrupted.
 #pragma once
 
 #include <string>

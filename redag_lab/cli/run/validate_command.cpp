@@ -25,7 +25,7 @@ struct Facts {
   std::size_t dags = 0;
   std::size_t tasks = 0;
   std::size_t edges = 0;
-  std::size_t without_wcet = 0;  // callbacks that are still to be measured
+  std::size_t without_wcet = 0;  // callbacks whose wcet is not measured yet
   double utilization = 0;
   std::uint32_t workers = 0;
   std::optional<Duration> hyperperiod;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The subcommands. Each has one file, <name>_command.cpp, and one function that declares its options and returns what
-// to do once they are parsed.
+// The subcommands. Each has one file, <name>_command.cpp, and one function. The function declares the options and
+// returns the action to run after parsing.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -12,7 +12,7 @@
 
 namespace redag::cli {
 
-// Exit statuses: what a script can branch on.
+// Exit statuses for scripts.
 inline constexpr int kExitOk = 0;
 inline constexpr int kExitNo = 1;   // the command worked, and the answer is no
 inline constexpr int kExitBad = 2;  // bad input, bad usage, or a result that could not be written

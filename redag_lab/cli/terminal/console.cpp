@@ -23,7 +23,7 @@ StreamTraits traits_of(int descriptor) {
   StreamTraits traits;
   traits.terminal = isatty(descriptor) == 1;
   if (!traits.terminal) return traits;
-  const char *no_color = std::getenv("NO_COLOR");  // https://no-color.org: present and not empty
+  const char *no_color = std::getenv("NO_COLOR");  // https://no-color.org: set and not empty
   const char *term = std::getenv("TERM");
   traits.colour = (no_color == nullptr || *no_color == '\0') && term != nullptr && std::strcmp(term, "dumb") != 0;
   winsize size{};
@@ -43,7 +43,8 @@ const char *code_of(Tint tint) {
   return "";
 }
 
-// The length of one of our own sequences at `at`: a colour, or back to the start of the line and clear it. 0: none.
+// Returns the length of one of our own control sequences at `at`, or 0. They are colours, and return to the start of
+// the line with clearing.
 std::size_t own_sequence(std::string_view text, std::size_t at) {
   constexpr std::string_view kClearLine = "\r\033[K";
   const std::string_view rest = text.substr(at);
@@ -53,7 +54,7 @@ std::size_t own_sequence(std::string_view text, std::size_t at) {
   return end != std::string_view::npos && rest[end] == 'm' ? end + 1 : 0;
 }
 
-// What a terminal gets: names of files, and whatever else comes from outside, must not steer it.
+// Escapes a text for the terminal. Names of files and other external texts must not control the terminal.
 std::string for_terminal(std::string_view text) {
   std::string shown;
   for (std::size_t at = 0; at < text.size();) {
@@ -69,7 +70,7 @@ std::string for_terminal(std::string_view text) {
   return shown;
 }
 
-// All of `text`; the errno of what went wrong, or 0.
+// Writes all of `text`. Returns the errno of a failure, or 0.
 int write_all(int descriptor, std::string_view text) {
   while (!text.empty()) {
     const ssize_t written = ::write(descriptor, text.data(), text.size());
@@ -119,7 +120,7 @@ void Console::note(std::string_view text) {
 void Console::note(const Diagnostic &diagnostic) {
   const bool is_error = diagnostic.severity == Severity::Error;
   std::string text = diagnostic.to_string();
-  // Colour the word that says how bad it is, and nothing else: the place must stay clickable.
+  // Only the severity is coloured: the place must stay clickable.
   const std::string_view word = is_error ? "error:" : "warning:";
   const std::size_t at = text.find(word, diagnostic.file.size());
   if (err_traits_.colour && at != std::string::npos) {

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Where a command's text goes: results to standard output (buffered, so that a broken pipe or a full disk is seen once,
-// at the end), everything else to standard error (at once). Knows what the terminals can show. Not thread-safe.
+// Output of a command. Results go to standard output and are buffered; a broken pipe or a full disk is then reported
+// once, at the end. All other text goes to standard error at once. Knows the abilities of the terminals. Not
+// thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -15,40 +16,40 @@ namespace redag::cli {
 
 enum class Tint : std::uint8_t { Plain, Good, Bad, Caution, Faint, Strong };
 
-/// `text` wrapped in the terminal's codes for `tint`, or as it is where `colour` is false.
+/// Wraps `text` in the terminal's codes for `tint`, or returns it unchanged if `colour` is false.
 [[nodiscard]] std::string tinted(std::string_view text, Tint tint, bool colour);
 
-/// Columns that a UTF-8 text takes, one a code point.
+/// Returns the number of columns of a UTF-8 text, one per code point.
 [[nodiscard]] std::size_t display_width(std::string_view text);
 
 struct StreamTraits {
   bool terminal = false;
-  bool colour = false;    // a terminal, and neither NO_COLOR nor TERM=dumb says otherwise
+  bool colour = false;    // a terminal, unless NO_COLOR or TERM=dumb is set
   std::size_t width = 0;  // columns; 0: no limit
 };
 
 class Console {
  public:
-  /// Writes to two file descriptors, which it does not own.
+  /// Writes to two file descriptors, which the caller owns.
   Console(int out, StreamTraits out_traits, int err, StreamTraits err_traits);
-  /// Standard output and standard error of the process.
+  /// Uses standard output and standard error of the process.
   Console();
 
   [[nodiscard]] const StreamTraits &out_traits() const { return out_traits_; }
   [[nodiscard]] const StreamTraits &err_traits() const { return err_traits_; }
 
-  /// Results.
+  /// Prints results.
   void print(std::string_view text);
-  /// Remarks; errors in writing them are ignored.
+  /// Prints remarks; errors in writing them are ignored.
   void note(std::string_view text);
   void note(const Diagnostic &diagnostic);
   void note(const Diagnostics &diagnostics);
-  /// A warning about the run, not about a file.
+  /// Prints a warning about the run, not about a file.
   void warn(std::string_view message, std::string_view hint = {});
   void error(std::string_view message, std::string_view hint = {});
 
-  /// Writes what was printed. A reader that went away (`| head`) is no error. False, with a note, if it could not be
-  /// written.
+  /// Writes the printed text. A reader that left early (`| head`) is no error. Returns false, after a note, if the text
+  /// could not be written.
   [[nodiscard]] bool flush();
 
  private:

@@ -38,7 +38,7 @@ Result<std::string> read_standard_input() {
   return trace::file_error("<stdin>", 0, fmt::format("longer than {} bytes", kMaxWorkloadBytes));
 }
 
-// Devices, pipes: what cannot be replaced by a rename.
+// Writes to devices and pipes, which a rename cannot replace.
 Result<void> write_in_place(const std::string &path, std::string_view text) {
   const std::unique_ptr<std::FILE, int (*)(std::FILE *)> file(std::fopen(path.c_str(), "we"), &std::fclose);
   if (file != nullptr && std::fwrite(text.data(), 1, text.size(), file.get()) == text.size() &&
@@ -50,7 +50,7 @@ Result<void> write_in_place(const std::string &path, std::string_view text) {
 
 constexpr const char *kFlightName = "flight";
 
-// "007" of "mte_007".
+// True if the text consists of digits, such as "007" of "mte_007".
 bool is_number(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
@@ -82,7 +82,7 @@ Result<void> check_output(const std::string &path) {
   const fs::file_status status = fs::symlink_status(path, ignored);
   const bool in_place = fs::exists(status) && !fs::is_regular_file(status);
   const std::string folder = fs::path(path).parent_path().string();
-  // What is there is replaced by a rename, which only the folder has to permit.
+  // A rename replaces the existing file, and needs the folder's permission only.
   const std::string place = in_place ? path : folder.empty() ? "." : folder;
   if (::access(place.c_str(), in_place ? W_OK : W_OK | X_OK) == 0) return {};
   return trace::file_error(path, 0, fmt::format("cannot write: {}", std::strerror(errno)),
@@ -115,7 +115,7 @@ std::string flight_folder(const std::string &folder) { return folder + "/" + kFl
 
 bool is_result_name(std::string_view name) {
   if (name == kFlightName) return true;
-  // What a killed command left behind ends in ".tmp.<pid>".
+  // A killed command can leave files that end in ".tmp.<pid>".
   if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
     name = name.substr(0, at);
   }
@@ -128,7 +128,7 @@ bool is_result_name(std::string_view name) {
                                                        "factorial.svg",  "observations.csv", "response_quantiles.csv",
                                                        "responses.svg",  "distance.svg"};
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
-  // Folders of a comparison: one an executor, in it one a repetition; and what `generate` writes.
+  // Folders of a comparison (executors, and repetitions below them), and the files of `generate`.
   const std::vector<std::string> &executors = variant_names();
   if (std::find(executors.begin(), executors.end(), name) != executors.end()) return true;
   const auto is_numbered = [name](std::string_view prefix, std::string_view suffix) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Files on behalf of commands: reading a workload ("-" is standard input), writing one text file, and result folders,
-// which are made when missing and never mixed with somebody else's files. Not thread-safe.
+// Files of commands: reading a workload ("-" is standard input), writing one text file, and result folders. Result
+// folders are created if missing and never mixed with foreign files. Not thread-safe.
 #pragma once
 
 #include <string>
@@ -14,27 +14,27 @@
 
 namespace redag::cli {
 
-/// load_workload(), or the text on standard input if `path` is "-".
+/// Calls load_workload(), or parses standard input if `path` is "-".
 [[nodiscard]] Result<LoadedWorkload> load_input(const std::string &path, LoadOptions options = {});
 
-/// Writes a whole file or nothing (trace::OutputFile); devices and pipes are written as they are.
+/// Writes a whole file or nothing (trace::OutputFile). Devices and pipes are written directly.
 [[nodiscard]] Result<void> write_text(const std::string &path, std::string_view text);
 
-/// Can write_text() write there? For commands that compute for long before they do.
+/// Checks that write_text() can write there, before a long computation.
 [[nodiscard]] Result<void> check_output(const std::string &path);
 
-/// A folder that results can go to: made with its parents if missing. Error if it holds a file that this program does
-/// not write, by name (unless `force`), or cannot be made or written. Nothing is deleted.
+/// Prepares a folder for results, creating it and its parents if missing. Error: the folder cannot be created or
+/// written, or holds a file that this program does not write, by name (unless `force`). Nothing is deleted.
 [[nodiscard]] Result<void> prepare_folder(const std::string &path, bool force);
 
-/// Where `redag run` records a run in its result folder while it goes on (trace/flight_recorder.hpp).
+/// Returns the place in a result folder where `redag run` records a run while it runs (trace/flight_recorder.hpp).
 [[nodiscard]] std::string flight_folder(const std::string &folder);
 
-/// The traces at a place, sorted: the file itself, or every events.jsonl in the folder and below. Error if there is
-/// none.
+/// Returns the traces at a place, sorted: the file itself, or every events.jsonl in the folder and below. Error: none
+/// found.
 [[nodiscard]] Result<std::vector<std::string>> find_traces(const std::string &place);
 
-/// Is this the name of something that a command writes into a result folder?
+/// True if a command writes a file or folder of this name into a result folder.
 [[nodiscard]] bool is_result_name(std::string_view name);
 
 }  // namespace redag::cli

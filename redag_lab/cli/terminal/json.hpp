@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// JSON as the commands write it: every document says where it comes from (redag/base/provenance.hpp).
+// JSON of the commands. Every document has its provenance (redag/base/provenance.hpp).
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,8 +13,8 @@ namespace redag::cli {
 
 using Json = nlohmann::ordered_json;
 
-/// Indented, with a newline at the end. A document (it has a `format`) gets the provenance of this process, unless it
-/// has that of the run that it is about. Bytes that are not UTF-8 (file names can hold any) become U+FFFD.
+/// Returns indented text with a newline at the end. A document (with a `format`) gets the provenance of this process,
+/// unless it has that of its run. Invalid UTF-8 (file names can contain any bytes) becomes U+FFFD.
 [[nodiscard]] std::string to_text(Json document);
 
 [[nodiscard]] Json diagnostics_json(const Diagnostics &diagnostics);

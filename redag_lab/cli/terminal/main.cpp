@@ -9,8 +9,8 @@
 #include "redag_lab/cli/terminal/program.hpp"
 
 int main(int argc, char **argv) {
-  // A reader that goes away (`| head`) must not end a run before its files are written: writing says so instead.
-  // The same for a file that may not grow any more (ulimit -f).
+  // A reader that leaves early (`| head`) must not end a run before its files are written; the write reports an error
+  // instead. The same holds for a file at its size limit (ulimit -f).
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
   redag::cli::Console console;

@@ -17,9 +17,9 @@
 namespace redag::cli {
 namespace {
 
-constexpr int kMaxCpu = 4095;  // more than any Linux of today has
+constexpr int kMaxCpu = 4095;  // above the limit of today's Linux
 
-// A number at the start of `text`, which it is taken from.
+// Parses a number at the start of `text` and removes it from there.
 std::optional<int> take_number(std::string_view &text) {
   int value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -69,7 +69,7 @@ CLI::Option *add_duration_to(CLI::App &app, const std::string &name, Target &tar
 }  // namespace
 
 void reject(const std::string &option, const std::string &message, const std::string &hint) {
-  // CLI11 puts the name before a ValidationError's message only if it has one.
+  // CLI11 puts the name before a ValidationError's message only if there is a name.
   throw CLI::ValidationError(option, message + (hint.empty() ? "" : " (" + hint + ")"));
 }
 

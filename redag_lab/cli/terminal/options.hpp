@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Command-line options whose values have a text form of this project: durations, names of choices, processors. What is
-// wrong with a value is said in the words that a workload file would get. Called while the program starts; no threads.
+// Command-line options whose values have a text form of this project: durations, names of choices, processors. Mistakes
+// in values have the same messages as in workload files. Used while the program starts, on one thread.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -23,53 +23,53 @@ namespace redag::cli {
 template <class Value>
 using Choices = std::vector<std::pair<std::string, Value>>;
 
-/// Throws CLI::ValidationError: "--period-min: ...".
+/// Throws CLI::ValidationError with a text such as "--period-min: ...".
 [[noreturn]] void reject(const std::string &option, const std::string &message, const std::string &hint = {});
 
-/// "5ms"; not negative, and positive unless `zero_allowed`.
+/// Adds an option such as "5ms". The value must not be negative, and is positive unless `zero_allowed`.
 CLI::Option *add_duration(CLI::App &app, const std::string &name, std::optional<Duration> &target,
                           const std::string &help, bool zero_allowed = false);
 CLI::Option *add_duration(CLI::App &app, const std::string &name, Duration &target, const std::string &help,
                           bool zero_allowed = false);
 
-/// The values that a number can have, ends included; said in words where it has another one.
+/// The allowed values of a number, including both ends. Messages name them.
 template <class Number>
 struct Range {
   Number least;
   Number most;
 };
 
-/// Where nothing but the machine sets a limit: so many threads, combinations, restarts, recorded events.
+/// Limits where only the machine sets one: threads, combinations, restarts, recorded events.
 inline constexpr std::uint32_t kMaxJobs = 1024;
 inline constexpr std::uint32_t kMaxRestarts = 1'000'000;
 inline constexpr std::uint64_t kMaxCombinations = 1'000'000'000;
 inline constexpr std::uint64_t kMaxEvents = 1'000'000'000;
 
-/// The option of `app` that is called `name` ("--out"), which must exist. CLI::App::get_option() ends the process where
-/// memory is short: it compares names in a function that must not throw.
+/// Returns the option of `app` with this `name` ("--out"), which must exist. CLI::App::get_option() ends the process
+/// when memory runs out: it compares names in a noexcept function.
 CLI::Option &option_named(CLI::App &app, std::string_view name);
 
-/// A whole number; shows its default.
+/// Adds a whole number; the help shows its default.
 CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint32_t &target, Range<std::uint32_t> range,
                        const std::string &help);
 CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint64_t &target, Range<std::uint64_t> range,
                        const std::string &help);
-/// Any whole number below 2^64.
+/// Adds a seed: any whole number below 2^64.
 CLI::Option *add_seed(CLI::App &app, std::uint64_t &target, const std::string &help);
-/// A finite number; shows its default.
+/// Adds a finite number; the help shows its default.
 CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, Range<double> range,
                         const std::string &help);
 
-/// "3" within `range`; throws as reject() does.
+/// Parses a number such as "3" within `range`; throws as reject() does.
 [[nodiscard]] std::uint32_t parse_count(const std::string &name, const std::string &text, Range<std::uint32_t> range);
 
-/// "0,2-5" -> {0, 2, 3, 4, 5}.
+/// Parses "0,2-5" into {0, 2, 3, 4, 5}.
 [[nodiscard]] std::optional<std::vector<int>> parse_cpu_list(std::string_view text);
 
-/// The nearest candidate in quotes, "did you mean 'x'?", or the list of all: "one of a, b, c".
+/// Returns the nearest candidate as "did you mean 'x'?", or else the list "one of a, b, c".
 [[nodiscard]] std::string suggestion(std::string_view given, const std::vector<std::string> &candidates);
 
-/// A name out of a list of choices; the help shows them. `Target` is Value or std::optional<Value>.
+/// Adds an option with a list of choices, which the help shows. `Target` is Value or std::optional<Value>.
 template <class Value, class Target>
 CLI::Option *add_choice(CLI::App &app, const std::string &name, Target &target, const Choices<Value> &choices,
                         const std::string &help) {

@@ -105,7 +105,7 @@ std::vector<std::string> command_names() {
   return names;
 }
 
-// What CLI11 says about an argument that it does not know, with the nearest one that it does.
+// Returns the message for an unknown argument, with the nearest known option.
 std::string unknown_argument(const CLI::App &command) {
   const std::vector<std::string> rest = command.remaining();
   if (rest.empty()) return "too many arguments";
@@ -116,11 +116,11 @@ std::string unknown_argument(const CLI::App &command) {
     for (const std::string &name : option->get_lnames()) names.push_back("--" + name);
   }
   const std::string hint = suggestion(given, names);
-  const bool is_near = hint.compare(0, 3, "did") == 0;  // otherwise it lists every option there is
+  const bool is_near = hint.compare(0, 3, "did") == 0;  // otherwise it lists all options
   return fmt::format("unknown option {}{}", in_quotes(given), is_near ? " (" + hint + ")" : "");
 }
 
-// What CLI11 says of an option that was given too often, or with a value that it does not take, in our words.
+// Returns the message for an option that was given twice, or with a value that it does not take.
 std::string mismatch(const CLI::ArgumentMismatch &error) {
   std::string said = error.what();
   if (const std::size_t at = said.find(": At Most 1 required"); at != std::string::npos) {
@@ -132,7 +132,8 @@ std::string mismatch(const CLI::ArgumentMismatch &error) {
   return said;
 }
 
-// An empty value is a variable that was not set, in a script: none of our options means anything by it.
+// Returns the name of an option with an empty value, which usually comes from an unset variable in a script. No option
+// accepts one.
 std::string find_empty(const CLI::App &command) {
   for (const CLI::Option *option : command.get_options()) {
     for (const std::string &value : option->results()) {
@@ -148,7 +149,7 @@ int usage_error(Console &console, const std::string &message, const std::string 
   return kExitBad;
 }
 
-// The subcommand that was named, the innermost one, or null.
+// Returns the innermost subcommand on the command line, or null.
 CLI::App *chosen(CLI::App &app) {
   const auto parsed = app.get_subcommands();
   if (parsed.empty()) return nullptr;
@@ -156,14 +157,14 @@ CLI::App *chosen(CLI::App &app) {
   return inner != nullptr ? inner : parsed.front();
 }
 
-// "experiment acceptance", or "" for the program itself.
+// Returns a name such as "experiment acceptance", or "" for the program itself.
 std::string name_of(const CLI::App *command) {
   if (command == nullptr || command->get_parent() == nullptr) return {};
   const std::string outer = name_of(command->get_parent());
   return outer.empty() ? command->get_name() : outer + " " + command->get_name();
 }
 
-// What stands before the command's own name in its usage line.
+// Returns the text before the command's own name in its usage line.
 std::string help_prefix(const CLI::App &command) {
   const std::string outer = name_of(command.get_parent());
   return outer.empty() ? "redag" : "redag " + outer;
@@ -200,7 +201,7 @@ int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
   }
 
   try {
-    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them last first
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 expects the last argument first
   } catch (const CLI::CallForHelp &) {
     CLI::App *command = chosen(app);
     console.print(command != nullptr ? command->help(help_prefix(*command)) : app.help());
@@ -236,7 +237,7 @@ int run_program(const std::vector<std::string> &arguments, Console &console) {
     status = parse_and_run(arguments, console);
   } catch (const std::bad_alloc &) {
     console.error("out of memory");
-  } catch (const std::exception &error) {  // of the libraries: a folder that vanished, say
+  } catch (const std::exception &error) {  // from a library, for example about a folder that vanished
     console.error(error.what());
   }
   if (!console.flush()) return kExitBad;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The program `redag` as a function: which subcommand, usage errors, help. main.cpp gives it the process's arguments
-// and streams.
+// The program `redag` as a function: selects the subcommand, reports usage errors and prints help. main.cpp provides
+// the process's arguments and streams.
 #pragma once
 
 #include <string>
@@ -12,7 +12,8 @@
 
 namespace redag::cli {
 
-/// `arguments` without the program's name. Returns the exit status (commands.hpp); nothing is left unwritten.
+/// Runs the program. `arguments` excludes the program's name. Returns the exit status (commands.hpp), with all output
+/// written.
 [[nodiscard]] int run_program(const std::vector<std::string> &arguments, Console &console);
 
 }  // namespace redag::cli

@@ -17,7 +17,7 @@ constexpr Duration kRedrawPeriod = 100 * kMillisecond;
 constexpr Duration kLinePeriod = 5 * kSecond;
 constexpr std::size_t kBarWidth = 20;
 
-// Beyond a day nobody cares for seconds, and a first guess can be far off.
+// Beyond a day, seconds are of no interest, and a first estimate can be far off.
 std::string rest_in_words(double rest) {
   return (rest < 86'400e9 ? humanize_duration(static_cast<Duration>(rest)) : "more than a day") + " left";
 }
@@ -67,7 +67,7 @@ void Progress::draw(double done, std::string_view detail) {
   }
   last_drawn_ = now();
   visible_ = true;
-  // One column stays free: a full last column wraps on some terminals.
+  // One column stays free, because a full last column wraps on some terminals.
   const std::size_t width = console_.err_traits().width;
   console_.note("\r\033[K" + progress_line(label_, done, detail, width > 1 ? width - 1 : 79));
 }

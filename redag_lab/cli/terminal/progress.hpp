@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A line on standard error that tells how far a long command is. On a terminal it is redrawn at most ten times a second
-// and erased when done; elsewhere a plain line comes every five seconds. Not thread-safe.
+// A line on standard error with the progress of a long command. On a terminal it is redrawn at most ten times a second
+// and finally erased. Elsewhere a plain line appears every five seconds. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -21,19 +21,20 @@ class Progress {
   Progress(const Progress &) = delete;
   Progress &operator=(const Progress &) = delete;
 
-  /// What stands before the bar: "mte 2/3".
+  /// Sets the text before the bar, such as "mte 2/3".
   void set_label(std::string label) { label_ = std::move(label); }
 
-  /// Is it time to redraw? Cheap enough to ask often, but reads a clock.
+  /// True if it is time to redraw. Reads a clock, but is cheap enough to call often.
   [[nodiscard]] bool due() const;
 
-  /// `done` in [0, 1]; `detail` stands after the bar, cut to the terminal.
+  /// Draws the line. `done` is in [0, 1]; `detail` follows the bar, cut to the terminal.
   void draw(double done, std::string_view detail);
 
-  /// ", 12s left": how long it will take from here on if it goes on as it did; empty while that is a mere guess.
+  /// Returns the estimated remaining time at the pace so far, such as ", 12s left"; empty while the estimate is too
+  /// uncertain.
   [[nodiscard]] std::string left(double done) const;
 
-  /// Takes the line away, so that other text can be written.
+  /// Erases the line before other text is written.
   void clear();
 
  private:
@@ -44,7 +45,7 @@ class Progress {
   bool visible_ = false;
 };
 
-/// Time since it was made.
+/// Measures the time since its construction.
 class Stopwatch {
  public:
   Stopwatch();
@@ -54,10 +55,10 @@ class Stopwatch {
   Time begin_;
 };
 
-/// "3 200 of 8 000, 512/s, 9.4s left": how `done` of `total` went, `elapsed` after the first of them began.
+/// Returns "3 200 of 8 000, 512/s, 9.4s left" for `done` of `total`, `elapsed` after the start.
 [[nodiscard]] std::string pace(std::uint64_t done, std::uint64_t total, Duration elapsed);
 
-/// "label [#####     ]  50 %  detail", at most `width` columns.
+/// Returns "label [#####     ]  50 %  detail", at most `width` columns.
 [[nodiscard]] std::string progress_line(std::string_view label, double done, std::string_view detail,
                                         std::size_t width);
 

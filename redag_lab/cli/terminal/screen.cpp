@@ -23,7 +23,7 @@ constexpr std::string_view kEnter = "\033[?1049h\033[?25l\033[?7l";  // alternat
 constexpr std::string_view kLeave = "\033[?7h\033[?25h\033[0m\033[?1049l";
 constexpr std::array kFatal{SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGHUP, SIGQUIT, SIGPIPE};
 
-// For the handlers: what the terminal was like. Written before they are installed.
+// The terminal's previous state, for the handlers. Written before the handlers are installed.
 termios old_terminal{};
 volatile std::sig_atomic_t is_taken = 0;
 volatile std::sig_atomic_t was_resized = 0;
@@ -40,7 +40,7 @@ bool write_all(std::string_view text) {
   return true;
 }
 
-// Async-signal-safe: write and tcsetattr.
+// Restores the terminal. Async-signal-safe: write and tcsetattr.
 void give_back() {
   if (is_taken == 0) return;
   is_taken = 0;
@@ -48,7 +48,8 @@ void give_back() {
   (void)tcsetattr(STDIN_FILENO, TCSANOW, &old_terminal);
 }
 
-// The handler is gone (SA_RESETHAND): the signal does what it would have done, once it is let through again.
+// Restores the terminal and raises the signal again. SA_RESETHAND has removed this handler, and the previous action
+// follows.
 void on_fatal(int number) {
   give_back();
   ::raise(number);
@@ -80,7 +81,7 @@ Screen::Screen() {
   raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
   raw.c_cc[VMIN] = 0;
   raw.c_cc[VTIME] = 0;
-  raw.c_cc[VSUSP] = _POSIX_VDISABLE;  // a stopped program would leave the terminal as ours
+  raw.c_cc[VSUSP] = _POSIX_VDISABLE;  // a stopped program would leave the terminal in our mode
   (void)tcsetattr(STDIN_FILENO, TCSANOW, &raw);
   (void)write_all(kEnter);
 }
@@ -101,7 +102,7 @@ bool Screen::draw(const std::vector<std::string> &lines) {
   const std::size_t room = std::min(lines.size(), size().lines);
   std::string text = "\033[H";
   for (std::size_t i = 0; i < room; ++i) {
-    // Erased first: after a line as wide as the terminal the cursor is still on its last character.
+    // Erases before writing: after a line as wide as the terminal the cursor is still on its last character.
     const bool last = i + 1 == room;
     text += (last ? "\033[J" : "\033[K") + lines[i] + (last ? "" : "\r\n");
   }
@@ -151,7 +152,7 @@ KeyPress take_key(std::string &bytes) {
   if (bytes.empty()) return {};
   if (bytes[0] == '\033') {
     const bool alone = bytes.size() == 1;
-    bytes.clear();  // what we do not know is not to be taken for letters
+    bytes.clear();  // an unknown sequence must not be read as letters
     return {alone ? Key::Escape : Key::None};
   }
   const char text = bytes[0];

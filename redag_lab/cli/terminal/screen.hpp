@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A whole terminal for a while: alternate screen, keys one by one, the size as it is now. What was there comes back
-// when this ends, also if the program crashes or is killed by a signal that can be caught. One at a time, one thread.
+// Takes over a terminal: alternate screen, single keys, the current size. The destructor restores the previous state,
+// and so do handlers for crashes and catchable signals. One object at a time, on one thread.
 #pragma once
 
 #include <cstdint>
@@ -20,12 +20,12 @@ struct KeyPress {
   char text = 0;  // Key::Text: an ASCII character
 };
 
-/// What the bytes that a terminal sent mean: the first key, which is taken from them. Unknown sequences are None.
+/// Parses and removes the first key from the bytes that a terminal sent. Unknown sequences are None.
 [[nodiscard]] KeyPress take_key(std::string &bytes);
 
 class Screen {
  public:
-  /// Takes standard input and standard output, which must be terminals (is_possible()).
+  /// Takes over standard input and standard output, which must be terminals (is_possible()).
   Screen();
   ~Screen();
   Screen(const Screen &) = delete;
@@ -39,11 +39,11 @@ class Screen {
   };
   [[nodiscard]] Size size() const;
 
-  /// Shows the lines from the top, as many as there is room for; what was there before is gone. None of them may be
-  /// wider than the screen. False: the terminal is gone.
+  /// Replaces the screen by the lines from the top, as many as fit. None of them may be wider than the screen. Returns
+  /// false if the terminal is gone.
   [[nodiscard]] bool draw(const std::vector<std::string> &lines);
 
-  /// The next key, or None after `timeout`, or when a signal came.
+  /// Returns the next key, or None after `timeout` or a signal.
   [[nodiscard]] KeyPress wait(Duration timeout);
 
  private:

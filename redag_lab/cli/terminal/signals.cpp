@@ -16,12 +16,13 @@ std::atomic<bool> interrupt_flag{false};
 std::atomic<Time> first_signal{0};
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<Time>::is_always_lock_free);
 
-// One wish can arrive twice: timeout(1) signals the process and then its group. Nobody presses Ctrl-C again that fast.
+// Two signals within this time count as one request: timeout(1) signals the process and then its group. A second Ctrl-C
+// by hand takes longer.
 constexpr Duration kSameWish = 200 * kMillisecond;
 
 // Async-signal-safe: atomics, clock_gettime and _exit.
 void on_signal(int number) {
-  constexpr int kSignalExit = 128;  // as a shell reports a death by signal
+  constexpr int kSignalExit = 128;  // as shells report a death by signal
   const Time now = runtime::monotonic_now();
   Time first = 0;
   if (first_signal.compare_exchange_strong(first, now)) {
@@ -44,8 +45,7 @@ InterruptGuard::InterruptGuard() {
   REDAG_CHECK(sigaction(SIGTERM, &action, &old_terminate_) == 0, "no handler for SIGTERM");
 }
 
-// Once interrupted the handlers stay: the program is about to end, and a wish that arrives twice must not kill it on
-// the way out.
+// After an interrupt the handlers stay. The program is about to end, and a duplicate signal must not kill it before.
 InterruptGuard::~InterruptGuard() {
   if (interrupted()) return;
   sigaction(SIGINT, &old_interrupt_, nullptr);

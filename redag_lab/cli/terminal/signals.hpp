@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Ctrl-C as a wish, not as an accident: the first SIGINT or SIGTERM sets a flag that the running command looks at, the
-// second ends the process at once. One guard at a time.
+// Handles Ctrl-C: the first SIGINT or SIGTERM sets a flag that the running command polls, and the second one ends the
+// process at once. One guard at a time.
 #pragma once
 
 #include <atomic>
@@ -12,13 +12,13 @@ namespace redag::cli {
 
 class InterruptGuard {
  public:
-  /// Installs the handlers; the destructor puts back what was there, unless there was a signal.
+  /// Installs the handlers. The destructor restores the previous ones, unless there was a signal.
   InterruptGuard();
   ~InterruptGuard();
   InterruptGuard(const InterruptGuard &) = delete;
   InterruptGuard &operator=(const InterruptGuard &) = delete;
 
-  /// Set by the first signal. Lock-free; any thread.
+  /// Set by the first signal. Lock-free; any thread may read it.
   [[nodiscard]] static const std::atomic<bool> &flag();
   [[nodiscard]] static bool interrupted() { return flag().load(std::memory_order_relaxed); }
 

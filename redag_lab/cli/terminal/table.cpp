@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kGap = 2;          // between columns
 constexpr std::size_t kShortestCut = 8;  // a text column is not cut below this
-constexpr std::size_t kLongestCut = 24;  // nor below what tells its cells apart, if that is no more than this
+constexpr std::size_t kLongestCut = 24;  // nor below the width at which its cells differ, up to this limit
 
 std::string padded(const std::string &text, std::size_t width, bool right) {
   const std::size_t used = display_width(text);
@@ -55,7 +55,7 @@ void Table::add(std::vector<Cell> row) {
   rows_.push_back(std::move(row));
 }
 
-// Widths of the columns in `shown`, from which those that do not fit were taken.
+// Returns the widths of the columns, and removes from `shown` those that do not fit.
 std::vector<std::size_t> Table::fit(std::size_t width, std::vector<std::size_t> &shown) const {
   std::vector<std::size_t> widths(columns_.size());
   for (std::size_t i = 0; i < columns_.size(); ++i) {
@@ -89,7 +89,7 @@ std::vector<std::size_t> Table::fit(std::size_t width, std::vector<std::size_t> 
     const auto importance = [&](std::size_t a, std::size_t b) {
       return columns_[a].importance < columns_[b].importance;
     };
-    // min_element finds the first of equals; the last of them is to go.
+    // Of equally important columns the last one goes. min_element finds the first, and therefore searches backwards.
     shown.erase(std::prev(std::min_element(shown.rbegin(), shown.rend(), importance).base()));
   }
   return widths;
@@ -105,7 +105,7 @@ std::string Table::render(std::size_t width, bool colour) const {
     std::string line;
     for (const std::size_t i : shown) {
       const Cell cell = cell_of(i);
-      // Without colour nothing invisible stands at the end of a line.
+      // The last column is not padded: without colour, lines have no trailing blanks.
       const bool last = i == shown.back() && !columns_[i].number;
       const std::string content = cut(cell.text, widths[i]);
       if (i != shown.front()) line.append(kGap, ' ');

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A table for people: aligned columns that fit the terminal. Where they do not, text columns are cut first, then the
-// least important columns go, and a line below says which.
+// A table for people, with aligned columns that fit the terminal. If they do not fit, text columns are cut first. Then
+// the least important columns are left out, and a line below names them.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +17,8 @@ namespace redag::cli {
 struct Column {
   std::string title;
   bool number = false;      // right-aligned, never cut
-  unsigned importance = 0;  // columns of lower importance go first; of equal ones the last
-  bool whole = false;       // never cut, though text
+  unsigned importance = 0;  // columns of lower importance are left out first; among equals the last
+  bool whole = false;       // never cut, although it is text
 };
 
 struct Cell {
@@ -30,23 +30,23 @@ class Table {
  public:
   explicit Table(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
-  /// Missing cells at the end are empty. Requires no more cells than columns.
+  /// Adds a row. Missing cells at the end are empty. Requires no more cells than columns.
   void add(std::vector<Cell> row);
 
-  /// `width` in columns, 0 for no limit. Ends with a newline.
+  /// Renders the table, with a newline at the end. `width` is in columns; 0: no limit.
   [[nodiscard]] std::string render(std::size_t width, bool colour) const;
 
  private:
   [[nodiscard]] std::vector<std::size_t> fit(std::size_t width, std::vector<std::size_t> &shown) const;
 
-  /// Least width at which cells that differ still do.
+  /// Returns the least width at which cells that differ remain different.
   [[nodiscard]] std::size_t shortest_cut(std::size_t column) const;
 
   std::vector<Column> columns_;
   std::vector<std::vector<Cell>> rows_;
 };
 
-/// At most `width` columns of `text`, the end replaced by "…" where it is longer.
+/// Returns at most `width` columns of `text`; the end of a longer text becomes "…".
 [[nodiscard]] std::string cut(std::string_view text, std::size_t width);
 
 }  // namespace redag::cli

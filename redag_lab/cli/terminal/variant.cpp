@@ -34,7 +34,7 @@ Result<Variant> parse_variant(const std::string &name) {
   const std::size_t dash = name.find('-');
   Variant variant{name, name.substr(0, dash), std::nullopt, false};
   const std::string detail = dash == std::string::npos ? "" : name.substr(dash + 1);
-  // rclcpp's executors cannot preempt: whatever the workload says, a callback runs to its end.
+  // rclcpp's executors cannot preempt: a callback runs to its end in every mode of the workload.
   if (!variant.is_redag()) variant.preemption = PreemptionMode::None;
   for (const auto &[text, mode] : preemption_choices()) {
     if (text == detail) variant.preemption = mode;

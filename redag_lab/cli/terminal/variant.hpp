@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// An executor as the command line names it: which scheduler, which preemption, which threads. "redag", "redag-none",
-// "redag-cooperative", "redag-os"; the models of other executors, "mte", "ste", ..., and "mte-fifo", "ste-fifo", ...,
+// An executor by its name on the command line: scheduler, preemption and threads. Names are "redag", "redag-none",
+// "redag-cooperative", "redag-os"; the models of other executors, "mte", "ste", ...; and "mte-fifo", "ste-fifo", ...,
 // the same on real-time threads. Pure.
 #pragma once
 
@@ -18,9 +18,9 @@
 namespace redag::cli {
 
 struct Variant {
-  std::string name;                          // as it was written
-  std::string executor;                      // of sched::executors()
-  std::optional<PreemptionMode> preemption;  // instead of the workload's; peers: none
+  std::string name;                          // as given
+  std::string executor;                      // a name of sched::executors()
+  std::optional<PreemptionMode> preemption;  // replaces the workload's; other executors: none
   bool realtime_threads = false;
 
   [[nodiscard]] bool is_redag() const { return executor == "redag"; }
@@ -28,16 +28,17 @@ struct Variant {
 
 [[nodiscard]] const std::vector<std::string> &variant_names();
 
-/// Error: an unknown name, with the nearest one.
+/// Parses a name. Error: an unknown name, with the nearest one.
 [[nodiscard]] Result<Variant> parse_variant(const std::string &name);
 
-/// The workload as the executor runs it: its own preemption mode and number of workers. Error: it cannot.
+/// Returns the workload as the executor runs it, with the executor's preemption mode and number of workers. Error: the
+/// executor cannot run it.
 [[nodiscard]] Result<Workload> configure(const Workload &workload, const Variant &variant);
 
-/// As workloads and the command line name it: full preemption is "os".
+/// Returns the mode's name in workloads and on the command line: full preemption is "os".
 [[nodiscard]] const char *mode_name(sched::Preemption preemption);
 
-/// "redag,mte": at least one, none twice.
+/// Parses a list such as "redag,mte" with at least one name and none twice.
 [[nodiscard]] Result<std::vector<Variant>> parse_variants(std::string_view list);
 
 }  // namespace redag::cli

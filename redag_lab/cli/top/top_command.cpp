@@ -73,7 +73,7 @@ int show_once(const Options &options, const std::optional<LiveTarget> &target, C
     return kExitNo;
   }
   if (!target) {
-    // Of what cannot be read there is nothing to choose, unless there is nothing else.
+    // Unreadable pages are no choice, unless all are unreadable.
     const auto readable = std::count_if(pages.begin(), pages.end(), [](const auto &l) { return l.page.has_value(); });
     if (readable > 0) std::erase_if(pages, [](const live::Listed &listed) { return !listed.page; });
   }

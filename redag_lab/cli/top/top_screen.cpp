@@ -77,7 +77,7 @@ class Top {
     const std::string text = describe(pages_, narrower, now_);
     for (std::size_t at = 0, row = 0; at < text.size(); ++row) {
       const std::size_t end = std::min(text.find('\n', at), text.size());
-      const bool is_chosen = row == chosen_ + 1;  // the titles are first
+      const bool is_chosen = row == chosen_ + 1;  // the first line has the titles
       const std::string number = row >= 1 && row <= 9 && row <= pages_.size() ? fmt::format("{}", row) : " ";
       lines.push_back(fmt::format("{} {} {}", is_chosen ? ">" : " ", number, text.substr(at, end - at)));
       at = end + 1;
@@ -108,7 +108,7 @@ class Top {
     return lines;
   }
 
-  // False: the user has seen enough.
+  // Handles a key. Returns false if the user quits.
   bool handle(const KeyPress &key) {
     switch (key.key) {
       case Key::Closed: return false;
@@ -181,14 +181,14 @@ class Top {
   LiveView view_;
   Attachment attachment_;
   std::vector<live::Listed> pages_;
-  std::optional<live::Listed> shown_;  // the last that was seen of it; its page is there
+  std::optional<live::Listed> shown_;  // the latest page read of the chosen executor
   bool gone_ = false;
   bool choosing_ = false;
   bool paused_ = false;
   std::size_t chosen_ = 0;
   std::size_t first_ = 0;  // row at the top
   std::size_t rows_ = 0;
-  std::size_t page_ = 0;  // rows that there is room for
+  std::size_t page_ = 0;  // number of rows that fit
   Time now_ = 0;
   Time next_look_ = 0;
   Screen::Size size_;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// `redag top` on a terminal: keys, what is chosen, what is shown. Takes the screen until the user has seen enough; one
+// `redag top` on a terminal: keys, the choice of an executor, its display. Holds the screen until the user quits; one
 // thread.
 #pragma once
 
@@ -18,7 +18,7 @@ namespace redag::cli {
 
 struct LiveTarget {
   std::int64_t pid = 0;
-  std::optional<std::uint32_t> number;  // of its executors
+  std::optional<std::uint32_t> number;  // of the process's executors
 
   [[nodiscard]] bool names(const live::Listed &listed) const {
     return listed.pid == pid && (!number || *number == listed.number);
@@ -33,13 +33,14 @@ struct TopOptions {
   bool colour = true;
 };
 
-/// Which executor is watched, also over its restarts. A value.
+/// Remembers the watched executor, also across its restarts. A value.
 class Attachment {
  public:
   explicit Attachment(std::optional<LiveTarget> target) : target_(target) {}
 
-  /// The executor to show, out of those that run; null: it is gone (is_known()), or there is none or several to choose
-  /// from. One that went is followed by the next one of the same name and program.
+  /// Returns the executor to show out of the running ones. Null means that it is gone (is_known()), or that there is
+  /// none or several to choose from. An executor that has ended is followed by the next one of the same name and
+  /// program.
   [[nodiscard]] const live::Listed *find(const std::vector<live::Listed> &pages);
   void attach(const live::Listed &listed);
   [[nodiscard]] bool is_known() const { return known_.has_value(); }
@@ -56,7 +57,7 @@ class Attachment {
   std::optional<Known> known_;
 };
 
-/// Exit status.
+/// Returns the exit status.
 [[nodiscard]] int run_top(const TopOptions &options);
 
 }  // namespace redag::cli

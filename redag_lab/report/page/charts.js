@@ -1,17 +1,17 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// ECharts in this page: one theme, light or dark; each chart redraws when theme, width or data change, and can be saved
-// as PNG and SVG.
+// ECharts on this page: one theme, light or dark. Each chart is redrawn when theme, width or data change, and can be
+// saved as PNG and SVG.
 
 const PALETTE = {
   light: ['#0b62c4', '#d9730d', '#2a8f4d', '#8e44ad', '#c2385a', '#0e8c99', '#8c6d1f', '#5a6270'],
   dark: ['#5aa9ff', '#ff9f45', '#5fd08a', '#c58af0', '#ff7f9e', '#4fd0dc', '#d9b95a', '#a9b4c0'],
 };
 const charts = [];
-const themed = [];   // what else to make again when the theme changes
-let beforePrint = null;  // what it was before the printer came
-let forced = null;  // 'light' or 'dark' where the reader or the printer said so
+const themed = [];   // functions to call when the theme changes
+let beforePrint = null;  // the state before printing, while printing
+let forced = null;  // 'light' or 'dark' if the reader or the printer chose it
 
 const systemDark = window.matchMedia('(prefers-color-scheme: dark)');
 const themeName = () => forced || (systemDark.matches ? 'dark' : 'light');
@@ -32,7 +32,7 @@ function applyTheme() {
   charts.forEach((chart) => chart.draw());
 }
 
-// Text, axes and tooltips as the page has them, under what a figure says itself.
+// Adds the page's text, axes and tooltips to an option. The figure's own values take precedence.
 function withTheme(option, t, width) {
   const axis = (own) => ({
     ...own,
@@ -45,14 +45,15 @@ function withTheme(option, t, width) {
   const axes = (own) => (Array.isArray(own) ? own.map(axis) : axis(own));
   return {
     animation: false,
-    // In a saved SVG ECharts puts it between double quotes as it is.
+    // ECharts writes the names into a saved SVG between double quotes, without escaping.
     textStyle: {fontFamily: "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif"},
     color: t.palette,
     ...option,
     xAxis: axes(option.xAxis),
     yAxis: axes(option.yAxis),
     legend: option.legend && {
-      // Beside the buttons, which paper does not have. (Of left, right and width ECharts takes one and the last.)
+      // The legend ends before the buttons, which are not printed. ECharts uses only one of left and right beside the
+      // width.
       type: 'scroll', top: 0, left: 0, width: Math.max(120, width - (beforePrint === null ? 92 : 8)), icon: 'roundRect', itemWidth: 14, itemHeight: 10,
       formatter: (name) => (name.length > 42 ? `${name.slice(0, 41)}\u2026` : name), textStyle: {color: t.ink},
       pageTextStyle: {color: t.soft}, pageIconColor: t.ink, inactiveColor: t.line, ...option.legend,
@@ -69,10 +70,10 @@ function download(name, blob) {
   document.body.append(link);
   link.click();
   link.remove();
-  setTimeout(() => URL.revokeObjectURL(url), 60000);  // a busy browser begins to read it late
+  setTimeout(() => URL.revokeObjectURL(url), 60000);  // a busy browser starts to read the URL late
 }
 
-// A picture of `option` as a Blob.
+// Returns a picture of `option` as a Blob.
 function pictureOf(option, kind, width, height) {
   const plain = {...option, animation: false};
   if (kind === 'svg') {
@@ -87,25 +88,25 @@ function pictureOf(option, kind, width, height) {
   drawing.setOption(plain);
   const url = drawing.getDataURL({type: 'png', pixelRatio: 3, backgroundColor: option.backgroundColor});
   drawing.dispose();
-  // Browsers do not save data URLs of any length.
+  // Browsers limit the length of data URLs that they save.
   const bytes = atob(url.slice(url.indexOf(',') + 1));
   return new Blob([Uint8Array.from(bytes, (byte) => byte.charCodeAt(0))], {type: 'image/png'});
 }
 
 /**
- * A figure: `build(t, width)` returns an ECharts option for theme `t`, or a sentence if there is nothing to draw.
- * `canvas`: many shapes, to be drawn as pixels. `onready(chart)` is called with every new chart.
+ * Returns a figure. `build(t, width)` returns an ECharts option for theme `t`, or a sentence if there is nothing to
+ * draw. `canvas` draws pixels instead of SVG, for many shapes. `onready(chart)` is called with every new chart.
  */
 function figure({name, height, build, caption, canvas = false, label, onready}) {
   const place = element('div', {style: `height:${height}px`, role: 'img', 'aria-label': label});
   const box = element('figure', {'data-figure': name}, element('div.chart', {}, place),
     element('figcaption', {}, caption));
   let chart = null;
-  let drawn = null;  // its option
+  let drawn = null;  // the option drawn
   let nothing = null;
 
   function save(kind) {
-    const now = chart.getOption();  // as the reader zoomed it and picked from its legend
+    const now = chart.getOption();  // includes the reader's zoom and legend selection
     const option = {...drawn, backgroundColor: theme().paper};
     if (drawn.dataZoom) option.dataZoom = now.dataZoom;
     if (drawn.legend) option.legend = {...drawn.legend, selected: now.legend[0].selected};
@@ -150,7 +151,7 @@ function figure({name, height, build, caption, canvas = false, label, onready}) 
 
 let lastWidth = window.innerWidth;
 window.addEventListener('resize', () => {
-  if (window.innerWidth === lastWidth) return;  // a phone's address bar comes and goes
+  if (window.innerWidth === lastWidth) return;  // on a phone the height changes with the address bar
   lastWidth = window.innerWidth;
   charts.forEach((chart) => chart.draw());
 });

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Building the page. Names come from users: they are only ever set as text, never as markup.
+// Builds the page's elements. Names come from users and are only ever set as text, never as markup.
 
-/** element('td.bad', {title: 'x'}, 'text', child, ...). */
+/** Creates an element: element('td.bad', {title: 'x'}, 'text', child, ...). */
 function element(kind, attributes = {}, ...children) {
   const [tag, ...classes] = kind.split('.');
   const node = document.createElement(tag);
@@ -24,7 +24,10 @@ function svgElement(tag, attributes, ...children) {
   return node;
 }
 
-/** A table in a frame that scrolls sideways. Rows: arrays of strings, nodes, or {text, kind}; the first is the head. */
+/**
+ * Returns a table in a frame that scrolls sideways. A row is an array of strings, nodes, or {text, kind}; its first
+ * cell is the row's head.
+ */
 function table(columns, rows) {
   const cell = (content, tag, column) => {
     const plain = content === null || typeof content !== 'object' || content instanceof Node;
@@ -39,7 +42,7 @@ function table(columns, rows) {
   return element('div.table', {tabindex: '0'}, element('table', {}, element('thead', {}, head), element('tbody', {}, ...body)));
 }
 
-/** Buttons of which one is pressed. `choose(index)` is called when another one is. */
+/** Returns a row of buttons, one of which is pressed. A press on another one calls `choose(index)`. */
 function choice(names, chosen, choose) {
   const buttons = names.map((name, i) => element('button', {type: 'button', 'aria-pressed': String(i === chosen), onclick: () => {
     buttons.forEach((button, j) => button.setAttribute('aria-pressed', String(i === j)));
@@ -48,14 +51,14 @@ function choice(names, chosen, choose) {
   return element('span.switch', {role: 'group'}, ...buttons);
 }
 
-/** A labelled list to choose from. */
+/** Returns a labelled drop-down list. */
 function dropdown(label, names, chosen, choose) {
   const list = element('select', {'aria-label': label, onchange: () => choose(list.selectedIndex)},
     ...names.map((name, i) => element('option', i === chosen ? {selected: ''} : {}, name)));
   return element('label', {}, label, list);
 }
 
-/** Lines of text for a tooltip: the first one strong. Returned as a node, so that ECharts does not read it as markup. */
+/** Returns a tooltip's lines, the first one bold. As a node, they cannot be parsed as markup by ECharts. */
 function tip(lines) {
   const [first, ...rest] = lines;
   return element('div.tip', {}, element('b', {}, first), ...rest.filter(Boolean).map((line) => element('div', {}, line)));

@@ -1,19 +1,20 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The page of a factorial experiment: executors over any factor, at chosen levels of the others; the bounds of two DAGs as
-// a map; what explains the differences.
+// The page of a factorial experiment: executors over any factor at chosen levels of the others, a map of the bounds of
+// two DAGs, and the factors' effects.
 
 const report = JSON.parse(document.getElementById('data').textContent);
 const {factors, points} = report;
 const EXECUTOR = 'executor';
-// Where an executor ran. Runs of several worlds can stand in one experiment, as executors "mte", "threads/mte", "ros2/mte".
+// The world of each executor. One experiment can have runs of several worlds, as executors "mte", "threads/mte",
+// "ros2/mte".
 const worldOf = new Map(factors.find(({name}) => name === EXECUTOR).levels.map((executor) => [executor,
   (points.find(({at, worlds}) => at.executor === executor && worlds.length > 0) || {worlds: [report.world]}).worlds[0]]));
 const worlds = Object.keys(WORLDS).filter((world) => [...worldOf.values()].includes(world));
 const plainName = (executor) => executor.slice(executor.indexOf('/') + 1);
 const label = (executor) => (worlds.length > 1 ? `${plainName(executor)}, ${WORLDS[worldOf.get(executor)]}` : executor);
-// The same executor in its worlds is side by side.
+// Sorts executors so that the worlds of one executor are side by side.
 const plainNames = [...new Set([...worldOf.keys()].map(plainName))];
 const executors = [...worldOf.keys()].sort((a, b) => plainNames.indexOf(plainName(a)) - plainNames.indexOf(plainName(b))
   || worlds.indexOf(worldOf.get(a)) - worlds.indexOf(worldOf.get(b)));
@@ -27,7 +28,7 @@ const METRICS = {
   deferred: 'deferred, of all jobs', preemptions: 'preemptions a job', paper_miss_ratio: 'missed as the paper counts',
   finished_per_s: 'finished jobs a second', work: 'processors in use',
 };
-// Why a figure is empty.
+// Returns the reason why a figure is empty.
 const nothing = (metric) => (metric.startsWith('response_') ? 'A response is that of one DAG, end to end: choose a DAG. (One that never answered has none.)'
   : 'There is nothing of this kind: the distance to the ideal needs the executor "ideal" on the same workers and jobs.');
 const isTime = (metric) => metric.endsWith('_ns');
@@ -35,16 +36,18 @@ const isShare = (metric) => metric.endsWith('_ratio') || metric === 'deferred';
 const show = (metric, value) => (isTime(metric) ? formatTime(value) : isShare(metric) ? formatPercent(value) : String(value));
 const words = (name) => name.replaceAll('_', ' ');
 
-// What is looked at: a level of each factor, the factor along the axis, a metric, a DAG, whose map it is.
+// The reader's choice: a level of each factor, the factor along the axis, a metric, a DAG, and the executor of the map.
 const state = {x: Math.max(0, varied.findIndex(({name}) => name !== 'workload')), metric: 'miss_ratio', dag: 'total', levels: {}, owner: 0};
 varied.forEach(({name, levels}) => { state.levels[name] = levels.includes('unbounded') ? 'unbounded' : levels[levels.length > 2 ? Math.floor(levels.length / 2) : 0]; });
 
 const byPlace = new Map(points.map((point) => [factors.map(({name}) => point.at[name] ?? '').join('\n'), point]));
-// Which factors an executor has a choice of: the others are not in the places of its points.
+// The factors that affect each executor. Other factors are not in the places of its points.
 const knows = new Map(executors.map((executor) => [executor, new Set(points.filter((point) => point.at.executor === executor)
   .flatMap((point) => Object.keys(point.at)))]));
 
-/** A DAG under an executor at the chosen levels, some of them replaced by `other`; null if it did not run. */
+/**
+ * Returns a DAG's row of an executor at the chosen levels, some of them replaced by `other`; null if it did not run.
+ */
 function dagAt(executor, other = {}) {
   const place = factors.map(({name, levels}) => {
     if (name === EXECUTOR) return executor;
@@ -55,7 +58,7 @@ function dagAt(executor, other = {}) {
   return (point && (point.dags.find(({name}) => name === state.dag) || point.dags[point.dags.length - 1])) || null;
 }
 
-/** [median, low, high] there; of a largest value [largest of all runs, least, largest]. */
+/** Returns [median, low, high] of the metric; for a maximum [largest of all runs, least, largest]. */
 function spreadAt(executor, metric, other = {}) {
   const dag = dagAt(executor, other);
   return dag === null ? null : dag.values[report.metrics.indexOf(metric)];
@@ -63,14 +66,14 @@ function spreadAt(executor, metric, other = {}) {
 
 const where = (skip) => varied.filter(({name}) => !skip.includes(name)).map(({name}) => `${words(name)} ${state.levels[name]}`).join(', ');
 
-/** A metric over the chosen factor, a line for each executor. */
+/** Draws a metric over the chosen factor, with a line for each executor. */
 function curvesFigure(name, metricOf, caption) {
   return figure({
     name, height: 348, label: 'A metric over a factor, by executor', caption,
     build(t, width) {
       const factor = varied[state.x];
       const metric = metricOf();
-      // Numbers far apart have their true distance; few and close ones stand beside each other.
+      // Widely spread numbers are placed to scale; a few close ones are evenly spaced.
       const numbers = factor.levels.map(Number);
       const numeric = factor.numeric && factor.levels.length > 3 && numbers[0] <= numbers[numbers.length - 1] / 2;
       const x = (i) => (numeric ? numbers[i] : i);
@@ -101,7 +104,7 @@ function curvesFigure(name, metricOf, caption) {
         series: [
           ...lines.map(({executor, e, values}) => ({
             type: 'line', name: label(executor), symbol: symbols[e % symbols.length], symbolSize: 8, itemStyle: {color: colourOf(t, e)},
-            // Between levels that are no numbers there is nothing: the line only leads the eye.
+            // Between levels that are not numbers the line has no values and only guides the eye.
             lineStyle: {width: 2, opacity: factor.numeric ? 1 : 0.35, type: executor === 'ideal' || executor === 'unlimited' ? 'dashed' : 'solid'}, data: values,
           })),
           ...lines.map(({executor, e, values}) => ({
@@ -120,7 +123,7 @@ function curvesFigure(name, metricOf, caption) {
   });
 }
 
-/** A metric at the chosen levels: a group of bars for each executor, a bar for each world that it ran in. */
+/** Draws a metric at the chosen levels: a group of bars for each executor, a bar for each of its worlds. */
 function worldsFigure() {
   return figure({
     name: 'worlds', height: 340, label: 'A metric of each executor, in each world',
@@ -133,7 +136,7 @@ function worldsFigure() {
       if (names.length === 0) return nothing(metric);
       const all = names.flatMap((name) => worlds.map((world) => spread(name, world))).filter((one) => one !== null);
       const most = Math.max(...all.map((one) => one[0]));
-      // Times are far apart; a logarithmic axis has no place for early ones (negative lateness).
+      // Times span several decades and get a logarithmic axis, unless a lateness is negative (early).
       const log = isTime(metric) && all.every((one) => one[0] > 0);
       const floor = log ? 10 ** Math.floor(Math.log10(Math.min(...all.map((one) => one[0])) / 2)) : 0;
       const bars = {barGap: '12%', barMaxWidth: 46};
@@ -181,7 +184,7 @@ function worldsFigure() {
   });
 }
 
-/** The bounds of two DAGs: a metric for each pair. */
+/** Draws a metric for each pair of bounds of two DAGs. */
 function boundsFigure() {
   const owners = executors.filter((executor) => knows.get(executor).has('max_active'));
   const note = element('p.soft');
@@ -229,7 +232,7 @@ function boundsFigure() {
   return {figure: self, owners, note};
 }
 
-/** What explains how much of the variation, one bar for each executor and workload. */
+/** Draws the share of the variation that each factor explains, with a bar for each executor and workload. */
 function effectsFigure() {
   const name = (term) => term.factors.map(words).join(' \u00d7 ');
   const shown = report.effects.filter(({variance}) => variance > 0);
@@ -301,7 +304,7 @@ function selectionTable() {
         if (value === null) return '';
         const range = `${show(metric, value[1])} to ${show(metric, value[2])}`;
         if (metric !== 'miss_ratio') return {text: show(metric, value[0]), title: range};
-        // Where most runs missed nothing the median hides what the others missed.
+        // If most runs missed nothing, the median hides the misses of the others.
         const {missed, released} = dagAt(executor, factor ? {[factor.name]: level} : {});
         const counted = `${formatCount(missed)} of ${formatCount(released)}`;
         return {text: value[0] === 0 && missed > 0 ? counted : show(metric, value[0]), title: `${range}; ${counted} in all runs`, kind: missed > 0 ? 'bad' : ''};
@@ -334,8 +337,9 @@ const bars = worlds.length > 1 || varied.length === 0 ? worldsFigure() : null;
 const curves = curvesFigure('curves', () => state.metric, `Medians at the chosen levels. ${intervals}`);
 const distance = curvesFigure('distance', () => 'excess_miss_ratio', 'Missed deadlines above those of the ideal (preemptive, no overhead, no bounds, in virtual '
   + `time) on the same jobs. Below 0: better than it, which is no contradiction, since a rate-monotonic order is not optimal. ${intervals}`);
-const map = boundsFigure();  // of width 0, so never drawn, where it is not shown
-const effects = varied.filter(({name}) => name !== 'workload').length > 1 ? effectsFigure() : null;  // one factor explains all
+const map = boundsFigure();  // not drawn while hidden, with a width of 0
+// A single factor explains everything.
+const effects = varied.filter(({name}) => name !== 'workload').length > 1 ? effectsFigure() : null;
 
 function redraw() {
   refill();

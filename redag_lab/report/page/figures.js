@@ -1,16 +1,19 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Figures of many jobs: distributions of responses, lateness, the run at a glance, executors side by side.
+// Figures of many jobs: distributions of responses, lateness, the whole run, and executors side by side.
 
-const LATENESS_CLASSES = 80;  // on [-1, 1) deadlines; the last count is what lies beyond
+const LATENESS_CLASSES = 80;  // on [-1, 1) deadlines; the last count holds all larger values
 
-const MOST_LINES = 24;        // of a figure that people can read
+const MOST_LINES = 24;        // that a figure can show legibly
 
 const taskName = (group, task) => `${group.dags[group.tasks[task].dag].name}.${group.tasks[task].name}`;
 const hasCurve = (task) => task.responses !== undefined && task.responses.value_ns.length > 0;
 
-/** Share of the jobs that had answered by each time: lost jobs never do. Jobs in progress at the end are left out. */
+/**
+ * Returns the share of jobs that had finished by each time. Lost jobs never finish, and jobs in progress at the end are
+ * left out.
+ */
 function distribution(task, scale, tail) {
   const jobs = task.jobs;
   const awaited = jobs.missed + jobs.finished - jobs.late;  // finished, lost or overdue
@@ -19,7 +22,7 @@ function distribution(task, scale, tail) {
     return [ns / scale, tail ? 1 - share : share];
   });
   const first = [points[0][0], tail ? 1 : 0];
-  // A logarithmic axis has no zero: where nobody is beyond, the curve ends.
+  // A logarithmic axis has no zero: the curve ends where no job is slower.
   return [first, ...points].filter(([, share]) => !tail || share > 1e-12);
 }
 
@@ -31,8 +34,8 @@ function verticalLine(t, x, text, colour, position) {
 }
 
 /**
- * Response times: of one task under every executor, with deadline and bounds; or of all tasks of one executor, each as a
- * share of its deadline.
+ * Draws response times: of one task under every executor, with deadline and bounds, or of all tasks of one executor,
+ * each as a share of its deadline.
  */
 function responseFigure(groups, state) {
   return figure({
@@ -94,7 +97,7 @@ function responseFigure(groups, state) {
   });
 }
 
-/** How early or late jobs finished, in classes of 1/40 of the deadline. */
+/** Draws how early or late jobs finished, in classes of 1/40 of the deadline. */
 function latenessFigure(groups, state) {
   return figure({
     name: 'lateness', height: 308, label: 'Histogram of lateness',
@@ -136,7 +139,7 @@ function latenessFigure(groups, state) {
   });
 }
 
-/** The whole run: what kept the workers busy, and where deadlines were missed. */
+/** Draws the whole run: the DAGs that kept the workers busy, and the missed deadlines. */
 function timelineFigure(groups, state) {
   return figure({
     name: 'timeline', height: 268, label: 'Workers in use and missed deadlines over the whole run',
@@ -189,7 +192,10 @@ function timelineFigure(groups, state) {
   });
 }
 
-/** One number of every DAG under every executor; `value(row, cell)` is {at, min, max}, or null where there is none. */
+/**
+ * Draws one number of every DAG under every executor. `value(row, cell)` returns {at, min, max}, or null without a
+ * value.
+ */
 function comparisonFigure({name, title, groups, rows, value, log, format, formatAxis, caption}) {
   return figure({
     name, height: 300, label: title, caption,
@@ -222,7 +228,7 @@ function comparisonFigure({name, title, groups, rows, value, log, format, format
               formatter: (item) => format(item.value)},
           })),
           ...groups.map((group, g) => ({
-            // From the lowest to the highest repetition, over the bar of its executor.
+            // A line from the lowest to the highest repetition, over the executor's bar.
             type: 'custom', name: group.label, silent: true, z: 5, data: rows.map((row, i) => [i, spread(row, g).min, spread(row, g).max]),
             renderItem: (params, api) => {
               const low = api.value(1);

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Numbers and times as people read them. Times are nanoseconds.
+// Formats numbers and times for display. Times are nanoseconds.
 
 const UNITS = [['s', 1e9], ['ms', 1e6], ['\u00b5s', 1e3], ['ns', 1]];
 
-/** "12.35 ms": four significant digits and the unit that fits; a dash where there is no time. */
+/** "12.35 ms": four significant digits and a suitable unit; a dash for a missing time. */
 function formatTime(ns) {
   if (ns === null || ns === undefined) return '\u2013';
   if (ns === 0) return '0';
@@ -14,7 +14,7 @@ function formatTime(ns) {
   return `${Number((ns / factor).toPrecision(4))}\u00a0${unit}`;
 }
 
-/** A time on an axis on which `step` is the least distance that can be told apart. */
+/** Formats a time on an axis whose least distinguishable distance is `step`. */
 function formatAxisTime(ns, step) {
   if (ns === 0) return '0';
   const [unit, factor] = UNITS.find(([, f]) => Math.abs(ns) >= f) || UNITS[3];
@@ -25,7 +25,7 @@ function formatAxisTime(ns, step) {
 /** 1234567 -> "1 234 567". */
 const formatCount = (count) => String(count).replace(/\B(?=(\d{3})+$)/g, '\u202f');
 
-/** "14.2 %"; what is not none never reads as none, and what is not all never as all. */
+/** "14.2 %". A ratio above 0 never reads as 0 %, and one below 1 never as 100 %. */
 function formatPercent(ratio) {
   const percent = 100 * ratio;
   if (percent > 0 && percent < 0.05) return `${Number(percent.toPrecision(2))}\u00a0%`;
@@ -33,7 +33,7 @@ function formatPercent(ratio) {
   return `${percent.toFixed(1)}\u00a0%`;
 }
 
-/** "0", "1 (0.0043 %)": beside a column that says of how many. */
+/** "0", "1 (0.0043 %)", for a column beside the total. */
 function formatCountAndShare(part, whole) {
   if (whole === 0) return '\u2013';
   return part === 0 ? '0' : `${formatCount(part)} (${formatPercent(part / whole)})`;
@@ -43,7 +43,8 @@ const DRIVERS = {
   simulator: 'in virtual time', threads: 'on threads of this machine', ros: 'under ROS 2, as the executor saw it',
   ros_nodes: 'under ROS 2, as the nodes saw it', ros2: 'under ROS 2',
 };
-const WORLDS = {simulator: 'virtual time', threads: 'threads', ros: 'ROS 2', ros_nodes: 'ROS 2', ros2: 'ROS 2'};  // in a table
+// Short names, for tables.
+const WORLDS = {simulator: 'virtual time', threads: 'threads', ros: 'ROS 2', ros_nodes: 'ROS 2', ros2: 'ROS 2'};
 const OUTCOMES = ['in progress', 'finished', 'skipped', 'aborted'];
 const REASONS = [
   '', 'not started when the next was released', 'not ready when the next was released', 'its queue was full',

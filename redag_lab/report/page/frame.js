@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What every page has: places that are made again, a verdict, the choice of a theme, a foot, and the start.
+// The parts of every page: places that can be refilled, the verdict, the choice of theme, the footer, and the start.
 
 const MARKS = {good: '\u2713', bad: '\u2717', caution: '!', plain: '\u2022'};
 const verdictList = (sentences) => element('ul.verdict', {},
   ...sentences.map(({tone, text}) => element(`li.${tone}`, {}, element('b', {'aria-hidden': 'true'}, MARKS[tone]), text.replaceAll(' %', '\u00a0%'))));
 
-/** A place whose content is made again by its `fill`. */
+/** Returns an element whose content is made again by refill(), which calls `fill`. */
 function place(fill) {
   const node = element('div');
   node.refill = () => node.replaceChildren(...[].concat(fill()));
@@ -21,7 +21,7 @@ function filled(fill) {
 }
 const refill = () => places.forEach((node) => node.refill());
 
-/** Buttons: as the system has it, light, dark. */
+/** Returns buttons for the theme: the system's, light, dark. */
 function themeChoice() {
   const names = ['auto', 'light', 'dark'];
   return choice(names, 0, (i) => {
@@ -33,7 +33,7 @@ function themeChoice() {
 /** "redag 0.1.0 (revision 0123abc)". */
 const programOf = ({version, revision}) => `redag ${version} (revision ${revision})`;
 
-/** Where results come from, as rows of a description list; `provenance` is null in results of older versions. */
+/** Returns the origin of results as rows of a description list. `provenance` is null in results of older versions. */
 function provenanceRows(provenance) {
   if (!provenance) return [['Recorded', 'by a version of redag that did not note when, where and how']];
   const {created, host, kernel, command, calibration} = provenance;
@@ -48,7 +48,7 @@ function pageFooter({version, provenance}) {
     + 'This file uses no network. Each figure can be saved as PNG or SVG with the buttons above it.');
 }
 
-/** Shows the page's nodes (null: nothing) and draws its figures. */
+/** Shows the page's nodes, without null ones, and draws its figures. */
 function startPage(nodes) {
   document.documentElement.dataset.theme = themeName();
   themed.push(refill);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The page: what stands where, and what the reader has chosen.
+// The layout of the page of recorded runs, and the reader's choices.
 
 const report = JSON.parse(document.getElementById('data').textContent);
 const {groups} = report;
@@ -68,7 +68,7 @@ function detailSections() {
     choice(groups.map((group) => group.label), 0, (i) => {
       const name = state.task === null ? null : taskName(groups[state.executor], state.task);
       state.executor = i;
-      // The same task, where the other one has it.
+      // Keeps the chosen task if the other executor has it.
       const same = name === null ? -1 : groups[i].tasks.findIndex((task, k) => taskName(groups[i], k) === name);
       state.task = same < 0 ? null : same;
       state.view = 0;
@@ -110,7 +110,7 @@ function detailSections() {
   ];
 }
 
-/** What is not shown; where it is the same of several executors, once. */
+/** Returns the notes on what is not shown. A note common to several executors appears once. */
 function cuts() {
   const owners = new Map();
   report.cuts.forEach((cut) => {

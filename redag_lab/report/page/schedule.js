@@ -1,19 +1,19 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The schedule: what ran where and when. Rows are tasks (with releases, deadlines and misses) or workers.
+// Draws the schedule: which job ran where and when. Rows are tasks (with releases, deadlines and misses) or workers.
 
 const OPEN = 3;       // Slice::End
 const PREEMPTED = 2;
 const SKIPPED = 2;    // JobOutcome
 const ROW_HEIGHT = 30;
 const MOST_ROWS = 64;
-const ROOM_FOR_ARROWS = 9;  // pixels from release to deadline; where there are fewer, only misses are marked
+const ROOM_FOR_ARROWS = 9;  // pixels from release to deadline; with fewer, only misses are marked
 
 function scheduleFigure(groups, state) {
-  let zoom = null;   // what the reader looks at, kept when the theme changes
+  let zoom = null;   // the visible range, kept when the theme changes
 
-  // Jobs and slices of the window that is looked at, as rows for ECharts; times in ns since the start of the run.
+  // Returns the jobs and slices of the chosen window as rows for ECharts. Times are in ns since the start of the run.
   function contents() {
     const group = groups[state.executor];
     const view = group.schedule.views[state.view] || group.schedule.views[0];
@@ -35,7 +35,7 @@ function scheduleFigure(groups, state) {
     return {group, view, jobs, slices, rows, bars, marks, from, to: seen.end_ns - start, start};
   }
 
-  // Tasks with a row: all, or those that missed deadlines and then the first ones.
+  // Returns the tasks with a row. If not all fit, tasks that missed deadlines precede the first ones.
   function tasksOf(jobs, slices, wanted) {
     const missing = new Set(jobs.task.filter((_, i) => jobs.missed[i] === 1));
     const rank = (task) => (task === wanted ? 0 : missing.has(task) ? 1 : 2);
@@ -166,7 +166,7 @@ function scheduleFigure(groups, state) {
     },
   });
 
-  // Of the beginning: as much as there is room for; of a worst job: its surroundings.
+  // Returns the initial range. The beginning shows as many jobs as fit; a worst job shows its surroundings.
   function firstLook(c) {
     if (state.view > 0) return [c.view.begin_ns - c.start, c.view.end_ns - c.start];
     const count = window.innerWidth < 640 ? 50 : 120;
@@ -188,7 +188,7 @@ function scheduleFigure(groups, state) {
   return fig;
 }
 
-/** What the list of views says: "the beginning", "control.pid #12: late by 2.1 ms". */
+/** Returns the names of the views: "the beginning", "control.pid #12: 2.1 ms late". */
 function viewNames(group) {
   const all = group.schedule.slices_shown === group.schedule.slices_in_all;
   return group.schedule.views.map((view) => {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Tables: per DAG, per task, executors side by side, the runs.
+// Draws the tables: by DAG, by task, executors side by side, and the runs.
 
 const MOST_ROWS_AT_ONCE = 40;
 
@@ -16,7 +16,7 @@ function missCell(jobs) {
   };
 }
 
-/** Median to maximum as a bar against the deadline (the end of the track), with the bound as a tick. */
+/** Returns a bar from the median to the maximum on a track that ends at the deadline, with the bound as a tick. */
 function meter(t, response, deadline, bound, colour) {
   if (!response || !deadline) return '';
   const most = Math.max(deadline, response.max_ns, bound || 0) * 1.04;
@@ -49,7 +49,7 @@ function taskTable(group, unfolded, unfold) {
     column('measured, bound, deadline', meterHelp, true), column('L max', 'Largest lateness; negative: how close a job came'),
     column('ran / wcet', 'Most processor time that a job used, and what it was stated to take at most'), column('preempted', 'How often jobs lost their worker'),
   ];
-  // Of many, first only those that came closest to a miss.
+  // Of many tasks, only those closest to a miss are shown at first.
   const all = group.tasks.filter((task) => task.jobs !== undefined);
   const closeness = ({jobs, deadline_ns: deadline}) => [jobs.miss_ratio, jobs.max_lateness_ns === null ? -1 : jobs.max_lateness_ns / deadline];
   const few = [...all].sort((a, b) => closeness(b)[0] - closeness(a)[0] || closeness(b)[1] - closeness(a)[1]).slice(0, MOST_ROWS_AT_ONCE);
@@ -77,7 +77,7 @@ function taskTable(group, unfolded, unfold) {
     element('button.controls', {type: 'button', onclick: unfold}, `all ${all.length} tasks`))];
 }
 
-/** Of a DAG with several sinks: each by itself. */
+/** Returns the responses of each sink of a DAG with several sinks. */
 function sinkTimes(group, dag) {
   const {sinks} = dag.end_to_end;
   if (sinks.length < 2) return undefined;
