@@ -285,9 +285,8 @@ TEST_P(RealtimeTest, ASpinAfterOneThatHadNoThreadsWorks) {
     const rlimit tight{pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + (rlim_t{1} << 20), before.rlim_max};
     ASSERT_EQ(setrlimit(RLIMIT_AS, &tight), 0);
     try {
-      for (;;)
-        others.emplace_back(
-            [&end] { end.wait(); });  // threads keep running, because stacks of ended threads are reused
+      // The threads keep running, because stacks of ended threads are reused.
+      for (;;) others.emplace_back([&end] { end.wait(); });
     } catch (const std::system_error &) {
     }
     try {
