@@ -60,7 +60,8 @@ class Rosdep(unittest.TestCase):
                            (SOURCE / "redag_rclcpp/CMakeLists.txt").read_text(), re.MULTILINE)
         keys = keys_of("redag_rclcpp")
         for name in found:
-            if "$" not in name and not name.startswith("reference_"):  # those come with Autoware's, where somebody has it
+            # The packages reference_* belong to the optional Autoware reference system.
+            if "$" not in name and not name.startswith("reference_"):
                 self.assertIn(CMAKE_PACKAGES.get(name, name), keys, f"find_package({name})")
 
     def test_redag_needs_no_test_library(self):

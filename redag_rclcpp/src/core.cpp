@@ -473,7 +473,7 @@ redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &
   info.preemption = to_string(setup_.mode.mode);
   info.preemption_why = setup_.mode.reason;
   info.driver = redag::trace::Driver::Ros;
-  info.stepped = true;  // with several spins, workers pause between them
+  info.stepped = true;  // between spins no job starts, and some spin functions run one job at a time
   info.end = engine_->now();
   info.lost_events = engine_->lost_events();
   info.machine = redag::trace::this_machine();

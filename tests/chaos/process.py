@@ -86,7 +86,7 @@ def check_results(folder, tidy=True):
             Child("check-trace", path).end({0})
         elif path.suffix == ".json":
             json.loads(path.read_text())
-        elif path.suffix in (".csv", ".html", ".svg") and path.name != "units.csv":  # that one may be cut anywhere
+        elif path.suffix in (".csv", ".html", ".svg") and path.name != "units.csv":  # a kill may cut units.csv
             expect(path.read_bytes()[-1:] in (b"\n", b""), f"{path.name} ends in the middle of a line")
 
 
@@ -152,7 +152,7 @@ def fewer_processors(rng, folder):
         try:
             for thread in os.listdir(f"/proc/{child.process.pid}/task"):
                 os.sched_setaffinity(int(thread), cpus)
-        except OSError:  # that thread has ended
+        except OSError:  # the thread has ended
             pass
     child.end({0})
     check_results(folder)

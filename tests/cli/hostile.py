@@ -29,7 +29,7 @@ BAD = {
     "CPUS": ["x", "1-", "99999", "-1"],
     "i/n": ["0/3", "4/3", "1/0", "x", "1/" + HUGE],
 }
-FREE = {("experiment acceptance", "--name")}  # any name will do
+FREE = {("experiment acceptance", "--name")}  # accepts any name
 SEED = "--seed"
 
 

@@ -73,7 +73,7 @@ def in_terminal(*arguments, columns=80, **environment):
     """Runs a command on a pseudo-terminal. Returns the exit status and all output."""
     try:
         pid, terminal = pty.fork()
-    except OSError as error:  # a chroot without /dev/pts
+    except OSError as error:  # there is no /dev/pts in this chroot
         raise unittest.SkipTest(f"no pseudo-terminal to be had here: {error}") from error
     if pid == 0:
         os.environ.update(TERM="xterm", **environment)
@@ -86,7 +86,7 @@ def in_terminal(*arguments, columns=80, **environment):
     while True:
         try:
             block = os.read(terminal, 65536)
-        except OSError:  # Linux says EIO once the other end is closed
+        except OSError:  # Linux returns EIO once the other end is closed
             break
         if not block:
             break

@@ -305,7 +305,7 @@ class Killed(Case):
         process = subprocess.Popen([PROGRAM, "run", self.cart, "--duration", "1h", "--preemption", "none", "--out", out,
                                     *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         record = out / "flight" / "events.bin"
-        for _ in range(2000):  # until several collections have been recorded
+        for _ in range(2000):  # until several collections are recorded
             if "--no-flight" in arguments and out.exists() or record.exists() and record.stat().st_size > 4 * 4096:
                 break
             time.sleep(0.02)

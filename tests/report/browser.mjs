@@ -246,7 +246,7 @@ await test('hostile names stay text, also in tooltips', async () => {
 
 await test('every figure is saved as PNG and SVG', async () => {
   for (const name of FIGURES.comparison) {
-    const {page, problems, close} = await open('comparison');  // Chromium lets a page save ten files in quick succession
+    const {page, problems, close} = await open('comparison');  // Chromium lets one page save only ten files
     for (const [kind, magic] of [['svg', '<svg'], ['png', '\x89PNG']]) {
       const waiting = page.waitForEvent('download', {timeout: 20000});
       await page.getByRole('button', {name: `${name} as ${kind}`, exact: true}).click();
