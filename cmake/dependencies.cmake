@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-# Every package that is looked for, by whichever CMakeLists.txt is the top one: imported targets are seen from that folder
-# and those below it only. tools/bootstrap installs them all.
+# Finds all packages. The top CMakeLists.txt includes this file, because imported targets are visible only in its folder
+# and below. tools/bootstrap installs the packages.
 find_package(fmt REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)

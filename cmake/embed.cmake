@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-# Writes page_assets.cpp, which holds the report page's files as text. Run when building, in script mode:
+# Writes page_assets.cpp, which holds the report page's files as text. Runs during the build, in script mode:
 #   cmake -DOUTPUT=page_assets.cpp -DPAGE=redag_lab/report/page -DECHARTS=third_party/echarts -P embed.cmake
 cmake_minimum_required(VERSION 3.22)
 
-# Raw strings, in pieces that every compiler takes; none of the files contains the delimiter.
+# Raw strings, in pieces that every compiler accepts. None of the files contains the delimiter.
 function(add_text name)
   set(text "")
   foreach(file IN LISTS ARGN)

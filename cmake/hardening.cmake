@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-# Optimised builds check buffer sizes, guard stacks, mark where indirect jumps may land, map relocations read-only and have
-# no executable stack; what it costs: docs/promises.md. Debug builds check the standard library's preconditions instead.
-# Neither goes together with the sanitizers' own checks of memory.
+# Optimised builds check buffer sizes, guard stacks, mark the targets of indirect jumps, map relocations read-only, and
+# have no executable stack. docs/promises.md states the cost. Debug builds check the standard library's preconditions
+# instead. The sanitizers have memory checks of their own, which exclude both.
 if(NOT REDAG_SANITIZE)
   include(CheckPIESupported)
   check_pie_supported(LANGUAGES CXX)
-  # Some distributions define _FORTIFY_SOURCE already, to another value: undefine it first.
+  # Some distributions define _FORTIFY_SOURCE with another value: undefine it first.
   add_compile_options("$<$<NOT:$<CONFIG:Debug>>:-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=2;-fstack-protector-strong>")
   include(CheckCXXCompilerFlag)
-  foreach(flag IN ITEMS -fstack-clash-protection -fcf-protection=full)  # not on every processor
+  foreach(flag IN ITEMS -fstack-clash-protection -fcf-protection=full)  # not available on every processor
     string(MAKE_C_IDENTIFIER HAS${flag} has_flag)
     check_cxx_compiler_flag(${flag} ${has_flag})
     if(${has_flag})

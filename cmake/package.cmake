@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-# What the packages redag/, redag_analysis/ and redag_lab/ have in common. Included by settings.cmake.
+# Functions shared by the packages redag/, redag_analysis/ and redag_lab/. Included by settings.cmake.
 include(CMakePackageConfigHelpers)
 cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH redag_repository)
 
-# Stops where package.xml states another version than the project.
+# Stops if package.xml and the project state different versions.
 function(redag_check_version)
   file(STRINGS ${PROJECT_SOURCE_DIR}/package.xml stated REGEX "<version>")
   if(NOT stated MATCHES "<version>${PROJECT_VERSION}</version>")
@@ -14,7 +14,8 @@ function(redag_check_version)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/package.xml)
 endfunction()
 
-# redag_sources(<variable> <folder>...): the sources of these folders without their tests. Adding a file needs no edit.
+# redag_sources(<variable> <folder>...) lists the sources of these folders without their tests. A new file needs no
+# edit.
 function(redag_sources variable)
   set(sources)
   foreach(folder IN LISTS ARGN)
@@ -25,8 +26,8 @@ function(redag_sources variable)
   set(${variable} ${sources} PARENT_SCOPE)
 endfunction()
 
-# redag_add_library(<target> <folder>...): the library of this project. Headers are included by their path from the
-# repository's root, here and once installed.
+# redag_add_library(<target> <folder>...) adds the library of this project. Headers are included by their path from the
+# repository's root, in the build and after installation.
 function(redag_add_library target)
   redag_sources(sources ${ARGN})
   add_library(${target} ${sources})
@@ -37,7 +38,8 @@ function(redag_add_library target)
   target_compile_features(${target} PUBLIC cxx_std_20)
 endfunction()
 
-# redag_install_library(<target>...): for find_package(<project>), with the config file that stands in the project's folder.
+# redag_install_library(<target>...) installs targets for find_package(<project>), with the config file in the project's
+# folder.
 function(redag_install_library)
   set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/${PROJECT_NAME})
   install(TARGETS ${ARGN} EXPORT ${PROJECT_NAME}_targets
@@ -49,11 +51,11 @@ function(redag_install_library)
   get_target_property(library_type ${library} TYPE)
   configure_package_config_file(${PROJECT_SOURCE_DIR}/${PROJECT_NAME}-config.cmake.in
     ${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config.cmake INSTALL_DESTINATION ${package_dir})
-  # Before 1.0 a new minor version may break what uses the old one.
+  # Before 1.0 a new minor version may break users of the old one.
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config-version.cmake
     COMPATIBILITY SameMinorVersion)
   install(FILES ${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config.cmake
     ${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config-version.cmake DESTINATION ${package_dir})
-  # colcon and ros2 look packages up here.
+  # colcon and ros2 look for packages here.
   install(FILES ${PROJECT_SOURCE_DIR}/package.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/${PROJECT_NAME})
 endfunction()

@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-# Writes build_revision.cpp, which holds the git revision of the sources. Run at every build, in script mode; the file
-# changes only when the revision does, so that a commit compiles this one file again and nothing else:
+# Writes build_revision.cpp, which holds the git revision of the sources. Runs at every build, in script mode. The file
+# changes only with the revision: a commit recompiles this one file.
 #   cmake -DOUTPUT=build_revision.cpp -DSOURCE=. [-DREVISION=given] -P revision.cmake
 cmake_minimum_required(VERSION 3.22)
 
 if(NOT REVISION)
   find_program(GIT git)
   if(GIT)
-    # Always the hash, whatever tags there are.
+    # Always gives the hash, even if there are tags.
     execute_process(COMMAND ${GIT} -C ${SOURCE} describe --always --dirty --abbrev=12 --exclude *
       OUTPUT_VARIABLE REVISION OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE failed)
     if(failed)

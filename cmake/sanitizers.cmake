@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-# REDAG_SANITIZE=address,undefined or thread: applied to everything, the library included.
+# REDAG_SANITIZE=address,undefined or thread applies to every target, the library included.
 set(REDAG_SANITIZE "" CACHE STRING "Sanitizers, as in -fsanitize=<value>")
 if(REDAG_SANITIZE)
   add_compile_options(-fsanitize=${REDAG_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${REDAG_SANITIZE})
-  # The library brings nominal_priorities.cpp with it, which says why; a test of the kernel's own priorities is left out.
+  # Links nominal_priorities.cpp, which gives the reason, with the library, and leaves out a test of the kernel's
+  # priorities.
   add_compile_definitions(REDAG_NOMINAL_PRIORITIES)
 endif()

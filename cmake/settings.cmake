@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-# What every target of this project is built with. Included by whichever CMakeLists.txt is the top one: the
-# repository's, or that of redag/, redag_analysis/ or redag_lab/ when one of these is built alone.
+# Settings for every target of this project. Included by the top CMakeLists.txt: the repository's, or that of redag/,
+# redag_analysis/ or redag_lab/ if one of these is built alone.
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
@@ -25,7 +25,7 @@ if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
 endif()
 
-# Messages name files as the repository does, whichever machine built them.
+# Messages name files by their paths in the repository, on every machine.
 cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH repository)
 add_compile_options(-fmacro-prefix-map=${repository}/=)
 

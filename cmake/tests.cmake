@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-# The tests that stand beside the sources: one program for each group of folders, redag_<group>_test, and each of its tests
-# in ctest as <group>.<name>, with the group as label (`ctest -L '^sched$'`). Included by the repository's CMakeLists.txt.
+# Builds the tests beside the sources: one program for each group of folders, redag_<group>_test. In ctest each test is
+# <group>.<name>, with the group as label (`ctest -L '^sched$'`). Included by the repository's CMakeLists.txt.
 set(base redag/base)
 set(live redag/live)
 set(model redag/model)
@@ -23,7 +23,7 @@ set(test_groups base live model sched trace runtime executors metrics sim analys
 
 redag_sources(testing_sources redag_testing)
 add_library(redag_testing STATIC ${testing_sources})
-# All that a test may use: nothing else needs to be named where a test program is added.
+# Everything that tests may use: a test program names no further libraries.
 target_link_libraries(redag_testing
   PUBLIC redag_lab fmt::fmt ${redag_yaml_cpp} nlohmann_json::nlohmann_json GTest::gtest GTest::gmock rapidcheck
   PRIVATE redag_warnings)
@@ -35,7 +35,7 @@ function(redag_add_test_program group)
   set(program redag_${group}_test)
   add_executable(${program} ${ARGN})
   target_link_libraries(${program} PRIVATE redag_testing GTest::gtest_main redag_warnings)
-  # Values would print as addresses, and rename the tests at every build.
+  # Printed values would be addresses, which rename the tests at every build.
   gtest_discover_tests(${program} TEST_PREFIX ${group}. NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60
     PROPERTIES LABELS ${group} TIMEOUT 300)
 endfunction()
@@ -53,6 +53,6 @@ endforeach()
 target_link_libraries(redag_cli_test PRIVATE redag_commands)
 add_dependencies(redag_cli_test redag_cli)
 
-# What has threads of its own, and so is worth a run under ThreadSanitizer.
+# Builds the tests that use threads, for runs under ThreadSanitizer.
 add_custom_target(redag_concurrency_tests)
 add_dependencies(redag_concurrency_tests redag_base_test redag_live_test redag_trace_test redag_runtime_test redag_run_test)

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What workloads/contention.yaml says about itself.
+// Checks the statements that workloads/contention.yaml makes about itself.
 #include <gtest/gtest.h>
 
 #include "redag/model/workload_yaml.hpp"

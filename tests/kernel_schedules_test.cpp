@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the kernel really ran, in `os` mode: random workloads on real threads, each judged by the kernel's own record of
-// its context switches (redag_testing/kernel_judge.hpp). Levels come from the reference scheduler without a limit on
-// threads, so that neither the scheduler, nor the engine, nor its pool is asked whether it was right.
+// Judges what the kernel really ran in `os` mode. Random workloads run on real threads, and the kernel's own record of
+// its context switches judges each run (redag_testing/kernel_judge.hpp). The reference scheduler, without a limit on
+// threads, gives the priority levels. The judgement is thus independent of the scheduler, the engine and its pool.
 //
-// Needs SCHED_FIFO and the right to perf_event_open; skipped, with the reason, where one is missing.
-// REDAG_KERNEL_SCHEDULES and REDAG_KERNEL_SEED choose others, and more.
+// The tests need SCHED_FIFO and the right to perf_event_open. They are skipped, with the reason, if one is missing.
+// REDAG_KERNEL_SCHEDULES sets the number of schedules, REDAG_KERNEL_SEED the first seed.
 #include <sched.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -46,7 +46,7 @@ using sched::Outcome;
 
 pid_t this_thread() { return static_cast<pid_t>(::syscall(SYS_gettid)); }
 
-// The bodies of a run note when they began and ended, and where.
+// Records when and on which thread the bodies of a run began and ended.
 class BodyLog {
  public:
   explicit BodyLog(std::size_t room) : runs_(room) {}
@@ -64,7 +64,7 @@ class BodyLog {
       return body(job);
     };
   }
-  /// Once no body runs.
+  /// The recorded bodies. Call it when no body runs.
   [[nodiscard]] std::optional<std::vector<BodyRun>> runs() const {
     if (used_ > runs_.size()) return std::nullopt;
     return std::vector<BodyRun>(runs_.begin(), runs_.begin() + static_cast<std::ptrdiff_t>(used_.load()));
@@ -82,7 +82,7 @@ class BodyLog {
 
 struct Tally {
   std::uint64_t schedules = 0;
-  std::uint64_t dropped = 0;  // the kernel's record was not complete
+  std::uint64_t dropped = 0;  // runs whose kernel record was incomplete
   std::uint64_t instants = 0;
   std::uint64_t contended = 0;
   std::uint64_t bodies = 0;
@@ -175,7 +175,7 @@ class KernelSchedules : public ::testing::Test {
     if (!recorder) GTEST_SKIP() << "nothing is judged: " << to_string(recorder.error());
   }
 
-  // The last processors, as the engine takes them.
+  // The last processors, which the engine takes as well.
   static std::vector<int> cpus_of(std::uint32_t workers) {
     std::vector<int> cpus = runtime::usable_cpus();
     cpus.erase(cpus.begin(), cpus.end() - static_cast<std::ptrdiff_t>(workers));
@@ -186,7 +186,7 @@ class KernelSchedules : public ::testing::Test {
     return static_cast<std::uint32_t>(rng.uniform(1, most));
   }
 
-  // What happened, by the kernel; what should have, by the reference.
+  // Compares what the kernel ran with what the reference scheduler would have run.
   void judge_run(SwitchRecorder recorder, const BodyLog &bodies, const RecordingScheduler::Log &log,
                  const Workload &workload, sched::Config config, std::function<bool(std::uint32_t)> judged,
                  const std::string &replay) {
@@ -215,7 +215,7 @@ class KernelSchedules : public ::testing::Test {
     tally_.switches += run.events.size();
   }
 
-  // A workload as `redag run` runs it.
+  // Runs a workload as `redag run` does.
   void run_as_workload(const Workload &workload, std::uint64_t seed, const std::string &replay) {
     const auto log = RecordingScheduler::make_log();
     BodyLog bodies(1U << 14U);
@@ -240,7 +240,7 @@ class KernelSchedules : public ::testing::Test {
 
   void run_reconfigured(std::uint64_t seed, bool throttled, const std::string &replay);
 
-  // Of both kinds alternately.
+  // Runs both kinds of schedules in turn.
   void run_many(std::uint64_t first, std::uint64_t count) {
     for (std::uint64_t seed = first; seed < first + count && !HasFailure(); ++seed) {
       const std::string replay = fmt::format(
@@ -260,7 +260,7 @@ class KernelSchedules : public ::testing::Test {
   Tally tally_;
 };
 
-// A run in which DAGs and tasks come, go and get other periods, while one thread, above all jobs, releases at random.
+// A run in which DAGs and tasks come, go and change their periods. One thread, above all jobs, releases jobs at random.
 class ChangingRun {
  public:
   ChangingRun(Rng &rng, runtime::Engine &engine, BodyLog &bodies, const Workload &workload)
@@ -352,12 +352,12 @@ class ChangingRun {
   runtime::Engine &engine_;
   BodyLog &bodies_;
   std::vector<Known> dags_;
-  std::vector<bool> is_high_;  // by task
+  std::vector<bool> is_high_;  // indexed by task
   std::size_t next_ = 0;
   std::size_t next_dag_ = 0;
 };
 
-// `throttled`: jobs of lower criticality give way, so that only what the others wait for is judged.
+// With `throttled`, jobs of lower criticality are demoted, and only the waits of the other jobs are judged.
 void KernelSchedules::run_reconfigured(std::uint64_t seed, bool throttled, const std::string &replay) {
   Rng rng(seed);
   const std::uint32_t workers = random_workers(rng);
@@ -408,7 +408,7 @@ TEST_F(KernelSchedules, TheMostUrgentStartedJobsHaveTheProcessors) {
       static_cast<unsigned long>(tally_.instants), static_cast<unsigned long>(tally_.contended));
 }
 
-// Two jobs of one task run for long: each keeps its thread while it is preempted, so that the urgent one needs a third.
+// Two jobs of one task run for long. Each keeps its thread while it is preempted: the urgent job needs a third thread.
 TEST_F(KernelSchedules, TheMostUrgentOfThreeJobsOfTwoTasksHasAProcessor) {
   if (runtime::usable_cpus().size() < 2) GTEST_SKIP() << "nothing is judged: one processor";
   const auto task = [](std::string name, Duration period, Duration wcet, std::uint32_t concurrency) {

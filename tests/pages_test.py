@@ -2,10 +2,10 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tables of pages against the code that they describe.
+"""Compares tables of pages with the code that they describe.
 
-Usage: pages_test.py SOURCE_DIR. Uses the standard library only. What the program itself can be asked is compared by
-tests/cli/usage.py.
+Usage: pages_test.py SOURCE_DIR. Uses the standard library only. tests/cli/usage.py compares what
+the program itself can tell.
 """
 import pathlib
 import re
@@ -16,7 +16,7 @@ SOURCE = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file_
 
 
 def first_cells(page, heading):
-    """The code spans in the first column of the first table behind a heading."""
+    """Returns the code spans in the first column of the first table below a heading."""
     text = (SOURCE / page).read_text(encoding="utf-8").split(f"\n## {heading}\n", maxsplit=1)[1]
     rows = re.search(r"(?:^\|.*\n)+", text, re.M)[0].splitlines()[2:]
     return [span for row in rows for span in re.findall(r"`([^`]+)`", row.split("|")[1])]
@@ -31,7 +31,7 @@ class Pages(unittest.TestCase):
         self.assertEqual(sorted(first_cells("docs/ros2.md", "Parameters")), sorted(declared))
 
     def test_the_map_has_every_page(self):
-        """A page of docs/ is linked from the README.md of that folder, or of its own one."""
+        """The README.md of docs/, or of a page's own folder, links every page."""
         docs = (SOURCE / "docs").resolve()
         maps = {docs / "README.md", *docs.glob("*/README.md")}
         linked = {(page.parent / target).resolve() for page in maps

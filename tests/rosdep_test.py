@@ -2,10 +2,10 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What `rosdep install --from-paths` has to resolve: the dependencies in our package.xml files.
+"""Checks that `rosdep install --from-paths` can resolve the dependencies in the package.xml files.
 
-Usage: rosdep_test.py SOURCE_DIR. Uses the standard library only. A key that rosdep does not know stops the installation
-of everything, so a new dependency gets its line here, copied from ros/rosdistro (rosdep/base.yaml).
+Usage: rosdep_test.py SOURCE_DIR. Uses the standard library only. A key that rosdep does not know stops the whole
+installation. A new dependency therefore gets its line here, copied from ros/rosdistro (rosdep/base.yaml).
 """
 import pathlib
 import re
@@ -29,7 +29,7 @@ SYSTEM_KEYS = {
 # Packages of the distributions themselves: ros-<distribution>-<name>.
 ROS_KEYS = {"ament_cmake", "diagnostic_msgs", "launch_ros", "rclcpp", "rclcpp_action", "rclcpp_components",
             "rclcpp_lifecycle", "std_msgs", "std_srvs", "test_msgs"}
-# What find_package() looks for, by the key that brings it.
+# Names that find_package() looks for, with the rosdep key that installs them.
 CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "yaml-cpp": "yaml-cpp", "tl-expected": "libexpected-dev",
                   "CLI11": "cli11", "TBB": "tbb", "GTest": "libgtest-dev"}
 PACKAGES = ("redag", "redag_analysis", "redag_lab", "redag_rclcpp")
@@ -47,23 +47,25 @@ class Rosdep(unittest.TestCase):
             self.assertEqual(unknown, set(), f"{package}/package.xml: no key of rosdep, or not listed in this test")
 
     def test_every_key_is_installed_by_bootstrap(self):
-        """The Debian names are right: the same list that builds without ROS."""
+        """The Debian names are correct: tools/bootstrap, which builds without ROS, lists the same."""
         words = set(re.findall(r"[\w.+-]+", (SOURCE / "tools/bootstrap").read_text()))
         for package in PACKAGES:
             for key in keys_of(package) & set(SYSTEM_KEYS):
                 self.assertIn(SYSTEM_KEYS[key], words, f"{package}/package.xml: {key}")
 
     def test_what_is_found_is_declared(self):
-        """What redag_rclcpp's CMakeLists.txt needs is in its own package.xml, whatever redag brings along."""
+        """redag_rclcpp's package.xml lists everything that its CMakeLists.txt needs, regardless of redag's
+        dependencies."""
         found = re.findall(r"^ *find_package\((\S+)[^)]*REQUIRED\)",
                            (SOURCE / "redag_rclcpp/CMakeLists.txt").read_text(), re.MULTILINE)
         keys = keys_of("redag_rclcpp")
         for name in found:
-            if "$" not in name and not name.startswith("reference_"):  # those come with Autoware's, where somebody has it
+            # The packages reference_* belong to the optional Autoware reference system.
+            if "$" not in name and not name.startswith("reference_"):
                 self.assertIn(CMAKE_PACKAGES.get(name, name), keys, f"find_package({name})")
 
     def test_redag_needs_no_test_library(self):
-        """colcon builds the libraries and the program; their tests belong to the repository's own build."""
+        """colcon builds the libraries and the program. The repository's own build holds their tests."""
         for package in ("redag", "redag_analysis", "redag_lab"):
             self.assertFalse({"librapidcheck-dev", "rapidcheck"} & keys_of(package))
             self.assertNotIn("BUILD_TESTING", (SOURCE / package / "CMakeLists.txt").read_text())

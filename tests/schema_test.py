@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Every workload file satisfies docs/workload.schema.json, and the schema refuses what it should.
+"""Checks that every workload file satisfies docs/workload.schema.json, and that the schema refuses bad files.
 
 Needs python3-jsonschema and python3-yaml. Run: python3 tests/schema_test.py
 """

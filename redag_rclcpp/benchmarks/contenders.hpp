@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The executors that the benchmarks compare: ours in each preemption mode that can be had here, and its peers.
+// The executors that the benchmarks compare: ReDAGExecutor in each preemption mode that this process may use, and its
+// peers.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +28,7 @@ inline std::unique_ptr<rclcpp::Executor> make_redag(redag::PreemptionMode mode, 
   return std::make_unique<ReDAGExecutor>(options);
 }
 
-/// With two threads, those that can have more than one.
+/// All contenders, with two threads or workers where they can have more than one.
 inline std::vector<Contender> contenders() {
   std::vector<Contender> all;
   for (const std::string &name : peer_names()) {
@@ -41,7 +42,7 @@ inline std::vector<Contender> contenders() {
   return all;
 }
 
-/// 0 if there are none.
+/// The median; 0 without values.
 inline double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   return values.empty() ? 0 : values[values.size() / 2];

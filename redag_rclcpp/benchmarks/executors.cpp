@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Latency and cost of executors, side by side: ours in each preemption mode and its peers (workload/peers.hpp),
-// interleaved round by round in one process. Prints a table of medians over the rounds.
+// Compares the latency and cost of executors: ReDAGExecutor in each preemption mode, and its peers
+// (workload/peers.hpp). The executors take turns in one process, round by round. Prints a table of medians over the
+// rounds.
 //
 //   ros2 run redag_rclcpp bench_executors [--rounds 5] [--seconds 1] [--only timer_idle,...]
 #include <sched.h>
@@ -48,7 +49,7 @@ double cpu_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// Microseconds, or what the measurement says.
+/// Values in microseconds unless the measurement says otherwise.
 struct Sample {
   std::vector<double> values;
   void add(double value) { values.push_back(value); }
@@ -65,7 +66,7 @@ using Figures = std::map<std::string, double>;
 class Spinning {
  public:
   explicit Spinning(rclcpp::Executor &executor) : executor_(executor), thread_([&] { executor.spin(); }) {
-    // EventsCBGExecutor never tells: it has a flag of its own, which this function does not see.
+    // Waits at most 50 ms: EventsCBGExecutor has a flag of its own, which this function does not see.
     for (int i = 0; i < 500 && !executor.is_spinning(); ++i) std::this_thread::sleep_for(100us);
     std::this_thread::sleep_for(50ms);
   }
@@ -85,13 +86,13 @@ void burn(nanoseconds time) {
   }
 }
 
-// A 100 Hz timer; how late is each call against a grid fitted to the earliest ones? With `load`, another callback of a
-// group of its own computes 60 ms of every 100 ms.
+// Lateness of a 100 Hz timer against a grid that is fitted to its earliest calls. With `load`, a callback of another
+// group computes 60 ms of every 100 ms.
 Figures timer_lateness(rclcpp::Executor &executor, double seconds, bool load) {
   auto node = std::make_shared<rclcpp::Node>("bench");
   auto fast = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
   auto slow = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
-  // The clock of the timers, which on Humble is another one than steady_clock and drifts from it by 0.1 ms a second.
+  // The timers' clock. On Humble it differs from steady_clock and drifts from it by 0.1 ms per second.
   rclcpp::Clock clock(RCL_STEADY_TIME);
   std::vector<std::int64_t> calls;
   calls.reserve(100000);
@@ -107,7 +108,7 @@ Figures timer_lateness(rclcpp::Executor &executor, double seconds, bool load) {
     std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
   }
   executor.remove_node(node);
-  // The grid: the phase that no call is earlier than.
+  // Fits the grid: its phase is that of the earliest call.
   constexpr std::int64_t kPeriod = 10'000'000;
   std::int64_t phase = kPeriod;
   if (calls.empty()) return {};
@@ -133,7 +134,7 @@ Figures timer_lateness(rclcpp::Executor &executor, double seconds, bool load) {
           {"lost_%", 100.0 * (1.0 - static_cast<double>(points) / expected)}};
 }
 
-// From publish() to the callback's begin, at 500 Hz.
+// Latency from publish() to the start of the callback, at 500 Hz.
 Figures publish_latency(rclcpp::Executor &executor, double seconds, bool intra_process) {
   auto node = std::make_shared<rclcpp::Node>("bench", rclcpp::NodeOptions().use_intra_process_comms(intra_process));
   Sample latency;
@@ -157,7 +158,7 @@ Figures publish_latency(rclcpp::Executor &executor, double seconds, bool intra_p
   return {{"p50_us", latency.at(0.5)}, {"p99_us", latency.at(0.99)}};
 }
 
-// Callbacks that each publish to the next of a ring of `count` subscriptions: the executor is never idle.
+// A ring of `count` subscriptions whose callbacks each publish to the next one: the executor is never idle.
 Figures saturation(rclcpp::Executor &executor, double seconds, int count) {
   auto node = std::make_shared<rclcpp::Node>("bench", rclcpp::NodeOptions().use_intra_process_comms(true));
   std::vector<rclcpp::Subscription<Message>::SharedPtr> subscriptions;
@@ -196,10 +197,10 @@ Figures saturation(rclcpp::Executor &executor, double seconds, int count) {
   return figures;
 }
 
-// The publishing side of arrivals_loaded, in a process of its own: 100 Hz, above everything it competes with.
+// The publishing process of arrivals_loaded: 100 Hz, above all threads it competes with.
 int publish_for(double seconds) {
   sched_param priority{95};
-  sched_setscheduler(0, SCHED_FIFO, &priority);  // refused: then it is as late as everybody
+  sched_setscheduler(0, SCHED_FIFO, &priority);  // if this is refused, it is as late as all others
   rclcpp::init(0, nullptr);
   auto node = std::make_shared<rclcpp::Node>("publishing");
   auto publisher = node->create_publisher<Message>("arrivals", rclcpp::QoS(10));
@@ -214,8 +215,8 @@ int publish_for(double seconds) {
   return 0;
 }
 
-// From publish() in another process to the callback's begin, while callbacks of lower rate compute 90 % of the time on
-// each of two processors.
+// Latency from publish() in another process to the start of the callback. Callbacks of lower rate meanwhile compute 90
+// % of the time on each of two processors.
 Figures arrivals_loaded(rclcpp::Executor &executor, double seconds) {
   const pid_t child = fork();
   if (child == 0) {
@@ -243,7 +244,7 @@ Figures arrivals_loaded(rclcpp::Executor &executor, double seconds) {
   executor.add_node(node);
   {
     Spinning spinning(executor);
-    std::this_thread::sleep_for(1s);  // discovery
+    std::this_thread::sleep_for(1s);  // time for discovery
     std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
   }
   executor.remove_node(node);
@@ -291,7 +292,7 @@ int main(int argc, char **argv) {
       all.push_back({"redag-os-not-raised", [] { return redag_rclcpp::make_redag(redag::PreemptionMode::Os, false); }});
     }
     if (!only.empty() && ("," + only + ",").find("," + measurement.name + ",") == std::string::npos) continue;
-    std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, by executor
+    std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, then by executor
     for (int round = 0; round < rounds; ++round) {
       for (const Contender &kind : all) {
         const auto executor = kind.make();

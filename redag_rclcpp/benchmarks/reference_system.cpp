@@ -1,13 +1,14 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The Autoware reference system (github.com/ros-realtime/reference-system) under every executor: latency of its hot
-// path from the lidar drivers to the collision estimator, samples dropped on it, jitter of the behavior planner, and
-// processor time. Executors take turns, each in a process of its own. Built where package autoware_reference_system is.
+// Runs the Autoware reference system (github.com/ros-realtime/reference-system) under every executor. Measures the
+// latency of its hot path from the lidar drivers to the collision estimator, the samples dropped on this path, the
+// jitter of the behavior planner, and processor time. Executors take turns, each in a process of its own. Built if the
+// package autoware_reference_system is present.
 //
 //   ros2 run redag_rclcpp bench_reference_system [--rounds 3] [--seconds 20] [--only mte,redag-os]
 //
-// `chrt -f 40` before it gives rclcpp's executors real-time threads, too.
+// Prefix it with `chrt -f 40` to give rclcpp's executors real-time threads as well.
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -34,9 +35,9 @@ using redag_rclcpp::Contender;
 using redag_rclcpp::contenders;
 using redag_rclcpp::median;
 
-constexpr double kWarmUp = 2;  // seconds at the start that do not count
+constexpr double kWarmUp = 2;  // seconds at the start that are left out
 
-// The system under one executor; it prints what it measures to standard output.
+// Runs the system under one executor, and prints the measurements to standard output.
 int run_system(const Contender &contender, double seconds) {
   rclcpp::init(0, nullptr);
   rclcpp::get_logger("redag_rclcpp").set_level(rclcpp::Logger::Level::Error);
@@ -73,7 +74,7 @@ struct Series {
 
 using Figures = std::map<std::string, double>;
 
-// Runs this program again as `contender` and reads what the system prints for each sample. Exits where it fails.
+// Runs this program again as `contender` and reads its measurements. Exits if it fails.
 Figures measure(const Contender &contender, double seconds) {
   int ends[2];
   if (pipe(ends) != 0) {
@@ -145,7 +146,7 @@ int main(int argc, char **argv) {
     if (option == "--seconds") seconds = std::atof(argv[i + 1]);
     if (option == "--only") only = argv[i + 1];
   }
-  std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, by executor
+  std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, then by executor
   std::vector<std::string> names;
   for (int round = 0; round < rounds; ++round) {
     for (const Contender &contender : all) {

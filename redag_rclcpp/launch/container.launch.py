@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A ReDAG component container with components in it.
+"""Launches a ReDAG component container with components.
 
     ros2 launch redag_rclcpp container.launch.py
     ros2 launch redag_rclcpp container.launch.py config:=robot.yaml \
@@ -21,7 +21,7 @@ from launch_ros.descriptions import ComposableNode
 
 PACKAGE = 'redag_rclcpp'
 
-# Name, default, description. All but the last three are parameters of the container, by the same name.
+# Name, default, description. All but the last three are parameters of the container with the same name.
 ARGUMENTS = [
     ('config', '', 'Workload file; by default that of the example, and none where `components` is given'),
     ('workers', '0', 'Callbacks at the same time; 0: what the workload says, or else one a processor'),
@@ -41,7 +41,7 @@ ARGUMENTS = [
 
 
 def example_components():
-    """Two pipelines: 200 Hz with 1.2 ms of work, 10 Hz with 40 ms."""
+    """Describes two pipelines: 200 Hz with 1.2 ms of work, and 10 Hz with 40 ms."""
     rates = [('fast', 0.005, (0.0002, 0.0005, 0.0002)), ('slow', 0.1, (0.005, 0.03, 0.005))]
     components = []
     for namespace, period, loads in rates:
@@ -87,7 +87,7 @@ def container(context):
             name=values['name'],
             namespace='',
             output='screen',
-            # The container is linked against libredag_pi.so, which reads this.
+            # The container is linked against libredag_pi.so, which reads this variable.
             additional_env={'REDAG_PI': '1' if is_true(values['inherit']) else '0'},
             parameters=[{
                 'config': values['config'],

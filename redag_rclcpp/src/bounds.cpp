@@ -20,7 +20,7 @@ namespace {
 
 std::string name_of(const redag::Dag &dag, const Task &task) { return dag.name + "." + task.name; }
 
-// The group in which ROS executes the task's callback.
+// The mutually exclusive group in which ROS executes the task's callback; "": none.
 std::string group_of(const Workload &learned, const std::string &name) {
   for (const redag::Dag &dag : learned.dags) {
     for (const Task &task : dag.tasks) {
@@ -48,7 +48,7 @@ bool Bounds::update(const std::vector<CallbackStats> &stats, const redag::sched:
   Workload workload;
   if (as_executed(stats, learned(), workload)) analyse(workload, config);
   for (auto &[name, bound] : bounds_) {
-    // What was counted goes on counting.
+    // Keeps the counts of a task whose bound is the same as before.
     const auto same = before.find(name);
     if (same == before.end() || same->second.response != bound.response) continue;
     bound.exceeded = same->second.exceeded;
@@ -77,7 +77,7 @@ bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload
         task.group = group_of(learned, name);
       }
       if (!absent_.empty()) return false;
-      // A timer's callback runs when the timer says, whatever the file says it follows.
+      // The timer alone releases its callback, whatever predecessors the file states.
       if (task.activation == redag::Activation::Timer) task.predecessors.clear();
       task.offset = 0;
       task.overrun = redag::Overrun::Skip;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Response times against proven bounds: which bound each task of a workload has on the executor as it runs, and which
-// responses exceeded it. A value; not thread-safe.
+// Compares response times with proven bounds. Finds the bound of each task as the executor really runs it, and counts
+// the responses that exceed it. A value; not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -24,49 +24,49 @@ namespace redag_rclcpp {
 
 struct TaskBound {
   redag::Duration response = 0;
-  std::string method;          // that gave it, see `redag analyze --methods`
-  std::uint64_t exceeded = 0;  // responses above it
-  redag::Duration worst = 0;   // of these
+  std::string method;          // analysis that gave the bound; see `redag analyze --methods`
+  std::uint64_t exceeded = 0;  // responses above the bound
+  redag::Duration worst = 0;   // longest response above the bound
 };
 
 class Bounds {
  public:
-  /// `workload`: as its file has it. `calibration`: what is charged of this machine, if anything.
+  /// `workload`: the workload as its file states it. `calibration`: overheads of this machine to charge, if any.
   explicit Bounds(redag::Workload workload, std::optional<redag::Calibration> calibration = std::nullopt)
       : workload_(std::move(workload)), calibration_(std::move(calibration)) {}
 
-  /// Analyses anew if the callbacks behind the tasks are not those of the last call. `learned` is asked only then. A
-  /// task that is one callback has the exclusive group that ROS gave this callback. Takes as long as the analysis. True
-  /// if it was done.
+  /// Repeats the analysis if the callbacks behind the tasks have changed since the last call. Calls `learned` only
+  /// then. A task that is one callback gets the exclusive group of this callback in ROS. Blocks for the time of the
+  /// analysis. Returns true if it was repeated.
   bool update(const std::vector<CallbackStats> &stats, const redag::sched::Config &config,
               const std::function<redag::Workload()> &learned);
 
-  /// Counts responses above their bounds. `name_of`: "dag.task" of an event's task id, asked once an id.
-  /// `first`: told of the first response above the bound of each task.
+  /// Counts responses above their bounds. `name_of` maps an event's task id to "dag.task"; it is called once for each
+  /// id. `first` is called for the first response of each task that exceeds the bound.
   void count(std::span<const redag::JobEvent> events, const std::function<std::string(redag::TaskId)> &name_of,
              const std::function<void(const std::string &name, const TaskBound &bound)> &first);
 
-  /// By "dag.task".
+  /// Bounds by "dag.task".
   [[nodiscard]] const std::map<std::string, TaskBound> &tasks() const { return bounds_; }
-  /// What stands in the way of bounds for all tasks; empty: nothing.
+  /// The reason why some tasks have no bound; empty: all have one.
   [[nodiscard]] const std::string &absent() const { return absent_; }
-  /// What the bounds charge of this machine; none: nothing.
+  /// Overheads of this machine that the bounds include; empty: none.
   [[nodiscard]] const std::optional<redag::Overheads> &machine() const { return machine_; }
 
  private:
-  /// `workload_` as the executor runs it. False, and `absent_` says why: it cannot be compared.
+  /// Gives `workload_` as the executor runs it. False: it cannot be compared, and `absent_` says why.
   [[nodiscard]] bool as_executed(const std::vector<CallbackStats> &stats, const redag::Workload &learned,
                                  redag::Workload &result);
   void analyse(const redag::Workload &workload, const redag::sched::Config &config);
 
   redag::Workload workload_;
   std::optional<redag::Calibration> calibration_;
-  std::optional<redag::Overheads> machine_;  // of it, what the bounds charge
-  std::vector<std::string> analysed_;        // what the last analysis was for
+  std::optional<redag::Overheads> machine_;  // part of calibration_ that the bounds include
+  std::vector<std::string> analysed_;        // tasks and callbacks of the last analysis
   std::map<std::string, TaskBound> bounds_;
   std::string absent_ = "no callback was seen yet";
 
-  redag::metrics::BoundWatch watch_;  // against bounds_; begins anew with them
+  redag::metrics::BoundWatch watch_;  // counts against bounds_; starts anew with them
 };
 
 }  // namespace redag_rclcpp

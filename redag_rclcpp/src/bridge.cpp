@@ -40,9 +40,10 @@ void Bridge::add(std::shared_ptr<Callback> callback) {
   wake();
 }
 
-// What is removed may be attached again at once. With Cyclone DDS, setting the hook of a subscription can lock up with
-// a wait that is just beginning for a QoS event of it: the one has the middleware's lock and wants the reader's, the
-// other has the reader's and waits for a listener, which wants the middleware's.
+// Waits until no other thread waits for the callback, because it may be attached again at once. With Cyclone DDS,
+// setting a subscription's hook can deadlock with a beginning wait for one of its QoS events. The hook holds the
+// middleware's lock and wants the reader's. The wait holds the reader's lock and waits for a listener, which wants the
+// middleware's lock.
 void Bridge::remove(const Callback &callback) {
   std::uint64_t begun = 0;
   {
@@ -74,11 +75,13 @@ void Bridge::wake() {
   try {
     wake_.trigger();
   } catch (const rclcpp::exceptions::RCLError &) {
-    // The context was shut down: whoever waits is woken by that.
+    // The context was shut down, which wakes the waiting thread anyway.
   }
 }
 
 void Bridge::wait(std::chrono::nanoseconds timeout) {
+  // Declared before `entries`, hence destroyed after it: a thread in remove() still owns the callback when `entries`
+  // releases it. Otherwise this thread, which is more urgent than all jobs, could be the one to destroy it.
   const struct Leave {
     ~Leave() {
       {
@@ -89,7 +92,7 @@ void Bridge::wait(std::chrono::nanoseconds timeout) {
       redag::futex_wake(bridge.left_, INT_MAX);
     }
     Bridge &bridge;
-  } leave{*this};  // last: what is removed then is not destroyed by this thread, which is more urgent than all jobs
+  } leave{*this};
   std::vector<Entry> entries;
   {
     const redag::LockGuard guard(lock_);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The part of the world that only a wait set can watch: the executor's guard conditions, guard conditions of timers,
-// and entities without hooks. One thread at a time waits; any thread may add, remove and wake.
+// Bridge watches with a wait set what has no usable hooks: the executor's guard conditions, the guard conditions of
+// timers, and some entities. One thread at a time waits; any thread may add, remove and wake.
 #pragma once
 
 #include <chrono>
@@ -27,19 +27,19 @@ class Bridge {
   Bridge(const Bridge &) = delete;
   Bridge &operator=(const Bridge &) = delete;
 
-  /// wait() returns when it is triggered. Outlives the bridge.
+  /// Makes wait() return when `condition` is triggered. `condition` must outlive the bridge.
   void watch(const rclcpp::GuardCondition &condition) { conditions_.push_back(&condition); }
 
   void add(std::shared_ptr<Callback> callback);
-  /// When this returns no other thread waits for it or holds it from a wait. Not with locks of ours held but Core's for
-  /// collecting.
+  /// Stops watching `callback`. On return no other thread waits for it, or holds it because of a wait. The caller may
+  /// hold Core::collect_lock_, but no other lock of this package.
   void remove(const Callback &callback);
   [[nodiscard]] bool empty() const;
 
-  /// The wait that is under way, or else the next one, returns at once.
+  /// Makes the current wait() return at once, or else the next one.
   void wake();
 
-  /// Waits until something is ready (negative timeout: for ever) and tells the callbacks that it concerns.
+  /// Waits until something is ready, and tells the callbacks concerned. A negative timeout means no limit.
   void wait(std::chrono::nanoseconds timeout);
 
  private:
@@ -58,15 +58,15 @@ class Bridge {
   std::vector<const rclcpp::GuardCondition *> conditions_;
   rcl_wait_set_t set_;
 
-  mutable redag::PiMutex lock_;  // threads of all priorities add and remove
+  mutable redag::PiMutex lock_;  // inherits priority: threads of all priorities add and remove
   std::vector<std::shared_ptr<Callback>> callbacks_ REDAG_GUARDED_BY(lock_);
-  std::thread::id waiter_ REDAG_GUARDED_BY(lock_);   // of the thread in rcl_wait(), if there is one
-  std::uint64_t waits_ REDAG_GUARDED_BY(lock_) = 0;  // begun
-  redag::FutexWord left_{0};                         // waits that have ended
+  std::thread::id waiter_ REDAG_GUARDED_BY(lock_);   // thread in rcl_wait(), if any
+  std::uint64_t waits_ REDAG_GUARDED_BY(lock_) = 0;  // number of waits that have begun
+  redag::FutexWord left_{0};                         // number of waits that have ended
 };
 
-/// What arrived before these callbacks were attached and was not executed by who had them before: hooks do not tell of
-/// it again.
+/// Finds messages that arrived before these callbacks were attached and that no earlier executor took. Hooks do not
+/// report such messages again.
 void find_leftovers(const rclcpp::Context::SharedPtr &context, const std::vector<std::shared_ptr<Callback>> &callbacks);
 
 }  // namespace redag_rclcpp

@@ -19,7 +19,7 @@ using redag::kNever;
 
 namespace {
 
-constexpr Duration kAskAgain = 10 * redag::kMillisecond;  // between two releases of what is not dropped when skipped
+constexpr Duration kAskAgain = 10 * redag::kMillisecond;  // between releases of a skipped job that keeps its input
 
 std::size_t depth_of(const rclcpp::QoS &qos) {
   return qos.history() == rclcpp::HistoryPolicy::KeepLast ? qos.depth() : 0;
@@ -63,7 +63,7 @@ Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const r
   by_wait_set_ = only_wait_set;
 }
 
-// ---- being connected ----
+// ---- connecting an entity ----
 
 bool Callback::attach(TaskId task) {
   task_ = task;
@@ -73,7 +73,7 @@ bool Callback::attach(TaskId task) {
     try {
       hook();
     } catch (const std::exception &) {
-      // The middleware, or a waitable of the user's, has no such hook.
+      // The middleware, or a user's waitable, offers no such hook.
       unhook();
       by_wait_set_ = true;
     }
@@ -127,7 +127,7 @@ void Callback::unhook() {
     try {
       clear_hook();
     } catch (const std::exception &) {
-      // It could not be set either.
+      // Setting this hook had failed as well.
     }
   };
   hook_.clear();
@@ -166,7 +166,7 @@ void Callback::arrived(std::size_t count, Source source, int part, bool seen_onl
     std::size_t overwritten = 0;
     {
       const redag::LockGuard guard(lock_);
-      if (!intake_) return;  // and perhaps there is no engine any more
+      if (!intake_) return;  // detached: the engine may no longer exist
       now = engine_.now();
       if (intake_->learning()) learn_from_arrival(now, count, source);
       const bool direct = intake_->direct();
@@ -176,7 +176,7 @@ void Callback::arrived(std::size_t count, Source source, int part, bool seen_onl
         if (depth_ > 0 && kept_[index_of(source)] >= depth_) {
           const Overwritten whose = drop_oldest(source);
           if (whose == Overwritten::Released && direct && !replaces) {
-            // The job that waits for a dropped token is now the next one's: its release takes the place of the old one.
+            // The released job's message is gone. Its release is replaced by one for the next message.
             replaces = true;
           } else if (whose != Overwritten::Skipped) {
             ++overwritten;
@@ -203,7 +203,7 @@ void Callback::arrived(std::size_t count, Source source, int part, bool seen_onl
   if (to_wake) to_wake->wake();
 }
 
-// The middleware overwrote its oldest message.
+// Removes the token of the oldest message, which the middleware has overwritten. Returns what became of its job.
 Callback::Overwritten Callback::drop_oldest(Source source) {
   const std::size_t at = index_of(source);
   for (std::size_t *skipped : {&dropping_[at], &dropped_[at]}) {
@@ -221,7 +221,7 @@ Callback::Overwritten Callback::drop_oldest(Source source) {
   return Overwritten::Started;
 }
 
-// True: the first token is to be released, by release() without the lock.
+// Prepares the release of the first token. True: the caller must call release() after it has left lock_.
 bool Callback::begin_release(Time &arrival) {
   if (released_ > 0 || !intake_ || tokens_.empty()) return false;
   if (!intake_->direct()) {
@@ -237,8 +237,8 @@ bool Callback::begin_release(Time &arrival) {
   return true;
 }
 
-// With release_lock_, or by a job: an id is not used again while a job of it runs. Where the job is skipped at once,
-// the next token's turn has come.
+// The caller holds release_lock_ or runs in a job of the task: the task's id is not reused while one of its jobs runs.
+// If the scheduler skips the job at once, the loop releases the next token.
 void Callback::release(Time arrival) {
   for (bool again = true; again;) {
     engine_.release(task_, arrival);
@@ -270,11 +270,11 @@ void Callback::skipped(redag::Reason reason) noexcept {
   {
     const redag::LockGuard guard(lock_);
     if (!intake_) return;
-    // A job that was replaced by the next one's is all that `overrun` means here: the token is that one's now.
+    // Reason::Overrun means that arrived() has replaced this job. The token now belongs to the new job.
     if (released_ == 1 && reason != redag::Reason::Overrun && !tokens_.empty()) {
       const Token &token = tokens_.front();
       if (token.seen_only || subscription_.expired()) {
-        // Still released: by the timer queue.
+        // The token stays released; the timer queue repeats its release.
         if (intake_->timers().schedule(*this, engine_.now() + kAskAgain)) intake_->timers_changed();
         return;
       }
@@ -282,7 +282,7 @@ void Callback::skipped(redag::Reason reason) noexcept {
       tokens_.pop();
     }
     --released_;
-    if (releasers_ > 0) return;  // whoever that is looks again
+    if (releasers_ > 0) return;  // the thread in release() looks for the next token
   }
   const redag::LockGuard release_guard(release_lock_);
   Time arrival = kNever;
@@ -315,7 +315,7 @@ void Callback::learn_from_arrival(Time now, std::size_t count, Source source) {
   if (arrivals_[0] + arrivals_[1] == 0) first_arrival_ = now;
   last_arrival_ = now;
   arrivals_[index_of(source)] += count;
-  // Messages of this process arrive on the thread that publishes them: in the job that is the task's predecessor.
+  // Messages of this process arrive on the publishing thread, within the job that is the task's predecessor.
   const auto publisher = engine_.current_task();
   if (publisher && std::find(publishers_.begin(), publishers_.end(), *publisher) == publishers_.end()) {
     publishers_.push_back(*publisher);
@@ -329,8 +329,8 @@ std::vector<TaskId> Callback::publishers() const {
 
 Duration Callback::mean_interval() const {
   const redag::LockGuard guard(lock_);
-  // Where another process subscribes, too, the middleware brings every message of this process a second time, and
-  // rclcpp does not take it. The share that was taken holds for what was overwritten before as well.
+  // If another process subscribes as well, the middleware brings each message of this process a second time, and rclcpp
+  // does not take it. The measured share of taken messages is assumed to hold for overwritten messages, too.
   auto arrivals = static_cast<double>(arrivals_[index_of(Source::Middleware)]);
   if (takes_ > 0) arrivals *= static_cast<double>(taken_) / static_cast<double>(takes_);
   arrivals += static_cast<double>(arrivals_[index_of(Source::IntraProcess)]);
@@ -339,7 +339,7 @@ Duration Callback::mean_interval() const {
   return (last_arrival_ - first_arrival_) / (handled - 1);
 }
 
-// ---- what the wait set does for us ----
+// ---- the wait set ----
 
 Callback::Waited Callback::waited() const {
   Waited waited;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Callbacks as jobs: what arrived is taken and handled.
+// Callbacks as jobs: takes what arrived and calls the user's function.
 #include <rcl/wait.h>
 
 #include <utility>
@@ -18,12 +18,13 @@ using redag::sched::Outcome;
 
 namespace {
 
-// rclcpp executes what we have no reason to do otherwise.
+// Opens rclcpp's own way of executing a subscription, for the cases that need no other.
 struct Rclcpp : rclcpp::Executor {
   using rclcpp::Executor::execute_subscription;
 };
 
-/// Takes with `take`, then calls `handle`. False: there was nothing to take. As rclcpp's executors do.
+/// Takes with `take`, then calls `handle`. False: there was nothing to take. Logs a failed take, as rclcpp's executors
+/// do.
 template <class Take, class Handle>
 bool take_and_handle(const char *what, const char *name, Take take, Handle handle) {
   bool taken = false;
@@ -38,8 +39,9 @@ bool take_and_handle(const char *what, const char *name, Take take, Handle handl
 
 }  // namespace
 
-// What a job that has started is to take. The middleware keeps it until begin(), and may overwrite it: what comes
-// instead is the job's then. So begin() stands as late as it can: to make a message to take into can take long.
+// Taking guards the message that a started job is about to take. The middleware keeps this message until begin() and
+// may overwrite it; the job then takes the newer one. begin() is called as late as possible, because creating the
+// message to take into can take long.
 class Callback::Taking {
  public:
   Taking(Callback &callback, Source source) : callback_(callback), source_(source) {}
@@ -47,7 +49,7 @@ class Callback::Taking {
     if (begun_) return;
     begin();
     const redag::LockGuard guard(callback_.lock_);
-    callback_.leftovers_[index_of(source_)] = true;  // it may still be there
+    callback_.leftovers_[index_of(source_)] = true;  // the message may still be there
   }
   Taking(const Taking &) = delete;
   Taking &operator=(const Taking &) = delete;
@@ -87,7 +89,7 @@ Outcome Callback::execute(const redag::runtime::Job &job) {
 }
 
 bool Callback::execute_token(const Token &token) {
-  // What the wait set saw is dealt with when this is left, however that is.
+  // Tells the wait set that its arrival was handled, also if an exception leaves this function.
   struct Watch {
     ~Watch() {
       if (!token.seen_only) return;
@@ -121,7 +123,7 @@ bool Callback::execute_arrival(const Token &token, Taking &taking) {
   if (token.source == Source::IntraProcess) {
     taking.begin();
     const auto waitable = intra_process_.lock();
-    // An empty buffer must not be taken from.
+    // Taking from an empty buffer is not allowed.
     rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
     return waitable && compat::is_ready(*waitable, unused) && execute_waitable(*waitable, token);
   }
@@ -138,7 +140,7 @@ bool Callback::execute_waitable(rclcpp::Waitable &waitable, const Token &token) 
   return true;
 }
 
-// Jobs of theirs were skipped.
+// Drops the messages whose jobs were skipped.
 void Callback::drop_messages(Source source) {
   const auto subscription = subscription_.lock();
   if (!subscription) return;
@@ -166,7 +168,7 @@ void Callback::drop_messages(Source source) {
   }
 }
 
-// `take` takes one; false: there is none. Of those to be dropped, some may have been overwritten meanwhile.
+// `take` takes one message; false: there is none. Some of the messages to drop may have been overwritten meanwhile.
 template <class Take>
 void Callback::drop_messages(Source source, Take take) {
   const std::size_t at = index_of(source);
@@ -176,7 +178,7 @@ void Callback::drop_messages(Source source, Take take) {
     --dropping_[at];
     --kept_[at];
   }
-  const redag::LockGuard guard(lock_);  // the others are not there either
+  const redag::LockGuard guard(lock_);  // the remaining messages are gone as well
   kept_[at] -= std::exchange(dropping_[at], 0);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Timers as callbacks: when they are due, and how they are called.
+// Timers as callbacks: finds when they are due, and calls them.
 #include <rcl/timer.h>
 
 #include <algorithm>
@@ -16,14 +16,14 @@ using redag::runtime::Release;
 
 namespace {
 
-constexpr Duration kClockReads = 10 * redag::kMicrosecond;  // two clocks read further apart than this are read again
-constexpr std::int64_t kMostMissed = 1000;                  // missed releases told of one by one
+constexpr Duration kClockReads = 10 * redag::kMicrosecond;  // clock readings further apart are repeated
+constexpr std::int64_t kMostMissed = 1000;                  // largest number of missed releases that are reported
 
-/// A timer's clock and ours, read together.
+/// Readings of a timer's clock and the engine's clock, taken together.
 struct TimerReading {
   bool cancelled = false;
-  Duration until = 0;  // its next call; negative: that is overdue
-  Time now = 0;        // ours, right before
+  Duration until = 0;  // time until the timer's next call; negative: overdue
+  Time now = 0;        // engine's clock, read right before
 };
 
 TimerReading read_timer(const rcl_timer_t &timer, const redag::runtime::Engine &engine) {
@@ -37,14 +37,14 @@ TimerReading read_timer(const rcl_timer_t &timer, const redag::runtime::Engine &
   return reading;
 }
 
-/// The timer's clock, if it is ROS time; else null.
+/// The timer's clock if it is ROS time, else null.
 rcl_clock_t *ros_clock_of(const rcl_timer_t &timer) {
   rcl_clock_t *clock = nullptr;
   if (rcl_timer_clock(const_cast<rcl_timer_t *>(&timer), &clock) != RCL_RET_OK) rcl_reset_error();
   return clock != nullptr && clock->type == RCL_ROS_TIME ? clock : nullptr;
 }
 
-/// Does the clock stand still between messages on /clock?
+/// True if the timer's clock stands still between messages on /clock.
 bool is_simulated(const rcl_timer_t &timer) {
   rcl_clock_t *clock = ros_clock_of(timer);
   bool enabled = false;
@@ -64,7 +64,7 @@ bool Callback::has_waited_timer() const {
   return is_timer() && (!compat::kTimersTellOfResets || ros_clock_of(*timer_handle_) != nullptr);
 }
 
-// When simulated time is switched on or off, rcl sets the timer anew and triggers nothing.
+// Watches for simulated time being switched on or off: rcl then sets the timer anew without triggering anything.
 void Callback::watch_clock(rclcpp::TimerBase &timer) {
   if (ros_clock_of(*timer_handle_) == nullptr) return;
   rcl_jump_threshold_t changes{};
@@ -91,7 +91,7 @@ void Callback::reschedule() {
 }
 
 Time Callback::expire(Time now, std::vector<Release> &releases, std::vector<Release> &missed) {
-  if (!is_timer()) {  // skipped before
+  if (!is_timer()) {  // a repeated release after a skip
     releases.push_back(Release{task_, now});
     return kNever;
   }
@@ -102,13 +102,13 @@ Time Callback::expire(Time now, std::vector<Release> &releases, std::vector<Rele
 
   const Duration period = period_of(*timer_handle_);
   if (simulated || period == 0) {
-    // Times of another clock have no point on ours; a period of 0 has no grid.
+    // Simulated time has no points on the engine's clock, and a period of 0 has no grid.
     if (!uncalled_.exchange(true)) {
       releases.push_back(Release{task_, now});
     }
     return kNever;
   }
-  // The latest point of the grid: the call itself is for the first one that was not called.
+  // The latest point of the grid that has passed. The call itself stands for the first point that was not called.
   const Time nominal = reading.now + reading.until + -reading.until / period * period;
   if (restarted_.exchange(false)) last_release_ = kNever;
   const bool again = last_release_ != kNever && nominal - last_release_ < period / 2;
@@ -124,8 +124,8 @@ Time Callback::expire(Time now, std::vector<Release> &releases, std::vector<Rele
   return nominal + period;
 }
 
-// The expiry whose job was skipped will have no other: it is consumed. Where there is a grid the next point's job
-// does that.
+// Consumes the expiry of a skipped job if no other job will. A timer with a grid needs none of this: the next point's
+// job consumes the expiry.
 void Callback::drop_expiry() {
   const auto timer = timer_.lock();
   if (!timer || (!is_simulated(*timer_handle_) && period_of(*timer_handle_) != 0)) return;
@@ -141,8 +141,8 @@ bool Callback::execute_timer() {
   if (rcl_timer_is_ready(timer_handle_.get(), &due) != RCL_RET_OK) rcl_reset_error();
   uncalled_ = false;
   if (!due) {
-    // Cancelled, or reset meanwhile; or the job before this one started so late that its call consumed this expiry too,
-    // which is lost.
+    // The timer was cancelled or reset, or the previous job started so late that its call consumed this expiry as well.
+    // In the last case the expiry is lost and counts as a miss.
     if (!restarted_ && !timer->is_canceled()) late_.fetch_add(1, std::memory_order_relaxed);
     reschedule();
     return false;

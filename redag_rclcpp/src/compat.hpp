@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What differs between ROS 2 distributions, behind one set of names. Humble: rclcpp 16; Jazzy: 28.
+// Hides differences between ROS 2 distributions behind one set of names. Humble has rclcpp 16, Jazzy 28.
 #pragma once
 
 #include <tracetools/tracetools.h>
@@ -30,7 +30,7 @@
 
 namespace redag_rclcpp::compat {
 
-// Waitables take the wait set and the data by reference since Jazzy.
+// Since Jazzy waitables take the wait set and the data by reference.
 #if RCLCPP_VERSION_MAJOR >= 28
 inline void add_to_wait_set(rclcpp::Waitable &waitable, rcl_wait_set_t &set) { waitable.add_to_wait_set(set); }
 inline bool is_ready(rclcpp::Waitable &waitable, const rcl_wait_set_t &set) { return waitable.is_ready(set); }
@@ -41,7 +41,7 @@ inline bool is_ready(rclcpp::Waitable &waitable, rcl_wait_set_t &set) { return w
 inline void execute(rclcpp::Waitable &waitable, std::shared_ptr<void> &data) { waitable.execute(data); }
 #endif
 
-/// Null if the group has none yet and its context is gone.
+/// Null if the group has no guard condition yet and its context is gone.
 inline rclcpp::GuardCondition::SharedPtr notify_guard_condition(rclcpp::CallbackGroup &group,
                                                                 const rclcpp::Context::SharedPtr &context) {
 #if RCLCPP_VERSION_MAJOR >= 28
@@ -52,7 +52,7 @@ inline rclcpp::GuardCondition::SharedPtr notify_guard_condition(rclcpp::Callback
 #endif
 }
 
-/// A timer's call: consumes the expiry, so that the next one is known, and can then be executed.
+/// A timer's call. The constructor consumes the expiry, which makes the next one known; execute() runs the callback.
 class TimerCall {
  public:
   explicit TimerCall(rclcpp::TimerBase &timer) : timer_(timer), data_(timer.call()) {}
@@ -75,7 +75,8 @@ class TimerCall {
 #endif
 };
 
-/// True if the timer itself tells of resets; elsewhere its guard condition does (and of jumps of ROS time, always).
+/// True if the timer itself reports resets. Otherwise its guard condition does. Jumps of ROS time are always reported
+/// by the guard condition.
 #if RCLCPP_VERSION_MAJOR >= 21
 inline constexpr bool kTimersTellOfResets = true;
 inline void set_on_reset(rclcpp::TimerBase &timer, std::function<void()> callback) {
@@ -88,7 +89,7 @@ inline void set_on_reset(rclcpp::TimerBase &, const std::function<void()> &) {}
 inline void clear_on_reset(rclcpp::TimerBase &) {}
 #endif
 
-/// The clock of a timer, which rclcpp keeps to itself.
+/// The clock of a timer, a protected member of rclcpp::TimerBase.
 inline rclcpp::Clock::SharedPtr clock_of(rclcpp::TimerBase &timer) {
   struct Opened : rclcpp::TimerBase {
     using rclcpp::TimerBase::clock_;
@@ -96,11 +97,10 @@ inline rclcpp::Clock::SharedPtr clock_of(rclcpp::TimerBase &timer) {
   return timer.*(&Opened::clock_);
 }
 
-/// Is the on-ready hook of this waitable one not to rely on?
-/// - Action servers, up to Jazzy at least, tell only wait sets that goals expire (rclcpp issue 2661). Newer ones have
-/// not
-///   been tried; there it costs nothing but the exact arrival times of goals.
-/// - Action clients and QoS events of Humble call a hook with too few arguments for what happened before it was set.
+/// True if the waitable's on-ready hook is not reliable:
+/// - Action servers, up to Jazzy at least, report expired goals to wait sets only (rclcpp issue 2661). On newer
+///   distributions the wait set costs nothing but the exact arrival times of goals.
+/// - Action clients and QoS events of Humble call the hook with too few arguments for arrivals before it was set.
 inline bool needs_wait_set(const rclcpp::Waitable &waitable) {
   if (dynamic_cast<const rclcpp_action::ServerBase *>(&waitable) != nullptr) return true;
 #if RCLCPP_VERSION_MAJOR < 21

@@ -36,11 +36,12 @@ using Kind = redag::Callback::Kind;
 
 namespace {
 
-constexpr redag::Duration kNodesAppear = 3 * redag::kSecond;  // after the first spin: then names should match
+constexpr redag::Duration kNodesAppear = 3 * redag::kSecond;  // after the first start: until names should match
 
 rclcpp::Logger logger() { return rclcpp::get_logger("redag_rclcpp"); }
 
-/// The workload checked and complete. Throws std::runtime_error: it is not valid.
+/// Checks and completes the workload. Throws std::runtime_error if the workload is invalid, std::invalid_argument for
+/// other options.
 ReDAGOptions prepare(ReDAGOptions options) {
   if (options.default_period <= nanoseconds(0)) {
     throw std::invalid_argument("default_period must be greater than 0: the shortest period goes first");
@@ -65,7 +66,7 @@ redag::runtime::Setup set_up(const ReDAGOptions &options) {
   return *std::move(setup);
 }
 
-/// Is libredag_pi.so in the process, and on?
+/// True if libredag_pi.so is in the process and switched on.
 bool locks_inherit() {
   void *const enabled = dlsym(RTLD_DEFAULT, "redag_pi_enabled");
   return enabled != nullptr && reinterpret_cast<int (*)()>(enabled)() != 0;
@@ -85,7 +86,7 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
   warnings_ = std::exchange(setup_.warnings, {});
   if (options_.lock_memory) engine.touched_stack = redag::runtime::kTouchedStack;
   engine.config = setup_.config;
-  engine.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id means one task
+  engine.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id stands for one task
   engine.band = setup_.band;
   engine.throttling = setup_.throttling;
   engine.cpus = options_.cpus;
@@ -140,7 +141,7 @@ void ReDAGExecutor::Core::close() {
   timer_parker_.unpark();
   if (timer_thread_.joinable()) timer_thread_.join();
   engine_->halt();
-  if (watchdog_) (void)engine_->wait_idle(kNever);  // a job that keeps us waiting is still named
+  if (watchdog_) (void)engine_->wait_idle(kNever);  // the watchdog still reports a job that delays this
   watchdog_.reset();
   engine_->join();
   const redag::LockGuard guard(collect_lock_);
@@ -164,8 +165,8 @@ void ReDAGExecutor::Core::note(std::shared_ptr<Callback> callback) {
 }
 
 void ReDAGExecutor::Core::wake() {
-  // Read after note(): who is about to wait sees what was noted, or is seen here. While workers run, the spinning
-  // thread takes what was noted just before they began.
+  // waiting_ is read after note(). A thread that is about to wait then sees what was noted, or waiting_ is seen here.
+  // While workers run, redag-wait admits callbacks that were noted just before they began.
   if (waiting_ || direct_) bridge_.wake();
 }
 
@@ -213,7 +214,7 @@ void ReDAGExecutor::Core::admit_noted() {
   for (const auto &callback : noted) callback->admit();
 }
 
-// For who pulls: everything that there is to do now becomes ready jobs.
+// For the spin functions that pull: makes ready jobs of everything that there is to do now.
 void ReDAGExecutor::Core::admit(bool look_around) {
   begin_learning();
   if (learning_ && engine_->now() >= learn_until_) stop_learning();
@@ -228,9 +229,10 @@ void ReDAGExecutor::Core::admit(bool look_around) {
 void ReDAGExecutor::Core::start() {
   begin_learning();
   if (started_) return;
-  if (!start_error_.empty()) throw std::runtime_error(start_error_);  // an engine can be started once
+  if (!start_error_.empty()) throw std::runtime_error(start_error_);  // an engine can be started only once
   if (options_.lock_memory) lock_memory();
-  // Before the engine's threads, which can be started once only: who catches the exception may spin again.
+  // Starts this thread before the engine's threads, which can be started only once. If it fails, a caller who catches
+  // the exception may spin again.
   if (!timer_thread_.joinable()) {
     redag::Result<std::thread> timer_thread =
         redag::runtime::start_thread({"redag-timer", setup_.timer_priority(), {}}, [this] { time_releases(); });
@@ -255,7 +257,7 @@ void ReDAGExecutor::Core::start() {
   if (matcher_) report_unmatched_at_ = engine_->now() + kNodesAppear;
 }
 
-// Tasks of the workload that are still without a callback when nodes and components should have been loaded.
+// Logs the tasks of the workload that still have no callback when nodes and components should have been loaded.
 void ReDAGExecutor::Core::report_unmatched() {
   report_unmatched_at_ = kNever;
   const redag::LockGuard guard(collect_lock_);
@@ -325,7 +327,7 @@ void ReDAGExecutor::Core::spin() {
     } join{*this, *std::move(watcher)};
     keep_house();
   } catch (...) {
-    // For instance because the context was shut down while entities were collected.
+    // One cause is a context that was shut down while entities were collected.
     stop_workers();
     if (rclcpp::ok(context_)) throw;
     throw_failure();
@@ -336,7 +338,7 @@ void ReDAGExecutor::Core::spin() {
   throw_failure();
 }
 
-// What spin() does on the calling thread, at that thread's own priority: all that takes long and is not urgent.
+// Work of spin() on the calling thread, at that thread's own priority: everything that takes long and is not urgent.
 void ReDAGExecutor::Core::keep_house() {
   while (host_.may_spin() && !wait_set_done_) {
     if (dirty_) collect();
@@ -352,8 +354,8 @@ void ReDAGExecutor::Core::keep_house() {
   }
 }
 
-// Above all jobs, so that a cancel() takes effect and arrivals that only a wait set sees are released while jobs use
-// all processors.
+// Runs on the thread redag-wait, with os above all jobs. While jobs use all processors, cancel() thus still takes
+// effect, and arrivals that only the wait set sees are still released.
 void ReDAGExecutor::Core::watch_wait_set() noexcept {
   try {
     while (host_.may_spin() && !wait_set_done_) {
@@ -361,7 +363,8 @@ void ReDAGExecutor::Core::watch_wait_set() noexcept {
       bridge_.wait(nanoseconds(-1));
     }
   } catch (...) {
-    wait_set_failure_ = std::current_exception();  // for instance: the context was shut down while the set was filled
+    // One cause is a context that was shut down while the wait set was filled.
+    wait_set_failure_ = std::current_exception();
   }
   timing_ = false;
   engine_->pause();
@@ -447,7 +450,7 @@ void ReDAGExecutor::Core::stop_learning() {
   RCLCPP_INFO(logger(), "learned the rates of %zu callbacks; they are frozen now", learned.size());
 }
 
-// ---- what can be asked ----
+// ---- queries ----
 
 std::vector<std::string> ReDAGExecutor::Core::warnings() const {
   const redag::LockGuard collect_guard(collect_lock_);
@@ -473,7 +476,7 @@ redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &
   info.preemption = to_string(setup_.mode.mode);
   info.preemption_why = setup_.mode.reason;
   info.driver = redag::trace::Driver::Ros;
-  info.stepped = true;  // spinning begins and ends
+  info.stepped = true;  // between spins no job starts, and some spin functions run one job at a time
   info.end = engine_->now();
   info.lost_events = engine_->lost_events();
   info.machine = redag::trace::this_machine();

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What is behind ReDAGExecutor: the engine with its scheduler, the callbacks of all groups, and the threads that tell
-// when they have something to do. Knows rclcpp's entities, not its Executor (see Host).
+// Core implements ReDAGExecutor: the engine with its scheduler, the callbacks of all groups, and the threads that
+// release their jobs. Core knows rclcpp's entities, but not rclcpp::Executor (see Host).
 //
-// Threads: collect() and the spin functions are serialised by their callers' rules (one spinner; collect_lock_).
-// While spin() runs, a thread above all jobs waits for the wait set; the calling thread, at its own priority, collects
-// entities and ends learning. Hooks are called by any thread. Lock order: collect_lock_, rclcpp's, callbacks', the
-// timer queue's, the engine's.
+// Threads: collect_lock_ serialises collect(). Only one thread may call a spin function at a time; ReDAGExecutor sees
+// to it. While spin() runs, the thread redag-wait, with os above all jobs, waits for the wait set. The thread that
+// called spin() collects entities and ends learning, at its own priority. Any thread may call hooks. Lock order:
+// collect_lock_, rclcpp's, the callbacks', the timer queue's, the engine's.
 #pragma once
 
 #include <atomic>
@@ -37,11 +37,11 @@ namespace redag_rclcpp {
 
 using NodeBase = rclcpp::node_interfaces::NodeBaseInterface;
 
-/// What Core asks of the rclcpp::Executor around it.
+/// What Core uses of the rclcpp::Executor around it.
 struct Host {
-  std::function<std::vector<rclcpp::CallbackGroup::WeakPtr>()> groups;  // all that are to be executed
-  std::function<bool()> may_spin;                                       // not cancelled and not shut down
-  std::function<void()> stop;                                           // as cancel()
+  std::function<std::vector<rclcpp::CallbackGroup::WeakPtr>()> groups;  // all groups that are to be executed
+  std::function<bool()> may_spin;                                       // false: cancelled or shut down
+  std::function<void()> stop;                                           // as rclcpp's cancel()
 };
 
 class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_this<Core> {
@@ -50,23 +50,23 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   ~Core() override;
 
   void open(Host host, const std::vector<const rclcpp::GuardCondition *> &conditions);
-  /// Disconnects everything and ends all threads. Before the executor's own members go.
+  /// Disconnects everything and ends all threads. Must be called before the executor's own members are destroyed.
   void close();
 
-  /// Runs `change`, which tells rclcpp and us (by the next four) what is to be executed, as one step: a thread that
-  /// collects sees all of it or nothing. Then collects.
+  /// Runs `change` as one step: a thread that collects sees all of it or nothing. `change` tells rclcpp and Core (by
+  /// add_node(), remove_node(), add_group(), remove_group()) what is to be executed. Then collects.
   void change(const std::function<void()> &change);
   void add_node(const NodeBase::SharedPtr &node);
   void remove_node(const NodeBase::SharedPtr &node);
-  /// Before remove_node(): `instance` lives until the callbacks of the node are gone and have ended.
+  /// Holds `instance` until the callbacks of the node are gone and have ended. Call it before remove_node().
   void keep_until_done(NodeBase &node, const std::shared_ptr<void> &instance);
   void add_group(const rclcpp::CallbackGroup::SharedPtr &group, const NodeBase::SharedPtr &node);
   void remove_group(const rclcpp::CallbackGroup::SharedPtr &group);
 
-  /// Brings the tasks in line with what the groups hold now.
+  /// Adds and removes tasks until they match the entities in the groups.
   void collect();
 
-  /// False: somebody cancelled before anything had spun; rclcpp would lose that. Only the first time.
+  /// Begins a spin. False, for the first spin only: cancel() was called before it, which rclcpp would forget.
   [[nodiscard]] bool begin_first_spin() { return first_spin_.exchange(FirstSpin::Begun) != FirstSpin::Cancelled; }
   void cancel_first_spin() {
     FirstSpin expected = FirstSpin::Awaited;
@@ -84,7 +84,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   void set_live_bounds(std::map<std::string, redag::Duration> bounds);
   [[nodiscard]] redag::trace::RunInfo run_info(std::vector<std::uint32_t> &positions) const;
 
-  // Intake
+  // Functions of Intake.
   redag::runtime::Engine &engine() override { return *engine_; }
   TimerQueue &timers() override { return timers_; }
   [[nodiscard]] bool direct() const override { return direct_; }
@@ -130,27 +130,27 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   const ReDAGOptions options_;
   Host host_;
   redag::runtime::Setup setup_;
-  redag::Time origin_ = 0;  // of the engine's clock, on CLOCK_MONOTONIC
+  redag::Time origin_ = 0;  // zero of the engine's clock, on CLOCK_MONOTONIC
   std::unique_ptr<redag::runtime::Engine> engine_;
   TimerQueue timers_;
   Bridge bridge_;
   TaskTable tasks_;
-  std::vector<redag::DagId> dag_ids_;  // of tasks_.dags()
+  std::vector<redag::DagId> dag_ids_;  // ids of tasks_.dags()
 
   template <class T>
   using ByGroup = std::map<rclcpp::CallbackGroup::WeakPtr, T, std::owner_less<rclcpp::CallbackGroup::WeakPtr>>;
 
-  mutable RecursiveMutex collect_lock_;  // recursive because destructors of users' objects run below it
+  mutable RecursiveMutex collect_lock_;  // recursive: destructors of users' objects run while it is held
   std::unique_ptr<redag::CallbackMatcher> matcher_ REDAG_PT_GUARDED_BY(collect_lock_);  // null: no workload
   std::vector<NodeBase::WeakPtr> nodes_ REDAG_GUARDED_BY(collect_lock_);
   std::map<const void *, std::shared_ptr<Callback>> callbacks_ REDAG_GUARDED_BY(collect_lock_);  // by entity
   ByGroup<std::string> group_names_ REDAG_GUARDED_BY(collect_lock_);
   ByGroup<NodeBase::WeakPtr> manual_groups_ REDAG_GUARDED_BY(collect_lock_);
-  // Of timers and waitables, by node and kind.
+  // Next index of a timer or waitable, by node and kind.
   std::map<std::pair<std::string, int>, std::uint32_t> next_index_ REDAG_GUARDED_BY(collect_lock_);
   std::uint64_t next_group_ REDAG_GUARDED_BY(collect_lock_) = 0;
 
-  mutable redag::PiMutex notes_lock_;  // innermost
+  mutable redag::PiMutex notes_lock_;  // innermost lock
   std::vector<std::string> warnings_ REDAG_GUARDED_BY(notes_lock_);
   std::exception_ptr failure_ REDAG_GUARDED_BY(notes_lock_);
   std::map<std::string, redag::Duration> live_bounds_ REDAG_GUARDED_BY(notes_lock_);
@@ -164,28 +164,28 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   redag::Time learn_until_ = redag::kNever;
   redag::Time report_unmatched_at_ = redag::kNever;
   bool started_ = false;
-  std::string start_error_;  // of the engine, for good
+  std::string start_error_;  // why the engine could not start; stays set
   bool closed_ REDAG_GUARDED_BY(collect_lock_) = false;
 
   redag::PiMutex noted_lock_;
   std::vector<std::shared_ptr<Callback>> noted_ REDAG_GUARDED_BY(noted_lock_);
-  std::atomic<bool> waiting_{false};  // a spin function that pulls waits for work
+  std::atomic<bool> waiting_{false};  // a spin function that pulls is waiting for work
 
-  redag::runtime::Parker keeper_parker_;    // of the thread in spin()
-  std::atomic<bool> wait_set_done_{false};  // watch_wait_set() has ended, or is to end
-  std::exception_ptr wait_set_failure_;     // of watch_wait_set(), for after it
+  redag::runtime::Parker keeper_parker_;    // wakes the thread in keep_house()
+  std::atomic<bool> wait_set_done_{false};  // watch_wait_set() has ended, or must end
+  std::exception_ptr wait_set_failure_;     // exception of watch_wait_set(), read after its end
 
   std::thread timer_thread_;
   redag::runtime::Parker timer_parker_;
   std::atomic<bool> timing_{false};
   std::atomic<bool> timer_exit_{false};
-  redag::PiMutex expire_lock_;  // of the timer thread, or of who pulls
+  redag::PiMutex expire_lock_;  // held by the timer thread, or by the thread that pulls
   std::vector<redag::runtime::Release> due_ REDAG_GUARDED_BY(expire_lock_);
   std::vector<redag::runtime::Release> missed_ REDAG_GUARDED_BY(expire_lock_);
 
-  std::unique_ptr<redag::runtime::Watchdog> watchdog_;  // while the engine has threads
+  std::unique_ptr<redag::runtime::Watchdog> watchdog_;  // set once the engine has threads
 
-  std::unique_ptr<redag::live::Publisher> live_;  // last: it asks for figures until it is gone
+  std::unique_ptr<redag::live::Publisher> live_;  // last member: it reads figures until it is destroyed
 };
 
 }  // namespace redag_rclcpp

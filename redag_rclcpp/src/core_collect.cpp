@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the executor's callback groups hold, as tasks of the engine.
+// Collects the entities of the executor's callback groups as tasks of the engine.
 #include <algorithm>
 #include <set>
 #include <stdexcept>
@@ -16,7 +16,7 @@ namespace redag_rclcpp {
 using redag::Task;
 using Kind = redag::Callback::Kind;
 
-/// An entity as it stands in a callback group.
+/// An entity found in a callback group.
 struct ReDAGExecutor::Core::Found {
   const void *key = nullptr;
   Kind kind = Kind::Timer;
@@ -62,7 +62,7 @@ void ReDAGExecutor::Core::keep_until_done(NodeBase &node, const std::shared_ptr<
     if (callback != callbacks_.end()) callback->second->keep_until_done(instance);
   };
   node.for_each_callback_group([&](const rclcpp::CallbackGroup::SharedPtr &group) {
-    // Others were given to an executor by themselves, and stay there.
+    // Other groups were added to an executor on their own, and stay there.
     if (group->automatically_add_to_executor_with_node()) group->collect_all_ptrs(keep, keep, keep, keep, keep);
   });
 }
@@ -78,7 +78,8 @@ void ReDAGExecutor::Core::remove_group(const rclcpp::CallbackGroup::SharedPtr &g
   manual_groups_.erase(group);
 }
 
-// Nodes need not be removed, only dropped. One that comes under the same name then begins to count anew.
+// Forgets nodes that were destroyed without being removed. The counters of their names begin anew with a node of the
+// same name.
 void ReDAGExecutor::Core::forget_gone_nodes() {
   std::erase_if(nodes_, [](const NodeBase::WeakPtr &weak) { return weak.expired(); });
   std::erase_if(manual_groups_, [](const auto &entry) { return entry.first.expired() || entry.second.expired(); });
@@ -98,7 +99,8 @@ void ReDAGExecutor::Core::mark_dirty() {
 }
 
 void ReDAGExecutor::Core::collect() {
-  // What users own is destroyed after the lock is left, if we are the last to hold it.
+  // Declared before the lock guard: if `found` is the last owner of a user's object, that object is destroyed without
+  // the lock.
   std::vector<Found> found;
   const redag::LockGuard guard(collect_lock_);
   if (closed_) return;
@@ -122,7 +124,8 @@ void ReDAGExecutor::Core::collect() {
 }
 
 std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
-  // Before the nodes are asked: a group that is created meanwhile waits for the next time, rather than have no node.
+  // Read before the nodes are. A group that is created meanwhile is left for the next time; otherwise it would lack its
+  // node.
   const auto groups = host_.groups();
   std::map<const rclcpp::CallbackGroup *, std::string> nodes;
   for (const auto &weak : nodes_) {
@@ -143,7 +146,7 @@ std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
   for (const auto &weak : groups) {
     const auto group = weak.lock();
     if (!group) continue;
-    (void)group_name(group);  // also an empty one is watched: something may be created in it
+    (void)group_name(group);  // Watches empty groups, too, because an entity may be created in them.
     Found base;
     base.group = group;
     base.node = nodes[group.get()];
@@ -161,7 +164,7 @@ std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
           try {
             found.intra_process = subscription->get_intra_process_waitable();
           } catch (const std::runtime_error &) {
-            // Its intra-process manager is gone already.
+            // The subscription's intra-process manager is already gone.
           }
           if (found.intra_process) intra_process.insert(found.intra_process.get());
         },
@@ -175,7 +178,8 @@ std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
   return result;
 }
 
-// The name under which the scheduler knows a mutually exclusive group. First time: also watches it for new entities.
+// The scheduler's name for a mutually exclusive group; "" for a reentrant one. The first call for a group also watches
+// it for new entities.
 std::string ReDAGExecutor::Core::group_name(const rclcpp::CallbackGroup::SharedPtr &group) {
   const auto [entry, is_new] = group_names_.try_emplace(group);
   if (is_new) {
@@ -231,7 +235,7 @@ void ReDAGExecutor::Core::add(const Found &found) {
   if (callback->attach(task)) bridge_.add(callback);
 }
 
-// Which task of which DAG the callback is, and with which parameters.
+// Decides which task of which DAG the callback is, and with which parameters.
 void ReDAGExecutor::Core::place(TaskTable::Entry &entry, const Found &found) {
   Task &task = entry.task;
   entry.dag = static_cast<std::uint32_t>(dag_ids_.size() - 1);
@@ -243,7 +247,7 @@ void ReDAGExecutor::Core::place(TaskTable::Entry &entry, const Found &found) {
   }
   if (task.period == 0) task.period = entry.id.period > 0 ? entry.id.period : options_.default_period.count();
   if (task.deadline == 0) task.deadline = task.period;
-  // What releases its jobs, and what they must not overlap with, is ROS' business.
+  // ROS decides what releases the jobs, and which jobs must not overlap.
   task.activation = redag::Activation::Timer;
   task.predecessors.clear();
   task.offset = 0;
@@ -259,7 +263,8 @@ void ReDAGExecutor::Core::remove(const std::shared_ptr<Callback> &gone) {
   if (entry != callbacks_.end()) callbacks_.erase(entry);
   callback->detach();
   {
-    // Releases that were taken out of the timer queue before have been passed on: the id can be another task's now.
+    // Waits until releases that left the timer queue earlier have been passed on. Afterwards the id may be another
+    // task's.
     const redag::LockGuard guard(expire_lock_);
   }
   bridge_.remove(*callback);

@@ -14,7 +14,7 @@ using std::chrono::nanoseconds;
 
 namespace {
 
-/// Sets a flag that is clear, and clears it again.
+/// Sets a flag and clears it again. Throws if the flag is already set.
 class Claim {
  public:
   Claim(std::atomic_bool &flag, const char *function) : flag_(flag) {
@@ -28,8 +28,8 @@ class Claim {
   std::atomic_bool &flag_;
 };
 
-/// Claims the executor for one spin function. cancel() clears rclcpp's own flag while callbacks still run, and to set
-/// it then would undo the cancel(): so ours comes first.
+/// Claims the executor for one spin function. The executor's own flag is claimed before rclcpp's. cancel() clears
+/// rclcpp's flag while callbacks still run, and setting it at that moment would undo the cancel().
 class Spinning {
  public:
   Spinning(std::atomic_bool &occupied, std::atomic_bool &spinning, const char *function)
@@ -49,7 +49,7 @@ ReDAGExecutor::ReDAGExecutor(const rclcpp::ExecutorOptions &options, ReDAGOption
 #if RCLCPP_VERSION_MAJOR < 21
     forget_expired();
     {
-      // Newer ones do this when they are asked for the groups.
+      // Newer distributions do this in get_all_callback_groups().
       const std::lock_guard<std::mutex> guard(mutex_);
       add_callback_groups_from_nodes_associated_to_executor();
     }
@@ -84,7 +84,7 @@ void ReDAGExecutor::remove_node(rclcpp::node_interfaces::NodeBaseInterface::Shar
   std::vector<rclcpp::CallbackGroup::SharedPtr> kept;
   core_->change([&] {
 #if RCLCPP_VERSION_MAJOR < 21
-    // It throws half-way if one of the node's groups is gone, and none of them must go now.
+    // Keeps all groups alive: rclcpp's remove_node() throws half-way if one of the node's groups is gone.
     for (const auto &group : get_all_callback_groups()) kept.push_back(group.lock());
     forget_expired();
 #endif
@@ -93,7 +93,7 @@ void ReDAGExecutor::remove_node(rclcpp::node_interfaces::NodeBaseInterface::Shar
   });
 }
 
-// By value: where no callback is in progress `instance` is destroyed here, without locks of ours.
+// Takes `instance` by value: if no callback is in progress, it is destroyed here, with no lock held.
 void ReDAGExecutor::retire_node(const rclcpp::node_interfaces::NodeBaseInterface::SharedPtr &node,
                                 std::shared_ptr<void> instance) {
   core_->keep_until_done(*node, instance);
@@ -116,7 +116,7 @@ void ReDAGExecutor::remove_callback_group(rclcpp::CallbackGroup::SharedPtr group
 }
 
 #if RCLCPP_VERSION_MAJOR < 21
-// rclcpp does this when it waits, which it never does for us.
+// Removes destroyed nodes and groups. rclcpp does this when it waits, and this executor never waits there.
 void ReDAGExecutor::forget_expired() {
   const std::lock_guard<std::mutex> guard(mutex_);
   const auto is_gone = [](const auto &entry) { return entry.first.expired() || entry.second.expired(); };
@@ -161,7 +161,7 @@ void ReDAGExecutor::spin_once(nanoseconds timeout) {
   core_->spin_one(timeout);
 }
 
-// What completes the future need not be one of our callbacks, so that no wait is long.
+// Limits each wait to 10 ms, because something other than a callback of this executor may complete the future.
 void ReDAGExecutor::spin_for_future(nanoseconds timeout) {
   constexpr nanoseconds kLongest = std::chrono::milliseconds(10);
   const bool is_long = timeout < nanoseconds(0) || timeout > kLongest;
@@ -172,13 +172,13 @@ void ReDAGExecutor::spin_for_future(nanoseconds timeout) {
   core_->spin_one(is_long ? kLongest : timeout);
 }
 
-// Called by rclcpp's spin_until_future_complete, which has set its flag without asking for ours.
+// Called by rclcpp's spin_until_future_complete, which sets rclcpp's flag but not occupied_.
 void ReDAGExecutor::spin_once_impl(nanoseconds timeout) {
   try {
     const Claim occupied(occupied_, "spin_until_future_complete");
     spin_for_future(timeout);
   } catch (...) {
-    rclcpp::Executor::cancel();  // a spin that was cancelled and has not returned yet may have seen the flag
+    rclcpp::Executor::cancel();  // a cancelled spin that has not returned yet may have seen rclcpp's flag set
     throw;
   }
 }
@@ -210,7 +210,7 @@ void ReDAGExecutor::cancel() {
   rclcpp::Executor::cancel();
 }
 
-// ---- what can be asked ----
+// ---- queries ----
 
 const redag::runtime::Mode &ReDAGExecutor::mode() const { return core_->setup().mode; }
 std::uint32_t ReDAGExecutor::workers() const { return core_->setup().config.workers; }

@@ -16,7 +16,8 @@ namespace redag_rclcpp {
 
 namespace {
 
-/// Who has which ticket. A ticket is a place and how often the place was given away before: an old one finds nobody.
+/// Maps tickets to their holders. A ticket is an index and the number of earlier uses of this place; an old ticket
+/// finds no holder.
 class Tickets {
  public:
   static Tickets &all() {
@@ -83,7 +84,8 @@ void Hook::set(const std::weak_ptr<Hooked> &hooked, Setter setter) {
 
 void Hook::clear() {
   if (!setter_) return;
-  if (setter_(nullptr, nullptr) != RCL_RET_OK) rcl_reset_error();  // it could not be set either, or is being destroyed
+  // This fails if setting the hook had failed as well, or if the entity is being destroyed.
+  if (setter_(nullptr, nullptr) != RCL_RET_OK) rcl_reset_error();
   Tickets::all().give_back(ticket_);
   setter_ = nullptr;
 }

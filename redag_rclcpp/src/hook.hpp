@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A hook of the middleware's that can be called at any time, also when what it belongs to is being destroyed.
+// Hook is a hook of the middleware that may be called at any time, even while its entity is being destroyed.
 //
-// rclcpp keeps the function of set_on_new_message_callback() and its like in the Subscription, Service or Client, and
-// gives the middleware its address. From Iron on their destructors no longer take it back (rclcpp pull request 2002):
-// the middleware's part, it is thought, is destroyed before. But that part is shared: with QoS event handlers, with
-// wait sets, with whoever asked for the handle. While one of them holds it, a message calls a function that is no more.
-// So our hooks are set below rclcpp, and the middleware gets a ticket instead of an address.
+// rclcpp stores the function of set_on_new_message_callback() and its like in the Subscription, Service or Client, and
+// gives the middleware its address. Since Iron the destructors no longer take the address back (rclcpp pull request
+// 2002), on the assumption that the middleware's part is destroyed earlier. But QoS event handlers, wait sets and users
+// who asked for the handle share that part. While one of them holds it, a message calls a function that no longer
+// exists. Hook is therefore set below rclcpp, and gives the middleware a ticket instead of an address.
 #pragma once
 
 #include <rcl/event_callback.h>
@@ -21,11 +21,12 @@
 
 namespace redag_rclcpp {
 
-/// Who is told by hooks. They hold it only weakly.
+/// Receives the calls of hooks, which hold it only weakly.
 class Hooked {
  public:
   virtual ~Hooked() = default;
-  /// `count` messages, requests or responses have arrived. Called by threads of the middleware with locks of its held.
+  /// `count` messages, requests or responses have arrived. The middleware's threads call this with locks of their own
+  /// held.
   virtual void arrived_in_middleware(std::size_t count) noexcept = 0;
 };
 
@@ -36,18 +37,19 @@ class Hook {
   Hook(const Hook &) = delete;
   Hook &operator=(const Hook &) = delete;
 
-  /// `setter` gives the entity's handle to rcl_subscription_set_on_new_message_callback or its like for services and
-  /// clients. Tells at once of what arrived before. Throws as rclcpp does: the middleware has no such hook.
+  /// Sets the hook. `setter` gives the entity's handle to rcl_subscription_set_on_new_message_callback or its like for
+  /// services and clients. Earlier arrivals are reported at once. Throws, as rclcpp does, if the middleware has no such
+  /// hook.
   template <class Entity>
   void set(const std::shared_ptr<Entity> &entity, rcl_ret_t (*setter)(Entity &, rcl_event_callback_t, const void *),
            const std::weak_ptr<Hooked> &hooked) {
-    // The entity, not the handle: a weak pointer keeps the handle's deleter, which keeps the node.
+    // Captures the entity, not the handle: a weak pointer to the handle keeps its deleter, which keeps the node.
     set(hooked, [weak = std::weak_ptr<Entity>(entity), setter](rcl_event_callback_t callback, const void *ticket) {
       const auto alive = weak.lock();
       return alive ? setter(*alive, callback, ticket) : RCL_RET_OK;
     });
   }
-  /// From now on calls find nobody. One that is under way is waited for if the entity still exists.
+  /// Disconnects: later calls have no effect. Waits for a call in progress if the entity still exists.
   void clear();
 
  private:
@@ -55,7 +57,7 @@ class Hook {
 
   void set(const std::weak_ptr<Hooked> &hooked, Setter setter);
 
-  Setter setter_;  // empty: not set
+  Setter setter_;  // empty: no hook is set
   const void *ticket_ = nullptr;
 };
 

@@ -24,10 +24,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Cyclone DDS: q_init.c, q_radmin.c, q_xevent.c. dq.* deliver what recv* received, tev sends acknowledgements.
+// Names in Cyclone DDS: q_init.c, q_radmin.c, q_xevent.c. dq.* deliver what recv* received; tev sends acknowledgements.
 constexpr std::array<std::string_view, 6> kCyclone{"recv", "recvMC", "recvUC", "dq.builtins", "dq.user", "tev"};
-// Fast DDS: UDPChannelResource.cpp, TCPTransportInterface.cpp, SharedMemChannelResource.hpp, RTPSParticipantImpl.cpp,
-// FlowControllerImpl.hpp. Numbers follow, with dots between them.
+// Names in Fast DDS: UDPChannelResource.cpp, TCPTransportInterface.cpp, SharedMemChannelResource.hpp,
+// RTPSParticipantImpl.cpp, FlowControllerImpl.hpp. Numbers follow, separated by dots.
 constexpr std::array<std::string_view, 5> kFastNumbered{"dds.udp.", "dds.tcp.", "dds.shm.", "dds.ev.", "dds.asyn."};
 constexpr std::string_view kFastAccepts = "dds.tcp_accept";
 
@@ -43,7 +43,7 @@ bool is_fast(std::string_view name) {
 
 fs::path folder_of(int thread) { return fs::path("/proc/self/task") / std::to_string(thread); }
 
-/// Does the thread block the signals that end or disturb a process?
+/// True if the thread blocks the signals that end or disturb a process.
 bool blocks_signals(int thread) {
   std::ifstream file(folder_of(thread) / "status");
   for (std::string line; std::getline(file, line);) {
@@ -57,13 +57,14 @@ bool blocks_signals(int thread) {
   return false;
 }
 
-/// When the thread began, in the kernel's ticks: an id can be given again. 0: there is no such thread.
+/// Start time of the thread in the kernel's ticks, which tells threads with the same id apart. 0: the thread does not
+/// exist.
 std::uint64_t start_of(int thread) {
   constexpr int kStartField = 22;  // man 5 proc
   std::ifstream file(folder_of(thread) / "stat");
   std::string text;
   std::getline(file, text);
-  const std::size_t name_end = text.rfind(')');  // the name may hold anything
+  const std::size_t name_end = text.rfind(')');  // the name may contain parentheses
   if (name_end == std::string::npos) return 0;
   std::istringstream fields(text.substr(name_end + 1));
   std::string field;
@@ -85,10 +86,10 @@ bool read_scheduling(int thread, Scheduling &scheduling) {
   return scheduling.policy >= 0 && sched_getparam(thread, &scheduling.parameters) == 0;
 }
 
-/// A thread that executors raised.
+/// A thread that executors have raised.
 struct Raised {
   Scheduling before;
-  int priority = 0;  // that it was given
+  int priority = 0;  // priority that the thread was given
   std::uint64_t start = 0;
   std::uint32_t users = 0;
 };
@@ -130,10 +131,10 @@ RaisedMiddleware::RaisedMiddleware(int priority) {
   for (const MiddlewareThread &thread : threads) {
     Scheduling now;
     const std::uint64_t start = start_of(thread.id);
-    if (start == 0 || !read_scheduling(thread.id, now)) continue;  // it has ended
+    if (start == 0 || !read_scheduling(thread.id, now)) continue;  // the thread has ended
     auto known = registry().threads.find(thread.id);
     if (known != registry().threads.end() && known->second.start != start) {
-      registry().threads.erase(known);  // of a thread that is no more
+      registry().threads.erase(known);  // the entry belongs to an ended thread of the same id
       known = registry().threads.end();
     }
     if (!now.is_realtime() || now.parameters.sched_priority < priority) {
@@ -147,7 +148,7 @@ RaisedMiddleware::RaisedMiddleware(int priority) {
       }
       known->second.priority = priority;
     }
-    if (known == registry().threads.end()) continue;  // as urgent by itself
+    if (known == registry().threads.end()) continue;  // its own priority is high enough
     ++known->second.users;
     raised_.push_back(thread.id);
   }
@@ -162,7 +163,7 @@ RaisedMiddleware::~RaisedMiddleware() {
     registry().threads.erase(known);
     Scheduling now;
     if (start_of(thread) != raised.start || !read_scheduling(thread, now)) continue;
-    // Somebody else may have given it another priority meanwhile, which is to stay.
+    // Leaves a priority in place that another part of the program has set meanwhile.
     if (now.policy != SCHED_FIFO || now.parameters.sched_priority != raised.priority) continue;
     (void)sched_setscheduler(thread, raised.before.policy, &raised.before.parameters);
   }

@@ -36,14 +36,14 @@ using std_srvs::srv::Trigger;
 namespace {
 
 constexpr auto kDrainPeriod = std::chrono::milliseconds(50);
-constexpr auto kLookPeriod = std::chrono::milliseconds(500);  // at the callbacks behind the bounds
+constexpr auto kLookPeriod = std::chrono::milliseconds(500);  // between looks at the callbacks behind the bounds
 
-/// What is to be done every so often.
+/// Schedule of a repeated action.
 class Turn {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `period` 0: never.
+  /// `period` 0 means never.
   explicit Turn(std::chrono::nanoseconds period) : period_(period) {
     if (period.count() == 0) next_ = Clock::time_point::max();
   }
@@ -109,9 +109,9 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
 
   const bool has_bounds_;
   redag::Mutex bounds_lock_;
-  std::optional<Bounds> bounds_ REDAG_GUARDED_BY(bounds_lock_);  // if has_bounds_
+  std::optional<Bounds> bounds_ REDAG_GUARDED_BY(bounds_lock_);  // set if has_bounds_
 
-  // The thread's, and after it finish()'s.
+  // Used by the monitor's thread, and by finish() once that thread has ended.
   Diagnoser diagnoser_;
   TraceKeeper keeper_;
   FlightLog flight_;
@@ -205,7 +205,7 @@ redag::Result<std::string> Monitor::Impl::save(const std::string &path) const {
   return absolute;
 }
 
-// ---- the thread ----
+// ---- the monitor's thread ----
 
 void Monitor::Impl::main() {
   const bool has_events = has_bounds_ || !options_.trace.empty();
@@ -225,7 +225,7 @@ void Monitor::Impl::main() {
   }
 }
 
-// Not by a callback: who wants to know how an overloaded executor does must not wait for it.
+// Publishes on the monitor's own thread: a callback for this would have to wait for an overloaded executor.
 void Monitor::Impl::publish() {
   const Snapshot now = snapshot();
   DiagnosticArray array;
@@ -248,7 +248,7 @@ void Monitor::Impl::look_at_callbacks() {
   const std::vector<CallbackStats> stats = executor_.stats();
   std::string absent;
   {
-    // The analysis works on a copy: who asks for figures does not wait for it.
+    // The analysis works on a copy: requests for figures do not wait for it.
     std::optional<Bounds> updated;
     {
       const redag::LockGuard guard(bounds_lock_);
@@ -331,7 +331,7 @@ redag::Result<void> Monitor::Impl::finish() {
     write_metrics(options_.trace + "/metrics.json");
     const redag::Diagnostics more = keeper_.write(options_.trace, executor_);
     problems.insert(problems.end(), more.begin(), more.end());
-    // As long as results are missing, the record is what there is.
+    // Removes the flight record only if all results were written.
     if (problems.empty()) {
       if (const redag::Result<void> removed = flight_.remove(); !removed) problems = removed.error();
     }

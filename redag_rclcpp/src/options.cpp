@@ -27,8 +27,8 @@ using std::chrono::nanoseconds;
 
 constexpr std::int64_t kMostThreads = 4096;
 constexpr std::int64_t kMostTraceEvents = 1'000'000'000;
-constexpr double kMostSeconds = 1e6;                          // eleven days: longer is a mistake of units
-constexpr std::size_t kTraceCapacity = std::size_t{1} << 14;  // events a ring; the monitor empties them often
+constexpr double kMostSeconds = 1e6;                          // eleven days: a larger value has the wrong unit
+constexpr std::size_t kTraceCapacity = std::size_t{1} << 14;  // events per ring; the monitor empties them every 50 ms
 
 constexpr std::array kModes = {redag::PreemptionMode::Auto, redag::PreemptionMode::None,
                                redag::PreemptionMode::Cooperative, redag::PreemptionMode::Os};
@@ -48,7 +48,7 @@ struct Spec {
   std::string allowed;
 };
 
-/// Declares and reads parameters, and judges their values itself: one message for the wrong type and the wrong value.
+/// Declares and reads parameters. It checks types and values itself, to give one message for both mistakes.
 class Reader {
  public:
   explicit Reader(rclcpp::Node &node) : node_(node) {}
@@ -59,7 +59,7 @@ class Reader {
       descriptor.description = spec.description;
       descriptor.additional_constraints = spec.allowed;
       descriptor.read_only = read_only;
-      descriptor.dynamic_typing = true;  // 5 for 5.0, and our own words for what is neither
+      descriptor.dynamic_typing = true;  // accepts 5 for 5.0; read functions reject other types
       node_.declare_parameter(spec.name, initial, descriptor);
     }
     return node_.get_parameter(spec.name).get_parameter_value();
@@ -142,7 +142,7 @@ std::vector<int> read_cpus(Reader &reader) {
   return cpus;
 }
 
-// The format has a default for the number of workers. A file that does not say it leaves it to the parameter.
+// True if the file states the number of workers. If it does not, the parameter counts, and not the format's default.
 bool states_workers(const std::string &path) {
   const YAML::Node file = YAML::LoadFile(path);
   return file["platform"] && file["platform"]["workers"];

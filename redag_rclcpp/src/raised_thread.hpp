@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A thread that must not wait for busy workers, for a while.
+// Raises the calling thread for a while, above busy workers.
 #pragma once
 
 #include <pthread.h>
@@ -10,7 +10,7 @@
 
 namespace redag_rclcpp {
 
-/// The calling thread at SCHED_FIFO `priority` for as long as this lives; 0: as it is.
+/// Gives the calling thread SCHED_FIFO `priority` until destruction; 0: leaves it unchanged.
 class RaisedThread {
  public:
   explicit RaisedThread(int priority) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A recursive mutex whose owner inherits the priority of the threads that wait for it, and that clang's -Wthread-safety
-// understands. std::recursive_mutex does not inherit.
+// RecursiveMutex is a recursive mutex whose owner inherits the priority of waiting threads. std::recursive_mutex does
+// not inherit. clang's -Wthread-safety understands the class.
 #pragma once
 
 #include <pthread.h>
@@ -30,7 +30,7 @@ class REDAG_CAPABILITY("mutex") RecursiveMutex {
   void unlock() REDAG_RELEASE() {
     REDAG_CHECK(pthread_mutex_unlock(&mutex_) == 0, "a mutex is unlocked by a thread that does not own it");
   }
-  /// Tells the analysis, where it cannot see the caller, that the caller has the mutex.
+  /// Tells the analysis that the caller holds the mutex, where it cannot see the caller.
   void assert_held() const REDAG_ASSERT_CAPABILITY(this) {}
 
  private:

@@ -66,7 +66,7 @@ void warn(DiagnosticStatus &status, const std::string &text) {
   status.message += text;
 }
 
-// "ekf" of "control.ekf"; "timer 2 ms (0)" of "/imu timer 2 ms (0)".
+// Drops the DAG or node: "ekf" for "control.ekf"; "timer 2 ms (0)" for "/imu timer 2 ms (0)".
 std::string short_name(const CallbackStats &stats) {
   const std::string &prefix = stats.dag.empty() ? stats.id.node : stats.dag;
   const bool has_prefix = stats.task.size() > prefix.size() && stats.task.compare(0, prefix.size(), prefix) == 0;
@@ -108,7 +108,7 @@ std::string to_json(const Snapshot &snapshot) {
                   {"warnings", snapshot.warnings},
                   {"bounds_absent", snapshot.has_bounds ? Json(snapshot.bounds_absent) : Json("not asked for")},
                   {"tasks", tasks}};
-  // Names from outside may not be UTF-8; a replaced character is better than no snapshot.
+  // Names from outside may not be UTF-8. A replaced character is better than no snapshot.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -160,7 +160,7 @@ std::vector<DiagnosticStatus> Diagnoser::diagnose(const Snapshot &snapshot) {
   std::map<std::string, std::size_t> positions;
   for (const TaskFigures &task : snapshot.tasks) {
     const CallbackStats &stats = task.stats;
-    // Nodes have many callbacks that never run: services, events of publishers.
+    // Leaves out callbacks that never ran. Nodes have many of them, such as services and events of publishers.
     if (stats.dag.empty() && (stats.jobs.released == 0 || is_ros_internal(stats.id))) continue;
     const std::string name = stats.dag.empty() ? "ReDAG: node " + stats.id.node : "ReDAG: DAG " + stats.dag;
     const auto [entry, is_new] = positions.emplace(name, result.size());

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the monitor says, as values and as text: a snapshot of an executor, its JSON, its diagnostics. Pure functions
-// and one value that remembers what was reported last.
+// The monitor's reports as values and as text: a snapshot of an executor, its JSON text, its diagnostics. These are
+// pure functions, and one class that remembers the last report.
 #pragma once
 
 #include <chrono>
@@ -23,7 +23,7 @@ namespace redag_rclcpp {
 struct TaskFigures {
   CallbackStats stats;
   std::optional<TaskBound> bound;
-  /// Is the deadline more than an assumption: stated by the workload, a timer's period, or learned?
+  /// True if the deadline is stated by the workload, a timer's period, or learned. Otherwise it is an assumption.
   bool has_deadline = false;
 };
 
@@ -35,25 +35,26 @@ struct Snapshot {
   bool learning = false;
   std::vector<std::string> warnings;
   bool has_bounds = false;
-  std::string bounds_absent;                // what stands in the way of bounds; empty: nothing
-  std::optional<redag::Overheads> machine;  // what the bounds charge of the machine
+  std::string bounds_absent;                // reason why some tasks have no bound; empty: all have one
+  std::optional<redag::Overheads> machine;  // overheads of this machine that the bounds include
   std::vector<TaskFigures> tasks;
 };
 
-/// "redag.metrics/1" (docs/results_format.md), one line.
+/// The snapshot as JSON, "redag.metrics/1" (docs/results_format.md), on one line.
 [[nodiscard]] std::string to_json(const Snapshot &snapshot);
 
-/// One line for people: jobs, misses, and who missed most.
+/// A summary on one line: jobs, misses, and the task with the most misses.
 [[nodiscard]] std::string summarize(const Snapshot &snapshot);
 
-/// Leaves out the tasks that never ran (services that nobody called, events of publishers), save those of DAGs that are
-/// in `configured`, and DAGs without tasks: they would keep the workload from being analysed.
+/// Removes tasks that never ran (unused services, events of publishers), except those of the DAGs in `configured`. Then
+/// removes DAGs without tasks. Such tasks and DAGs would prevent an analysis of the workload.
 void drop_idle_tasks(redag::Workload &workload, const std::set<std::string> &configured);
 
-/// Turns snapshots into diagnostics; what is new is new since the last one.
+/// Turns snapshots into diagnostics. Warns of deadlines that were missed since the previous snapshot.
 class Diagnoser {
  public:
-  /// A status for the executor, one for each DAG, one for each node with callbacks that the workload does not name.
+  /// Returns a status for the executor, one for each DAG, and one for each node with callbacks that the workload does
+  /// not name.
   [[nodiscard]] std::vector<diagnostic_msgs::msg::DiagnosticStatus> diagnose(const Snapshot &snapshot);
 
  private:

@@ -42,7 +42,7 @@ redag::Diagnostics TraceKeeper::write(const std::string &folder, const ReDAGExec
     if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
   };
   redag::trace::Trace trace = executor.as_trace(std::move(events_));
-  // What is kept of a longer run is a run that ended earlier.
+  // The kept events describe a run that ended with the last of them.
   if (is_cut_ && !trace.events.empty()) trace.info.end = trace.events.back().time;
 
   const redag::metrics::Summary summary = redag::metrics::summarize(trace);
@@ -57,7 +57,7 @@ redag::Diagnostics TraceKeeper::write(const std::string &folder, const ReDAGExec
 std::optional<std::string> FlightLog::prepare(const std::string &folder) {
   folder_ = folder + "/flight";
   if (!redag::trace::has_flight_record(folder_)) return std::nullopt;
-  // A robot that starts again after a crash must start, and somebody will want the record.
+  // Moves an earlier record aside: a robot must start again after a crash, and its user may want the record.
   std::string aside;
   std::error_code error;
   for (int number = 1; aside.empty() || std::filesystem::exists(aside, error); ++number)
@@ -74,7 +74,7 @@ redag::Result<void> FlightLog::add(const std::vector<redag::JobEvent> &events, c
   return kept;
 }
 
-// Tasks come while the executor spins, and rates are learned.
+// Describes the tasks again when new ones have appeared, or when their rates were learned.
 redag::Result<void> FlightLog::describe(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor) {
   const bool is_known = std::all_of(events.begin(), events.end(),
                                     [this](const auto &event) { return event.task.value < positions_.size(); });

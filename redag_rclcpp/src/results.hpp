@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A run's trace as files: what the executor's rings give, kept until the end, because only then it is known what the
-// events' task ids mean. Not thread-safe.
+// Writes the trace of a run as files. TraceKeeper holds the events until the end, because only then the meaning of
+// their task ids is known. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -17,22 +17,22 @@
 
 namespace redag_rclcpp {
 
-/// Makes a folder, with its parents, that files can be written to. Error: why that is not possible.
+/// Creates a folder with its parents, and checks that it is writable. Error: the reason why not.
 [[nodiscard]] redag::Result<void> prepare_folder(const std::string &path);
 
 class TraceKeeper {
  public:
   explicit TraceKeeper(std::size_t most_events) : most_(most_events) {}
 
-  /// Keeps the first ones; of what follows only the fact.
+  /// Keeps events until `most_events` is reached. Later events only set is_cut().
   void add(const std::vector<redag::JobEvent> &events);
 
-  /// summary.json, jobs.csv, trace.json and events.jsonl, as docs/results_format.md has them. After spinning; every
-  /// problem there is.
+  /// Writes summary.json, jobs.csv, trace.json and events.jsonl (docs/results_format.md). Call it after spinning.
+  /// Returns all problems.
   [[nodiscard]] redag::Diagnostics write(const std::string &folder, const ReDAGExecutor &executor);
 
   [[nodiscard]] std::size_t size() const { return events_.size(); }
-  /// Were there more than could be kept?
+  /// True if there were more events than could be kept.
   [[nodiscard]] bool is_cut() const { return is_cut_; }
 
  private:
@@ -41,14 +41,14 @@ class TraceKeeper {
   std::vector<redag::JobEvent> events_;
 };
 
-/// A record of the run that outlives the process, in `folder`/flight: `redag recover` makes results of it.
+/// Records the run in `folder`/flight, in a form that outlives the process. `redag recover` makes results of it.
 class FlightLog {
  public:
-  /// What an earlier process left there is moved aside, to flight.1 and so on; returns where to.
+  /// Moves the record of an earlier process aside, to flight.1 and so on. Returns the new path, or nothing.
   [[nodiscard]] std::optional<std::string> prepare(const std::string &folder);
-  /// Error, once: from here on nothing is recorded.
+  /// Appends events. An error is returned only once; afterwards nothing is recorded.
   [[nodiscard]] redag::Result<void> add(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor);
-  /// The results are written.
+  /// Removes the record. Call it when the results are written.
   [[nodiscard]] redag::Result<void> remove();
 
  private:
@@ -56,7 +56,7 @@ class FlightLog {
 
   std::string folder_;
   std::optional<redag::trace::FlightRecorder> recorder_;
-  std::vector<std::uint32_t> positions_;  // of the tasks that the record describes
+  std::vector<std::uint32_t> positions_;  // positions of the tasks that the record describes
   bool learning_ = true;
   bool broken_ = false;
 };

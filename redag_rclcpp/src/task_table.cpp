@@ -20,7 +20,7 @@ using Kind = redag::Callback::Kind;
 
 namespace {
 
-/// Makes tasks of a cycle tasks of their own: what was seen can be one, a DAG cannot.
+/// Breaks cycles of learned edges by making a task of each cycle a timer task without predecessors.
 void break_cycles(redag::Dag &dag) {
   std::vector<std::uint8_t> done(dag.tasks.size(), 0);
   const auto is_ready = [&](const Task &task) {
@@ -56,8 +56,8 @@ TaskTable::TaskTable(redag::Platform platform, redag::PolicyKind policy, redag::
     : platform_(platform), policy_(policy), ties_(ties), configured_(configured) {
   if (configured != nullptr) dags_ = configured->dags;
   for (redag::Dag &dag : dags_) dag.tasks.clear();
-  // All that the workload does not name: no bound, and last among equals. In HI mode not more often than its period,
-  // after everything else.
+  // A DAG for all callbacks that the workload does not name. It has no max_active, and its tasks come last among
+  // equals. In HI mode they run after everything else, and not more often than their periods.
   dags_.emplace_back().name = "ros";
   dags_.back().degrade = redag::Degrade{.kind = redag::Degrade::Kind::Stretch, .skip = 1, .stretch = 1};
 }
@@ -69,7 +69,7 @@ void TaskTable::set(TaskId task, Entry entry) {
 }
 
 void TaskTable::drop(TaskId task) {
-  std::shared_ptr<Callback> gone;  // not destroyed under the lock
+  std::shared_ptr<Callback> gone;  // declared before the guard: destroyed without the lock
   const redag::LockGuard guard(lock_);
   gone.swap(entries_[task.value].callback);
 }
@@ -120,7 +120,7 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
   }
   std::vector<CallbackStats> result;
   {
-    // Where the callback has gone meanwhile, the engine may have counted for another task of the same id.
+    // If the callback has gone meanwhile, the engine may have counted for another task of the same id.
     const redag::LockGuard guard(lock_);
     for (Row &row : rows) {
       if (entries_[row.task.value].callback == row.callback) result.push_back(std::move(row.stats));
@@ -158,16 +158,16 @@ void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std:
   for (Row &row : rows) {
     const redag::runtime::TaskFigures figures = engine.figures(TaskId(row.task.key));
     redag::runtime::fill(row.task, figures);
-    row.task.misses = row.callback->late() + figures.jobs.skipped;  // as in stats(): no data is no miss
+    row.task.misses = row.callback->late() + figures.jobs.skipped;  // as in stats(): aborted jobs are no misses
   }
-  // As in stats(): what has gone meanwhile may have been counted with another task.
+  // As in stats(): skips callbacks that have gone meanwhile.
   const redag::LockGuard guard(lock_);
   for (Row &row : rows) {
     if (entries_[row.task.key].callback == row.callback) sample.tasks.push_back(std::move(row.task));
   }
 }
 
-// ---- what was seen ----
+// ---- learned rates and edges ----
 
 std::vector<std::pair<TaskId, redag::Duration>> TaskTable::adopt_rates() {
   const redag::LockGuard guard(lock_);
@@ -187,12 +187,12 @@ std::vector<std::pair<TaskId, redag::Duration>> TaskTable::adopt_rates() {
   return changed;
 }
 
-// The largest period among the tasks whose jobs publish what arrives here (as data tasks inherit it), or else the mean
-// time between arrivals; 0: unknown. `depth` ends cycles.
+// The largest period of the tasks whose jobs publish to this task, as data tasks inherit it. Without such a task, the
+// mean time between arrivals; 0: unknown. `depth` ends cycles.
 redag::Duration TaskTable::seen_period(const Entry &entry, int depth) const {
   constexpr int kDeepest = 32;
   if (entry.configured || entry.callback->is_timer()) return entry.task.period;
-  if (is_ros_internal(entry.id)) return 0;  // loading nodes comes in bursts that say nothing of a rate
+  if (is_ros_internal(entry.id)) return 0;  // nodes are loaded in bursts, which tell no rate
   redag::Duration period = 0;
   for (const TaskId publisher : entry.callback->publishers()) {
     if (depth >= kDeepest || publisher.value >= entries_.size() || !entries_[publisher.value].callback) continue;
@@ -201,7 +201,8 @@ redag::Duration TaskTable::seen_period(const Entry &entry, int depth) const {
   return period > 0 ? period : entry.callback->mean_interval();
 }
 
-// `live`: what there is now, for a workload file; else all that there ever was, each with a wcet, for a trace.
+// With `live`, the present tasks, for a workload file. Otherwise all tasks that ever existed, each with a wcet, for a
+// trace.
 Workload TaskTable::as_workload(Ids &ids, bool live) const {
   Workload workload;
   workload.name = configured_ != nullptr ? configured_->name : "ros";
@@ -250,8 +251,8 @@ Workload TaskTable::learned() const {
   return workload;
 }
 
-// A message's task follows the task that publishes it. With several publishers it runs for each of them, which an
-// AND-join cannot say: it stays a task with a rate of its own.
+// Makes the task of a message follow the task that publishes it. With several publishers the task runs for each of
+// them, which an AND-join cannot express. Such a task keeps a rate of its own.
 void TaskTable::add_seen_edges(Workload &workload, const Ids &ids) const {
   for (std::size_t d = 0; d < workload.dags.size(); ++d) {
     redag::Dag &dag = workload.dags[d];
@@ -270,13 +271,13 @@ void TaskTable::add_seen_edges(Workload &workload, const Ids &ids) const {
     }
     break_cycles(dag);
     for (Task &task : dag.tasks) {
-      if (task.activation == redag::Activation::Data) task.period = 0;  // inherited
+      if (task.activation == redag::Activation::Data) task.period = 0;  // inherited from the predecessor
     }
     redag::inherit_periods(dag);
   }
 }
 
-// As the file has them, between the tasks that there are.
+// Adds the edges that the file states, between tasks that exist.
 void TaskTable::add_configured_edges(redag::Dag &dag, std::size_t task, const Entry &entry) const {
   const std::vector<Task> &configured = configured_->dags[entry.dag].tasks;
   const auto named = [](const std::vector<Task> &tasks, const std::string &name) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Which callback is which task: of which DAG, under which name, with which parameters. For all who ask about tasks:
-// figures, traces, what was learned. Decides nothing. Any thread; its lock is the innermost.
+// TaskTable knows the task of each callback: its DAG, name and parameters. It answers questions about tasks: figures,
+// traces, the learned workload. Any thread may call it; its lock is the innermost.
 #pragma once
 
 #include <cstdint>
@@ -32,42 +32,42 @@ class TaskTable {
     redag::CallbackId id;
     redag::Task task;
     std::uint32_t dag = 0;    // position in dags()
-    std::uint32_t rank = 0;   // topological, in its DAG
+    std::uint32_t rank = 0;   // topological rank within its DAG
     bool configured = false;  // named by the workload
   };
 
-  /// `platform`, `policy` and `ties`: the executor's. `configured`: what the user's workload says, or null.
+  /// `platform`, `policy` and `ties` are the executor's. `configured` is the user's workload, or null.
   TaskTable(redag::Platform platform, redag::PolicyKind policy, redag::Ties ties, const redag::Workload *configured);
 
-  /// The workload's, and last that of all that it does not name. Without tasks.
+  /// The workload's DAGs without their tasks. The last one, "ros", is for callbacks that the workload does not name.
   [[nodiscard]] const std::vector<redag::Dag> &dags() const { return dags_; }
 
-  /// An id can be given again once it was dropped.
+  /// Sets the task of an id. An id may be reused after drop().
   void set(redag::TaskId task, Entry entry);
   void drop(redag::TaskId task);
 
-  /// "control.ekf", or to_string(CallbackId).
+  /// Returns "control.ekf", or to_string(CallbackId).
   [[nodiscard]] std::string name_of(redag::TaskId task) const;
 
-  /// Most urgent first.
+  /// Figures of all callbacks, shortest period first.
   [[nodiscard]] std::vector<CallbackStats> stats(const redag::runtime::Engine &engine) const;
 
-  /// For the live page. `bounds`: on response times, by the name of the task.
+  /// Appends DAGs and figures for the live page. `bounds`: on response times, by task name.
   void sample(const redag::runtime::Engine &engine, const std::map<std::string, redag::Duration> &bounds,
               redag::live::Sample &sample) const;
 
-  /// Gives callbacks without a rate of their own the one they were seen to have: the tasks that change, with their
-  /// new period and deadline.
+  /// Gives callbacks without a stated rate the rate that was learned. Returns the changed tasks and their new period,
+  /// which is also their deadline.
   std::vector<std::pair<redag::TaskId, redag::Duration>> adopt_rates();
 
-  /// What there is now, with the edges that were seen (see ReDAGExecutor::learned).
+  /// The present tasks with learned edges (see ReDAGExecutor::learned).
   [[nodiscard]] redag::Workload learned() const;
 
-  /// All that there ever was; task i of the engine is at positions[i] of the workload.
+  /// All tasks that ever existed. Task i of the engine is at positions[i] of the workload.
   [[nodiscard]] redag::Workload describe(std::vector<std::uint32_t> &positions) const;
 
  private:
-  /// The ids of a workload's tasks, DAG by DAG.
+  /// Task ids in the engine, by DAG and position in the workload.
   using Ids = std::vector<std::vector<std::uint32_t>>;
 
   [[nodiscard]] std::string name(const Entry &entry) const;
@@ -83,7 +83,7 @@ class TaskTable {
   std::vector<redag::Dag> dags_;
 
   mutable redag::PiMutex lock_;
-  std::vector<Entry> entries_ REDAG_GUARDED_BY(lock_);  // by TaskId
+  std::vector<Entry> entries_ REDAG_GUARDED_BY(lock_);  // indexed by TaskId
 };
 
 }  // namespace redag_rclcpp

@@ -51,7 +51,7 @@ void TimerQueue::place(Timer &timer, Time due) {
   sift(hole);
 }
 
-// Moves the entry up or down to where it belongs.
+// Moves the entry up or down to its place in the heap.
 void TimerQueue::sift(std::size_t position) {
   Timer *timer = heap_[position];
   while (position > 0) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// When which timer expires next: a heap of due times, without a thread. The expiry itself is the timer's affair: the
-// queue asks it (Timer::expire). Any thread; allocates only while it grows.
+// TimerQueue is a heap of due times that tells which timer expires next. It has no thread. When a due time has passed,
+// it calls Timer::expire(). Any thread may call it; it allocates only while it grows.
 #pragma once
 
 #include <vector>
@@ -20,14 +20,15 @@ using redag::Time;
 class TimerQueue {
  public:
   static constexpr std::size_t kNowhere = ~std::size_t{0};
-  /// Two readings of a timer differ by a little: due times closer than this are the same one.
+  /// Two readings of a timer differ slightly: due times closer than this count as the same.
   static constexpr Duration kSame = 2 * redag::kMicrosecond;
 
-  /// What waits in the queue. Outlives its stay there.
+  /// An entry of the queue. Must outlive its time in the queue.
   class Timer {
    public:
-    /// Its time has come. Appends the release if it has really expired, and the releases it missed on the way; returns
-    /// when to ask again (kNever: when it says so, by schedule()). Under the queue's lock.
+    /// Called when the due time has passed, with the queue's lock held. Appends the release if the timer has really
+    /// expired, and the releases that were missed before it. Returns when to call it again; kNever: after the next
+    /// schedule().
     virtual Time expire(Time now, std::vector<redag::runtime::Release> &releases,
                         std::vector<redag::runtime::Release> &missed) = 0;
 
@@ -36,16 +37,16 @@ class TimerQueue {
    private:
     friend class TimerQueue;
     Time due_ = redag::kNever;
-    std::size_t position_ = kNowhere;  // in the heap
+    std::size_t position_ = kNowhere;  // position in the heap
   };
 
-  /// Replaces what was scheduled for `timer` before; kNever: nothing. True if the queue now has an earlier next().
+  /// Replaces the timer's due time; kNever: removes the timer. True if next() has become earlier.
   bool schedule(Timer &timer, Time due);
 
-  /// When the next timer is due; kNever: none.
+  /// Due time of the next timer; kNever: none.
   [[nodiscard]] Time next() const;
 
-  /// Asks all timers that are due. Returns when the next one is.
+  /// Calls expire() of all timers that are due. Returns the due time of the next one.
   Time expire_due(Time now, std::vector<redag::runtime::Release> &releases,
                   std::vector<redag::runtime::Release> &missed);
 
@@ -55,7 +56,7 @@ class TimerQueue {
   void set(std::size_t position, Timer *timer) REDAG_REQUIRES(lock_);
 
   mutable redag::PiMutex lock_;
-  std::vector<Timer *> heap_ REDAG_GUARDED_BY(lock_);  // binary, by due_
+  std::vector<Timer *> heap_ REDAG_GUARDED_BY(lock_);  // binary heap, ordered by due_
 };
 
 }  // namespace redag_rclcpp

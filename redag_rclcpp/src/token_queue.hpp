@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A FIFO in a ring that grows by doubling: allocates only while it grows. Not thread-safe.
+// TokenQueue is a FIFO in a ring that grows by doubling. It allocates only while it grows. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +32,7 @@ class TokenQueue {
 
   void clear() { size_ = 0; }
 
-  /// Removes the value at `position`; those behind it move up.
+  /// Removes the value at `position`; later values move up.
   void erase(std::size_t position) {
     for (std::size_t i = position; i + 1 < size_; ++i) {
       ring_[(first_ + i) % ring_.size()] = std::move(ring_[(first_ + i + 1) % ring_.size()]);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Nodes whose callbacks misbehave, at random from a seed: what the chaos test gives an executor.
+// Nodes for the chaos test. Their callbacks misbehave at random, from a seed.
 #pragma once
 
 #include <array>
@@ -82,15 +82,16 @@ inline constexpr std::array kFaultNames = {"callbacks without a fault",
                                            "callbacks that cancel"};
 inline constexpr std::size_t kFaults = kFaultNames.size();
 
-/// What an episode has to be judged by.
+/// Counts of an episode, on which it is judged.
 struct Record {
   std::array<std::atomic<std::uint64_t>, kFaults> faults{};
   std::atomic<std::uint64_t> thrown{0};
-  std::atomic<std::uint64_t> overlaps{0};            // of callbacks of one exclusive group
-  std::atomic<std::uint64_t> spun_in_a_callback{0};  // it was not refused
+  std::atomic<std::uint64_t> overlaps{0};            // overlapping callbacks of one exclusive group
+  std::atomic<std::uint64_t> spun_in_a_callback{0};  // spins in a callback that were not refused
 };
 
-/// A node with what it has, which its own callbacks change too. Those hold it while they run: it can go in one.
+/// A node and its entities, which its own callbacks change as well. Callbacks hold it while they run: the node may be
+/// destroyed within one of them.
 struct Troublemaker {
   struct Group {
     rclcpp::CallbackGroup::SharedPtr group;
@@ -98,7 +99,7 @@ struct Troublemaker {
     std::shared_ptr<std::atomic<int>> inside = std::make_shared<std::atomic<int>>(0);
   };
   rclcpp::Node::SharedPtr node;
-  std::mutex lock;  // the rest
+  std::mutex lock;  // guards the members below
   std::vector<Group> groups;
   std::vector<rclcpp::TimerBase::SharedPtr> timers;
   std::vector<rclcpp::SubscriptionBase::SharedPtr> subscriptions;
@@ -107,7 +108,7 @@ struct Troublemaker {
   rclcpp::Client<EmptyService>::SharedPtr client;
 };
 
-/// The nodes of one episode. Threads: any.
+/// The nodes of one episode. Any thread may call it.
 class Troublemakers {
  public:
   Troublemakers(ReDAGExecutor &executor, Record &record, std::uint64_t seed, double fault_rate)
@@ -115,7 +116,7 @@ class Troublemakers {
     clock_publisher_ = here_->create_publisher<Clock>("/clock", rclcpp::ClockQoS());
   }
 
-  /// A node more, known to the executor.
+  /// Creates a node and adds it to the executor.
   void add_node() {
     const std::uint64_t number = next_node_.fetch_add(1);
     if (number >= kMostNodes) return;
@@ -144,7 +145,7 @@ class Troublemakers {
     executor_.add_node(made->node);
   }
 
-  /// One node less: taken from the executor before, or not.
+  /// Drops a node, with or without removing it from the executor first.
   void remove_one(Rng &dice) {
     std::shared_ptr<Troublemaker> gone;
     {
@@ -157,7 +158,7 @@ class Troublemakers {
     if (dice.uniform01() < 0.5) leave(*gone);
   }
 
-  /// On /clock: some time within an hour of the start, before the last one or after it.
+  /// Publishes a time on /clock: within an hour of the start, before the last published time or after it.
   void move_time(Rng &dice) {
     Clock message;
     const Duration time = kClockStart + dice.uniform(0, 3600) * redag::kSecond + dice.uniform(0, redag::kSecond - 1);
@@ -175,7 +176,7 @@ class Troublemakers {
   [[nodiscard]] std::uint64_t calls() const { return next_call_; }
   [[nodiscard]] std::size_t nodes_made() const { return std::min<std::size_t>(next_node_, kMostNodes); }
 
-  /// Little of its own, so that there can be many.
+  /// Few entities per node, to allow many nodes.
   static rclcpp::NodeOptions node_options() {
     return rclcpp::NodeOptions().enable_rosout(false).start_parameter_services(false).start_parameter_event_publisher(
         false);
@@ -190,7 +191,7 @@ class Troublemakers {
 
   static std::string topic(Rng &dice) { return "/trouble" + std::to_string(dice.uniform(0, 2)); }
 
-  // With the lock of `of` held.
+  // The caller holds the lock of `of`.
   Troublemaker::Group group(Troublemaker &of, Rng &dice) {
     if (of.groups.empty() || (of.groups.size() < 3 && dice.uniform01() < 0.4)) {
       Troublemaker::Group made;
@@ -202,12 +203,12 @@ class Troublemakers {
     return of.groups[static_cast<std::size_t>(dice.uniform(0, std::ssize(of.groups) - 1))];
   }
 
-  // With the lock of `to` held.
+  // The caller holds the lock of `to`.
   void add_entity(const std::shared_ptr<Troublemaker> &to, Rng &dice) {
     if (to->timers.size() + to->subscriptions.size() >= kMostEntities) return;
     const Troublemaker::Group in = group(*to, dice);
     const auto call = [this, weak = std::weak_ptr(to), exclusive = in.exclusive, inside = in.inside] {
-      const auto self = weak.lock();  // perhaps the last to hold it, and its node
+      const auto self = weak.lock();  // perhaps the last owner of the node
       if (self) enter(self, exclusive, *inside);
     };
     const nanoseconds period(dice.uniform(1, 8) * redag::kMillisecond);
@@ -215,7 +216,7 @@ class Troublemakers {
       case 0:
       case 1: to->timers.push_back(to->node->create_wall_timer(period, call, in.group)); break;
       case 2:
-        // Of a variable it would keep a reference.
+        // A lambda of its own: rclcpp would keep a reference to a variable.
         to->timers.push_back(rclcpp::create_timer(
             to->node, to->node->get_clock(), rclcpp::Duration(period), [call] { call(); }, in.group));
         break;
@@ -254,7 +255,7 @@ class Troublemakers {
       case Fault::Sleeps: std::this_thread::sleep_for(nanoseconds(dice.uniform(1, redag::kMillisecond))); break;
       case Fault::Overruns: burn(100 * kWcet, dice.uniform01() < 0.5); break;
       case Fault::Locks: {
-        const redag::LockGuard guard(shared_);  // may be held by a preempted callback
+        const redag::LockGuard guard(shared_);  // a preempted callback may hold it
         burn(kWcet, false);
         break;
       }
@@ -277,10 +278,11 @@ class Troublemakers {
     }
   }
 
-  // What needs the node's lock. A callback does not wait for it: on top of its holder (cooperative) it would for ever.
+  // Executes the faults that need the node's lock. A callback only tries to lock: on top of the lock's holder
+  // (cooperative) it would wait for ever.
   void change(const std::shared_ptr<Troublemaker> &self, Fault fault, Rng &dice) {
     std::future<EmptyService::Response::SharedPtr> answer;
-    // Destroyed without the lock: that waits for nobody then.
+    // Declared before the guard: destroyed without the lock, which the destruction may need.
     std::vector<std::shared_ptr<void>> gone;
     {
       const std::unique_lock guard(self->lock, std::try_to_lock);
@@ -324,7 +326,7 @@ class Troublemakers {
     }
   }
 
-  // It may have been taken from the executor before, which says so.
+  // Removes the node from the executor. The executor throws if the node was removed before.
   void leave(Troublemaker &node) {
     try {
       executor_.remove_node(node.node);
@@ -349,8 +351,9 @@ class Troublemakers {
   redag::PiMutex shared_;
   std::mutex lock_;
   std::vector<std::shared_ptr<Troublemaker>> nodes_;
-  // Until the executor is gone: their /clock callback, which runs there, uses what belongs to the node (rclcpp's
-  // TimeSource captures a plain pointer), and would still do so when the node is destroyed meanwhile.
+  // These nodes live until the executor is gone. Their /clock callback runs in the executor and uses members of the
+  // node, because rclcpp's TimeSource captures a plain pointer. It would do so even if the node were destroyed
+  // meanwhile.
   std::vector<rclcpp::Node::SharedPtr> hear_clock_;
 };
 

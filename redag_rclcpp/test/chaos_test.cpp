@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Chaos: callbacks that throw, block, overrun, spin their own executor, destroy what they belong to, cancel, and let
-// ROS time jump, while nodes come and go. Nothing crashes or hangs, every exception is told, exclusive groups do not
-// overlap, and afterwards the executor serves a new node. REDAG_SEED: of the first episode; REDAG_CHAOS_EPISODES: how
-// many for each mode.
+// Chaos: callbacks throw, block, overrun, spin their own executor, destroy the objects they belong to, cancel, and let
+// ROS time jump, while nodes come and go. Nothing may crash or hang. Every exception must be reported, exclusive groups
+// must not overlap, and afterwards the executor must serve a new node. REDAG_SEED is the seed of the first episode,
+// REDAG_CHAOS_EPISODES the number of episodes for each mode.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -27,7 +27,7 @@ using namespace std::chrono_literals;
 using redag::PreemptionMode;
 using std::chrono::steady_clock;
 
-/// Ends the process, and says where, if it is not destroyed in time: what hangs has no other end.
+/// Ends the process with a message unless it is destroyed in time. A hanging test has no other end.
 class Watchdog {
  public:
   explicit Watchdog(std::string what)
@@ -57,10 +57,10 @@ class Watchdog {
 
 constexpr auto kLongestStorm = 2s;
 
-/// How exceptions of callbacks are told.
+/// How the executor reports exceptions of callbacks.
 enum class Told { ToAHandlerThatContinues, ToAHandlerThatStops, BySpinning };
 
-/// The thread that spins, again and again: whatever ends a spin, there is another.
+/// A thread that spins again whenever a spin has ended.
 class Driving {
  public:
   Driving(ReDAGExecutor &executor, std::uint64_t seed) : executor_(executor), thread_([this, seed] { work(seed); }) {}
@@ -68,7 +68,7 @@ class Driving {
 
   void stop() {
     stop_ = true;
-    // A cancel() between two spins is lost.
+    // Repeats cancel(), because a call between two spins is lost.
     while (!ended_) {
       executor_.cancel();
       std::this_thread::sleep_for(1ms);
@@ -125,7 +125,7 @@ class Episode {
     for (auto nodes = rng_.uniform(1, 3); nodes > 0; --nodes) nodes_->add_node();
     Driving driving(*executor_, seed_ + 1);
     storm();
-    if (rng_.uniform01() < 0.5) nodes_->clear();  // else they go on beside the new one
+    if (rng_.uniform01() < 0.5) nodes_->clear();  // otherwise the old nodes stay beside the new one
     EXPECT_TRUE(serves_a_new_node()) << "after the storm";
     nodes_->clear();
     driving.stop();
@@ -140,7 +140,7 @@ class Episode {
  private:
   void storm() {
     const auto calls = static_cast<std::uint64_t>(rng_.uniform(20, 300));
-    // Where nodes went, fewer callbacks may be left than that.
+    // Nodes may have gone: the remaining callbacks can be too few to reach `calls`.
     const auto end = steady_clock::now() + kLongestStorm;
     while (nodes_->calls() < calls && steady_clock::now() < end) {
       switch (rng_.uniform(0, 9)) {
@@ -170,7 +170,7 @@ class Episode {
     const bool served = eventually([&] { return ticks >= 3 && received >= 3; });
     timer->cancel();
     executor_->remove_node(node);
-    // What they count must outlive them: nothing of this node runs after this.
+    // The counters are destroyed on return: waits until no callback of this node can run any more.
     EXPECT_TRUE(eventually([&] { return timer.use_count() == 1 && subscription.use_count() == 1; }));
     return served;
   }
@@ -184,7 +184,7 @@ class Episode {
         EXPECT_EQ(rethrown, 0U);
         break;
       case Told::ToAHandlerThatStops: EXPECT_EQ(handled_, record_.thrown); [[fallthrough]];
-      case Told::BySpinning:  // a spin throws the first
+      case Told::BySpinning:  // a spin throws the first exception only
         EXPECT_LE(rethrown, record_.thrown);
         EXPECT_EQ(rethrown == 0, record_.thrown == 0);
     }
@@ -196,7 +196,7 @@ class Episode {
   Record record_;
   std::atomic<std::uint64_t> handled_{0};
   std::unique_ptr<ReDAGExecutor> executor_;
-  std::unique_ptr<Troublemakers> nodes_;  // after the executor: its callbacks go first
+  std::unique_ptr<Troublemakers> nodes_;  // declared after the executor: its callbacks are destroyed first
 };
 
 class ChaosTest : public ::testing::TestWithParam<PreemptionMode> {

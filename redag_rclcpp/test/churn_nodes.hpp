@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Nodes, groups and entities that come and go at random, from several threads and from callbacks: what the churn test
-// gives an executor.
+// Nodes, groups and entities for the churn test. They come and go at random, from several threads and from callbacks.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -41,10 +40,10 @@ inline void burn(std::chrono::microseconds time) {
   for (const auto end = steady_clock::now() + time; steady_clock::now() < end;) redag::preemption_point();
 }
 
-/// A node with what it has, which its own callbacks change too.
+/// A node and its entities, which its own callbacks change as well.
 struct Patch {
   rclcpp::Node::SharedPtr node;
-  std::mutex lock;  // the rest
+  std::mutex lock;  // guards the members below
   Random random;
   std::vector<rclcpp::CallbackGroup::SharedPtr> groups;
   std::vector<rclcpp::TimerBase::SharedPtr> timers;
@@ -58,10 +57,10 @@ struct Counts {
   std::atomic<std::uint64_t> operations{0};
   std::atomic<std::uint64_t> callbacks{0};
   std::atomic<std::uint64_t> thrown{0};
-  std::atomic<std::uint64_t> silent{0};  // callbacks that nothing calls
+  std::atomic<std::uint64_t> silent{0};  // calls of callbacks that nothing should call
 };
 
-/// The changes, at random.
+/// Makes random changes.
 class Churn {
  public:
   explicit Churn(Counts &counts) : counts_(counts) {
@@ -74,8 +73,8 @@ class Churn {
     auto patch = std::make_shared<Patch>();
     patch->random.seed(seed);
     Random &random = patch->random;
-    // No parameter events: where they arrive they use the node's time source, which Humble destroys under them when a
-    // node is dropped, whatever the executor.
+    // Without parameter events: a node that receives them uses its time source. Humble destroys the time source under a
+    // node that is dropped, with any executor.
     const auto options = rclcpp::NodeOptions()
                              .use_intra_process_comms(below(random, 2) == 0)
                              .start_parameter_services(below(random, 8) == 0)
@@ -91,7 +90,7 @@ class Churn {
     return patch;
   }
 
-  // With the patch's lock held, from here on.
+  // The following functions need the patch's lock.
 
   void add(const std::shared_ptr<Patch> &patch) {
     const std::size_t entities =
@@ -133,7 +132,7 @@ class Churn {
     }
   }
 
-  /// Nodes that somebody still holds.
+  /// Number of nodes that still have an owner.
   [[nodiscard]] std::size_t living() {
     const std::lock_guard guard(lock_);
     return static_cast<std::size_t>(std::count_if(nodes_.begin(), nodes_.end(), [](auto &n) { return !n.expired(); }));
@@ -166,7 +165,7 @@ class Churn {
 
   void add_timer(const std::shared_ptr<Patch> &patch) {
     const std::chrono::milliseconds period(2 + below(patch->random, 20));
-    // Now and then longer than the period.
+    // One timer in eight computes for longer than its period.
     const std::chrono::microseconds longest = below(patch->random, 8) == 0 ? period * 3 / 2 : 200us;
     std::weak_ptr<Patch> weak = patch;
     patch->timers.push_back(patch->node->create_wall_timer(
@@ -181,9 +180,10 @@ class Churn {
         [this, weak = std::weak_ptr<Patch>(patch)](Strings::ConstSharedPtr) { run(weak, 100us); }, options));
   }
 
-  // Not within the process: rclcpp, up to Rolling at least, locks itself up when a publisher goes while some
-  // subscription gets a message from elsewhere (IntraProcessManager::matches_any_publishers is then the last to hold
-  // it, and its destructor wants the lock that is held there). Those within the process stay: publishers_.
+  // Publishers of a patch do not use intra-process communication. rclcpp, up to Rolling at least, deadlocks when such a
+  // publisher is destroyed while a subscription gets a message from elsewhere.
+  // IntraProcessManager::matches_any_publishers then holds the last reference, and the publisher's destructor wants the
+  // lock that is held there. The publishers within the process, publishers_, are never destroyed.
   void add_publisher(Patch &patch) {
     rclcpp::PublisherOptions options;
     options.use_intra_process_comm = rclcpp::IntraProcessSetting::Disable;
@@ -196,7 +196,8 @@ class Churn {
         [this](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) { ++counts_.callbacks; }));
   }
 
-  /// Nothing ever calls these. Were a task's id used for another's arrivals, they would be given jobs.
+  /// Adds callbacks that nothing ever calls. If arrivals of a former task with the same id reached them, they would
+  /// run.
   void add_silent(Patch &patch) {
     patch.services.push_back(patch.node->create_service<EmptyService>(
         "~/silent", [this](EmptyService::Request::SharedPtr, EmptyService::Response::SharedPtr) { ++counts_.silent; }));
@@ -207,7 +208,7 @@ class Churn {
 
   void run(const std::weak_ptr<Patch> &weak, std::chrono::microseconds longest) {
     ++counts_.callbacks;
-    const auto patch = weak.lock();  // perhaps the last to hold it, and its node
+    const auto patch = weak.lock();  // perhaps the last owner of the node
     if (!patch) return;
     burn(longest);
     const std::unique_lock guard(patch->lock, std::try_to_lock);
@@ -229,7 +230,7 @@ class Churn {
   std::vector<std::weak_ptr<rclcpp::Node>> nodes_;
 };
 
-/// A thread that changes what the executor has, until stopped; then it drops everything.
+/// A thread that changes the executor's nodes until it is stopped, and then drops all of them.
 class Gardener {
  public:
   Gardener(ReDAGExecutor &executor, Churn &churn, Counts &counts, std::uint64_t seed)
@@ -242,7 +243,7 @@ class Gardener {
  private:
   struct Bed {
     std::shared_ptr<Patch> patch;
-    std::vector<rclcpp::CallbackGroup::SharedPtr> manual;  // added without the node
+    std::vector<rclcpp::CallbackGroup::SharedPtr> manual;  // groups that were added without their node
   };
 
   void work() {
@@ -281,7 +282,7 @@ class Gardener {
     const std::size_t position = below(random_, beds_.size());
     const Bed bed = beds_[position];
     beds_.erase(beds_.begin() + static_cast<std::ptrdiff_t>(position));
-    // Else it is dropped as it is.
+    // Otherwise the node is dropped without being removed.
     if (below(random_, 2) == 0) executor_.remove_node(bed.patch->node);
   }
 

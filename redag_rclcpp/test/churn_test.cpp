@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Nodes, groups and entities come and go, from several threads and from callbacks, while the executor is busy: what
-// stays goes on, what goes is let go of, and nothing runs that nobody asked for. REDAG_SEED chooses what happens,
-// REDAG_CHURN_SECONDS how long for each mode.
+// Nodes, groups and entities come and go, from several threads and from callbacks, while the executor is busy. Entities
+// that stay must keep working, entities that go must be released, and no callback may run without cause. REDAG_SEED
+// chooses the changes, REDAG_CHURN_SECONDS their duration for each mode.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -40,7 +40,7 @@ constexpr int kThreads = 3;
 
 enum class Driver { Spin, Pull, Restart };
 
-/// The thread that drives the executor.
+/// The thread that spins the executor.
 class Driving {
  public:
   Driving(ReDAGExecutor &executor, Driver driver, std::uint64_t seed)
@@ -48,10 +48,10 @@ class Driving {
   ~Driving() {
     if (done_.valid()) stop();
   }
-  /// False: a spin function did not return.
+  /// Ends the thread. False: a spin function did not return.
   bool stop() {
     stop_ = true;
-    // A cancel() between two spins is lost.
+    // Repeats cancel(), because a call between two spins is lost.
     for (const auto end = steady_clock::now() + kLimit; steady_clock::now() < end;) {
       executor_.cancel();
       if (done_.wait_for(10ms) == std::future_status::ready) {
@@ -80,7 +80,7 @@ class Driving {
   std::future<void> done_;
 };
 
-/// A node that stays, and what it did.
+/// A node that stays, and the counts of its work.
 struct Steady {
   static constexpr std::chrono::nanoseconds kPeriod = 2ms;
 
@@ -104,7 +104,7 @@ struct Steady {
       inner->publish(std::make_unique<Strings>());
       outer->publish(Strings());
       ++sent;
-      // One at a time: a service keeps ten requests, and at full load more would be overwritten.
+      // Sends one request at a time: a service keeps ten, and at full load more would be overwritten.
       if (ticks % 4 == 0 && asked == answered && client->service_is_ready()) {
         ++asked;
         client->async_send_request(std::make_shared<EmptyService::Request>(),
@@ -158,7 +158,7 @@ class ChurnTest : public ::testing::TestWithParam<Parameters> {
     return std::get<1>(GetParam()) == Driver::Spin ? all * 3 / 5 : all / 5;
   }
 
-  /// Everything but the steady node comes and goes.
+  /// Lets everything but the steady node come and go.
   void churn(ReDAGExecutor &executor, std::chrono::milliseconds time) {
     const std::uint64_t seed = from_environment("REDAG_SEED", 20240607);
     Counts counts;
@@ -192,7 +192,7 @@ class ChurnTest : public ::testing::TestWithParam<Parameters> {
                 counts.callbacks.load(), counts.thrown.load(), steady->ticks.load());
   }
 
-  /// Every node but the steady one was dropped; nothing is under way when this returns.
+  /// Waits until nothing is in progress. Every node but the steady one was dropped before.
   void settle(ReDAGExecutor &executor, Churn &churn, Counts &counts) {
     EXPECT_TRUE(steady->goes_on());
     EXPECT_TRUE(eventually([&] { return churn.living() == 0; })) << churn.living() << " nodes are still held";
@@ -205,20 +205,20 @@ class ChurnTest : public ::testing::TestWithParam<Parameters> {
         << " sent, " << steady->inner_received << " and " << steady->outer_received << " received";
     EXPECT_TRUE(eventually([&] { return steady->answered >= steady->asked; }))
         << steady->asked << " asked, " << steady->answered << " answered";
-    // What was dropped is forgotten with the next change.
+    // The executor forgets dropped nodes at the next change.
     EXPECT_TRUE(eventually([&] {
       steady->node->create_wall_timer(1h, [] {});
       const auto stats = executor.stats();
       return std::all_of(stats.begin(), stats.end(), [](const CallbackStats &s) { return s.id.node == "/steady"; });
     }));
-    // A job that is ready when spinning ends would stay so.
+    // Waits for ready jobs: those left when spinning ends would remain in flight.
     EXPECT_TRUE(eventually([&] {
       const auto stats = executor.stats();
       return std::all_of(stats.begin(), stats.end(), [](const CallbackStats &s) { return s.jobs.in_flight() == 0; });
     }));
   }
 
-  /// At rest every job has ended, and who counted for himself counted the same.
+  /// At rest no job is in flight, and the executor's counts match those of the callbacks.
   void check_jobs(ReDAGExecutor &executor) {
     std::uint64_t inner = 0;
     std::uint64_t ticks = 0;
@@ -237,7 +237,7 @@ class ChurnTest : public ::testing::TestWithParam<Parameters> {
 };
 
 TEST_P(ChurnTest, WhatStaysGoesOnAndWhatGoesIsLetGoOf) {
-  // The middleware starts threads as it needs them: a first round has it start them all.
+  // A first round starts the threads that the middleware creates on demand.
   {
     const auto executor = make_executor();
     churn(*executor, 200ms);
@@ -254,7 +254,7 @@ TEST_P(ChurnTest, WhatStaysGoesOnAndWhatGoesIsLetGoOf) {
   EXPECT_TRUE(eventually([&] { return process_tasks().size() <= threads; }))
       << process_tasks().size() << " threads, " << threads << " before";
 
-  // The node is as it was, for another executor.
+  // The steady node is unchanged, and another executor can use it.
   const auto second = make_executor();
   second->add_node(steady->node);
   Driving driving(*second, Driver::Spin, 0);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What users of any rclcpp executor rely on, for ours and for rclcpp's own: conformance_*_test.cpp. Waits are for
-// things to happen, with a generous limit; nothing is asserted about how fast.
+// conformance_*_test.cpp check what users of any rclcpp executor rely on, for ReDAGExecutor and for rclcpp's own
+// executors. They wait for events with a generous limit, and assert nothing about speed.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -28,8 +28,8 @@ class Conformance : public ::testing::Test {
     node.reset();
     if (rclcpp::ok()) rclcpp::shutdown();
   }
-  /// After a node with several groups was removed. Humble's executors keep pointers to the guard conditions of its
-  /// groups and use them when they are spun again; ours has to go on.
+  /// Replaces the executor after a node with several groups was removed. Humble's executors keep pointers to the guard
+  /// conditions of these groups, and use them at the next spin. ReDAGExecutor must go on without replacement.
   void renew_executor() {
     if (!kOurs<T>) executor = std::make_unique<T>();
   }

@@ -90,7 +90,7 @@ TYPED_TEST(Conformance, OverwrittenMessagesAreNotWaitedFor) {
   EXPECT_TRUE(eventually([&] { return last == 49; }));
   std::this_thread::sleep_for(20ms);
   EXPECT_LE(count, 2);
-  // What comes later still arrives.
+  // Later messages still arrive.
   message.string_value = "100";
   publisher->publish(message);
   EXPECT_TRUE(eventually([&] { return last == 100; }));
@@ -141,7 +141,7 @@ TYPED_TEST(Conformance, ActionsGiveFeedbackAndResults) {
       [](std::shared_ptr<Handle>) { return rclcpp_action::CancelResponse::ACCEPT; },
       [&](std::shared_ptr<Handle> handle) {
         threads.emplace_back([&feedback, handle] {
-          // A client ignores what comes before it has seen that its goal was accepted.
+          // A client ignores feedback that arrives before it knows that its goal was accepted.
           eventually([&] { return feedback > 0; },
                      [&] {
                        handle->publish_feedback(std::make_shared<Fibonacci::Feedback>());
@@ -214,8 +214,8 @@ TYPED_TEST(Conformance, ParametersAndLifecycle) {
   EXPECT_EQ(lifecycle->get_current_state().label(), "active");
 }
 
-/// Ready from a trigger until it is taken, as rclcpp's own are: an executor may ask and then not take it, because its
-/// group is busy. Its hook is what the constructor says.
+/// Ready from a trigger until data is taken, like rclcpp's own waitables. An executor may ask and then not take it,
+/// because the group is busy. The constructor says whether it has a hook.
 class TriggeredWaitable : public rclcpp::Waitable {
  public:
   explicit TriggeredWaitable(bool has_hook) : has_hook_(has_hook) {}
@@ -276,7 +276,7 @@ TYPED_TEST(Conformance, WaitablesWithAndWithoutHooks) {
       }
     }
     this->executor->remove_node(other);
-    // The same, pulled.
+    // The same with the functions that pull.
     this->executor->add_node(other);
     const int before = waitable->count;
     waitable->trigger();

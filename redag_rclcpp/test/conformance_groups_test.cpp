@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Conformance: callback groups, and what comes and goes while it spins.
+// Conformance: callback groups, and entities that come and go while the executor spins.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -46,13 +46,13 @@ TYPED_TEST(Conformance, AnExclusiveGroupNeverOverlapsWithItself) {
 TYPED_TEST(Conformance, GroupsAndReentrantCallbacksRunInParallel) {
   if (!kParallel<TypeParam>) GTEST_SKIP() << "single-threaded";
   for (const bool reentrant : {false, true}) {
-    if (reentrant && kCbg<TypeParam>) continue;  // it runs one callback of a group at a time, whatever the group
+    if (reentrant && kCbg<TypeParam>) continue;  // runs one callback of any group at a time
     SCOPED_TRACE(reentrant ? "one reentrant group" : "two exclusive groups");
     auto other = std::make_shared<rclcpp::Node>("other");
     auto type = reentrant ? rclcpp::CallbackGroupType::Reentrant : rclcpp::CallbackGroupType::MutuallyExclusive;
     auto first = other->create_callback_group(type);
     auto second = reentrant ? first : other->create_callback_group(type);
-    // Each waits for the other: both have to be inside at once.
+    // Each callback waits for the other: both must run at the same time.
     std::atomic<int> inside{0};
     std::atomic<bool> met{false};
     const auto meet = [&] {
@@ -178,7 +178,7 @@ TYPED_TEST(Conformance, ANodeCanBeDestroyedWhileItsMessagesAreQueued) {
     for (int i = 0; i < 20; ++i) publisher->publish(Empty());
     EXPECT_TRUE(eventually([&] { return count > 0; })) << round;
     this->executor->remove_node(temporary);
-    // A callback that runs may end first.
+    // Lets a running callback end first.
     std::weak_ptr<rclcpp::Node> weak = temporary;
     std::this_thread::sleep_for(5ms);
     subscription.reset();

@@ -39,8 +39,9 @@ TYPED_TEST(Conformance, TimersRunUntilCancelled) {
 }
 
 TYPED_TEST(Conformance, SpinsAgainAfterCancel) {
-  // Cancelled between taking a callback and running it, it returns without giving the callback's group back
-  // (execute_any_executable() returns early, run() then resets any_exec.callback_group): the timer never runs again.
+  // rclcpp's MultiThreadedExecutor may be cancelled between taking a callback and running it. It then returns without
+  // releasing the callback's group, and the timer never runs again: execute_any_executable() returns early, then run()
+  // resets any_exec.callback_group.
   if (kParallel<TypeParam> && !kOurs<TypeParam> && !kCbg<TypeParam>) {
     GTEST_SKIP() << "rclcpp's MultiThreadedExecutor can lose a group here";
   }
@@ -105,7 +106,7 @@ TYPED_TEST(Conformance, AnOverrunningTimerDoesNotBurst) {
   if (kEvents<TypeParam>) GTEST_SKIP() << "the EventsExecutor catches up (rclcpp issue 2771)";
   std::atomic<int> count{0};
   auto timer = this->node->create_wall_timer(5ms, [&] {
-    // One long run misses many periods: they are dropped, not caught up with.
+    // One long run misses many periods. The missed calls must be dropped.
     if (++count == 1) std::this_thread::sleep_for(200ms);
   });
   this->executor->add_node(this->node);
@@ -113,7 +114,7 @@ TYPED_TEST(Conformance, AnOverrunningTimerDoesNotBurst) {
   Spinner spinner(*this->executor);
   ASSERT_TRUE(eventually([&] { return count >= 4; }));
   const auto elapsed = steady_clock::now() - start;
-  // Had the missed ones been caught up with, dozens would have run at once.
+  // If the missed calls had been made up for, dozens would have run at once.
   EXPECT_LE(count, 1 + (elapsed - 200ms) / 5ms + 3);
 }
 
@@ -136,7 +137,7 @@ TYPED_TEST(Conformance, SimulatedTimeMovesTimers) {
     });
   };
   ASSERT_TRUE(now_is(100'000'000'000));
-  // The activation of simulated time may count as an expiry, sooner or later.
+  // Switching simulated time on may count as an expiry, at any later moment.
   int before = 0;
   EXPECT_TRUE(eventually([&] {
     before = count;
@@ -192,7 +193,7 @@ TYPED_TEST(Conformance, AFutureOfAnotherThreadEndsTheSpin) {
     std::this_thread::sleep_for(50ms);
     promise.set_value();
   });
-  // rclcpp's executors look at the future only when something wakes them.
+  // rclcpp's executors check the future only when something wakes them.
   rclcpp::TimerBase::SharedPtr waking;
   if (!kOurs<TypeParam>) waking = this->node->create_wall_timer(10ms, [] {});
   EXPECT_EQ(this->executor->spin_until_future_complete(future, kLimit), rclcpp::FutureReturnCode::SUCCESS);

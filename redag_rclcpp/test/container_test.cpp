@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The component container as a program of its own: loading, running, metrics, a clean end with results, bad parameters.
+// Runs the component container as a program of its own: loading, execution, metrics, a clean end with results, and bad
+// parameters.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -49,7 +50,7 @@ dags:
       - {name: filter, wcet: 5ms, activation: data, after: sensor, callback: {node: /fast/filter, subscription: /fast/samples}}
 )";
 
-/// A child process; killed if it is still there at the end.
+/// A child process. The destructor kills it if it still runs.
 class Process {
  public:
   Process(const std::vector<std::string> &arguments, const std::string &output) {
@@ -73,7 +74,7 @@ class Process {
 
   void interrupt() const { kill(id_, SIGINT); }
 
-  /// Its exit code; -1 if a signal ended it, -2 if it does not end.
+  /// Returns the exit code; -1 if a signal ended the process, -2 if it does not end.
   int wait() {
     int status = 0;
     const auto end = steady_clock::now() + kLimit;
@@ -94,7 +95,7 @@ class ContainerTest : public ::testing::Test {
   void SetUp() override {
     folder_ = std::filesystem::temp_directory_path() / ("redag_container_test_" + std::to_string(getpid()));
     output_ = folder_ / "output";
-    // An install prefix with nothing but the components in it.
+    // An install prefix that contains only the components.
     const std::filesystem::path index = folder_ / "share/ament_index/resource_index";
     std::filesystem::create_directories(index / "rclcpp_components");
     std::ofstream components(index / "rclcpp_components" / "examples");
@@ -204,7 +205,7 @@ TEST_F(ContainerTest, ComponentsRunAndResultsAreWrittenAtTheEnd) {
   EXPECT_GE(tasks["fast.filter"]["execution"]["max_ns"], redag::kMillisecond);
   EXPECT_EQ(tasks["fast.sensor"]["period_ns"], 10 * redag::kMillisecond);
 
-  // A component that goes while its callback is in progress takes nothing with it.
+  // Unloads a component while its callback is in progress; the container must survive.
   bool is_controlled = false;
   const auto commands =
       node_->create_subscription<Float64>("/fast/command", 1, [&](const Float64 &) { is_controlled = true; });

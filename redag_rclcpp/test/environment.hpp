@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Tests that can do more than they do by default: how much, and from which seed, stands in the environment.
+// Environment variables set the amount and the seed of tests that can do more than by default.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What our executor does beyond rclcpp's: order, bounds, learning, exceptions, figures, traces.
+// Features of ReDAGExecutor beyond rclcpp's executors: order, bounds, learning, exceptions, figures, traces.
 #include "redag_rclcpp/executor.hpp"
 
 #include <gmock/gmock.h>
@@ -209,7 +209,7 @@ TEST_P(ExecutorTest, AHandlerCanContinueAfterAnException) {
   EXPECT_GE(executor.stats().at(0).jobs.aborted, 3U);
 }
 
-// Also after cancel(), which clears rclcpp's own flag long before spin() returns; and the cancel() still counts.
+// Also after cancel(), which clears rclcpp's own flag long before spin() returns. The cancel() must still take effect.
 TEST_P(ExecutorTest, SpinningInACallbackIsRefused) {
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
   std::atomic<int> calls{0};
@@ -260,7 +260,7 @@ TEST_P(ExecutorTest, MissedPeriodsOfATimerAreCounted) {
   EXPECT_EQ(stats.period, 10'000'000);
   EXPECT_EQ(stats.jobs.released,
             stats.jobs.finished + stats.jobs.skipped + stats.jobs.aborted + stats.jobs.in_flight());
-  // The long run spans ten points of the grid at least; the last of them ran, late or not.
+  // The long run spans at least ten points of the grid. The last point's job ran, perhaps late.
   EXPECT_GE(stats.jobs.skipped, 8U);
   EXPECT_GE(stats.misses, 9U);
 }
@@ -289,7 +289,8 @@ TEST_P(ExecutorTest, WhatOneExecutorLeavesTheNextOneTakes) {
   }
 }
 
-// What is left of it, here the handle, still gets messages. (What the test is about AddressSanitizer sees.)
+// The subscription's handle outlives it and still gets messages. AddressSanitizer would report a call into the
+// destroyed part.
 TEST_P(ExecutorTest, AMessageForADestroyedSubscriptionIsNoCallOfWhatIsGone) {
   ReDAGExecutor executor(options);
   auto ours = std::make_shared<rclcpp::Node>("through_the_middleware");
@@ -304,13 +305,13 @@ TEST_P(ExecutorTest, AMessageForADestroyedSubscriptionIsNoCallOfWhatIsGone) {
   for (int round = 0; round < 2; ++round) {
     publisher->publish(Empty());  // the hook is still set
     executor.spin_all(100ms);
-    ours->create_wall_timer(1h, [] {});  // second round: what is gone was noticed
+    ours->create_wall_timer(1h, [] {});  // makes the executor notice the destroyed subscription before the second round
   }
   const auto stats = executor.stats();
   EXPECT_TRUE(std::none_of(stats.begin(), stats.end(), [](const auto &s) { return s.id.name == "/gone"; }));
 }
 
-// The callbacks of a node use the object that has it as a base or member.
+// Callbacks of a node use the object that has the node as base or member.
 TEST_P(ExecutorTest, ARetiredNodeIsDestroyedWhenItsCallbacksHaveEnded) {
   std::atomic<bool> started{false};
   redag::runtime::Event end;
@@ -395,7 +396,7 @@ TEST_P(ExecutorTest, LearnsRatesAndEdges) {
   EXPECT_THAT(dag.tasks[position("/c")].predecessors, ElementsAre(position("/b")));
   EXPECT_EQ(dag.tasks[position("/c")].activation, redag::Activation::Data);
   EXPECT_GT(dag.tasks[position("/c")].wcet, 0);
-  // What was learned can be given to the next run, and names the same callbacks.
+  // The learned workload can be given to the next run, and names the same callbacks.
   options.workload = learned;
   options.learn = 0ms;
   ReDAGExecutor again(rclcpp::ExecutorOptions(), options);
@@ -404,8 +405,8 @@ TEST_P(ExecutorTest, LearnsRatesAndEdges) {
   EXPECT_THAT(again.warnings(), ::testing::Not(::testing::Contains(HasSubstr("no callback matches"))));
 }
 
-// Where another process subscribes, too (a recorder, rviz), the middleware brings every message a second time, which
-// rclcpp ignores: it is no second arrival.
+// If another process subscribes as well (a recorder, rviz), the middleware brings every message a second time. rclcpp
+// ignores the copy, and learning must not count it.
 TEST_P(ExecutorTest, LearnsARateOnceWhereOthersSubscribeToo) {
   options.learn = 1s;
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);

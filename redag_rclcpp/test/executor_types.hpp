@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The executors that every conformance test runs with: one listed here runs all of them.
+// The executors that every conformance test runs with.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -63,7 +63,7 @@ struct TypeNames {
   }
 };
 
-/// Executes callbacks of several groups at the same time.
+/// True if T executes callbacks of several groups at the same time.
 template <class T>
 inline constexpr bool kParallel =
     std::is_base_of_v<ReDAGExecutor, T> || std::is_same_v<T, rclcpp::executors::MultiThreadedExecutor> || kCbg<T>;
@@ -79,7 +79,7 @@ template <class T>
 inline constexpr bool kEvents = false;
 #endif
 
-/// This machine lets us use SCHED_FIFO, if T needs it.
+/// True if T needs no SCHED_FIFO, or if this machine permits it.
 template <class T>
 bool can_run() {
   return !std::is_same_v<T, ReDAGOs> || redag::runtime::probe_priority_band().top_job > 0;

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// libredag_pi.so, against which this program is linked: every mutex inherits priority and otherwise stays what it was.
+// Tests libredag_pi.so, which this program is linked against: every mutex inherits priority, and otherwise stays as it
+// was.
 #include "redag_rclcpp/inherit.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +35,7 @@ using namespace std::chrono_literals;
 using redag::runtime::Event;
 using redag::runtime::set_fifo_priority;
 
-/// The SCHED_FIFO priority at which the kernel runs the thread now, inherited or its own; 0: none.
+/// The SCHED_FIFO priority at which the kernel now runs the thread, inherited or its own; 0: none.
 int effective_priority(int thread) {
   constexpr int kPriorityField = 18;  // man 5 proc: -1 - priority for real-time threads
   std::ifstream file("/proc/self/task/" + std::to_string(thread) + "/stat");
@@ -47,7 +48,7 @@ int effective_priority(int thread) {
   return priority < 0 ? -1 - priority : 0;
 }
 
-/// Does the owner of a mutex get the priority of a thread that waits for it?
+/// True if the owner of a mutex gets the priority of a waiting thread.
 bool inherits(const std::function<void()> &lock, const std::function<void()> &unlock) {
   constexpr int kLow = 5;
   constexpr int kHigh = 20;
@@ -72,7 +73,7 @@ bool inherits(const std::function<void()> &lock, const std::function<void()> &un
     got = true;
     unlock();
   });
-  // A waiter that has asked is asleep soon; the owner then has its priority, or never gets it.
+  // The waiter sleeps soon after it has asked. By then the owner has its priority, or never gets it.
   const auto end = std::chrono::steady_clock::now() + 2s;
   bool inherited = false;
   while (!inherited && std::chrono::steady_clock::now() < end) {
@@ -280,7 +281,7 @@ TEST(Inherit, ConditionVariablesWork) {
   EXPECT_EQ(turn, kTurns);
 }
 
-// The first lock changes what the mutex is, and several threads do it at once.
+// The first lock changes the mutex's kind, here on several threads at once.
 TEST(Inherit, ManyFirstLocksAtTheSameTime) {
   constexpr int kRounds = 3000;
   constexpr int kThreads = 4;
@@ -304,7 +305,7 @@ TEST(Inherit, ManyFirstLocksAtTheSameTime) {
   for (const int count : counts) ASSERT_EQ(count, 10 * kThreads);
 }
 
-/// What a child process with this wish in its environment says of a fresh mutex.
+/// True if, after `prepare` in a child process, the library leaves a fresh mutex unchanged.
 bool is_left_alone(const std::function<void()> &prepare) {
   const pid_t child = fork();
   if (child == 0) {

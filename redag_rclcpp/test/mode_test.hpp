@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Tests of our executor in each preemption mode: a node, and options of one worker.
+// Base of tests that run ReDAGExecutor in each preemption mode: a node, and options with one worker.
 #pragma once
 
 #include <gtest/gtest.h>

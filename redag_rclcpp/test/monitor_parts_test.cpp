@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The monitor's parts in virtual time: bounds, diagnostics, what is saved.
+// Tests the monitor's parts in virtual time: bounds, diagnostics, and the saved workload.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -71,7 +71,8 @@ TEST(Bounds, AreThoseOfTheModeThatRuns) {
   Bounds none(workload);
   EXPECT_TRUE(none.update(stats, one_worker(), learned));
   EXPECT_EQ(none.absent(), "");
-  // One worker: the fast one can wait for a slow one that began just before, the slow one for the fast one.
+  // With one worker, the fast task can wait for a slow one that began just before. The slow task can wait for the fast
+  // one.
   EXPECT_EQ(none.tasks().at("control.fast").response, 3 * kMillisecond - 1);
   EXPECT_EQ(none.tasks().at("control.slow").response, 3 * kMillisecond);
 
@@ -148,7 +149,8 @@ TEST(Bounds, ResponsesAboveThemAreCountedAndTheFirstIsTold) {
   };
   using Kind = JobEventKind;
   const redag::Time ms = kMillisecond;
-  // Another task's; at the bound; above it, over two calls; skipped and aborted; above it again.
+  // Events: of another task; a response at the bound; one above it, split over two calls; a skipped and an aborted job;
+  // a second response above the bound.
   bounds.count(
       std::vector{event(Kind::Released, 9, 0, 0), event(Kind::Finished, 9, 0, 50 * ms), event(Kind::Released, 5, 0, 0),
                   event(Kind::Finished, 5, 0, 2 * ms), event(Kind::Released, 5, 1, 10 * ms)},

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The monitor with a real executor: what is reported, when, and what is written.
+// Tests the monitor with a real executor: its reports, their timing, and its files.
 #include "redag_rclcpp/monitor.hpp"
 
 #include <gmock/gmock.h>
@@ -37,7 +37,7 @@ using redag::kMillisecond;
 using ::testing::HasSubstr;
 using Json = nlohmann::json;
 
-// What is logged, for as long as this lives.
+// Collects the log messages of its lifetime.
 class LogCapture {
  public:
   LogCapture() : before_(rcutils_logging_get_output_handler()) {
@@ -179,7 +179,7 @@ class MonitorTest : public ::testing::Test {
 
 TEST_F(MonitorTest, ATaskThatMissesIsWarnedOfAlsoWhileNothingElseGetsToRun) {
   configure(kOneTimer);
-  const auto slow = std::make_shared<std::atomic<bool>>(true);  // the timer goes on until TearDown
+  const auto slow = std::make_shared<std::atomic<bool>>(true);  // shared: the timer runs until TearDown()
   add_timer(10ms, [slow] { std::this_thread::sleep_for(*slow ? 35ms : 0ms); });
   start();
   EXPECT_TRUE(eventually_status("ReDAG: DAG control", DiagnosticStatus::WARN, "loop missed"));
@@ -237,7 +237,7 @@ TEST_F(MonitorTest, ServicesAnswer) {
   ASSERT_TRUE(loaded) << to_string(loaded.error());
   EXPECT_GT(loaded->workload.task_count(), 0U);
 
-  // Another path, while running; and one that does not work.
+  // Saves to another path while the executor spins, and then to an invalid one.
   ASSERT_TRUE(node_->set_parameter({"save_path", (folder_ / "other.yaml").string()}).successful);
   EXPECT_TRUE(call("/robot/save")->success);
   EXPECT_TRUE(std::filesystem::exists(folder_ / "other.yaml"));
@@ -303,7 +303,7 @@ TEST_F(MonitorTest, ResultsAreWrittenWhenSpinningHasEnded) {
   EXPECT_TRUE(monitor_->finish()) << "once more does nothing";
 }
 
-// What a killed process would leave: the record, while the executor spins.
+// The flight record must exist while the executor spins: it is what a killed process leaves.
 TEST_F(MonitorTest, ARecordIsThereWhileItSpins) {
   options_.trace_capacity = 1 << 14;
   monitor_options_.trace = folder_ / "results";
@@ -317,7 +317,7 @@ TEST_F(MonitorTest, ARecordIsThereWhileItSpins) {
     std::error_code ignored;
     return std::filesystem::file_size(record / "events.bin", ignored) > 4096 && !ignored;
   }));
-  // A copy: the record is locked as long as it is written.
+  // Reads a copy, because the record is locked while it is written.
   std::filesystem::copy(record, folder_ / "copy");
   const auto recovered = redag::trace::recover(folder_ / "copy");
   ASSERT_TRUE(recovered) << to_string(recovered.error());

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the tests of the monitor and of its parts share.
+// Shared by the tests of the monitor and of its parts.
 #pragma once
 
 #include <string>

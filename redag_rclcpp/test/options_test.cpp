@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Parameters become options: defaults, what wins over what, and what mistakes are called.
+// Tests how parameters become options: defaults, precedence, and messages about mistakes.
 #include "redag_rclcpp/options.hpp"
 
 #include <gmock/gmock.h>
@@ -219,7 +219,7 @@ TEST_F(OptionsTest, MistakesInTheWorkloadAreNamedByLine) {
   EXPECT_THAT(mistake_with({{"config", "/nowhere/robot.yaml"}}), AllOf(HasSubstr("'config'"), HasSubstr("/nowhere")));
 }
 
-// A value of any type, most of them near what is allowed or at its limits.
+// A random value of any type, mostly close to the allowed values or at their limits.
 rclcpp::ParameterValue any_value(std::mt19937_64 &random, const std::string &workload) {
   const auto one_of = [&](const auto &values) { return values[random() % std::size(values)]; };
   static constexpr std::int64_t kIntegers[] = {0,
@@ -272,7 +272,7 @@ rclcpp::ParameterValue any_value(std::mt19937_64 &random, const std::string &wor
   }
 }
 
-// REDAG_SEED chooses the values, REDAG_OPTION_ROUNDS how many.
+// REDAG_SEED chooses the values, REDAG_OPTION_ROUNDS the number of rounds.
 TEST_F(OptionsTest, AnyValuesAreReadOrRefused) {
   const std::vector<std::string> names{"workers",      "preemption",     "policy",         "ties",   "threads",
                                        "cpu_affinity", "config",         "default_period", "learn",  "raise_middleware",
@@ -281,7 +281,8 @@ TEST_F(OptionsTest, AnyValuesAreReadOrRefused) {
   const std::string workload = file_with(kWorkload);
   const std::uint64_t seed = from_environment("REDAG_SEED", 1);
   const std::uint64_t rounds = from_environment("REDAG_OPTION_ROUNDS", 400);
-  // The middleware's participant goes with its last node: another one each time would take most of the time.
+  // Keeps the middleware's participant alive, which ends with its last node. Creating one each time would take most of
+  // the time.
   const auto stays = node_with({});
   std::mt19937_64 random(seed);
   std::uint64_t refused = 0;

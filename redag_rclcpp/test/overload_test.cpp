@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What our executor does with what is too much: full queues, budgets, criticality.
+// Tests ReDAGExecutor under overload: full queues, budgets, criticality.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ using ::testing::IsEmpty;
 
 using OverloadTest = ModeTest;
 
-/// A subscription of numbered messages, in a group of its own.
+/// A subscription that receives numbered messages, in a callback group of its own.
 class Numbers {
  public:
   Numbers(const rclcpp::Node::SharedPtr &node, const std::string &topic, bool in_process, std::size_t depth = 10)
@@ -55,8 +55,8 @@ class Numbers {
   }
 
   std::vector<int> received;
-  redag::Duration execution = 0;           // of the callback
-  std::function<void()> before_next_take;  // when there is a message to take into; not for those of the same process
+  redag::Duration execution = 0;           // processor time of the callback
+  std::function<void()> before_next_take;  // called when a message to take into is created; not within a process
 
  private:
   class Messages : public rclcpp::message_memory_strategy::MessageMemoryStrategy<BasicTypes> {
@@ -113,7 +113,7 @@ TEST_P(OverloadTest, OverwrittenMessagesAreCounted) {
   EXPECT_EQ(stats.jobs.skipped, 7U);
 }
 
-// Messages that come between a job's start and the moment it takes its own: what it was released for is overwritten.
+// Messages arrive between the start of a job and its take. They overwrite the message that released the job.
 TEST_P(OverloadTest, AJobTakesWhatHasOverwrittenItsMessage) {
   options.workload = parse(kOneSubscription);
   ReDAGExecutor executor(options);
@@ -136,7 +136,7 @@ TEST_P(OverloadTest, ASkippedMessageThatIsOverwrittenIsNotDroppedTwice) {
   ReDAGExecutor executor(options);
   Numbers numbers(node, "/numbers", false, 3);
   executor.add_node(node);
-  numbers.execution = 2 * redag::kMillisecond;  // more than its budget: the next one is skipped
+  numbers.execution = 2 * redag::kMillisecond;  // more than its budget: the next job is skipped
   numbers.publish(1);
   executor.spin_some();
   numbers.execution = 0;
@@ -241,7 +241,7 @@ TEST_P(OverloadTest, HighModeDropsMessagesOfLowerCriticalityUntilItEnds) {
     Numbers map(node, "/map", in_process);
     executor.add_node(node);
     for (int i = 1; i <= 3; ++i) {
-      if (i == 2) control.publish(i);  // HI mode begins and, as nothing else is there to do, ends
+      if (i == 2) control.publish(i);  // HI mode begins, and ends because nothing else is in progress
       map.publish(i);
       executor.spin_some();
     }
@@ -286,7 +286,8 @@ TEST_P(OverloadTest, LowerCriticalityGoesOnAfterHighModeOnWorkers) {
   const auto all_ended = [&] {
     const auto controls = jobs_of(executor, "high.control");
     const auto maps = jobs_of(executor, "low.map");
-    // Aborted: where the queue is full, a message can be overwritten and its successor taken before that is told.
+    // Counts aborted jobs, too. With a full queue, a message can be overwritten and its successor taken before the
+    // executor learns of it.
     return controls.finished + controls.skipped == rounds && maps.finished + maps.skipped + maps.aborted == sent;
   };
   {
@@ -299,7 +300,7 @@ TEST_P(OverloadTest, LowerCriticalityGoesOnAfterHighModeOnWorkers) {
                              std::this_thread::sleep_for(5ms);
                            }));
     ASSERT_TRUE(eventually(all_ended));
-    // HI mode goes on as long as anything else is in progress, such as the node's own callbacks.
+    // HI mode lasts while anything else is in progress, such as the node's own callbacks.
     const std::uint64_t before = jobs_of(executor, "low.map").finished;
     ASSERT_TRUE(eventually([&] { return jobs_of(executor, "low.map").finished > before; },
                            [&] {
@@ -312,7 +313,7 @@ TEST_P(OverloadTest, LowerCriticalityGoesOnAfterHighModeOnWorkers) {
   EXPECT_EQ(map.received.back(), 1'000'000);
 }
 
-// Where the kernel throttles real-time threads, a callback of lower criticality that goes on and on leaves the class.
+// If the kernel throttles real-time threads, a long callback of lower criticality must leave the real-time class.
 TEST_P(OverloadTest, WhatIsNotOfHighCriticalityBearsTheThrottling) {
   if (GetParam() != redag::PreemptionMode::Os || !redag::runtime::realtime_throttling()) {
     GTEST_SKIP() << "nothing is throttled";

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A workload out of text, for tests.
+// Parses a workload from text, for tests.
 #pragma once
 
 #include <gtest/gtest.h>

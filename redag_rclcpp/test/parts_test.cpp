@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The executor's parts that need no nodes: timer queue, token queue, hooks.
+// Tests the executor's parts that need no nodes: timer queue, token queue, hooks.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -77,7 +77,7 @@ TEST(TimerQueue, AgreesWithASortedMap) {
     } else {
       const Time at = now + 1 + static_cast<Time>(random() % 1'000'000);
       queue.schedule(timers[i], at);
-      // A time that hardly differs is the same one.
+      // A due time that hardly differs counts as the same.
       const auto old = due.find(i);
       if (old == due.end() || std::abs(old->second - at) >= TimerQueue::kSame) due[i] = at;
     }
@@ -128,7 +128,8 @@ TEST(TokenQueue, IsAFifoThatGrowsAndDropsFromTheMiddle) {
 
 // ---- hooks ----
 
-/// A middleware's part: calls who is set, also after it was told not to, as one that is being destroyed may.
+/// A fake entity of the middleware. It can call its last hook after the hook was cleared, as a real one may during its
+/// destruction.
 struct FakeEntity {
   rcl_event_callback_t callback = nullptr;
   const void *ticket = nullptr;

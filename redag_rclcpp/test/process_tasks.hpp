@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The threads of this process as the kernel shows them, for tests of what an executor leaves behind or wakes.
+// Reads the threads of this process from the kernel. Tests use it to see which threads an executor leaves behind or
+// wakes.
 #pragma once
 
 #include <filesystem>
@@ -13,10 +14,10 @@ namespace redag_rclcpp {
 
 struct ProcessTask {
   std::string name;
-  std::uint64_t switches = 0;  // voluntary: how often it has gone to sleep
+  std::uint64_t switches = 0;  // voluntary switches: how often the thread went to sleep
 };
 
-/// By thread id. Threads that end meanwhile are left out.
+/// Threads by id. Threads that end meanwhile are left out.
 inline std::map<int, ProcessTask> process_tasks() {
   std::map<int, ProcessTask> tasks;
   std::error_code ignored;

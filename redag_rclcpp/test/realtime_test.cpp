@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the executor asks of Linux: priorities of its own threads and of the middleware's, locked memory, threads that
-// cannot be had, jobs that do not end.
+// Tests what the executor requests from Linux: priorities of its own threads and of the middleware's, locked memory,
+// and threads. Includes threads that cannot be created, and jobs that do not end.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rcutils/logging.h>
@@ -57,7 +57,7 @@ TEST(MiddlewareThreads, AreKnownByTheirWholeNames) {
   }
 }
 
-/// A thread of a user's with this name.
+/// A user's thread with this name.
 class NamedThread {
  public:
   NamedThread(const char *name, bool blocks_signals)
@@ -161,7 +161,7 @@ TEST_F(RaisedThreads, KeepAPriorityThatSomebodyElseGaveThem) {
 
 // ---- the executor's threads ----
 
-/// Names and SCHED_FIFO priorities (0: none) of the threads of this process.
+/// Names and SCHED_FIFO priorities of the threads of this process; 0: no such priority.
 std::vector<std::pair<std::string, int>> thread_priorities() {
   std::vector<std::pair<std::string, int>> result;
   std::error_code ignored;
@@ -184,7 +184,7 @@ class RealtimeTest : public ModeTest {
   }
 };
 
-/// A waitable that notes the priority of the thread that attaches it.
+/// A waitable that records the priority of the thread that attaches it.
 class NotingWaitable final : public rclcpp::Waitable {
  public:
 #if RCLCPP_VERSION_MAJOR >= 28
@@ -206,7 +206,7 @@ class NotingWaitable final : public rclcpp::Waitable {
   std::atomic<int> priority{-1};
 };
 
-// It takes time that grows with the number of entities.
+// Collecting entities takes time that grows with their number, and must not run above jobs.
 TEST_P(RealtimeTest, CollectingEntitiesIsNoneOfTheUrgentWork) {
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
   executor.add_node(node);
@@ -215,7 +215,7 @@ TEST_P(RealtimeTest, CollectingEntitiesIsNoneOfTheUrgentWork) {
   node->get_node_waitables_interface()->add_waitable(waitable, nullptr);
   EXPECT_TRUE(eventually([&] { return waitable->priority >= 0; }));
   EXPECT_EQ(waitable->priority, 0);
-  // What tells of arrivals stays above all jobs.
+  // The threads that report arrivals stay above all jobs.
   for (const char *name : {"redag-wait", "redag-timer"}) {
     const std::pair<std::string, int> expected(name, above_jobs());
     EXPECT_TRUE(eventually([&] {
@@ -225,7 +225,7 @@ TEST_P(RealtimeTest, CollectingEntitiesIsNoneOfTheUrgentWork) {
   }
 }
 
-// The thread that called spin() is an ordinary one, and gets no processor while jobs use them all.
+// The thread that called spin() is an ordinary one. It gets no processor while jobs use all of them.
 TEST_P(RealtimeTest, CancelTakesEffectWhileJobsUseTheProcessor) {
   if (GetParam() != redag::PreemptionMode::Os) GTEST_SKIP() << "without real-time jobs all threads get their share";
   const int processor = redag::runtime::usable_cpus().back();
@@ -233,7 +233,7 @@ TEST_P(RealtimeTest, CancelTakesEffectWhileJobsUseTheProcessor) {
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
   std::atomic<int> calls{0};
   constexpr int kBefore = 20;
-  constexpr int kMost = 5000;  // several times what fits between two pauses by real-time throttling
+  constexpr int kMost = 5000;  // several times the jobs between two pauses of real-time throttling
   const auto topic = publisher("/again");
   auto subscription = subscribe("/again", [&] {
     if (calls < kMost) topic->publish(Empty());
@@ -272,7 +272,7 @@ TEST_P(RealtimeTest, ASpinAfterOneThatHadNoThreadsWorks) {
   auto timer = node->create_wall_timer(
       5ms, [&] { ++ticks; }, new_group());
   executor.add_node(node);
-  // Not one more thread: their stacks are what there is no memory for.
+  // Uses up the memory for thread stacks: no further thread can be created.
   rlimit before{};
   ASSERT_EQ(getrlimit(RLIMIT_AS, &before), 0);
   std::string first;
@@ -285,7 +285,8 @@ TEST_P(RealtimeTest, ASpinAfterOneThatHadNoThreadsWorks) {
     const rlimit tight{pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + (rlim_t{1} << 20), before.rlim_max};
     ASSERT_EQ(setrlimit(RLIMIT_AS, &tight), 0);
     try {
-      for (;;) others.emplace_back([&end] { end.wait(); });  // stacks of threads that ended are used again
+      // The threads keep running, because stacks of ended threads are reused.
+      for (;;) others.emplace_back([&end] { end.wait(); });
     } catch (const std::system_error &) {
     }
     try {
@@ -314,7 +315,7 @@ std::size_t locked_kilobytes() {
   return amount;
 }
 
-/// Of the pages below the caller's frame on its stack, those that are not in memory.
+/// Number of absent pages among the `bytes` of stack below the caller's frame.
 std::size_t absent_pages_below(std::size_t bytes) {
   const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
   const auto here = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0)) / page * page;
@@ -350,7 +351,7 @@ TEST_P(RealtimeTest, LockedMemoryIsThereBeforeCallbacksNeedIt) {
 
 // ---- jobs that do not end ----
 
-/// Keeps what is logged while it lives.
+/// Collects the log messages of its lifetime.
 class LogCapture {
  public:
   LogCapture() : before_(rcutils_logging_get_output_handler()) {

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What an executor costs while nothing happens, and what it holds on to in the long run. REDAG_SOAK_SECONDS says how
-// long the busy part is (10), REDAG_SOAK_WORKERS how many workers there are (2), REDAG_SOAK_LOAD what share of them is
-// used (0); REDAG_SOAK_EXECUTOR=multi_threaded does the same with rclcpp's, to compare with.
+// Measures what an idle executor costs, and which memory and threads it keeps in the long run. REDAG_SOAK_SECONDS is
+// the length of the busy part (10), REDAG_SOAK_WORKERS the number of workers (2), REDAG_SOAK_LOAD the share of them
+// that is used (0). REDAG_SOAK_EXECUTOR=multi_threaded runs rclcpp's executor instead, for comparison.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -55,7 +55,7 @@ double number_from(const char *variable, double otherwise) {
   return text == nullptr ? otherwise : std::atof(text);
 }
 
-/// Wake-ups of our threads, and of the one that spins.
+/// Wake-ups of the executor's threads and of the spinning thread.
 std::uint64_t wake_ups(int spinning_thread) {
   std::uint64_t all = 0;
   for (const auto &[id, task] : process_tasks()) {
@@ -89,7 +89,7 @@ TEST_P(IdleTest, NothingWakesTheExecutor) {
   ReDAGExecutor executor(options);
   executor.add_node(node);
   const Spinner spinner(executor);
-  // It does work, and sees to what happens at the start.
+  // Shows that the executor works, and waits until its start is over.
   ASSERT_TRUE(eventually([&] {
     publisher->publish(Strings());
     std::this_thread::sleep_for(10ms);
@@ -109,7 +109,7 @@ INSTANTIATE_TEST_SUITE_P(Modes, IdleTest,
                                            redag::PreemptionMode::Os),
                          [](const auto &test) { return std::string(to_string(test.param)); });
 
-/// A chain of three, a service that is called, and nodes that come and go.
+/// A chain of three callbacks, a service that is called, and nodes that come and go.
 class Graph {
  public:
   explicit Graph(rclcpp::Executor &executor) : executor_(executor) {
@@ -132,7 +132,7 @@ class Graph {
     executor_.add_node(node_);
   }
 
-  /// One node more and one less; every other one is only dropped.
+  /// Adds a node and drops one. Every other one is dropped without being removed.
   void churn() {
     auto node = std::make_shared<rclcpp::Node>("guest" + std::to_string(guests_++),
                                                rclcpp::NodeOptions().start_parameter_event_publisher(false));
@@ -163,7 +163,7 @@ class Graph {
   std::uint64_t guests_ = 0;
 };
 
-/// Two timers for each worker, which use `load` of it: a quarter of that in short periods, the rest in long jobs.
+/// Two timers for each worker, which use `load` of it. A quarter of the load has short periods, the rest are long jobs.
 class Load {
  public:
   Load(rclcpp::Executor &executor, std::size_t workers, double load) {
@@ -174,7 +174,8 @@ class Load {
     executor.add_node(node_);
   }
 
-  /// The 99th percentile of the first short one's responses since the last call, in microseconds; 0 without any.
+  /// The 99th percentile, in microseconds, of the first short timer's responses since the last call; 0 without
+  /// responses.
   double take_p99() {
     const std::lock_guard lock(mutex_);
     if (responses_.empty()) return 0;
@@ -211,13 +212,13 @@ class Load {
   }
 
   rclcpp::Node::SharedPtr node_ = std::make_shared<rclcpp::Node>("load");
-  std::vector<rclcpp::CallbackGroup::SharedPtr> groups_;  // the node does not keep them
+  std::vector<rclcpp::CallbackGroup::SharedPtr> groups_;  // the node does not keep its groups alive
   std::vector<rclcpp::TimerBase::SharedPtr> timers_;
   std::mutex mutex_;
   std::vector<double> responses_;
 };
 
-/// Least-squares slope, a minute.
+/// Least-squares slope, per minute.
 double slope(const std::vector<double> &minutes, const std::vector<double> &values, std::size_t from) {
   const auto n = static_cast<double>(values.size() - from);
   double x = 0;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What tests need that spin an executor in a thread of its own, and callbacks that take time.
+// Helpers for tests that spin an executor on a thread of its own, and for callbacks that take time.
 #pragma once
 
 #include <sys/syscall.h>
@@ -15,10 +15,10 @@
 
 namespace redag_rclcpp {
 
-/// How long a test waits for what has to happen: far longer than it ever takes.
+/// Longest wait of a test for an expected event; far longer than any event takes.
 inline constexpr std::chrono::seconds kLimit{60};
 
-/// Does `meanwhile` until `condition` holds. False: it never did.
+/// Repeats `meanwhile` until `condition` holds. False: the limit was reached.
 template <class Condition, class Meanwhile>
 bool eventually(Condition condition, Meanwhile meanwhile) {
   const auto end = std::chrono::steady_clock::now() + kLimit;
@@ -34,14 +34,14 @@ bool eventually(Condition condition) {
   return eventually(condition, [] { std::this_thread::sleep_for(std::chrono::milliseconds(1)); });
 }
 
-/// Processor time of this thread.
+/// Uses `amount` of this thread's processor time.
 inline void use_processor(std::chrono::nanoseconds amount) {
   const redag::Time end = redag::runtime::thread_cpu_now() + amount.count();
   while (redag::runtime::thread_cpu_now() < end) {
   }
 }
 
-/// Spins in a thread of its own for as long as it lives.
+/// Spins an executor on a thread of its own until destruction.
 template <class Executor>
 class Spinner {
  public:

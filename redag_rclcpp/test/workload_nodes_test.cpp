@@ -75,7 +75,7 @@ class Bodies {
   std::vector<JobEvent> events_;
 };
 
-// task, number, release, start (-1: none), outcome, reason
+// Task, number, release in ms, start in ms (-1: none), outcome, reason.
 using Row = std::tuple<std::uint32_t, std::uint32_t, double, double, JobOutcome, Reason>;
 
 std::vector<Row> rows(const std::vector<JobRecord> &jobs) {
@@ -132,8 +132,8 @@ TEST(NodeEvents, AJobThatBeganAfterTheNextReleaseIsNotSkipped) {
   EXPECT_TRUE(report.ok()) << report.to_string();
 }
 
-// Called in time, then kept from the processor for more than a period: the releases of two jobs are overlooked, and the
-// second ends the first.
+// The timer was called in time, but the body had no processor for more than two periods. The releases of two jobs are
+// overlooked; each ends the job before it.
 TEST(NodeEvents, ReleasesOverlookedTogetherFollowEachOther) {
   const Workload workload = workload_of(kTimer);
   const auto bodies = Bodies().ran(0, 0, 32.5, 33).ran(0, 3, 33.1, 34);
@@ -150,7 +150,7 @@ TEST(NodeEvents, MessagesOverlookedTogetherFollowEachOther) {
                           .ran(0, 0, 0, 1)
                           .ran(0, 1, 10, 11)
                           .ran(0, 2, 20, 21)
-                          .ran(1, 0, 25, 26, 1, 1)  // took its message at 1
+                          .ran(1, 0, 25, 26, 1, 1)  // takes the message of time 1
                           .ran(1, 2, 26, 27, 21, 1);
   const auto all = rows(bodies.jobs(workload, 30));
   EXPECT_THAT(std::vector<Row>(all.begin() + 3, all.end()),
@@ -163,7 +163,7 @@ TEST(NodeEvents, MessagesOverlookedTogetherFollowEachOther) {
 TEST(NodeEvents, ACallJustBeforeItsPointIsOnTime) {
   const Workload workload = workload_of(kTimer);
   const auto bodies = Bodies().ran(0, 0, 1.99, 4).ran(0, 1, 13, 14);
-  EXPECT_FALSE(check(workload, bodies.stream(workload, 20), Bodies::ms(20)).ok());  // timers are not so early
+  EXPECT_FALSE(check(workload, bodies.stream(workload, 20), Bodies::ms(20)).ok());  // timers are never this early
   const auto events = bodies.stream(workload, 20, false, Bodies::ms(0.01));
   EXPECT_THAT(rows(redag::metrics::fold_jobs(workload, events)),
               ElementsAre(Row{0, 0, 2, 2, kDone, kNone}, Row{0, 1, 12, 13, kDone, kNone}));
@@ -182,14 +182,14 @@ TEST(NodeEvents, AnOverwrittenMessageIsASkippedJob) {
                         .ran(0, 1, 10, 11)
                         .ran(0, 2, 20, 21)
                         .ran(1, 0, 1, 2, 1, 1)
-                        .ran(1, 2, 25, 26, 21, 1)  // 11 was overwritten
+                        .ran(1, 2, 25, 26, 21, 1)  // the message of time 11 was overwritten
                         .jobs(workload_of(kChain), 30);
   EXPECT_EQ(jobs.size(), 6U);
   const auto all = rows(jobs);
   EXPECT_THAT(std::vector<Row>(all.begin() + 3, all.end()),
               ElementsAre(Row{1, 0, 1, 1, kDone, kNone}, Row{1, 1, 11, -1, kSkipped, Reason::Overrun},
                           Row{1, 2, 21, 25, kDone, kNone}));
-  // End to end: from the release of the source's job.
+  // The end-to-end response counts from the release of the source's job.
   EXPECT_EQ(jobs.back().origin, Bodies::ms(20));
 }
 
@@ -212,7 +212,7 @@ TEST(NodeEvents, AJoinIsReleasedByTheLastOfItsPredecessors) {
   const auto all = rows(jobs);
   EXPECT_THAT(std::vector<Row>(all.begin() + 7, all.end()),
               ElementsAre(Row{2, 0, 5, 6, kDone, kNone}, Row{2, 1, 45, 46, kDone, kNone}));
-  EXPECT_EQ(jobs.back().origin, Bodies::ms(30));  // b's second; a's fifth was released later
+  EXPECT_EQ(jobs.back().origin, Bodies::ms(30));  // b's second job; a's fifth was released later
 }
 
 const char *const kWaiting =
@@ -223,7 +223,7 @@ TEST(NodeEvents, ATimerTaskWithoutItsDataIsSkippedForThatReason) {
   const auto jobs = Bodies()
                         .ran(0, 0, 1, 3)
                         .ran(1, 0, 4, 5, 3, 1)
-                        .ran(0, 1, 12, 22)  // too late for t's second job: that wanted this one's data
+                        .ran(0, 1, 12, 22)  // too late for t's second job, which needed the data of this one
                         .ran(0, 2, 22, 23)
                         .ran(1, 2, 24, 25, 23, 1)
                         .jobs(workload, 30);
@@ -250,14 +250,14 @@ TEST(NodeEvents, ABodyWithoutAProcessorHoldsNone) {
                           .ran(0, 0, 3, 8)
                           .was_absent(0, 0, 4, 5)
                           .was_absent(0, 0, 6, 7.5)
-                          .was_absent(0, 1, 12.000001, 15)  // from its beginning to its end
+                          .was_absent(0, 1, 12.000001, 15)  // from its start to its end
                           .ran(0, 1, 12, 15);
   const auto jobs = bodies.jobs(workload, 20);
   ASSERT_EQ(jobs.size(), 2U);
   EXPECT_EQ(jobs[0].preemptions, 2U);
   EXPECT_EQ(jobs[0].on_worker, Bodies::ms(2.5));
   EXPECT_EQ(jobs[1].preemptions, 1U);
-  EXPECT_EQ(jobs[1].on_worker, 2);  // a nanosecond before and after: within the body
+  EXPECT_EQ(jobs[1].on_worker, 2);  // one nanosecond after the start and one before the end
   const auto report = check(workload, bodies.stream(workload, 20), Bodies::ms(20));
   EXPECT_TRUE(report.ok()) << report.to_string();
 }
@@ -286,7 +286,8 @@ struct Collected {
   redag::Duration phase_error = 0;
 };
 
-// Runs on a rclcpp executor for `duration`: much longer than a busy machine may stand still, where jobs are to be seen.
+// Runs the nodes on an rclcpp executor for `duration`. It must far exceed the pauses of a busy machine if jobs are to
+// be seen.
 template <class Executor>
 Collected collect(const Workload &workload, Executor &executor, NodesOptions options, redag::Duration duration) {
   options.threads = 8;
@@ -310,7 +311,7 @@ Collected collect(const Workload &workload, Executor &executor, NodesOptions opt
   return collected;
 }
 
-// Little load: whatever the machine does, every release is seen, and joins follow exactly.
+// A light load: even on a busy machine every release is seen, and joins follow exactly.
 const char *const kLight =
     "{name: light, platform: {workers: 2}, dags: ["
     " {name: fast, tasks: [{name: a, wcet: 100us, period: 20ms}, {name: b, wcet: 100us, activation: data, after: a}]},"
@@ -327,7 +328,7 @@ void expect_jobs_add_up(const Workload &workload, const std::vector<JobRecord> &
       EXPECT_GE(job.finish, job.start);
     }
   }
-  // 400 ms: a and y every 20 ms, x and t every 40 ms from 5 ms on; none at 400 ms.
+  // 400 ms: a and y run every 20 ms, x and t every 40 ms from 5 ms on. No release is at 400 ms.
   EXPECT_EQ(counts[0], 20U);
   EXPECT_EQ(counts[2], 10U);
   EXPECT_EQ(counts[3], 20U);
@@ -385,8 +386,8 @@ TEST_F(Nodes, ABudgetCutsOffAndReleasesNobody) {
   }
 }
 
-// 10 ms every 10 ms, and as much again: half of the releases cannot run. One thread, so every count is known but for
-// where the run is cut.
+// 25 ms of work every 10 ms: more than half of the releases cannot run. With one thread every count is known, except
+// around the end of the run.
 TEST_F(Nodes, ExpiriesThatATimerDropsAreCounted) {
   const Workload workload =
       workload_of("{dags: [{name: d, tasks: [{name: a, wcet: 25ms, period: 10ms, deadline: 10ms}]}]}");
@@ -401,7 +402,7 @@ TEST_F(Nodes, ExpiriesThatATimerDropsAreCounted) {
   for (std::size_t i = 1; i < jobs.size(); ++i) EXPECT_EQ(jobs[i].release - jobs[i - 1].release, 10 * kMillisecond);
 }
 
-// Who should say halt() may not get to it: under SCHED_FIFO an overloaded executor can keep it from every processor.
+// The thread that calls halt() may come late: under SCHED_FIFO an overloaded executor can keep it from every processor.
 TEST_F(Nodes, NoBodyBeginsAtOrAfterTheEndThoughNobodySaysHalt) {
   const Workload workload =
       workload_of("{dags: [{name: d, tasks: [{name: a, wcet: 4ms, period: 2ms, deadline: 2ms}]}]}");
@@ -418,8 +419,8 @@ TEST_F(Nodes, NoBodyBeginsAtOrAfterTheEndThoughNobodySaysHalt) {
   EXPECT_GT(began, 0U);
 }
 
-// Twice what the processors can do, in each of our modes: the record is whole and lawful, at the end and when broken
-// off.
+// Twice the load that the processors can take, in each mode of ReDAGExecutor. The record must be complete and valid,
+// also if the run is broken off.
 TEST_F(Nodes, ARunInOverloadIsRecordedWhole) {
   const Workload workload = workload_of(
       "{name: overload, platform: {workers: 2}, dags: ["
@@ -433,7 +434,7 @@ TEST_F(Nodes, ARunInOverloadIsRecordedWhole) {
       SCOPED_TRACE(std::string(executor) + (broken_off ? ", broken off" : ""));
       const bool os = std::string(executor) == "redag-os";
       if (os && redag::runtime::probe_priority_band().top_job == 0) continue;
-      const std::atomic<bool> stop{broken_off};  // at once: nothing may have run
+      const std::atomic<bool> stop{broken_off};  // stops at once: perhaps nothing has run
       WorkloadRunOptions options;
       options.executor = executor;
       options.duration = 300 * kMillisecond;
@@ -449,7 +450,7 @@ TEST_F(Nodes, ARunInOverloadIsRecordedWhole) {
   }
 }
 
-// The middleware learns late that the nodes of the run before are gone.
+// The middleware learns late that the nodes of an earlier run have gone.
 TEST_F(Nodes, AUserOfATopicWhoLeavesIsNoneWhoStays) {
   const Workload workload = workload_of(
       "{name: w, dags: [{name: fast, tasks: [{name: a, wcet: 1ms, period: 10ms},"

@@ -1,8 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The first, second, third, ... allocation fails, until none does any more: each time the program says "out of memory"
-// (or, where a library handles it, something else) and ends with 2, as a child would; nothing leaks into the next try.
+// Makes the first, second, third, ... allocation fail, until a run needs no further one. Each time the program must
+// report an error ("out of memory", or what a library makes of it) and return 0, 1 or 2, as a child process would. No
+// failure may affect the next try.
+//
 //   redag_allocation_failures FOLDER_OF_WORKLOADS
 #include <fcntl.h>
 #include <unistd.h>
@@ -19,7 +21,7 @@
 
 namespace {
 
-std::atomic<std::int64_t> left{-1};  // allocations until one fails; negative: none does
+std::atomic<std::int64_t> left{-1};  // allocations until one fails; negative: none fails
 
 void *allocate(std::size_t size) {
   if (left.load(std::memory_order_relaxed) >= 0 && left.fetch_sub(1) == 0) throw std::bad_alloc();
@@ -32,7 +34,7 @@ struct Tried {
   std::uint64_t wrong = 0;
 };
 
-// Steps grow: the first allocations are where a program is set up, each of them; later ones are alike.
+// Steps grow. The first allocations set up the program, and each of them is tried. Later ones are alike.
 Tried try_all(const std::vector<std::string> &arguments) {
   const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
   Tried tried;
@@ -68,7 +70,7 @@ int main(int argc, char **argv) {
   const std::string robot = std::string(argv[1]) + "/robot.yaml";
   const std::string hello = std::string(argv[1]) + "/hello.yaml";
   const std::vector<std::vector<std::string>> commands = {
-      // Not with --json: nlohmann::json destroys its trees with the help of memory (3.11), which nobody can handle.
+      // Without --json: nlohmann::json 3.11 allocates when it destroys a tree, and such a failure cannot be handled.
       {"validate", robot},
       {"simulate", hello, "--duration", "20ms"},
       {"analyze", robot},

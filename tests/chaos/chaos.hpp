@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// One run of each kind of chaos, from a seed. Returns what broke, or nothing; `survived` counts faults by kind.
+// One run of each kind of chaos, from a seed. Returns a description of what broke, or "". `survived` counts faults by
+// kind.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +13,12 @@ namespace redag::chaos {
 
 using Survived = std::map<std::string, std::uint64_t>;
 
-/// A random workload in virtual time: jobs that run for up to 100 times their wcet, releases near the ends of time,
-/// runs that are broken off, every executor.
+/// Simulates a random workload: jobs run for up to 100 times their wcet, releases lie near the ends of time, and runs
+/// are broken off. Uses every executor.
 std::string simulator_run(std::uint64_t seed, Survived &survived);
 
-/// An executor with bodies that throw, sleep, block, lock, overrun, call the executor, add DAGs and remove their own,
-/// while DAGs come and go, processors do, and it is stopped from anywhere.
+/// Runs an executor on threads. Bodies throw, sleep, block, lock, overrun, call the executor, add DAGs and remove their
+/// own. Meanwhile DAGs and processors come and go, and any thread may stop the executor.
 std::string executor_run(std::uint64_t seed, Survived &survived);
 
 }  // namespace redag::chaos

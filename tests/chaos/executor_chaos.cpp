@@ -84,7 +84,7 @@ std::size_t thread_count() {
   return threads;
 }
 
-// Of all threads of the process: what a container's manager does.
+// Moves all threads of the process, as a container's manager does.
 void move_to(const std::vector<int> &cpus) {
   cpu_set_t set;
   CPU_ZERO(&set);
@@ -146,7 +146,7 @@ class Run {
     executor_->drain(events_);
     std::string verdict = judge();
     executor_.reset();
-    // A thread that was joined can be listed for a moment more.
+    // A joined thread may be listed for a moment longer.
     const Time give_up = runtime::monotonic_now() + 10 * kSecond;
     while (thread_count() > threads_before && runtime::monotonic_now() < give_up) std::this_thread::sleep_for(1ms);
     if (thread_count() > threads_before) return "threads are left over\n" + verdict;
@@ -162,7 +162,7 @@ class Run {
   }
 
  private:
-  // What the executor was told, as a workload: DagIds are positions.
+  // Adds a DAG to the executor and to `dags_`, where its position is its DagId.
   void add() {
     const LockGuard guard(lock_);
     if (dags_.size() >= kMostDags) return;
@@ -229,7 +229,7 @@ class Run {
   void misbehave(DagId dag) {
     Rng dice = Rng::stream(seed_, dag.value, jobs_.fetch_add(1));
     const Fault fault = dice.uniform01() < fault_rate_ ? static_cast<Fault>(dice.uniform(1, Stops)) : None;
-    // Few runs are to end early.
+    // Only few runs are to end early.
     if (fault == Stops && dice.uniform01() > 0.02) return;
     ++faults_[fault];
     switch (fault) {
@@ -241,7 +241,7 @@ class Run {
       case Sleeps: std::this_thread::sleep_for(nanoseconds(dice.uniform(1, 1'000'000))); break;
       case Overruns: spin(100 * kWcet, points_); break;
       case Locks: {
-        const LockGuard guard(shared_);  // may be held by a preempted body
+        const LockGuard guard(shared_);  // a preempted body may hold it
         spin(kWcet, false);
         break;
       }
@@ -281,19 +281,20 @@ class Run {
     if (mistakes_ > 0) return "a body could wait for its own executor";
     // DAGs that are added later have grids of their own.
     metrics::RuleSet rules = metrics::RuleSet::all().without(metrics::Rule::Grid);
-    // Once tasks of a removed DAG have left the order, its smallest period is that of the others: the trace does not
-    // say so.
+    // Once the tasks of a removed DAG have left the order, its smallest period is that of the other tasks. The trace
+    // does not record this.
     if (policy_ == PolicyKind::ChainAware) {
       rules = rules.without(metrics::Rule::Priority).without(metrics::Rule::Preemption);
     }
-    // Nor which tasks shared a level when: only that whoever preempts comes first in the order.
+    // Nor does the trace record which tasks shared a level at a time. Only the order of preemption can be checked.
     std::uint32_t &levels = trace.info.config.levels;
     levels_shared_ = levels > 0 && trace.info.workload.task_count() > levels;
     if (levels_shared_) {
       levels = 0;
       rules = rules.without(metrics::Rule::Priority);
     }
-    // Overload in os mode can keep this thread from draining. A trace with holes cannot be checked; the counts can.
+    // In os mode, overload can keep this thread from draining. A trace with lost events cannot be checked; the counts
+    // can.
     events_lost_ = trace.info.lost_events > 0;
     if (events_lost_) rules = rules.without(metrics::Rule::Stream);
     const metrics::CheckReport report = metrics::check_trace(trace, rules);
@@ -310,39 +311,40 @@ class Run {
                        trace.info.config.workers, to_string(policy_));
   }
 
-  // The trace does not say that a DAG was removed: its jobs that had started release nothing any more.
+  // True if all violations belong to removed DAGs. The trace does not record removals; started jobs of a removed DAG
+  // release no successors.
   [[nodiscard]] bool lawful_but_for_removals(const metrics::CheckReport &report) const {
     if (report.violation_count > report.violations.size()) return false;
     return std::all_of(report.violations.begin(), report.violations.end(), [this](const metrics::Violation &violation) {
       if (violation.rule != metrics::Rule::Precedence) return false;
-      return !there_[std::stoul(violation.job.substr(1))];  // "d5.t1#7"
+      return !there_[std::stoul(violation.job.substr(1))];  // the DAG's number in "d5.t1#7"
     });
   }
 
   static constexpr std::size_t kMostDags = 60;
 
   std::uint64_t seed_;
-  Rng rng_;  // of the controlling thread
+  Rng rng_;  // used by the controlling thread
   std::vector<int> usable_;
   bool points_ = false;
   double fault_rate_ = 0;
-  bool crowded_ = false;  // many DAGs at a time: often more tasks than the system has priority levels
+  bool crowded_ = false;  // many DAGs at a time, often with more tasks than the system has priority levels
   PolicyKind policy_ = PolicyKind::RateMonotonic;
   PreemptionMode trace_preemption_ = PreemptionMode::None;
-  bool levels_shared_ = false;  // for some time, perhaps
+  bool levels_shared_ = false;  // tasks may have shared levels for some time
   bool events_lost_ = false;
-  std::shared_ptr<int> alive_ = std::make_shared<int>(0);  // every body has a share
+  std::shared_ptr<int> alive_ = std::make_shared<int>(0);  // every body holds a reference
   PiMutex shared_;
   PiMutex lock_;
-  Rng dice_{seed_ + 1};      // lock_
-  std::vector<Dag> dags_;    // lock_
-  std::vector<bool> there_;  // lock_
+  Rng dice_{seed_ + 1};      // guarded by lock_
+  std::vector<Dag> dags_;    // guarded by lock_
+  std::vector<bool> there_;  // guarded by lock_
   std::vector<JobEvent> events_;
   std::atomic<std::uint32_t> jobs_{0};
   std::array<std::atomic<std::uint64_t>, kFaultNames.size()> faults_{};
   std::atomic<std::uint64_t> exceptions_{0};
   std::atomic<std::uint64_t> mistakes_{0};
-  std::unique_ptr<Executor> executor_;  // last: its bodies use the rest
+  std::unique_ptr<Executor> executor_;  // last member: its bodies use the others
 };
 
 }  // namespace

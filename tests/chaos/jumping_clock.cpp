@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// For LD_PRELOAD: the time of day (CLOCK_REALTIME) jumps to and fro by a day to some years with every look at it, and a
-// wait for a time of day ends the program. To set the machine's own clock would hurt whatever else runs on it.
+// A library for LD_PRELOAD. The time of day (CLOCK_REALTIME) jumps back and forth by one day to eleven years at every
+// reading. A wait for a time of day ends the program. Setting the machine's own clock would disturb other programs.
 #include <dlfcn.h>
 #include <linux/futex.h>
 #include <pthread.h>
@@ -25,7 +25,7 @@ bool is_time_of_day(clockid_t clock) {
   return clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE || clock == CLOCK_TAI;
 }
 
-// Forward at one look and back at the next, further and further apart.
+// Jumps forward at one reading and back at the next, further each time.
 time_t jump() {
   static std::atomic<std::uint32_t> looks{0};
   const std::uint32_t look = looks.fetch_add(1, std::memory_order_relaxed);

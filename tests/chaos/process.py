@@ -2,13 +2,15 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Faults from outside, at random moments: signals, limits, full and read-only folders, lost rights, fewer processors.
+"""Injects faults from outside, at random moments.
+
+The faults are signals, limits, full and read-only folders, lost rights, and fewer processors.
 
 Usage: process.py PROGRAM SOURCE_DIR [--runs N] [--seed S] [--fault NAME]... [--clock LIBRARY]
 
-Each fault is tried N times, each time from a seed that is printed when something breaks: `--runs 1 --seed S --fault NAME`
-does it again. Whatever happens, the program ends in time, by itself or by the signal, never by a crash; it says why when it
-fails; what it leaves behind is whole; what it says it did is lawful. Standard library only.
+Each fault is tried N times, each time from a seed. If something breaks, the seed is printed, and
+`--runs 1 --seed S --fault NAME` repeats the try. The program must end in time, by itself or by the signal, and never by
+a crash. It must say why it failed. Its files must be complete, and its traces lawful. Uses the standard library only.
 """
 import argparse
 import ctypes
@@ -47,7 +49,7 @@ def expect(condition, what):
 
 
 class Child:
-    """The program with faults around it."""
+    """Runs the program with faults around it."""
 
     def __init__(self, *arguments, prepare=None, **options):
         self.arguments = [str(a) for a in arguments]
@@ -74,7 +76,7 @@ class Child:
 
 
 def check_results(folder, tidy=True):
-    """Every file is whole, every trace lawful; nothing temporary is left."""
+    """Checks that every file is complete, every trace lawful, and no temporary file is left."""
     for path in pathlib.Path(folder).rglob("*"):
         if not path.is_file():
             continue
@@ -84,12 +86,12 @@ def check_results(folder, tidy=True):
             Child("check-trace", path).end({0})
         elif path.suffix == ".json":
             json.loads(path.read_text())
-        elif path.suffix in (".csv", ".html", ".svg") and path.name != "units.csv":  # that one may be cut anywhere
+        elif path.suffix in (".csv", ".html", ".svg") and path.name != "units.csv":  # a kill may cut units.csv
             expect(path.read_bytes()[-1:] in (b"\n", b""), f"{path.name} ends in the middle of a line")
 
 
 def workload(rng, folder, tasks=4, busy=True):
-    """A random one of a few short periods, so that a second of it is a lot."""
+    """Writes a random workload with a few short periods: one second of it holds many jobs."""
     path = folder / "random.yaml"
     Child("generate", "--dags", tasks, "--utilization", 0.9 if busy else 0.3, "--workers", 2, "--seed",
           rng.randrange(2**32), "-o", path).end({0})
@@ -97,7 +99,7 @@ def workload(rng, folder, tasks=4, busy=True):
 
 
 def some_command(rng, folder):
-    """Something that takes a while."""
+    """Returns a command that takes a while."""
     file = workload(rng, folder)
     out = ["--out", folder / "out"]
     return rng.choice([
@@ -112,7 +114,7 @@ def some_command(rng, folder):
 
 
 def interrupted(rng, folder):
-    """Ctrl-C at any moment, and perhaps once more."""
+    """Sends Ctrl-C at a random moment, and perhaps once more."""
     child = Child(*some_command(rng, folder))
     time.sleep(rng.uniform(0, 0.6))
     number = rng.choice([signal.SIGINT, signal.SIGTERM])
@@ -126,7 +128,7 @@ def interrupted(rng, folder):
 
 
 def stopped(rng, folder):
-    """SIGSTOP and SIGCONT: time jumps for everybody."""
+    """Sends SIGSTOP and SIGCONT: time jumps for all threads."""
     file = workload(rng, folder, busy=False)
     child = Child("run", file, "--duration", "1s", "--preemption", rng.choice(["none", "cooperative", "auto"]), "--out",
                   folder / "out")
@@ -140,7 +142,7 @@ def stopped(rng, folder):
 
 
 def fewer_processors(rng, folder):
-    """The affinity of every thread shrinks to one processor, and grows again, while jobs run."""
+    """The affinity of every thread shrinks to one processor and grows again, while jobs run."""
     usable = sorted(os.sched_getaffinity(0))
     file = workload(rng, folder, busy=False)
     child = Child("run", file, "--duration", "1s", "--preemption", rng.choice(["none", "cooperative", "auto"]), "--out",
@@ -150,13 +152,13 @@ def fewer_processors(rng, folder):
         try:
             for thread in os.listdir(f"/proc/{child.process.pid}/task"):
                 os.sched_setaffinity(int(thread), cpus)
-        except OSError:  # that thread has ended
+        except OSError:  # the thread has ended
             pass
     child.end({0})
     check_results(folder)
 
 
-# Ten times what its processor can do, and a DAG that is to be spared.
+# Ten times the load of its processor, with a DAG that must be spared.
 SPARED = """\
 name: spared
 platform: {workers: 1}
@@ -172,7 +174,7 @@ dags:
 
 
 def throttled(rng, folder):
-    """More SCHED_FIFO work than one processor has: the kernel takes it away from all threads of the class for a while."""
+    """More SCHED_FIFO work than one processor can do: the kernel pauses all real-time threads for a while."""
     file = folder / "random.yaml"
     Child("generate", "--dags", 4, "--utilization", 2, "--workers", 2, "--seed", rng.randrange(2**32), "-o", file).end({0})
     one = {rng.choice(sorted(os.sched_getaffinity(0)))}
@@ -198,7 +200,7 @@ def throttled(rng, folder):
 
 
 def clock_jumps(rng, folder):
-    """The time of day jumps by days and years, to and fro; nobody may wait for one."""
+    """The time of day jumps back and forth by days and years. No thread may wait for a time of day."""
     if CLOCK is None:
         raise Skipped("--clock is not given")
     jumping = {"env": os.environ | {"LD_PRELOAD": str(CLOCK)}}
@@ -214,14 +216,14 @@ def clock_jumps(rng, folder):
 
 
 def drop_realtime():
-    """No CAP_SYS_NICE from here on, whoever runs it; needs the capability to drop it."""
+    """Drops CAP_SYS_NICE for this and later programs, which itself needs a capability."""
     resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
     libc = ctypes.CDLL(None)
     libc.prctl(24, 23, 0, 0, 0)  # PR_CAPBSET_DROP, CAP_SYS_NICE
 
 
 def without_realtime(rng, folder):
-    """`auto` goes on without; `os` is an error that says what to do."""
+    """`auto` works without real-time rights; `os` is an error that says what to do."""
     file = workload(rng, folder, busy=False)
     child = Child("run", file, "--duration", "200ms", "--preemption", "auto", "--out", folder / "out",
                   prepare=drop_realtime).end({0})
@@ -245,7 +247,7 @@ def as_nobody(limit=None):
 
 
 def for_everybody(folder, rng):
-    """The program and a workload where `nobody` may read them."""
+    """Copies the program and a workload to where `nobody` may read them."""
     program = folder / "redag"
     shutil.copy(PROGRAM, program)
     program.chmod(0o755)
@@ -254,7 +256,7 @@ def for_everybody(folder, rng):
 
 
 def no_threads(rng, folder):
-    """RLIMIT_NPROC: some of the threads, or none, can be made."""
+    """RLIMIT_NPROC: only some of the threads, or none, can be created."""
     program, file = for_everybody(folder, rng)
     limit = (resource.RLIMIT_NPROC, (rng.randint(1, 6),) * 2)
     arguments = ["run", file, "--duration", "100ms", "--workers", rng.randint(1, 64), "--preemption", "none"]
@@ -265,7 +267,7 @@ def no_threads(rng, folder):
 
 
 def read_only(rng, folder):
-    """A folder of somebody else."""
+    """Writes into a folder of another user."""
     program, file = for_everybody(folder, rng)
     (folder / "out").mkdir(mode=0o755)
     command = rng.choice([["run", file, "--duration", "100ms"], ["simulate", file], ["compare", file, "--simulate"],
@@ -288,7 +290,7 @@ def writing_command(rng, folder, out):
 
 
 def small_files(rng, folder):
-    """RLIMIT_FSIZE: every file ends somewhere."""
+    """RLIMIT_FSIZE: every file is cut off at a random size."""
     size = rng.choice([0, rng.randrange(1000), rng.randrange(100_000)])
     arguments = writing_command(rng, folder, folder / "out")
     Child(*arguments, prepare=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))).end()
@@ -311,7 +313,7 @@ class Tmpfs:
 
 
 def full_disk(rng, folder):
-    """A small disk; an experiment goes on once there is room."""
+    """A small disk: an experiment continues once there is room."""
     with Tmpfs(folder / "disk", rng.choice([4096, 16384, 65536, 300_000])) as disk:
         arguments = writing_command(rng, folder, disk / "out")
         child = Child(*arguments).end()
@@ -327,7 +329,7 @@ def full_disk(rng, folder):
 
 
 def killed(rng, folder):
-    """kill -9 in the middle of an experiment, several times: nothing is lost, nothing counts twice."""
+    """kill -9 during an experiment, several times: no unit is lost or counted twice."""
     arguments = ["experiment", "acceptance", "--utilization", "0.2,0.5,0.8", "--sets", "60", "--seed",
                  rng.randrange(1000), "--jobs", rng.randint(1, 3), "--out"]
     for _ in range(rng.randint(1, 4)):
@@ -343,7 +345,7 @@ def killed(rng, folder):
 
 @functools.cache
 def least_memory():
-    """MiB of address space: with less the kernel kills the program while it is being mapped, before it begins."""
+    """Finds the MiB of address space below which the kernel kills the program while mapping it, before it begins."""
     def begins(limit):
         limits = (limit << 20, limit << 20)
         return subprocess.run([PROGRAM, "--version"], capture_output=True, check=False,
@@ -359,13 +361,13 @@ def little_memory(rng, folder):
                           ["analyze", file], ["run", file, "--duration", "100ms", "--preemption", "none"],
                           ["generate", "--dags", "20000"], ["assign", SOURCE / "workloads" / "robot.yaml"],
                           ["experiment", "acceptance", "--sets", "5", "--utilization", "0.5", "--out", folder / "out"]])
-    # 127: the loader itself had no room for the program's libraries.
+    # 127: the loader had no room for the program's libraries.
     child = Child(*command, prepare=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit))).end(GOOD | {127})
     check_results(folder)
 
 
 def few_files(rng, folder):
-    """RLIMIT_NOFILE, and standard streams that are closed."""
+    """RLIMIT_NOFILE, and closed standard streams."""
     limit = rng.randint(4, 12)
     closed = [descriptor for descriptor in (0, 1, 2) if rng.random() < 0.3]
 

@@ -16,8 +16,8 @@
 namespace redag::chaos {
 namespace {
 
-// Times of a random workload are microseconds: in their place years, so that releases, deadlines and the end come near
-// the largest time there is.
+// Replaces microseconds by years in a random workload: releases, deadlines and the end then come near the largest
+// representable time.
 void stretch(Workload &workload, Duration factor) {
   const auto scale = [factor](Duration &time) { time *= factor; };
   for (Dag &dag : workload.dags) {
@@ -87,7 +87,7 @@ std::string simulator_run(std::uint64_t seed, Survived &survived) {
         return trace.events.size() < most;
       });
   trace.info.end = result.end;
-  // How long jobs execute is not what the workload says here.
+  // Jobs run for other times than the workload states, and the check must not judge their execution times.
   const metrics::CheckReport report =
       metrics::check_trace(trace, metrics::rules_for(trace.info).without(metrics::Rule::Execution));
   if (!report.ok()) return report.to_string() + testing::describe(workload, trace.info.config);

@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""`redag analyze`, `sensitivity` and `assign`.
+"""Tests `redag analyze`, `sensitivity` and `assign`.
 
 Usage: analysis.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
@@ -12,7 +12,7 @@ import subprocess
 
 from program import CART, MISTAKEN, PROGRAM, SANITIZED, SOURCE, Case, body, in_terminal, interrupt, main, redag
 
-# Harmonic, U = 1/4 + 1/8 + 1/8: with rate-monotonic priorities on one worker everything up to U = 1 is schedulable.
+# Harmonic, U = 1/4 + 1/8 + 1/8: on one worker, rate-monotonic priorities schedule everything up to U = 1.
 HARMONIC = """\
 name: harmonic
 platform: {workers: 1, preemption: os}
@@ -24,7 +24,7 @@ dags:
   - name: c
     tasks: [{name: t, wcet: 2ms, period: 16ms}]
 """
-# By rate b answers after 5 ms, by deadline after 2 ms.
+# With priorities by rate, b answers after 5 ms; with priorities by deadline, after 2 ms.
 SHORT_DEADLINE = """\
 name: short
 platform: {workers: 1, preemption: os}
@@ -40,7 +40,7 @@ dags:
 class Analyze(Case):
     def test_table_and_verdict(self):
         result = self.expect(redag("analyze", self.cart, "--all"), 0)
-        # One worker, run to completion: plan (25 ms) blocks fast, which has 10 ms.
+        # One worker, run to completion: plan (25 ms) blocks fast, whose period is 10 ms.
         self.assertRegex(result.stdout, r"fast\.sense +10ms +- +- +no bound")
         self.assertRegex(result.stdout, r"slow\.plan +100ms +\S+ms +\S+ms +ok +dag_one_worker_deferred")
         self.assertIn("preemption: none\n", result.stdout)
@@ -61,7 +61,7 @@ class Analyze(Case):
         self.assertEqual(len(lines), 3)
 
     def test_suggestion_holds(self):
-        # One group that a lower rate holds too long for the higher one.
+        # A task of a lower rate holds the shared group too long for the task of the higher rate.
         text = """\
 name: shared
 platform: {workers: 2, preemption: os}
@@ -80,7 +80,7 @@ dags:
         self.assertIn("what to change in the file: wcet of slow.t: " + found[1], explained)
 
     def test_robot_has_every_bound(self):
-        # Two pipelines share an accelerator; the faster one answers later than its period and in time all the same.
+        # Two pipelines share an accelerator. The faster one answers later than its period, but before its deadline.
         robot = json.loads(self.expect(redag("analyze", SOURCE / "workloads" / "robot.yaml", "--json", "--check"), 0).stdout)
         self.assertTrue(all(row["bound_ns"] is not None for row in robot["tasks"] + robot["dags"]))
 
@@ -128,7 +128,7 @@ dags:
 
     def test_explanation(self):
         text = self.expect(redag("analyze", self.cart, "--preemption", "os", "--explain", "slow.plan"), 0).stdout
-        # 25 ms of its own and four times the 2 ms of fast: in 33 ms, fast comes at 0, 10, 20 and 30.
+        # 25 ms of its own, and four times the 2 ms of fast, which is released at 0, 10, 20 and 30 ms.
         self.assertIn("slow.plan: answers within 33ms of its release, deadline 100ms: ok", text)
         self.assertRegex(text, r"own execution +slow.plan +1 +25ms +75\.8 %")
         self.assertRegex(text, r"interference of +fast +4 +8ms +24\.2 %")
@@ -146,7 +146,7 @@ dags:
         first, second = document["chains"]
         self.assertEqual(first["age_ns"], sum(part["period_ns"] + part["response_ns"] for part in first["segments"]))
         self.assertLessEqual(first["reaction_ns"], first["age_ns"])
-        # Right after a read at 0: read at 100 ms, written at its deadline.
+        # Input that arrives right after the read at 0 is read at 100 ms, and written at that job's deadline.
         self.assertEqual((second["age_ns"], second["let_ns"]), (133_000_000, 200_000_000))
         self.expect(redag("analyze", self.cart, "--chain", "fast.sense,slow.plam"), 2, "did you mean 'slow.plan'?")
         self.expect(redag("analyze", self.cart, "--chain", "fast"), 2, "'fast' is a DAG")
@@ -174,7 +174,7 @@ dags:
         self.assertEqual(explained["explanation"]["name"], "slow")
 
     def test_exploration(self):
-        # plan is released with fast, whose two jobs go first, and has ended when fast comes again.
+        # plan is released with fast, whose two jobs run first. plan ends before the next release of fast.
         short = self.write("short.yaml", CART.replace("25ms", "7ms"))
         text = self.expect(redag("analyze", "--explore", short, "--check", "--all"), 0).stdout
         self.assertRegex(text, r"exploration +schedulable +bounds 3 of 3 tasks; \d+ states, 21 jobs a hyperperiod, exact")
@@ -344,7 +344,7 @@ class Assign(Case):
         self.assertIn("nothing to change", again.stdout)
 
     def test_audsley(self):
-        # J. Lehoczky, RTSS 1990: deadlines beyond periods, where neither rates nor deadlines decide.
+        # J. Lehoczky, RTSS 1990: deadlines beyond periods, where neither order by rates nor by deadlines works.
         file = self.write("lehoczky.yaml", """\
 name: lehoczky
 platform: {workers: 1, preemption: os}

@@ -2,9 +2,10 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Time and memory of the program are bounded: what a large workload or a long run costs, and what ends it.
+"""Tests that time and memory of the program are bounded: the cost of large workloads and long runs, and their limits.
 
-Usage: bounded.py PROGRAM SOURCE_DIR. Uses the standard library only. Judged are peak memory and what is said, never seconds.
+Usage: bounded.py PROGRAM SOURCE_DIR. Uses the standard library only. Judges peak memory and
+messages, never seconds.
 """
 import json
 import os
@@ -18,7 +19,7 @@ MIB = 1 << 20
 
 
 def independent(count, workers=1):
-    """Tasks of three periods that use half of the workers."""
+    """Returns a workload of tasks with three periods, which use half of the workers."""
     lines = ["name: many", f"platform: {{workers: {workers}, preemption: os}}", "dags:"]
     for i in range(count):
         period = 10_000_000 * (i % 3 + 1)
@@ -27,7 +28,7 @@ def independent(count, workers=1):
 
 
 def peak(*arguments):
-    """What `redag` wrote to standard output, and the most memory that it had, in bytes."""
+    """Runs `redag`. Returns its exit status, its standard output, and its peak memory in bytes."""
     with tempfile.TemporaryFile("w+") as out:
         process = subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=out, stderr=subprocess.DEVNULL)
         _, status, usage = os.wait4(process.pid, 0)
@@ -39,14 +40,14 @@ def peak(*arguments):
 @unittest.skipIf(SANITIZED, "a sanitizer's memory is not ours")
 class Memory(Case):
     def test_an_analysis_is_linear_in_the_tasks(self):
-        """With all terms, 1,000 tasks took 162 MiB and 2,000 took 621 MiB."""
+        """An earlier version kept all terms: 1,000 tasks took 162 MiB, and 2,000 took 621 MiB."""
         for workers in (1, 2):
             few, many = (peak("analyze", self.write(f"{count}.yaml", independent(count, workers)), "--json")[2]
                          for count in (500, 3000))
             self.assertLess(many - few, 60 * MIB, f"{workers} workers")
 
     def test_a_simulation_does_not_grow_with_its_length(self):
-        """Two tasks with a job each a microsecond; 32 bytes a job were kept."""
+        """Simulates two tasks with a job per microsecond each. An earlier version kept 32 bytes for each job."""
         fast = self.write("fast.yaml", "name: fast\nplatform: {workers: 2}\ndags:\n" + "".join(
             f"  - {{name: d{i}, tasks: [{{name: t, period: 1us, wcet: 300ns, bcet: 100ns}}]}}\n" for i in range(2)))
         sizes = []

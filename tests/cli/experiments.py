@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""`redag experiment` as its users meet it: the same results however it was run.
+"""Tests `redag experiment` from outside: the way in which it runs does not change its results.
 
 Usage: experiments.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
@@ -30,7 +30,7 @@ executors: [ideal, redag, redag-none, mte, ste]
 
 
 def start(case, folder, *arguments):
-    """An experiment that takes some seconds, once it has more units on file than before."""
+    """Starts an experiment that takes some seconds. Returns it once it has more units on file than before."""
     units = folder / "units.csv"
     lines = units.read_text().count("\n") if units.exists() else 2
     process = subprocess.Popen([PROGRAM, "experiment", *map(str, arguments), "--out", folder],
@@ -146,7 +146,7 @@ class Acceptance(Case):
         self.assertIn("3 DAGs, 2 workers, full preemption", texts)
 
     def test_violation_is_an_error_with_a_replay(self):
-        """A workload that misses is made to look as if a bound had accepted it."""
+        """A miss is changed to look as if a bound had accepted the workload."""
         self.acceptance("forged", "--sets", "2")
         units = self.folder / "forged" / "units.csv"
         lines = units.read_text().splitlines()
@@ -219,7 +219,8 @@ class Factorial(Case):
         self.assertEqual(self.results("one"), self.results("merged"))
 
         rows = list(csv.DictReader(self.results("one")[0].splitlines()))
-        # ideal, mte: workers x deadlines; redag, redag-none: x bounds; ste: deadlines. Each two DAGs and the total.
+        # Factors of ideal and mte: workers x deadlines; of redag and redag-none: bounds as well; of ste: deadlines.
+        # Each has two DAGs and the total.
         self.assertEqual(len(rows), (4 + 8 + 8 + 4 + 2) * 3)
         total = {(row["executor"], row["workers"], row["deadline_scale"], row["max_active"]): row
                  for row in rows if row["dag"] == "total"}
@@ -244,10 +245,10 @@ class Factorial(Case):
         self.expect(redag("report", self.folder / "done", self.folder / "done"), 2, "name one folder")
         (self.folder / "done" / "factorial.json").write_text("{}")
         self.expect(redag("report", self.folder / "done"), 2, "factorial.json: error: is no redag.experiment.factorial/2")
-        self.run_plan(self.folder / "done" / "plan.yaml", "done")  # a page in the folder is no stranger
+        self.run_plan(self.folder / "done" / "plan.yaml", "done")  # an earlier page is accepted
 
     def test_plan_in_the_folder_is_whole(self):
-        """A folder can be gone on with where the workload's file is not."""
+        """An experiment can continue in a folder where its workload's file is missing."""
         self.run_plan(self.plan(), "done")
         (self.folder / "cart.yaml").unlink()
         (self.folder / "elsewhere").mkdir()
@@ -307,7 +308,7 @@ class Factorial(Case):
         self.expect(redag("experiment", "factorial", threads, "--shard", "1/2"), 2, "belong to one machine")
 
     def test_threads(self):
-        """Real runs: one after the other, the ideal beside them in virtual time."""
+        """Real runs take turns. The ideal runs beside them in virtual time."""
         plan = self.write("plan.yaml", "experiment: factorial\nworld: threads\nduration: 300ms\nrepetitions: 2\n"
                           "workloads: cart.yaml\nexecutors: [ideal, redag-none, mte]\n")
         result = self.run_plan(plan, "threads", "-j4")
@@ -322,7 +323,7 @@ class Factorial(Case):
             self.assertLessEqual(int(row["released"]), 60)
 
     def test_ros2(self):
-        """What stands in for run_workload here simulates; with the real one it is the same command line."""
+        """A substitute for run_workload simulates here. The command line is that of the real program."""
         plan = self.write("plan.yaml", "experiment: factorial\nworld: ros2\nduration: 500ms\nrepetitions: 2\nworkers: [1, 2]\n"
                           "workloads: cart.yaml\nexecutors: [ideal, redag-none, mte, ste]\n")
         program = self.write("run_workload", f"""#!/bin/sh
@@ -340,7 +341,7 @@ exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --w
         self.assertIn("source the workspace", self.run_plan(plan, "worse", "--run-workload", "/no/such", status=2).stderr)
 
     def test_recorded_runs_become_part_of_an_experiment(self):
-        """Stands in for run_workload: a simulated run that says that nodes ran it."""
+        """Creates a substitute for run_workload: it simulates, and reports that nodes ran the workload."""
         cart = self.folder / "cart.yaml"
         self.run_plan(self.write("plan.yaml", "experiment: factorial\nduration: 500ms\nrepetitions: 2\n"
                                  "workloads: cart.yaml\nexecutors: [ideal, mte]\n"), "simulated")

@@ -2,8 +2,10 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Bad values: of every option that --help lists, of combinations of options, and in files. What is wrong is said, by the
-option's name or by file, line and column; the exit status is 2, nothing is written, and no terminal is steered.
+"""Tests bad values: of every option that --help lists, of combinations of options, and in files.
+
+The program must name the mistake by the option's name, or by file, line and column. It must exit with 2, write nothing,
+and print no control characters to the terminal.
 
 Usage: hostile.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
@@ -27,18 +29,18 @@ BAD = {
     "CPUS": ["x", "1-", "99999", "-1"],
     "i/n": ["0/3", "4/3", "1/0", "x", "1/" + HUGE],
 }
-FREE = {("experiment acceptance", "--name")}  # any name will do
+FREE = {("experiment acceptance", "--name")}  # accepts any name
 SEED = "--seed"
 
 
 def options_of(command):
-    """(name, type) of every option that takes a value."""
+    """Returns (name, type) of every option that takes a value."""
     text = redag(*command, "--help").stdout.split("Examples:")[0]
     return re.findall(r"^ +(?:-\w,)?(--[\w-]+) ([A-Zi][\w/.,-]*)(?=[ \n=])", text, re.MULTILINE)
 
 
 class EveryOption(Case):
-    """Found in --help, so that an option of tomorrow is tried as well."""
+    """Tries the options that --help lists, which includes future ones."""
 
     def arguments(self, command):
         if command in (["generate"], ["calibrate"], ["top"], ["experiment"], ["experiment", "acceptance"]):
@@ -75,7 +77,7 @@ class EveryOption(Case):
         self.assertGreater(tried, 400)
 
     def test_limits_are_said(self):
-        """Every number has a range, which the message names."""
+        """Every number has a range, which the message states."""
         for command in COMMANDS:
             for option, kind in options_of(command):
                 if kind in ("N", "X"):
@@ -120,12 +122,12 @@ class Combinations(Case):
                         says="redag-os: preemption 'os' needs a static policy")
         self.refuse("analyze", self.cart, "--executor", "mte", "--policy", "edf", says="--policy edf: 'mte'")
         self.refuse("compare", self.cart, "--executors", "mte,redag-none", "--preemption", "os", says="--preemption os")
-        # What at least one of them takes is fine.
+        # A value that at least one executor accepts is accepted.
         self.expect(redag("compare", self.cart, "--simulate", "--executors", "mte,redag", "--preemption", "os", "--duration", "1s"), 0)
         self.expect(redag("simulate", self.cart, "--executor", "redag-none", "--preemption", "none"), 0)
 
     def test_one_vocabulary_of_modes(self):
-        """A mode that is printed can be given."""
+        """A mode that is printed can also be given."""
         for arguments in (["simulate", self.cart], ["analyze", self.cart], ["compare", self.cart, "--simulate", "--duration", "1s"]):
             for given in ("none", "cooperative", "os", "auto"):
                 text = self.expect(redag(*arguments, "--preemption", given), 0).stdout

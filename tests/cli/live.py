@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""`redag top`: runs that are watched.
+"""Tests `redag top`, which watches runs.
 
 Usage: live.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
@@ -23,7 +23,7 @@ from program import PROGRAM, Case, main, redag
 
 
 class Top(Case):
-    """A live executor, seen from outside. Others may run on this machine: each test looks for its own."""
+    """Watches a live executor from outside. Other executors may run on this machine: each test looks for its own."""
 
     def start(self, *arguments):
         process = subprocess.Popen([PROGRAM, "run", self.cart, "--duration", "1h", "--json", *map(str, arguments)],
@@ -36,7 +36,7 @@ class Top(Case):
         return pathlib.Path(f"/dev/shm/redag.{process.pid}.0")
 
     def frame_of(self, process, until=lambda frame: True):
-        """The first frame that is as wanted."""
+        """Returns the first frame that satisfies the condition."""
         deadline = time.monotonic() + 100
         while time.monotonic() < deadline:
             result = redag("top", process.pid, "--json")
@@ -58,7 +58,8 @@ class Top(Case):
         self.assertEqual([task["name"] for task in frame["tasks"]], ["sense", "act", "plan"])
         self.assertEqual([task["deadline_ns"] for task in frame["tasks"]], [10_000_000, 10_000_000, 100_000_000])
         self.assertEqual(frame["preemption"], "none")
-        # Without preemption plan makes sense miss a release, and so has a bound alone: its own time and both others'.
+        # Without preemption plan makes sense miss a release. Only plan has a bound: its own time and that of both
+        # others.
         self.assertEqual([task["bound_ns"] for task in frame["tasks"]], [None, None, 27_000_000])
         for task in frame["tasks"]:
             self.assertGreaterEqual(task["response"]["max_ns"], task["response"]["p50_ns"])
@@ -135,12 +136,13 @@ class Top(Case):
             self.expect(redag("top", "--folder", self.folder, "--list"), 0)
 
     def linked(self, folder, process):
-        """The page of `process`, in a folder where those of others are not. In /dev/shm too, as links need."""
+        """Links the page of `process` into a folder without other pages. The folder is in /dev/shm, because links
+        cannot leave it."""
         self.frame_of(process)
         os.link(self.page(process), folder / self.page(process).name)
 
     def test_on_a_terminal(self):
-        """Keys, a restart of the executor, and the terminal afterwards."""
+        """Tests keys, a restart of the executor, and the terminal afterwards."""
         first = self.start()
         self.frame_of(first)
         screen = Screen(self, first.pid)
@@ -152,7 +154,8 @@ class Top(Case):
         screen.read_until("since the start")
         screen.resize(10, 40)
         screen.read_until("fast.act")
-        # Erased before it is written: afterwards the last character of a line as wide as the terminal would go, too.
+        # The line is erased before it is written. Erasing afterwards would remove the last character of a full line,
+        # too.
         self.assertRegex(screen.read_until("q quit"), r"\033\[J(\033\[\d+m)?\Z")
         first.kill()
         first.wait(timeout=100)
@@ -169,7 +172,7 @@ class Top(Case):
             screen.read_until("waiting for one")
             first, second = sorted((self.start(), self.start()), key=lambda process: process.pid)
             self.linked(folder, first)
-            screen.read_until(f"redag {first.pid}")  # the only one
+            screen.read_until(f"redag {first.pid}")  # the only executor
             self.linked(folder, second)
             screen.press("l")
             screen.read_until("which executor?")
@@ -177,13 +180,13 @@ class Top(Case):
             screen.read_until(f"2 {second.pid}")
             screen.press(DOWN)
             screen.read_until(f"> 2 {second.pid}")
-            screen.press(DOWN + UP)  # it stays within the list
+            screen.press(DOWN + UP)  # the selection stays within the list
             screen.read_until(f"> 1 {first.pid}")
             screen.press(PAGE_DOWN)
             screen.read_until(f"> 2 {second.pid}")
             screen.press(PAGE_UP)
             screen.read_until(f"> 1 {first.pid}")
-            screen.press("7")  # there are two
+            screen.press("7")  # there are only two
             screen.press(END)
             screen.read_until(f"> 2 {second.pid}")
             screen.press("\r")
@@ -216,7 +219,7 @@ class Top(Case):
         screen.press(" ")
         screen.read_until("paused")
         screen.press(" ")
-        # Room for two rows of five: two DAGs and three tasks.
+        # Leaves room for two of five rows: two DAGs and three tasks.
         screen.press("i")
         screen.resize(8, 120)
         screen.press(END)
@@ -232,7 +235,7 @@ ESCAPE = "\033"
 
 
 class Screen:
-    """`redag top` on a terminal of its own."""
+    """Runs `redag top` on a terminal of its own."""
 
     def __init__(self, case, *arguments):
         self.case, self.seen = case, ""
@@ -256,7 +259,7 @@ class Screen:
         os.write(self.terminal, keys.encode())
 
     def read_until(self, text):
-        """What comes before."""
+        """Returns the output up to `text`."""
         deadline = time.monotonic() + 100
         while text not in self.seen:
             self.case.assertLess(time.monotonic(), deadline, f"no '{text}' in: {self.seen[-3000:]}")
@@ -266,7 +269,7 @@ class Screen:
 
     def end(self):
         self.read_until("\033[?1049l")
-        # Not closed before it has ended: that would hang it up.
+        # Closing the terminal earlier would hang the program up.
         self.case.assertEqual(os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1]), 0)
         os.close(self.terminal)
 

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the tests of the program share: how it is called, and a folder for each test.
+"""Shared by the tests of the program: how to call it, and a folder for each test.
 
-The first two arguments of whoever imports this are the program and the source tree.
+The first two arguments of the importing script are the program and the source tree.
 """
 import fcntl
 import json
@@ -22,8 +22,8 @@ import unittest
 if len(sys.argv) < 3:
     sys.exit(f"usage: {sys.argv[0]} PROGRAM SOURCE_DIR [unittest arguments]")
 PROGRAM, SOURCE = (pathlib.Path(argument).resolve() for argument in sys.argv[1:3])
-# Set where the program is built with sanitizers, several times as slow: they look for other faults than these tests,
-# which run in whole without them.
+# Set for builds with sanitizers, which run several times slower. They look for other faults than these tests, which
+# also run in full without sanitizers.
 SANITIZED = os.environ.get("REDAG_SANITIZED") == "1"
 
 CART = """\
@@ -52,14 +52,14 @@ def redag(*arguments, text=None, **options):
 
 
 def body(text):
-    """A JSON document without where it comes from: what has to be the same for the same input."""
+    """Removes provenance from a JSON document: the rest must be equal for equal input."""
     document = json.loads(text)
     del document["provenance"]
     return json.dumps(document)
 
 
 def interrupt(process, after=0.0, by=signal.SIGINT):
-    """Waits until the process listens to the signal, which would just kill it while it starts, and for `after` s more."""
+    """Interrupts a process `after` s after it has begun to listen for the signal, which would kill it before."""
     listens = 0
     while process.poll() is None and not listens >> (by - 1) & 1:
         time.sleep(0.01)
@@ -70,10 +70,10 @@ def interrupt(process, after=0.0, by=signal.SIGINT):
 
 
 def in_terminal(*arguments, columns=80, **environment):
-    """Runs on a pseudo-terminal; returns exit status and everything written."""
+    """Runs a command on a pseudo-terminal. Returns the exit status and all output."""
     try:
         pid, terminal = pty.fork()
-    except OSError as error:  # a chroot without /dev/pts
+    except OSError as error:  # there is no /dev/pts in this chroot
         raise unittest.SkipTest(f"no pseudo-terminal to be had here: {error}") from error
     if pid == 0:
         os.environ.update(TERM="xterm", **environment)
@@ -86,7 +86,7 @@ def in_terminal(*arguments, columns=80, **environment):
     while True:
         try:
             block = os.read(terminal, 65536)
-        except OSError:  # Linux says EIO once the other end is closed
+        except OSError:  # Linux returns EIO once the other end is closed
             break
         if not block:
             break
@@ -114,7 +114,7 @@ class Case(unittest.TestCase):
         return result
 
     def document(self, result, form, status=0):
-        """Standard output is one JSON document and nothing else."""
+        """Checks that standard output is one JSON document and nothing else."""
         self.expect(result, status)
         document = json.loads(result.stdout)
         self.assertEqual(document["format"], form)

@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is made of results: `redag diff`, `check-trace`, `report`, `tune`.
+"""Tests the commands that read results: `redag diff`, `check-trace`, `report`, `tune`.
 
 Usage: results.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
@@ -44,7 +44,7 @@ class Diff(Case):
         result = redag("diff", folder / "mte", folder / "redag", "--json")
         self.assertEqual(self.document(result, "redag.difference/2")["a"]["seeds"], [1, 2, 3])
         self.expect(redag("diff", folder, folder / "mte"), 2, "holds runs of several kinds: redag, mte", "name one of them")
-        # Repetitions by any other name, as run_workload of redag_rclcpp has them.
+        # Repetitions in folders of other names, as run_workload of redag_rclcpp writes them.
         for n in 1, 2, 3:
             (folder / "redag" / f"repetition-{n}").rename(folder / "redag" / str(n))
         again = self.document(redag("diff", folder / "mte", folder / "redag", "--json"), "redag.difference/2")
@@ -105,7 +105,7 @@ class CheckTrace(Case):
     def test_a_lie_is_found(self):
         trace = self.trace()
         text = trace.read_text()
-        # The same events under another policy: somebody was chosen against the rules.
+        # The same events under another policy: a job was chosen against the rules.
         lie = text.replace('"policy":"rate_monotonic"', '"policy":"fifo"', 1)
         self.assertNotEqual(lie, text)
         result = self.expect(redag("check-trace", self.write("lie.jsonl", lie)), 1)
@@ -113,7 +113,7 @@ class CheckTrace(Case):
         document = self.document(redag("check-trace", "--json", self.folder / "lie.jsonl"), "redag.check-trace/1", 1)
         self.assertGreater(document["traces"][0]["check"]["violation_count"], 0)
 
-        # Nodes see no decisions: of them nobody can say that.
+        # Nodes record no decisions: the checker must not judge them.
         nodes = lie.replace('"driver":"simulator"', '"driver":"ros_nodes"', 1)
         self.assertNotEqual(nodes, lie)
         self.expect(redag("check-trace", self.write("nodes.jsonl", nodes)), 0)
@@ -142,7 +142,7 @@ class Report(Case):
         data = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
         self.assertIn("report", data["provenance"]["command"])
         self.assertIn("simulate", data["groups"][0]["runs"][0]["provenance"]["command"])
-        # A page among the results does not keep the next run from writing there.
+        # An existing page does not prevent the next run from writing into the folder.
         self.results("out")
 
     def test_data(self):
@@ -265,7 +265,7 @@ dags:
         interrupt(process, 0.5)
         out, err = process.communicate(timeout=250)
         self.assertIn("interrupted", err)
-        self.assertIn(process.returncode, (0, 2))  # 2: not even the workload as it is was judged
+        self.assertIn(process.returncode, (0, 2))  # 2: not even the given workload was judged yet
         self.assertEqual(process.returncode == 0, "stopped after" in out)
 
     def test_bad_input(self):

@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Simulations, runs and comparisons: what they print and write, and what streams and signals do to them.
+"""Tests simulations, runs and comparisons: their output and files, and the effect of streams and signals.
 
 Usage: runs.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
@@ -43,7 +43,7 @@ class Calibrate(Case):
         self.assertIn("overheads: release", redag("simulate", self.cart, "--duration", "1s", "--overheads", path).stdout)
 
     def test_runs_and_their_reports_charge_it(self):
-        # As a quiet machine has them: a busy one leaves nothing that could be bounded.
+        # Overheads of a quiet machine. On a busy one no bound would remain.
         path = self.write("overheads.yaml", "overheads: {normal: {timer: 5us, dispatch: 50us, preempt: 5us, lateness: 1ms, stall: 2ms, "
                           "stall_per_second: 5ms, noise: 50us, noise_per_second: 5ms, clock: 1us}}\n")
         out = self.folder / "out"
@@ -269,7 +269,7 @@ class Interrupts(Case):
         self.assertIn("stopped early", text)
 
     def test_one_wish_that_arrives_twice_is_one(self):
-        # As timeout(1) does: first to the process, then to its group.
+        # As timeout(1) does: signals the process first, then its group.
         process = self.start("run", self.cart, "--duration", "1h", "--json")
         interrupt(process, 2)
         time.sleep(0.02)
@@ -279,7 +279,7 @@ class Interrupts(Case):
         self.assertTrue(json.loads(text)["stopped"])
 
     def test_the_second_one_ends_it_at_once(self):
-        # A job that cannot be waited for: the run asks it to end, and then waits for seconds.
+        # A job that does not end: the run asks it to end, and then waits for seconds.
         endless = self.write("endless.yaml", "name: e\nplatform: {workers: 1, preemption: none}\ndags:\n"
                              "  - {name: d, tasks: [{name: t, wcet: 1000s, period: 2000s}]}\n")
         process = self.start("run", endless, "--duration", "3000s")
@@ -305,7 +305,7 @@ class Killed(Case):
         process = subprocess.Popen([PROGRAM, "run", self.cart, "--duration", "1h", "--preemption", "none", "--out", out,
                                     *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         record = out / "flight" / "events.bin"
-        for _ in range(2000):  # until several collections have been recorded
+        for _ in range(2000):  # until several collections are recorded
             if "--no-flight" in arguments and out.exists() or record.exists() and record.stat().st_size > 4 * 4096:
                 break
             time.sleep(0.02)

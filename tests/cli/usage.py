@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The program as its users first meet it: help, mistakes, workloads checked and generated.
+"""Tests the first contact with the program: help, mistakes, checking and generating workloads.
 
 Usage: usage.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
@@ -42,7 +42,7 @@ class Usage(Case):
                 self.assertIn(option, options, command)
 
     def test_the_page_has_the_commands_and_their_options(self):
-        """docs/cli.md: every command has a row, and an option named in a command's section is one of that command."""
+        """docs/cli.md has a row for every command, and a command's section names only options of that command."""
         page = (SOURCE / "docs" / "cli.md").read_text(encoding="utf-8")
         helps = {" ".join(command): redag(*command, "--help").stdout for command in [*COMMANDS, ["recover"]]}
         commands = re.findall(r"^  ([a-z][a-z-]+) {2,}", redag("--help").stdout.split("Subcommands:")[1], re.M)
@@ -111,7 +111,7 @@ class Validate(Case):
         json.loads(result.stdout)
 
     def test_strict(self):
-        # 3 tasks of 60 % on one worker: legal, and a warning.
+        # 3 tasks of 60 % on one worker: legal, with a warning.
         text = CART.replace("wcet: 25ms", "wcet: 99ms")
         crowded = self.write("crowded.yaml", text)
         warned = redag("validate", crowded)

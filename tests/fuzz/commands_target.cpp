@@ -17,7 +17,7 @@
 namespace redag::fuzz {
 namespace {
 
-// 0: yes, 1: the answer is no. Anything else is not an answer.
+// True if the command exits with 0 (yes) or 1 (no). Any other status is a failure.
 bool answers(const std::vector<std::string> &arguments) {
   static const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
   cli::Console console(nowhere, {}, nowhere, {});
@@ -25,7 +25,7 @@ bool answers(const std::vector<std::string> &arguments) {
   return status == 0 || status == 1;
 }
 
-// What is asked for grows with the number of releases: some of the fastest task's.
+// Limits the run to some releases of the fastest task: its cost grows with their number.
 Duration some_releases(const Workload &workload) {
   constexpr Duration kReleases = 30;
   Duration fastest = kSecond;
@@ -51,7 +51,7 @@ void commands_target(std::string_view input) {
   REDAG_CHECK(answers({"report", results}), "report");
   REDAG_CHECK(answers({"analyze", file, "--json"}), "analyze");
   REDAG_CHECK(answers({"analyze", file, "--preemption", "none", "--explore=1000"}), "analyze --explore");
-  constexpr std::size_t kMostTasks = 4;  // of what analyses again and again
+  constexpr std::size_t kMostTasks = 4;  // limit for the commands that analyse repeatedly
   if (loaded->workload.task_count() > kMostTasks) return;
   REDAG_CHECK(answers({"sensitivity", file, "--json"}), "sensitivity");
   REDAG_CHECK(answers({"assign", file, "--json"}), "assign");

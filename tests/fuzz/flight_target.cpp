@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kBlockBytes = 4096;
 
-// Random bytes have no right checksums: put right what the reader only compares.
+// Corrects the checksums, which random bytes rarely match.
 std::string with_checksums(std::string_view input) {
   std::string blocks(input);
   for (std::size_t at = 0; at + kBlockBytes <= blocks.size(); at += kBlockBytes) {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// libFuzzer's entry for one target, which the build names.
+// libFuzzer's entry point for one target, whose name the build sets.
 #include <cstddef>
 #include <cstdint>
 

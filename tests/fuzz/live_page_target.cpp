@@ -18,7 +18,7 @@ namespace {
 using live::page::FrameHeader;
 using live::page::Header;
 
-// Random bytes have no right checksum: put right what the reader only compares.
+// Corrects the checksum, which random bytes rarely match.
 void complete(std::string &page) {
   Header header{};
   if (page.size() < sizeof(header)) return;
@@ -42,7 +42,7 @@ void complete(std::string &page) {
 void live_page_target(std::string_view input) {
   std::string bytes(input);
   complete(bytes);
-  const int tries = 1;  // nobody goes on writing
+  const int tries = 1;  // no writer changes the page meanwhile
   const Result<live::Page> page = live::read_page(scratch_file("redag.1.0", bytes), tries);
   if (!page) {
     REDAG_CHECK(!page.error().empty(), "a refusal says why");

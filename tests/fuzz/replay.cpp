@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Runs a target on files and on those of folders: the corpus as a test, and a crash once more in a debugger.
+// Runs a target on files, and on the files of folders: the corpus as a test, or a crash again in a debugger.
+//
 //   redag_fuzz_replay <target> <file or folder>...
 #include <algorithm>
 #include <cstdio>
@@ -19,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using redag::fuzz::kTargets;
 
-// Of processor time, on any machine and under sanitizers: bad input costs milliseconds.
+// Limit in processor time, on any machine and under sanitizers. Bad input costs milliseconds.
 constexpr double kMostSeconds = 20;
 
 std::vector<fs::path> files_of(const std::vector<std::string> &places) {
@@ -46,7 +47,7 @@ int replay(const redag::fuzz::Target &target, const std::vector<fs::path> &files
       std::fprintf(stderr, "%s: cannot be read\n", file.c_str());
       return 2;
     }
-    std::fprintf(stderr, "%s\n", file.filename().c_str());  // the last one named is the one that crashed
+    std::fprintf(stderr, "%s\n", file.filename().c_str());  // after a crash, the last name is that of the file
     const double begin = cpu_seconds();
     target.run(input);
     const double seconds = cpu_seconds() - begin;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A folder of the process in memory, for readers that take paths; removed when the process ends as it should.
+// A folder in memory for readers that take paths. It is removed when the process ends normally.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@
 
 namespace redag::fuzz {
 
-/// The folder, made at the first call.
+/// Returns the path of the folder, which the first call creates.
 [[nodiscard]] const std::string &scratch_folder();
 
-/// Writes a file in it, which only its owner can read, and returns its path.
+/// Writes a file into the folder, readable by its owner only, and returns its path.
 std::string scratch_file(std::string_view name, std::string_view content);
 
 }  // namespace redag::fuzz

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Readers of input from outside as functions of bytes. A target ends by returning; what is wrong with the reader ends
-// the process: a failed REDAG_CHECK, a sanitizer's finding, too much time or memory. One thread.
+// Functions of bytes that run the readers of outside input. A target returns, or it ends the process: a failed
+// REDAG_CHECK, a sanitizer's finding, too much time or memory. Single-threaded.
 #pragma once
 
 #include <array>
@@ -10,25 +10,26 @@
 
 namespace redag::fuzz {
 
-/// Workload YAML, for the simulator and for ROS 2 (callbacks, no wcet); what is accepted survives being written.
+/// Reads workload YAML, for the simulator and for ROS 2 (callbacks, no wcet). An accepted workload must survive being
+/// written.
 void workload_target(std::string_view input);
-/// Plans of experiments.
+/// Reads plans of experiments.
 void plan_target(std::string_view input);
-/// events.jsonl, and everything that is made of a trace: checks, summary, jobs.csv, Perfetto, report.
+/// Reads events.jsonl, and makes everything that is made of a trace: checks, summary, jobs.csv, Perfetto, report.
 void trace_target(std::string_view input);
-/// jobs.csv.
+/// Reads jobs.csv.
 void jobs_csv_target(std::string_view input);
-/// comparison.json beside recorded runs.
+/// Reads comparison.json beside recorded runs.
 void comparison_target(std::string_view input);
-/// units.csv of an experiment.
+/// Reads units.csv of an experiment.
 void units_target(std::string_view input);
-/// The page of shared memory that `redag top` reads.
+/// Reads the page of shared memory of `redag top`.
 void live_page_target(std::string_view input);
-/// The record of a run that was killed; what is recovered makes results.
+/// Recovers the record of a killed run, and makes results of it.
 void flight_target(std::string_view input);
-/// Values of the command line and of files: durations, processors, utilizations, patterns of ROS names.
+/// Parses values of the command line and of files: durations, processors, utilizations, patterns of ROS names.
 void values_target(std::string_view input);
-/// A workload that the loader accepts, and every subcommand.
+/// Runs every subcommand on a workload that the loader accepts.
 void commands_target(std::string_view input);
 
 struct Target {

@@ -29,7 +29,7 @@ void units_target(std::string_view input) {
     (void)to_csv(acceptance, counter.results());
     (void)to_svg(acceptance, counter.results());
   }
-  // To go on with: what is accepted once is accepted again, and the same.
+  // An accepted journal must be accepted again, with the same content, before it is continued.
   Result<Journal> journal = Journal::open(path, kSubject);
   if (!journal) {
     REDAG_CHECK(!journal.error().empty(), "a refusal says why");

@@ -11,7 +11,7 @@
 namespace redag::fuzz {
 namespace {
 
-// What the loader accepts is without mistakes, and writing it loses nothing.
+// An accepted workload must be free of errors, and writing it must lose nothing.
 void load(std::string_view input, LoadOptions options) {
   const Result<LoadedWorkload> loaded = parse_workload(input, "fuzz.yaml", options);
   if (!loaded) {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// In place of redag/base/check.cpp: a broken invariant ends the exploration, with the run that breaks it.
+// Replaces redag/base/check.cpp: a broken invariant ends the exploration and reports the run that breaks it.
 #include "redag/base/check.hpp"
 
 #include <string>

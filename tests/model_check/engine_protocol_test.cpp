@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Every interleaving of small uses of the engine: how jobs are released, handed to threads, run, preempted, and how the
-// engine is halted.
+// Explores every interleaving of small uses of the engine: releasing jobs, giving them to threads, running and
+// preempting them, and halting the engine.
 #include <array>
 #include <stdexcept>
 
@@ -28,7 +28,7 @@ INSTANTIATE_TEST_SUITE_P(Modes, EngineProtocol,
                          ::testing::Values(Preemption::None, Preemption::Cooperative, Preemption::Full),
                          [](const auto &instance) { return name_of(instance.param); });
 
-// Nothing but a job's own wake-up makes it run: if one is lost, the wait does not end.
+// Only a job's own wake-up makes it run. If one is lost, the wait does not end.
 void what_is_released_runs_once(const Platform &platform) {
   Countdown all(3);
   const auto work = [&](const Job &) {
@@ -54,7 +54,7 @@ class LookingThreads : public EngineProtocol {};
 INSTANTIATE_TEST_SUITE_P(Modes, LookingThreads, ::testing::Values(Preemption::None, Preemption::Cooperative),
                          [](const auto &instance) { return name_of(instance.param); });
 
-// A job that is handed to a thread which still looks for one; or which has just looked for the last time.
+// A job is given to a thread that still looks for one, or that has just looked for the last time.
 TEST_P(LookingThreads, RunWhatIsReleased) {
   expect_holds([] {
     Platform looking = platform(1);
@@ -81,7 +81,7 @@ TEST_P(EngineProtocol, WhatIsReleasedRunsThoughSleepersWakeForNoReason) {
       ExploreOptions{true, 50'000'000, 1, false});
 }
 
-// Started before there are threads, while they come, and after.
+// A release before the threads exist, while they start, and after.
 TEST_P(EngineProtocol, AReleaseDuringTheStartIsNotLost) {
   expect_holds([] {
     Countdown all(1);
@@ -97,7 +97,7 @@ TEST_P(EngineProtocol, AReleaseDuringTheStartIsNotLost) {
   });
 }
 
-// The halt, and the end of the threads, at every point of a run.
+// The halt and the end of the threads at every point of a run.
 TEST_P(EngineProtocol, NothingRunsOnceItIsIdleAfterAHalt) {
   expect_holds([] {
     Machine machine(ladder(2), platform(1), {nullptr, nullptr});
@@ -106,7 +106,7 @@ TEST_P(EngineProtocol, NothingRunsOnceItIsIdleAfterAHalt) {
     machine.release(1);
     machine.finish();
     explored::join(source);
-    machine.release(1);  // ignored
+    machine.release(1);  // ignored after the halt
   });
 }
 
@@ -120,7 +120,7 @@ TEST_P(EngineProtocol, AHaltFindsTwoThreadsAtWork) {
   });
 }
 
-// As the destructor does it: without waiting first.
+// Joins without waiting first, as the destructor does.
 TEST_P(EngineProtocol, JoinWaitsForWhatHasStarted) {
   expect_holds([] {
     Machine machine(ladder(2), platform(1), {nullptr, nullptr});
@@ -136,7 +136,7 @@ TEST_P(EngineProtocol, JoinWaitsForWhatHasStarted) {
   });
 }
 
-// A release that met no halt yet decides while the threads are told to end.
+// A release that began before the halt decides while the threads are told to end.
 TEST_P(EngineProtocol, JoinWaitsForADecisionUnderWay) {
   expect_holds([] {
     Machine machine(ladder(1), platform(1), {nullptr});
@@ -181,7 +181,7 @@ TEST_P(EngineProtocol, AHaltFromABodyEndsTheRun) {
   });
 }
 
-// Three tasks, two of them of a DAG that runs one job at a time; two of the three in one group.
+// Three tasks. Two of them belong to a DAG that runs one job at a time, and two of the three share a group.
 TEST_P(EngineProtocol, BoundsAndGroupsHold) {
   expect_holds([] {
     Room dag(1);
@@ -216,7 +216,7 @@ TEST_P(EngineProtocol, BoundsAndGroupsHold) {
   });
 }
 
-// One worker: the low job is preempted wherever the mode allows it, and always goes on.
+// One worker. The low job is preempted wherever the mode allows it, and always resumes.
 TEST_P(EngineProtocol, PreemptedJobsResume) {
   expect_holds([] {
     Countdown all(3);
@@ -243,7 +243,7 @@ TEST_P(EngineProtocol, PreemptedJobsResume) {
   });
 }
 
-// A task's next job waits for the one before it; successors get their data.
+// A task's next job waits for the previous one, and successors get their data.
 TEST_P(EngineProtocol, ChainsRunInTheirOrder) {
   expect_holds([] {
     Workload workload = ladder(2);
@@ -275,8 +275,8 @@ TEST_P(EngineProtocol, ChainsRunInTheirOrder) {
   });
 }
 
-// The last job's body releases the others: one worker is free, and its thread sleeps. Which thread begins the first of
-// them depends on which is free and awake first; a thread that is robbed may be given the second.
+// The last task's body releases a job while one worker is free and its thread sleeps. The thread that is first free and
+// awake begins the job. A thread whose job was stolen may be given another one.
 TEST_P(EngineProtocol, AJobIsBegunByItsThreadOrByOneThatIsFreeBefore) {
   int own = 0;
   int robbed = 0;
@@ -330,7 +330,7 @@ TEST_P(EngineProtocol, AnExceptionEndsItsJobAlone) {
   });
 }
 
-// wait_idle() with an end: either way the truth is told.
+// wait_idle() with a deadline: the result is correct whether the deadline passes or not.
 TEST_P(EngineProtocol, WaitIdleWithADeadline) {
   expect_holds(
       [] {
@@ -348,7 +348,7 @@ TEST_P(EngineProtocol, WaitIdleWithADeadline) {
       ExploreOptions{true, 50'000'000, 0, true});
 }
 
-// Events drained while jobs run: none lost, and each job's in order.
+// Events are drained while jobs run. None is lost, and each job's events are in order.
 TEST_P(EngineProtocol, EventsAreDrainedInOrder) {
   expect_holds([] {
     Countdown all(2);
@@ -398,12 +398,12 @@ TEST(EngineStart, AThreadThatCannotBeHadEndsTheOthers) {
   });
 }
 
-// Nothing is left for real-time threads, from when the keeper of their share first looks: at any moment of a run.
+// Real-time threads have no share left from the moment when the throttling guard first looks, at any point of a run.
 TEST(EngineShare, OnlyJobsOfLowerCriticalityAreOrdinaryThreads) {
   int ordinary = 0;
   int realtime = 0;
   expect_holds([&] {
-    std::array<int, 16> priorities{};  // of the explorer's threads
+    std::array<int, 16> priorities{};  // indexed by the explorer's threads
     priorities.fill(1);
     const testing::ObjectId object = explored::new_object();
     runtime::on_set_priority = [&](std::uint32_t thread, int priority) {
@@ -419,7 +419,8 @@ TEST(EngineShare, OnlyJobsOfLowerCriticalityAreOrdinaryThreads) {
     workload.dags[1].criticality = Criticality::High;
     Countdown all(2);
     Platform platform{Preemption::Full, 1, 2, false, 0};
-    platform.throttling = runtime::Throttling{0, explored::kForever / kMicrosecond + 1};  // it looks when it is woken
+    // The guard looks only when it is woken.
+    platform.throttling = runtime::Throttling{0, explored::kForever / kMicrosecond + 1};
     Machine machine(workload, platform,
                     {[&](const Job &) {
                        ++(is_realtime() ? realtime : ordinary);
@@ -443,7 +444,7 @@ TEST(EngineShare, OnlyJobsOfLowerCriticalityAreOrdinaryThreads) {
   EXPECT_GT(realtime, 0);
 }
 
-// A watchdog looks while jobs begin, are preempted and end: what it names is in progress then, and a limit is told
+// The watchdog looks while jobs begin, are preempted and end. It reports only jobs in progress, and each limit only
 // once.
 TEST_P(EngineProtocol, AWatchdogSeesOnlyJobsInProgress) {
   expect_holds([] {
@@ -452,7 +453,7 @@ TEST_P(EngineProtocol, AWatchdogSeesOnlyJobsInProgress) {
       task.budget = 1;
       task.on_budget = OnBudget::Log;
     }
-    runtime::cpu_of_others = kSecond;  // every look finds a budget used
+    runtime::cpu_of_others = kSecond;  // every look finds a budget exceeded
     Countdown all(2);
     std::array<int, 2> begun{};
     const auto work = [&](const Job &job) {

@@ -15,7 +15,7 @@
 namespace redag::testing {
 namespace {
 
-// Threads that each run one function; joined by thread 0.
+// Runs each function on a thread of its own; thread 0 joins them.
 void run_all(const std::vector<std::function<void()>> &bodies) {
   std::vector<std::uint32_t> threads;
   threads.reserve(bodies.size());
@@ -75,7 +75,8 @@ TEST(Explorer, FindsADeadlockOfTwoLocks) {
   EXPECT_NE(found.failure.find("nobody can go on"), std::string::npos) << found.failure;
 }
 
-// A sleeper that does not look again under the futex's own check misses a wake-up between its look and its sleep.
+// A sleeper must check the value again under the futex's own check. Otherwise it misses a wake-up between its check and
+// its sleep.
 TEST(Explorer, FindsAWakeUpThatIsLost) {
   for (const bool looks_again : {true, false}) {
     const Exploration found = explore([&] {
@@ -152,12 +153,12 @@ TEST(Explorer, WakeUpsForNoReasonComeAsOftenAsAllowed) {
 // ---- the reduction leaves out nothing ----
 
 struct Step {
-  int kind = 0;  // 0: load, 1: store, 2: lock .. unlock around a store, 3: wait while 0, 4: store and wake, 5: timed 3
+  int kind = 0;  // 0: load, 1: store, 2: store under a lock, 3: wait while 0, 4: store and wake, 5: timed 3
   std::size_t object = 0;
 };
 using Program = std::vector<std::vector<Step>>;
 
-// What each thread saw and how each object ended, in every execution; deadlocks are ends too.
+// The values that each thread saw and each object had at the end, for every execution; deadlocks count as ends.
 std::set<std::string> outcomes(const Program &program, bool reduce, Exploration &all) {
   std::set<std::string> seen;
   all = explore(
@@ -190,7 +191,8 @@ std::set<std::string> outcomes(const Program &program, bool reduce, Exploration 
                   break;
                 case 3:
                 case 5: {
-                  // A wait for ever would end in a deadlock, and that ends an exploration: thread 0 wakes at the end.
+                  // An endless wait would end the exploration with a deadlock. The last thread therefore stores to
+                  // every object and wakes all waiters.
                   const bool woken = explored::wait(
                       id, [&] { return value == 0; }, step.kind == 5 ? 5 : explored::kForever);
                   views[t] += woken ? "w" : "t";
@@ -218,8 +220,8 @@ std::set<std::string> outcomes(const Program &program, bool reduce, Exploration 
   return seen;
 }
 
-// The store of thread 1 goes last although its load came first, and thread 0 has seen the last thread's stores: with
-// sleep sets, to reverse each race by the thread that lost it is not enough.
+// Thread 1's store goes last although its load came first, and thread 0 sees the stores of the last thread. With sleep
+// sets, it is not enough to reverse each race by the thread that lost it.
 TEST(Explorer, AnOrderIsNotLeftOutBecauseItsBeginningSleeps) {
   const Program program{{{0, 1}, {0, 0}}, {{0, 1}, {1, 0}}};
   Exploration all;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Every interleaving of pausing, stepping and reconfiguring an engine that is at work.
+// Explores every interleaving of pausing, stepping and reconfiguring an engine at work.
 #include <deque>
 
 #include "protocol.hpp"
@@ -15,7 +15,7 @@ constexpr Preemption kModes[] = {Preemption::None, Preemption::Cooperative, Pree
 
 Platform platform(Preemption preemption, std::uint32_t workers) { return {preemption, workers, workers + 1, false, 0}; }
 
-// From wait_paused() to resume() no job is in progress, and what was released meanwhile runs after.
+// From wait_paused() to resume() no job is in progress. Jobs that are released meanwhile run afterwards.
 TEST(PauseProtocol, PausedNothingRunsAndAfterwardsEverythingDoes) {
   for (const Preemption preemption : kModes) {
     expect_holds([&] {
@@ -64,7 +64,7 @@ TEST(PauseProtocol, WaitPausedEndsWhenItIsResumedOrInTime) {
   }
 }
 
-// The job ends only after the wait: it is resume() that ends the wait.
+// The job ends only after the wait: resume() must end the wait.
 TEST(PauseProtocol, ResumeEndsAWaitThoughAJobGoesOn) {
   for (const Preemption preemption : kModes) {
     expect_holds([&] {
@@ -88,7 +88,7 @@ TEST(PauseProtocol, ResumeEndsAWaitThoughAJobGoesOn) {
   }
 }
 
-// run_one() takes one job, on this thread, while others release; the workers take the rest after resume().
+// run_one() executes one job on this thread while another releases jobs. The workers execute the others after resume().
 TEST(PauseProtocol, RunOneTakesOneJobThatNobodyElseRuns) {
   for (const Preemption preemption : kModes) {
     expect_holds([&] {
@@ -115,7 +115,7 @@ TEST(PauseProtocol, RunOneTakesOneJobThatNobodyElseRuns) {
   }
 }
 
-// A halt meets a pause: neither waits for the other.
+// A halt meets a pause, and neither waits for the other.
 TEST(PauseProtocol, AHaltEndsAPause) {
   for (const Preemption preemption : kModes) {
     expect_holds([&] {
@@ -136,7 +136,7 @@ TEST(PauseProtocol, AHaltEndsAPause) {
   }
 }
 
-// Ids are used again; a body lives until the last of its jobs has ended, and no longer.
+// Ids are reused. A body lives until the last of its jobs has ended, and no longer.
 TEST(TaskProtocol, ATaskThatIsRemovedEndsItsJobsAndThenItsBody) {
   for (const Preemption preemption : kModes) {
     expect_holds([&] {
@@ -170,7 +170,7 @@ TEST(TaskProtocol, ATaskThatIsRemovedEndsItsJobsAndThenItsBody) {
           std::shared_ptr<Record> alive(&records.emplace_back(), [](Record *it) { it->destroyed = true; });
           bodies.emplace_back(alive);
           return engine.add_task(dag, 0, task, [&ran, alive = std::move(alive)](const Job &) {
-            // If the body is destroyed while it runs, nothing that it holds is there any more.
+            // Reads the captures first: they no longer exist if the body is destroyed while it runs.
             Record &record = *alive;
             int &count = ran;
             explored::write(record.object, "body begins");
@@ -210,7 +210,7 @@ TEST(TaskProtocol, ADagThatIsRemovedFromItsOwnBody) {
       Machine machine(ladder(1), platform(preemption, 1), {nullptr});
       machine.work(0) = [&](const Job &) {
         machine.engine->remove_dag(DagId(0));
-        machine.release(0);  // ignored
+        machine.release(0);  // ignored: the task is removed
         all.count();
         return Outcome::Finished;
       };

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the protocol tests share: an engine whose every job is watched, and the exploration of a scenario with it.
+// Shared by the protocol tests: an engine whose every job is watched, and the exploration of a scenario with it.
 //
-// Watching makes an operation of the explorer only where the engine itself has to keep two things apart: there it costs
+// Watching a job is an operation of the explorer only where the engine itself must keep two things apart. As long as
+// the engine does so, watching adds no executions. If it does not, every order is explored.
 // no execution as long as the engine does so, and shows every order in which it does not.
 #pragma once
 
@@ -31,7 +32,7 @@ using testing::Exploration;
 using testing::ExploreOptions;
 namespace explored = testing::explored;
 
-/// Explores all of `scenario`, prints how much that was, and expects that nothing breaks.
+/// Explores all of `scenario`, prints the size of the exploration, and expects that no check fails.
 inline Exploration expect_holds(const std::function<void()> &scenario, ExploreOptions options = {}) {
   if (const char *most = std::getenv("REDAG_EXPLORE")) options.max_executions = std::strtoull(most, nullptr, 10);
   const testing::ThreadState running_job{
@@ -49,7 +50,7 @@ inline Exploration expect_holds(const std::function<void()> &scenario, ExploreOp
   return all;
 }
 
-/// How many are somewhere at a time. Where it is an object, entering and leaving are operations.
+/// Counts the jobs within a region. Entering and leaving are operations of the explorer.
 class Room {
  public:
   explicit Room(int most) : most_(most) {}
@@ -68,7 +69,7 @@ class Room {
   testing::ObjectId object_ = explored::new_object();
 };
 
-/// A promise that from some moment on no job is in progress.
+/// Checks that no job is in progress from begin() to end().
 class Quiet {
  public:
   void begin() {
@@ -97,8 +98,8 @@ class Quiet {
   testing::ObjectId object_ = explored::new_object();
 };
 
-/// Lets a thread wait until something has happened so many times. Not of the engine's own making, so that an error
-/// there is not hidden by the same error here.
+/// Lets a thread wait until something has happened `count` times. It does not use the engine's primitives, whose errors
+/// it would share.
 class Countdown {
  public:
   explicit Countdown(int count) : left_(count) {}
@@ -119,7 +120,7 @@ class Countdown {
   testing::ObjectId object_ = explored::new_object();
 };
 
-/// One DAG of independent timer tasks; task t has priority t: the last one is the most urgent.
+/// A DAG of independent timer tasks. Task t has priority t: the last one is the most urgent.
 inline Workload ladder(std::size_t tasks) {
   Workload workload;
   workload.policy = PolicyKind::Fixed;
@@ -137,14 +138,14 @@ inline Workload ladder(std::size_t tasks) {
 struct Platform {
   Preemption preemption = Preemption::None;
   std::uint32_t workers = 1;
-  std::uint32_t threads = 0;  // Full: jobs that can be in progress
+  std::uint32_t threads = 0;  // full preemption: jobs that can be in progress
   bool start_paused = false;
   std::size_t trace_capacity = 0;
-  std::uint32_t looks = 0;  // of a thread for a job, before it sleeps
+  std::uint32_t looks = 0;  // looks for a job before a thread sleeps
   std::optional<runtime::Throttling> throttling = std::nullopt;
 };
 
-/// An engine that is told what its tasks do. Every job is checked to run once, as what the scheduler counted.
+/// An engine with given task bodies. Checks that every job runs once, and that the scheduler's counts match.
 class Machine {
  public:
   using Work = std::function<Outcome(const Job &)>;
@@ -174,14 +175,14 @@ class Machine {
   }
 
   void start() { explored::check(engine->start().has_value(), "the engine does not start"); }
-  /// start(), until the threads sleep; not explored.
+  /// Calls start() and waits until the threads sleep; not explored.
   void start_calmly() {
     explored::calm(true);
     start();
     explored::settle();
     explored::calm(false);
   }
-  /// Once nobody can go on: finish(), not explored.
+  /// Calls finish() once no thread can go on; not explored.
   void finish_calmly() {
     explored::settle();
     explored::calm(true);
@@ -189,7 +190,7 @@ class Machine {
   }
   void release(std::size_t task) { engine->release(TaskId(task), 0); }
 
-  /// Halts, waits, ends the threads, and checks that what ran is what was counted.
+  /// Halts, waits, ends the threads, and compares the jobs that ran with the counts.
   void finish() {
     engine->halt();
     explored::check(engine->wait_idle(kNever), "wait_idle() for ever came back without");
@@ -203,7 +204,7 @@ class Machine {
       explored::check(jobs.in_flight() <= 1, "more than one job of a task waits");
     }
   }
-  /// What a task does from its next job on.
+  /// The body of a task, for its next jobs.
   [[nodiscard]] Work &work(std::size_t task) { return works_[task]; }
   [[nodiscard]] std::size_t ran(std::size_t task) const { return ran_[task].size(); }
 
@@ -215,7 +216,7 @@ class Machine {
   Outcome run(std::size_t t, const Job &job) {
     quiet.job_begins();
     explored::check(job.task.value == t, "a job runs another task's body");
-    // Jobs of a task follow each other, and each begins once.
+    // Jobs of a task follow each other, and each begins only once.
     explored::check(ran_[t].empty() || ran_[t].back() < job.number, "a job runs twice, or before an earlier one");
     ran_[t].push_back(job.number);
     struct Leave {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Every interleaving of what sleeps by time: the parker, the event, the release timer, and an executor around it all.
+// Explores every interleaving of what sleeps by time: the parker, the event, the release timer, and a whole executor.
 #include <array>
 
 #include "protocol.hpp"
@@ -18,7 +18,7 @@ std::uint32_t thread(std::function<void()> body) { return explored::spawn(std::m
 
 constexpr ExploreOptions kTimed{true, 50'000'000, 0, true};
 
-// Each token ends one park(), whenever it comes; two that come together are one.
+// Each token ends one park(), whenever it comes. Two tokens that come together count as one.
 TEST(ParkerProtocol, NoTokenIsLost) {
   for (const std::uint32_t spurious : {0U, 1U}) {
     expect_holds(
@@ -34,7 +34,7 @@ TEST(ParkerProtocol, NoTokenIsLost) {
             send();
             send();
           });
-          // What was sent before a token is seen once it was taken: else this waits for ever.
+          // A thread that has taken a token sees what was sent before it. Otherwise this would wait for ever.
           while (sent.load() < 3) parker.park();
           explored::join(a);
           explored::join(b);
@@ -119,7 +119,7 @@ Dag one_timer_task(Duration period) {
   return dag;
 }
 
-// Every point of the grid before the stop, once and in order, none early.
+// Reports every grid point before the stop, once, in order, and never early.
 TEST(TimerProtocol, ReleasesAreOnTheGridUntilTheStop) {
   expect_holds(
       [] {
@@ -150,7 +150,7 @@ TEST(TimerProtocol, ReleasesAreOnTheGridUntilTheStop) {
       kTimed);
 }
 
-// A task that is added while the timer sleeps for longer wakes it.
+// Adding a task wakes the timer from a longer sleep.
 TEST(TimerProtocol, AnAdditionIsNotSleptThrough) {
   expect_holds([] {
     Countdown seen(2);
@@ -168,7 +168,7 @@ TEST(TimerProtocol, AnAdditionIsNotSleptThrough) {
   });
 }
 
-// Once remove() has returned, the id can be another task's: no release of before comes then.
+// After remove() has returned, the id may be another task's. No earlier release may be reported then.
 TEST(TimerProtocol, WhatWasRemovedIsNotReported) {
   expect_holds([] {
     Quiet removed;
@@ -188,7 +188,7 @@ TEST(TimerProtocol, WhatWasRemovedIsNotReported) {
   });
 }
 
-// A whole executor: the timer's releases, a body that stops it or another thread that does, and the end of both.
+// A whole executor: the timer's releases, a stop from a body or from another thread, and the end of both.
 TEST(ExecutorProtocol, NothingRunsAfterStop) {
   for (const bool from_body : {false, true}) {
     expect_holds(
@@ -201,7 +201,7 @@ TEST(ExecutorProtocol, NothingRunsAfterStop) {
           Quiet quiet;
           runtime::DagBuilder dag("dag");
           dag.timer("t", std::chrono::nanoseconds(3600 * kSecond),
-                    [&] {  // one release, and none that a sleep of this length leads to
+                    [&] {  // one release: the timer's sleep is too long for a second one
                       quiet.job_begins();
                       if (from_body) executor.stop();
                       quiet.job_ends();

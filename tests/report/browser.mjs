@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Opens report pages in Chromium: every figure draws, nothing is logged as an error, nothing is requested from anywhere,
-// nothing is wider than a phone, hostile names stay text, figures can be saved. Leaves screenshots to look at.
+// Opens report pages in Chromium. Every figure must be drawn and can be saved. No error may be logged, nothing may be
+// requested from the network or be wider than a phone, and hostile names must stay text. Leaves screenshots for
+// inspection.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import path from 'node:path';
@@ -208,7 +209,7 @@ await test('legends end where the buttons begin', async () => {
     const {page, close} = await open(name, options);
     const beside = await page.evaluate(() => [...document.querySelectorAll('figure[data-figure]')].flatMap((box) => {
       const buttons = box.querySelector('.save').getBoundingClientRect();
-      // What a legend has no room for is clipped, and comes with its arrows.
+      // A legend that has too little room is clipped and shows arrows.
       const end = (text) => {
         const clipped = text.closest('[clip-path]');
         const clip = clipped && document.querySelector(clipped.getAttribute('clip-path').slice(4, -1)).firstElementChild.getBBox();
@@ -245,7 +246,7 @@ await test('hostile names stay text, also in tooltips', async () => {
 
 await test('every figure is saved as PNG and SVG', async () => {
   for (const name of FIGURES.comparison) {
-    const {page, problems, close} = await open('comparison');  // Chromium lets a page save ten files in quick succession
+    const {page, problems, close} = await open('comparison');  // Chromium lets one page save only ten files
     for (const [kind, magic] of [['svg', '<svg'], ['png', '\x89PNG']]) {
       const waiting = page.waitForEvent('download', {timeout: 20000});
       await page.getByRole('button', {name: `${name} as ${kind}`, exact: true}).click();
@@ -256,7 +257,7 @@ await test('every figure is saved as PNG and SVG', async () => {
       const bytes = fs.readFileSync(file);
       assert.equal(bytes.subarray(0, 4).toString('latin1'), magic);
       assert.ok(bytes.length > 3000, `${name}.${kind} has ${bytes.length} bytes`);
-      if (kind === 'svg') {  // other programs read it as XML
+      if (kind === 'svg') {  // other programs read the SVG as XML
         const mistake = await page.evaluate((text) => new DOMParser().parseFromString(text, 'image/svg+xml').querySelector('parsererror')?.textContent, bytes.toString());
         assert.equal(mistake, undefined, name);
       }

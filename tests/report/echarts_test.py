@@ -2,9 +2,9 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The bundle of ECharts is what its package files say: version, notices, nothing that would end a <script>.
+"""Checks the bundle of ECharts against its package files: version, notices, and no text that would end a <script>.
 
-Usage: echarts_test.py FOLDER. That it is byte for byte what they make, third_party/echarts/build --check says; it needs npm.
+Usage: echarts_test.py FOLDER. `third_party/echarts/build --check` compares every byte; it needs npm.
 """
 import json
 import pathlib

@@ -22,7 +22,7 @@ double entries_of(const char *folder) {
   return count;
 }
 
-// A thread that wakes up has gone to sleep before.
+// Counts voluntary switches: a thread that wakes up has slept before.
 std::uint64_t wake_ups_of_others() {
   const std::string self = std::to_string(::syscall(SYS_gettid));
   std::uint64_t all = 0;

@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// An executor under load for a long time, while DAGs come and go: does anything grow? Writes a sample a minute (a
-// second, if it runs for less than ten minutes) as CSV, and at the end a verdict on each series by its slope. Exit 1:
-// something grows, or no work was done.
+// Runs an executor under load for a long time, while DAGs come and go, and checks whether anything grows. Writes a
+// sample per minute as CSV (per second if it runs for less than ten minutes), and at the end a verdict on each series
+// by its slope. Exits with 1 if something grows, or if no work was done.
 //
 //   redag_soak SECONDS [--workers 1] [--preemption auto] [--load 0.8] [--churn 2] [--csv FILE]
 //
-// Memory, threads and files must be flat in every run. How often threads wake up and how late jobs end is also the
-// machine's: of that only runs of ten minutes and more are judged.
+// Memory, threads and files must be flat in every run. Wake-ups and lateness also depend on the machine: they are
+// judged only in runs of ten minutes and more.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -45,14 +45,14 @@ struct Arguments {
   std::uint32_t workers = 1;
   PreemptionMode preemption = PreemptionMode::Auto;
   double load = 0.8;  // of each worker
-  double churn = 2;   // DAGs that come, and that go, a second
+  double churn = 2;   // DAGs that come, and DAGs that go, per second
   std::string csv;
 };
 
 constexpr Duration kLongRun = 600 * kSecond;
 constexpr std::size_t kGuests = 3;
 #ifdef __SANITIZE_ADDRESS__
-constexpr bool kMemoryIsOurs = false;  // what was freed is kept for a while, to find who still uses it
+constexpr bool kMemoryIsOurs = false;  // sanitizers keep freed memory for a while
 #else
 constexpr bool kMemoryIsOurs = true;
 #endif
@@ -64,7 +64,7 @@ std::function<void()> busy(double share, Duration period) {
   };
 }
 
-/// What stays: of each worker's time `load`, less what the guests use.
+/// Steady DAGs and guests, which together use `load` of each worker's time.
 class Load {
  public:
   explicit Load(const Arguments &arguments)
@@ -86,7 +86,7 @@ class Load {
     for (std::size_t i = 0; i < kGuests; ++i) come();
   }
 
-  /// The oldest guest goes, and another comes. Every other one is removed by its own body.
+  /// Removes the oldest guest and adds another. Every other guest is removed by its own body.
   void churn() {
     const Guest oldest = guests_.front();
     guests_.pop_front();
@@ -99,7 +99,7 @@ class Load {
   }
 
   Executor &executor() { return executor_; }
-  /// Jobs of control0.act that finished. Waits for the first one: a busy machine takes its time.
+  /// Finished jobs of control0.act. Waits for the first one, because a busy machine needs time.
   [[nodiscard]] std::uint64_t finished() const {
     const auto give_up = steady_clock::now() + std::chrono::seconds(60);
     for (;;) {
@@ -113,7 +113,7 @@ class Load {
  private:
   struct Guest {
     DagId dag;
-    std::shared_ptr<std::atomic<bool>> leave;  // null: somebody else removes it
+    std::shared_ptr<std::atomic<bool>> leave;  // null: another thread removes it
   };
 
   static runtime::ExecutorOptions options_of(const Arguments &arguments) {
@@ -121,7 +121,7 @@ class Load {
     options.name = "soak";
     options.workers = arguments.workers;
     options.preemption = arguments.preemption;
-    options.live = true;  // where the response times come from
+    options.live = true;  // gives the response times
     return options;
   }
 
@@ -148,10 +148,10 @@ class Load {
   double unit_;
   std::uint64_t number_ = 0;
   std::deque<Guest> guests_;
-  Executor executor_;  // last: its bodies use the rest
+  Executor executor_;  // last member: its bodies use the others
 };
 
-/// The figures of one task, as `redag top` sees them.
+/// Figures of one task, as `redag top` shows them.
 class Observed {
  public:
   Observed(std::string dag, std::string task) : dag_(std::move(dag)), task_(std::move(task)) {}
@@ -171,7 +171,7 @@ class Observed {
       if (figures_.recent_jobs > 0) p99_.push_back(static_cast<double>(figures_.recent_p99) / kMicrosecond);
     }
   }
-  /// The median of what was seen since the last call; microseconds.
+  /// The median of the samples since the last call, in microseconds.
   double take_p99() {
     if (p99_.empty()) return 0;
     const auto middle = p99_.begin() + static_cast<std::ptrdiff_t>(p99_.size() / 2);
@@ -203,7 +203,7 @@ struct Record {
   bool judge(bool long_run) const {
     bool flat = true;
     for (const Series *series : {&heap, &resident, &threads, &files, &wake_ups, &act, &detect}) {
-      // The first tenth is the start: pools fill, every path is taken once.
+      // The first tenth is the start: pools fill, and every path is taken once.
       const std::size_t start = std::min(series->values.size(), series->values.size() / 10 + 1);
       const std::vector<double> values(series->values.begin() + static_cast<std::ptrdiff_t>(start),
                                        series->values.end());
@@ -239,7 +239,7 @@ int run(const Arguments &arguments) {
   const Duration step = long_run ? 60 * kSecond : kSecond / 4;
   const auto pause = nanoseconds(static_cast<Duration>(static_cast<double>(kSecond) / arguments.churn));
   Observed act("control0", "act");       // the end of the most urgent chain
-  Observed detect("vision0", "detect");  // preempted by it, and by the guests
+  Observed detect("vision0", "detect");  // preempted by that chain, and by the guests
   Record record;
   ProcessFigures before = process_figures();
   std::uint64_t finished = 0;

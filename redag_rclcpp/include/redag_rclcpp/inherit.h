@@ -3,8 +3,8 @@
 
 /* The interface of libredag_pi.so, which makes the mutexes of a process inherit priority (PTHREAD_PRIO_INHERIT).
  *
- * The library stands before libc when symbols are looked up: preload it (LD_PRELOAD) or link the program against it.
- * The environment REDAG_PI=0 turns it off. docs/ros2.md, "Locks of the middleware", states the limits. */
+ * The library must come before libc in the search for symbols: preload it (LD_PRELOAD), or link the program against
+ * it. The environment variable REDAG_PI=0 turns it off. docs/ros2.md, "Locks of the middleware", states the limits. */
 #ifndef REDAG_RCLCPP_INHERIT_H
 #define REDAG_RCLCPP_INHERIT_H
 
@@ -12,11 +12,11 @@
 extern "C" {
 #endif
 
-/* 1 if a mutex that is used for the first time from now on inherits priority, otherwise 0: it was turned off, or the
- * kernel has no priority-inheriting futexes. Any thread. */
+/* Returns 1 if a mutex that is first used from now on inherits priority. Returns 0 if the library was turned off, or if
+ * the kernel has no priority-inheriting futexes. Any thread may call it. */
 int redag_pi_enabled(void);
 
-/* Turns it off for mutexes that have not been used yet. While the process has one thread only. */
+/* Turns the library off for mutexes that have not been used yet. Call it while the process has only one thread. */
 void redag_pi_disable(void);
 
 #ifdef __cplusplus

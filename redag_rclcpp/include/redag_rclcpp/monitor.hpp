@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Says what an executor's callbacks do: diagnostics, a JSON snapshot, services to ask for one and to save what was
-// learned, response times above their proven bounds, and result files when spinning has ended. Decides nothing.
+// Monitor reports what an executor's callbacks do. It publishes diagnostics and a JSON snapshot, offers services for a
+// snapshot and for saving the learned workload, and counts responses above their proven bounds. When spinning has
+// ended, it writes the result files. It takes no part in scheduling.
 //
-// Threads: the services' callbacks are a group of their own. All else (snapshots, traces, analysis) is done by a thread
-// of its own, at normal priority, so that it costs the workers nothing and is there when they are overloaded. The
-// functions may be called from any thread.
+// Threads: the callbacks of the services run on the executor, in a callback group of their own. Everything else
+// (publishing, traces, analysis) happens on the monitor's own thread, at normal priority. That thread costs the workers
+// nothing, and it still reports when they are overloaded. The functions may be called from any thread.
 #pragma once
 
 #include <chrono>
@@ -23,46 +24,48 @@
 namespace redag_rclcpp {
 
 struct MonitorOptions {
-  std::chrono::nanoseconds period = std::chrono::seconds(1);  // between two snapshots; 0: only when asked for
+  std::chrono::nanoseconds period = std::chrono::seconds(1);  // between two published snapshots; 0: only on request
 
-  /// Folder for events.jsonl, jobs.csv, summary.json, trace.json and metrics.json, made if missing; "": none. Needs
-  /// ReDAGOptions::trace_capacity.
+  /// Folder for events.jsonl, jobs.csv, summary.json, trace.json and metrics.json; created if missing. "": no files.
+  /// Needs ReDAGOptions::trace_capacity.
   std::string trace{};
-  std::size_t trace_events = 10'000'000;  // so many of the first events are kept, at 32 bytes each
-  std::string metrics_file{};             // the last snapshot; "": none, save in `trace`
+  std::size_t trace_events = 10'000'000;  // number of first events that are kept, at 32 bytes each
+  std::string metrics_file{};             // file for the last snapshot; "": none besides the one in `trace`
 
-  /// Where ~/save writes to; the default of the node's parameter of this name.
+  /// File that ~/save writes; the default of the node's parameter of this name.
   std::string save_path = "redag_workload.yaml";
 
-  /// ReDAGOptions::default_period: a subscription that has it has no deadline to be held to.
+  /// ReDAGOptions::default_period. A subscription that still has this period learned no rate: the diagnostics count no
+  /// misses for it.
   std::chrono::nanoseconds default_period = std::chrono::milliseconds(100);
 
-  /// What the executor was given, for bounds on response times. None: no bounds. Responses are counted against them
-  /// where there is ReDAGOptions::trace_capacity.
+  /// The executor's workload, for bounds on response times. Empty: no bounds. Counting responses above their bounds
+  /// needs ReDAGOptions::trace_capacity.
   std::optional<redag::Workload> workload{};
 
-  /// What `redag calibrate` measured of this machine, charged to these bounds; none: nothing is charged.
+  /// Overheads of this machine, measured by `redag calibrate` and charged to the bounds. Empty: no overheads are
+  /// charged.
   std::optional<redag::Calibration> calibration{};
 };
 
 class Monitor {
  public:
-  /// Creates, in `node`: publishers of /diagnostics and ~/metrics, services ~/metrics and ~/save. The executor
-  /// has to execute the node, and to outlive this. Throws std::runtime_error if the folder for results cannot be used.
+  /// Creates in `node` the publishers /diagnostics and ~/metrics, and the services ~/metrics and ~/save. The executor
+  /// must execute the node and outlive the monitor. Throws std::runtime_error if the folder for results cannot be used.
   Monitor(const rclcpp::Node::SharedPtr &node, ReDAGExecutor &executor, MonitorOptions options = MonitorOptions());
-  /// finish(), with problems logged.
+  /// Calls finish() and logs its problems.
   ~Monitor();
   Monitor(const Monitor &) = delete;
   Monitor &operator=(const Monitor &) = delete;
 
-  /// What ~/metrics answers ("redag.metrics/1", docs/results_format.md).
+  /// The JSON text that ~/metrics answers ("redag.metrics/1", docs/results_format.md).
   [[nodiscard]] std::string metrics() const;
 
-  /// Writes ReDAGExecutor::learned() as a workload file, without unnamed callbacks that never ran. The path as an
-  /// absolute one, or why not.
+  /// Writes ReDAGExecutor::learned() as a workload file, without callbacks that never ran and that the workload does
+  /// not name. Returns the absolute path, or the problems.
   [[nodiscard]] redag::Result<std::string> save(const std::string &path) const;
 
-  /// To be called when spinning has ended: writes the files of the options. Later calls do nothing.
+  /// Logs a summary and writes the files of the options. Call it when spinning has ended. Later calls do nothing.
   redag::Result<void> finish();
 
  private:

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// ROS parameters of a node as options of the executor and of its monitor, with descriptions, so that `ros2 param
-// describe` tells what docs/ros2.md tells. Reads a workload file; keeps nothing. Call from one thread, before spinning.
+// Reads ROS parameters of a node as options of the executor and of its monitor. The parameters carry descriptions:
+// `ros2 param describe` tells what docs/ros2.md tells. Also reads the workload file; keeps no state. Call from one
+// thread, before spinning.
 #pragma once
 
 #include "rclcpp/node.hpp"
@@ -11,17 +12,17 @@
 
 namespace redag_rclcpp {
 
-/// Declares (where that has not happened) and reads: workers, preemption, policy, ties, threads, cpu_affinity,
-/// config, default_period, learn, raise_middleware, lock_memory, spin, watchdog, live, trace, bounds. The parameters
-/// are read-only from then on.
+/// Declares (unless declared already) and reads these parameters: workers, preemption, policy, ties, threads,
+/// cpu_affinity, config, default_period, learn, raise_middleware, lock_memory, spin, watchdog, live, trace, bounds.
+/// They are read-only from then on.
 ///
-/// `config` names a workload file: what the file says of its platform and policy counts where the parameter is at its
-/// default. Throws rclcpp::exceptions::InvalidParameterValueException, whose text says which parameter, what it is and
-/// what is allowed; for mistakes in the workload, every one as file:line.
+/// `config` names a workload file. The file's platform and policy count where the parameter has its default. Throws
+/// rclcpp::exceptions::InvalidParameterValueException, whose text names the parameter, its value, and the allowed
+/// values. Mistakes in the workload are listed all at once, each as file:line.
 [[nodiscard]] ReDAGOptions declare_options(rclcpp::Node &node);
 
-/// The same for the monitor of an executor that gets `executor`: metrics_period, metrics_file, save_path, trace,
-/// trace_events, bounds.
+/// Declares and reads the parameters of a monitor whose executor gets `executor`: metrics_period, metrics_file,
+/// save_path, trace, trace_events, bounds, overheads.
 [[nodiscard]] MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &executor);
 
 }  // namespace redag_rclcpp

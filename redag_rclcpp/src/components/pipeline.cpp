@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Components to try the container with: a sensor (timer), a filter and a controller (subscriptions), which use the
-// processor as long as they are told. Two such pipelines at different rates are what the executor is for.
+// Example components for the container: a sensor (timer), a filter and a controller (subscriptions). Each uses the
+// processor for the time that its parameter `load` states. The executor shows its worth with two such pipelines at
+// different rates.
 #include <time.h>
 
 #include <chrono>
@@ -32,8 +33,8 @@ nanoseconds thread_time() {
   return std::chrono::seconds(now.tv_sec) + nanoseconds(now.tv_nsec);
 }
 
-/// Uses so much processor time. In cooperative mode a more urgent callback can run at each preemption point; what it
-/// uses on this thread is not ours.
+/// Uses `load` of processor time. In cooperative mode a more urgent callback can run at each preemption point; its
+/// processor time on this thread is not counted.
 void compute(nanoseconds load) {
   constexpr nanoseconds kRegion = std::chrono::microseconds(100);
   for (nanoseconds used(0); used < load;) {
@@ -48,7 +49,7 @@ void compute(nanoseconds load) {
 
 }  // namespace
 
-/// Publishes `samples` every `period` seconds, `load` seconds of processor time later.
+/// Publishes on `samples` every `period` seconds, after using the processor for `load` seconds.
 class Sensor : public rclcpp::Node {
  public:
   explicit Sensor(const rclcpp::NodeOptions &options)

@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// libredag_pi.so: mutexes inherit priority, although the library that owns them never asked for it.
+// libredag_pi.so makes mutexes inherit priority, even if the library that owns them never asked for it.
 //
-// pthread_mutex_init() is replaced and adds PTHREAD_PRIO_INHERIT to the attributes. A mutex with a static initialiser
-// (std::mutex is one) never passes there: the replaced lock functions change its kind before its first lock, by one
-// compare-and-swap. Every lock passes here, so a mutex that still has the initialiser's kind was never locked. Which
-// kinds correspond is asked of glibc. Owns no thread and no lock, and allocates nothing.
+// The replaced pthread_mutex_init() adds PTHREAD_PRIO_INHERIT to the attributes. A mutex with a static initialiser
+// (std::mutex is one) never passes through it. The replaced lock functions change the kind of such a mutex before its
+// first lock, by one compare-and-swap. Every lock passes through them: a mutex with the initialiser's kind was
+// therefore never locked. glibc itself tells which kinds correspond. The library owns no thread and no lock, and
+// allocates nothing.
 #include <dlfcn.h>
 #include <pthread.h>
 
@@ -27,7 +28,7 @@ using Lock = int (*)(pthread_mutex_t *);
 using TimedLock = int (*)(pthread_mutex_t *, const timespec *);
 using ClockLock = int (*)(pthread_mutex_t *, clockid_t, const timespec *);
 
-/// The function of this name behind ours. glibc can resolve it before any constructor has run.
+/// Finds the next function of this name behind the replaced one. glibc may call it before any constructor has run.
 template <class Function>
 Function next(std::atomic<void *> &known, const char *name) {
   void *function = known.load(std::memory_order_relaxed);
@@ -49,21 +50,22 @@ int real_init(pthread_mutex_t *mutex, const pthread_mutexattr_t *attributes) {
   return next<Init>(init_function, "pthread_mutex_init")(mutex, attributes);
 }
 
-// Kinds that static initialisers give: normal, recursive, error-checking, adaptive.
+// The kinds of static initialisers: normal, recursive, error-checking, adaptive.
 constexpr int kStaticKinds = 4;
 constexpr int kUnknown = -1;
 
 enum class State : int { Undecided, Off, On };
 std::atomic<State> state{State::Undecided};
-std::atomic<int> inheriting[kStaticKinds] = {kUnknown, kUnknown, kUnknown, kUnknown};  // by the static kind
+std::atomic<int> inheriting[kStaticKinds] = {kUnknown, kUnknown, kUnknown, kUnknown};  // indexed by the static kind
 
-/// The kind that glibc gives to a mutex of this type and protocol; kUnknown: it refuses.
+/// The kind that glibc gives to a mutex of this type and protocol. kUnknown: glibc refuses.
 int kind_of(int type, int protocol) {
   pthread_mutexattr_t attributes;
   if (pthread_mutexattr_init(&attributes) != 0) return kUnknown;
   pthread_mutex_t mutex{};
   int kind = kUnknown;
-  // Normal is what the attributes begin with. To set it would also forbid lock elision, which is another kind.
+  // PTHREAD_MUTEX_TIMED_NP (normal) is the initial type. Setting it would also forbid lock elision, which changes the
+  // kind.
   const bool typed = type == PTHREAD_MUTEX_TIMED_NP || pthread_mutexattr_settype(&attributes, type) == 0;
   if (typed && pthread_mutexattr_setprotocol(&attributes, protocol) == 0 && real_init(&mutex, &attributes) == 0) {
     kind = mutex.__data.__kind;
@@ -73,7 +75,7 @@ int kind_of(int type, int protocol) {
   return kind;
 }
 
-// May run on several threads at once: all of them find the same.
+// Decides whether mutexes inherit. Several threads may run it at once; all of them find the same answer.
 State decide() {
   const char *wish = std::getenv("REDAG_PI");
   bool works = wish == nullptr || std::strcmp(wish, "0") != 0;
@@ -92,18 +94,18 @@ bool is_on() {
   return (now == State::Undecided ? decide() : now) == State::On;
 }
 
-/// Before every lock: a mutex that still is as its initialiser left it becomes one that inherits.
+/// Called before every lock. Makes a mutex that its initialiser left unchanged one that inherits.
 void adopt(pthread_mutex_t *mutex) {
   std::atomic_ref<int> kind(mutex->__data.__kind);
   int now = kind.load(std::memory_order_relaxed);
   if (static_cast<unsigned>(now) >= static_cast<unsigned>(kStaticKinds))
-    return;  // it inherits, or has another protocol
+    return;  // it inherits already, or has another protocol
   if (!is_on()) return;
-  // Somebody who does not pass here holds it: to change it now would lose the unlock.
+  // A thread that locked it in another way holds it. Changing the kind now would lose the unlock.
   if (std::atomic_ref<int>(mutex->__data.__lock).load(std::memory_order_relaxed) != 0) return;
   if (mutex->__data.__owner != 0 || mutex->__data.__nusers != 0) return;
   const int wanted = inheriting[now].load(std::memory_order_relaxed);
-  // If another thread was faster, it has stored the same.
+  // A faster thread has stored the same kind.
   kind.compare_exchange_strong(now, wanted, std::memory_order_relaxed);
 }
 
@@ -132,7 +134,7 @@ REDAG_PI_EXPORT int pthread_mutex_init(pthread_mutex_t *mutex, const pthread_mut
   if (attributes != nullptr) pthread_mutexattr_getprotocol(attributes, &protocol);
   if (protocol != PTHREAD_PRIO_NONE || !is_on()) return real_init(mutex, attributes);
 
-  // glibc's attributes are plain values: a copy has the type, robustness and sharing of the original.
+  // Copies the attributes: glibc's are plain values, and the copy has the same type, robustness and sharing.
   pthread_mutexattr_t own;
   if (attributes != nullptr) {
     own = *attributes;
@@ -159,8 +161,8 @@ REDAG_PI_EXPORT int pthread_mutex_timedlock(pthread_mutex_t *mutex, const timesp
   return next<TimedLock>(timed_function, "pthread_mutex_timedlock")(mutex, deadline);
 }
 
-// Before glibc 2.35 and Linux 5.14 a mutex that inherits cannot wait by CLOCK_MONOTONIC, which is what std::timed_mutex
-// does: it would be told EINVAL and take it for "not locked".
+// Falls back to CLOCK_REALTIME. Before glibc 2.35 and Linux 5.14 an inheriting mutex cannot wait by CLOCK_MONOTONIC, as
+// std::timed_mutex does. It would get EINVAL and take that for "not locked".
 REDAG_PI_EXPORT int pthread_mutex_clocklock(pthread_mutex_t *mutex, clockid_t clock,
                                             const timespec *deadline) noexcept {
   adopt(mutex);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// component_container: rclcpp_components' container with a ReDAGExecutor. Components need no change; what they do is
-// ordered, measured and reported (docs/ros2.md).
+// component_container is rclcpp_components' container with a ReDAGExecutor. Components need no change. The executor
+// orders their callbacks, and the monitor reports on them (docs/ros2.md).
 #include <fmt/format.h>
 
 #include <cstdint>
@@ -24,7 +24,7 @@ namespace {
 
 constexpr int kExitOk = 0;
 constexpr int kExitFailed = 1;    // a callback threw, or results could not be written
-constexpr int kExitBadInput = 2;  // parameters, the workload file
+constexpr int kExitBadInput = 2;  // a parameter or the workload file is invalid
 
 constexpr const char *kHelp = R"(A component container that executes callbacks by rate, across all components.
 
@@ -60,7 +60,7 @@ Services: ~/_container/load_node and its kin (ros2 component ...), ~/metrics and
 Ends with SIGINT or SIGTERM: 0; 1 if a callback threw or results could not be written; 2 for bad parameters.
 )";
 
-/// A component can be unloaded by one worker while another one executes a callback of it.
+/// Keeps an unloaded component alive until its callbacks have ended: another worker may still execute one of them.
 class Manager : public rclcpp_components::ComponentManager {
  public:
   using ComponentManager::ComponentManager;
@@ -115,7 +115,7 @@ int main(int argc, char **argv) {
     }
   }
 #ifdef REDAG_INHERITS
-  // Where no thread can be at real-time priority there is nothing to inherit.
+  // Without real-time priorities there is nothing to inherit.
   if (redag::runtime::probe_priority_band().top_job == 0) redag_pi_disable();
 #endif
   try {

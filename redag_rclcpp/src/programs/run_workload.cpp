@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// `ros2 run redag_rclcpp run_workload`: a workload as real ROS 2 nodes on a chosen executor, or on several in turn.
+// `ros2 run redag_rclcpp run_workload` runs a workload as real ROS 2 nodes on one executor, or on several in turn.
 #include <fmt/format.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -82,7 +82,8 @@ struct Arguments {
 std::atomic<bool> interrupted{false};
 std::atomic<pid_t> child{0};
 
-// Async-signal-safe. A child in this terminal gets its own; for kill(1) on this process alone it is passed on.
+// Async-signal-safe. Passes the signal on to the child: kill(1) reaches this process alone, while the terminal's
+// signals reach both.
 void on_signal(int number) {
   interrupted.store(true);
   if (const pid_t to = child.load(); to > 0) kill(to, number);
@@ -135,7 +136,7 @@ redag::Result<std::vector<std::string>> parse_executors(std::string_view list) {
   return names;
 }
 
-// One option with its value; takes it over into `arguments`.
+// Parses the value of one option into `arguments`.
 redag::Result<void> take_option(const std::string &name, const std::string &value, Arguments &arguments) {
   const auto keep = [](auto parsed, auto &to) -> redag::Result<void> {
     if (!parsed) return tl::unexpected(parsed.error());
@@ -243,9 +244,9 @@ int run_once(const redag::Workload &workload, const Arguments &arguments) {
   return lawful ? kExitOk : kExitNo;
 }
 
-// ---- several, compared ----
+// ---- several runs, compared ----
 
-// What the repetitions of one executor gave, by DAG.
+// Summaries of one executor's repetitions; each holds one entry per DAG.
 using Repetitions = std::vector<std::vector<redag::metrics::DagSummary>>;
 
 double median(std::vector<double> values) {
@@ -254,7 +255,7 @@ double median(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
 }
 
-// A percentile of the end-to-end response: its median over the repetitions in which the DAG answered.
+// The median of a percentile of the end-to-end response, over the repetitions in which the DAG responded.
 std::string percentile_text(const Repetitions &repetitions, std::size_t dag,
                             redag::Duration Distribution::*percentile) {
   std::vector<double> values;
@@ -300,7 +301,7 @@ std::string comparison_table(const redag::Workload &workload, const std::vector<
   return table.render();
 }
 
-// This program again, for one executor, with its report not shown. Its exit status.
+// Runs this program again for one executor, without its report. Returns its exit status.
 int run_child(const Arguments &arguments, const std::string &executor, const std::string &folder) {
   const WorkloadRunOptions &run = arguments.run;
   const std::vector<std::string> words = {"run_workload",

@@ -22,13 +22,13 @@ using redag::Time;
 
 namespace {
 
-// While it had no processor.
+// A time in which a body had no processor.
 struct Absence {
   Time from = 0;
   Time to = kNever;
 };
 
-// A body, from its events.
+// A body, put together from its events.
 struct Body {
   std::uint32_t job = 0;
   std::uint32_t worker = 0;
@@ -49,11 +49,11 @@ struct Job {
 
 struct TaskJobs {
   const Task *task = nullptr;
-  std::vector<Body> bodies;  // by start
-  std::vector<Job> jobs;     // by release
+  std::vector<Body> bodies;  // ordered by start
+  std::vector<Job> jobs;     // ordered by release
 };
 
-// What a predecessor completed.
+// The completion of a predecessor's job.
 struct Completion {
   Time time = 0;
   Time release = 0;
@@ -61,7 +61,7 @@ struct Completion {
   std::size_t input = 0;
 };
 
-// Order of events at one time. Dispatched stands before the release that it overlooked.
+// Order of events of the same time. Dispatched precedes a release that the executor overlooked meanwhile.
 int phase_of(JobEventKind kind) {
   switch (kind) {
     case JobEventKind::Finished:
@@ -77,7 +77,7 @@ int phase_of(JobEventKind kind) {
     case JobEventKind::Exceeded:
     case JobEventKind::HighMode:
     case JobEventKind::LowMode:
-    case JobEventKind::Executed: break;  // nodes know nothing of these
+    case JobEventKind::Executed: break;  // nodes do not record these
   }
   return 8;
 }
@@ -93,7 +93,7 @@ class Assembly {
   void collect(std::span<const JobEvent> events) {
     std::vector<JobEvent> sorted(events.begin(), events.end());
     std::stable_sort(sorted.begin(), sorted.end(), [](const JobEvent &a, const JobEvent &b) {
-      // A task's bodies do not overlap: its Started and Finished alternate.
+      // Bodies of one task do not overlap: its Started and Finished events alternate.
       return std::pair(a.time, a.kind == JobEventKind::Started) < std::pair(b.time, b.kind == JobEventKind::Started);
     });
     for (const JobEvent &event : sorted) {
@@ -114,7 +114,7 @@ class Assembly {
     }
   }
 
-  // In topological order: a task's releases follow from its predecessors' completions.
+  // Derives the jobs in topological order: a task's releases follow from its predecessors' completions.
   void derive(const Dag &dag, std::size_t first) {
     const std::vector<std::uint32_t> ranks = redag::topological_ranks(dag);
     std::vector<std::size_t> order(dag.tasks.size());
@@ -178,8 +178,8 @@ class Assembly {
       for (const Completion &input : latest) job.origin = std::min(job.origin, input.origin);
       task.jobs.push_back(job);
     }
-    // A body ran for the latest release that its data can stand for: between the data of two bodies of a join every
-    // predecessor completed, so no two find the same one.
+    // Assigns a body to the latest release up to its data. Between the data of two bodies of a join every predecessor
+    // completed a job. Two bodies therefore find different releases.
     for (const Body &body : task.bodies) {
       const auto next = std::upper_bound(task.jobs.begin(), task.jobs.end(), body.trigger,
                                          [](Time trigger, const Job &job) { return trigger < job.release; });
@@ -200,7 +200,7 @@ class Assembly {
     }
   }
 
-  // Timer tasks with predecessors: docs/model.md, "Readiness".
+  // Finds when jobs of timer tasks with predecessors become ready: docs/model.md, "Readiness".
   static void find_ready(TaskJobs &task, const std::vector<Completion> &data, const std::vector<bool> &aligned) {
     std::vector<Completion> latest(aligned.size());
     std::vector<bool> fresh(aligned.size(), false);
@@ -232,18 +232,18 @@ class Assembly {
         take();
         if (job.ready == kNever && complete()) become_ready(time);
       }
-      // It ran on data that overtook what the model gave it.
+      // The body ran earlier than the model predicts, on newer data.
       if (job.body != nullptr && (job.ready == kNever || job.ready > job.body->start)) job.ready = job.body->start;
-      if (job.body == nullptr && job.ready != kNever) fresh.assign(fresh.size(), true);  // nobody used its data
+      if (job.body == nullptr && job.ready != kNever) fresh.assign(fresh.size(), true);  // no body used its data
     }
   }
 
   void emit(const TaskJobs &task, TaskId id) {
-    std::size_t last_run = 0;  // one past it
+    std::size_t last_run = 0;  // one past the last job that ran
     for (std::size_t k = 0; k < task.jobs.size(); ++k) {
       if (task.jobs[k].body != nullptr) last_run = k + 1;
     }
-    Time not_before = 0;  // right after the start of the job before, and what it overlooked so far
+    Time not_before = 0;  // one past the start of the previous job and the releases overlooked before it
     for (std::size_t k = 0; k < task.jobs.size(); ++k) {
       const Job &job = task.jobs[k];
       const auto number = static_cast<std::uint32_t>(k);
@@ -253,7 +253,8 @@ class Assembly {
       constexpr std::uint32_t kNobody = redag::WorkerId::kNoneValue;
       const Time released = std::max(job.release, not_before);
       add(released, JobEventKind::Released, job.release, kNobody, Reason::None);
-      // Of several releases overlooked, each ends the one before: at one time they would say so of all at once.
+      // Overlooked releases get different times: each one ends the job before it, and equal times would end all of them
+      // at once.
       if (released > job.release) not_before = released + 1;
       const Time next = k + 1 < task.jobs.size() ? std::max(task.jobs[k + 1].release, not_before) : kNever;
       if (job.ready != kNever && (job.body != nullptr || job.ready < next)) {
@@ -264,7 +265,8 @@ class Assembly {
         add(body.start, JobEventKind::Dispatched, job.release + task.task->deadline, body.worker, Reason::None);
         add(body.start, JobEventKind::Started, body.start, body.worker, Reason::None);
         for (const Absence &absence : body.absences) {
-          // Within the body: at the time of its beginning or end it would stand on the other side of that event.
+          // Keeps the absence strictly within the body: at equal times, the sort would place its events before Started
+          // or after Finished.
           const Time from = std::max(absence.from, body.start + 1);
           const Time to = std::min(absence.to, body.end - 1);
           if (from >= to) continue;
@@ -284,9 +286,9 @@ class Assembly {
     }
   }
 
-  // A body that begins on a thread inside another one (cooperative preemption) suspends it.
+  // Adds preemptions by bodies that begin on a thread inside another body (cooperative preemption).
   void add_preemptions() {
-    std::map<std::uint32_t, std::vector<JobEvent>> stacks;  // by worker
+    std::map<std::uint32_t, std::vector<JobEvent>> stacks;  // indexed by worker
     std::vector<JobEvent> more;
     const auto note = [&](JobEvent event, Time time, JobEventKind kind) {
       event.time = time;
@@ -316,7 +318,7 @@ class Assembly {
   }
 
   const NodeEventsOptions &options_;
-  std::vector<TaskJobs> tasks_;  // by TaskId
+  std::vector<TaskJobs> tasks_;  // indexed by TaskId
   std::vector<JobEvent> events_;
 };
 

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The life of every job of a workload that runs as ROS 2 nodes, out of what the nodes themselves saw: when which body
-// began and ended. What no callback sees follows from the model: releases stand on the timers' grid or at the end of
-// the last predecessor, and a job that never began was skipped. Pure function.
+// node_events() derives the life of every job of a workload that runs as ROS 2 nodes. The nodes record when bodies
+// begin and end. The rest follows from the model. Releases are points of the timers' grid, or ends of the last
+// predecessor. A job that never began was skipped. Pure function.
 #pragma once
 
 #include <span>
@@ -15,18 +15,19 @@
 namespace redag_rclcpp {
 
 struct NodeEventsOptions {
-  redag::Time end = 0;              // nothing is released at or after it; later events are left out
-  redag::Duration phase_error = 0;  // the timers' grid is off its points by at most this: a call so early is on time
-  bool timers_queue = false;        // the executor keeps every expiry: those that have not run at the end are in flight
+  redag::Time end = 0;              // no job is released at or after it; later events are left out
+  redag::Duration phase_error = 0;  // largest error of the timers' grid; a call this much early is on time
+  bool timers_queue = false;  // the executor keeps every expiry: expiries that have not run at the end are in flight
 };
 
-/// `bodies`: Started and Finished or Aborted of each body that began, and Preempted and Resumed of one that was kept
-/// from its processor, in any order. `job` of a timer task is the point of its grid, and `value` of a data task's
-/// Started the end of its last predecessor, as the messages told. Times count from the origin of the grid. The result
-/// is a stream as other drivers make it: job numbers, Released to Finished, in order of time. Dispatched has the time
-/// of Started: when the executor decided, the nodes do not see. A release that the executor overlooked while it began
-/// the job before (its timer was called in time, its message taken) is noted right after that beginning, several one
-/// after the other.
+/// `bodies` holds, in any order, Started and Finished or Aborted of each body, and Preempted and Resumed of bodies that
+/// lost their processor. `job` of a timer task is the point of its grid. `value` of a data task's Started is the end of
+/// its last predecessor, taken from the messages. Times count from the origin of the grid.
+///
+/// The result is a stream like that of other drivers: job numbers from 0, events from Released to Finished, ordered by
+/// time. Dispatched has the time of Started, because the nodes do not see when the executor decided. The executor may
+/// overlook releases while it begins the previous job (its timer was called in time, its message taken). Such releases
+/// are placed one after the other, right after that start.
 [[nodiscard]] std::vector<redag::JobEvent> node_events(const redag::Workload &workload,
                                                        std::span<const redag::JobEvent> bodies,
                                                        const NodeEventsOptions &options);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The executors that ours is compared with, by the names of programs and tests: rclcpp's own, and what is built beside
-// it. Which there are depends on the ROS distribution, and on the packages that were found when this was built.
+// The executors that ReDAGExecutor is compared with, by the names that programs and tests use: rclcpp's own, and others
+// of the workspace. Which of them exist depends on the ROS distribution, and on the packages found at build time.
 #pragma once
 
 #include <cstddef>
@@ -29,13 +29,13 @@ inline constexpr bool kHasCbg = true;
 inline constexpr bool kHasCbg = false;
 #endif
 
-/// mte, ste, static, events, cbg: also those that are not here.
+/// mte, ste, static, events, cbg: also those that this build lacks.
 [[nodiscard]] const std::vector<std::string> &peer_names();
 
-/// Has one thread, whatever is asked for.
+/// True if the executor always has one thread.
 [[nodiscard]] bool has_one_thread(const std::string &peer);
 
-/// `name`: one of peer_names(). Error: it is not here, and what it takes to have it.
+/// `name`: one of peer_names(). Error: this build lacks it; the text says what it needs.
 [[nodiscard]] redag::Result<void> check_peer(const std::string &name);
 
 /// Requires check_peer(name).

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A table in plain text: the first column to the left, the others to the right. Not thread-safe.
+// TextTable renders a table as plain text. The first columns are aligned to the left, the others to the right. Not
+// thread-safe.
 #pragma once
 
 #include <algorithm>
@@ -14,12 +15,12 @@ namespace redag_rclcpp {
 
 class TextTable {
  public:
-  /// `left`: columns, from the first, that are aligned to the left.
+  /// `left`: number of columns, from the first, that are aligned to the left.
   explicit TextTable(std::vector<std::string> header, std::size_t left = 1) : left_(left) {
     rows_.push_back(std::move(header));
   }
 
-  /// As many cells as the header has.
+  /// `row` has as many cells as the header.
   void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
 
   [[nodiscard]] std::string render() const {
@@ -40,7 +41,7 @@ class TextTable {
   }
 
  private:
-  // Characters, not bytes: "µs" is three bytes wide and two characters.
+  // Width in characters, not bytes: "µs" has three bytes and two characters.
   static std::size_t width_of(const std::string &text) {
     std::size_t width = 0;
     for (const char c : text) width += (static_cast<unsigned char>(c) & 0xC0U) != 0x80U ? 1 : 0;

@@ -34,28 +34,28 @@ using redag::Time;
 
 redag::Time timer_clock_now() noexcept {
   rcutils_time_point_value_t now = 0;
-  // It fails for a null pointer and where there is no steady clock: neither can be here.
+  // The call fails only for a null pointer and without a steady clock; neither happens here.
   [[maybe_unused]] const rcutils_ret_t status = rcutils_steady_time_now(&now);
   return now;
 }
 
 namespace {
 
-constexpr Duration kPhaseTolerance = redag::kMicrosecond;  // of a timer's first expiry
+constexpr Duration kPhaseTolerance = redag::kMicrosecond;  // largest error of a timer's first expiry
 constexpr int kPhaseAttempts = 1000;
 constexpr Duration kConnectLook = 5 * redag::kMillisecond;
-constexpr Duration kForgotten = 3 * redag::kSecond;  // by then the middleware knows that a run before ours has ended
-// An absence from the processor that is recorded: longer than what the kernel itself takes, interrupts and the like.
+constexpr Duration kForgotten = 3 * redag::kSecond;  // the middleware has forgotten an earlier run by then
+// The shortest absence from the processor that is recorded. Interrupts and the like are shorter.
 constexpr Duration kAbsence = 50 * redag::kMicrosecond;
 
 std::atomic<std::uint64_t> instances{0};
 
-// About a microsecond between two looks at the clock, which is a system call.
+// Spins for about a microsecond between two clock readings: reading the thread's clock is a system call.
 void spin_briefly() {
   for (int i = 0; i < 400; ++i) asm volatile("" ::: "memory");
 }
 
-// What ROS accepts as part of a name: letters, digits, underscores, no digit first.
+// Makes a part of a ROS name: letters, digits and underscores, without a digit first.
 std::string ros_token(const std::string &name) {
   std::string token;
   for (const char c : name) token += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
@@ -63,7 +63,7 @@ std::string ros_token(const std::string &name) {
   return token;
 }
 
-// `token`, or with a number behind it if it is taken.
+// Returns `token`, or `token` with a number behind it if it is taken.
 std::string unique(const std::string &token, std::set<std::string> &taken) {
   std::string name = token;
   for (int n = 2; !taken.insert(name).second; ++n) name = fmt::format("{}_{}", token, n);
@@ -73,7 +73,7 @@ std::string unique(const std::string &token, std::set<std::string> &taken) {
 rclcpp::NodeOptions node_options(bool intra_process) {
   rclcpp::NodeOptions options;
   options.use_intra_process_comms(intra_process);
-  // Nothing but the workload's own callbacks.
+  // The nodes get no callbacks but the workload's own.
   options.start_parameter_services(false).start_parameter_event_publisher(false).enable_rosout(false);
   options.use_global_arguments(false);
   options.append_parameter_override("start_type_description_service", false);
@@ -112,7 +112,7 @@ redag::Diagnostics ros_limits(const redag::Workload &workload) {
   return found;
 }
 
-// A topic that a task publishes on.
+// A topic on which a task publishes.
 struct WorkloadNodes::Output {
   std::string topic;
   std::size_t depth = 1;
@@ -120,11 +120,11 @@ struct WorkloadNodes::Output {
   rclcpp::Publisher<Message>::SharedPtr publisher;
 };
 
-// What a task gets from one predecessor. Guarded by the task's callback group, as all of TaskNode is.
+// The input of a task from one predecessor. The task's callback group guards it, like all of TaskNode.
 struct WorkloadNodes::Input {
   TaskId from;
-  std::uint32_t output = 0;  // position among the predecessor's
-  bool aligned = false;      // timer tasks of one period and offset: job k waits for job k
+  std::uint32_t output = 0;  // position among the predecessor's outputs
+  bool aligned = false;      // both are timer tasks of one period and offset: job k waits for job k
   bool fresh = false;
   std::int64_t sequence = 0;
   Time release = 0;
@@ -136,26 +136,26 @@ struct WorkloadNodes::Input {
 struct WorkloadNodes::TaskNode {
   TaskId id;
   const Task *task = nullptr;
-  std::string dag_name;   // in ROS
-  std::string task_name;  // in ROS
+  std::string dag_name;   // name in ROS
+  std::string task_name;  // name in ROS
   rclcpp::Node::SharedPtr node;
   rclcpp::CallbackGroup::SharedPtr group;
   rclcpp::TimerBase::SharedPtr timer;
-  std::uint32_t timer_index = 0;  // among the timers of its node
+  std::uint32_t timer_index = 0;  // index among the timers of its node
   Time first_expiry = 0;
-  std::int64_t last_job = -1;  // timer: that expired
-  std::int64_t waiting = -1;   // timer with predecessors: job that waits for data; -1: none
-  Time consumed = -1;          // data: end of the last predecessor, of the last job
+  std::int64_t last_job = -1;  // timer task: number of the last expired job
+  std::int64_t waiting = -1;   // timer task with predecessors: job that waits for data; -1: none
+  Time consumed = -1;          // data task: end of the last predecessor of the last job
   std::int64_t completed = 0;
   std::deque<Input> inputs;
-  std::uint32_t slowest = 0;  // input that numbers the jobs of a data task: the one with the largest period
+  std::uint32_t slowest = 0;  // input with the largest period; it numbers the jobs of a data task
   std::deque<Output> outputs;
   Message message;
 };
 
 struct WorkloadNodes::Job {
-  std::int64_t number = 0;  // for the execution time; of timer tasks the job's number
-  Time trigger = 0;         // of data tasks: end of the last predecessor
+  std::int64_t number = 0;  // selects the execution time; the job's number for timer tasks
+  Time trigger = 0;         // data tasks: end of the last predecessor
   Time release = 0;
   Time origin = 0;
 };
@@ -193,7 +193,7 @@ WorkloadNodes::WorkloadNodes(const redag::Workload &workload, const NodesOptions
 
 WorkloadNodes::~WorkloadNodes() = default;
 
-// Tasks of one exclusive group share a node, because a callback group belongs to one.
+// Tasks of one exclusive group share a node, because a callback group belongs to one node.
 void WorkloadNodes::create_node(TaskNode &task) {
   if (!task.task->group.empty()) {
     for (const TaskNode &other : tasks_) {
@@ -208,8 +208,8 @@ void WorkloadNodes::create_node(TaskNode &task) {
   nodes_.push_back(task.node);
 }
 
-// A topic per task with successors. Where tasks of one node have the same predecessor, each but the first has a topic
-// of its own: by their topics alone the executor tells callbacks of a node apart.
+// Creates a topic for each task with successors. If tasks of one node share a predecessor, each but the first gets a
+// topic of its own: the executor tells callbacks of a node apart by their topics alone.
 void WorkloadNodes::create_topics() {
   std::set<std::pair<const rclcpp::Node *, std::string>> subscribed;
   for (TaskNode &task : tasks_) {
@@ -275,8 +275,9 @@ redag::Result<void> WorkloadNodes::connect(Duration timeout) {
 
 // ---- timers ----
 
-// A timer's grid begins when it is reset. With the distance to its first expiry as its period, and the true one set
-// right after, it stands where we want it, but for the time between two looks at a clock.
+// Starts each timer's grid at the wanted time. A grid begins when the timer is reset. The timer is reset with the
+// distance to its first expiry as period, and the true period is set right after. The error is the time between two
+// clock readings.
 void WorkloadNodes::arm(Time origin) {
   origin_ = origin;
   std::map<const rclcpp::Node *, std::uint32_t> timers;
@@ -318,13 +319,13 @@ void WorkloadNodes::create_timer(TaskNode &task) {
   phase_error_ = std::max(phase_error_, std::abs(task.first_expiry - wanted) + unsure);
 }
 
-// The point of the timer's grid that was called: the one before its next.
+// Number of the grid point whose call this is: the one before the timer's next point.
 std::int64_t WorkloadNodes::expired_job(TaskNode &task) const {
   for (;;) {
     const Time before = timer_clock_now();
     const Duration until = task.timer->time_until_trigger().count();
     const Time after = timer_clock_now();
-    // Preempted in between for so long that the answer could be of another point: look again.
+    // Repeats the reading if the thread was preempted for so long that another point could be meant.
     if (after - before > task.task->period / 4) continue;
     return (before + until + task.task->period / 2 - task.first_expiry) / task.task->period - 1;
   }
@@ -334,7 +335,7 @@ std::int64_t WorkloadNodes::expired_job(TaskNode &task) const {
 
 void WorkloadNodes::on_timer(TaskNode &task, std::int64_t job) {
   if (halting_.load(std::memory_order_relaxed)) return;
-  job = std::max(job, task.last_job + 1);  // a call within the phase error of a point of the grid
+  job = std::max(job, task.last_job + 1);  // a call may come before its point, within the phase error
   task.last_job = job;
   if (task.inputs.empty()) {
     const Time release = task.task->offset + job * task.task->period;
@@ -347,7 +348,8 @@ void WorkloadNodes::on_timer(TaskNode &task, std::int64_t job) {
 
 void WorkloadNodes::on_message(TaskNode &task, Input &input, const Message &message) {
   if (halting_.load(std::memory_order_relaxed) || message.data.size() != 4) return;
-  // Completed before the release of the last job, which consumed all data up to then: docs/model.md, "Release".
+  // Ignores data completed before the release of the last job, which consumed all data up to then (docs/model.md,
+  // "Release").
   if (message.data[3] <= task.consumed) return;
   input.fresh = true;
   input.sequence = message.data[0];
@@ -420,7 +422,7 @@ void WorkloadNodes::publish(TaskNode &task, const Job &job, Time finish) {
   ++task.completed;
 }
 
-// Of its own processor time: being preempted does not shorten its work.
+// Uses `demand` of the body's own processor time: being preempted does not shorten its work.
 void WorkloadNodes::use_processor(Duration demand, Duration region, JobEvent job, redag::trace::Ring *events) {
   const auto used = [this] { return options_.redag ? redag::job_cpu_time() : redag::runtime::thread_cpu_now(); };
   const Duration begin = used();
@@ -436,11 +438,11 @@ void WorkloadNodes::use_processor(Duration demand, Duration region, JobEvent job
     spin_briefly();
     const Time time = notes_absences_ ? now() : seen;
     const Duration before = std::exchange(so_far, used() - begin);
-    // What passed of time and not of its own was another's.
+    // The time that passed and that the body did not use belonged to others.
     const Duration absent = time - seen - (so_far - before);
     if (absent >= kAbsence) {
       job.value = 0;
-      job.time = std::max(seen, begun + 1);  // after Started
+      job.time = std::max(seen, begun + 1);  // strictly after Started
       job.kind = JobEventKind::Preempted;
       record(job, events);
       job.time = seen + absent;
@@ -509,10 +511,11 @@ Duration WorkloadNodes::measurement_cost() {
   return (timer_clock_now() - begin) / kRounds;
 }
 
-// ---- for the executor ----
+// ---- the executor's workload ----
 
-// A task is one callback there. A task here has one per predecessor, and a timer: in each of them its job can run. The
-// others become tasks of their own, as urgent as the first.
+// Binds every callback to a task, because the executor executes one callback per task. A task here has one callback per
+// predecessor, and perhaps a timer; its job can run in each of them. The further callbacks become tasks of their own,
+// as urgent as the first.
 redag::Workload WorkloadNodes::bound_workload() const {
   redag::Workload bound = workload_;
   std::size_t next = 0;
@@ -520,7 +523,7 @@ redag::Workload WorkloadNodes::bound_workload() const {
     std::vector<Task> more;
     for (Task &task : dag.tasks) {
       const TaskNode &node = tasks_[next++];
-      task.budget = 0;  // the body keeps it
+      task.budget = 0;  // the body enforces the budget
       task.on_budget = redag::OnBudget::Abort;
       const auto bind = [&](redag::Callback::Kind kind) -> redag::Callback & {
         Task *to = &task;

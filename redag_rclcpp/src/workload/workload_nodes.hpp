@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A workload as real ROS 2 nodes: a node per task (or per exclusive group), a wall timer per timer task, a topic per
-// task with successors, a subscription per edge. Bodies use the processor time that the workload asks for, publish at
-// their end, and record when they began and ended; node_events() makes jobs of that. Knows no executor.
+// WorkloadNodes runs a workload as real ROS 2 nodes. It has a node per task (or per exclusive group), a wall timer per
+// timer task, a topic per task with successors, and a subscription per edge. Bodies use the processor time that the
+// workload states, publish at their end, and record when they began and ended. node_events() derives jobs from these
+// records. The class knows no executor.
 //
-// Threads: bodies run on the executor's threads, which may be many; everything else on one thread.
+// Threads: bodies run on any number of executor threads. Everything else runs on one thread.
 #pragma once
 
 #include <algorithm>
@@ -25,64 +26,66 @@
 
 namespace redag_rclcpp {
 
-/// rclcpp's steady clock, on which timers expire; in some distributions it is not std::chrono's.
+/// Reads rclcpp's steady clock, on which timers expire. In some distributions it differs from std::chrono's.
 [[nodiscard]] redag::Time timer_clock_now() noexcept;
 
 struct NodesOptions {
   std::uint64_t seed = 1;
-  bool intra_process = true;        // messages as pointers, or through the middleware
-  bool redag = false;               // the executor is ours: bodies can be suspended at preemption points
-  std::uint32_t threads = 1;        // at most so many threads execute bodies
-  redag::Time end = redag::kNever;  // no body begins at or after it, though nobody may get to say halt() in time
-  std::size_t trace_capacity = std::size_t{1} << 15U;  // events a thread between two drain()
+  bool intra_process = true;        // false: messages pass through the middleware
+  bool redag = false;               // the executor is ReDAGExecutor: preemption points can suspend bodies
+  std::uint32_t threads = 1;        // largest number of threads that execute bodies
+  redag::Time end = redag::kNever;  // no body begins at or after it, even if halt() comes late
+  std::size_t trace_capacity = std::size_t{1} << 15U;  // events per thread between two drain()
 };
 
-/// What ROS 2 cannot do of a workload. Errors: that would change what is measured. Warnings: that is ignored.
+/// Finds what ROS 2 cannot do of a workload. Errors would change the measurement. Warnings are features that are
+/// ignored.
 [[nodiscard]] redag::Diagnostics ros_limits(const redag::Workload &workload);
 
 class WorkloadNodes {
  public:
-  /// Requires a valid workload without errors in ros_limits(). rclcpp must be initialised. May throw what rclcpp
-  /// throws.
+  /// Requires a valid workload without errors in ros_limits(), and an initialised rclcpp. May throw rclcpp's
+  /// exceptions.
   WorkloadNodes(const redag::Workload &workload, const NodesOptions &options);
   ~WorkloadNodes();
   WorkloadNodes(const WorkloadNodes &) = delete;
   WorkloadNodes &operator=(const WorkloadNodes &) = delete;
 
-  /// Waits until every subscription knows its publisher. Error: not in time, or somebody else uses the same topics.
+  /// Waits until every subscription knows its publisher. Error: the time is over, or another program uses the same
+  /// topics.
   [[nodiscard]] redag::Result<void> connect(redag::Duration timeout);
 
-  /// Creates the timers so that they expire at origin + offset + k * period, k = 0, 1, ... Call once, before the nodes
-  /// are given to an executor, and in good time before `origin` (timer_clock_now()).
+  /// Creates the timers, which expire at origin + offset + k * period, k = 0, 1, ... Call it once, before the nodes are
+  /// added to an executor, and well before `origin` (on timer_clock_now()).
   void arm(redag::Time origin);
 
   [[nodiscard]] const std::vector<rclcpp::Node::SharedPtr> &nodes() const { return nodes_; }
 
-  /// The workload as ReDAGOptions::workload wants it: every callback of the nodes is bound to a task.
+  /// The workload for ReDAGOptions::workload: every callback of the nodes is bound to a task.
   [[nodiscard]] redag::Workload bound_workload() const;
 
-  /// The current time on the origin's clock.
+  /// Time since the origin.
   [[nodiscard]] redag::Time now() const noexcept { return timer_clock_now() - origin_; }
 
-  /// Bodies record when they were without a processor (preemption os). Before the nodes are given to an executor.
+  /// Makes bodies record when they had no processor (preemption os). Call it before the nodes are added to an executor.
   void note_absences() noexcept { notes_absences_ = true; }
 
-  /// No body begins from now on.
+  /// Lets no further body begin.
   void halt() noexcept { halting_.store(true); }
-  /// After halt(): waits until none runs; false: not by `deadline` (timer_clock_now()).
+  /// Waits, after halt(), until no body runs. False: one still runs at `deadline` (on timer_clock_now()).
   [[nodiscard]] bool wait_idle(redag::Time deadline) const;
-  /// Bodies that run end at once.
+  /// Makes running bodies end at once.
   void give_up() noexcept { give_up_.store(true); }
 
-  /// Appends what bodies recorded since the last call; see node_events().
+  /// Appends the events that bodies recorded since the last call; see node_events().
   void drain(std::vector<redag::JobEvent> &events);
   [[nodiscard]] std::uint64_t lost_events() const;
-  /// Threads that executed bodies so far; JobEvent::worker counts them.
+  /// Number of threads that have executed bodies. JobEvent::worker is below it.
   [[nodiscard]] std::uint32_t threads_seen() const { return std::min(next_thread_.load(), options_.threads); }
-  /// How far the timers' grid is off origin + offset, at most.
+  /// Largest distance of the timers' grid from origin + offset.
   [[nodiscard]] redag::Duration phase_error() const { return phase_error_; }
 
-  /// What measuring adds to a job: two looks at the clock, two records, and of a timer which expiry it is.
+  /// Time that measuring adds to a job: two clock readings, two records, and for a timer the number of its expiry.
   [[nodiscard]] redag::Duration measurement_cost();
 
  private:
@@ -107,15 +110,15 @@ class WorkloadNodes {
 
   const redag::Workload &workload_;
   NodesOptions options_;
-  std::uint64_t instance_;  // of this object: threads may have worked for another one
+  std::uint64_t instance_;  // tells this object from earlier ones that the same threads worked for
   redag::Time origin_ = 0;
   redag::Duration phase_error_ = 0;
   bool notes_absences_ = false;
-  std::deque<TaskNode> tasks_;  // by TaskId
+  std::deque<TaskNode> tasks_;  // indexed by TaskId
   std::vector<rclcpp::Node::SharedPtr> nodes_;
   std::vector<std::unique_ptr<redag::trace::Ring>> rings_;
   std::atomic<std::uint32_t> next_thread_{0};
-  std::atomic<std::uint64_t> lost_{0};  // of threads beyond options_.threads
+  std::atomic<std::uint64_t> lost_{0};  // events of threads beyond options_.threads
   std::atomic<std::uint32_t> running_{0};
   std::atomic<bool> halting_{false};
   std::atomic<bool> give_up_{false};

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The results of a run as files and as text.
+// Writes the results of a run as files and as text.
 #include <fmt/format.h>
 
 #include <algorithm>

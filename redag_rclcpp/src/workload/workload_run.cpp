@@ -39,7 +39,7 @@ constexpr Duration kConnectTimeout = 20 * redag::kSecond;
 constexpr Duration kStartMargin = 300 * redag::kMillisecond;  // from the timers' creation to time 0
 constexpr Duration kCollectEvery = 100 * redag::kMillisecond;
 constexpr Duration kDrainTimeout = 5 * redag::kSecond;
-constexpr std::uint32_t kSpareThreads = 16;  // of our executor, with os
+constexpr std::uint32_t kSpareThreads = 16;  // spare threads of ReDAGExecutor with os
 constexpr std::size_t kSchedulerEvents = std::size_t{1} << 17U;
 
 bool is_redag(const std::string &name) { return name.rfind("redag", 0) == 0; }
@@ -54,7 +54,7 @@ std::optional<PreemptionMode> preemption_of(const std::string &name) {
 class Run {
  public:
   Run(const redag::Workload &workload, const WorkloadRunOptions &options) : workload_(workload), options_(options) {
-    // max_active and groups are judged by this one; the threads are what really ran.
+    // The check judges max_active and groups by this number. The threads that ran bodies can be more.
     workers_ = options_.threads > 0 ? options_.threads : workload_.platform.workers;
     if (has_one_thread(options_.executor)) workers_ = 1;
     workload_.platform.workers = workers_;
@@ -73,7 +73,7 @@ class Run {
     if (auto connected = nodes_->connect(kConnectTimeout); !connected) return tl::unexpected(connected.error());
     try {
       make_executor();
-    } catch (const std::runtime_error &error) {  // preemption that this process may not have
+    } catch (const std::runtime_error &error) {  // this process may not have the requested preemption
       return redag::make_error(error.what(), options_.executor == "redag-os" ? redag::runtime::realtime_hint() : "");
     }
     if (preempts_by_priority()) nodes_->note_absences();
@@ -149,13 +149,13 @@ class Run {
     }
   }
 
-  // Full preemption: the priorities of threads are those of the jobs.
+  // True with preemption os: threads have the priorities of their jobs.
   [[nodiscard]] bool preempts_by_priority() const {
     return redag_ != nullptr && redag_->mode().mode == PreemptionMode::Os;
   }
 
-  // Above the threads that execute bodies, which in overload leave no time: with os those have priorities of their own,
-  // under chrt this thread's.
+  // A priority above the threads that execute bodies, which under overload leave no time to others. With os these
+  // threads have priorities of their own. Under chrt they have this thread's priority.
   [[nodiscard]] int collecting_priority() const {
     return preempts_by_priority() ? redag::runtime::probe_priority_band().top_job + 1
                                   : redag::runtime::fifo_priority_above_this_thread();
@@ -170,8 +170,8 @@ class Run {
       result_.warnings.push_back(
           fmt::format("bodies were still running {} after the end", redag::format_duration(kDrainTimeout)));
     }
-    // A cancel() before the spin began is lost, by rclcpp's executors and, where it is not virtual (Humble), here by
-    // ours.
+    // Repeats cancel(), because one before the spin began is lost: by rclcpp's executors, and on Humble by
+    // ReDAGExecutor, where cancel() is not virtual.
     while (!spin_ended_) {
       executor_->cancel();
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -199,7 +199,8 @@ class Run {
     redag::trace::RunInfo &info = result_.trace.info;
     info.workload = workload_;
     info.executor = options_.executor;
-    // Threads that ran bodies: with os more than run at the same time, which the workload's platform says.
+    // The number of threads that ran bodies. With os it exceeds the number that ran at the same time, which the
+    // workload's platform states.
     info.config.workers = std::max(workers_, nodes_->threads_seen());
     info.config.policy = workload_.policy;
     info.config.ties = workload_.ties;
@@ -245,8 +246,8 @@ class Run {
   std::uint32_t workers_ = 1;
   WorkloadRun result_;
   std::unique_ptr<WorkloadNodes> nodes_;
-  std::shared_ptr<rclcpp::Executor> executor_;  // after the nodes: it goes first
-  std::shared_ptr<ReDAGExecutor> redag_;        // the same, if it is ours
+  std::shared_ptr<rclcpp::Executor> executor_;  // declared after the nodes: destroyed before them
+  std::shared_ptr<ReDAGExecutor> redag_;        // the same object, if it is a ReDAGExecutor
   std::vector<JobEvent> bodies_;
   std::vector<JobEvent> decisions_;
   Time end_ = 0;

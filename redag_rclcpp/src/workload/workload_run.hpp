@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// One run of a workload as ROS 2 nodes on one executor, from the file to result files; what `redag run` is without
-// ROS. Blocks until the run is over; one at a time. rclcpp must be initialised.
+// Runs a workload as ROS 2 nodes on one executor, and writes result files. It corresponds to `redag run` without ROS.
+// Blocks until the run is over; only one run at a time. rclcpp must be initialised.
 #pragma once
 
 #include <atomic>
@@ -19,10 +19,10 @@
 
 namespace redag_rclcpp {
 
-/// Names for --executor, ours first: "redag", "redag-os", "mte", ...
+/// Names for --executor, those of ReDAGExecutor first: "redag", "redag-os", "mte", ...
 [[nodiscard]] const std::vector<std::string> &executor_names();
 
-/// Error: an unknown name, or one that this ROS distribution does not have.
+/// Error: the name is unknown, or this ROS distribution lacks the executor.
 [[nodiscard]] redag::Result<void> check_executor(const std::string &name);
 
 struct WorkloadRunOptions {
@@ -31,34 +31,34 @@ struct WorkloadRunOptions {
   redag::Duration warm_up = 0;
   std::uint64_t seed = 1;
   bool intra_process = true;
-  std::uint32_t threads = 0;  // 0: the workload's workers; executors with one thread have one
+  std::uint32_t threads = 0;  // 0: the workload's workers; executors with one thread ignore it
   const std::atomic<bool> *stop = nullptr;
 };
 
-/// What our executor's scheduler decided, by its own account.
+/// The decisions of ReDAGExecutor's scheduler, from its own trace.
 struct SchedulerTrace {
   redag::trace::Trace trace;
   redag::metrics::CheckReport check;
 };
 
 struct WorkloadRun {
-  redag::trace::Trace trace;  // as the nodes saw it
+  redag::trace::Trace trace;  // as the nodes recorded it
   redag::metrics::Summary summary;
-  redag::metrics::CheckReport check;  // of `trace`
+  redag::metrics::CheckReport check;  // check of `trace`
   std::optional<SchedulerTrace> scheduler;
   std::vector<std::string> warnings;
   bool stopped = false;
 };
 
-/// `workload` must be valid. Errors: what ROS or the machine refuse.
+/// `workload` must be valid. Errors: requests that ROS or the machine refuse.
 [[nodiscard]] redag::Result<WorkloadRun> run_as_nodes(const redag::Workload &workload,
                                                       const WorkloadRunOptions &options);
 
-/// jobs.csv, summary.json, trace.json, events.jsonl, and for our executor scheduler_events.jsonl; and check.json with
-/// the verdicts. Everything that went wrong.
+/// Writes jobs.csv, summary.json, trace.json, events.jsonl, check.json with the verdicts, and for ReDAGExecutor
+/// scheduler_events.jsonl. Returns all problems.
 [[nodiscard]] redag::Diagnostics write_results(const WorkloadRun &run, const std::string &folder);
 
-/// The run for people: a table of tasks, one of DAGs, verdicts.
+/// The run as text: a table of tasks, a table of DAGs, and the verdicts.
 [[nodiscard]] std::string describe(const WorkloadRun &run);
 
 }  // namespace redag_rclcpp

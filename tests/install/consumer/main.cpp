@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A small program outside this repository that uses the library: it fails where a symbol, a header or a dependency of
-// the installation is missing.
+// A small program outside this repository that uses the installed library. Building or running it fails if the
+// installation lacks a symbol, a header or a dependency.
 #include <cstdio>
 
 #include "redag/redag.hpp"

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// In place of redag/base/atomic.hpp: an atomic whose every access is an operation of the explorer. Sequentially
-// consistent, whatever order is asked for.
+// Replaces redag/base/atomic.hpp: every access is an operation of the explorer. Accesses are sequentially consistent,
+// whatever order is requested.
 #pragma once
 
 #include <atomic>
@@ -55,7 +55,7 @@ class Atomic {
     return value;
   }
 
-  // For what looks at the value within one operation: the futex.
+  // For callers that read the value within one operation: the futex.
   [[nodiscard]] testing::ObjectId id() const noexcept { return id_; }
   [[nodiscard]] T peek() const noexcept { return value_; }
 

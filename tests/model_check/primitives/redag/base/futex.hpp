@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// In place of redag/base/futex.hpp: the same operations, on the explorer's threads.
+// Replaces redag/base/futex.hpp: the same operations on the explorer's threads.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// In place of redag/base/mutex.hpp.
+// Replaces redag/base/mutex.hpp.
 #pragma once
 
 #include "redag/base/pi_mutex.hpp"

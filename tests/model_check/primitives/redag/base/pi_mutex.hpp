@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// In place of redag/base/pi_mutex.hpp: a mutex of the explorer. It knows no priorities: every order is tried.
+// Replaces redag/base/pi_mutex.hpp by a mutex of the explorer. It knows no priorities: every order is tried.
 #pragma once
 
 #include "redag/base/thread_annotations.hpp"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// In place of redag/runtime/clock.hpp: the explorer's time. Processor time stands still.
+// Replaces redag/runtime/clock.hpp by the explorer's time. Processor time stands still.
 #pragma once
 
 #include <ctime>
@@ -14,7 +14,7 @@ namespace redag::runtime {
 [[nodiscard]] inline Time monotonic_now() noexcept { return testing::explored::now(); }
 [[nodiscard]] inline Duration thread_cpu_now() noexcept { return 0; }
 
-/// What a watchdog reads of the others.
+/// The processor time that a watchdog reads for other threads.
 inline Duration cpu_of_others = 0;
 [[nodiscard]] inline Duration cpu_now(clockid_t) noexcept { return cpu_of_others; }
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// In place of redag/runtime/threads.hpp: the explorer's threads, which can do all that is asked of them, save that
+// Replaces redag/runtime/threads.hpp by the explorer's threads. They grant every request; only starting
 // thread_that_fails is refused.
 #pragma once
 
@@ -56,7 +56,7 @@ struct ThreadSetup {
 
 inline constexpr std::size_t kTouchedStack = 0;
 
-inline std::optional<std::string> thread_that_fails;  // by name
+inline std::optional<std::string> thread_that_fails;  // name of the thread that cannot be started
 
 [[nodiscard]] inline Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()> main) {
   if (thread_that_fails == setup.name) return make_error("thread '" + setup.name + "' cannot be created");
