@@ -16,12 +16,17 @@ Median median_of(std::vector<double> values) {
   const std::size_t n = values.size();
   // The true median is outside the k-th values from either end with probability 2 P(B(n, 1/2) < k).
   constexpr double kMostOutside = 0.05;
-  double term = std::pow(0.5, static_cast<double>(n));  // P(B = 0); underflows for more than 1,074 values
-  double below = term;
+  // P(B = k) is mantissa * 2^exponent, step by step: 0.5^n alone is 0 for more than 1,074 values.
+  double mantissa = 1;
+  int exponent = -static_cast<int>(n);
+  double below = std::ldexp(mantissa, exponent);
   std::size_t k = 1;
   double outside = 2 * below;
   while (k < n / 2) {
-    term *= static_cast<double>(n - k + 1) / static_cast<double>(k);
+    int shift = 0;
+    mantissa = std::frexp(mantissa * (static_cast<double>(n - k + 1) / static_cast<double>(k)), &shift);
+    exponent += shift;
+    const double term = std::ldexp(mantissa, exponent);
     if (2 * (below + term) > kMostOutside) break;
     below += term;
     outside = 2 * below;

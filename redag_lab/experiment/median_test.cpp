@@ -4,6 +4,7 @@
 #include "redag_lab/experiment/median.hpp"
 
 #include <gtest/gtest.h>
+#include <cmath>
 
 #include <numeric>
 
@@ -27,6 +28,16 @@ TEST(Median, IntervalsAreThoseOfTheTables) {
   EXPECT_EQ(ranks(50), std::pair(18.0, 33.0));
   EXPECT_NEAR(median_of(one_to(20)).confidence, 0.9586, 1e-4);
   EXPECT_EQ(median_of(one_to(20)).median, 10.5);
+}
+
+TEST(Median, ManyValuesHaveANarrowInterval) {
+  // About n / 2 -+ 0.98 sqrt(n), by the normal approximation.
+  for (const int n : {1074, 1075, 5000, 100'000}) {
+    const Median m = median_of(one_to(n));
+    EXPECT_NEAR(m.low, n / 2.0 - 0.98 * std::sqrt(n), 2) << n;
+    EXPECT_NEAR(m.high, n / 2.0 + 0.98 * std::sqrt(n), 2) << n;
+    EXPECT_NEAR(m.confidence, 0.9525, 0.0025) << n;
+  }
 }
 
 TEST(Median, FewValuesSayHowLittleTheyProve) {
