@@ -48,13 +48,14 @@ instructions: ## what the scheduler executes for a job, counted by valgrind: the
 	cmake --build --preset bench --target redag_scheduler_steps
 	tools/count_instructions
 
-lint: ## layers, references, commits, formatting, locks, and clang-tidy on the files that differ from the main branch
+lint: ## layers, references, commits, module diagram, formatting, locks, and clang-tidy on files that differ from the main branch
 	@tools/bootstrap lint
 	tools/check_layers
 	tools/check_prose
 	tools/check_spdx
 	tools/check_references
 	tools/check_commits
+	tools/module_diagram --check
 	tools/format --check
 	cmake --preset dev
 	tools/thread_safety
