@@ -32,7 +32,7 @@ SEEDS ?= 10
 seeds: test ## run the tests of random cases SEEDS (10) times, each time with a new seed; make test always has the same one
 	@for i in $$(seq $(SEEDS)); do \
 	  seed=$$(od -An -N4 -tu4 /dev/urandom | tr -d ' '); echo "$$i of $(SEEDS): RC_PARAMS=seed=$$seed"; \
-	  RC_PARAMS="seed=$$seed" ctest --preset dev --progress -L '^(base|metrics|model|runtime|sched|testing|model_check)$$' || exit; \
+	  RC_PARAMS="seed=$$seed" ctest --preset dev --progress -L '^(base|executors|metrics|model|runtime|testing|workload|model_check)$$' || exit; \
 	done
 
 BENCH_ROUNDS ?= 7
@@ -77,7 +77,7 @@ tsan: ## the tests of what has threads, and chaos, under ThreadSanitizer
 	$(NO_RANDOMISATION) cmake --build --preset tsan
 	$(NO_RANDOMISATION) ctest --preset tsan
 
-coverage: ## lines and branches of redag/ that the tests run; a page in results/coverage/
+coverage: ## lines and branches of the sources that the tests run; a page in results/coverage/
 	@tools/bootstrap coverage
 	cmake --preset coverage
 	cmake --build --preset coverage
@@ -87,7 +87,7 @@ coverage: ## lines and branches of redag/ that the tests run; a page in results/
 	gcovr --config tools/gcovr.cfg --html-details results/coverage/index.html --json-summary results/coverage/summary.json \
 	  build/coverage
 
-mutate: ## break redag/ on purpose, as tests/mutations.yaml says, and see whether the tests notice
+mutate: ## break the sources on purpose, as tests/mutations.yaml says, and see whether the tests notice
 	@tools/bootstrap test
 	tools/mutate
 
