@@ -4,7 +4,7 @@
 // The smallest program: one task every 100 ms, and a body that ends the run.
 #include <cstdio>
 
-#include "redag/runtime/executor.hpp"
+#include "redag/redag.hpp"
 
 using namespace std::chrono_literals;
 using redag::runtime::DagBuilder;
