@@ -113,7 +113,7 @@ ros: ## build redag_rclcpp with colcon and run its tests, for each ROS 2 under /
 	@tools/bootstrap test
 	tools/test_rclcpp
 
-install: ## install library, headers and program to PREFIX (default /usr/local)
+install: ## install libraries, headers and program to PREFIX (default /usr/local)
 	@tools/bootstrap run
 	cmake --preset release
 	cmake --build --preset release
