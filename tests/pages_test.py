@@ -55,12 +55,16 @@ class Pages(unittest.TestCase):
         self.assertEqual(set(docs.rglob("*.md")) - linked - {docs / "README.md"}, set())
 
     def test_no_walk_takes_a_step_back_up(self):
-        """Each step of a walk is a file of its own, in the layer of the step before or in one below."""
+        """Each step of a walk is a file of its own, in the layer of the step before or in one below, and has what is named."""
         layer_of, below = layers()
         text = (SOURCE / "docs/life_of_a_job.md").read_text(encoding="utf-8").split("\n## Where values go\n")[1]
-        walks = [re.findall(r"^\d+\. `([^`]+)`", walk, re.M) for walk in text.split("\n### ")[1:]]
-        self.assertEqual(len(walks), 3)
-        for walk in walks:
+        steps = [re.findall(r"^\d+\. `([^`]+)`(.*(?:\n   .*)*)", walk, re.M) for walk in text.split("\n### ")[1:]]
+        self.assertEqual(len(steps), 3)
+        for file, said in (step for walk in steps for step in walk):
+            source = (SOURCE / file).read_text(encoding="utf-8")
+            for name in re.findall(r"`(?:\w+::)*(\w+)(?:\(\))?`", said):
+                self.assertRegex(source, rf"\b{name}\b", f"{file} has no {name}")
+        for walk in ([file for file, _ in walk] for walk in steps):
             self.assertGreater(len(walk), 5)
             self.assertEqual(len(walk), len(set(walk)), walk)
             for file in walk:
