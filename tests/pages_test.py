@@ -55,7 +55,7 @@ class Pages(unittest.TestCase):
         self.assertEqual(set(docs.rglob("*.md")) - linked - {docs / "README.md"}, set())
 
     def test_no_walk_takes_a_step_back_up(self):
-        """Each step of a walk is a file of its own, in the layer of the step before or in one below, and has what is named."""
+        """Each step of a walk is a file of its own, not in a layer above the step before, and has what is named."""
         layer_of, below = layers()
         text = (SOURCE / "docs/life_of_a_job.md").read_text(encoding="utf-8").split("\n## Where values go\n")[1]
         steps = [re.findall(r"^\d+\. `([^`]+)`(.*(?:\n   .*)*)", walk, re.M) for walk in text.split("\n### ")[1:]]
