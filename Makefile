@@ -32,7 +32,7 @@ SEEDS ?= 10
 seeds: test ## run the tests of random cases SEEDS (10) times, each time with a new seed; make test always has the same one
 	@for i in $$(seq $(SEEDS)); do \
 	  seed=$$(od -An -N4 -tu4 /dev/urandom | tr -d ' '); echo "$$i of $(SEEDS): RC_PARAMS=seed=$$seed"; \
-	  RC_PARAMS="seed=$$seed" ctest --preset dev --progress -L '^(base|metrics|model|runtime|sched|testing|model_check)$$' || exit; \
+	  RC_PARAMS="seed=$$seed" ctest --preset dev --progress -L '^(base|executors|metrics|model|runtime|testing|workload|model_check)$$' || exit; \
 	done
 
 BENCH_ROUNDS ?= 7
@@ -48,13 +48,14 @@ instructions: ## what the scheduler executes for a job, counted by valgrind: the
 	cmake --build --preset bench --target redag_scheduler_steps
 	tools/count_instructions
 
-lint: ## layers, references, commits, formatting, locks, and clang-tidy on the files that differ from the main branch
+lint: ## layers, references, commits, module diagram, formatting, locks, and clang-tidy on files that differ from the main branch
 	@tools/bootstrap lint
 	tools/check_layers
 	tools/check_prose
 	tools/check_spdx
 	tools/check_references
 	tools/check_commits
+	tools/module_diagram --check
 	tools/format --check
 	cmake --preset dev
 	tools/thread_safety
@@ -76,7 +77,7 @@ tsan: ## the tests of what has threads, and chaos, under ThreadSanitizer
 	$(NO_RANDOMISATION) cmake --build --preset tsan
 	$(NO_RANDOMISATION) ctest --preset tsan
 
-coverage: ## lines and branches of redag/ that the tests run; a page in results/coverage/
+coverage: ## lines and branches of the sources that the tests run; a page in results/coverage/
 	@tools/bootstrap coverage
 	cmake --preset coverage
 	cmake --build --preset coverage
@@ -86,7 +87,7 @@ coverage: ## lines and branches of redag/ that the tests run; a page in results/
 	gcovr --config tools/gcovr.cfg --html-details results/coverage/index.html --json-summary results/coverage/summary.json \
 	  build/coverage
 
-mutate: ## break redag/ on purpose, as tests/mutations.yaml says, and see whether the tests notice
+mutate: ## break the sources on purpose, as tests/mutations.yaml says, and see whether the tests notice
 	@tools/bootstrap test
 	tools/mutate
 
@@ -112,7 +113,7 @@ ros: ## build redag_rclcpp with colcon and run its tests, for each ROS 2 under /
 	@tools/bootstrap test
 	tools/test_rclcpp
 
-install: ## install library, headers and program to PREFIX (default /usr/local)
+install: ## install libraries, headers and program to PREFIX (default /usr/local)
 	@tools/bootstrap run
 	cmake --preset release
 	cmake --build --preset release

@@ -4,7 +4,7 @@
 // The smallest program: one task runs every 100 ms, and its body ends the run.
 #include <cstdio>
 
-#include "redag/runtime/executor.hpp"
+#include "redag/redag.hpp"
 
 using namespace std::chrono_literals;
 using redag::runtime::DagBuilder;

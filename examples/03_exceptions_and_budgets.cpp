@@ -5,8 +5,7 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "redag/runtime/executor.hpp"
-#include "redag/runtime/preemption_point.hpp"
+#include "redag/redag.hpp"
 
 using namespace std::chrono_literals;
 using namespace redag::runtime;

@@ -5,7 +5,7 @@
 #include <csignal>
 #include <cstdio>
 
-#include "redag/runtime/executor.hpp"
+#include "redag/redag.hpp"
 
 using namespace std::chrono_literals;
 using namespace redag::runtime;

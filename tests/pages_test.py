@@ -7,12 +7,28 @@
 Usage: pages_test.py SOURCE_DIR. Uses the standard library only. tests/cli/usage.py compares what
 the program itself can tell.
 """
+import importlib.machinery
+import importlib.util
 import pathlib
 import re
 import sys
 import unittest
 
 SOURCE = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).parent.parent)
+
+
+def layers():
+    """LAYERS of tools/check_layers, each with all that lies below it."""
+    loader = importlib.machinery.SourceFileLoader("check_layers", str(SOURCE / "tools" / "check_layers"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    sys.dont_write_bytecode = True
+    loader.exec_module(module)
+    below = {layer: {module.layer_of(place) for place in allowed} - {None, layer}
+             for layer, allowed in module.LAYERS.items()}
+    for _ in below:
+        for places in below.values():
+            places.update(*(below[place] for place in list(places)))
+    return module.layer_of, below
 
 
 def first_cells(page, heading):
@@ -37,6 +53,24 @@ class Pages(unittest.TestCase):
         linked = {(page.parent / target).resolve() for page in maps
                   for target in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8"))}
         self.assertEqual(set(docs.rglob("*.md")) - linked - {docs / "README.md"}, set())
+
+    def test_no_walk_takes_a_step_back_up(self):
+        """Each step of a walk is a file of its own, not in a layer above the step before, and has what is named."""
+        layer_of, below = layers()
+        text = (SOURCE / "docs/life_of_a_job.md").read_text(encoding="utf-8").split("\n## Where values go\n")[1]
+        steps = [re.findall(r"^\d+\. `([^`]+)`(.*(?:\n   .*)*)", walk, re.M) for walk in text.split("\n### ")[1:]]
+        self.assertEqual(len(steps), 3)
+        for file, said in (step for walk in steps for step in walk):
+            source = (SOURCE / file).read_text(encoding="utf-8")
+            for name in re.findall(r"`(?:\w+::)*(\w+)(?:\(\))?`", said):
+                self.assertRegex(source, rf"\b{name}\b", f"{file} has no {name}")
+        for walk in ([file for file, _ in walk] for walk in steps):
+            self.assertGreater(len(walk), 5)
+            self.assertEqual(len(walk), len(set(walk)), walk)
+            for file in walk:
+                self.assertTrue((SOURCE / file).is_file(), file)
+            for before, after in zip(walk, walk[1:]):
+                self.assertNotIn(layer_of(before), below[layer_of(after)], f"{before}, then {after}")
 
     def test_contributing_lists_the_targets_of_the_makefile(self):
         makefile = (SOURCE / "Makefile").read_text(encoding="utf-8")
