@@ -36,6 +36,10 @@ function(redag_add_library target)
   target_include_directories(${target} PUBLIC
     $<BUILD_INTERFACE:${redag_repository}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(${target} PUBLIC cxx_std_20)
+  # A shared library names all that it needs; otherwise a use of what lies above it would show only in a program.
+  if(NOT REDAG_SANITIZE)
+    target_link_options(${target} PRIVATE LINKER:--no-undefined)
+  endif()
 endfunction()
 
 # redag_install_library(<target>...) installs targets for find_package(<project>), with the config file in the project's

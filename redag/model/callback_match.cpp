@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "redag/model/workload_yaml_nearest.hpp"
+#include "redag/base/nearest.hpp"
 
 namespace redag {
 namespace {
@@ -161,7 +161,7 @@ std::string CallbackMatcher::explain(const Entry &entry) const {
   std::vector<std::string> texts;
   texts.reserve(seen_.size());
   for (const Seen &seen : seen_) texts.push_back(in_words_of(pattern, seen.id));
-  const std::string_view best = yaml::nearest(wanted, {texts.begin(), texts.end()});
+  const std::string_view best = nearest(wanted, {texts.begin(), texts.end()});
   auto near = seen_.end();
   if (!best.empty()) {
     near = seen_.begin() + (std::find(texts.begin(), texts.end(), best) - texts.begin());

@@ -11,8 +11,8 @@
 
 #include <fmt/format.h>
 
+#include "redag/base/nearest.hpp"
 #include "redag/model/validate.hpp"
-#include "redag/model/workload_yaml_nearest.hpp"
 
 namespace redag::yaml {
 

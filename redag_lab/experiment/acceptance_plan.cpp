@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "redag/model/workload_yaml_nearest.hpp"
+#include "redag/base/nearest.hpp"
 #include "redag_analysis/core/bound.hpp"
 #include "redag_lab/experiment/acceptance.hpp"
 #include "redag_lab/experiment/plan_yaml.hpp"
@@ -75,7 +75,7 @@ class Checker {
     const std::vector<std::string_view> known = method_names();
     for (const std::string &name : plan_.methods) {
       if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-      const std::string_view near = yaml::nearest(name, known);
+      const std::string_view near = nearest(name, known);
       say("methods", fmt::format("unknown method '{}'", name),
           near.empty() ? "'redag analyze --methods' lists them; any and simulation are others"
                        : fmt::format("did you mean '{}'?", near));

@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "redag/model/workload_yaml_nearest.hpp"
+#include "redag/base/nearest.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_lab/experiment/plan_yaml.hpp"
 
@@ -131,7 +131,7 @@ class Checker {
     std::vector<std::string_view> known(of_world.begin(), of_world.end());
     if (name == written) known.insert(known.begin(), {kIdeal, kUnlimited});
     if (std::find(known.begin(), known.end(), name) == known.end()) {
-      const std::string_view near = yaml::nearest(name, known);
+      const std::string_view near = nearest(name, known);
       say("executors", fmt::format("there is no executor '{}'", written),
           near.empty() ? fmt::format("known: {}", fmt::join(known, ", ")) : fmt::format("did you mean '{}'?", near));
     } else if (world == World::Simulator && name.ends_with("-fifo")) {

@@ -10,13 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "redag_lab/cli/run/session.hpp"
-#include "redag_lab/cli/terminal/console.hpp"
-#include "redag_lab/cli/terminal/json.hpp"
-#include "redag_lab/cli/terminal/variant.hpp"
 #include "redag_lab/report/verdict.hpp"
+#include "redag_lab/run/session.hpp"
+#include "redag_lab/run/variant.hpp"
 
-namespace redag::cli {
+namespace redag::lab {
 
 /// One DAG in one session; times are in ns. "total" means all DAGs together.
 struct Observation {
@@ -63,15 +61,4 @@ struct Comparison {
   std::vector<std::string> warnings;       // about the whole comparison
 };
 
-/// Returns sentences such as "control: redag misses none, mte 14.2 %, ste 30.1 %: redag misses fewest".
-[[nodiscard]] std::vector<std::string> verdicts(const Comparison &comparison);
-
-/// Returns a caution if only some executors had real-time threads; otherwise empty.
-[[nodiscard]] std::string caveat(const Comparison &comparison);
-
-[[nodiscard]] std::string describe(const Comparison &comparison, const StreamTraits &terminal);
-[[nodiscard]] Json to_json(const Comparison &comparison);
-/// Returns a row per executor, DAG and repetition.
-[[nodiscard]] std::string to_csv(const Comparison &comparison);
-
-}  // namespace redag::cli
+}  // namespace redag::lab

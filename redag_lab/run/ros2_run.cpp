@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/run/ros2_run.hpp"
+#include "redag_lab/run/ros2_run.hpp"
 
 #include <fcntl.h>
 #include <spawn.h>
@@ -25,7 +25,7 @@
 
 extern char **environ;  // NOLINT(readability-redundant-declaration): POSIX has it in no header
 
-namespace redag::cli {
+namespace redag::lab {
 namespace {
 
 namespace fs = std::filesystem;
@@ -130,4 +130,4 @@ Result<experiment::FinishedRun> run_in_ros2(const experiment::PlannedRun &planne
   return run;
 }
 
-}  // namespace redag::cli
+}  // namespace redag::lab

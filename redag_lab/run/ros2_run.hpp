@@ -12,7 +12,7 @@
 #include "redag/base/result.hpp"
 #include "redag_lab/experiment/factorial.hpp"
 
-namespace redag::cli {
+namespace redag::lab {
 
 /// Returns the executors of run_workload.
 [[nodiscard]] const std::vector<std::string> &ros2_executors();
@@ -22,4 +22,4 @@ namespace redag::cli {
 [[nodiscard]] Result<experiment::FinishedRun> run_in_ros2(const experiment::PlannedRun &planned,
                                                           const std::string &program, const std::atomic<bool> &stop);
 
-}  // namespace redag::cli
+}  // namespace redag::lab

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/run/session.hpp"
+#include "redag_lab/run/session.hpp"
 
 #include <fmt/format.h>
 
@@ -18,7 +18,7 @@
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_lab/run/run_workload.hpp"
 
-namespace redag::cli {
+namespace redag::lab {
 namespace {
 
 Duration since(std::chrono::steady_clock::time_point begin) {
@@ -270,4 +270,4 @@ Duration sensible_duration(const Workload &workload) {
   return (least + *hyperperiod - 1) / *hyperperiod * *hyperperiod;
 }
 
-}  // namespace redag::cli
+}  // namespace redag::lab

@@ -20,9 +20,9 @@
 #include "redag_analysis/metrics/check_report.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/sim/simulator.hpp"
-#include "redag_lab/cli/terminal/variant.hpp"
+#include "redag_lab/run/variant.hpp"
 
-namespace redag::cli {
+namespace redag::lab {
 
 struct SessionOptions {
   trace::Driver driver = trace::Driver::Simulator;
@@ -76,4 +76,4 @@ struct Session {
 /// is shorter. A hyperperiod longer than six times this length is ignored.
 [[nodiscard]] Duration sensible_duration(const Workload &workload);
 
-}  // namespace redag::cli
+}  // namespace redag::lab

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/run/session.hpp"
+#include "redag_lab/run/session.hpp"
 
 #include <gtest/gtest.h>
 
 #include "redag_analysis/metrics/summary_json.hpp"
 
-namespace redag::cli {
+namespace redag::lab {
 namespace {
 
 Task timer(std::string name, Duration period, Duration wcet) {
@@ -134,4 +134,4 @@ TEST(SensibleDuration, HoldsAFewMillionJobs) {
 }
 
 }  // namespace
-}  // namespace redag::cli
+}  // namespace redag::lab

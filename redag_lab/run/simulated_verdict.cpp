@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/run/simulated_verdict.hpp"
+#include "redag_lab/run/simulated_verdict.hpp"
 
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 
-namespace redag::cli {
+namespace redag::lab {
 
 bool misses_nothing(const Workload &workload, const analysis::AnalysisPlatform &platform, Duration duration,
                     const std::atomic<bool> *stop) {
@@ -32,4 +32,4 @@ bool misses_nothing(const Workload &workload, const analysis::AnalysisPlatform &
   return !missed && result.end >= duration;
 }
 
-}  // namespace redag::cli
+}  // namespace redag::lab

@@ -10,7 +10,7 @@
 #include "redag/model/workload.hpp"
 #include "redag_analysis/core/system.hpp"
 
-namespace redag::cli {
+namespace redag::lab {
 
 /// Simulates `workload` on `platform` for `duration`, with its offsets, every job for its wcet, and no jitter. Returns
 /// true if no job finished late, was skipped or aborted, and no DAG exceeded its end-to-end deadline. `stop` ends the
@@ -18,4 +18,4 @@ namespace redag::cli {
 [[nodiscard]] bool misses_nothing(const Workload &workload, const analysis::AnalysisPlatform &platform,
                                   Duration duration, const std::atomic<bool> *stop = nullptr);
 
-}  // namespace redag::cli
+}  // namespace redag::lab

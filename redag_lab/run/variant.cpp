@@ -1,17 +1,17 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/terminal/variant.hpp"
+#include "redag_lab/run/variant.hpp"
 
 #include <algorithm>
 
 #include "redag/base/check.hpp"
+#include "redag/base/nearest.hpp"
 #include "redag/base/text.hpp"
 #include "redag/model/validate.hpp"
 #include "redag_analysis/executors/executors.hpp"
-#include "redag_lab/cli/terminal/options.hpp"
 
-namespace redag::cli {
+namespace redag::lab {
 
 const std::vector<std::string> &variant_names() {
   static const std::vector<std::string> kNames = [] {
@@ -36,8 +36,8 @@ Result<Variant> parse_variant(const std::string &name) {
   const std::string detail = dash == std::string::npos ? "" : name.substr(dash + 1);
   // rclcpp's executors cannot preempt: a callback runs to its end in every mode of the workload.
   if (!variant.is_redag()) variant.preemption = PreemptionMode::None;
-  for (const auto &[text, mode] : preemption_choices()) {
-    if (text == detail) variant.preemption = mode;
+  for (const PreemptionMode mode : {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os}) {
+    if (to_string(mode) == detail) variant.preemption = mode;
   }
   variant.realtime_threads = detail == "fifo";
   return variant;
@@ -81,4 +81,4 @@ const char *mode_name(sched::Preemption preemption) {
   return "?";
 }
 
-}  // namespace redag::cli
+}  // namespace redag::lab

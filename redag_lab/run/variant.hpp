@@ -15,7 +15,7 @@
 #include "redag/model/workload.hpp"
 #include "redag/sched/scheduler.hpp"
 
-namespace redag::cli {
+namespace redag::lab {
 
 struct Variant {
   std::string name;                          // as given
@@ -41,4 +41,4 @@ struct Variant {
 /// Parses a list such as "redag,mte" with at least one name and none twice.
 [[nodiscard]] Result<std::vector<Variant>> parse_variants(std::string_view list);
 
-}  // namespace redag::cli
+}  // namespace redag::lab

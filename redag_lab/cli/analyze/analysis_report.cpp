@@ -13,7 +13,7 @@
 #include "redag_analysis/many_workers/global.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/cli/terminal/table.hpp"
-#include "redag_lab/cli/terminal/variant.hpp"
+#include "redag_lab/run/variant.hpp"
 #include "redag_lab/search/remedy.hpp"
 
 namespace redag::cli {
@@ -325,7 +325,7 @@ std::vector<Row> dag_rows(const Analysed &analysed) {
   return rows;
 }
 
-const char *mode_name(const Analysed &analysed) { return mode_name(analysed.system.platform.preemption); }
+const char *mode_name(const Analysed &analysed) { return lab::mode_name(analysed.system.platform.preemption); }
 
 std::string mode_reason(const Analysed &analysed) {
   const analysis::System &system = analysed.system;

@@ -151,7 +151,8 @@ int analyze_file(const Options &options, Console &console) {
     return kExitBad;
   }
   const std::optional<Workload> workload = load_configured(options.analysis.run, console);
-  if (!workload || !takes_arguments({*parse_variant(options.executor)}, options.analysis.run, console)) return kExitBad;
+  if (!workload || !takes_arguments({*lab::parse_variant(options.executor)}, options.analysis.run, console))
+    return kExitBad;
   const Result<Analysed> analysed = analyse_configured(*workload, options, console);
   if (!analysed) {
     console.note(analysed.error());

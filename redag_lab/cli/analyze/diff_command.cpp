@@ -26,7 +26,7 @@ constexpr std::size_t kMostShown = 10;
 struct Options {
   std::string a;
   std::string b;
-  metrics::BootstrapOptions bootstrap;
+  lab::BootstrapOptions bootstrap;
   bool different = false;
   bool check = false;
   bool json = false;
@@ -51,11 +51,11 @@ class Diffing {
     if (!compare_workloads()) return kExitBad;
     for (std::string &caveat : caveats(diffed_.a, diffed_.b)) diffed_.warnings.push_back(std::move(caveat));
     progress_.draw(1, "comparing");
-    diffed_.difference = metrics::compare_sides(diffed_.a.jobs, diffed_.b.jobs, diffed_.options);
+    diffed_.difference = lab::compare_sides(diffed_.a.jobs, diffed_.b.jobs, diffed_.options);
     progress_.clear();
     console_.print(options_.json ? to_text(to_json(diffed_))
                                  : describe(diffed_, console_.out_traits(), options_.all_tasks));
-    return options_.check && diffed_.difference.is_any(metrics::Verdict::Worse) ? kExitNo : kExitOk;
+    return options_.check && diffed_.difference.is_any(lab::Verdict::Worse) ? kExitNo : kExitOk;
   }
 
  private:

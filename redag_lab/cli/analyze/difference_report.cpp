@@ -17,24 +17,24 @@
 namespace redag::cli {
 namespace {
 
-using metrics::DifferenceRow;
-using metrics::DifferenceSide;
-using metrics::FigureDifference;
-using metrics::Verdict;
+using lab::DifferenceRow;
+using lab::DifferenceSide;
+using lab::FigureDifference;
+using lab::Verdict;
 
 constexpr std::size_t kMostTasks = 20;  // with more rows, only those with a difference are shown
 
 struct Figure {
   const char *name;
-  FigureDifference metrics::RowDifference::*value;
+  FigureDifference lab::RowDifference::*value;
   Verdict DifferenceRow::*verdict;
 };
-constexpr std::array<Figure, 4> kFigures = {{{"missed", &metrics::RowDifference::miss_ratio, &DifferenceRow::miss},
-                                             {"p50", &metrics::RowDifference::p50, &DifferenceRow::p50},
-                                             {"p95", &metrics::RowDifference::p95, &DifferenceRow::p95},
-                                             {"p99", &metrics::RowDifference::p99, &DifferenceRow::p99}}};
+constexpr std::array<Figure, 4> kFigures = {{{"missed", &lab::RowDifference::miss_ratio, &DifferenceRow::miss},
+                                             {"p50", &lab::RowDifference::p50, &DifferenceRow::p50},
+                                             {"p95", &lab::RowDifference::p95, &DifferenceRow::p95},
+                                             {"p99", &lab::RowDifference::p99, &DifferenceRow::p99}}};
 
-bool is_miss(const Figure &figure) { return figure.value == &metrics::RowDifference::miss_ratio; }
+bool is_miss(const Figure &figure) { return figure.value == &lab::RowDifference::miss_ratio; }
 
 // Returns the text of one side's figure: a response time, or misses with their count.
 std::string value_text(const Figure &figure, const DifferenceSide::Row &side, double value) {

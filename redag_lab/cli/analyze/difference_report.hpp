@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "redag_analysis/metrics/difference.hpp"
 #include "redag_lab/cli/terminal/console.hpp"
 #include "redag_lab/cli/terminal/json.hpp"
+#include "redag_lab/run/difference.hpp"
 #include "redag_lab/workload/changes.hpp"
 
 namespace redag::cli {
@@ -17,15 +17,15 @@ namespace redag::cli {
 /// One of the two compared places.
 struct DiffSide {
   std::string name;
-  metrics::DifferenceSide jobs;
+  lab::DifferenceSide jobs;
 };
 
 struct Diffed {
   DiffSide a;
   DiffSide b;
   std::vector<Change> changes;  // between the workloads
-  metrics::Difference difference;
-  metrics::BootstrapOptions options;
+  lab::Difference difference;
+  lab::BootstrapOptions options;
   std::vector<std::string> warnings;
 };
 

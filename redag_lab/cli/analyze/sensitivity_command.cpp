@@ -9,12 +9,12 @@
 #include "redag_lab/cli/analyze/analysis_arguments.hpp"
 #include "redag_lab/cli/analyze/analysis_explanation.hpp"
 #include "redag_lab/cli/analyze/sensitivity_report.hpp"
-#include "redag_lab/cli/run/simulated_verdict.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
 #include "redag_lab/cli/terminal/table.hpp"
+#include "redag_lab/run/simulated_verdict.hpp"
 
 namespace redag::cli {
 namespace {
@@ -74,7 +74,7 @@ std::string search(Sensitivity &sensitivity, const std::vector<analysis::Knob> &
   const analysis::AnalysisPlatform &platform = sensitivity.analysed.system.platform;
   const Workload &workload = sensitivity.analysed.workload;
   const analysis::Accepts simulated = [&](const Workload &candidate, const analysis::System &) {
-    return misses_nothing(candidate, platform, sensitivity.simulated_for, &InterruptGuard::flag());
+    return lab::misses_nothing(candidate, platform, sensitivity.simulated_for, &InterruptGuard::flag());
   };
   Progress &progress = watch.progress();
   analysis::SensitivityOptions searching;

@@ -136,7 +136,7 @@ int tune_file(const Options &options, Console &console) {
     tuning.options.machine = *machine;
     tuning.options.simulation.overheads = sim::overheads_of(*machine);
   }
-  tuning.options.simulation.duration = options.run.duration.value_or(sensible_duration(*workload));
+  tuning.options.simulation.duration = options.run.duration.value_or(lab::sensible_duration(*workload));
 
   const InterruptGuard guard;  // covers writing the results too
   std::optional<tune::Tuned> tuned = search(*workload, tuning.options, console);

@@ -12,11 +12,11 @@
 #include "redag_lab/cli/experiment/experiment_run.hpp"
 #include "redag_lab/cli/experiment/experiment_studies.hpp"
 #include "redag_lab/cli/experiment/factorial_report.hpp"
-#include "redag_lab/cli/run/ros2_run.hpp"
-#include "redag_lab/cli/run/session.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
-#include "redag_lab/cli/terminal/variant.hpp"
 #include "redag_lab/experiment/factorial_results.hpp"
+#include "redag_lab/run/ros2_run.hpp"
+#include "redag_lab/run/session.hpp"
+#include "redag_lab/run/variant.hpp"
 
 namespace redag::cli {
 namespace {
@@ -28,17 +28,17 @@ using experiment::World;
 
 /// Executes a run in any world; `program` is the one for ROS 2.
 Result<FinishedRun> drive(const PlannedRun &planned, const std::string &program) {
-  if (planned.world == World::Ros2) return run_in_ros2(planned, program, InterruptGuard::flag());
-  const Result<Variant> variant = parse_variant(planned.executor);
+  if (planned.world == World::Ros2) return lab::run_in_ros2(planned, program, InterruptGuard::flag());
+  const Result<lab::Variant> variant = lab::parse_variant(planned.executor);
   REDAG_CHECK(variant.has_value(), "the plan was checked");
-  SessionOptions options;
+  lab::SessionOptions options;
   options.driver = planned.world == World::Simulator ? trace::Driver::Simulator : trace::Driver::Threads;
   options.duration = planned.duration;
   options.warm_up = planned.warm_up;
   options.seed = planned.seed;
   options.overheads = planned.overheads;
   options.stop = &InterruptGuard::flag();
-  Result<Session> session = run_session(planned.workload, *variant, options);
+  Result<lab::Session> session = lab::run_session(planned.workload, *variant, options);
   if (!session) return tl::unexpected<Diagnostics>(std::move(session.error()));
   if (session->stopped) return make_error("interrupted");
   if (session->cut_at) {
@@ -133,14 +133,16 @@ Action add_factorial(CLI::App &app) {
         console.error("--shard: real runs belong to one machine", "give each machine a plan and a folder");
         return kExitBad;
       }
-      if (const auto busy = busy_machine_warning()) console.warn(*busy);
+      if (const auto busy = lab::busy_machine_warning()) console.warn(*busy);
     }
     FactorialStudy study(std::move(*plan), *program);
     return run_study(study, *settings, console);
   };
 }
 
-std::vector<std::string> executors_of(World world) { return world == World::Ros2 ? ros2_executors() : variant_names(); }
+std::vector<std::string> executors_of(World world) {
+  return world == World::Ros2 ? lab::ros2_executors() : lab::variant_names();
+}
 
 std::unique_ptr<Study> make_factorial(const std::string &plan, const std::string &file, Console &console) {
   Result<FactorialPlan> read = experiment::parse_factorial_plan(plan, file, executors_of);

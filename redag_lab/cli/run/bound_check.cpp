@@ -29,7 +29,7 @@ const char *name_of(Broken broken) {
 
 }  // namespace
 
-BoundCheck check_bounds(const Session &session) {
+BoundCheck check_bounds(const lab::Session &session) {
   BoundCheck check;
   const trace::RunInfo &info = session.info;
   Workload workload = info.workload;

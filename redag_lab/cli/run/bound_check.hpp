@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "redag_analysis/metrics/assumptions.hpp"
-#include "redag_lab/cli/run/session.hpp"
 #include "redag_lab/cli/terminal/console.hpp"
 #include "redag_lab/cli/terminal/json.hpp"
+#include "redag_lab/run/session.hpp"
 
 namespace redag::cli {
 
@@ -28,7 +28,7 @@ struct BoundCheck {
 
 /// Analyses the workload as it ran, under its executor, with the overheads that the run recorded. Responses are those
 /// of the whole trace, including the warm-up.
-[[nodiscard]] BoundCheck check_bounds(const Session &session);
+[[nodiscard]] BoundCheck check_bounds(const lab::Session &session);
 
 [[nodiscard]] std::string describe(const BoundCheck &check, std::size_t tasks, const StreamTraits &terminal);
 [[nodiscard]] Json to_json(const BoundCheck &check);

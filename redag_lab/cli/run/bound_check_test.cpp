@@ -17,10 +17,10 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 // Simulates 100 ms of the workload.
-Session simulated(const Workload &workload, const std::string &executor = "redag") {
-  SessionOptions options;
+lab::Session simulated(const Workload &workload, const std::string &executor = "redag") {
+  lab::SessionOptions options;
   options.duration = 100 * kMillisecond;
-  return run_session(workload, *parse_variant(executor), options).value();
+  return lab::run_session(workload, *lab::parse_variant(executor), options).value();
 }
 
 Duration bound_of(const BoundCheck &check, std::size_t task) { return check.assumptions.tasks.at(task).response.bound; }
@@ -46,7 +46,7 @@ TEST(BoundCheck, ARunWithinItsBounds) {
 }
 
 TEST(BoundCheck, ChargesTheOverheadsOfTheRun) {
-  Session session = simulated(fast_and_slow());
+  lab::Session session = simulated(fast_and_slow());
   Overheads machine;
   machine.dispatch = kMillisecond;
   machine.lateness = kMillisecond;
@@ -72,7 +72,7 @@ TEST(BoundCheck, ARunOfAnotherExecutor) {
 
 // Jobs executed longer than the wcet of the bounds. Both tasks respond late, the second because of the first.
 TEST(BoundCheck, NamesWhatIsBroken) {
-  Session session = simulated(fast_and_slow());
+  lab::Session session = simulated(fast_and_slow());
   Task &imu = session.info.workload.dags[0].tasks[0];
   imu.wcet = imu.bcet = kMillisecond;
   const BoundCheck check = check_bounds(session);
@@ -95,7 +95,7 @@ TEST(BoundCheck, NamesWhatIsBroken) {
 }
 
 TEST(BoundCheck, SaysWhyThereIsNone) {
-  Session session = simulated(fast_and_slow());
+  lab::Session session = simulated(fast_and_slow());
   session.info.workload.dags[1].tasks[0].wcet = 60 * kMillisecond;
   const BoundCheck check = check_bounds(session);
   EXPECT_EQ(check.bounded, 1U);

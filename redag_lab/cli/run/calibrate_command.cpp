@@ -8,7 +8,6 @@
 
 #include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
-#include "redag_lab/cli/run/session.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/json.hpp"
@@ -17,6 +16,7 @@
 #include "redag_lab/cli/terminal/signals.hpp"
 #include "redag_lab/cli/terminal/table.hpp"
 #include "redag_lab/run/calibrate.hpp"
+#include "redag_lab/run/session.hpp"
 
 namespace redag::cli {
 namespace {
@@ -111,7 +111,7 @@ int calibrate(const Options &options, Console &console) {
     console.error(fmt::format("--duration: {} is more than a day", format_duration(options.duration)));
     return kExitBad;
   }
-  if (const auto busy = busy_machine_warning()) console.warn(*busy);
+  if (const auto busy = lab::busy_machine_warning()) console.warn(*busy);
   const InterruptGuard guard;  // covers writing the file too
   Result<Calibration> measured = measure(options, console);
   if (!measured) {

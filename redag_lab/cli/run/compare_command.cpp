@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "redag_lab/cli/run/comparison.hpp"
+#include "redag_lab/cli/run/comparison_report.hpp"
 #include "redag_lab/cli/run/run_arguments.hpp"
 #include "redag_lab/cli/run/run_report.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
@@ -30,19 +30,20 @@ struct Options {
 
 class Comparing {
  public:
-  Comparing(const Options &options, const Workload &workload, const SessionOptions &session,
-            const std::vector<Variant> &variants, std::uint32_t repetitions, Console &console)
+  Comparing(const Options &options, const Workload &workload, const lab::SessionOptions &session,
+            const std::vector<lab::Variant> &variants, std::uint32_t repetitions, Console &console)
       : options_(options),
         workload_(workload),
         session_(session),
         repetitions_(repetitions),
         console_(console),
         progress_(console) {
-    for (const Variant &variant : variants) results_.push_back(ExecutorResults{variant, {}, {}, {}, false, 0, {}});
+    for (const lab::Variant &variant : variants)
+      results_.push_back(lab::ExecutorResults{variant, {}, {}, {}, false, 0, {}});
   }
 
   int run() {
-    if (const auto busy = options_.simulate ? std::nullopt : busy_machine_warning()) {
+    if (const auto busy = options_.simulate ? std::nullopt : lab::busy_machine_warning()) {
       console_.warn(*busy);
       warnings_.push_back(*busy);
     }
@@ -55,7 +56,7 @@ class Comparing {
       return kExitBad;
     }
     // Keeps whole rounds only: every executor has the same number of repetitions.
-    for (ExecutorResults &results : results_) results.repetitions.resize(done);
+    for (lab::ExecutorResults &results : results_) results.repetitions.resize(done);
     if (done < repetitions_) console_.warn(fmt::format("interrupted: {} of {} repetitions", done, repetitions_));
     return report();
   }
@@ -74,13 +75,13 @@ class Comparing {
     return true;
   }
 
-  bool run_one(ExecutorResults &results, std::uint32_t repetition) {
-    SessionOptions options = session_;
+  bool run_one(lab::ExecutorResults &results, std::uint32_t repetition) {
+    lab::SessionOptions options = session_;
     // Virtual time repeats exactly. Only another seed makes another repetition.
     if (options_.simulate) options.seed += repetition;
     progress_.set_label(fmt::format("{} {}/{}", results.variant.name, repetition + 1, repetitions_));
-    const Result<Session> session =
-        run_session(workload_, results.variant, options, progress_hook(progress_, workload_, options.duration));
+    const Result<lab::Session> session =
+        lab::run_session(workload_, results.variant, options, progress_hook(progress_, workload_, options.duration));
     progress_.clear();
     if (!session) {
       for (const Diagnostic &problem : session.error()) {
@@ -97,7 +98,7 @@ class Comparing {
     return write(*session, results.variant, repetition);
   }
 
-  bool write(const Session &session, const Variant &variant, std::uint32_t repetition) {
+  bool write(const lab::Session &session, const lab::Variant &variant, std::uint32_t repetition) {
     if (options_.run.folder.empty()) return true;
     const std::string folder = fmt::format("{}/{}/repetition-{}", options_.run.folder, variant.name, repetition + 1);
     if (const Result<void> made = prepare_folder(folder, options_.run.force); !made) {
@@ -112,12 +113,12 @@ class Comparing {
 
   [[nodiscard]] std::size_t rounds() const {
     std::size_t least = results_.front().repetitions.size();
-    for (const ExecutorResults &results : results_) least = std::min(least, results.repetitions.size());
+    for (const lab::ExecutorResults &results : results_) least = std::min(least, results.repetitions.size());
     return least;
   }
 
-  [[nodiscard]] Comparison comparison() {
-    Comparison comparison;
+  [[nodiscard]] lab::Comparison comparison() {
+    lab::Comparison comparison;
     comparison.workload = workload_.name;
     for (const Dag &dag : workload_.dags) comparison.dags.push_back(dag.name);
     comparison.dags.emplace_back("total");
@@ -131,8 +132,8 @@ class Comparing {
   }
 
   int report() {
-    const Comparison compared = comparison();
-    for (const ExecutorResults &results : results_) {
+    const lab::Comparison compared = comparison();
+    for (const lab::ExecutorResults &results : results_) {
       for (const std::string &warning : results.warnings) console_.warn(results.variant.name + ": " + warning);
     }
     const std::string document = to_text(to_json(compared));
@@ -150,7 +151,7 @@ class Comparing {
     }
     if (!all_written_) return kExitBad;
     const bool violated = std::any_of(results_.begin(), results_.end(),
-                                      [](const ExecutorResults &results) { return results.check_violations > 0; });
+                                      [](const lab::ExecutorResults &results) { return results.check_violations > 0; });
     const bool missed = compared.executors.front().has_misses();
     return violated || (options_.run.check && missed) ? kExitNo : kExitOk;
   }
@@ -172,17 +173,17 @@ class Comparing {
 
   const Options &options_;
   const Workload &workload_;
-  SessionOptions session_;
+  lab::SessionOptions session_;
   std::uint32_t repetitions_;
   Console &console_;
   Progress progress_;
-  std::vector<ExecutorResults> results_;
+  std::vector<lab::ExecutorResults> results_;
   std::vector<std::string> warnings_;
   bool all_written_ = true;
 };
 
 int compare(const Options &options, Console &console) {
-  const Result<std::vector<Variant>> variants = parse_variants(options.executors);
+  const Result<std::vector<lab::Variant>> variants = lab::parse_variants(options.executors);
   if (!variants) {
     console.note(variants.error());
     return kExitBad;
@@ -192,7 +193,7 @@ int compare(const Options &options, Console &console) {
                   "name two or more, such as redag,mte; 'redag run' runs one");
     return kExitBad;
   }
-  for (const Variant &variant : *variants) {
+  for (const lab::Variant &variant : *variants) {
     if (!options.simulate || !variant.realtime_threads) continue;
     console.error(fmt::format("the simulator has no threads: '{}' is '{}' there", variant.name, variant.executor));
     return kExitBad;
@@ -205,15 +206,15 @@ int compare(const Options &options, Console &console) {
     console.error("--seed and --repeat: the last seed is not below 2^64", "begin with a smaller seed");
     return kExitBad;
   }
-  for (const Variant &variant : *variants) {
-    if (const Result<Workload> configured = configure(*workload, variant); !configured) {
+  for (const lab::Variant &variant : *variants) {
+    if (const Result<Workload> configured = lab::configure(*workload, variant); !configured) {
       console.note(configured.error());
       return kExitBad;
     }
   }
   const trace::Driver driver = options.simulate ? trace::Driver::Simulator : trace::Driver::Threads;
-  const Duration usual = options.simulate ? sensible_duration(*workload) : kThreadsDuration;
-  const std::optional<SessionOptions> session = session_options(options.run, driver, usual, console);
+  const Duration usual = options.simulate ? lab::sensible_duration(*workload) : kThreadsDuration;
+  const std::optional<lab::SessionOptions> session = session_options(options.run, driver, usual, console);
   if (!session) return kExitBad;
   return Comparing(options, *workload, *session, *variants, repetitions, console).run();
 }

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/run/comparison.hpp"
+#include "redag_lab/cli/run/comparison_report.hpp"
 
 #include <fmt/format.h>
 
@@ -12,21 +12,16 @@
 namespace redag::cli {
 namespace {
 
-template <class Value>
-Spread spread_over(const ExecutorResults &results, std::size_t dag, Value value) {
-  std::vector<double> values;
-  for (const auto &repetition : results.repetitions) values.push_back(static_cast<double>(value(repetition[dag])));
-  return report::spread_of(std::move(values));
-}
-
 // Returns "13.9 % to 14.8 %" if repetitions differ, else an empty text.
-std::string range_text(const Spread &miss) {
+std::string range_text(const lab::Spread &miss) {
   const std::string low = format_percent(miss.min);
   const std::string high = format_percent(miss.max);
   return low == high ? std::string() : fmt::format("{} to {}", low, high);
 }
 
-Json to_json(const Spread &spread) { return Json{{"median", spread.median}, {"min", spread.min}, {"max", spread.max}}; }
+Json to_json(const lab::Spread &spread) {
+  return Json{{"median", spread.median}, {"min", spread.min}, {"max", spread.max}};
+}
 
 Json to_json(const metrics::Distribution &d) {
   return Json{{"count", d.count}, {"mean_ns", d.mean}, {"min_ns", d.min}, {"p50_ns", d.p50},
@@ -38,7 +33,7 @@ Json counts_json(const metrics::JobCounts &jobs) {
               {"skipped", jobs.skipped},   {"aborted", jobs.aborted},   {"missed", jobs.missed()}};
 }
 
-Json to_json(const Observation &seen, bool is_dag) {
+Json to_json(const lab::Observation &seen, bool is_dag) {
   Json json = counts_json(seen.jobs);
   json["miss_ratio"] = seen.jobs.miss_ratio();
   json["miss_ratio_with_lost"] = seen.jobs.miss_ratio_with_lost();
@@ -48,9 +43,9 @@ Json to_json(const Observation &seen, bool is_dag) {
   return json;
 }
 
-Json optional_spread(const std::optional<Spread> &spread) { return spread ? to_json(*spread) : Json(); }
+Json optional_spread(const std::optional<lab::Spread> &spread) { return spread ? to_json(*spread) : Json(); }
 
-Json row_json(const ExecutorResults &results, const std::string &name, std::size_t dag, bool is_dag) {
+Json row_json(const lab::ExecutorResults &results, const std::string &name, std::size_t dag, bool is_dag) {
   Json json{{"name", name}};
   json.update(counts_json(results.jobs(dag)));
   json["miss_ratio"] = to_json(results.late(dag));
@@ -76,7 +71,7 @@ std::string quoted(const std::string &text) {
   return result + "\"";
 }
 
-std::string comparison_table(const Comparison &comparison, const StreamTraits &terminal) {
+std::string comparison_table(const lab::Comparison &comparison, const StreamTraits &terminal) {
   const bool is_repeated = comparison.executors.front().repetitions.size() > 1;
   std::vector<Column> columns = {
       {"DAG", false, 9}, {"executor", false, 9, true}, {"jobs", true, 7}, {"late", true, 2}, {"missed", true, 8}};
@@ -84,10 +79,10 @@ std::string comparison_table(const Comparison &comparison, const StreamTraits &t
   columns.insert(columns.end(), {{"p50", true, 4}, {"p95", true, 1}, {"p99", true, 6}, {"max", true, 5}});
   Table table(std::move(columns));
   for (std::size_t dag = 0; dag < comparison.dags.size(); ++dag) {
-    for (const ExecutorResults &results : comparison.executors) {
+    for (const lab::ExecutorResults &results : comparison.executors) {
       const metrics::JobCounts jobs = results.jobs(dag);
       const auto time = [&](Duration metrics::Distribution::*percentile) {
-        const std::optional<Spread> spread = results.end_to_end(dag, percentile);
+        const std::optional<lab::Spread> spread = results.end_to_end(dag, percentile);
         return Cell{spread ? humanize_duration(static_cast<Duration>(spread->median)) : "-"};
       };
       const std::optional<Duration> longest = results.longest_end_to_end(dag);
@@ -110,13 +105,13 @@ std::string comparison_table(const Comparison &comparison, const StreamTraits &t
 }
 
 // Explains the columns of the table in words.
-std::string legend(const Comparison &comparison, std::size_t repetitions) {
+std::string legend(const lab::Comparison &comparison, std::size_t repetitions) {
   std::string text = "missed: late, skipped or aborted, of all jobs";
   if (repetitions > 1) text += " of all repetitions";
   text += "\np50 to max: end to end, from the release of a source to the finish of a sink";
   const bool several = std::any_of(comparison.executors.front().repetitions.front().begin(),
                                    comparison.executors.front().repetitions.front().end(),
-                                   [](const Observation &seen) { return seen.end_to_end.sinks.size() > 1; });
+                                   [](const lab::Observation &seen) { return seen.end_to_end.sinks.size() > 1; });
   if (several) text += ";\nof several sinks, each figure is that of the worst one";
   if (repetitions > 1) text += ";\nmax is of all repetitions, p50 to p99 are medians over the repetitions";
   return text + "\n\n";
@@ -124,73 +119,11 @@ std::string legend(const Comparison &comparison, std::size_t repetitions) {
 
 }  // namespace
 
-void ExecutorResults::add(const Session &session) {
-  std::vector<Observation> seen;
-  for (const metrics::DagSummary &dag : session.summary.dags) seen.push_back({dag.jobs, dag.end_to_end});
-  seen.push_back({session.summary.total, {}});
-  repetitions.push_back(std::move(seen));
-  preemption = session.info.preemption;
-  preemption_why = session.info.preemption_why;
-  realtime = session.realtime_threads;
-  check_violations += session.check.violation_count;
-  for (const std::string &warning : session.warnings) {
-    if (std::find(warnings.begin(), warnings.end(), warning) == warnings.end()) warnings.push_back(warning);
-  }
-}
-
-Spread ExecutorResults::miss(std::size_t dag) const {
-  return spread_over(*this, dag, [](const Observation &seen) { return seen.jobs.miss_ratio_with_lost(); });
-}
-
-Spread ExecutorResults::late(std::size_t dag) const {
-  return spread_over(*this, dag, [](const Observation &seen) { return seen.jobs.miss_ratio(); });
-}
-
-std::optional<Spread> ExecutorResults::end_to_end(std::size_t dag, Duration metrics::Distribution::*percentile) const {
-  std::vector<double> values;
-  for (const auto &repetition : repetitions) {
-    const metrics::Distribution &response = repetition[dag].end_to_end.response;
-    if (response.count > 0) values.push_back(static_cast<double>(response.*percentile));
-  }
-  if (values.empty()) return std::nullopt;
-  return report::spread_of(std::move(values));
-}
-
-std::optional<Duration> ExecutorResults::longest_end_to_end(std::size_t dag) const {
-  std::optional<Duration> longest;
-  for (const auto &repetition : repetitions) {
-    const metrics::Distribution &response = repetition[dag].end_to_end.response;
-    if (response.count > 0) longest = std::max(longest.value_or(response.max), response.max);
-  }
-  return longest;
-}
-
-std::uint64_t ExecutorResults::late_end_to_end(std::size_t dag) const {
-  std::uint64_t late = 0;
-  for (const auto &repetition : repetitions) late += repetition[dag].end_to_end.late;
-  return late;
-}
-
-metrics::JobCounts ExecutorResults::jobs(std::size_t dag) const {
-  metrics::JobCounts all;
-  for (const auto &repetition : repetitions) all.add_counts(repetition[dag].jobs);
-  return all;
-}
-
-bool ExecutorResults::has_misses() const {
-  const std::size_t total = repetitions.front().size() - 1;
-  if (jobs(total).missed() > 0) return true;
-  for (std::size_t dag = 0; dag < total; ++dag) {
-    if (late_end_to_end(dag) > 0) return true;
-  }
-  return false;
-}
-
-std::vector<std::string> verdicts(const Comparison &comparison) {
+std::vector<std::string> verdicts(const lab::Comparison &comparison) {
   std::vector<std::string> lines;
   for (std::size_t dag = 0; dag + 1 < comparison.dags.size(); ++dag) {
     std::vector<report::Contender> contenders;
-    for (const ExecutorResults &results : comparison.executors) {
+    for (const lab::ExecutorResults &results : comparison.executors) {
       const metrics::JobCounts jobs = results.jobs(dag);
       contenders.push_back({.name = results.variant.name,
                             .missed = jobs.missed(),
@@ -202,10 +135,10 @@ std::vector<std::string> verdicts(const Comparison &comparison) {
   return lines;
 }
 
-std::string caveat(const Comparison &comparison) {
+std::string caveat(const lab::Comparison &comparison) {
   std::vector<std::string> with;
   std::vector<std::string> without;
-  for (const ExecutorResults &results : comparison.executors) {
+  for (const lab::ExecutorResults &results : comparison.executors) {
     (results.realtime ? with : without).push_back(results.variant.name);
   }
   if (with.empty() || without.empty()) return {};
@@ -215,14 +148,14 @@ std::string caveat(const Comparison &comparison) {
       report::join(with), report::join(without));
 }
 
-std::string describe(const Comparison &comparison, const StreamTraits &terminal) {
+std::string describe(const lab::Comparison &comparison, const StreamTraits &terminal) {
   const std::size_t repetitions = comparison.executors.front().repetitions.size();
   const bool simulated = comparison.driver == trace::Driver::Simulator;
   std::string text = fmt::format("{}: {} worker{}, {} repetition{} of {} {}, seed {}\n", comparison.workload,
                                  comparison.workers, comparison.workers == 1 ? "" : "s", repetitions,
                                  repetitions == 1 ? "" : "s", humanize_duration(comparison.duration),
                                  simulated ? "in virtual time" : "on threads", comparison.seed);
-  for (const ExecutorResults &results : comparison.executors) {
+  for (const lab::ExecutorResults &results : comparison.executors) {
     text += fmt::format("  {}: preemption {}{}\n", results.variant.name, results.preemption,
                         results.preemption_why.empty() ? "" : " (" + results.preemption_why + ")");
   }
@@ -231,7 +164,7 @@ std::string describe(const Comparison &comparison, const StreamTraits &terminal)
   for (const std::string &line : verdicts(comparison)) text += line + "\n";
   if (const std::string unfair = caveat(comparison); !unfair.empty()) text += "note: " + unfair + "\n";
   std::string violated;
-  for (const ExecutorResults &results : comparison.executors) {
+  for (const lab::ExecutorResults &results : comparison.executors) {
     if (results.check_violations == 0) continue;
     violated += fmt::format("{}{}: {} violations", violated.empty() ? "" : ", ", results.variant.name,
                             format_count(results.check_violations));
@@ -243,9 +176,9 @@ std::string describe(const Comparison &comparison, const StreamTraits &terminal)
   return text;
 }
 
-Json to_json(const Comparison &comparison) {
+Json to_json(const lab::Comparison &comparison) {
   Json executors = Json::array();
-  for (const ExecutorResults &results : comparison.executors) {
+  for (const lab::ExecutorResults &results : comparison.executors) {
     Json dags = Json::array();
     for (std::size_t dag = 0; dag + 1 < comparison.dags.size(); ++dag) {
       dags.push_back(row_json(results, comparison.dags[dag], dag, true));
@@ -274,14 +207,14 @@ Json to_json(const Comparison &comparison) {
               {"warnings", comparison.warnings}};
 }
 
-std::string to_csv(const Comparison &comparison) {
+std::string to_csv(const lab::Comparison &comparison) {
   std::string text =
       "executor,dag,repetition,released,finished,late,skipped,aborted,missed,miss_ratio,miss_ratio_with_lost,"
       "end_to_end_late,end_to_end_p50_ns,end_to_end_p95_ns,end_to_end_p99_ns,end_to_end_max_ns\n";
-  for (const ExecutorResults &results : comparison.executors) {
+  for (const lab::ExecutorResults &results : comparison.executors) {
     for (std::size_t r = 0; r < results.repetitions.size(); ++r) {
       for (std::size_t dag = 0; dag + 1 < comparison.dags.size(); ++dag) {
-        const Observation &seen = results.repetitions[r][dag];
+        const lab::Observation &seen = results.repetitions[r][dag];
         const metrics::JobCounts &jobs = seen.jobs;
         text += fmt::format("{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{}", results.variant.name,
                             quoted(comparison.dags[dag]), r + 1, jobs.released, jobs.finished, jobs.late, jobs.skipped,

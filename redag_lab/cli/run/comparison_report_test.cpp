@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/run/comparison.hpp"
+#include "redag_lab/cli/run/comparison_report.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,12 +12,12 @@ namespace redag::cli {
 namespace {
 
 // Returns an executor whose one DAG misses these shares of 1 000 jobs in its repetitions, and responds after 1 ms.
-ExecutorResults results(const std::string &name, const std::vector<double> &misses) {
-  ExecutorResults made;
-  made.variant = *parse_variant(name);
+lab::ExecutorResults results(const std::string &name, const std::vector<double> &misses) {
+  lab::ExecutorResults made;
+  made.variant = *lab::parse_variant(name);
   made.preemption = "none";
   for (const double miss : misses) {
-    Observation seen;
+    lab::Observation seen;
     seen.jobs.released = 1000;
     seen.jobs.finished = 1000;
     seen.jobs.late = static_cast<std::uint64_t>(std::lround(miss * 1000));
@@ -25,27 +25,27 @@ ExecutorResults results(const std::string &name, const std::vector<double> &miss
     seen.end_to_end.response.p99 = kMillisecond;
     seen.end_to_end.response.max = kMillisecond;
     seen.end_to_end.sinks.resize(1);
-    Observation total = seen;
+    lab::Observation total = seen;
     total.end_to_end = {};
     made.repetitions.push_back({seen, total});
   }
   return made;
 }
 
-Comparison comparison_of(std::vector<ExecutorResults> executors) {
-  Comparison comparison;
+lab::Comparison comparison_of(std::vector<lab::ExecutorResults> executors) {
+  lab::Comparison comparison;
   comparison.workload = "w";
   comparison.dags = {"control", "total"};
   comparison.executors = std::move(executors);
   return comparison;
 }
 
-std::string verdict(std::vector<ExecutorResults> executors) {
+std::string verdict(std::vector<lab::ExecutorResults> executors) {
   return verdicts(comparison_of(std::move(executors))).at(0);
 }
 
 TEST(Spread, MedianAndRange) {
-  const Spread odd = report::spread_of({3, 1, 2});
+  const lab::Spread odd = report::spread_of({3, 1, 2});
   EXPECT_EQ(odd.median, 2);
   EXPECT_EQ(odd.min, 1);
   EXPECT_EQ(odd.max, 3);
@@ -79,7 +79,7 @@ TEST(Verdict, GroupsThoseThatAreAlike) {
 }
 
 TEST(Caveat, SaysWhoHadRealTimeThreads) {
-  Comparison comparison;
+  lab::Comparison comparison;
   comparison.executors = {results("redag", {0}), results("mte", {0})};
   EXPECT_EQ(caveat(comparison), "");
   comparison.executors[0].realtime = true;
@@ -89,19 +89,19 @@ TEST(Caveat, SaysWhoHadRealTimeThreads) {
 }
 
 // Returns the executor's row of the table.
-std::string table_row(const Comparison &comparison, const std::string &executor, bool colour = false) {
+std::string table_row(const lab::Comparison &comparison, const std::string &executor, bool colour = false) {
   const std::string text = describe(comparison, StreamTraits{.colour = colour, .width = 0});
   const std::size_t name = text.find(executor, text.find("executor"));
   return text.substr(name, text.find('\n', name) - name);
 }
 
 TEST(Comparison, MaximaAreOfAllRepetitions) {
-  ExecutorResults three = results("redag", {0, 0, 0});
+  lab::ExecutorResults three = results("redag", {0, 0, 0});
   three.repetitions[1][0].end_to_end.response.max = 9 * kMillisecond;
   three.repetitions[2][0].end_to_end.response.p99 = 3 * kMillisecond;
   EXPECT_EQ(three.longest_end_to_end(0), 9 * kMillisecond) << "not the median of the maxima";
   EXPECT_EQ(three.end_to_end(0, &metrics::Distribution::p99)->median, kMillisecond);
-  const Comparison comparison = comparison_of({three});
+  const lab::Comparison comparison = comparison_of({three});
   EXPECT_NE(table_row(comparison, "redag").find("9ms"), std::string::npos) << table_row(comparison, "redag");
   EXPECT_EQ(to_json(comparison)["executors"][0]["dags"][0]["end_to_end_max_ns"], 9 * kMillisecond);
   EXPECT_NE(describe(comparison, StreamTraits{}).find("max is of all repetitions, p50 to p99 are medians"),
@@ -109,7 +109,7 @@ TEST(Comparison, MaximaAreOfAllRepetitions) {
 }
 
 TEST(Comparison, OneMissIsShownAndNotGreen) {
-  const ExecutorResults once = results("redag", {0, 0.001, 0});
+  const lab::ExecutorResults once = results("redag", {0, 0.001, 0});
   const std::string row = table_row(comparison_of({once}), "redag", true);
   EXPECT_NE(row.find(tinted("1 (0.033 %)", Tint::Bad, true)), std::string::npos) << row;
   EXPECT_TRUE(once.has_misses());
@@ -120,7 +120,7 @@ TEST(Comparison, OneMissIsShownAndNotGreen) {
 }
 
 TEST(Comparison, ARepetitionWithoutAnAnswerHasNoPercentile) {
-  ExecutorResults two = results("redag", {1, 1});
+  lab::ExecutorResults two = results("redag", {1, 1});
   two.repetitions[0][0].end_to_end.response = {};
   EXPECT_EQ(two.end_to_end(0, &metrics::Distribution::p99)->min, kMillisecond) << "not 0 of the silent one";
   two.repetitions[1][0].end_to_end.response = {};
@@ -130,14 +130,14 @@ TEST(Comparison, ARepetitionWithoutAnAnswerHasNoPercentile) {
 }
 
 TEST(Comparison, LateEndToEndIsAMiss) {
-  ExecutorResults late = results("redag", {0, 0});
+  lab::ExecutorResults late = results("redag", {0, 0});
   EXPECT_FALSE(late.has_misses());
   late.repetitions[1][0].end_to_end.late = 1;
   EXPECT_TRUE(late.has_misses());
 }
 
 TEST(Comparison, CsvHasARowForEveryRepetitionAndQuotesNames) {
-  Comparison comparison;
+  lab::Comparison comparison;
   comparison.dags = {"a,\"b\"", "total"};
   comparison.executors = {results("redag", {0.5, 0.25})};
   const std::string text = to_csv(comparison);
@@ -146,7 +146,7 @@ TEST(Comparison, CsvHasARowForEveryRepetitionAndQuotesNames) {
 }
 
 TEST(Comparison, JsonHasEveryRepetition) {
-  Comparison comparison;
+  lab::Comparison comparison;
   comparison.dags = {"control", "total"};
   comparison.executors = {results("redag", {0.5, 0.25, 0.75})};
   const Json document = to_json(comparison);

@@ -62,7 +62,7 @@ int recover(const Options &options, Console &console) {
     return kExitBad;
   }
   console.note(warnings_of(*recovered));
-  const Session session = session_of(std::move(recovered->trace));
+  const lab::Session session = lab::session_of(std::move(recovered->trace));
   if (options.json) {
     console.print(to_text(to_json(session)));
   } else {

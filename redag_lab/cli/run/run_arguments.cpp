@@ -123,27 +123,28 @@ std::optional<Workload> load_configured(const RunArguments &arguments, Console &
   return std::nullopt;
 }
 
-bool takes_arguments(const std::vector<Variant> &variants, const RunArguments &arguments, Console &console) {
+bool takes_arguments(const std::vector<lab::Variant> &variants, const RunArguments &arguments, Console &console) {
   const auto none = [&](const auto &takes) { return std::none_of(variants.begin(), variants.end(), takes); };
-  const Variant &first = variants.front();
-  if (arguments.preemption &&
-      none([&](const Variant &variant) { return !variant.preemption || variant.preemption == arguments.preemption; })) {
+  const lab::Variant &first = variants.front();
+  if (arguments.preemption && none([&](const lab::Variant &variant) {
+        return !variant.preemption || variant.preemption == arguments.preemption;
+      })) {
     console.error(fmt::format("--preemption {}: '{}' always runs with preemption {}", to_string(*arguments.preemption),
                               first.name, to_string(*first.preemption)),
                   "leave --preemption out, or choose the executor 'redag'");
     return false;
   }
-  if (arguments.policy && none([](const Variant &variant) { return variant.is_redag(); })) {
+  if (arguments.policy && none([](const lab::Variant &variant) { return variant.is_redag(); })) {
     console.error(fmt::format("--policy {}: '{}' has an order of its own", to_string(*arguments.policy), first.name),
                   "leave --policy out, or choose the executor 'redag'");
     return false;
   }
-  if (arguments.ties && none([](const Variant &variant) { return variant.is_redag(); })) {
+  if (arguments.ties && none([](const lab::Variant &variant) { return variant.is_redag(); })) {
     console.error(fmt::format("--ties {}: '{}' has an order of its own", to_string(*arguments.ties), first.name),
                   "leave --ties out, or choose the executor 'redag'");
     return false;
   }
-  const auto has_workers = [](const Variant &variant) {
+  const auto has_workers = [](const lab::Variant &variant) {
     return !sched::find_executor(variant.executor)->single_worker;
   };
   if (arguments.workers > 1 && none(has_workers)) {
@@ -154,9 +155,9 @@ bool takes_arguments(const std::vector<Variant> &variants, const RunArguments &a
   return true;
 }
 
-std::optional<SessionOptions> session_options(const RunArguments &arguments, trace::Driver driver,
-                                              Duration default_duration, Console &console) {
-  SessionOptions options;
+std::optional<lab::SessionOptions> session_options(const RunArguments &arguments, trace::Driver driver,
+                                                   Duration default_duration, Console &console) {
+  lab::SessionOptions options;
   options.driver = driver;
   options.duration = arguments.duration.value_or(default_duration);
   options.warm_up = arguments.warm_up;
@@ -212,7 +213,7 @@ std::optional<SessionOptions> session_options(const RunArguments &arguments, tra
   return options;
 }
 
-ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration) {
+lab::ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration) {
   std::vector<std::string> names;
   for (const Dag &dag : workload.dags) names.push_back(dag.name);
   return [&progress, names, duration](Time now, const std::vector<std::uint64_t> &misses) {

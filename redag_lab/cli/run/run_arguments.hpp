@@ -14,10 +14,10 @@
 #include "redag/base/time.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
-#include "redag_lab/cli/run/session.hpp"
 #include "redag_lab/cli/terminal/console.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
-#include "redag_lab/cli/terminal/variant.hpp"
+#include "redag_lab/run/session.hpp"
+#include "redag_lab/run/variant.hpp"
 
 namespace redag::cli {
 
@@ -65,15 +65,15 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments);
 
 /// Returns false, with an error, if the command line requests a mode, a policy or workers that none of the executors
 /// takes.
-[[nodiscard]] bool takes_arguments(const std::vector<Variant> &variants, const RunArguments &arguments,
+[[nodiscard]] bool takes_arguments(const std::vector<lab::Variant> &variants, const RunArguments &arguments,
                                    Console &console);
 
 /// Returns the options of a session, except `stop`. `default_duration` applies if no duration is given. Errors are
 /// printed.
-[[nodiscard]] std::optional<SessionOptions> session_options(const RunArguments &arguments, trace::Driver driver,
-                                                            Duration default_duration, Console &console);
+[[nodiscard]] std::optional<lab::SessionOptions> session_options(const RunArguments &arguments, trace::Driver driver,
+                                                                 Duration default_duration, Console &console);
 
 /// Draws `progress` over a session of `duration`: the time, and the DAGs with misses.
-[[nodiscard]] ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration);
+[[nodiscard]] lab::ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration);
 
 }  // namespace redag::cli

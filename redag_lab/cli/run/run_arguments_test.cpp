@@ -16,7 +16,7 @@ class RunArgumentsTest : public ::testing::Test {
 
   bool takes(const std::string &executors, const RunArguments &arguments) {
     Console console(nowhere_, {}, nowhere_, {});
-    const auto variants = parse_variants(executors);
+    const auto variants = lab::parse_variants(executors);
     return variants.has_value() && takes_arguments(*variants, arguments, console);
   }
 
@@ -65,7 +65,7 @@ TEST(Configure, IsTheWorkloadAsTheExecutorRunsIt) {
   dag.name = "d";
   dag.tasks = {task};
   workload.dags.push_back(dag);
-  const auto as = [&](const char *name) { return configure(workload, *parse_variant(name)); };
+  const auto as = [&](const char *name) { return lab::configure(workload, *lab::parse_variant(name)); };
   EXPECT_EQ(as("redag")->platform, workload.platform);
   EXPECT_EQ(as("redag-os")->platform, (Platform{4, PreemptionMode::Os}));
   EXPECT_EQ(as("ste")->platform, (Platform{1, PreemptionMode::None}));

@@ -52,7 +52,7 @@ std::vector<std::size_t> shown_tasks(const metrics::Summary &summary, bool all) 
   return order;
 }
 
-std::string task_table(const Session &session, const StreamTraits &terminal, bool all) {
+std::string task_table(const lab::Session &session, const StreamTraits &terminal, bool all) {
   Table table({{"task", false, 9},
                {"jobs", true, 7},
                {"late", true, 1},
@@ -89,7 +89,7 @@ std::string task_table(const Session &session, const StreamTraits &terminal, boo
   return text;
 }
 
-std::string dag_table(const Session &session, const StreamTraits &terminal) {
+std::string dag_table(const lab::Session &session, const StreamTraits &terminal) {
   Table table({{"DAG", false, 9},
                {"jobs", true, 7},
                {"missed", true, 8},
@@ -114,7 +114,7 @@ std::string dag_table(const Session &session, const StreamTraits &terminal) {
   return table.render(terminal.width, terminal.colour);
 }
 
-std::string legend(const Session &session) {
+std::string legend(const lab::Session &session) {
   std::string text =
       "missed: late, skipped or aborted; times of a task: finish - release; of a DAG, end to end:\nfinish of a sink - "
       "release of its source";
@@ -124,16 +124,16 @@ std::string legend(const Session &session) {
   return text + (several ? ", each figure that of the worst sink\n" : "\n");
 }
 
-std::string verdict_line(const Session &session, const StreamTraits &terminal) {
+std::string verdict_line(const lab::Session &session, const StreamTraits &terminal) {
   const metrics::DeadlineVerdict verdict = metrics::deadline_verdict(session.summary.total, session.summary.dags);
   const Tint tint = !verdict.is_judged ? Tint::Caution : verdict.is_met ? Tint::Good : Tint::Bad;
   return tinted(verdict.text, tint, terminal.colour) + "\n";
 }
 
 // Simulations are not compared with bounds here; the property tests do so.
-bool has_bounds(const Session &session) { return session.info.driver == trace::Driver::Threads; }
+bool has_bounds(const lab::Session &session) { return session.info.driver == trace::Driver::Threads; }
 
-std::string headline(const Session &session) {
+std::string headline(const lab::Session &session) {
   const trace::RunInfo &info = session.info;
   const bool simulated = info.driver == trace::Driver::Simulator;
   std::string text =
@@ -164,7 +164,7 @@ std::string describe_check(const metrics::CheckReport &check, const StreamTraits
       tested, check.to_string());
 }
 
-std::string describe(const Session &session, const StreamTraits &terminal, const ReportOptions &options) {
+std::string describe(const lab::Session &session, const StreamTraits &terminal, const ReportOptions &options) {
   std::string text = headline(session) + "\n";
   text += task_table(session, terminal, options.all_tasks) + "\n" + dag_table(session, terminal) + "\n";
   text += legend(session) + verdict_line(session, terminal);
@@ -223,7 +223,7 @@ Json to_json(const metrics::CheckReport &check) {
       {"ok", check.ok()}, {"violation_count", check.violation_count}, {"rules", rules}, {"violations", violations}};
 }
 
-Json to_json(const Session &session) {
+Json to_json(const lab::Session &session) {
   Json document = Json::parse(metrics::summary_to_json(session.summary, session.info));
   Json check = to_json(session.check);
   check["until_ns"] = session.cut_at.value_or(session.info.end);
@@ -234,7 +234,7 @@ Json to_json(const Session &session) {
   return document;
 }
 
-Diagnostics write_session(const Session &session, const std::string &folder) {
+Diagnostics write_session(const lab::Session &session, const std::string &folder) {
   Diagnostics problems;
   const auto keep = [&problems](const Result<void> &written) {
     if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());

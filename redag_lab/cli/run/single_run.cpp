@@ -15,8 +15,8 @@ namespace {
 
 constexpr Duration kThreadsDuration = 10 * kSecond;
 
-Result<Session> run_interruptibly(const Workload &workload, const Variant &variant, SessionOptions options,
-                                  Console &console) {
+Result<lab::Session> run_interruptibly(const Workload &workload, const lab::Variant &variant,
+                                       lab::SessionOptions options, Console &console) {
   options.stop = &InterruptGuard::flag();
   Progress progress(console);
   progress.set_label(variant.name);
@@ -24,13 +24,13 @@ Result<Session> run_interruptibly(const Workload &workload, const Variant &varia
     progress.clear();
     console.warn(text);
   };
-  return run_session(workload, variant, options, progress_hook(progress, workload, options.duration));
+  return lab::run_session(workload, variant, options, progress_hook(progress, workload, options.duration));
 }
 
 }  // namespace
 
 int run_once(const RunArguments &arguments, const std::string &executor, trace::Driver driver, Console &console) {
-  const Result<Variant> variant = parse_variant(executor);
+  const Result<lab::Variant> variant = lab::parse_variant(executor);
   if (!variant) {
     console.note(variant.error());
     return kExitBad;
@@ -43,17 +43,17 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   const std::optional<Workload> workload = load_configured(arguments, console);
   if (!workload) return kExitBad;
   if (!takes_arguments({*variant}, arguments, console)) return kExitBad;
-  if (const Result<Workload> configured = configure(*workload, *variant); !configured) {
+  if (const Result<Workload> configured = lab::configure(*workload, *variant); !configured) {
     console.note(configured.error());
     return kExitBad;
   }
-  const Duration usual = simulated ? sensible_duration(*workload) : kThreadsDuration;
-  const std::optional<SessionOptions> options = session_options(arguments, driver, usual, console);
+  const Duration usual = simulated ? lab::sensible_duration(*workload) : kThreadsDuration;
+  const std::optional<lab::SessionOptions> options = session_options(arguments, driver, usual, console);
   if (!options) return kExitBad;
 
-  if (const auto busy = simulated ? std::nullopt : busy_machine_warning()) console.warn(*busy);
+  if (const auto busy = simulated ? std::nullopt : lab::busy_machine_warning()) console.warn(*busy);
   const InterruptGuard guard;  // covers writing the results too
-  const Result<Session> session = run_interruptibly(*workload, *variant, *options, console);
+  const Result<lab::Session> session = run_interruptibly(*workload, *variant, *options, console);
   if (!session) {
     console.note(session.error());
     return kExitBad;

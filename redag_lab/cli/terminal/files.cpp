@@ -16,7 +16,7 @@
 #include <system_error>
 
 #include "redag/trace/output_file.hpp"
-#include "redag_lab/cli/terminal/variant.hpp"
+#include "redag_lab/run/variant.hpp"
 
 namespace redag::cli {
 namespace {
@@ -129,7 +129,7 @@ bool is_result_name(std::string_view name) {
                                                        "responses.svg",  "distance.svg"};
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
   // Folders of a comparison (executors, and repetitions below them), and the files of `generate`.
-  const std::vector<std::string> &executors = variant_names();
+  const std::vector<std::string> &executors = lab::variant_names();
   if (std::find(executors.begin(), executors.end(), name) != executors.end()) return true;
   const auto is_numbered = [name](std::string_view prefix, std::string_view suffix) {
     return name.size() > prefix.size() + suffix.size() && name.substr(0, prefix.size()) == prefix &&

@@ -12,8 +12,6 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "redag/model/workload_yaml_nearest.hpp"
-
 namespace redag::cli {
 namespace {
 
@@ -135,19 +133,6 @@ std::optional<std::vector<int>> parse_cpu_list(std::string_view text) {
   std::sort(cpus.begin(), cpus.end());
   cpus.erase(std::unique(cpus.begin(), cpus.end()), cpus.end());
   return cpus;
-}
-
-std::string suggestion(std::string_view given, const std::vector<std::string> &candidates) {
-  const std::vector<std::string_view> views(candidates.begin(), candidates.end());
-  const std::string_view best = yaml::nearest(given, views);
-  if (!best.empty()) return "did you mean '" + std::string(best) + "'?";
-  constexpr std::size_t kMostNamed = 20;
-  std::string all;
-  for (std::size_t i = 0; i < std::min(candidates.size(), kMostNamed); ++i) {
-    all += (i == 0 ? "one of " : ", ") + candidates[i];
-  }
-  if (candidates.size() > kMostNamed) all += fmt::format(" and {} more", candidates.size() - kMostNamed);
-  return all;
 }
 
 const Choices<PolicyKind> &policy_choices() {

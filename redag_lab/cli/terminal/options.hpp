@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "redag/base/nearest.hpp"
 #include "redag/base/text.hpp"
 #include "redag/base/time.hpp"
 #include "redag/model/workload.hpp"
@@ -65,9 +66,6 @@ CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, 
 
 /// Parses "0,2-5" into {0, 2, 3, 4, 5}.
 [[nodiscard]] std::optional<std::vector<int>> parse_cpu_list(std::string_view text);
-
-/// Returns the nearest candidate as "did you mean 'x'?", or else the list "one of a, b, c".
-[[nodiscard]] std::string suggestion(std::string_view given, const std::vector<std::string> &candidates);
 
 /// Adds an option with a list of choices, which the help shows. `Target` is Value or std::optional<Value>.
 template <class Value, class Target>

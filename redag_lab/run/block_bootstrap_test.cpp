@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_analysis/metrics/block_bootstrap.hpp"
+#include "redag_lab/run/block_bootstrap.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "redag/base/rng.hpp"
 
-namespace redag::metrics {
+namespace redag::lab {
 namespace {
 
 // Jobs of a run in which misses come in bursts: after a missed job the next one is likely to miss, too.
@@ -182,4 +182,4 @@ TEST(DiscoveryThreshold, IsThatOfBenjaminiAndHochberg) {
 }
 
 }  // namespace
-}  // namespace redag::metrics
+}  // namespace redag::lab

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_analysis/metrics/difference.hpp"
+#include "redag_lab/run/difference.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 #include "redag/base/rng.hpp"
 #include "redag_analysis/metrics/miss.hpp"
 
-namespace redag::metrics {
+namespace redag::lab {
 namespace {
 
 constexpr Duration kMostBlocks = 30;
@@ -84,21 +84,21 @@ void DifferenceSide::add(const trace::Trace &trace) {
   const Duration block = block_length(length, longest_period(run.workload));
   const auto blocks = static_cast<std::size_t>(std::max<Duration>(1, length / block));
   for (Row &row : rows_) row.runs.emplace_back(blocks);
-  for (const JobRecord &job : fold_jobs(run.workload, trace.events)) {
+  for (const metrics::JobRecord &job : metrics::fold_jobs(run.workload, trace.events)) {
     if (job.release < begin) continue;
     const std::size_t at = std::min(blocks - 1, static_cast<std::size_t>((job.release - begin) / block));
-    const Miss miss = miss_of(job, run.end);
+    const metrics::Miss miss = metrics::miss_of(job, run.end);
     const Places &places = places_[job.task.value];
     for (const std::size_t index : {std::size_t{0}, places.dag, places.task}) {
       Row &row = rows_[index];
       ++row.released;
-      if (miss == Miss::Deadline) ++row.late;
-      if (miss == Miss::Lost) ++row.lost;
+      if (miss == metrics::Miss::Deadline) ++row.late;
+      if (miss == metrics::Miss::Lost) ++row.lost;
       Block &here = row.runs.back()[at];
       ++here.released;
-      if (miss != Miss::None) ++here.missed;
+      if (miss != metrics::Miss::None) ++here.missed;
     }
-    if (job.outcome != JobOutcome::Finished) continue;
+    if (job.outcome != metrics::JobOutcome::Finished) continue;
     const auto respond = [&](Row &row, Duration response) {
       row.max = std::max(row.max, response);
       row.runs.back()[at].responses.push_back(response);
@@ -161,4 +161,4 @@ Difference compare_sides(const DifferenceSide &a, const DifferenceSide &b, const
   return difference;
 }
 
-}  // namespace redag::metrics
+}  // namespace redag::lab

@@ -14,7 +14,7 @@
 
 #include "redag/base/time.hpp"
 
-namespace redag::metrics {
+namespace redag::lab {
 
 /// The jobs that were released in one stretch of a run.
 struct Block {
@@ -75,4 +75,4 @@ inline constexpr double kFewestJobsBeyond = 10;
 /// Hochberg, Journal of the Royal Statistical Society B 57(1), 1995); 0 if none is.
 [[nodiscard]] double discovery_threshold(std::vector<double> p_values, double rate = 0.05);
 
-}  // namespace redag::metrics
+}  // namespace redag::lab

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_analysis/metrics/block_bootstrap.hpp"
+#include "redag_lab/run/block_bootstrap.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 #include "redag/base/rng.hpp"
 #include "redag_analysis/metrics/distribution.hpp"
 
-namespace redag::metrics {
+namespace redag::lab {
 namespace {
 
 constexpr std::array<double, 3> kPercents = {50, 95, 99};
@@ -228,8 +228,8 @@ RowDifference compare_blocks(const BlockedRuns &a, const BlockedRuns &b, const B
   const auto fewest = static_cast<double>(std::min(responses_a.size(), responses_b.size()));
   std::array<bool, 3> enough{};
   for (std::size_t p = 0; p < kPercents.size(); ++p) {
-    if (!responses_a.empty()) figures[p]->a = static_cast<double>(percentile(responses_a, kPercents[p]));
-    if (!responses_b.empty()) figures[p]->b = static_cast<double>(percentile(responses_b, kPercents[p]));
+    if (!responses_a.empty()) figures[p]->a = static_cast<double>(metrics::percentile(responses_a, kPercents[p]));
+    if (!responses_b.empty()) figures[p]->b = static_cast<double>(metrics::percentile(responses_b, kPercents[p]));
     enough[p] = fewest * (1 - kPercents[p] / 100) >= kFewestJobsBeyond;
   }
   const std::size_t blocks_a = block_count(a);
@@ -269,4 +269,4 @@ double discovery_threshold(std::vector<double> p_values, double rate) {
   return 0;
 }
 
-}  // namespace redag::metrics
+}  // namespace redag::lab

@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/model/workload_yaml_nearest.hpp"
+#include "redag/base/nearest.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-namespace redag::yaml {
+namespace redag {
 namespace {
 
 TEST(EditDistance, CountsEdits) {
@@ -32,4 +32,4 @@ TEST(Nearest, IsOnlyOfferedWhenItIsNear) {
 }
 
 }  // namespace
-}  // namespace redag::yaml
+}  // namespace redag

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "redag/trace/trace.hpp"
-#include "redag_analysis/metrics/block_bootstrap.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
+#include "redag_lab/run/block_bootstrap.hpp"
 
-namespace redag::metrics {
+namespace redag::lab {
 
 /// The runs of one side. All runs have the same task names.
 class DifferenceSide {
@@ -92,4 +92,4 @@ struct Difference {
 [[nodiscard]] Difference compare_sides(const DifferenceSide &a, const DifferenceSide &b,
                                        const BootstrapOptions &options);
 
-}  // namespace redag::metrics
+}  // namespace redag::lab

@@ -1,12 +1,14 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/model/workload_yaml_nearest.hpp"
+#include "redag/base/nearest.hpp"
 
 #include <algorithm>
+
+#include <fmt/format.h>
 #include <numeric>
 
-namespace redag::yaml {
+namespace redag {
 
 std::size_t edit_distance(std::string_view a, std::string_view b, std::size_t limit) {
   const std::size_t longer = std::max(a.size(), b.size());
@@ -38,4 +40,17 @@ std::string_view nearest(std::string_view name, const std::vector<std::string_vi
   return best;
 }
 
-}  // namespace redag::yaml
+std::string suggestion(std::string_view given, const std::vector<std::string> &candidates) {
+  const std::vector<std::string_view> views(candidates.begin(), candidates.end());
+  const std::string_view best = nearest(given, views);
+  if (!best.empty()) return "did you mean '" + std::string(best) + "'?";
+  constexpr std::size_t kMostNamed = 20;
+  std::string all;
+  for (std::size_t i = 0; i < std::min(candidates.size(), kMostNamed); ++i) {
+    all += (i == 0 ? "one of " : ", ") + candidates[i];
+  }
+  if (candidates.size() > kMostNamed) all += fmt::format(" and {} more", candidates.size() - kMostNamed);
+  return all;
+}
+
+}  // namespace redag

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_analysis/metrics/difference.hpp"
+#include "redag_lab/run/difference.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_testing/timeline.hpp"
 
-namespace redag::metrics {
+namespace redag::lab {
 namespace {
 
 using ::testing::ElementsAre;
@@ -154,4 +154,4 @@ TEST(Difference, ShortRunsAreNotTested) {
 }
 
 }  // namespace
-}  // namespace redag::metrics
+}  // namespace redag::lab

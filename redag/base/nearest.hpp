@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace redag::yaml {
+namespace redag {
 
 /// Returns how many edits (insert, delete or replace a byte) turn one text into the other (Levenshtein). Gives up
 /// beyond `limit` and returns limit + 1.
@@ -18,4 +18,7 @@ namespace redag::yaml {
 /// Returns the nearest candidate within three edits and half the length of `name`, the first of several; empty: none.
 [[nodiscard]] std::string_view nearest(std::string_view name, const std::vector<std::string_view> &candidates);
 
-}  // namespace redag::yaml
+/// Returns the nearest candidate as "did you mean 'x'?", or else the list "one of a, b, c".
+[[nodiscard]] std::string suggestion(std::string_view given, const std::vector<std::string> &candidates);
+
+}  // namespace redag
