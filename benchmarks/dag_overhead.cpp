@@ -23,7 +23,7 @@
 #include "redag/base/rng.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/engine.hpp"
-#include "redag/runtime/looks.hpp"
+#include "redag/runtime/spins.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
@@ -114,7 +114,7 @@ void redag_engine(benchmark::State &state, Shape shape, PreemptionMode mode, Dur
   EngineOptions options;
   options.config = setup->config;
   options.band = setup->band;
-  options.looks = looks_in(spin);
+  options.spins = spins_in(spin);
   Engine engine(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
   FutexWord done{0};
   std::uint32_t left = 0;

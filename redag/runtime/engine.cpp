@@ -40,7 +40,7 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
       decisions_(options_.trace_capacity) {
   const sched::Config &config = options_.config;
   REDAG_CHECK(!os() || config.max_started >= config.workers, "os: a thread for every processor, at least");
-  REDAG_CHECK(!os() || options_.looks == 0, "os: a thread that looks for a job would keep others off its processor");
+  REDAG_CHECK(!os() || options_.spins == 0, "os: a thread that looks for a job would keep others off its processor");
   const std::uint32_t count = os() ? config.max_started : config.workers;
   idle_.reserve(count);
   handed_.reserve(count);
@@ -111,7 +111,7 @@ Result<void> Engine::start_threads(const std::vector<int> &cpus) {
   }
   if (!share_keeper_) return {};
   Result<ThreadHandle> started =
-      start_thread({options_.name + "-share", options_.band.timer, {}}, [this] { keep_share(); });
+      start_thread({options_.name + "-guard", options_.band.timer, {}}, [this] { guard_throttling(); });
   if (!started) return tl::unexpected(started.error());
   share_keeper_->handle = *std::move(started);
   return {};
@@ -132,7 +132,7 @@ void Engine::main(Thread &self) noexcept {
   for (;;) {
     // Read before the mail: all mail was posted before this was set.
     const bool exiting = exit_.load(std::memory_order_acquire);
-    if (self.claim_mail()) {
+    if (self.take_mail()) {
       const Assignment first = self.mail;
       // A job that was dispatched to this very thread when the last one ended needs no wake-up.
       Next next{Next::Kind::Start, first};
@@ -142,7 +142,7 @@ void Engine::main(Thread &self) noexcept {
       continue;
     }
     if (exiting) return;
-    self.parker.park(options_.looks);
+    self.parker.park(options_.spins);
   }
 }
 
@@ -165,7 +165,7 @@ void Engine::join() {
 }
 
 // The throttling guard: sleeps until a job is in progress, then checks several times a second while there are jobs.
-void Engine::keep_share() noexcept {
+void Engine::guard_throttling() noexcept {
   for (Duration until_next = kNever;;) {
     if (until_next == kNever) {
       share_keeper_->parker.park();
@@ -332,7 +332,7 @@ void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob
     const Job &job = thread->stack.back();
     TaskEntry &entry = tasks_[job.task.value];
     const Duration elapsed = as_of - running->begun;
-    const bool overdue = !running->named && entry.is_overdue(elapsed, limits);
+    const bool overdue = !running->reported && entry.is_overdue(elapsed, limits);
     // A job cannot have used more than the time that has passed.
     const Duration limit = entry.next_limit(*running);
     if (!overdue && (limit == kNever || elapsed <= limit)) continue;
@@ -341,7 +341,7 @@ void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob
     if (thread->top.load(std::memory_order_acquire) != running) continue;  // it has ended and waits for the lock
     if (used - kSlack > limit) told = tell_limits(*running, used - kSlack, at, true) || told;
     if (!overdue) continue;
-    running->named = true;
+    running->reported = true;
     ++entry.usage.overdue;
     out.push_back(OverdueJob{job, elapsed, used});
   }

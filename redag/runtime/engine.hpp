@@ -80,8 +80,8 @@ struct EngineOptions {
   ExceptionHandler on_exception;   // empty: exceptions are only counted
   bool start_paused = false;       // as after pause()
   bool measure = false;            // figures() includes responses, misses and preemptions
-  // none, cooperative: how many spins a thread without a job makes before it sleeps; see looks_in().
-  std::uint32_t looks = 0;
+  // none, cooperative: how many spins a thread without a job makes before it sleeps; see spins_in().
+  std::uint32_t spins = 0;
   std::size_t touched_stack = 0;  // bytes of each worker thread's stack; see ThreadSetup
 };
 
@@ -210,7 +210,7 @@ class Engine {
   Result<void> start_threads(const std::vector<int> &cpus);
   void end_threads();
   void main(Thread &self) noexcept;
-  void keep_share() noexcept;
+  void guard_throttling() noexcept;
   Next run(Thread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;
   sched::Outcome call(const Assignment &assignment);
   Duration charge(Thread &self, const TaskEntry &entry, const RunningJob &running, Time at) noexcept;
@@ -224,7 +224,7 @@ class Engine {
   Next decide(Locked &locked, Time now, Thread *self, JobSlot below) REDAG_REQUIRES(lock_);
   Next place(Locked &locked, const sched::Step &step, Thread *self, JobSlot below) REDAG_REQUIRES(lock_);
   static const sched::Dispatch *choose_own(const sched::Step &step, JobSlot below);
-  Thread *rob(std::uint32_t level) REDAG_REQUIRES(lock_);
+  Thread *steal(std::uint32_t level) REDAG_REQUIRES(lock_);
   Assignment move_job(Thread &from, Thread &to) REDAG_REQUIRES(lock_);
   Duration look_at_share() REDAG_EXCLUDES(lock_);
   void note_where_realtime_ran() REDAG_REQUIRES(lock_);
@@ -235,7 +235,7 @@ class Engine {
   [[nodiscard]] int priority_of(const Thread &thread) const REDAG_REQUIRES(lock_);
   void change_level(const sched::Dispatch &dispatch) REDAG_REQUIRES(lock_);
   Assignment assign(Thread &thread, const sched::Dispatch &dispatch) REDAG_REQUIRES(lock_);
-  void hand(Locked &locked, Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
+  void post(Locked &locked, Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
   void apply(std::span<const ThreadPriorities::Change> changes) REDAG_REQUIRES(lock_);
   void refresh_outranked() REDAG_REQUIRES(lock_);
   void register_task(TaskId id, const Task &task, DagId dag, Body &body,

@@ -58,7 +58,7 @@ Engine::Next Engine::place(Locked &locked, const sched::Step &step, Thread *self
   if (self != nullptr && !below.valid() && !is_caller) {
     // In `os` mode a thread steals only if it would be idle: two threads that exchange jobs must exchange priorities.
     const std::uint32_t above = own == nullptr ? sched::kNoLimit : (os() ? 0 : own->level);
-    if (Thread *other = rob(above)) {
+    if (Thread *other = steal(above)) {
       next = Next{Next::Kind::Start, move_job(*other, *self)};
       own = nullptr;
     } else if (own == nullptr) {
@@ -81,7 +81,7 @@ Engine::Next Engine::place(Locked &locked, const sched::Step &step, Thread *self
     idle_.pop_back();
     const Assignment assignment = assign(thread, dispatch);
     set_priority_for_job(thread, assignment);
-    hand(locked, thread, assignment);
+    post(locked, thread, assignment);
   }
   return next;
 }
@@ -98,7 +98,7 @@ const Dispatch *Engine::choose_own(const sched::Step &step, JobSlot below) {
 
 // Steals the job of a thread that is not awake yet, if that job is above `level`; waking it takes longer than most
 // jobs. Returns that thread, or null. The thread then finds no mail.
-Engine::Thread *Engine::rob(std::uint32_t level) {
+Engine::Thread *Engine::steal(std::uint32_t level) {
   Thread *victim = nullptr;
   for (std::size_t i = 0; i < handed_.size();) {
     Thread &thread = *handed_[i];
@@ -114,7 +114,7 @@ Engine::Thread *Engine::rob(std::uint32_t level) {
     }
     ++i;
   }
-  return victim != nullptr && victim->claim_mail() ? victim : nullptr;
+  return victim != nullptr && victim->take_mail() ? victim : nullptr;
 }
 
 Engine::Assignment Engine::move_job(Thread &from, Thread &to) {
@@ -226,7 +226,7 @@ Engine::Assignment Engine::assign(Thread &thread, const Dispatch &dispatch) {
   return Assignment{job, &entry, entry.expected_short()};
 }
 
-void Engine::hand(Locked &locked, Thread &thread, const Assignment &assignment) {
+void Engine::post(Locked &locked, Thread &thread, const Assignment &assignment) {
   REDAG_CHECK(!thread.has_mail.load(std::memory_order_relaxed), "a worker was given two jobs");
   thread.mail = assignment;
   thread.has_mail.store(true, std::memory_order_release);

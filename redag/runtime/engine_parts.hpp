@@ -93,7 +93,7 @@ struct alignas(64) Engine::Thread {
   Thread(std::uint32_t its_index, std::size_t trace_capacity) : index(its_index), events(trace_capacity) {}
 
   /// Takes the mail; returns true for one caller only.
-  bool claim_mail() noexcept {
+  bool take_mail() noexcept {
     return has_mail.load(std::memory_order_relaxed) && has_mail.exchange(false, std::memory_order_acquire);
   }
 

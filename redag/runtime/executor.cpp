@@ -24,9 +24,9 @@
 #include "redag/runtime/dag_mistakes.hpp"
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/live_sample.hpp"
-#include "redag/runtime/looks.hpp"
 #include "redag/runtime/release_timer.hpp"
 #include "redag/runtime/setup.hpp"
+#include "redag/runtime/spins.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/runtime/watchdog.hpp"
 #include "redag/sched/priority_scheduler.hpp"
@@ -167,7 +167,7 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   engine.cpus = options_.cpus;
   engine.trace_capacity = options_.trace_capacity;
   engine.measure = options_.live;
-  engine.looks = looks_before_sleep(setup_, options_.spin.count());
+  engine.spins = spins_before_sleep(setup_, options_.spin.count());
   if (options_.lock_memory) engine.touched_stack = kTouchedStack;
   engine.on_exception = [this](const Job &job, std::exception_ptr e) { on_exception(job, std::move(e)); };
   auto scheduler = std::make_unique<sched::PriorityScheduler>(Workload{}, engine.config);

@@ -17,10 +17,10 @@ namespace redag::runtime {
 
 class Parker {
  public:
-  /// Owner only: takes a token. Spins up to `looks` times for it, then sleeps. A token that comes during the spin needs
+  /// Owner only: takes a token. Spins up to `spins` times for it, then sleeps. A token that comes during the spin needs
   /// no system call.
-  void park(std::uint32_t looks = 0) noexcept {
-    static_cast<void>(look(looks));
+  void park(std::uint32_t spins = 0) noexcept {
+    static_cast<void>(spin(spins));
     if (begin()) return;
     do {
       futex_wait(state_, kParked);
@@ -36,10 +36,10 @@ class Parker {
     return state_.exchange(kEmpty, std::memory_order_acquire) == kToken;
   }
 
-  /// Owner only: spins up to `looks` times, with a pause after each, until there is a token. Leaves the token there.
+  /// Owner only: spins up to `spins` times, with a pause after each, until there is a token. Leaves the token there.
   /// Returns true if there is one.
-  [[nodiscard]] bool look(std::uint32_t looks) const noexcept {
-    for (; looks > 0; --looks) {
+  [[nodiscard]] bool spin(std::uint32_t spins) const noexcept {
+    for (; spins > 0; --spins) {
       if (state_.load(std::memory_order_relaxed) == kToken) return true;
       relax();
     }

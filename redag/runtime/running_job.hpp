@@ -30,7 +30,7 @@ struct RunningJob {
   Duration total = -1;                  // processor time of the whole job; below 0: not known yet
   bool used_wcet_low = false;           // reported to the scheduler; written under the engine's lock
   bool used_budget = false;
-  bool named = false;  // was reported overdue; written under the engine's lock
+  bool reported = false;  // was reported overdue; written under the engine's lock
 
   void reach_preemption_point();
   void reach_limit(Duration used);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/runtime/looks.hpp"
+#include "redag/runtime/spins.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -20,7 +20,7 @@ Duration measure() {
   Duration fastest = kNever;
   for (int i = 0; i < 8; ++i) {
     const Time begin = monotonic_now();
-    static_cast<void>(parker.look(kSample));
+    static_cast<void>(parker.spin(kSample));
     fastest = std::min(fastest, monotonic_now() - begin);
   }
   return std::max<Duration>(fastest, 1);
@@ -28,16 +28,16 @@ Duration measure() {
 
 }  // namespace
 
-std::uint32_t looks_in(Duration duration) {
+std::uint32_t spins_in(Duration duration) {
   static const Duration sample = measure();
-  const double looks = static_cast<double>(duration) * kSample / static_cast<double>(sample);
+  const double spins = static_cast<double>(duration) * kSample / static_cast<double>(sample);
   return static_cast<std::uint32_t>(
-      std::clamp(looks, duration > 0 ? 1.0 : 0.0, static_cast<double>(std::numeric_limits<std::uint32_t>::max())));
+      std::clamp(spins, duration > 0 ? 1.0 : 0.0, static_cast<double>(std::numeric_limits<std::uint32_t>::max())));
 }
 
-std::uint32_t looks_before_sleep(Setup &setup, Duration spin) {
+std::uint32_t spins_before_sleep(Setup &setup, Duration spin) {
   if (spin <= 0) return 0;
-  if (setup.mode.mode != PreemptionMode::Os) return looks_in(spin);
+  if (setup.mode.mode != PreemptionMode::Os) return spins_in(spin);
   setup.warnings.push_back("workers do not look for jobs before they sleep: that is for modes none and cooperative");
   return 0;
 }

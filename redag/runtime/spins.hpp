@@ -14,10 +14,10 @@ namespace redag::runtime {
 
 /// Returns how many spins of Parker::park() take about `duration` (ns) on this machine. Measures it once, in less than
 /// a millisecond.
-[[nodiscard]] std::uint32_t looks_in(Duration duration);
+[[nodiscard]] std::uint32_t spins_in(Duration duration);
 
-/// Returns the value for EngineOptions::looks. With os it is 0, with a warning in `setup`: a real-time thread that
+/// Returns the value for EngineOptions::spins. With os it is 0, with a warning in `setup`: a real-time thread that
 /// spins would keep others off its processor.
-[[nodiscard]] std::uint32_t looks_before_sleep(Setup &setup, Duration spin);
+[[nodiscard]] std::uint32_t spins_before_sleep(Setup &setup, Duration spin);
 
 }  // namespace redag::runtime

@@ -148,7 +148,7 @@ class Lifecycle : public Scheduler {
   std::vector<Job> jobs_;
   std::vector<TaskState> tasks_;
   std::vector<DagState> dag_states_;
-  bool has_chores_ = false;  // dispatch() must also end HI mode or requeue held-back jobs
+  bool has_post_dispatch_work_ = false;  // dispatch() must also end HI mode or requeue held-back jobs
 
  private:
   static constexpr std::uint32_t kUnboundedQueue = std::numeric_limits<std::uint32_t>::max();

@@ -74,7 +74,7 @@ void Lifecycle::enter_high_mode(const Job &cause) {
   if (high_mode_ || closed_ || degrades(dag_states_[tasks_[cause.task.value].dag.value])) return;
   high_mode_ = true;
   refresh_restricted();
-  has_chores_ = true;
+  has_post_dispatch_work_ = true;
   mode_cause_ = cause;
   mode_cause_.worker = WorkerId();
   high_since_ = now_;

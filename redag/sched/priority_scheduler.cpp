@@ -35,7 +35,7 @@ Step PriorityScheduler::dispatch(Time now, std::uint32_t most) {
     run(best, place);
   }
   close_open_workers();
-  if (has_chores_) do_chores();
+  if (has_post_dispatch_work_) do_post_dispatch_work();
   return step();
 }
 
@@ -44,22 +44,22 @@ Step PriorityScheduler::dispatch(Time now, std::uint32_t most) {
 bool PriorityScheduler::set_aside(std::uint32_t slot) {
   if (config_.preemption != Preemption::Full) return false;
   remove(slot);
-  jobs_[slot].next = aside_;
-  aside_ = slot;
-  has_chores_ = true;
+  jobs_[slot].next = held_back_;
+  held_back_ = slot;
+  has_post_dispatch_work_ = true;
   return true;
 }
 
-void PriorityScheduler::do_chores() {
+void PriorityScheduler::do_post_dispatch_work() {
   put_back();
   if (high_mode()) restore_if_idle();
-  has_chores_ = high_mode();
+  has_post_dispatch_work_ = high_mode();
 }
 
 void PriorityScheduler::put_back() {
-  while (aside_ != kNil) {
-    const std::uint32_t slot = aside_;
-    aside_ = jobs_[slot].next;
+  while (held_back_ != kNil) {
+    const std::uint32_t slot = held_back_;
+    held_back_ = jobs_[slot].next;
     jobs_[slot].next = kNil;
     push(slot);
   }

@@ -73,7 +73,7 @@ class PriorityScheduler final : public Lifecycle {
   bool park_if_not_eligible(std::uint32_t slot);
   void inherit(std::uint32_t holder, const Job &waiter);
   void close_open_workers();
-  void do_chores();
+  void do_post_dispatch_work();
   void restore_if_idle();
   bool set_aside(std::uint32_t slot);
   void put_back();
@@ -116,7 +116,7 @@ class PriorityScheduler final : public Lifecycle {
   LevelBitmap free_workers_;
   std::vector<std::uint32_t> open_workers_;
   std::uint64_t thread_waits_ = 0;
-  std::uint32_t aside_ = kNil;  // during dispatch(): held-back jobs, linked by Job::next; they may not start
+  std::uint32_t held_back_ = kNil;  // during dispatch(): held-back jobs, linked by Job::next; they may not start
 };
 
 }  // namespace redag::sched

@@ -14,8 +14,8 @@
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
-#include "redag/runtime/looks.hpp"
 #include "redag/runtime/release_timer.hpp"
+#include "redag/runtime/spins.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_lab/run/concurrency.hpp"
@@ -75,7 +75,7 @@ class Run {
     if (options_.realtime_threads && setup->band.top_job == 0) {
       return make_error("the workers cannot be SCHED_FIFO threads: this process may not", realtime_hint());
     }
-    const std::uint32_t looks = looks_before_sleep(*setup, options_.spin);
+    const std::uint32_t spins = spins_before_sleep(*setup, options_.spin);
     result_.warnings = std::move(setup->warnings);
     const std::uint64_t most = most_started(workload_);
     if (preemptive && result_.mode.mode == PreemptionMode::Os && setup->config.max_started < most) {
@@ -99,7 +99,7 @@ class Run {
     engine.cpus = options_.cpus;
     engine.trace_capacity = options_.trace_capacity;
     engine.measure = options_.live;
-    engine.looks = looks;
+    engine.spins = spins;
     if (options_.lock_memory) engine.touched_stack = kTouchedStack;
     if (kind != nullptr) engine.config = sched::effective_config(*kind, engine.config);
     auto scheduler = options_.scheduler ? options_.scheduler(workload_, engine.config)

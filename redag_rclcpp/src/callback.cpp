@@ -27,16 +27,17 @@ std::size_t depth_of(const rclcpp::QoS &qos) {
 
 }  // namespace
 
-Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id)
+Callback::Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id)
     : id_(std::move(id)), engine_(intake->engine()), intake_(std::move(intake)) {}
 
-Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::TimerBase::SharedPtr &timer)
+Callback::Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id,
+                   const rclcpp::TimerBase::SharedPtr &timer)
     : Callback(std::move(intake), std::move(id)) {
   timer_ = timer;
   timer_handle_ = timer->get_timer_handle();
 }
 
-Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id,
+Callback::Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id,
                    const rclcpp::SubscriptionBase::SharedPtr &subscription,
                    const rclcpp::Waitable::SharedPtr &intra_process)
     : Callback(std::move(intake), std::move(id)) {
@@ -46,18 +47,20 @@ Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id,
   depth_ = depth_of(subscription->get_actual_qos());
 }
 
-Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ServiceBase::SharedPtr &service)
+Callback::Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id,
+                   const rclcpp::ServiceBase::SharedPtr &service)
     : Callback(std::move(intake), std::move(id)) {
   service_ = service;
 }
 
-Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ClientBase::SharedPtr &client)
+Callback::Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id,
+                   const rclcpp::ClientBase::SharedPtr &client)
     : Callback(std::move(intake), std::move(id)) {
   client_ = client;
 }
 
-Callback::Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::Waitable::SharedPtr &waitable,
-                   bool only_wait_set)
+Callback::Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id,
+                   const rclcpp::Waitable::SharedPtr &waitable, bool only_wait_set)
     : Callback(std::move(intake), std::move(id)) {
   waitable_ = waitable;
   by_wait_set_ = only_wait_set;
@@ -138,7 +141,7 @@ void Callback::unhook() {
 }
 
 void Callback::detach() {
-  std::shared_ptr<Intake> intake;
+  std::shared_ptr<ExecutorContext> intake;
   {
     const redag::LockGuard release_guard(release_lock_);
     const redag::LockGuard guard(lock_);
@@ -157,7 +160,7 @@ bool Callback::alive() const {
 // ---- arrivals ----
 
 void Callback::arrived(std::size_t count, Source source, int part, bool seen_only) {
-  std::shared_ptr<Intake> to_wake;
+  std::shared_ptr<ExecutorContext> to_wake;
   {
     const redag::LockGuard release_guard(release_lock_);
     Time now = 0;

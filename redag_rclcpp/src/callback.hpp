@@ -37,9 +37,9 @@
 namespace redag_rclcpp {
 
 /// The part of the executor that callbacks use.
-class Intake {
+class ExecutorContext {
  public:
-  virtual ~Intake() = default;
+  virtual ~ExecutorContext() = default;
 
   virtual redag::runtime::Engine &engine() = 0;
   virtual TimerQueue &timers() = 0;
@@ -61,14 +61,15 @@ class Callback final : public TimerQueue::Timer,
                        public redag::runtime::SkipListener,
                        public std::enable_shared_from_this<Callback> {
  public:
-  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::TimerBase::SharedPtr &timer);
+  Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id, const rclcpp::TimerBase::SharedPtr &timer);
   /// `intra_process`: the waitable that brings the subscription messages of its own process, or null.
-  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id,
+  Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id,
            const rclcpp::SubscriptionBase::SharedPtr &subscription, const rclcpp::Waitable::SharedPtr &intra_process);
-  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ServiceBase::SharedPtr &service);
-  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::ClientBase::SharedPtr &client);
+  Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id,
+           const rclcpp::ServiceBase::SharedPtr &service);
+  Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id, const rclcpp::ClientBase::SharedPtr &client);
   /// `only_wait_set`: the waitable's on-ready hook does not report everything.
-  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id, const rclcpp::Waitable::SharedPtr &waitable,
+  Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id, const rclcpp::Waitable::SharedPtr &waitable,
            bool only_wait_set);
 
   /// Connects the entity: later arrivals are released as jobs of `task`. True if a wait set must watch part of it; see
@@ -140,7 +141,7 @@ class Callback final : public TimerQueue::Timer,
 
   static std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
 
-  Callback(std::shared_ptr<Intake> intake, redag::CallbackId id);
+  Callback(std::shared_ptr<ExecutorContext> intake, redag::CallbackId id);
 
   void hook();
   void unhook();
@@ -198,8 +199,8 @@ class Callback final : public TimerQueue::Timer,
   redag::PiMutex release_lock_;
 
   mutable redag::PiMutex lock_;
-  std::shared_ptr<Intake> intake_ REDAG_GUARDED_BY(lock_);  // null once detached
-  TokenQueue<Token> tokens_ REDAG_GUARDED_BY(lock_);        // if a job is released, the first token is its
+  std::shared_ptr<ExecutorContext> intake_ REDAG_GUARDED_BY(lock_);  // null once detached
+  TokenQueue<Token> tokens_ REDAG_GUARDED_BY(lock_);                 // if a job is released, the first token is its
   // Indexed by source. The source keeps a message until the moment before it is taken. Earlier arrivals may overwrite
   // it.
   std::size_t kept_[2] REDAG_GUARDED_BY(lock_) = {0, 0};        // messages that the source keeps

@@ -93,7 +93,7 @@ bool Callback::execute_token(const Token &token) {
   struct Watch {
     ~Watch() {
       if (!token.seen_only) return;
-      std::shared_ptr<Intake> intake;
+      std::shared_ptr<ExecutorContext> intake;
       {
         const redag::LockGuard guard(self.lock_);
         self.seen_ = false;

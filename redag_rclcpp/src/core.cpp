@@ -18,7 +18,7 @@
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
-#include "redag/runtime/looks.hpp"
+#include "redag/runtime/spins.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
@@ -82,7 +82,7 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
       tasks_(redag::Platform{setup_.config.workers, setup_.mode.mode}, options_.policy, options_.ties,
              options_.workload ? &*options_.workload : nullptr) {
   redag::runtime::EngineOptions engine;
-  engine.looks = redag::runtime::looks_before_sleep(setup_, options_.spin.count());
+  engine.spins = redag::runtime::spins_before_sleep(setup_, options_.spin.count());
   warnings_ = std::exchange(setup_.warnings, {});
   if (options_.lock_memory) engine.touched_stack = redag::runtime::kTouchedStack;
   engine.config = setup_.config;
@@ -130,8 +130,8 @@ void ReDAGExecutor::Core::set_live_bounds(std::map<std::string, redag::Duration>
 
 ReDAGExecutor::Core::~Core() = default;
 
-void ReDAGExecutor::Core::open(Host host, const std::vector<const rclcpp::GuardCondition *> &conditions) {
-  host_ = std::move(host);
+void ReDAGExecutor::Core::open(ExecutorHooks hooks, const std::vector<const rclcpp::GuardCondition *> &conditions) {
+  hooks_ = std::move(hooks);
   for (const rclcpp::GuardCondition *condition : conditions) bridge_.watch(*condition);
 }
 
@@ -340,7 +340,7 @@ void ReDAGExecutor::Core::spin() {
 
 // Work of spin() on the calling thread, at that thread's own priority: everything that takes long and is not urgent.
 void ReDAGExecutor::Core::keep_house() {
-  while (host_.may_spin() && !wait_set_done_) {
+  while (hooks_.may_spin() && !wait_set_done_) {
     if (dirty_) collect();
     const redag::Time now = engine_->now();
     if (learning_ && now >= learn_until_) stop_learning();
@@ -358,7 +358,7 @@ void ReDAGExecutor::Core::keep_house() {
 // effect, and arrivals that only the wait set sees are still released.
 void ReDAGExecutor::Core::watch_wait_set() noexcept {
   try {
-    while (host_.may_spin() && !wait_set_done_) {
+    while (hooks_.may_spin() && !wait_set_done_) {
       admit_noted();
       bridge_.wait(nanoseconds(-1));
     }
@@ -385,14 +385,14 @@ void ReDAGExecutor::Core::spin_ready(nanoseconds max_duration, bool exhaustive) 
   while (again) {
     admit(true);
     again = false;
-    while (host_.may_spin() && engine_->now() < end && run_one()) again = exhaustive;
+    while (hooks_.may_spin() && engine_->now() < end && run_one()) again = exhaustive;
   }
 }
 
 void ReDAGExecutor::Core::spin_one(nanoseconds timeout) {
   const redag::Time end = timeout.count() < 0 ? kNever : engine_->now() + timeout.count();
   admit(true);
-  while (host_.may_spin() && !run_one()) {
+  while (hooks_.may_spin() && !run_one()) {
     const redag::Time now = engine_->now();
     if (now >= end) return;
     waiting_ = true;
@@ -422,7 +422,7 @@ void ReDAGExecutor::Core::on_exception(const redag::runtime::Job &job, std::exce
     const redag::LockGuard guard(notes_lock_);
     if (!failure_) failure_ = std::move(exception);
   }
-  host_.stop();
+  hooks_.stop();
 }
 
 void ReDAGExecutor::Core::throw_failure() {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Core implements ReDAGExecutor: the engine with its scheduler, the callbacks of all groups, and the threads that
-// release their jobs. Core knows rclcpp's entities, but not rclcpp::Executor (see Host).
+// release their jobs. Core knows rclcpp's entities, but not rclcpp::Executor (see ExecutorHooks).
 //
 // Threads: collect_lock_ serialises collect(). Only one thread may call a spin function at a time; ReDAGExecutor sees
 // to it. While spin() runs, the thread redag-wait, with os above all jobs, waits for the wait set. The thread that
@@ -38,18 +38,18 @@ namespace redag_rclcpp {
 using NodeBase = rclcpp::node_interfaces::NodeBaseInterface;
 
 /// What Core uses of the rclcpp::Executor around it.
-struct Host {
+struct ExecutorHooks {
   std::function<std::vector<rclcpp::CallbackGroup::WeakPtr>()> groups;  // all groups that are to be executed
   std::function<bool()> may_spin;                                       // false: cancelled or shut down
   std::function<void()> stop;                                           // as rclcpp's cancel()
 };
 
-class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_this<Core> {
+class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_shared_from_this<Core> {
  public:
   Core(const rclcpp::Context::SharedPtr &context, ReDAGOptions options);
   ~Core() override;
 
-  void open(Host host, const std::vector<const rclcpp::GuardCondition *> &conditions);
+  void open(ExecutorHooks hooks, const std::vector<const rclcpp::GuardCondition *> &conditions);
   /// Disconnects everything and ends all threads. Must be called before the executor's own members are destroyed.
   void close();
 
@@ -84,7 +84,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   void set_live_bounds(std::map<std::string, redag::Duration> bounds);
   [[nodiscard]] redag::trace::RunInfo run_info(std::vector<std::uint32_t> &positions) const;
 
-  // Functions of Intake.
+  // Functions of ExecutorContext.
   redag::runtime::Engine &engine() override { return *engine_; }
   TimerQueue &timers() override { return timers_; }
   [[nodiscard]] bool direct() const override { return direct_; }
@@ -95,14 +95,14 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
   [[nodiscard]] bool learning() const override { return learning_; }
 
  private:
-  struct Found;
+  struct Entity;
 
   void forget_gone_nodes() REDAG_REQUIRES(collect_lock_);
-  void add(const Found &found) REDAG_REQUIRES(collect_lock_);
+  void add(const Entity &found) REDAG_REQUIRES(collect_lock_);
   void remove(const std::shared_ptr<Callback> &callback) REDAG_REQUIRES(collect_lock_);
-  void place(TaskTable::Entry &entry, const Found &found) REDAG_REQUIRES(collect_lock_);
+  void place(TaskTable::Entry &entry, const Entity &found) REDAG_REQUIRES(collect_lock_);
   void watch_group(rclcpp::CallbackGroup &group, const std::function<void(std::size_t)> &callback);
-  [[nodiscard]] std::vector<Found> find_entities() REDAG_REQUIRES(collect_lock_);
+  [[nodiscard]] std::vector<Entity> find_entities() REDAG_REQUIRES(collect_lock_);
   [[nodiscard]] std::string group_name(const rclcpp::CallbackGroup::SharedPtr &group) REDAG_REQUIRES(collect_lock_);
 
   void go_live();
@@ -128,7 +128,7 @@ class ReDAGExecutor::Core final : public Intake, public std::enable_shared_from_
 
   rclcpp::Context::SharedPtr context_;
   const ReDAGOptions options_;
-  Host host_;
+  ExecutorHooks hooks_;
   redag::runtime::Setup setup_;
   redag::Time origin_ = 0;  // zero of the engine's clock, on CLOCK_MONOTONIC
   std::unique_ptr<redag::runtime::Engine> engine_;

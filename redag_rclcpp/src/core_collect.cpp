@@ -17,7 +17,7 @@ using redag::Task;
 using Kind = redag::Callback::Kind;
 
 /// An entity found in a callback group.
-struct ReDAGExecutor::Core::Found {
+struct ReDAGExecutor::Core::Entity {
   const void *key = nullptr;
   Kind kind = Kind::Timer;
   std::string node;
@@ -101,13 +101,13 @@ void ReDAGExecutor::Core::mark_dirty() {
 void ReDAGExecutor::Core::collect() {
   // Declared before the lock guard: if `found` is the last owner of a user's object, that object is destroyed without
   // the lock.
-  std::vector<Found> found;
+  std::vector<Entity> found;
   const redag::LockGuard guard(collect_lock_);
   if (closed_) return;
   dirty_ = false;
   found = find_entities();
-  std::map<const void *, const Found *> present;
-  for (const Found &entity : found) present.emplace(entity.key, &entity);
+  std::map<const void *, const Entity *> present;
+  for (const Entity &entity : found) present.emplace(entity.key, &entity);
 
   std::vector<std::shared_ptr<Callback>> gone;
   for (const auto &[key, callback] : callbacks_) {
@@ -115,7 +115,7 @@ void ReDAGExecutor::Core::collect() {
   }
   for (const auto &callback : gone) remove(callback);
   std::vector<std::shared_ptr<Callback>> added;
-  for (const Found &entity : found) {
+  for (const Entity &entity : found) {
     if (callbacks_.count(entity.key) != 0) continue;
     add(entity);
     added.push_back(callbacks_.at(entity.key));
@@ -123,10 +123,10 @@ void ReDAGExecutor::Core::collect() {
   if (!added.empty() && rclcpp::ok(context_)) find_leftovers(context_, added);
 }
 
-std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
+std::vector<ReDAGExecutor::Core::Entity> ReDAGExecutor::Core::find_entities() {
   // Read before the nodes are. A group that is created meanwhile is left for the next time; otherwise it would lack its
   // node.
-  const auto groups = host_.groups();
+  const auto groups = hooks_.groups();
   std::map<const rclcpp::CallbackGroup *, std::string> nodes;
   for (const auto &weak : nodes_) {
     if (const auto node = weak.lock()) {
@@ -142,16 +142,16 @@ std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
     }
   }
 
-  std::vector<Found> result;
+  std::vector<Entity> result;
   for (const auto &weak : groups) {
     const auto group = weak.lock();
     if (!group) continue;
     (void)group_name(group);  // Watches empty groups, too, because an entity may be created in them.
-    Found base;
+    Entity base;
     base.group = group;
     base.node = nodes[group.get()];
     std::set<const void *> intra_process;
-    const auto push = [&](const void *key, Kind kind) -> Found & {
+    const auto push = [&](const void *key, Kind kind) -> Entity & {
       result.push_back(base);
       result.back().key = key;
       result.back().kind = kind;
@@ -159,7 +159,7 @@ std::vector<ReDAGExecutor::Core::Found> ReDAGExecutor::Core::find_entities() {
     };
     group->collect_all_ptrs(
         [&](const rclcpp::SubscriptionBase::SharedPtr &subscription) {
-          Found &found = push(subscription.get(), Kind::Subscription);
+          Entity &found = push(subscription.get(), Kind::Subscription);
           found.subscription = subscription;
           try {
             found.intra_process = subscription->get_intra_process_waitable();
@@ -197,7 +197,7 @@ void ReDAGExecutor::Core::watch_group(rclcpp::CallbackGroup &group, const std::f
   if (condition) condition->set_on_trigger_callback(callback);
 }
 
-void ReDAGExecutor::Core::add(const Found &found) {
+void ReDAGExecutor::Core::add(const Entity &found) {
   TaskTable::Entry entry;
   entry.id.kind = found.kind;
   entry.id.node = found.node;
@@ -236,7 +236,7 @@ void ReDAGExecutor::Core::add(const Found &found) {
 }
 
 // Decides which task of which DAG the callback is, and with which parameters.
-void ReDAGExecutor::Core::place(TaskTable::Entry &entry, const Found &found) {
+void ReDAGExecutor::Core::place(TaskTable::Entry &entry, const Entity &found) {
   Task &task = entry.task;
   entry.dag = static_cast<std::uint32_t>(dag_ids_.size() - 1);
   if (const auto ref = matcher_ ? matcher_->find(entry.id) : std::nullopt) {

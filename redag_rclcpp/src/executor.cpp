@@ -44,8 +44,8 @@ class Spinning {
 
 ReDAGExecutor::ReDAGExecutor(const rclcpp::ExecutorOptions &options, ReDAGOptions redag_options)
     : rclcpp::Executor(options), core_(std::make_shared<Core>(options.context, std::move(redag_options))) {
-  Host host;
-  host.groups = [this] {
+  ExecutorHooks hooks;
+  hooks.groups = [this] {
 #if RCLCPP_VERSION_MAJOR < 21
     forget_expired();
     {
@@ -56,14 +56,14 @@ ReDAGExecutor::ReDAGExecutor(const rclcpp::ExecutorOptions &options, ReDAGOption
 #endif
     return get_all_callback_groups();
   };
-  host.may_spin = [this] { return rclcpp::ok(context_) && spinning.load(); };
-  host.stop = [this] { rclcpp::Executor::cancel(); };
+  hooks.may_spin = [this] { return rclcpp::ok(context_) && spinning.load(); };
+  hooks.stop = [this] { rclcpp::Executor::cancel(); };
 #if RCLCPP_VERSION_MAJOR >= 28
   const rclcpp::GuardCondition *interrupt = interrupt_guard_condition_.get();
 #else
   const rclcpp::GuardCondition *interrupt = &interrupt_guard_condition_;
 #endif
-  core_->open(std::move(host), {interrupt, shutdown_guard_condition_.get()});
+  core_->open(std::move(hooks), {interrupt, shutdown_guard_condition_.get()});
 }
 
 ReDAGExecutor::ReDAGExecutor(ReDAGOptions redag_options)

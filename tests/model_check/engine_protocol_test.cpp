@@ -50,15 +50,15 @@ TEST_P(EngineProtocol, WhatIsReleasedRunsOnce) {
   expect_holds([] { what_is_released_runs_once(platform(2)); });
 }
 
-class LookingThreads : public EngineProtocol {};
-INSTANTIATE_TEST_SUITE_P(Modes, LookingThreads, ::testing::Values(Preemption::None, Preemption::Cooperative),
+class SpinningThreads : public EngineProtocol {};
+INSTANTIATE_TEST_SUITE_P(Modes, SpinningThreads, ::testing::Values(Preemption::None, Preemption::Cooperative),
                          [](const auto &instance) { return name_of(instance.param); });
 
 // A job is given to a thread that still looks for one, or that has just looked for the last time.
-TEST_P(LookingThreads, RunWhatIsReleased) {
+TEST_P(SpinningThreads, RunWhatIsReleased) {
   expect_holds([] {
     Platform looking = platform(1);
-    looking.looks = 2;
+    looking.spins = 2;
     what_is_released_runs_once(looking);
   });
 }
@@ -279,7 +279,7 @@ TEST_P(EngineProtocol, ChainsRunInTheirOrder) {
 // awake begins the job. A thread whose job was stolen may be given another one.
 TEST_P(EngineProtocol, AJobIsBegunByItsThreadOrByOneThatIsFreeBefore) {
   int own = 0;
-  int robbed = 0;
+  int stolen = 0;
   expect_holds([&] {
     Countdown all(3);
     std::vector<std::uint32_t> begun_by(3);
@@ -302,10 +302,10 @@ TEST_P(EngineProtocol, AJobIsBegunByItsThreadOrByOneThatIsFreeBefore) {
     explored::join(source);
     machine.finish_calmly();
     for (std::size_t t = 0; t < 3; ++t) explored::check(machine.ran(t) == 1, "a job did not run");
-    ++(begun_by[1] == begun_by[2] ? robbed : own);
+    ++(begun_by[1] == begun_by[2] ? stolen : own);
   });
   EXPECT_GT(own, 0);
-  EXPECT_GT(robbed, 0);
+  EXPECT_GT(stolen, 0);
 }
 
 TEST_P(EngineProtocol, AnExceptionEndsItsJobAlone) {
@@ -398,7 +398,7 @@ TEST(EngineStart, AThreadThatCannotBeHadEndsTheOthers) {
   });
 }
 
-// Real-time threads have no share left from the moment when the throttling guard first looks, at any point of a run.
+// Real-time threads have no share left from the moment when the throttling guard first spins, at any point of a run.
 TEST(EngineShare, OnlyJobsOfLowerCriticalityAreOrdinaryThreads) {
   int ordinary = 0;
   int realtime = 0;

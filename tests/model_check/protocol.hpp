@@ -141,7 +141,7 @@ struct Platform {
   std::uint32_t threads = 0;  // full preemption: jobs that can be in progress
   bool start_paused = false;
   std::size_t trace_capacity = 0;
-  std::uint32_t looks = 0;  // looks for a job before a thread sleeps
+  std::uint32_t spins = 0;  // looks for a job before a thread sleeps
   std::optional<runtime::Throttling> throttling = std::nullopt;
 };
 
@@ -164,7 +164,7 @@ class Machine {
     options.throttling = platform.throttling;
     options.start_paused = platform.start_paused;
     options.trace_capacity = platform.trace_capacity;
-    options.looks = platform.looks;
+    options.spins = platform.spins;
     options.on_exception = [this](const Job &, const std::exception_ptr &) { ++exceptions; };
     engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
     std::vector<runtime::Body> bodies;
