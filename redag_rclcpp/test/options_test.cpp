@@ -215,7 +215,7 @@ TEST_F(OptionsTest, MistakesInTheWorkloadAreNamedByLine) {
   text.replace(text.find("wcet"), 4, "wect");
   const std::string file = file_with(text);
   EXPECT_THAT(mistake_with({{"config", file}}),
-              AllOf(HasSubstr("'config'"), HasSubstr(file + ":7:"), HasSubstr("wcet")));
+              AllOf(HasSubstr("'config'"), HasSubstr(file + ":8:"), HasSubstr("wcet")));
   EXPECT_THAT(mistake_with({{"config", "/nowhere/robot.yaml"}}), AllOf(HasSubstr("'config'"), HasSubstr("/nowhere")));
 }
 
