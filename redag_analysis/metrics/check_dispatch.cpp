@@ -218,7 +218,7 @@ void DispatchRules::end_of_instant() {
   complaints_.clear();
   for (const Eviction &eviction : evictions_) {
     context_.expect(Rule::Preemption, false, eviction.job.task, eviction.job.number,
-                    [] { return std::string("preempted by nobody"); });
+                    [] { return std::string("no job took its worker, and it was preempted all the same"); });
   }
   evictions_.clear();
   check_free_workers();

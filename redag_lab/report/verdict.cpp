@@ -172,7 +172,7 @@ Spread spread_of(std::vector<double> values) {
 }
 
 std::string ranking(std::span<const Contender> contenders) {
-  REDAG_CHECK(!contenders.empty(), "a ranking of nobody");
+  REDAG_CHECK(!contenders.empty(), "a ranking needs contenders");
   const auto best = std::min_element(contenders.begin(), contenders.end(), [](const Contender &a, const Contender &b) {
     return a.misses.median < b.misses.median;
   });

@@ -56,24 +56,24 @@ class Diff(Case):
         other = self.results("other", file=self.write("other.yaml", CART.replace("25ms", "20ms")))
         self.expect(redag("diff", one, other), 2, "different workloads: wcet of slow.plan: 25ms -> 20ms", "--different")
         result = self.expect(redag("diff", one, other, "--different"), 0)
-        self.assertIn("beware the two ran different workloads", result.stdout)
+        self.assertIn("caution: the two ran different workloads", result.stdout)
 
     def test_what_else_differs(self):
         simulated = self.results("simulated")
         slowed = self.results("slowed", "--overhead-dispatch", "100us")
-        self.assertIn("beware overheads differ: none, and release 0s, dispatch 0.1ms, preempt 0s",
+        self.assertIn("caution: overheads differ: none, and release 0s, dispatch 0.1ms, preempt 0s",
                       self.expect(redag("diff", simulated, slowed), 0).stdout)
         on_threads = self.folder / "threads"
         self.expect(redag("run", self.cart, "--duration", "500ms", "--out", on_threads), 0)
         text = self.expect(redag("diff", simulated, on_threads), 0).stdout
-        self.assertIn("beware one side comes from 'simulator', the other from 'threads'", text)
-        self.assertIn("beware a side has a single run", text)
+        self.assertIn("caution: one side comes from 'simulator', the other from 'threads'", text)
+        self.assertIn("caution: a side has a single run", text)
         info, *events = (on_threads / "events.jsonl").read_text().splitlines(keepends=True)
         (self.folder / "elsewhere").mkdir()
         changed = json.loads(info)
         changed["run"]["machine"]["kernel"] += "-other"
         (self.folder / "elsewhere" / "events.jsonl").write_text("".join([json.dumps(changed) + "\n", *events]))
-        self.assertIn("beware the sides ran on different machines or kernels",
+        self.assertIn("caution: the sides ran on different machines or kernels",
                       self.expect(redag("diff", on_threads, self.folder / "elsewhere"), 0).stdout)
 
     def test_bad_input(self):

@@ -259,7 +259,7 @@ std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool al
                                    : "",
       diffed.difference.tests);
   for (const std::string &caution : cautions(diffed)) {
-    text += tinted("beware ", Tint::Caution, terminal.colour) + caution + "\n";
+    text += tinted("caution: ", Tint::Caution, terminal.colour) + caution + "\n";
   }
   return text;
 }

@@ -144,7 +144,7 @@ std::string caveat(const lab::Comparison &comparison) {
   if (with.empty() || without.empty()) return {};
   return fmt::format(
       "{} had real-time (SCHED_FIFO) threads, {} had not: on a busy machine part of the difference is that alone; "
-      "mte-fifo and ste-fifo, or --realtime, give them to everybody",
+      "mte-fifo and ste-fifo, or --realtime, give them to all",
       report::join(with), report::join(without));
 }
 

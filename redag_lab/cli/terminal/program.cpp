@@ -72,8 +72,7 @@ constexpr std::array kCommands = {
           "  redag assign cart.yaml\n"
           "  redag assign cart.yaml --objective slack -o tuned.yaml\n"
           "  redag assign cart.yaml --keep priorities --workers 4 --json\n"},
-    Entry{"tune", "Find better max_active, workers and tie order by simulation, held to seeds not searched with",
-          add_tune,
+    Entry{"tune", "Find better max_active, workers and tie order by simulation, validated on unseen seeds", add_tune,
           "  redag tune cart.yaml\n"
           "  redag tune cart.yaml --objective max_lateness --per-criticality -o tuned.yaml\n"
           "  redag tune cart.yaml --vary max_active --caps 2-5 --simulator-only --all-trials\n"},

@@ -64,7 +64,7 @@ function detailSections() {
   const schedule = scheduleFigure(groups, state);
   const redraw = () => { responses.draw(); lateness.draw(); };
 
-  const pick = several ? [element('div.row.executors', {}, element('span.soft', {}, 'what follows is of'),
+  const pick = several ? [element('div.row.executors', {}, element('span.soft', {}, 'details for'),
     choice(groups.map((group) => group.label), 0, (i) => {
       const name = state.task === null ? null : taskName(groups[state.executor], state.task);
       state.executor = i;
