@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include "redag/model/validate.hpp"
 #include "redag/sched/policy.hpp"
@@ -368,6 +369,33 @@ AnalysisPlatform charge(AnalysisPlatform platform, const Overheads &overheads) {
   platform.lateness = overheads.lateness;
   platform.stall = overheads.stall;
   return platform;
+}
+
+Result<ExecutedRun> as_executed(Workload workload, const sched::Config &config, std::string_view overheads) {
+  ExecutedRun run{std::move(workload), platform_of(config)};
+  run.workload.policy = config.policy;
+  run.workload.ties = config.ties;
+  if (const std::optional<Overheads> machine = parse_overheads(overheads)) {
+    run.platform = charge(run.platform, *machine);
+    return run;
+  }
+  for (std::string_view rest = overheads; !rest.empty();) {
+    const std::size_t comma = std::min(rest.find(", "), rest.size());
+    const std::string_view part = rest.substr(0, comma);
+    rest.remove_prefix(std::min(rest.size(), comma + 2));
+    const std::size_t blank = std::min(part.find(' '), part.size());
+    const std::string_view what = part.substr(0, blank);
+    const Result<Duration> value = parse_duration(part.substr(std::min(part.size(), blank + 1)));
+    Duration *target = what == "release"    ? &run.platform.release_overhead
+                       : what == "dispatch" ? &run.platform.dispatch_overhead
+                       : what == "preempt"  ? &run.platform.preempt_overhead
+                                            : nullptr;
+    if (!value || target == nullptr) {
+      return make_error("the run's overheads are not understood: " + std::string(overheads));
+    }
+    *target = *value;
+  }
+  return run;
 }
 
 AnalysisPlatform platform_of(const sched::Config &config) {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "redag/base/result.hpp"
@@ -46,6 +47,17 @@ struct AnalysisPlatform {
 
 /// The platform on which the simulator runs the workload: `os` and `auto` mean full preemption; no overheads.
 [[nodiscard]] AnalysisPlatform platform_of(const Workload &workload);
+
+/// A run as the bounds see it: the workload with the policy and the ties of its scheduler, and its platform.
+struct ExecutedRun {
+  Workload workload;
+  AnalysisPlatform platform;
+};
+
+/// `overheads` is the text that a run records: of a machine, as to_string() writes them, or "release 2us, dispatch 1us,
+/// preempt 0" of a simulation; empty: none. Error: any other text.
+[[nodiscard]] Result<ExecutedRun> as_executed(Workload workload, const sched::Config &config,
+                                              std::string_view overheads);
 
 inline constexpr std::uint32_t kNoGroup = 0xffffffff;
 

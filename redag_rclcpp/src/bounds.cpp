@@ -89,10 +89,6 @@ bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload
 }
 
 void Bounds::analyse(const Workload &workload, const redag::sched::Config &config) {
-  Workload analysed = workload;
-  analysed.policy = config.policy;
-  analysed.ties = config.ties;
-  redag::analysis::AnalysisPlatform platform = redag::analysis::platform_of(config);
   machine_.reset();
   if (calibration_) {
     const redag::Result<redag::Overheads> machine =
@@ -102,9 +98,9 @@ void Bounds::analyse(const Workload &workload, const redag::sched::Config &confi
       return;
     }
     machine_ = *machine;
-    platform = redag::analysis::charge(platform, *machine);
   }
-  const redag::Result<redag::analysis::System> system = redag::analysis::compile(analysed, platform);
+  const auto executed = redag::analysis::as_executed(workload, config, machine_ ? to_string(*machine_) : "");
+  const auto system = redag::analysis::compile(executed->workload, executed->platform);
   if (!system) {
     absent_ = to_string(system.error());
     return;

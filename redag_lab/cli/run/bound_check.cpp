@@ -32,14 +32,10 @@ const char *name_of(Broken broken) {
 BoundCheck check_bounds(const lab::Session &session) {
   BoundCheck check;
   const trace::RunInfo &info = session.info;
-  Workload workload = info.workload;
-  workload.policy = info.config.policy;
-  workload.ties = info.config.ties;
-  analysis::AnalysisPlatform platform = analysis::platform_of(info.config);
-  if (const std::optional<Overheads> machine = parse_overheads(info.overheads)) {
-    platform = analysis::charge(platform, *machine);
-  }
-  const Result<Analysed> analysed = analyse(workload, platform, nullptr, info.executor);
+  const Workload &workload = info.workload;
+  const auto executed = analysis::as_executed(workload, info.config, info.overheads);
+  const Result<Analysed> analysed = executed ? analyse(executed->workload, executed->platform, nullptr, info.executor)
+                                             : Result<Analysed>(tl::unexpected(executed.error()));
   std::vector<Duration> bounds(workload.task_count(), 0);
   check.methods.resize(bounds.size());
   if (!analysed) check.absent = to_string(analysed.error());
