@@ -17,8 +17,8 @@ using analysis::ChainBound;
 using analysis::ChainSegment;
 using analysis::NotApplicable;
 
-Result<TaskId> find_task(const Analysed &analysed, const std::string &name) {
-  const Result<Row> row = find_row(analysed, name);
+Result<TaskId> find_task(const lab::Analysed &analysed, const std::string &name) {
+  const Result<lab::Row> row = find_row(analysed, name);
   if (!row) return tl::unexpected<Diagnostics>(row.error());
   for (std::size_t t = 0; t < analysed.system.tasks.size(); ++t) {
     if (task_name(analysed, TaskId(t)) == row->name) return TaskId(t);
@@ -26,7 +26,7 @@ Result<TaskId> find_task(const Analysed &analysed, const std::string &name) {
   return make_error("'" + name + "' is a DAG", "a chain is of tasks: dag.task,dag.task");
 }
 
-std::optional<Duration> let_reaction_of(const Analysed &analysed, const std::vector<TaskId> &tasks) {
+std::optional<Duration> let_reaction_of(const lab::Analysed &analysed, const std::vector<TaskId> &tasks) {
   std::vector<analysis::LetTask> chain;
   for (const TaskId id : tasks) {
     const analysis::SystemTask &task = analysed.system.tasks[id.value];
@@ -36,13 +36,13 @@ std::optional<Duration> let_reaction_of(const Analysed &analysed, const std::vec
   return analysis::let_reaction(chain);
 }
 
-std::string name_of(const Analysed &analysed, const std::vector<TaskId> &tasks) {
+std::string name_of(const lab::Analysed &analysed, const std::vector<TaskId> &tasks) {
   std::string text;
   for (const TaskId task : tasks) text += (text.empty() ? "" : " > ") + task_name(analysed, task);
   return text;
 }
 
-std::string name_of(const Analysed &analysed, const ChainSegment &segment) {
+std::string name_of(const lab::Analysed &analysed, const ChainSegment &segment) {
   std::string text = task_name(analysed, segment.first);
   if (segment.last != segment.first) text += " to " + task_name(analysed, segment.last);
   return text;
@@ -50,7 +50,7 @@ std::string name_of(const Analysed &analysed, const ChainSegment &segment) {
 
 }  // namespace
 
-Result<ChainRow> find_chain(const Analysed &analysed, const std::string &chain) {
+Result<ChainRow> find_chain(const lab::Analysed &analysed, const std::string &chain) {
   ChainRow row;
   for (std::size_t begin = 0; begin <= chain.size();) {
     const std::size_t end = std::min(chain.find(',', begin), chain.size());
@@ -64,7 +64,7 @@ Result<ChainRow> find_chain(const Analysed &analysed, const std::string &chain) 
   return row;
 }
 
-std::string describe(const Analysed &analysed, const std::vector<ChainRow> &chains, const StreamTraits &terminal) {
+std::string describe(const lab::Analysed &analysed, const std::vector<ChainRow> &chains, const StreamTraits &terminal) {
   Table table({{"chain", false, 9}, {"reaction", true, 8}, {"age", true, 7}, {"LET", true, 5}});
   std::string parts;
   for (const ChainRow &row : chains) {
@@ -88,7 +88,7 @@ std::string describe(const Analysed &analysed, const std::vector<ChainRow> &chai
          "strictly periodic timers. LET: both, exact, if tasks read at their release and write at their deadline\n";
 }
 
-Json to_json(const Analysed &analysed, const std::vector<ChainRow> &chains) {
+Json to_json(const lab::Analysed &analysed, const std::vector<ChainRow> &chains) {
   Json document = Json::array();
   for (const ChainRow &row : chains) {
     const auto *bound = std::get_if<ChainBound>(&row.bound);

@@ -25,12 +25,12 @@ struct ChainRow {
 
 /// Bounds the chain "dag.task,dag.task,..." with the tightest bounds of the tasks and DAGs. Error: malformed, or a name
 /// without a task.
-[[nodiscard]] Result<ChainRow> find_chain(const Analysed &analysed, const std::string &chain);
+[[nodiscard]] Result<ChainRow> find_chain(const lab::Analysed &analysed, const std::string &chain);
 
 /// Returns a table, the segments of each chain, and an explanation of the figures.
-[[nodiscard]] std::string describe(const Analysed &analysed, const std::vector<ChainRow> &chains,
+[[nodiscard]] std::string describe(const lab::Analysed &analysed, const std::vector<ChainRow> &chains,
                                    const StreamTraits &terminal);
 
-[[nodiscard]] Json to_json(const Analysed &analysed, const std::vector<ChainRow> &chains);
+[[nodiscard]] Json to_json(const lab::Analysed &analysed, const std::vector<ChainRow> &chains);
 
 }  // namespace redag::cli

@@ -9,7 +9,7 @@ namespace redag::cli {
 namespace {
 
 // Returns on one worker a sensor (T 10, C 3) above a DAG of two tasks (T 20, C 2 and 5), in milliseconds.
-Analysed sensor_and_pipeline() {
+lab::Analysed sensor_and_pipeline() {
   const auto timer = [](std::string name, Duration period, Duration wcet) {
     Task task;
     task.name = std::move(name);
@@ -25,13 +25,13 @@ Analysed sensor_and_pipeline() {
   workload.platform = Platform{1, PreemptionMode::Os};
   workload.dags = {Dag{"sensor", {timer("read", 10, 3)}, 0, 0, 0, Criticality::Normal, {}},
                    Dag{"pipeline", {timer("first", 20, 2), second}, 0, 0, 0, Criticality::Normal, {}}};
-  Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload));
+  Result<lab::Analysed> analysed = lab::analyse(workload, analysis::platform_of(workload));
   EXPECT_TRUE(analysed) << to_string(analysed.error());
   return *std::move(analysed);
 }
 
 TEST(AnalysisChains, OverSeveralDags) {
-  const Analysed analysed = sensor_and_pipeline();
+  const lab::Analysed analysed = sensor_and_pipeline();
   const Result<ChainRow> row = find_chain(analysed, "sensor.read,pipeline.first,pipeline.second");
   ASSERT_TRUE(row) << to_string(row.error());
   const auto &bound = std::get<analysis::ChainBound>(row->bound);
@@ -58,7 +58,7 @@ TEST(AnalysisChains, OfTimersLogicalExecutionTimeIsExact) {
 }
 
 TEST(AnalysisChains, SaysWhatIsWrongWithAName) {
-  const Analysed analysed = sensor_and_pipeline();
+  const lab::Analysed analysed = sensor_and_pipeline();
   for (const char *chain : {"", "sensor.read,", "sensor.raed", "pipeline"}) {
     const Result<ChainRow> row = find_chain(analysed, chain);
     ASSERT_FALSE(row) << chain;

@@ -17,7 +17,7 @@ namespace {
 using analysis::Term;
 
 // Names the owner of a term. A unit of several tasks has its DAG's name.
-std::string owner(const Analysed &analysed, const Term &term) {
+std::string owner(const lab::Analysed &analysed, const Term &term) {
   if (term.task.valid()) return task_name(analysed, term.task);
   if (term.dag.valid()) return analysed.system.dags[term.dag.value].name;
   switch (term.kind) {
@@ -42,7 +42,7 @@ std::string what(const Term &term) {
   return "?";
 }
 
-std::string advice_on_blocking(const Analysed &analysed, const std::string &who) {
+std::string advice_on_blocking(const lab::Analysed &analysed, const std::string &who) {
   switch (analysed.system.mode) {
     case sched::Preemption::None:
       return fmt::format(
@@ -56,7 +56,7 @@ std::string advice_on_blocking(const Analysed &analysed, const std::string &who)
   return fmt::format("{} holds a group or shares a priority level: shorten it, or take it out of the group", who);
 }
 
-std::string advice(const Analysed &analysed, const Term &term) {
+std::string advice(const lab::Analysed &analysed, const Term &term) {
   const std::string who = owner(analysed, term);
   switch (term.kind) {
     case Term::Kind::Own:
@@ -83,9 +83,9 @@ double share(Duration part, Duration whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
 }
 
-std::string explain_bound(const Analysed &analysed, const Row &row, const StreamTraits &terminal) {
+std::string explain_bound(const lab::Analysed &analysed, const lab::Row &row, const StreamTraits &terminal) {
   const Duration response = *row.tightest.response;
-  std::vector<Term> terms = terms_of(analysed, row);
+  std::vector<Term> terms = lab::terms_of(analysed, row);
   std::stable_sort(terms.begin(), terms.end(), [](const Term &a, const Term &b) { return a.amount > b.amount; });
   Table table({{"what", false, 9}, {"of", false, 8}, {"jobs", true, 2}, {"time", true, 7}, {"share", true, 5}});
   for (const Term &term : terms) {
@@ -108,7 +108,7 @@ std::string explain_bound(const Analysed &analysed, const Row &row, const Stream
 }
 
 // Returns the reason why there is no bound, the methods that gave up or do not apply, and the load.
-std::string explain_absence(const Analysed &analysed, const Row &row) {
+std::string explain_absence(const lab::Analysed &analysed, const lab::Row &row) {
   std::string text = fmt::format("why there is no bound: {}\n", row.reason);
   if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return text;
   text += describe_gave_up(analysed.report);
@@ -131,10 +131,10 @@ std::string explain_absence(const Analysed &analysed, const Row &row) {
 
 }  // namespace
 
-Result<Row> find_row(const Analysed &analysed, const std::string &name) {
+Result<lab::Row> find_row(const lab::Analysed &analysed, const std::string &name) {
   std::vector<std::string> names;
   for (const bool of_dags : {false, true}) {
-    for (Row &row : of_dags ? dag_rows(analysed) : task_rows(analysed)) {
+    for (lab::Row &row : of_dags ? lab::dag_rows(analysed) : lab::task_rows(analysed)) {
       std::string slashed = row.name;
       if (const std::size_t dot = slashed.find('.'); dot != std::string::npos) slashed[dot] = '/';
       if (row.name == name || (!of_dags && slashed == name)) return std::move(row);
@@ -151,7 +151,7 @@ Result<Row> find_row(const Analysed &analysed, const std::string &name) {
   return make_error("there is no task or DAG " + in_quotes(name), suggestion(name, names));
 }
 
-std::string explain(const Analysed &analysed, const Row &row, const StreamTraits &terminal) {
+std::string explain(const lab::Analysed &analysed, const lab::Row &row, const StreamTraits &terminal) {
   std::string text = tinted(row.name, Tint::Strong, terminal.colour) + ": ";
   if (row.tightest.response) {
     text += fmt::format("answers within {} of its release, ", humanize_up(*row.tightest.response));
@@ -159,15 +159,15 @@ std::string explain(const Analysed &analysed, const Row &row, const StreamTraits
     text += "no bound on its response time, ";
   }
   text += row.deadline > 0 ? fmt::format("deadline {}: ", humanize_duration(row.deadline)) : "no end-to-end deadline: ";
-  text += row.standing == Standing::NoDeadline ? "nothing to miss" : to_string(row.standing);
-  if (row.standing == Standing::Ok && row.says != nullptr) text += fmt::format(", shown by {}", row.says->name);
+  text += row.standing == lab::Standing::NoDeadline ? "nothing to miss" : to_string(row.standing);
+  if (row.standing == lab::Standing::Ok && row.says != nullptr) text += fmt::format(", shown by {}", row.says->name);
   text += "\n";
   if (row.due && row.deadline > *row.due) {
     text += fmt::format("held to {}: beyond, the next release would skip a job that has not started\n",
                         humanize_duration(*row.due));
   }
   text += row.tightest.response ? explain_bound(analysed, row, terminal) : explain_absence(analysed, row);
-  const bool is_open = row.standing == Standing::MayMiss || (row.standing == Standing::NoBound && row.due);
+  const bool is_open = row.standing == lab::Standing::MayMiss || (row.standing == lab::Standing::NoBound && row.due);
   if (is_open && analysed.report.verdict != analysis::Verdict::Schedulable) {
     text += "what to change in the file: " +
             suggested_change(analysed, row).value_or("no single change was found that lets every deadline be shown") +

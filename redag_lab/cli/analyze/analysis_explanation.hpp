@@ -13,9 +13,9 @@ namespace redag::cli {
 
 /// Finds a row by `name`: "dag.task" (or "dag/task"), or a DAG's name. Error, with the nearest name, if there is no
 /// such task or DAG.
-[[nodiscard]] Result<Row> find_row(const Analysed &analysed, const std::string &name);
+[[nodiscard]] Result<lab::Row> find_row(const lab::Analysed &analysed, const std::string &name);
 
 /// Returns the terms of the bound, largest share first, and a suggested change; or the reason why there is no bound.
-[[nodiscard]] std::string explain(const Analysed &analysed, const Row &row, const StreamTraits &terminal);
+[[nodiscard]] std::string explain(const lab::Analysed &analysed, const lab::Row &row, const StreamTraits &terminal);
 
 }  // namespace redag::cli

@@ -21,22 +21,22 @@ using testing::make_workload;
 using ::testing::Not;
 using Kind = Term::Kind;
 
-Analysed look_at(const Workload &workload) {
-  Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload));
+lab::Analysed look_at(const Workload &workload) {
+  Result<lab::Analysed> analysed = lab::analyse(workload, analysis::platform_of(workload));
   EXPECT_TRUE(analysed) << to_string(analysed.error());
   return *std::move(analysed);
 }
 
 // Returns two tasks on one worker: fast.a (T 10, C 3) and slow.b (T 20, C 7, with a preemption point every
 // millisecond).
-Analysed two_tasks(PreemptionMode mode) {
+lab::Analysed two_tasks(PreemptionMode mode) {
   Workload workload = make_workload({make_dag("fast", {{"a", 10, 3}}), make_dag("slow", {{"b", 20, 7}})}, 1, mode);
   workload.dags[1].tasks[0].region = kMillisecond;
   return look_at(workload);
 }
 
-Row row_of(const Analysed &analysed, const std::string &name) {
-  Result<Row> row = find_row(analysed, name);
+lab::Row row_of(const lab::Analysed &analysed, const std::string &name) {
+  Result<lab::Row> row = find_row(analysed, name);
   EXPECT_TRUE(row) << to_string(row.error());
   return *std::move(row);
 }
@@ -52,17 +52,17 @@ Term term(Kind kind, Duration ms, TaskId task = {}, std::int64_t jobs = 0) {
 
 // Returns the explanation of slow.b if `largest` is 6 of its 10 ms.
 std::string explained(const Term &largest, PreemptionMode mode = PreemptionMode::Os) {
-  const Analysed analysed = two_tasks(mode);
-  Row row = row_of(analysed, "slow.b");
+  const lab::Analysed analysed = two_tasks(mode);
+  lab::Row row = row_of(analysed, "slow.b");
   row.tightest.response = row.tightest.bound.response = 10 * kMillisecond;
   row.tightest.bound.terms = {term(Kind::Own, 4, TaskId(1), 1), largest};
   return explain(analysed, row, StreamTraits{});
 }
 
 TEST(Explanation, TermsAddUpAndTheLargestIsNamed) {
-  const Analysed analysed = two_tasks(PreemptionMode::None);
+  const lab::Analysed analysed = two_tasks(PreemptionMode::None);
   // Without preemption, a waits only for b: 7 ms, of which at least one nanosecond has passed.
-  const Row row = row_of(analysed, "fast/a");
+  const lab::Row row = row_of(analysed, "fast/a");
   EXPECT_EQ(row.tightest.response, 10 * kMillisecond - 1);
   const std::string text = explain(analysed, row, StreamTraits{});
   EXPECT_THAT(text, HasSubstr("blocking by    slow.b     1   7ms  70.0 %"));
@@ -75,8 +75,8 @@ TEST(Explanation, TermsAddUpAndTheLargestIsNamed) {
 TEST(Explanation, OfADagOnSeveralWorkersTellsThePathFromTheRest) {
   const Dag fork =
       make_dag("fork", {{"first", 10, 1}, {"left", 0, 4, {0}}, {"right", 0, 4, {0}}, {"third", 0, 4, {0}}});
-  const Analysed analysed = look_at(make_workload({fork}, 2, PreemptionMode::Os));
-  const Row row = row_of(analysed, "fork.right");
+  const lab::Analysed analysed = look_at(make_workload({fork}, 2, PreemptionMode::Os));
+  const lab::Row row = row_of(analysed, "fork.right");
   EXPECT_EQ(row.tightest.response, 9 * kMillisecond);
   EXPECT_EQ(row.tightest.response, row_of(analysed, "fork").tightest.response);
   const std::string text = explain(analysed, row, StreamTraits{});
@@ -134,8 +134,8 @@ TEST(Explanation, WhatIsTakenOffHasNoShareAndWhatIsNothingNoRow) {
 }
 
 TEST(Explanation, SaysWhenADeadlineBeyondThePeriodCannotBeUsed) {
-  const Analysed analysed = two_tasks(PreemptionMode::Os);
-  Result<Row> row = find_row(analysed, "slow/b");
+  const lab::Analysed analysed = two_tasks(PreemptionMode::Os);
+  Result<lab::Row> row = find_row(analysed, "slow/b");
   ASSERT_TRUE(row);
   row->deadline = 30 * kMillisecond;
   row->due = 20 * kMillisecond;

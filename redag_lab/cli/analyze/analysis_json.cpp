@@ -13,7 +13,7 @@ using analysis::MethodReport;
 Json duration_json(const std::optional<Duration> &duration) { return duration ? Json(*duration) : Json(); }
 
 // Returns null if the terms were left out (kMostItemised).
-Json terms_json(const Analysed &analysed, const analysis::ResponseBound &bound) {
+Json terms_json(const lab::Analysed &analysed, const analysis::ResponseBound &bound) {
   if (bound.response && bound.terms.empty()) return nullptr;
   Json terms = Json::array();
   for (const analysis::Term &term : bound.terms) {
@@ -26,7 +26,7 @@ Json terms_json(const Analysed &analysed, const analysis::ResponseBound &bound) 
   return terms;
 }
 
-Json row_json(const Analysed &analysed, const Row &row) {
+Json row_json(const lab::Analysed &analysed, const lab::Row &row) {
   return Json{{"name", row.name},
               {"deadline_ns", row.deadline > 0 ? Json(row.deadline) : Json()},
               {"due_ns", duration_json(row.due)},
@@ -38,7 +38,7 @@ Json row_json(const Analysed &analysed, const Row &row) {
               {"terms", terms_json(analysed, row.tightest.bound)}};
 }
 
-Json bounds_json(const std::vector<analysis::ResponseBound> &bounds, const std::vector<Row> &rows) {
+Json bounds_json(const std::vector<analysis::ResponseBound> &bounds, const std::vector<lab::Row> &rows) {
   Json list = Json::array();
   for (std::size_t i = 0; i < bounds.size() && i < rows.size(); ++i) {
     list.push_back(Json{{"name", rows[i].name},
@@ -77,7 +77,7 @@ const char *to_string(analysis::Exploration::End end) {
   return "?";
 }
 
-Json exploration_json(const Analysed &analysed) {
+Json exploration_json(const lab::Analysed &analysed) {
   const analysis::Exploration &exploration = *analysed.exploration;
   Json document = {{"end", to_string(exploration.end)},
                    {"exact", exploration.exact},
@@ -102,7 +102,7 @@ Json exploration_json(const Analysed &analysed) {
 
 }  // namespace
 
-Json to_json(const Analysed &analysed, bool each) {
+Json to_json(const lab::Analysed &analysed, bool each) {
   const analysis::AnalysisPlatform &platform = analysed.system.platform;
   Json document = {
       {"format", "redag.analysis/1"},
@@ -126,16 +126,16 @@ Json to_json(const Analysed &analysed, bool each) {
       {"schedulable", analysed.report.verdict == analysis::Verdict::Schedulable},
       {"verdict", verdict_in_words(analysed)},
   };
-  const std::optional<Row> weakest = weakest_row(analysed);
+  const std::optional<lab::Row> weakest = lab::weakest_row(analysed);
   document["weakest"] = weakest ? Json(weakest->name) : Json();
   document["by"] = Json::array();
   for (const Method *method : analysed.report.by) document["by"].push_back(std::string(method->name));
-  const std::vector<Row> tasks = task_rows(analysed);
-  const std::vector<Row> dags = dag_rows(analysed);
+  const std::vector<lab::Row> tasks = lab::task_rows(analysed);
+  const std::vector<lab::Row> dags = lab::dag_rows(analysed);
   document["tasks"] = Json::array();
-  for (const Row &row : tasks) document["tasks"].push_back(row_json(analysed, row));
+  for (const lab::Row &row : tasks) document["tasks"].push_back(row_json(analysed, row));
   document["dags"] = Json::array();
-  for (const Row &row : dags) document["dags"].push_back(row_json(analysed, row));
+  for (const lab::Row &row : dags) document["dags"].push_back(row_json(analysed, row));
   document["methods"] = Json::array();
   for (const MethodReport &report : analysed.report.methods) {
     document["methods"].push_back(method_json(report));

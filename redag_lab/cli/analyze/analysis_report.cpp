@@ -26,85 +26,24 @@ using analysis::Verdict;
 
 constexpr std::size_t kMostTasks = 50;  // with more tasks, the table shows only this many, the tightest
 
-// Returns a trusted test that accepts all tasks at once, or null.
-const Method *accepting_test(const Analysed &analysed) {
-  for (const MethodReport &method : analysed.report.methods) {
-    const analysis::Bound *bound = method.bound();
-    if (method.trusted && bound != nullptr && bound->accepts == true) return method.method;
-  }
-  return nullptr;
-}
-
-// If a more urgent task prevents this bound, returns the most urgent task without a bound and its reason.
-std::string culprit_of(const Analysed &analysed, const analysis::Bound &bound, const analysis::ResponseBound &asked) {
-  if (asked.absent != analysis::global::kMoreUrgent && asked.absent != analysis::global::kPeer) return {};
-  for (const std::uint32_t t : analysed.system.by_rank) {
-    const std::string_view absent = bound.tasks[t].absent;
-    if (absent.empty() || absent == analysis::global::kMoreUrgent || absent == analysis::global::kPeer) continue;
-    return fmt::format(" ({}: {})", task_name(analysed, TaskId(t)), absent);
-  }
-  return {};
-}
-
-// Returns the first reason that a trusted method states for the missing bound.
-std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_dag) {
-  if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return analysed.system.not_analysable;
-  for (const MethodReport &method : analysed.report.methods) {
-    const analysis::Bound *bound = method.bound();
-    if (!method.trusted || bound == nullptr) continue;
-    const auto &bounds = is_dag ? bound->dags : bound->tasks;
-    if (index < bounds.size() && !bounds[index].absent.empty()) {
-      return fmt::format("{}: {}{}", method.method->name, bounds[index].absent,
-                         culprit_of(analysed, *bound, bounds[index]));
-    }
-  }
-  for (const MethodReport &method : analysed.report.methods) {
-    if (!method.gave_up() || method.method->subject == analysis::Subject::System) continue;
-    return fmt::format("gave up on {}: {}", method.method->name, std::get<NotApplicable>(method.outcome).reason);
-  }
-  return "no method that bounds response times applies";
-}
-
-void judge(const Analysed &analysed, Row &row, std::size_t index, bool is_dag) {
-  row.says = row.tightest.method;
-  if (row.tightest.response && row.due) row.slack = *row.due - *row.tightest.response;
-  if (!row.tightest.response) row.reason = why_no_bound(analysed, index, is_dag);
-  const Method *test = accepting_test(analysed);
-  const bool is_met = row.slack.value_or(-1) >= 0;
-  if (!is_met && row.due && test != nullptr) {
-    // A yes-or-no test can accept where the bounds are too coarse. A bound above the deadline is then dropped.
-    row.tightest = {};
-    row.slack.reset();
-    row.reason = fmt::format("{} accepts the workload as a whole, and tells no response times", test->name);
-    row.says = test;
-    row.standing = Standing::Ok;
-  } else if (!row.tightest.response) {
-    row.standing = row.due || test == nullptr ? Standing::NoBound : Standing::NoDeadline;
-  } else if (!row.due) {
-    row.standing = Standing::NoDeadline;
-  } else {
-    row.standing = is_met ? Standing::Ok : Standing::MayMiss;
-  }
-}
-
-Tint tint_of(Standing standing) {
+Tint tint_of(lab::Standing standing) {
   switch (standing) {
-    case Standing::Ok: return Tint::Good;
-    case Standing::MayMiss: return Tint::Bad;
-    case Standing::NoBound: return Tint::Caution;
-    case Standing::NoDeadline: return Tint::Faint;
+    case lab::Standing::Ok: return Tint::Good;
+    case lab::Standing::MayMiss: return Tint::Bad;
+    case lab::Standing::NoBound: return Tint::Caution;
+    case lab::Standing::NoDeadline: return Tint::Faint;
   }
   return Tint::Plain;
 }
 
-std::string table_of(const char *title, const std::vector<Row> &rows, const StreamTraits &terminal) {
+std::string table_of(const char *title, const std::vector<lab::Row> &rows, const StreamTraits &terminal) {
   Table table({{title, false, 9},
                {"deadline", true, 4},
                {"bound", true, 7},
                {"slack", true, 5},
                {"verdict", false, 8, true},
                {"method", false, 3}});
-  for (const Row &row : rows) {
+  for (const lab::Row &row : rows) {
     const Tint tint = tint_of(row.standing);
     table.add({{row.name},
                {row.deadline > 0 ? humanize_duration(row.deadline) : "-"},
@@ -117,13 +56,14 @@ std::string table_of(const char *title, const std::vector<Row> &rows, const Stre
 }
 
 // Returns all rows in the workload's order, or only those nearest to a miss.
-std::vector<Row> shown_rows(std::vector<Row> rows, bool all) {
+std::vector<lab::Row> shown_rows(std::vector<lab::Row> rows, bool all) {
   if (all || rows.size() <= kMostTasks) return rows;
-  const auto urgency = [](const Row &row) {
-    if (row.standing == Standing::NoBound) return -kMaxDuration;
+  const auto urgency = [](const lab::Row &row) {
+    if (row.standing == lab::Standing::NoBound) return -kMaxDuration;
     return row.slack.value_or(kMaxDuration);
   };
-  std::stable_sort(rows.begin(), rows.end(), [&](const Row &a, const Row &b) { return urgency(a) < urgency(b); });
+  std::stable_sort(rows.begin(), rows.end(),
+                   [&](const lab::Row &a, const lab::Row &b) { return urgency(a) < urgency(b); });
   rows.resize(kMostTasks);
   return rows;
 }
@@ -140,7 +80,7 @@ Cell answer(const MethodReport &report) {
   return {"not shown", Tint::Caution};
 }
 
-std::string remark(const Analysed &analysed, const MethodReport &report) {
+std::string remark(const lab::Analysed &analysed, const MethodReport &report) {
   const analysis::Bound *bound = report.bound();
   std::string text;
   if (!bound->tasks.empty()) {
@@ -153,7 +93,7 @@ std::string remark(const Analysed &analysed, const MethodReport &report) {
   return text;
 }
 
-std::string method_table(const Analysed &analysed, const StreamTraits &terminal) {
+std::string method_table(const lab::Analysed &analysed, const StreamTraits &terminal) {
   if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) {
     return fmt::format("none of the {} methods applies: {}\n", analysed.report.methods.size(),
                        analysed.system.not_analysable);
@@ -175,7 +115,7 @@ std::string method_table(const Analysed &analysed, const StreamTraits &terminal)
 }
 
 // Returns the best and worst responses over all schedules. Bounds give no best case.
-std::string exploration_table(const Analysed &analysed, const StreamTraits &terminal, bool all) {
+std::string exploration_table(const lab::Analysed &analysed, const StreamTraits &terminal, bool all) {
   const analysis::Exploration &exploration = *analysed.exploration;
   Table table({{"explored", false, 9}, {"best", true, 5}, {"worst", true, 5}});
   const std::size_t shown = all ? analysed.system.tasks.size() : std::min(kMostTasks, analysed.system.tasks.size());
@@ -194,7 +134,7 @@ std::string plural(std::size_t count, const char *noun) {
   return fmt::format("{} {}{}", format_count(count), noun, count == 1 ? "" : "s");
 }
 
-std::string headline(const Analysed &analysed) {
+std::string headline(const lab::Analysed &analysed) {
   const analysis::AnalysisPlatform &platform = analysed.system.platform;
   const std::string reason = mode_reason(analysed);
   // The jobs are ordered by the policy, or by another executor, which ignores policies.
@@ -230,104 +170,21 @@ std::string listed(const std::vector<const Method *> &methods) {
   return text;
 }
 
-// Keeps the methods with these names. Error: an unknown name.
-std::optional<Diagnostics> keep_only(const std::vector<std::string> &only, std::vector<Method> &methods) {
-  if (only.empty()) return std::nullopt;
-  std::vector<std::string> names;
-  names.reserve(methods.size());
-  for (const Method &method : methods) names.emplace_back(method.name);
-  for (const std::string &name : only) {
-    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
-    return make_error("--method: there is no method '" + name + "'", suggestion(name, names)).value();
-  }
-  std::erase_if(methods,
-                [&](const Method &method) { return std::find(only.begin(), only.end(), method.name) == only.end(); });
-  return std::nullopt;
-}
-
 }  // namespace
 
-const char *to_string(Standing standing) {
+const char *to_string(lab::Standing standing) {
   switch (standing) {
-    case Standing::Ok: return "ok";
-    case Standing::MayMiss: return "MAY MISS";
-    case Standing::NoBound: return "no bound";
-    case Standing::NoDeadline: return "-";
+    case lab::Standing::Ok: return "ok";
+    case lab::Standing::MayMiss: return "MAY MISS";
+    case lab::Standing::NoBound: return "no bound";
+    case lab::Standing::NoDeadline: return "-";
   }
   return "?";
 }
 
-Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                         const analysis::ExplorationOptions *explore, const std::string &executor,
-                         const analysis::AnalyzeOptions &limits, const std::vector<std::string> &only) {
-  const sched::ExecutorKind *kind = sched::find_executor(executor);
-  if (kind == nullptr) return make_error("there is no analysis of the executor '" + executor + "'");
-  Result<analysis::System> system = analysis::compile_for(*kind, workload, platform);
-  if (!system) return tl::unexpected<Diagnostics>(system.error());
-  std::vector<Method> methods = analysis::methods_of(*kind);
-  std::shared_ptr<const analysis::Exploration> exploration;
-  if (explore != nullptr && kind->ours) {
-    std::optional<std::string> reason = analysis::why_not_explore(*system);
-    if (!reason) exploration = std::make_shared<analysis::Exploration>(analysis::explore(*system, *explore));
-    methods.push_back(analysis::exploration());
-    methods.back().apply = [exploration, reason](const analysis::System &asked) -> analysis::Outcome {
-      if (reason) return NotApplicable{*reason};
-      return to_bound(asked, *exploration);
-    };
-  }
-  if (auto missing = keep_only(only, methods)) return tl::unexpected<Diagnostics>(*std::move(missing));
-  analysis::AnalyzeOptions options = limits;
-  options.itemise = system->tasks.size() <= kMostItemised;
-  analysis::Report report = analysis::analyze(*system, std::move(methods), options);
-  return Analysed{workload, kind, *std::move(system), std::move(report), std::move(exploration)};
-}
+const char *mode_name(const lab::Analysed &analysed) { return lab::mode_name(analysed.system.platform.preemption); }
 
-std::vector<analysis::Term> terms_of(const Analysed &analysed, const Row &row) {
-  if (!row.tightest.bound.terms.empty()) return row.tightest.bound.terms;
-  if (row.task.valid()) return itemised(analysed.system, row.tightest, row.task).terms;
-  return itemised(analysed.system, row.tightest, row.dag).terms;
-}
-
-std::string task_name(const Analysed &analysed, TaskId task) {
-  const analysis::SystemTask &found = analysed.system.tasks[task.value];
-  const std::string &dag = analysed.system.dags[found.dag.value].name;
-  return dag + "." + found.name.substr(dag.size() + 1);
-}
-
-std::vector<Row> task_rows(const Analysed &analysed) {
-  std::vector<Row> rows;
-  for (std::size_t t = 0; t < analysed.system.tasks.size(); ++t) {
-    const analysis::SystemTask &task = analysed.system.tasks[t];
-    Row row;
-    row.name = task_name(analysed, TaskId(t));
-    row.task = TaskId(t);
-    row.deadline = task.deadline;
-    row.due = std::min(task.deadline, task.limit);
-    row.tightest = analysed.report.tasks[t];
-    judge(analysed, row, t, false);
-    rows.push_back(std::move(row));
-  }
-  return rows;
-}
-
-std::vector<Row> dag_rows(const Analysed &analysed) {
-  std::vector<Row> rows;
-  for (std::size_t d = 0; d < analysed.system.dags.size(); ++d) {
-    Row row;
-    row.name = analysed.system.dags[d].name;
-    row.dag = DagId(d);
-    row.deadline = analysed.system.dags[d].deadline;
-    if (row.deadline > 0) row.due = row.deadline;
-    row.tightest = analysed.report.dags[d];
-    judge(analysed, row, d, true);
-    rows.push_back(std::move(row));
-  }
-  return rows;
-}
-
-const char *mode_name(const Analysed &analysed) { return lab::mode_name(analysed.system.platform.preemption); }
-
-std::string mode_reason(const Analysed &analysed) {
+std::string mode_reason(const lab::Analysed &analysed) {
   const analysis::System &system = analysed.system;
   if (system.platform.preemption == sched::Preemption::Cooperative && system.mode == sched::Preemption::None) {
     return "no task has a region: the same as none";
@@ -340,7 +197,7 @@ std::string mode_reason(const Analysed &analysed) {
                            to_string(system.policy));
 }
 
-std::string verdict_in_words(const Analysed &analysed) {
+std::string verdict_in_words(const lab::Analysed &analysed) {
   const analysis::Report &report = analysed.report;
   if (report.verdict == Verdict::Schedulable) {
     return fmt::format("schedulable: every deadline is met, by {}", listed(report.by));
@@ -356,16 +213,16 @@ std::string verdict_in_words(const Analysed &analysed) {
   }
   std::size_t late = 0;
   std::size_t unbounded = 0;
-  const auto count = [&](const std::vector<Row> &rows) {
-    for (const Row &row : rows) {
-      if (row.standing == Standing::MayMiss) ++late;
-      if (row.standing == Standing::NoBound && row.due) ++unbounded;
+  const auto count = [&](const std::vector<lab::Row> &rows) {
+    for (const lab::Row &row : rows) {
+      if (row.standing == lab::Standing::MayMiss) ++late;
+      if (row.standing == lab::Standing::NoBound && row.due) ++unbounded;
     }
   };
-  count(task_rows(analysed));
+  count(lab::task_rows(analysed));
   const std::size_t late_tasks = late;
   const std::size_t unbounded_tasks = unbounded;
-  count(dag_rows(analysed));
+  count(lab::dag_rows(analysed));
   std::string missing;
   const auto say = [&](std::size_t number, const char *noun, const char *what) {
     if (number > 0) missing += fmt::format("{}{} {}", missing.empty() ? "" : ", ", plural(number, noun), what);
@@ -378,18 +235,18 @@ std::string verdict_in_words(const Analysed &analysed) {
                      missing);
 }
 
-std::string describe(const Analysed &analysed, const StreamTraits &terminal, bool all) {
-  const std::vector<Row> tasks = task_rows(analysed);
+std::string describe(const lab::Analysed &analysed, const StreamTraits &terminal, bool all) {
+  const std::vector<lab::Row> tasks = lab::task_rows(analysed);
   std::string text = headline(analysed) + "\n" + table_of("task", shown_rows(tasks, all), terminal);
   if (!all && tasks.size() > kMostTasks) {
     text += fmt::format("(the {} of {} tasks with the least slack; --all-tasks shows every one)\n", kMostTasks,
                         format_count(tasks.size()));
   }
-  text += "\n" + table_of("DAG", dag_rows(analysed), terminal) + "\n";
+  text += "\n" + table_of("DAG", lab::dag_rows(analysed), terminal) + "\n";
   text +=
       "bound: response time from the nominal release that no job exceeds; of a DAG, and of its tasks where edges\n"
       "join them, from the source's release to the finish of the last task; verdicts hold for every execution\n";
-  for (const Row &row : tasks) {
+  for (const lab::Row &row : tasks) {
     if (*row.due == row.deadline) continue;
     text += "slack: to the deadline, or to where the next release would skip a job that has not started, if sooner\n";
     break;
@@ -405,59 +262,15 @@ std::string describe(const Analysed &analysed, const StreamTraits &terminal, boo
   return text;
 }
 
-// Returns the row with the least slack for its deadline. Rows without a bound precede all others, the most urgent
-// first.
-std::optional<Row> weakest_row(const Analysed &analysed) {
-  std::optional<Row> weakest;
-  std::pair<bool, double> least;  // has a bound, then the slack's share or the rank
-  const auto consider = [&](Row row, double rank) {
-    if (!row.due || (row.standing == Standing::Ok && !row.slack)) return;
-    const std::pair<bool, double> key = {
-        row.slack.has_value(), row.slack ? static_cast<double>(*row.slack) / static_cast<double>(*row.due) : rank};
-    if (weakest && key >= least) return;
-    least = key;
-    weakest = std::move(row);
-  };
-  const std::vector<Row> tasks = task_rows(analysed);
-  for (std::size_t t = 0; t < tasks.size(); ++t) consider(tasks[t], analysed.system.tasks[t].rank);
-  for (Row &row : dag_rows(analysed)) consider(std::move(row), static_cast<double>(tasks.size()));
-  return weakest;
-}
-
-std::vector<TaskId> suspects_of(const Analysed &analysed, const Row &row) {
-  const analysis::System &system = analysed.system;
-  std::vector<TaskId> suspects;
-  const auto add = [&](std::uint32_t t) {
-    if (std::find(suspects.begin(), suspects.end(), TaskId(t)) == suspects.end()) suspects.emplace_back(t);
-  };
-  std::vector<analysis::Term> terms;
-  if (row.tightest.response) terms = terms_of(analysed, row);
-  std::stable_sort(terms.begin(), terms.end(), [](const auto &a, const auto &b) { return a.amount > b.amount; });
-  for (const analysis::Term &term : terms) {
-    if (term.task.valid()) add(term.task.value);
-  }
-  for (const analysis::SystemDag &dag : system.dags) {
-    if (row.name != dag.name && row.name.rfind(dag.name + ".", 0) != 0) continue;
-    for (const std::uint32_t t : dag.tasks) add(t);
-  }
-  std::vector<std::uint32_t> others = system.by_rank;
-  const auto load = [&](std::uint32_t t) {
-    return static_cast<double>(system.tasks[t].wcet) / static_cast<double>(system.tasks[t].period);
-  };
-  std::stable_sort(others.begin(), others.end(), [&](auto a, auto b) { return load(a) > load(b); });
-  for (const std::uint32_t t : others) add(t);
-  return suspects;
-}
-
-std::optional<std::string> suggested_change(const Analysed &analysed, const Row &row) {
+std::optional<std::string> suggested_change(const lab::Analysed &analysed, const lab::Row &row) {
   if (!analysed.executor->ours) return std::nullopt;
   if (analysed.system.tasks.size() > analysis::kMostTasksForRemedy) return std::nullopt;
-  auto remedy = analysis::find_remedy(analysed.workload, analysed.system.platform, suspects_of(analysed, row));
+  auto remedy = analysis::find_remedy(analysed.workload, analysed.system.platform, lab::suspects_of(analysed, row));
   if (!remedy) return std::nullopt;
   return *remedy + ": then every deadline is shown to be met";
 }
 
-std::string summarise(const Analysed &analysed, const StreamTraits &terminal) {
+std::string summarise(const lab::Analysed &analysed, const StreamTraits &terminal) {
   const bool yes = analysed.report.verdict == Verdict::Schedulable;
   const std::string words = verdict_in_words(analysed);
   const std::size_t colon = words.find(':');
@@ -465,7 +278,7 @@ std::string summarise(const Analysed &analysed, const StreamTraits &terminal) {
   std::string text =
       fmt::format("{}: {}{}\n", analysed.workload.name.empty() ? std::string("workload") : analysed.workload.name,
                   tinted(words.substr(0, colon), yes ? Tint::Good : Tint::Bad, terminal.colour), words.substr(colon));
-  const std::optional<Row> weakest = weakest_row(analysed);
+  const std::optional<lab::Row> weakest = lab::weakest_row(analysed);
   if (weakest) {
     const bool is_task = weakest->name.find('.') != std::string::npos;
     text += fmt::format("weakest: {}{}, deadline {}, ", is_task ? "" : "DAG ", weakest->name,

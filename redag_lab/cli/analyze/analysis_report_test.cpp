@@ -33,26 +33,26 @@ Workload two_tasks(PreemptionMode mode) {
   return workload;
 }
 
-Analysed look_at(const Workload &workload) {
-  Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload));
+lab::Analysed look_at(const Workload &workload) {
+  Result<lab::Analysed> analysed = lab::analyse(workload, analysis::platform_of(workload));
   EXPECT_TRUE(analysed) << to_string(analysed.error());
   return *std::move(analysed);
 }
 
-Row row_of(const Analysed &analysed, const std::string &name) {
-  Result<Row> row = find_row(analysed, name);
+lab::Row row_of(const lab::Analysed &analysed, const std::string &name) {
+  Result<lab::Row> row = find_row(analysed, name);
   EXPECT_TRUE(row) << to_string(row.error());
   return *std::move(row);
 }
 
 TEST(AnalysisReport, KnownResponsesOnOneWorker) {
-  const Analysed analysed = look_at(two_tasks(PreemptionMode::Os));
-  const std::vector<Row> rows = task_rows(analysed);
+  const lab::Analysed analysed = look_at(two_tasks(PreemptionMode::Os));
+  const std::vector<lab::Row> rows = lab::task_rows(analysed);
   ASSERT_EQ(rows.size(), 2U);
   EXPECT_EQ(rows[0].name, "fast.a");
   EXPECT_EQ(rows[0].tightest.response, 3 * kMillisecond);
   EXPECT_EQ(rows[0].slack, 7 * kMillisecond);
-  EXPECT_EQ(rows[0].standing, Standing::Ok);
+  EXPECT_EQ(rows[0].standing, lab::Standing::Ok);
   EXPECT_EQ(rows[0].says->name, "rta_preemptive");
   EXPECT_EQ(rows[1].tightest.response, 10 * kMillisecond);
   EXPECT_EQ(verdict_in_words(analysed).find("schedulable: every deadline is met, by "), 0U);
@@ -61,16 +61,16 @@ TEST(AnalysisReport, KnownResponsesOnOneWorker) {
 TEST(AnalysisReport, AnotherExecutorIsItsOwnHeadlineAndMethods) {
   Workload workload = two_tasks(PreemptionMode::Os);
   workload.dags[0].tasks[0].period = workload.dags[0].tasks[0].deadline = 20 * kMillisecond;
-  const Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload), nullptr, "ste");
+  const Result<lab::Analysed> analysed = lab::analyse(workload, analysis::platform_of(workload), nullptr, "ste");
   ASSERT_TRUE(analysed);
-  EXPECT_EQ(task_rows(*analysed)[0].tightest.response, 10 * kMillisecond) << "3 after 7";
+  EXPECT_EQ(lab::task_rows(*analysed)[0].tightest.response, 10 * kMillisecond) << "3 after 7";
   const std::string text = describe(*analysed, StreamTraits{}, false);
   EXPECT_NE(text.find("SingleThreadedExecutor"), std::string::npos) << text;
   EXPECT_NE(text.find("wait_set_rates"), std::string::npos) << text;
   EXPECT_EQ(text.find("rta_nonpreemptive"), std::string::npos) << text;
   EXPECT_EQ(to_json(*analysed)["executor"], "ste");
   EXPECT_EQ(to_json(*analysed)["preemption"], "none");
-  EXPECT_FALSE(analyse(workload, analysis::platform_of(workload), nullptr, "SingleThreadedExecutor"));
+  EXPECT_FALSE(lab::analyse(workload, analysis::platform_of(workload), nullptr, "SingleThreadedExecutor"));
 }
 
 // Without preemption and with fixed offsets, b never arrives while a runs, nor a while b runs.
@@ -78,9 +78,9 @@ TEST(AnalysisReport, AnExplorationIsAMethodAmongOthers) {
   Workload workload = two_tasks(PreemptionMode::None);
   workload.dags[1].tasks[0].offset = 3 * kMillisecond;
   const analysis::ExplorationOptions options;
-  const Result<Analysed> analysed = analyse(workload, analysis::platform_of(workload), &options);
+  const Result<lab::Analysed> analysed = lab::analyse(workload, analysis::platform_of(workload), &options);
   ASSERT_TRUE(analysed);
-  const std::vector<Row> rows = task_rows(*analysed);
+  const std::vector<lab::Row> rows = lab::task_rows(*analysed);
   EXPECT_EQ(rows[0].tightest.response, 3 * kMillisecond);
   EXPECT_EQ(rows[0].says->name, "exploration");
   const std::string text = describe(*analysed, StreamTraits{}, false);
@@ -92,7 +92,7 @@ TEST(AnalysisReport, AnExplorationIsAMethodAmongOthers) {
 
   EXPECT_FALSE(to_json(look_at(workload)).contains("exploration"));
   workload.platform.preemption = PreemptionMode::Os;
-  const Result<Analysed> preempted = analyse(workload, analysis::platform_of(workload), &options);
+  const Result<lab::Analysed> preempted = lab::analyse(workload, analysis::platform_of(workload), &options);
   ASSERT_TRUE(preempted);
   EXPECT_EQ(preempted->exploration, nullptr);
   EXPECT_EQ(preempted->report.methods.back().method->name, "exploration");
@@ -102,9 +102,9 @@ TEST(AnalysisReport, AnExplorationIsAMethodAmongOthers) {
 TEST(AnalysisReport, ATightDeadlineIsNamedNotCalledAMiss) {
   Workload workload = two_tasks(PreemptionMode::Os);
   workload.dags[1].tasks[0].deadline = 9 * kMillisecond;
-  const Analysed analysed = look_at(workload);
-  const Row row = row_of(analysed, "slow.b");
-  EXPECT_EQ(row.standing, Standing::MayMiss);
+  const lab::Analysed analysed = look_at(workload);
+  const lab::Row row = row_of(analysed, "slow.b");
+  EXPECT_EQ(row.standing, lab::Standing::MayMiss);
   EXPECT_EQ(row.slack, -kMillisecond);
   const std::string words = verdict_in_words(analysed);
   EXPECT_EQ(words.find("not shown schedulable: 1 task with a bound above the deadline;"), 0U) << words;
@@ -116,9 +116,9 @@ TEST(AnalysisReport, ATightDeadlineIsNamedNotCalledAMiss) {
 TEST(AnalysisReport, DeadlinesOfDagsCount) {
   Workload workload = two_tasks(PreemptionMode::Os);
   workload.dags[1].deadline = 8 * kMillisecond;
-  const Analysed analysed = look_at(workload);
-  EXPECT_EQ(dag_rows(analysed)[0].standing, Standing::NoDeadline);
-  EXPECT_EQ(dag_rows(analysed)[1].standing, Standing::MayMiss);
+  const lab::Analysed analysed = look_at(workload);
+  EXPECT_EQ(lab::dag_rows(analysed)[0].standing, lab::Standing::NoDeadline);
+  EXPECT_EQ(lab::dag_rows(analysed)[1].standing, lab::Standing::MayMiss);
   EXPECT_EQ(verdict_in_words(analysed).find("not shown schedulable: 1 DAG with a bound above the end-to-end"), 0U);
 }
 
@@ -127,9 +127,9 @@ TEST(AnalysisReport, ATestWithoutNumbersStillAnswers) {
   workload.policy = PolicyKind::Edf;
   workload.dags[0].tasks[0].wcet = 5 * kMillisecond;  // a fully used worker: too much for the bounds
   workload.dags[1].tasks[0].wcet = 10 * kMillisecond;
-  const Analysed analysed = look_at(workload);
-  const Row row = row_of(analysed, "fast.a");
-  EXPECT_EQ(row.standing, Standing::Ok);
+  const lab::Analysed analysed = look_at(workload);
+  const lab::Row row = row_of(analysed, "fast.a");
+  EXPECT_EQ(row.standing, lab::Standing::Ok);
   EXPECT_FALSE(row.slack);
   EXPECT_EQ(row.says->name, "edf_demand");
   EXPECT_NE(mode_reason(analysed).find("threads run edf as cooperative"), std::string::npos);
@@ -155,10 +155,10 @@ TEST(AnalysisReport, ThePapersEquationsAreShownAndNotTrusted) {
 TEST(AnalysisReport, WhatNoMethodTakesIsSaidOnce) {
   Workload workload = two_tasks(PreemptionMode::Os);
   workload.dags[0].tasks[0].budget = kMillisecond;
-  const Analysed analysed = look_at(workload);
+  const lab::Analysed analysed = look_at(workload);
   const std::string text = describe(analysed, StreamTraits{}, false);
   EXPECT_NE(text.find("none of the"), std::string::npos) << text;
-  EXPECT_EQ(row_of(analysed, "fast").standing, Standing::NoBound);
+  EXPECT_EQ(row_of(analysed, "fast").standing, lab::Standing::NoBound);
   EXPECT_NE(row_of(analysed, "fast").reason.find("budget"), std::string::npos);
 }
 
@@ -167,7 +167,7 @@ TEST(AnalysisReport, ManyTasksAreCutToThoseWithTheLeastSlack) {
   for (int i = 0; i < 60; ++i) {
     workload.dags.push_back(dag_of("d" + std::to_string(i), {timer("t", kSecond, kMicrosecond)}));
   }
-  const Analysed analysed = look_at(workload);
+  const lab::Analysed analysed = look_at(workload);
   const std::string few = describe(analysed, StreamTraits{}, false);
   EXPECT_NE(few.find("(the 50 of 62 tasks with the least slack"), std::string::npos);
   EXPECT_NE(few.find("fast.a "), std::string::npos);
@@ -175,9 +175,9 @@ TEST(AnalysisReport, ManyTasksAreCutToThoseWithTheLeastSlack) {
 }
 
 TEST(AnalysisReport, UnknownNamesGetTheNearest) {
-  const Analysed analysed = look_at(two_tasks(PreemptionMode::Os));
+  const lab::Analysed analysed = look_at(two_tasks(PreemptionMode::Os));
   for (const auto &[given, meant] : {std::pair{"fast.b", "fast.a"}, {"b", "slow.b"}, {"slwo", "slow"}}) {
-    const Result<Row> row = find_row(analysed, given);
+    const Result<lab::Row> row = find_row(analysed, given);
     ASSERT_FALSE(row) << given;
     EXPECT_NE(row.error().front().hint.find(std::string("'") + meant + "'"), std::string::npos) << given;
   }

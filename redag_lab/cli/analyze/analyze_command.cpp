@@ -47,7 +47,8 @@ constexpr std::uint64_t kUsualStates = 1'000'000;
 constexpr std::uint64_t kMostEffort = 1'000'000'000;
 
 // Finds the requested chains. Returns nothing, with an error on the console, if a task is unknown.
-std::optional<std::vector<ChainRow>> find_chains(const Analysed &analysed, const Options &options, Console &console) {
+std::optional<std::vector<ChainRow>> find_chains(const lab::Analysed &analysed, const Options &options,
+                                                 Console &console) {
   std::vector<ChainRow> rows;
   for (const std::string &chain : options.chains) {
     Result<ChainRow> row = find_chain(analysed, chain);
@@ -61,14 +62,14 @@ std::optional<std::vector<ChainRow>> find_chains(const Analysed &analysed, const
 }
 
 // Reports one task or DAG in words, or the whole analysis. Returns false if that task or DAG is unknown.
-bool report(const Analysed &analysed, const Options &options, Console &console) {
+bool report(const lab::Analysed &analysed, const Options &options, Console &console) {
   const std::optional<std::vector<ChainRow>> chains = find_chains(analysed, options, console);
   if (!chains) return false;
   Json document;
   if (options.analysis.run.json) document = to_json(analysed, options.methods);
   if (options.analysis.run.json && !chains->empty()) document["chains"] = to_json(analysed, *chains);
   if (!options.explain.empty()) {
-    const Result<Row> row = find_row(analysed, options.explain);
+    const Result<lab::Row> row = find_row(analysed, options.explain);
     if (!row) {
       console.error("--explain: " + row.error().front().message, row.error().front().hint);
       return false;
@@ -105,14 +106,14 @@ std::string is_states(const std::string &text) {
 }
 
 // Analyses the workload. After Ctrl-C, the answers of the other methods remain.
-Result<Analysed> analyse_configured(const Workload &workload, const Options &options, Console &console) {
+Result<lab::Analysed> analyse_configured(const Workload &workload, const Options &options, Console &console) {
   const Result<analysis::AnalysisPlatform> configured = platform_for(workload, options.analysis, options.executor);
   if (!configured) return tl::unexpected(configured.error());
   const analysis::AnalysisPlatform &platform = *configured;
   const InterruptGuard guard;
   AnalysisWatch watch(options.analysis, console);
   if (options.explore == 0) {
-    return analyse(workload, platform, nullptr, options.executor, watch.options(), options.only);
+    return lab::analyse(workload, platform, nullptr, options.executor, watch.options(), options.only);
   }
   Progress &progress = watch.progress();
   progress.set_label("explore");
@@ -125,7 +126,8 @@ Result<Analysed> analyse_configured(const Workload &workload, const Options &opt
     }
     return watch.why_stop().empty();
   };
-  Result<Analysed> analysed = analyse(workload, platform, &explore, options.executor, watch.options(), options.only);
+  Result<lab::Analysed> analysed =
+      lab::analyse(workload, platform, &explore, options.executor, watch.options(), options.only);
   progress.clear();
   if (InterruptGuard::interrupted()) console.warn("interrupted: the exploration is not complete");
   return analysed;
@@ -153,7 +155,7 @@ int analyze_file(const Options &options, Console &console) {
   const std::optional<Workload> workload = load_configured(options.analysis.run, console);
   if (!workload || !takes_arguments({*lab::parse_variant(options.executor)}, options.analysis.run, console))
     return kExitBad;
-  const Result<Analysed> analysed = analyse_configured(*workload, options, console);
+  const Result<lab::Analysed> analysed = analyse_configured(*workload, options, console);
   if (!analysed) {
     console.note(analysed.error());
     return kExitBad;

@@ -70,7 +70,7 @@ TEST(SensitivityReport, FactorsAreNeverRoundedUp) {
   workload.dags[1].tasks[0].deadline = 20 * kMillisecond;
   Sensitivity sensitivity;
   const analysis::AnalysisPlatform platform = analysis::platform_of(workload);
-  sensitivity.analysed = analyse(workload, platform).value();
+  sensitivity.analysed = lab::analyse(workload, platform).value();
   for (const analysis::Knob &knob : analysis::knobs_of(workload, sensitivity.analysed.system)) {
     sensitivity.results.push_back({analysis::margin_of(workload, platform, knob).value(), {}});
   }

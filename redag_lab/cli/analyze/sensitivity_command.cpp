@@ -30,11 +30,11 @@ struct Options {
 };
 
 // Returns the knobs of the named task or DAG only. Returns nothing, with an error, if there is no such task or DAG.
-std::optional<std::vector<analysis::Knob>> chosen_knobs(const Analysed &analysed, const std::string &name,
+std::optional<std::vector<analysis::Knob>> chosen_knobs(const lab::Analysed &analysed, const std::string &name,
                                                         Console &console) {
   std::vector<analysis::Knob> knobs = analysis::knobs_of(analysed.workload, analysed.system);
   if (name.empty()) return knobs;
-  const Result<Row> row = find_row(analysed, name);
+  const Result<lab::Row> row = find_row(analysed, name);
   if (!row) {
     console.error("--task: " + row.error().front().message, row.error().front().hint);
     return std::nullopt;
@@ -106,9 +106,9 @@ int sensitivity_of_file(const Options &options, Console &console) {
   if (!workload) return kExitBad;
   const InterruptGuard guard;  // covers writing the results too
   AnalysisWatch watch(options.analysis, console);
-  Result<Analysed> analysed =
+  Result<lab::Analysed> analysed =
       platform_for(*workload, options.analysis).and_then([&](const analysis::AnalysisPlatform &platform) {
-        return analyse(*workload, platform, nullptr, "redag", watch.options());
+        return lab::analyse(*workload, platform, nullptr, "redag", watch.options());
       });
   if (!analysed) {
     console.note(analysed.error());

@@ -67,7 +67,7 @@ std::string factor_text(const std::optional<Margin> &margin) {
 }
 
 // Names the position above the margin that is accepted again.
-std::string again_text(const Analysed &analysed, const Margin &margin) {
+std::string again_text(const lab::Analysed &analysed, const Margin &margin) {
   const std::optional<Duration> value = value_at(margin.knob, *margin.again);
   return value ? humanize_duration(*value)
                : "a factor of " + format_factor(load_factor(analysed.workload, margin.knob, *margin.again));
@@ -120,7 +120,7 @@ const Margin *nearest(const Sensitivity &sensitivity, bool rates) {
   return best;
 }
 
-std::string change_of(const Analysed &analysed, const Margin &margin) {
+std::string change_of(const lab::Analysed &analysed, const Margin &margin) {
   const std::string name = knob_name(analysed, margin.knob);
   const std::optional<Duration> now = value_at(margin.knob, margin.nominal);
   if (!now) return fmt::format("{}, to {} of what it is", name, format_factor(margin.factor));
@@ -198,7 +198,7 @@ const char *kind_name(Kind kind) {
 
 }  // namespace
 
-std::string knob_name(const Analysed &analysed, const Knob &knob) {
+std::string knob_name(const lab::Analysed &analysed, const Knob &knob) {
   if (knob.kind == Kind::AllWcets) return "all wcets";
   if (knob.kind == Kind::Wcet) return "wcet of " + task_name(analysed, TaskId(knob.tasks.front()));
   if (knob.kind == Kind::Rates && knob.tasks.size() == analysed.system.tasks.size()) return "all rates";
@@ -230,7 +230,7 @@ std::string in_words(const Sensitivity &sensitivity) {
 }
 
 std::string describe(const Sensitivity &sensitivity, const StreamTraits &terminal, bool all) {
-  const Analysed &analysed = sensitivity.analysed;
+  const lab::Analysed &analysed = sensitivity.analysed;
   const std::string reason = mode_reason(analysed);
   std::string text = fmt::format("{}: {}, {} worker{}, utilization {:.3f}\npreemption: {}{}\n", analysed.workload.name,
                                  to_string(analysed.workload.policy), analysed.system.platform.workers,
@@ -261,7 +261,7 @@ std::string describe(const Sensitivity &sensitivity, const StreamTraits &termina
 }
 
 Json to_json(const Sensitivity &sensitivity) {
-  const Analysed &analysed = sensitivity.analysed;
+  const lab::Analysed &analysed = sensitivity.analysed;
   Json document = {{"format", "redag.sensitivity/1"},
                    {"workload", analysed.workload.name},
                    {"policy", to_string(analysed.workload.policy)},

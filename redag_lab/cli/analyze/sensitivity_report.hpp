@@ -19,7 +19,7 @@ struct KnobResult {
 };
 
 struct Sensitivity {
-  Analysed analysed;
+  lab::Analysed analysed;
   std::vector<KnobResult> results;
   std::size_t knobs = 0;  // requested; more than `results` if the search was stopped
   std::uint32_t probes = 0;
@@ -27,7 +27,7 @@ struct Sensitivity {
 };
 
 /// Returns "wcet of slow.plan", "all wcets", "period of fast", "rates of fast" or "all rates".
-[[nodiscard]] std::string knob_name(const Analysed &analysed, const analysis::Knob &knob);
+[[nodiscard]] std::string knob_name(const lab::Analysed &analysed, const analysis::Knob &knob);
 
 [[nodiscard]] std::string describe(const Sensitivity &sensitivity, const StreamTraits &terminal, bool all);
 

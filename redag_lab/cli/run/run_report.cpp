@@ -14,7 +14,7 @@
 #include "redag_analysis/metrics/perfetto.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
 #include "redag_analysis/metrics/verdict.hpp"
-#include "redag_lab/cli/run/bound_check.hpp"
+#include "redag_lab/cli/run/bound_report.hpp"
 #include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
@@ -186,7 +186,7 @@ std::string describe(const lab::Session &session, const StreamTraits &terminal, 
                   inversions.count > 0 ? fmt::format(", longest {}, in all {}", humanize_duration(inversions.longest),
                                                      humanize_duration(inversions.total))
                                        : "");
-  if (has_bounds(session)) text += describe(check_bounds(session), session.summary.tasks.size(), terminal);
+  if (has_bounds(session)) text += describe(lab::check_bounds(session), session.summary.tasks.size(), terminal);
   if (session.summary.total.exceeded > 0) {
     text += fmt::format("jobs that used their budget and went on: {}\n", format_count(session.summary.total.exceeded));
   }
@@ -228,7 +228,7 @@ Json to_json(const lab::Session &session) {
   Json check = to_json(session.check);
   check["until_ns"] = session.cut_at.value_or(session.info.end);
   document["check"] = std::move(check);
-  if (has_bounds(session)) document["bounds"] = to_json(check_bounds(session));
+  if (has_bounds(session)) document["bounds"] = to_json(lab::check_bounds(session));
   document["stopped"] = session.stopped;
   document["warnings"] = session.warnings;
   return document;

@@ -10,11 +10,9 @@
 #include <vector>
 
 #include "redag_analysis/metrics/assumptions.hpp"
-#include "redag_lab/cli/terminal/console.hpp"
-#include "redag_lab/cli/terminal/json.hpp"
 #include "redag_lab/run/session.hpp"
 
-namespace redag::cli {
+namespace redag::lab {
 
 struct BoundCheck {
   metrics::AssumptionCheck assumptions;  // tasks by TaskId; empty if the workload could not be analysed
@@ -28,9 +26,6 @@ struct BoundCheck {
 
 /// Analyses the workload as it ran, under its executor, with the overheads that the run recorded. Responses are those
 /// of the whole trace, including the warm-up.
-[[nodiscard]] BoundCheck check_bounds(const lab::Session &session);
+[[nodiscard]] BoundCheck check_bounds(const Session &session);
 
-[[nodiscard]] std::string describe(const BoundCheck &check, std::size_t tasks, const StreamTraits &terminal);
-[[nodiscard]] Json to_json(const BoundCheck &check);
-
-}  // namespace redag::cli
+}  // namespace redag::lab

@@ -1,15 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/run/bound_check.hpp"
+#include "redag_lab/cli/run/bound_report.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 
-#include "redag_analysis/analyze/analyze.hpp"
-#include "redag_lab/cli/analyze/analysis_report.hpp"
 #include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
@@ -29,38 +27,7 @@ const char *name_of(Broken broken) {
 
 }  // namespace
 
-BoundCheck check_bounds(const lab::Session &session) {
-  BoundCheck check;
-  const trace::RunInfo &info = session.info;
-  const Workload &workload = info.workload;
-  const auto executed = analysis::as_executed(workload, info.config, info.overheads);
-  const Result<Analysed> analysed = executed ? analyse(executed->workload, executed->platform, nullptr, info.executor)
-                                             : Result<Analysed>(tl::unexpected(executed.error()));
-  std::vector<Duration> bounds(workload.task_count(), 0);
-  check.methods.resize(bounds.size());
-  if (!analysed) check.absent = to_string(analysed.error());
-  const std::vector<Row> rows = analysed ? task_rows(*analysed) : std::vector<Row>();
-  for (const TaskRef &ref : flatten(workload)) {
-    const std::size_t t = ref.id.value;
-    check.names.push_back(trace::task_name(workload, ref.id));
-    check.wcets.push_back(ref.task->wcet);
-    if (!analysed) continue;
-    const analysis::Tightest &bound = analysed->report.tasks[t];
-    if (bound.response) {
-      ++check.bounded;
-      bounds[t] = *bound.response;
-      check.methods[t] = std::string(bound.method->name);
-    } else if (check.absent.empty()) {
-      check.absent = fmt::format("{}: {}", check.names[t], rows[t].reason);
-    }
-  }
-  check.assumptions =
-      metrics::check_assumptions(info, session.trace.events, [&](TaskId task) { return bounds[task.value]; });
-  check.remarks = metrics::remarks(check.assumptions, workload);
-  return check;
-}
-
-std::string describe(const BoundCheck &check, std::size_t tasks, const StreamTraits &terminal) {
+std::string describe(const lab::BoundCheck &check, std::size_t tasks, const StreamTraits &terminal) {
   std::string text = fmt::format("bounds: {} of {} tasks have one", check.bounded, tasks);
   text += check.absent.empty() ? "" : fmt::format(" ({})", check.absent);
   text += check.assumptions.is_calibrated ? ", with the overheads of the machine" : "";
@@ -83,7 +50,7 @@ std::string describe(const BoundCheck &check, std::size_t tasks, const StreamTra
   return text;
 }
 
-Json to_json(const BoundCheck &check) {
+Json to_json(const lab::BoundCheck &check) {
   Json tasks = Json::array();
   for (const metrics::TaskCheck &task : check.assumptions.tasks) {
     const std::size_t t = task.task.value;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/run/bound_check.hpp"
+#include "redag_lab/cli/run/bound_report.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -23,7 +23,9 @@ lab::Session simulated(const Workload &workload, const std::string &executor = "
   return lab::run_session(workload, *lab::parse_variant(executor), options).value();
 }
 
-Duration bound_of(const BoundCheck &check, std::size_t task) { return check.assumptions.tasks.at(task).response.bound; }
+Duration bound_of(const lab::BoundCheck &check, std::size_t task) {
+  return check.assumptions.tasks.at(task).response.bound;
+}
 
 Workload fast_and_slow() {
   return make_workload({make_dag("fast", {{.name = "imu", .period_ms = 10, .wcet_ms = 2}}),
@@ -32,7 +34,7 @@ Workload fast_and_slow() {
 }
 
 TEST(BoundCheck, ARunWithinItsBounds) {
-  const BoundCheck check = check_bounds(simulated(fast_and_slow()));
+  const lab::BoundCheck check = lab::check_bounds(simulated(fast_and_slow()));
   ASSERT_EQ(check.assumptions.tasks.size(), 2U);
   EXPECT_EQ(check.bounded, 2U);
   EXPECT_EQ(check.absent, "");
@@ -51,7 +53,7 @@ TEST(BoundCheck, ChargesTheOverheadsOfTheRun) {
   machine.dispatch = kMillisecond;
   machine.lateness = kMillisecond;
   session.info.overheads = to_string(machine);
-  const BoundCheck check = check_bounds(session);
+  const lab::BoundCheck check = lab::check_bounds(session);
   EXPECT_EQ(bound_of(check, 0), 4 * kMillisecond);
   const std::string text = describe(check, 2, StreamTraits{});
   EXPECT_THAT(text, HasSubstr("with the overheads of the machine"));
@@ -63,7 +65,7 @@ TEST(BoundCheck, ARunOfAnotherExecutor) {
   Workload workload = fast_and_slow();
   workload.dags[0].tasks[0].period = workload.dags[0].tasks[0].deadline = 50 * kMillisecond;
   for (const char *executor : {"ste", "events"}) {
-    const BoundCheck check = check_bounds(simulated(workload, executor));
+    const lab::BoundCheck check = lab::check_bounds(simulated(workload, executor));
     EXPECT_EQ(check.bounded, 2U) << executor << ": " << check.absent;
     EXPECT_EQ(bound_of(check, 0), 22 * kMillisecond) << executor;
     EXPECT_TRUE(check.remarks.empty()) << executor;
@@ -75,7 +77,7 @@ TEST(BoundCheck, NamesWhatIsBroken) {
   lab::Session session = simulated(fast_and_slow());
   Task &imu = session.info.workload.dags[0].tasks[0];
   imu.wcet = imu.bcet = kMillisecond;
-  const BoundCheck check = check_bounds(session);
+  const lab::BoundCheck check = lab::check_bounds(session);
   const metrics::TaskCheck &fast = check.assumptions.tasks.at(0);
   const metrics::TaskCheck &slow = check.assumptions.tasks.at(1);
   EXPECT_EQ(fast.response.exceeded, 10U);
@@ -97,7 +99,7 @@ TEST(BoundCheck, NamesWhatIsBroken) {
 TEST(BoundCheck, SaysWhyThereIsNone) {
   lab::Session session = simulated(fast_and_slow());
   session.info.workload.dags[1].tasks[0].wcet = 60 * kMillisecond;
-  const BoundCheck check = check_bounds(session);
+  const lab::BoundCheck check = lab::check_bounds(session);
   EXPECT_EQ(check.bounded, 1U);
   EXPECT_THAT(describe(check, 2, StreamTraits{}), HasSubstr("1 of 2 tasks have one (slow.plan: "));
 }

@@ -1,0 +1,43 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/run/bound_check.hpp"
+
+#include <fmt/format.h>
+
+#include "redag_lab/search/analysed.hpp"
+
+namespace redag::lab {
+
+BoundCheck check_bounds(const Session &session) {
+  BoundCheck check;
+  const trace::RunInfo &info = session.info;
+  const Workload &workload = info.workload;
+  const auto executed = analysis::as_executed(workload, info.config, info.overheads);
+  const Result<Analysed> analysed = executed ? analyse(executed->workload, executed->platform, nullptr, info.executor)
+                                             : Result<Analysed>(tl::unexpected(executed.error()));
+  std::vector<Duration> bounds(workload.task_count(), 0);
+  check.methods.resize(bounds.size());
+  if (!analysed) check.absent = to_string(analysed.error());
+  const std::vector<Row> rows = analysed ? task_rows(*analysed) : std::vector<Row>();
+  for (const TaskRef &ref : flatten(workload)) {
+    const std::size_t t = ref.id.value;
+    check.names.push_back(trace::task_name(workload, ref.id));
+    check.wcets.push_back(ref.task->wcet);
+    if (!analysed) continue;
+    const analysis::Tightest &bound = analysed->report.tasks[t];
+    if (bound.response) {
+      ++check.bounded;
+      bounds[t] = *bound.response;
+      check.methods[t] = std::string(bound.method->name);
+    } else if (check.absent.empty()) {
+      check.absent = fmt::format("{}: {}", check.names[t], rows[t].reason);
+    }
+  }
+  check.assumptions =
+      metrics::check_assumptions(info, session.trace.events, [&](TaskId task) { return bounds[task.value]; });
+  check.remarks = metrics::remarks(check.assumptions, workload);
+  return check;
+}
+
+}  // namespace redag::lab

@@ -1,0 +1,211 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/search/analysed.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "redag/base/nearest.hpp"
+#include "redag_analysis/many_workers/global.hpp"
+
+namespace redag::lab {
+namespace {
+
+using analysis::Method;
+using analysis::MethodReport;
+using analysis::NotApplicable;
+
+// Returns a trusted test that accepts all tasks at once, or null.
+const Method *accepting_test(const Analysed &analysed) {
+  for (const MethodReport &method : analysed.report.methods) {
+    const analysis::Bound *bound = method.bound();
+    if (method.trusted && bound != nullptr && bound->accepts == true) return method.method;
+  }
+  return nullptr;
+}
+
+// If a more urgent task prevents this bound, returns the most urgent task without a bound and its reason.
+std::string culprit_of(const Analysed &analysed, const analysis::Bound &bound, const analysis::ResponseBound &asked) {
+  if (asked.absent != analysis::global::kMoreUrgent && asked.absent != analysis::global::kPeer) return {};
+  for (const std::uint32_t t : analysed.system.by_rank) {
+    const std::string_view absent = bound.tasks[t].absent;
+    if (absent.empty() || absent == analysis::global::kMoreUrgent || absent == analysis::global::kPeer) continue;
+    return fmt::format(" ({}: {})", task_name(analysed, TaskId(t)), absent);
+  }
+  return {};
+}
+
+// Returns the first reason that a trusted method states for the missing bound.
+std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_dag) {
+  if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return analysed.system.not_analysable;
+  for (const MethodReport &method : analysed.report.methods) {
+    const analysis::Bound *bound = method.bound();
+    if (!method.trusted || bound == nullptr) continue;
+    const auto &bounds = is_dag ? bound->dags : bound->tasks;
+    if (index < bounds.size() && !bounds[index].absent.empty()) {
+      return fmt::format("{}: {}{}", method.method->name, bounds[index].absent,
+                         culprit_of(analysed, *bound, bounds[index]));
+    }
+  }
+  for (const MethodReport &method : analysed.report.methods) {
+    if (!method.gave_up() || method.method->subject == analysis::Subject::System) continue;
+    return fmt::format("gave up on {}: {}", method.method->name, std::get<NotApplicable>(method.outcome).reason);
+  }
+  return "no method that bounds response times applies";
+}
+
+void judge(const Analysed &analysed, Row &row, std::size_t index, bool is_dag) {
+  row.says = row.tightest.method;
+  if (row.tightest.response && row.due) row.slack = *row.due - *row.tightest.response;
+  if (!row.tightest.response) row.reason = why_no_bound(analysed, index, is_dag);
+  const Method *test = accepting_test(analysed);
+  const bool is_met = row.slack.value_or(-1) >= 0;
+  if (!is_met && row.due && test != nullptr) {
+    // A yes-or-no test can accept where the bounds are too coarse. A bound above the deadline is then dropped.
+    row.tightest = {};
+    row.slack.reset();
+    row.reason = fmt::format("{} accepts the workload as a whole, and tells no response times", test->name);
+    row.says = test;
+    row.standing = Standing::Ok;
+  } else if (!row.tightest.response) {
+    row.standing = row.due || test == nullptr ? Standing::NoBound : Standing::NoDeadline;
+  } else if (!row.due) {
+    row.standing = Standing::NoDeadline;
+  } else {
+    row.standing = is_met ? Standing::Ok : Standing::MayMiss;
+  }
+}
+
+// Keeps the methods with these names. Error: an unknown name.
+std::optional<Diagnostics> keep_only(const std::vector<std::string> &only, std::vector<Method> &methods) {
+  if (only.empty()) return std::nullopt;
+  std::vector<std::string> names;
+  names.reserve(methods.size());
+  for (const Method &method : methods) names.emplace_back(method.name);
+  for (const std::string &name : only) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+    return make_error("--method: there is no method '" + name + "'", suggestion(name, names)).value();
+  }
+  std::erase_if(methods,
+                [&](const Method &method) { return std::find(only.begin(), only.end(), method.name) == only.end(); });
+  return std::nullopt;
+}
+
+}  // namespace
+
+Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
+                         const analysis::ExplorationOptions *explore, const std::string &executor,
+                         const analysis::AnalyzeOptions &limits, const std::vector<std::string> &only) {
+  const sched::ExecutorKind *kind = sched::find_executor(executor);
+  if (kind == nullptr) return make_error("there is no analysis of the executor '" + executor + "'");
+  Result<analysis::System> system = analysis::compile_for(*kind, workload, platform);
+  if (!system) return tl::unexpected<Diagnostics>(system.error());
+  std::vector<Method> methods = analysis::methods_of(*kind);
+  std::shared_ptr<const analysis::Exploration> exploration;
+  if (explore != nullptr && kind->ours) {
+    std::optional<std::string> reason = analysis::why_not_explore(*system);
+    if (!reason) exploration = std::make_shared<analysis::Exploration>(analysis::explore(*system, *explore));
+    methods.push_back(analysis::exploration());
+    methods.back().apply = [exploration, reason](const analysis::System &asked) -> analysis::Outcome {
+      if (reason) return NotApplicable{*reason};
+      return to_bound(asked, *exploration);
+    };
+  }
+  if (auto missing = keep_only(only, methods)) return tl::unexpected<Diagnostics>(*std::move(missing));
+  analysis::AnalyzeOptions options = limits;
+  options.itemise = system->tasks.size() <= kMostItemised;
+  analysis::Report report = analysis::analyze(*system, std::move(methods), options);
+  return Analysed{workload, kind, *std::move(system), std::move(report), std::move(exploration)};
+}
+
+std::vector<analysis::Term> terms_of(const Analysed &analysed, const Row &row) {
+  if (!row.tightest.bound.terms.empty()) return row.tightest.bound.terms;
+  if (row.task.valid()) return itemised(analysed.system, row.tightest, row.task).terms;
+  return itemised(analysed.system, row.tightest, row.dag).terms;
+}
+
+std::string task_name(const Analysed &analysed, TaskId task) {
+  const analysis::SystemTask &found = analysed.system.tasks[task.value];
+  const std::string &dag = analysed.system.dags[found.dag.value].name;
+  return dag + "." + found.name.substr(dag.size() + 1);
+}
+
+std::vector<Row> task_rows(const Analysed &analysed) {
+  std::vector<Row> rows;
+  for (std::size_t t = 0; t < analysed.system.tasks.size(); ++t) {
+    const analysis::SystemTask &task = analysed.system.tasks[t];
+    Row row;
+    row.name = task_name(analysed, TaskId(t));
+    row.task = TaskId(t);
+    row.deadline = task.deadline;
+    row.due = std::min(task.deadline, task.limit);
+    row.tightest = analysed.report.tasks[t];
+    judge(analysed, row, t, false);
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+std::vector<Row> dag_rows(const Analysed &analysed) {
+  std::vector<Row> rows;
+  for (std::size_t d = 0; d < analysed.system.dags.size(); ++d) {
+    Row row;
+    row.name = analysed.system.dags[d].name;
+    row.dag = DagId(d);
+    row.deadline = analysed.system.dags[d].deadline;
+    if (row.deadline > 0) row.due = row.deadline;
+    row.tightest = analysed.report.dags[d];
+    judge(analysed, row, d, true);
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+// Returns the row with the least slack for its deadline. Rows without a bound precede all others, the most urgent
+// first.
+std::optional<Row> weakest_row(const Analysed &analysed) {
+  std::optional<Row> weakest;
+  std::pair<bool, double> least;  // has a bound, then the slack's share or the rank
+  const auto consider = [&](Row row, double rank) {
+    if (!row.due || (row.standing == Standing::Ok && !row.slack)) return;
+    const std::pair<bool, double> key = {
+        row.slack.has_value(), row.slack ? static_cast<double>(*row.slack) / static_cast<double>(*row.due) : rank};
+    if (weakest && key >= least) return;
+    least = key;
+    weakest = std::move(row);
+  };
+  const std::vector<Row> tasks = task_rows(analysed);
+  for (std::size_t t = 0; t < tasks.size(); ++t) consider(tasks[t], analysed.system.tasks[t].rank);
+  for (Row &row : dag_rows(analysed)) consider(std::move(row), static_cast<double>(tasks.size()));
+  return weakest;
+}
+
+std::vector<TaskId> suspects_of(const Analysed &analysed, const Row &row) {
+  const analysis::System &system = analysed.system;
+  std::vector<TaskId> suspects;
+  const auto add = [&](std::uint32_t t) {
+    if (std::find(suspects.begin(), suspects.end(), TaskId(t)) == suspects.end()) suspects.emplace_back(t);
+  };
+  std::vector<analysis::Term> terms;
+  if (row.tightest.response) terms = terms_of(analysed, row);
+  std::stable_sort(terms.begin(), terms.end(), [](const auto &a, const auto &b) { return a.amount > b.amount; });
+  for (const analysis::Term &term : terms) {
+    if (term.task.valid()) add(term.task.value);
+  }
+  for (const analysis::SystemDag &dag : system.dags) {
+    if (row.name != dag.name && row.name.rfind(dag.name + ".", 0) != 0) continue;
+    for (const std::uint32_t t : dag.tasks) add(t);
+  }
+  std::vector<std::uint32_t> others = system.by_rank;
+  const auto load = [&](std::uint32_t t) {
+    return static_cast<double>(system.tasks[t].wcet) / static_cast<double>(system.tasks[t].period);
+  };
+  std::stable_sort(others.begin(), others.end(), [&](auto a, auto b) { return load(a) > load(b); });
+  for (const std::uint32_t t : others) add(t);
+  return suspects;
+}
+
+}  // namespace redag::lab
