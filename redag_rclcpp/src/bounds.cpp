@@ -115,8 +115,8 @@ void Bounds::analyse(const Workload &workload, const redag::sched::Config &confi
   }
   const redag::analysis::Report report = redag::analysis::analyze(*system);
   std::vector<std::string> without;
-  for (const redag::TaskRef &ref : redag::flatten(analysed)) {
-    const std::string name = name_of(analysed.dags[ref.dag.value], *ref.task);
+  for (const redag::TaskRef &ref : redag::flatten(workload)) {
+    const std::string name = name_of(workload.dags[ref.dag.value], *ref.task);
     const redag::analysis::Tightest &tightest = report.tasks[ref.id.value];
     if (tightest.response) {
       bounds_[name] = TaskBound{*tightest.response, std::string(tightest.method->name), 0, 0};
