@@ -13,9 +13,10 @@ BoundCheck check_bounds(const Session &session) {
   BoundCheck check;
   const trace::RunInfo &info = session.info;
   const Workload &workload = info.workload;
-  const auto executed = analysis::as_executed(workload, info.config, info.overheads);
-  const Result<Analysed> analysed = executed ? analyse(executed->workload, executed->platform, nullptr, info.executor)
-                                             : Result<Analysed>(tl::unexpected(executed.error()));
+  const Result<Analysed> analysed =
+      analysis::as_executed(workload, info.config, info.overheads).and_then([&](const analysis::ExecutedRun &run) {
+        return analyse(run.workload, run.platform, nullptr, info.executor);
+      });
   std::vector<Duration> bounds(workload.task_count(), 0);
   check.methods.resize(bounds.size());
   if (!analysed) check.absent = to_string(analysed.error());

@@ -7,11 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "redag/base/rounded_time.hpp"
-#include "redag_analysis/many_workers/global.hpp"
-#include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/cli/terminal/table.hpp"
 #include "redag_lab/run/variant.hpp"
 #include "redag_lab/search/remedy.hpp"
