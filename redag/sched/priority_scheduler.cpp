@@ -39,10 +39,10 @@ Step PriorityScheduler::dispatch(Time now, std::uint32_t most) {
   return step();
 }
 
-// No more jobs may start. Holds this job back and lets dispatch() look past it for started jobs. Only full preemption
-// keeps those in the ready queue.
+// No more jobs may start. Holds this job back and lets dispatch() look past it for started jobs, as long as there are
+// some in the ready queue. Only full preemption keeps them there.
 bool PriorityScheduler::set_aside(std::uint32_t slot) {
-  if (config_.preemption != Preemption::Full) return false;
+  if (queued_started_ == 0) return false;
   remove(slot);
   jobs_[slot].next = held_back_;
   held_back_ = slot;
@@ -308,10 +308,12 @@ std::uint32_t PriorityScheduler::list_of(const Job &job) const {
 }
 
 void PriorityScheduler::push(std::uint32_t slot) {
+  queued_started_ += jobs_[slot].started() ? 1 : 0;
   static_ ? levels_.push(jobs_, slot, list_of(jobs_[slot])) : heap_.push(jobs_, slot);
 }
 
 void PriorityScheduler::remove(std::uint32_t slot) {
+  queued_started_ -= jobs_[slot].started() ? 1 : 0;
   static_ ? levels_.remove(jobs_, slot) : heap_.remove(jobs_, slot);
 }
 
@@ -335,6 +337,7 @@ void PriorityScheduler::on_reconfigured() {
   const std::size_t lowest = config_.levels > 0 ? config_.levels : tier_count();
   levels_ = LevelQueue(static_ ? 2 * std::size_t{tier_count()} + lowest + 1 : 0);
   heap_ = HeapQueue();
+  queued_started_ = 0;
 
   static_assert(sizeof(TaskGates) == 32, "two tasks' gates in a cache line");
   shared_gates_.clear();

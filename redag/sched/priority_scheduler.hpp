@@ -107,6 +107,7 @@ class PriorityScheduler final : public Lifecycle {
   bool static_;
   LevelQueue levels_;  // the ready queue of static policies; otherwise heap_
   HeapQueue heap_;
+  std::uint32_t queued_started_ = 0;  // started jobs in the ready queue; only full preemption puts them there
   // Where levels are limited: the level of each key, and the first key of that level. Empty: each tier is a level.
   std::vector<std::uint32_t> level_of_key_;
   std::vector<std::uint32_t> first_of_level_;

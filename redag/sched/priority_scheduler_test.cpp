@@ -542,5 +542,24 @@ TEST(PriorityScheduler, ALimitHoldsBackWhatHasNotStarted) {
   EXPECT_EQ(rest.dispatches[0].task, TaskId(1));
 }
 
+TEST(PriorityScheduler, ALimitLooksPastReadyJobsForSuspendedOnes) {
+  const Workload workload = make_workload({make_dag("a", {{"low", 30}, {"mid", 20}, {"high", 10}})}, 1);
+  PriorityScheduler scheduler(workload, {1, Preemption::Full, PolicyKind::RateMonotonic, 0, 0});
+  scheduler.release(TaskId(0), 0, 0);
+  const JobSlot low = scheduler.dispatch(0).dispatches[0].job;
+  scheduler.release(TaskId(2), 1, 1);
+  const JobSlot high = scheduler.dispatch(1).dispatches[0].job;
+  scheduler.release(TaskId(1), 2, 2);
+  scheduler.complete(high, 3, Outcome::Finished);
+  const Step held = scheduler.dispatch(3, 0);
+  ASSERT_EQ(held.dispatches.size(), 1U);
+  EXPECT_EQ(held.dispatches[0].kind, DispatchKind::Resume);
+  EXPECT_EQ(held.dispatches[0].job, low);
+  const Step rest = scheduler.dispatch(3);
+  ASSERT_EQ(rest.dispatches.size(), 1U);
+  EXPECT_EQ(rest.dispatches[0].task, TaskId(1));
+  EXPECT_EQ(rest.dispatches[0].over, low);
+}
+
 }  // namespace
 }  // namespace redag::sched
