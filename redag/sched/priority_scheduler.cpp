@@ -308,12 +308,12 @@ std::uint32_t PriorityScheduler::list_of(const Job &job) const {
 }
 
 void PriorityScheduler::push(std::uint32_t slot) {
-  queued_started_ += jobs_[slot].started() ? 1 : 0;
+  if (jobs_[slot].started()) ++queued_started_;
   static_ ? levels_.push(jobs_, slot, list_of(jobs_[slot])) : heap_.push(jobs_, slot);
 }
 
 void PriorityScheduler::remove(std::uint32_t slot) {
-  queued_started_ -= jobs_[slot].started() ? 1 : 0;
+  if (jobs_[slot].started()) --queued_started_;
   static_ ? levels_.remove(jobs_, slot) : heap_.remove(jobs_, slot);
 }
 
