@@ -109,7 +109,7 @@ chaos: ## faults by the thousand: CHAOS_RUNS (2000) runs of executor and simulat
 	tests/chaos/process.py build/dev/bin/redag . --runs $$(($(CHAOS_RUNS) / 100)) \
 	  --clock build/dev/tests/chaos/libredag_jumping_clock.so
 
-ros: ## build redag_rclcpp with colcon and run its tests, for each ROS 2 under /opt/ros
+ros: ## build the ROS packages with colcon and run their tests, for each ROS 2 under /opt/ros
 	@tools/bootstrap test
 	tools/test_rclcpp
 

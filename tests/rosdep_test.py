@@ -32,7 +32,8 @@ ROS_KEYS = {"ament_cmake", "diagnostic_msgs", "launch_ros", "rclcpp", "rclcpp_ac
 # Names that find_package() looks for, with the rosdep key that installs them.
 CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "yaml-cpp": "yaml-cpp", "tl-expected": "libexpected-dev",
                   "CLI11": "cli11", "TBB": "tbb", "GTest": "libgtest-dev"}
-PACKAGES = ("redag", "redag_analysis", "redag_lab", "redag_rclcpp")
+ROS_PACKAGES = ("redag_rclcpp", "redag_rclcpp_lab")
+PACKAGES = ("redag", "redag_analysis", "redag_lab", *ROS_PACKAGES)
 
 
 def keys_of(package):
@@ -54,15 +55,17 @@ class Rosdep(unittest.TestCase):
                 self.assertIn(SYSTEM_KEYS[key], words, f"{package}/package.xml: {key}")
 
     def test_what_is_found_is_declared(self):
-        """redag_rclcpp's package.xml lists everything that its CMakeLists.txt needs, regardless of redag's
+        """The package.xml of a ROS package lists everything that its CMakeLists.txt needs, regardless of redag's
         dependencies."""
-        found = re.findall(r"^ *find_package\((\S+)[^)]*REQUIRED\)",
-                           (SOURCE / "redag_rclcpp/CMakeLists.txt").read_text(), re.MULTILINE)
-        keys = keys_of("redag_rclcpp")
-        for name in found:
-            # The packages reference_* belong to the optional Autoware reference system.
-            if "$" not in name and not name.startswith("reference_"):
-                self.assertIn(CMAKE_PACKAGES.get(name, name), keys, f"find_package({name})")
+        for package in ROS_PACKAGES:
+            found = re.findall(r"^ *find_package\((\S+)[^)]*REQUIRED\)",
+                               (SOURCE / package / "CMakeLists.txt").read_text(), re.MULTILINE)
+            self.assertGreater(len(found), 5, package)
+            keys = keys_of(package)
+            for name in found:
+                # The packages reference_* belong to the optional Autoware reference system.
+                if "$" not in name and not name.startswith("reference_"):
+                    self.assertIn(CMAKE_PACKAGES.get(name, name), keys, f"{package}: find_package({name})")
 
     def test_redag_needs_no_test_library(self):
         """colcon builds the libraries and the program. The repository's own build holds their tests."""

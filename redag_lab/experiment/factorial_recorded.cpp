@@ -35,7 +35,7 @@ std::string executor_of(const RecordedRun &run) { return std::string("ros2/") + 
 Result<void> fits(const FactorialPlan &plan, const RecordedRun &run) {
   if (run.info.driver != trace::Driver::RosNodes) {
     return make_error(fmt::format("{}: not a run of ROS 2 nodes", run.file),
-                      "run_workload of redag_rclcpp records such");
+                      "run_workload of redag_rclcpp_lab records such");
   }
   const auto differ = [&](const char *what, Duration is, Duration planned) {
     return make_error(fmt::format("{}: its {} is {}, that of the plan {}", run.file, what, format_duration(is),

@@ -101,7 +101,7 @@ Result<experiment::FinishedRun> run_in_ros2(const experiment::PlannedRun &planne
     return tl::unexpected<Diagnostics>(std::move(saved.error()));
   }
   std::vector<std::string> words = {program};
-  if (program.empty()) words = {"ros2", "run", "redag_rclcpp", "run_workload"};
+  if (program.empty()) words = {"ros2", "run", "redag_rclcpp_lab", "run_workload"};
   const std::string out = scratch.file("out");
   for (std::string word :
        {scratch.file("workload.yaml"), "--executor=" + planned.executor,
@@ -110,11 +110,11 @@ Result<experiment::FinishedRun> run_in_ros2(const experiment::PlannedRun &planne
     words.push_back(std::move(word));
   }
   const std::string log = scratch.file("log");
-  const std::string name = program.empty() ? "ros2 run redag_rclcpp run_workload" : program;
+  const std::string name = program.empty() ? "ros2 run redag_rclcpp_lab run_workload" : program;
   const int status = run_program(words, log, stop);
   if (status < 0) {
     return make_error(fmt::format("cannot start '{}': {}", name, std::strerror(-status)),
-                      "source the workspace with redag_rclcpp, or name the program with --run-workload");
+                      "source the workspace with redag_rclcpp_lab, or name the program with --run-workload");
   }
   if (stop.load()) return make_error("interrupted");
   // Status 1 means that the trace breaks a rule, which is checked below.

@@ -8,8 +8,16 @@
 
 #include <string>
 
+#include "rclcpp/executors.hpp"
+#include "rclcpp/version.h"
 #include "redag_rclcpp/executor.hpp"
-#include "workload/peers.hpp"
+#define REDAG_HAS_EVENTS (RCLCPP_VERSION_MAJOR >= 21)
+#if REDAG_HAS_EVENTS
+#include "rclcpp/experimental/executors/events_executor/events_executor.hpp"
+#endif
+#ifdef REDAG_HAS_CM_EXECUTORS
+#include "cm_executors/events_cbg_executor.hpp"
+#endif
 
 namespace redag_rclcpp {
 

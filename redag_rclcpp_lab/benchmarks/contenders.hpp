@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "peers.hpp"
 #include "redag_rclcpp/executor.hpp"
-#include "workload/peers.hpp"
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 struct Contender {
   std::string name;
@@ -48,4 +48,4 @@ inline double median(std::vector<double> values) {
   return values.empty() ? 0 : values[values.size() / 2];
 }
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "workload/node_events.hpp"
+#include "node_events.hpp"
 
 #include <algorithm>
 #include <cstdint>
 #include <map>
 #include <utility>
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 using redag::Activation;
 using redag::Dag;
@@ -336,4 +336,4 @@ std::vector<JobEvent> node_events(const redag::Workload &workload, std::span<con
   return assembly.emit();
 }
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

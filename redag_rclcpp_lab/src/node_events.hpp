@@ -12,7 +12,7 @@
 #include "redag/model/job_event.hpp"
 #include "redag/model/workload.hpp"
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 struct NodeEventsOptions {
   redag::Time end = 0;              // no job is released at or after it; later events are left out
@@ -32,4 +32,4 @@ struct NodeEventsOptions {
                                                        std::span<const redag::JobEvent> bodies,
                                                        const NodeEventsOptions &options);
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "workload/peers.hpp"
+#include "peers.hpp"
 
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 const std::vector<std::string> &peer_names() {
   static const std::vector<std::string> kNames = {"mte", "ste", "static", "events", "cbg"};
@@ -46,4 +46,4 @@ std::unique_ptr<rclcpp::Executor> make_peer(const std::string &name, std::size_t
   return std::make_unique<rclcpp::executors::SingleThreadedExecutor>();
 }
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

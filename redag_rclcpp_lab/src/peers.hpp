@@ -21,7 +21,7 @@
 #include "cm_executors/events_cbg_executor.hpp"
 #endif
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 #ifdef REDAG_HAS_CM_EXECUTORS
 inline constexpr bool kHasCbg = true;
@@ -41,4 +41,4 @@ inline constexpr bool kHasCbg = false;
 /// Requires check_peer(name).
 [[nodiscard]] std::unique_ptr<rclcpp::Executor> make_peer(const std::string &name, std::size_t threads);
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

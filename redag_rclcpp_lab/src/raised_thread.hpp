@@ -8,7 +8,7 @@
 
 #include "redag/runtime/threads.hpp"
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 /// Gives the calling thread SCHED_FIFO `priority` until destruction; 0: leaves it unchanged.
 class RaisedThread {
@@ -29,4 +29,4 @@ class RaisedThread {
   sched_param parameters_{};
 };
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 class TextTable {
  public:
@@ -52,4 +52,4 @@ class TextTable {
   std::vector<std::vector<std::string>> rows_;
 };
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "workload/workload_nodes.hpp"
+#include "workload_nodes.hpp"
 
 #include <fmt/format.h>
 #include <rcl/timer.h>
@@ -20,7 +20,7 @@
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/preemption_point.hpp"
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 using redag::Activation;
 using redag::Dag;
@@ -547,4 +547,4 @@ redag::Workload WorkloadNodes::bound_workload() const {
   return bound;
 }
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

@@ -24,7 +24,7 @@
 #include "redag/trace/ring.hpp"
 #include "std_msgs/msg/int64_multi_array.hpp"
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 /// Reads rclcpp's steady clock, on which timers expire. In some distributions it differs from std::chrono's.
 [[nodiscard]] redag::Time timer_clock_now() noexcept;
@@ -124,4 +124,4 @@ class WorkloadNodes {
   std::atomic<bool> give_up_{false};
 };
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

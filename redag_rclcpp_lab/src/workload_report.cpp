@@ -15,10 +15,10 @@
 #include "redag_analysis/metrics/jobs_csv.hpp"
 #include "redag_analysis/metrics/perfetto.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
-#include "workload/text_table.hpp"
-#include "workload/workload_run.hpp"
+#include "text_table.hpp"
+#include "workload_run.hpp"
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 using redag::metrics::CheckReport;
 using redag::metrics::Distribution;
@@ -118,4 +118,4 @@ std::string describe(const WorkloadRun &run) {
   return text;
 }
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "workload/workload_run.hpp"
+#include "workload_run.hpp"
 
 #include <fmt/format.h>
 
@@ -15,6 +15,8 @@
 #include <thread>
 #include <utility>
 
+#include "node_events.hpp"
+#include "peers.hpp"
 #include "raised_thread.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/lock_guard.hpp"
@@ -22,11 +24,9 @@
 #include "redag/runtime/threads.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_rclcpp/executor.hpp"
-#include "workload/node_events.hpp"
-#include "workload/peers.hpp"
-#include "workload/workload_nodes.hpp"
+#include "workload_nodes.hpp"
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 using redag::Duration;
 using redag::JobEvent;
@@ -280,4 +280,4 @@ redag::Result<WorkloadRun> run_as_nodes(const redag::Workload &workload, const W
   return Run(workload, options).execute();
 }
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

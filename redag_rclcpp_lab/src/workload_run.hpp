@@ -17,7 +17,7 @@
 #include "redag_analysis/metrics/check_report.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 
 /// Names for --executor, those of ReDAGExecutor first: "redag", "redag-os", "mte", ...
 [[nodiscard]] const std::vector<std::string> &executor_names();
@@ -61,4 +61,4 @@ struct WorkloadRun {
 /// The run as text: a table of tasks, a table of DAGs, and the verdicts.
 [[nodiscard]] std::string describe(const WorkloadRun &run);
 
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

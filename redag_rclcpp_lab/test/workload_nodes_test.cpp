@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "workload/workload_nodes.hpp"
+#include "workload_nodes.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,6 +14,8 @@
 #include <thread>
 #include <tuple>
 
+#include "node_events.hpp"
+#include "peers.hpp"
 #include "rclcpp/version.h"
 #include "redag/model/callback_match.hpp"
 #include "redag/model/demand.hpp"
@@ -22,11 +24,9 @@
 #include "redag/trace/worker_count.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
-#include "workload/node_events.hpp"
-#include "workload/peers.hpp"
-#include "workload/workload_run.hpp"
+#include "workload_run.hpp"
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 namespace {
 
 using redag::JobEvent;
@@ -539,4 +539,4 @@ TEST(Executors, OnlyThoseOfThisDistributionAreAccepted) {
 }
 
 }  // namespace
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab

@@ -44,7 +44,7 @@ class Diff(Case):
         result = redag("diff", folder / "mte", folder / "redag", "--json")
         self.assertEqual(self.document(result, "redag.difference/2")["a"]["seeds"], [1, 2, 3])
         self.expect(redag("diff", folder, folder / "mte"), 2, "holds runs of several kinds: redag, mte", "name one of them")
-        # Repetitions in folders of other names, as run_workload of redag_rclcpp writes them.
+        # Repetitions in folders of other names, as run_workload of redag_rclcpp_lab writes them.
         for n in 1, 2, 3:
             (folder / "redag" / f"repetition-{n}").rename(folder / "redag" / str(n))
         again = self.document(redag("diff", folder / "mte", folder / "redag", "--json"), "redag.difference/2")

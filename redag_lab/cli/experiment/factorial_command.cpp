@@ -114,8 +114,9 @@ Action add_factorial(CLI::App &app) {
   const auto settings = std::make_shared<StudySettings>();
   app.add_option("PLAN", *file, "Plan (YAML, docs/experiments.md)")->type_name("FILE")->required();
   const auto program = std::make_shared<std::string>();
-  app.add_option("--run-workload", *program,
-                 "world: ros2: the program run_workload of redag_rclcpp; default: 'ros2 run redag_rclcpp run_workload'")
+  app.add_option(
+         "--run-workload", *program,
+         "world: ros2: the program run_workload of redag_rclcpp_lab; default: 'ros2 run redag_rclcpp_lab run_workload'")
       ->type_name("PROGRAM");
   add_study_settings(app, *settings);
   app.footer(

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// `ros2 run redag_rclcpp run_workload` runs a workload as real ROS 2 nodes on one executor, or on several in turn.
+// `ros2 run redag_rclcpp_lab run_workload` runs a workload as real ROS 2 nodes on one executor, or on several in turn.
 #include <fmt/format.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -24,10 +24,10 @@
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/summary.hpp"
-#include "workload/text_table.hpp"
-#include "workload/workload_run.hpp"
+#include "text_table.hpp"
+#include "workload_run.hpp"
 
-namespace redag_rclcpp {
+namespace redag_rclcpp::lab {
 namespace {
 
 namespace fs = std::filesystem;
@@ -60,8 +60,8 @@ the timer's grid or the end of the last predecessor; a release that never ran is
 the results so far.
 
 examples:
-  ros2 run redag_rclcpp run_workload contention.yaml --executor redag-os --out results
-  ros2 run redag_rclcpp run_workload contention.yaml --executor redag,mte,ste --repeat 5 --duration 20s
+  ros2 run redag_rclcpp_lab run_workload contention.yaml --executor redag-os --out results
+  ros2 run redag_rclcpp_lab run_workload contention.yaml --executor redag,mte,ste --repeat 5 --duration 20s
   redag check-trace results/scheduler_events.jsonl
 
 exit code: 0 done; 1 a trace breaks the model's rules; 2 bad input, or the machine or ROS refused
@@ -425,7 +425,7 @@ int run(const std::vector<std::string> &words, int argc, char **argv) {
 }
 
 }  // namespace
-}  // namespace redag_rclcpp
+}  // namespace redag_rclcpp::lab
 
 int main(int argc, char **argv) {
   std::vector<std::string> words = rclcpp::remove_ros_arguments(argc, argv);
