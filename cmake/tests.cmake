@@ -12,13 +12,14 @@ set(runtime redag/runtime)
 set(executors redag_analysis/executors)
 set(metrics redag_analysis/metrics)
 set(sim redag_analysis/sim)
+set(text redag_analysis/text)
 set(analysis redag_analysis/core redag_analysis/one_worker redag_analysis/many_workers redag_analysis/explore
   redag_analysis/peers redag_analysis/analyze)
 foreach(group IN ITEMS workload run search report experiment cli)
   set(${group} redag_lab/${group})
 endforeach()
 set(testing redag_testing)
-set(test_groups base live model sched trace runtime executors metrics sim analysis workload run search report experiment
+set(test_groups base live model sched trace runtime executors metrics sim text analysis workload run search report experiment
   cli testing)
 
 redag_sources(testing_sources redag_testing)

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/terminal/table.hpp"
+#include "redag_analysis/text/table.hpp"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 
 #include "redag/base/check.hpp"
 
-namespace redag::cli {
+namespace redag {
 namespace {
 
 constexpr std::size_t kGap = 2;          // between columns
@@ -25,17 +25,6 @@ std::string padded(const std::string &text, std::size_t width, bool right) {
 }
 
 }  // namespace
-
-std::string cut(std::string_view text, std::size_t width) {
-  if (display_width(text) <= width) return std::string(text);
-  if (width == 0) return {};
-  std::size_t bytes = 0;
-  for (std::size_t columns = 0; bytes < text.size(); ++bytes) {
-    const bool starts_character = (static_cast<unsigned char>(text[bytes]) & 0xc0U) != 0x80U;
-    if (starts_character && ++columns == width) break;
-  }
-  return std::string(text.substr(0, bytes)) + "…";
-}
 
 std::size_t Table::shortest_cut(std::size_t column) const {
   const auto different = [&](std::size_t width) {
@@ -128,4 +117,4 @@ std::string Table::render(std::size_t width, bool colour) const {
   return text;
 }
 
-}  // namespace redag::cli
+}  // namespace redag

@@ -9,10 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "redag/base/text.hpp"
-#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_analysis/text/tint.hpp"
 
-namespace redag::cli {
+namespace redag {
 
 struct Column {
   std::string title;
@@ -46,7 +45,4 @@ class Table {
   std::vector<std::vector<Cell>> rows_;
 };
 
-/// Returns at most `width` columns of `text`; the end of a longer text becomes "…".
-[[nodiscard]] std::string cut(std::string_view text, std::size_t width);
-
-}  // namespace redag::cli
+}  // namespace redag

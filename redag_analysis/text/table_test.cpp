@@ -1,15 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/terminal/table.hpp"
+#include "redag_analysis/text/table.hpp"
 
 #include <gtest/gtest.h>
 
 #include <sstream>
 
-#include "redag_lab/cli/terminal/progress.hpp"
-
-namespace redag::cli {
+namespace redag {
 namespace {
 
 Table three_columns() {
@@ -72,11 +70,6 @@ TEST(Table, CountsCharactersNotBytes) {
   EXPECT_EQ(cut("abc", 0), "");
 }
 
-TEST(ProgressLine, FitsTheTerminal) {
-  EXPECT_EQ(progress_line("mte 1/3", 0.5, "1.0 of 2.0 s", 80), "mte 1/3 [##########          ]  50 %  1.0 of 2.0 s");
-  EXPECT_EQ(display_width(progress_line("mte 1/3", 2.0, std::string(200, 'x'), 60)), 60U);
-}
-
 TEST(Table, NamesAreNotCutUntilTheyAreTheSame) {
   Table table({{"task", false, 9}, {"jobs", true, 5}, {"late", true, 1}});
   table.add({{"perception.camera"}, {"1 000 000"}, {"1 000 000"}});
@@ -88,4 +81,4 @@ TEST(Table, NamesAreNotCutUntilTheyAreTheSame) {
 }
 
 }  // namespace
-}  // namespace redag::cli
+}  // namespace redag

@@ -31,9 +31,9 @@
 namespace {
 
 using namespace std::chrono_literals;
-using redag_rclcpp::Contender;
-using redag_rclcpp::contenders;
-using redag_rclcpp::median;
+using redag_rclcpp::lab::Contender;
+using redag_rclcpp::lab::contenders;
+using redag_rclcpp::lab::median;
 using Message = std_msgs::msg::UInt64;
 using std::chrono::nanoseconds;
 using std::chrono::steady_clock;
@@ -289,7 +289,8 @@ int main(int argc, char **argv) {
   for (const Measurement &measurement : measurements()) {
     auto all = contenders();
     if (measurement.name == "arrivals_loaded" && all.back().name == "redag-os") {
-      all.push_back({"redag-os-not-raised", [] { return redag_rclcpp::make_redag(redag::PreemptionMode::Os, false); }});
+      all.push_back(
+          {"redag-os-not-raised", [] { return redag_rclcpp::lab::make_redag(redag::PreemptionMode::Os, false); }});
     }
     if (!only.empty() && ("," + only + ",").find("," + measurement.name + ",") == std::string::npos) continue;
     std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, then by executor

@@ -31,9 +31,9 @@
 
 namespace {
 
-using redag_rclcpp::Contender;
-using redag_rclcpp::contenders;
-using redag_rclcpp::median;
+using redag_rclcpp::lab::Contender;
+using redag_rclcpp::lab::contenders;
+using redag_rclcpp::lab::median;
 
 constexpr double kWarmUp = 2;  // seconds at the start that are left out
 

@@ -15,7 +15,7 @@
 #include "redag_analysis/metrics/jobs_csv.hpp"
 #include "redag_analysis/metrics/perfetto.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
-#include "text_table.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "workload_run.hpp"
 
 namespace redag_rclcpp::lab {
@@ -91,25 +91,47 @@ std::string describe(const WorkloadRun &run) {
                   info.preemption_why.empty() ? "" : " (" + info.preemption_why + ")", info.overheads);
   if (info.warm_up > 0) text += fmt::format("the first {} are not counted\n", redag::humanize_duration(info.warm_up));
   if (run.stopped) text += "stopped early: the results are those of the shorter run\n";
-  TextTable tasks({"task", "jobs", "late", "skipped", "aborted", "missed", "p50", "p95", "p99", "max"});
+  redag::Table tasks({{"task"},
+                      {"jobs", true},
+                      {"late", true},
+                      {"skipped", true},
+                      {"aborted", true},
+                      {"missed", true},
+                      {"p50", true},
+                      {"p95", true},
+                      {"p99", true},
+                      {"max", true}});
   for (const redag::metrics::TaskSummary &task : run.summary.tasks) {
     const redag::metrics::JobStats &jobs = task.jobs;
-    tasks.add({task.dag + "." + task.name, fmt::format("{}", jobs.released), fmt::format("{}", jobs.late),
-               fmt::format("{}", jobs.skipped), fmt::format("{}", jobs.aborted),
-               redag::format_count_and_share(jobs.missed(), jobs.released),
-               time_text(jobs.response, &Distribution::p50), time_text(jobs.response, &Distribution::p95),
-               time_text(jobs.response, &Distribution::p99), time_text(jobs.response, &Distribution::max)});
+    tasks.add({{task.dag + "." + task.name},
+               {fmt::format("{}", jobs.released)},
+               {fmt::format("{}", jobs.late)},
+               {fmt::format("{}", jobs.skipped)},
+               {fmt::format("{}", jobs.aborted)},
+               {redag::format_count_and_share(jobs.missed(), jobs.released)},
+               {time_text(jobs.response, &Distribution::p50)},
+               {time_text(jobs.response, &Distribution::p95)},
+               {time_text(jobs.response, &Distribution::p99)},
+               {time_text(jobs.response, &Distribution::max)}});
   }
-  TextTable dags({"DAG", "jobs", "missed", "end-to-end p50", "p99", "max", "active"});
+  redag::Table dags({{"DAG"},
+                     {"jobs", true},
+                     {"missed", true},
+                     {"end-to-end p50", true},
+                     {"p99", true},
+                     {"max", true},
+                     {"active", true}});
   for (const redag::metrics::DagSummary &dag : run.summary.dags) {
     const Distribution &end_to_end = dag.end_to_end.response;
-    dags.add({dag.name, fmt::format("{}", dag.jobs.released),
-              redag::format_count_and_share(dag.jobs.missed(), dag.jobs.released),
-              time_text(end_to_end, &Distribution::p50), time_text(end_to_end, &Distribution::p99),
-              time_text(end_to_end, &Distribution::max),
-              fmt::format("{}/{}", dag.peak_active, dag.max_active > 0 ? fmt::format("{}", dag.max_active) : "-")});
+    dags.add({{dag.name},
+              {fmt::format("{}", dag.jobs.released)},
+              {redag::format_count_and_share(dag.jobs.missed(), dag.jobs.released)},
+              {time_text(end_to_end, &Distribution::p50)},
+              {time_text(end_to_end, &Distribution::p99)},
+              {time_text(end_to_end, &Distribution::max)},
+              {fmt::format("{}/{}", dag.peak_active, dag.max_active > 0 ? fmt::format("{}", dag.max_active) : "-")}});
   }
-  text += "\n" + tasks.render() + "\n" + dags.render() + "\n";
+  text += "\n" + tasks.render(0, false) + "\n" + dags.render(0, false) + "\n";
   text +=
       "missed: late, skipped or aborted; times of a task: finish - release; of a DAG, end to end: finish of a sink - "
       "release of its source\n";

@@ -7,8 +7,8 @@
 
 #include <algorithm>
 
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/analyze/analysis_explanation.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -8,8 +8,9 @@
 #include <algorithm>
 
 #include "redag/base/rounded_time.hpp"
+#include "redag/base/text.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

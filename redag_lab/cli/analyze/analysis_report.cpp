@@ -9,7 +9,8 @@
 #include <cmath>
 
 #include "redag/base/rounded_time.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
+#include "redag/base/text.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/run/variant.hpp"
 #include "redag_lab/search/remedy.hpp"
 

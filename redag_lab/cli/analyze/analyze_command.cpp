@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "redag/base/text.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/analyze/analysis_arguments.hpp"
 #include "redag_lab/cli/analyze/analysis_chains.hpp"
 #include "redag_lab/cli/analyze/analysis_explanation.hpp"
@@ -18,7 +20,6 @@
 #include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -8,7 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "redag_lab/cli/terminal/table.hpp"
+#include "redag/base/text.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/workload/changes.hpp"
 
 namespace redag::cli {

@@ -12,7 +12,7 @@
 
 #include "redag/base/text.hpp"
 #include "redag/trace/worker_count.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
+#include "redag_analysis/text/table.hpp"
 
 namespace redag::cli {
 namespace {

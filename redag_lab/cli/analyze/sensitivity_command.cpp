@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <memory>
 
+#include "redag/base/text.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/analyze/analysis_arguments.hpp"
 #include "redag_lab/cli/analyze/analysis_explanation.hpp"
 #include "redag_lab/cli/analyze/sensitivity_report.hpp"
@@ -13,7 +15,6 @@
 #include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
 #include "redag_lab/run/simulated_verdict.hpp"
 
 namespace redag::cli {

@@ -10,7 +10,7 @@
 #include <map>
 
 #include "redag/base/text.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/workload/changes.hpp"
 
 namespace redag::cli {

@@ -10,7 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "redag_lab/cli/terminal/table.hpp"
+#include "redag/base/text.hpp"
+#include "redag_analysis/text/table.hpp"
 
 namespace redag::cli {
 namespace {

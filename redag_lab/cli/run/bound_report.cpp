@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <array>
 
-#include "redag_lab/cli/terminal/table.hpp"
+#include "redag_analysis/text/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -8,13 +8,13 @@
 
 #include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/json.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
 #include "redag_lab/run/calibrate.hpp"
 #include "redag_lab/run/session.hpp"
 

@@ -5,12 +5,13 @@
 
 #include <memory>
 
+#include "redag/base/text.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/run/run_report.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "redag_lab/cli/run/comparison_report.hpp"
+#include "redag_analysis/text/tint.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,8 @@
 #include <array>
 #include <cmath>
 
-#include "redag_lab/cli/terminal/table.hpp"
+#include "redag/base/text.hpp"
+#include "redag_analysis/text/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "redag/live/reader.hpp"
+#include "redag_analysis/text/tint.hpp"
 #include "redag_lab/cli/terminal/console.hpp"
 #include "redag_lab/cli/terminal/json.hpp"
 

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "redag_analysis/text/tint.hpp"
 #include "redag_lab/cli/terminal/screen.hpp"
 #include "redag_lab/cli/top/top_screen.hpp"
 

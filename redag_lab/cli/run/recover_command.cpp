@@ -6,11 +6,12 @@
 #include <filesystem>
 #include <memory>
 
+#include "redag/base/text.hpp"
 #include "redag/trace/flight_recorder.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/run/run_report.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -8,14 +8,15 @@
 #include <algorithm>
 #include <numeric>
 
+#include "redag/base/text.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/jobs_csv.hpp"
 #include "redag_analysis/metrics/perfetto.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
 #include "redag_analysis/metrics/verdict.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/run/bound_report.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

@@ -13,6 +13,7 @@
 #include <cstring>
 
 #include "redag/base/text.hpp"
+#include "redag_analysis/text/tint.hpp"
 
 namespace redag::cli {
 namespace {
@@ -29,18 +30,6 @@ StreamTraits traits_of(int descriptor) {
   winsize size{};
   traits.width = ioctl(descriptor, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
   return traits;
-}
-
-const char *code_of(Tint tint) {
-  switch (tint) {
-    case Tint::Plain: break;
-    case Tint::Good: return "\033[32m";
-    case Tint::Bad: return "\033[31m";
-    case Tint::Caution: return "\033[33m";
-    case Tint::Faint: return "\033[2m";
-    case Tint::Strong: return "\033[1m";
-  }
-  return "";
 }
 
 // Returns the length of one of our own control sequences at `at`, or 0. They are colours, and return to the start of
@@ -82,16 +71,6 @@ int write_all(int descriptor, std::string_view text) {
 }
 
 }  // namespace
-
-std::string tinted(std::string_view text, Tint tint, bool colour) {
-  if (!colour || tint == Tint::Plain) return std::string(text);
-  return fmt::format("{}{}\033[0m", code_of(tint), text);
-}
-
-std::size_t display_width(std::string_view text) {
-  const auto starts_character = [](char c) { return (static_cast<unsigned char>(c) & 0xc0U) != 0x80U; };
-  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), starts_character));
-}
 
 Console::Console(int out, StreamTraits out_traits, int err, StreamTraits err_traits)
     : out_(out), err_(err), out_traits_(out_traits), err_traits_(err_traits) {}

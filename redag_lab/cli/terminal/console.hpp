@@ -14,14 +14,6 @@
 
 namespace redag::cli {
 
-enum class Tint : std::uint8_t { Plain, Good, Bad, Caution, Faint, Strong };
-
-/// Wraps `text` in the terminal's codes for `tint`, or returns it unchanged if `colour` is false.
-[[nodiscard]] std::string tinted(std::string_view text, Tint tint, bool colour);
-
-/// Returns the number of columns of a UTF-8 text, one per code point.
-[[nodiscard]] std::size_t display_width(std::string_view text);
-
 struct StreamTraits {
   bool terminal = false;
   bool colour = false;    // a terminal, unless NO_COLOR or TERM=dumb is set

@@ -8,7 +8,8 @@
 #include <algorithm>
 #include <chrono>
 
-#include "redag_lab/cli/terminal/table.hpp"
+#include "redag/base/text.hpp"
+#include "redag_analysis/text/table.hpp"
 
 namespace redag::cli {
 namespace {

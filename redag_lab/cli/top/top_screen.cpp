@@ -10,9 +10,9 @@
 #include <utility>
 
 #include "redag/runtime/clock.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
-#include "redag_lab/cli/terminal/table.hpp"
 
 namespace redag::cli {
 namespace {

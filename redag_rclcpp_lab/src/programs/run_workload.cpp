@@ -24,7 +24,7 @@
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/summary.hpp"
-#include "text_table.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "workload_run.hpp"
 
 namespace redag_rclcpp::lab {
@@ -278,7 +278,17 @@ std::string longest_text(const Repetitions &repetitions, std::size_t dag) {
 
 std::string comparison_table(const redag::Workload &workload, const std::vector<std::string> &executors,
                              std::map<std::string, Repetitions> &results) {
-  TextTable table({"DAG", "executor", "runs", "jobs", "missed", "lowest", "highest", "p50", "p95", "p99", "max"}, 2);
+  redag::Table table({{"DAG"},
+                      {"executor"},
+                      {"runs", true},
+                      {"jobs", true},
+                      {"missed", true},
+                      {"lowest", true},
+                      {"highest", true},
+                      {"p50", true},
+                      {"p95", true},
+                      {"p99", true},
+                      {"max", true}});
   for (std::size_t dag = 0; dag < workload.dags.size(); ++dag) {
     for (const std::string &executor : executors) {
       const Repetitions &repetitions = results[executor];
@@ -290,15 +300,20 @@ std::string comparison_table(const redag::Workload &workload, const std::vector<
         missed.push_back(dags[dag].jobs.miss_ratio_with_lost());
       }
       const auto [low, high] = std::minmax_element(missed.begin(), missed.end());
-      table.add({workload.dags[dag].name, executor, fmt::format("{}", repetitions.size()),
-                 fmt::format("{}", jobs.released), redag::format_count_and_share(jobs.missed(), jobs.released),
-                 redag::format_percent(*low), redag::format_percent(*high),
-                 percentile_text(repetitions, dag, &Distribution::p50),
-                 percentile_text(repetitions, dag, &Distribution::p95),
-                 percentile_text(repetitions, dag, &Distribution::p99), longest_text(repetitions, dag)});
+      table.add({{workload.dags[dag].name},
+                 {executor},
+                 {fmt::format("{}", repetitions.size())},
+                 {fmt::format("{}", jobs.released)},
+                 {redag::format_count_and_share(jobs.missed(), jobs.released)},
+                 {redag::format_percent(*low)},
+                 {redag::format_percent(*high)},
+                 {percentile_text(repetitions, dag, &Distribution::p50)},
+                 {percentile_text(repetitions, dag, &Distribution::p95)},
+                 {percentile_text(repetitions, dag, &Distribution::p99)},
+                 {longest_text(repetitions, dag)}});
     }
   }
-  return table.render();
+  return table.render(0, false);
 }
 
 // Runs this program again for one executor, without its report. Returns its exit status.
@@ -430,5 +445,5 @@ int run(const std::vector<std::string> &words, int argc, char **argv) {
 int main(int argc, char **argv) {
   std::vector<std::string> words = rclcpp::remove_ros_arguments(argc, argv);
   words.erase(words.begin());
-  return redag_rclcpp::run(words, argc, argv);
+  return redag_rclcpp::lab::run(words, argc, argv);
 }
