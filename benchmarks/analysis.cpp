@@ -24,11 +24,11 @@ using analysis::global::GlobalUnit;
 constexpr std::uint32_t kWorkers = 4;
 constexpr std::size_t kSets = 256;  // more than the branch predictor can memorize
 
-std::vector<analysis::System> systems(redag::DagShape shape, std::uint32_t percent) {
-  const bool graphs = shape != redag::DagShape::Independent;
+std::vector<analysis::System> systems(lab::DagShape shape, std::uint32_t percent) {
+  const bool graphs = shape != lab::DagShape::Independent;
   std::vector<analysis::System> result;
   for (std::uint64_t seed = 0; result.size() < kSets; ++seed) {
-    redag::GenerateOptions options;
+    lab::GenerateOptions options;
     options.shape = shape;
     options.workers = kWorkers;
     options.preemption = redag::PreemptionMode::Os;
@@ -36,7 +36,7 @@ std::vector<analysis::System> systems(redag::DagShape shape, std::uint32_t perce
     options.min_tasks = graphs ? 3 : 1;
     options.max_tasks = graphs ? 9 : 1;
     options.utilization = kWorkers * percent / 100.0;
-    const redag::Result<Workload> workload = redag::generate(options, seed);
+    const redag::Result<Workload> workload = lab::generate(options, seed);
     if (!workload) continue;
     result.push_back(analysis::compile(*workload, analysis::platform_of(*workload)).value());
   }
@@ -66,7 +66,7 @@ void run_bare(benchmark::State &state, std::vector<std::vector<GlobalUnit>> sets
   state.counters["bounded"] = static_cast<double>(schedulable) / static_cast<double>(state.iterations());
 }
 
-void run_method(benchmark::State &state, const analysis::Method &method, redag::DagShape shape) {
+void run_method(benchmark::State &state, const analysis::Method &method, lab::DagShape shape) {
   const auto sets = systems(shape, static_cast<std::uint32_t>(state.range(0)));
   std::size_t next = 0;
   for (auto _ : state) benchmark::DoNotOptimize(method.apply(sets[next++ % kSets]));
@@ -74,23 +74,23 @@ void run_method(benchmark::State &state, const analysis::Method &method, redag::
 }
 
 void BM_GuanBare(benchmark::State &state) {
-  const auto sets = systems(redag::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
+  const auto sets = systems(lab::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
   run_bare(state, bare(sets), [](std::vector<GlobalUnit> &units, std::size_t k) {
     return analysis::global::guan_response(units, k, kWorkers, analysis::global::start_after(units, k));
   });
 }
 
 void BM_BertognaCirineiBare(benchmark::State &state) {
-  const auto sets = systems(redag::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
+  const auto sets = systems(lab::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
   run_bare(state, bare(sets), [](std::vector<GlobalUnit> &units, std::size_t k) {
     return analysis::global::bertogna_cirinei_response(units, k, kWorkers, analysis::global::start_after(units, k));
   });
 }
 
-void BM_Guan(benchmark::State &state) { run_method(state, analysis::guan(), redag::DagShape::Independent); }
+void BM_Guan(benchmark::State &state) { run_method(state, analysis::guan(), lab::DagShape::Independent); }
 
 void BM_MelaniBare(benchmark::State &state) {
-  const auto sets = systems(redag::DagShape::Layered, static_cast<std::uint32_t>(state.range(0)));
+  const auto sets = systems(lab::DagShape::Layered, static_cast<std::uint32_t>(state.range(0)));
   auto units = bare(sets);
   for (auto &set : units) {
     for (GlobalUnit &unit : set) analysis::global::set_width(unit, kWorkers);
@@ -100,8 +100,8 @@ void BM_MelaniBare(benchmark::State &state) {
   });
 }
 
-void BM_Melani(benchmark::State &state) { run_method(state, analysis::melani(), redag::DagShape::Layered); }
-void BM_DagBounded(benchmark::State &state) { run_method(state, analysis::dag_bounded(), redag::DagShape::Layered); }
+void BM_Melani(benchmark::State &state) { run_method(state, analysis::melani(), lab::DagShape::Layered); }
+void BM_DagBounded(benchmark::State &state) { run_method(state, analysis::dag_bounded(), lab::DagShape::Layered); }
 
 }  // namespace
 

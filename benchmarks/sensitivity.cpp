@@ -20,14 +20,14 @@ std::vector<Workload> sets(std::uint32_t workers) {
   constexpr std::size_t kSets = 32;
   std::vector<Workload> result;
   for (std::uint64_t seed = 0; result.size() < kSets; ++seed) {
-    redag::GenerateOptions options;
-    options.shape = redag::DagShape::Independent;
+    lab::GenerateOptions options;
+    options.shape = lab::DagShape::Independent;
     options.workers = workers;
     options.preemption = redag::PreemptionMode::Os;
     options.dags = 20;
     options.min_tasks = options.max_tasks = 1;
     options.utilization = 0.5 * workers;
-    if (const redag::Result<Workload> workload = redag::generate(options, seed)) result.push_back(*workload);
+    if (const redag::Result<Workload> workload = lab::generate(options, seed)) result.push_back(*workload);
   }
   return result;
 }

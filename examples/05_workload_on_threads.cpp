@@ -19,9 +19,9 @@ int main(int argc, char **argv) {
     return 2;
   }
   const Workload &workload = file->workload;
-  runtime::RunOptions options;
+  lab::RunOptions options;
   options.duration = 3 * kSecond;
-  const auto result = runtime::run_workload(workload, options);
+  const auto result = lab::run_workload(workload, options);
   if (!result) {
     fmt::print(stderr, "{}\n", to_string(result.error()));
     return 2;

@@ -163,7 +163,7 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
   };
 
   const sched::Config config = analysis::config_of(platform, workload);
-  const auto scheduler = sched::make_scheduler(property.executor, workload, config);
+  const auto scheduler = executors::make_scheduler(property.executor, workload, config);
   metrics::DeadlineWatch watch(workload);
   const auto see = [&](const metrics::JudgedJob &job) { observe(job, system, observed); };
   const sim::Result result =
@@ -244,7 +244,7 @@ void check_one(const analysis::Method &method, const BoundGenerator &generator, 
                std::uint64_t seed, BoundPropertyResult &result, std::vector<double> &ratios) {
   Rng rng(seed);
   const BoundCase bound_case = generator(rng);
-  const sched::ExecutorKind &executor = *sched::find_executor(options.executor);
+  const executors::ExecutorKind &executor = *executors::find_executor(options.executor);
   const auto system = analysis::compile_for(executor, bound_case.workload, bound_case.platform);
   ASSERT_TRUE(system) << to_string(system.error()) << describe(bound_case);
   if (!system->not_analysable.empty()) {

@@ -66,7 +66,7 @@ struct BoundPropertyOptions {
   std::uint32_t workloads = 1000;  // number to which the method applies; see how_many()
   std::uint32_t runs = 5;          // simulations of each workload
   std::uint32_t periods = 10;      // length of a simulation, in largest periods
-  std::string executor = "redag";  // one of sched::executors(), under which the bound must hold
+  std::string executor = "redag";  // one of executors::all(), under which the bound must hold
   /// Also tests bounds that a method itself calls unsound, to show that they are.
   bool include_unsound = false;
 };

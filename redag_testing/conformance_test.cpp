@@ -26,17 +26,17 @@ std::uint64_t from_environment(const char *name, std::uint64_t otherwise) {
 // Small workloads with much contention that use every feature of the model.
 Workload random_workload(std::uint64_t seed) {
   Rng rng(seed);
-  GenerateOptions options;
+  lab::GenerateOptions options;
   options.dags = static_cast<std::uint32_t>(rng.uniform(1, 4));
   options.min_tasks = 1;
   options.max_tasks = static_cast<std::uint32_t>(rng.uniform(1, 7));
   options.workers = static_cast<std::uint32_t>(rng.uniform(1, 4));
   const double most = 0.9 * options.dags * options.min_tasks;
   options.utilization = std::min(most, (0.2 + 1.2 * rng.uniform01()) * options.workers);
-  options.periods = PeriodModel::Harmonic;
+  options.periods = lab::PeriodModel::Harmonic;
   options.period_max = 40 * kMillisecond;
-  options.rates = rng.uniform01() < 0.5 ? RateScope::PerDag : RateScope::PerTask;
-  options.shape = static_cast<DagShape>(rng.uniform(0, 4));
+  options.rates = rng.uniform01() < 0.5 ? lab::RateScope::PerDag : lab::RateScope::PerTask;
+  options.shape = static_cast<lab::DagShape>(rng.uniform(0, 4));
   options.data_share = rng.uniform01();
   options.bcet_min = 0.2;
   options.jitter = rng.uniform01() < 0.3 ? 0.5 : 0.0;

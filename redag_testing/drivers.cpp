@@ -224,7 +224,7 @@ trace::Trace ManualDriver::run(const RunSpec &spec) {
 }
 
 trace::Trace ThreadsDriver::run(const RunSpec &spec) {
-  runtime::RunOptions options;
+  lab::RunOptions options;
   options.duration = spec.horizon;
   options.seed = spec.seed;
   options.executor = spec.executor;
@@ -233,7 +233,7 @@ trace::Trace ThreadsDriver::run(const RunSpec &spec) {
     case sched::Preemption::Cooperative: options.preemption = PreemptionMode::Cooperative; break;
     case sched::Preemption::Full: options.preemption = PreemptionMode::Os; break;
   }
-  Result<runtime::RunResult> result = runtime::run_workload(spec.workload, options);
+  Result<lab::RunResult> result = lab::run_workload(spec.workload, options);
   REDAG_CHECK(result.has_value(), "the workload could not be run on threads");
   return std::move(result->trace);
 }

@@ -32,7 +32,7 @@ constexpr Duration kHour = 3600 * kSecond;
 // wait.
 Workload random_system(std::uint64_t seed) {
   Rng rng(seed);
-  GenerateOptions options;
+  lab::GenerateOptions options;
   options.dags = static_cast<std::uint32_t>(rng.uniform(2, 4));
   options.min_tasks = 1;
   options.max_tasks = 4;
@@ -142,7 +142,7 @@ void run_a_day(std::uint64_t seed, Duration length, Figures &figures) {
   const auto system = analysis::compile(workload, analysis::platform_of(workload));
   ASSERT_TRUE(system) << to_string(system.error());
   const analysis::Report report = analysis::analyze(*system);
-  const auto scheduler = sched::make_scheduler("redag", workload, config);
+  const auto scheduler = executors::make_scheduler("redag", workload, config);
   Day day(workload, report);
 
   sim::Options options;

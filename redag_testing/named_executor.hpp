@@ -47,7 +47,7 @@ class NamedExecutor {
     for (const TaskRef &ref : flatten(workload_)) names_.push_back(ref.task->name);
     sched::Config config;
     config.workers = workers;
-    scheduler_ = sched::make_scheduler(executor, workload_, config);
+    scheduler_ = executors::make_scheduler(executor, workload_, config);
   }
 
   void release(const std::string &name) {

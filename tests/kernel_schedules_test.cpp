@@ -219,7 +219,7 @@ class KernelSchedules : public ::testing::Test {
   void run_as_workload(const Workload &workload, std::uint64_t seed, const std::string &replay) {
     const auto log = RecordingScheduler::make_log();
     BodyLog bodies(1U << 14U);
-    runtime::RunOptions options;
+    lab::RunOptions options;
     options.duration = 150 * kMillisecond;
     options.seed = seed;
     sched::Config used;
@@ -227,13 +227,13 @@ class KernelSchedules : public ::testing::Test {
       used = config;
       return std::make_unique<RecordingScheduler>(std::make_unique<sched::PriorityScheduler>(w, config), log);
     };
-    options.bodies = [&](std::vector<Body> synthetic, const runtime::Now & /*now*/) {
+    options.bodies = [&](std::vector<Body> synthetic, const lab::Now & /*now*/) {
       for (Body &body : synthetic) body = bodies.noted(std::move(body));
       return synthetic;
     };
     auto recorder = SwitchRecorder::start(cpus_of(workload.platform.workers), kBeat);
     ASSERT_TRUE(recorder);
-    const auto result = runtime::run_workload(workload, options);
+    const auto result = lab::run_workload(workload, options);
     ASSERT_TRUE(result) << to_string(result.error());
     judge_run(*std::move(recorder), bodies, *log, workload, used, {}, replay);
   }
@@ -300,7 +300,7 @@ class ChangingRun {
     return [task](const Job &job) {
       static const std::atomic<bool> kNever{false};
       Rng rng(job.task.value * 7919ULL + job.number);
-      runtime::burn(rng.uniform(task.bcet, task.wcet), task.region, kNever);
+      lab::burn(rng.uniform(task.bcet, task.wcet), task.region, kNever);
       return Outcome::Finished;
     };
   }

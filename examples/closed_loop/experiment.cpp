@@ -93,7 +93,7 @@ ExecutorChoice executor_choice(const std::string &name) {
                                          {"redag", "redag", PreemptionMode::Auto, false, false},
                                          {"redag-cooperative", "redag", PreemptionMode::Cooperative, false, false},
                                          {"redag-none", "redag", PreemptionMode::None, false, false}};
-  for (const sched::ExecutorKind &kind : sched::executors()) {
+  for (const executors::ExecutorKind &kind : executors::all()) {
     const std::string peer(kind.name);
     if (kind.ours) continue;
     choices.push_back({peer, peer, PreemptionMode::None, false, false});
@@ -123,13 +123,13 @@ RunOutcome run_in_virtual_time(const Workload &workload, const ExecutorChoice &c
   };
 
   const sched::Config config = sched::config_of(run);
-  const auto scheduler = sched::make_scheduler(choice.executor, run, config);
-  const sched::ExecutorKind *kind = sched::find_executor(choice.executor);
+  const auto scheduler = executors::make_scheduler(choice.executor, run, config);
+  const executors::ExecutorKind *kind = executors::find_executor(choice.executor);
   sim::Options options;
   options.horizon = setup.duration;
   options.seed = setup.seed;
   // Events come in order of time, and the physics of every plant can follow them.
-  sim::simulate(run, *scheduler, sched::effective_config(*kind, config).workers, options,
+  sim::simulate(run, *scheduler, executors::effective_config(*kind, config).workers, options,
                 [&](std::span<const JobEvent> batch) {
                   for (const JobEvent &event : batch) {
                     if (next_snapshot <= event.time) record_until(event.time);
@@ -146,7 +146,7 @@ RunOutcome run_in_virtual_time(const Workload &workload, const ExecutorChoice &c
                 });
   if (next_snapshot != kNever) record_until(setup.duration);
   RunOutcome outcome = outcome_of(run, events, setup.duration, loops, std::move(snapshots));
-  outcome.mode = trace::preemption_name(sched::effective_config(*kind, config).preemption);
+  outcome.mode = trace::preemption_name(executors::effective_config(*kind, config).preemption);
   return outcome;
 }
 
@@ -157,13 +157,13 @@ RunOutcome run_on_threads(const Workload &workload, const ExecutorChoice &choice
   std::vector<std::vector<Snapshot>> snapshots(loops.all().size());
   std::vector<Time> next_snapshot(loops.all().size(), 0);
 
-  runtime::RunOptions options;
+  lab::RunOptions options;
   options.duration = setup.duration;
   options.seed = setup.seed;
   options.executor = choice.executor;
   options.realtime_threads = choice.realtime_threads;
   options.stop = setup.stop;
-  options.bodies = [&](std::vector<runtime::Body> synthetic, const runtime::Now &now) {
+  options.bodies = [&](std::vector<runtime::Body> synthetic, const lab::Now &now) {
     // Wraps the synthetic body, which takes the processor for as long as the workload says.
     for (std::size_t t = 0; t < synthetic.size(); ++t) {
       const TaskRole role = roles[t];
@@ -189,7 +189,7 @@ RunOutcome run_on_threads(const Workload &workload, const ExecutorChoice &choice
     }
     return synthetic;
   };
-  const Result<runtime::RunResult> result = runtime::run_workload(run, options);
+  const Result<lab::RunResult> result = lab::run_workload(run, options);
   if (!result) throw std::runtime_error(to_string(result.error()));
   RunOutcome outcome = outcome_of(run, result->trace.events, result->trace.info.end, loops, std::move(snapshots));
   outcome.mode = to_string(result->mode.mode);

@@ -573,7 +573,7 @@ TEST(LoadWorkload, RefusesHugeFilesBeforeParsingThem) {
 }
 
 TEST(SaveWorkload, RoundTripsThroughAFile) {
-  const Workload workload = generate(GenerateOptions{}, 1).value();
+  const Workload workload = generate(lab::GenerateOptions{}, 1).value();
   const TemporaryFile file("redag_saved.yaml");
   ASSERT_TRUE(save_workload(workload, file.path()));
   EXPECT_EQ(load_workload(file.path()).value().workload, workload);
@@ -602,14 +602,14 @@ Callback arbitrary_callback(Activation activation) {
 
 /// A generated workload with every optional part drawn, too.
 Workload arbitrary_workload() {
-  GenerateOptions options;
+  lab::GenerateOptions options;
   options.dags = *rc::gen::inRange(1U, 5U);
   options.min_tasks = 1;
   options.max_tasks = *rc::gen::inRange(1U, 10U);
   options.utilization = 0.5;
-  options.shape = *rc::gen::element(DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin);
-  options.rates = *rc::gen::element(RateScope::PerDag, RateScope::PerTask);
-  options.periods = *rc::gen::element(PeriodModel::LogUniform, PeriodModel::Robot);
+  options.shape = *rc::gen::element(lab::DagShape::Layered, lab::DagShape::ErdosRenyi, lab::DagShape::ForkJoin);
+  options.rates = *rc::gen::element(lab::RateScope::PerDag, lab::RateScope::PerTask);
+  options.periods = *rc::gen::element(lab::PeriodModel::LogUniform, lab::PeriodModel::Robot);
   options.policy = *rc::gen::element(PolicyKind::RateMonotonic, PolicyKind::Fixed, PolicyKind::Fifo);
   options.data_share = 0.6;
   options.bcet_min = *rc::gen::element(0.0, 0.5, 1.0);

@@ -16,7 +16,7 @@ const std::vector<Method> &executor_methods() {
   return kAll;
 }
 
-const std::vector<Method> &methods_of(const sched::ExecutorKind &executor) {
+const std::vector<Method> &methods_of(const executors::ExecutorKind &executor) {
   static const std::vector<Method> kAnyOrder = {bertogna_cirinei_any(), graham(), long_paths(), dag_any()};
   static const std::vector<Method> kWaitSet = [] {
     std::vector<Method> all = executor_methods();
@@ -28,13 +28,13 @@ const std::vector<Method> &methods_of(const sched::ExecutorKind &executor) {
   return executor.name == "ste" || executor.name == "mte" ? kWaitSet : kAnyOrder;
 }
 
-AnalysisPlatform effective_platform(const sched::ExecutorKind &executor, AnalysisPlatform platform) {
+AnalysisPlatform effective_platform(const executors::ExecutorKind &executor, AnalysisPlatform platform) {
   sched::Config config;
   config.workers = platform.workers;
   config.preemption = platform.preemption;
   config.levels = platform.levels;
   config.max_started = platform.max_started;
-  config = sched::effective_config(executor, config);
+  config = executors::effective_config(executor, config);
   platform.workers = config.workers;
   platform.preemption = config.preemption;
   platform.levels = config.levels;
@@ -42,7 +42,7 @@ AnalysisPlatform effective_platform(const sched::ExecutorKind &executor, Analysi
   return platform;
 }
 
-Result<System> compile_for(const sched::ExecutorKind &executor, const Workload &workload,
+Result<System> compile_for(const executors::ExecutorKind &executor, const Workload &workload,
                            const AnalysisPlatform &platform) {
   const AnalysisPlatform effective = effective_platform(executor, platform);
   if (executor.ours) return compile(workload, effective);

@@ -15,13 +15,13 @@ namespace redag::analysis {
 
 /// Returns methods() for our executor. A peer gets the bounds for any work-conserving order without preemption, which
 /// all peers have, and those known for it alone. Proofs: docs/analysis.md, "rclcpp's executors".
-[[nodiscard]] const std::vector<Method> &methods_of(const sched::ExecutorKind &executor);
+[[nodiscard]] const std::vector<Method> &methods_of(const executors::ExecutorKind &executor);
 
-/// The platform that the executor makes of `platform`: sched::effective_config().
-[[nodiscard]] AnalysisPlatform effective_platform(const sched::ExecutorKind &executor, AnalysisPlatform platform);
+/// The platform that the executor makes of `platform`: executors::effective_config().
+[[nodiscard]] AnalysisPlatform effective_platform(const executors::ExecutorKind &executor, AnalysisPlatform platform);
 
 /// Compiles what the executor sees: peers do not know max_active. Errors: those of compile().
-[[nodiscard]] Result<System> compile_for(const sched::ExecutorKind &executor, const Workload &workload,
+[[nodiscard]] Result<System> compile_for(const executors::ExecutorKind &executor, const Workload &workload,
                                          const AnalysisPlatform &platform);
 
 }  // namespace redag::analysis

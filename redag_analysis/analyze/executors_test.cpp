@@ -17,9 +17,9 @@
 namespace redag::analysis {
 namespace {
 
-const sched::ExecutorKind &executor(std::string_view name) { return *sched::find_executor(name); }
+const executors::ExecutorKind &executor(std::string_view name) { return *executors::find_executor(name); }
 
-bool has_method(const sched::ExecutorKind &kind, std::string_view name) {
+bool has_method(const executors::ExecutorKind &kind, std::string_view name) {
   const std::vector<Method> &methods = methods_of(kind);
   return std::any_of(methods.begin(), methods.end(), [name](const Method &method) { return method.name == name; });
 }
@@ -33,7 +33,7 @@ void expect_holds(const Method &method, testing::BoundCaseLimits limits) {
   limits.max_period = 300;
   limits.min_utilization = 0.02;
   limits.max_utilization = 0.5;
-  for (const sched::ExecutorKind &kind : sched::executors()) {
+  for (const executors::ExecutorKind &kind : executors::all()) {
     if (kind.ours) continue;
     ASSERT_TRUE(has_method(kind, method.name)) << kind.name;
     limits.max_workers = kind.single_worker ? 1 : 4;

@@ -102,7 +102,7 @@ TEST(ExtremeTimes, NoBoundWraps) {
     Rng rng(seed);
     const testing::BoundCase drawn = any_case(rng);
     if (has_errors(validate(drawn.workload))) continue;
-    for (const sched::ExecutorKind &executor : sched::executors()) {
+    for (const executors::ExecutorKind &executor : executors::all()) {
       const Result<System> system = compile_for(executor, drawn.workload, drawn.platform);
       if (!system || !system->not_analysable.empty()) continue;
       ++analysed;

@@ -57,7 +57,7 @@ void count(const testing::BoundCaseLimits &limits, std::map<std::string, Count> 
     const testing::BoundCase coarse = with_tick(drawn, 100);
     const testing::BoundCase fine = with_tick(drawn, kMillisecond);
     for (const char *name : {"redag", "ste", "mte"}) {
-      const sched::ExecutorKind &executor = *sched::find_executor(name);
+      const executors::ExecutorKind &executor = *executors::find_executor(name);
       const auto before = compile_for(executor, coarse.workload, coarse.platform);
       const auto after = compile_for(executor, fine.workload, fine.platform);
       ASSERT_TRUE(before && after);

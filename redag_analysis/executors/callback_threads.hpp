@@ -10,20 +10,20 @@
 
 #include "redag/sched/lifecycle.hpp"
 
-namespace redag::sched {
+namespace redag::executors {
 
 /// Runs callbacks to completion; Lifecycle keeps the state of the jobs.
-class CallbackThreads : public Lifecycle {
+class CallbackThreads : public sched::Lifecycle {
  public:
   /// Does nothing: these executors know neither budgets nor criticality.
-  void exceed(JobSlot /*job*/, Limit /*limit*/, Time /*now*/) final {}
+  void exceed(JobSlot /*job*/, sched::Limit /*limit*/, Time /*now*/) final {}
   void preemption_point(JobSlot job, Time now) final;
-  Step dispatch(Time now, std::uint32_t most = kNoLimit) final;
+  sched::Step dispatch(Time now, std::uint32_t most = sched::kNoLimit) final;
   [[nodiscard]] bool outranked(JobSlot /*job*/) const final { return false; }
 
  protected:
   /// Requires config.workers > 0 and Preemption::None.
-  explicit CallbackThreads(const Config &config, TimerReleases timer_releases = TimerReleases::AsTheTaskSays);
+  explicit CallbackThreads(const sched::Config &config, TimerReleases timer_releases = TimerReleases::AsTheTaskSays);
 
   /// Removes and returns the ready job that a free thread runs next; kNil if there is none for it.
   virtual std::uint32_t take() = 0;
@@ -39,4 +39,4 @@ class CallbackThreads : public Lifecycle {
   std::vector<bool> working_;  // by thread
 };
 
-}  // namespace redag::sched
+}  // namespace redag::executors

@@ -8,9 +8,9 @@
 
 #include "redag/base/check.hpp"
 
-namespace redag::sched {
+namespace redag::executors {
 
-EventsScheduler::EventsScheduler(const Workload &workload, const Config &config, Kind kind)
+EventsScheduler::EventsScheduler(const Workload &workload, const sched::Config &config, Kind kind)
     : CallbackThreads(config, kind == Kind::Events ? TimerReleases::AllKept : TimerReleases::AsTheTaskSays),
       kind_(kind) {
   REDAG_CHECK(kind != Kind::Events || config.workers == 1, "rclcpp's EventsExecutor has one thread");
@@ -23,10 +23,10 @@ std::uint32_t EventsScheduler::take() {
     const std::uint32_t group = ready_groups_.front();
     ready_groups_.pop_front();
     const std::uint32_t slot = take_from(groups_[group]);
-    if (slot != kNil) return slot;
+    if (slot != sched::kNil) return slot;
     give_back(group);  // its only events were of messages that are gone: the turn is over at once
   }
-  return kNil;
+  return sched::kNil;
 }
 
 // Models FirstInFirstOutCallbackGroupHandle::get_next_ready_entity. An event of a timer without a job, or of a removed
@@ -38,9 +38,9 @@ std::uint32_t EventsScheduler::take_from(Group &group) {
     Entity &entity = entities_[task.value];
     if (!entity.ready.empty()) return entity.ready.pop(jobs_);
     entity.armed = true;
-    if (!tasks_[task.value].timer && tasks_[task.value].life == TaskLife::Live) return kNil;
+    if (!tasks_[task.value].timer && tasks_[task.value].life == TaskLife::Live) return sched::kNil;
   }
-  return kNil;
+  return sched::kNil;
 }
 
 void EventsScheduler::enqueue(TaskId task) {
@@ -103,9 +103,9 @@ void EventsScheduler::on_reconfigured() {
   }
   for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
     const std::uint32_t named = tasks_[t].group;
-    const std::uint32_t own = named == kNil ? 2 * t : 2 * named + 1;
+    const std::uint32_t own = named == sched::kNil ? 2 * t : 2 * named + 1;
     entities_[t].group = kind_ == Kind::Events ? 0 : own;
   }
 }
 
-}  // namespace redag::sched
+}  // namespace redag::executors

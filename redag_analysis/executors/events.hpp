@@ -13,7 +13,7 @@
 #include "redag_analysis/executors/callback_threads.hpp"
 #include "redag_analysis/executors/ready_jobs.hpp"
 
-namespace redag::sched {
+namespace redag::executors {
 
 /// An event says that a timer expired or a message arrived. It waits in a queue and names the entity, not the job. The
 /// thread that takes it runs the entity's oldest job. It runs nothing if there is no job left: a newer message took the
@@ -43,7 +43,7 @@ class EventsScheduler final : public CallbackThreads {
   enum class Kind : std::uint8_t { Events, CallbackGroups };
 
   /// Requires Preemption::None and config.workers > 0; Kind::Events requires 1 worker.
-  EventsScheduler(const Workload &workload, const Config &config, Kind kind);
+  EventsScheduler(const Workload &workload, const sched::Config &config, Kind kind);
 
  private:
   struct Entity {
@@ -76,4 +76,4 @@ class EventsScheduler final : public CallbackThreads {
   std::vector<TaskId> ended_;               // jobs whose group is still to go back
 };
 
-}  // namespace redag::sched
+}  // namespace redag::executors

@@ -16,7 +16,7 @@
 #include "redag_testing/named_executor.hpp"
 #include "redag_testing/random_workloads.hpp"
 
-namespace redag::sched {
+namespace redag::executors {
 namespace {
 
 using testing::NamedExecutor;
@@ -135,7 +135,7 @@ void keeps_groups_apart_and_workers_busy(std::string_view executor, std::uint64_
   Rng rng(seed);
   const Workload workload = testing::random_workload(rng);
   const std::vector<TaskRef> tasks = flatten(workload);
-  Config config;
+  sched::Config config;
   config.workers = static_cast<std::uint32_t>(rng.uniform(1, 3));
   const std::uint32_t workers = effective_config(*find_executor(executor), config).workers;
   const auto scheduler = make_scheduler(executor, workload, config);
@@ -143,11 +143,12 @@ void keeps_groups_apart_and_workers_busy(std::string_view executor, std::uint64_
     const Task &task = *tasks[id.value].task;
     return task.group.empty() ? std::to_string(id.value) : task.group;
   };
-  std::map<std::uint32_t, Dispatch> running;  // by worker
+  std::map<std::uint32_t, sched::Dispatch> running;  // by worker
   std::vector<std::int64_t> next(tasks.size(), 0);
   Time now = 0;
   const auto dispatch = [&] {
-    for (const Dispatch &d : scheduler->dispatch(now).dispatches) RC_ASSERT(running.emplace(d.worker.value, d).second);
+    for (const sched::Dispatch &d : scheduler->dispatch(now).dispatches)
+      RC_ASSERT(running.emplace(d.worker.value, d).second);
     std::map<std::string, int> held;
     for (const auto &[worker, d] : running) RC_ASSERT(++held[group_of(d.task)] == 1);
     if (running.size() == workers) return;
@@ -156,7 +157,8 @@ void keeps_groups_apart_and_workers_busy(std::string_view executor, std::uint64_
   const auto end_one = [&] {
     auto victim = running.begin();
     std::advance(victim, rng.uniform(0, static_cast<std::int64_t>(running.size()) - 1));
-    scheduler->complete(victim->second.job, now, rng.uniform01() < 0.1 ? Outcome::Threw : Outcome::Finished);
+    scheduler->complete(victim->second.job, now,
+                        rng.uniform01() < 0.1 ? sched::Outcome::Threw : sched::Outcome::Finished);
     running.erase(victim);
   };
   for (; now < 200; ++now) {
@@ -182,4 +184,4 @@ RC_GTEST_PROP(EventsCbg, KeepsGroupsApartAndWorkersBusy, (std::uint64_t seed)) {
 }
 
 }  // namespace
-}  // namespace redag::sched
+}  // namespace redag::executors

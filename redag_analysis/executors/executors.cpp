@@ -11,7 +11,7 @@
 #include "redag_analysis/executors/events.hpp"
 #include "redag_analysis/executors/wait_set.hpp"
 
-namespace redag::sched {
+namespace redag::executors {
 namespace {
 
 constexpr std::array<ExecutorKind, 6> kExecutors{{
@@ -25,7 +25,7 @@ constexpr std::array<ExecutorKind, 6> kExecutors{{
 
 }  // namespace
 
-std::span<const ExecutorKind> executors() { return kExecutors; }
+std::span<const ExecutorKind> all() { return kExecutors; }
 
 const ExecutorKind *find_executor(std::string_view name) {
   const auto *found = std::find_if(kExecutors.begin(), kExecutors.end(),
@@ -33,9 +33,9 @@ const ExecutorKind *find_executor(std::string_view name) {
   return found == kExecutors.end() ? nullptr : found;
 }
 
-Config effective_config(const ExecutorKind &kind, Config config) {
+sched::Config effective_config(const ExecutorKind &kind, sched::Config config) {
   if (!kind.ours) {
-    config.preemption = Preemption::None;
+    config.preemption = sched::Preemption::None;
     config.levels = 0;
     config.max_started = 0;
   }
@@ -43,11 +43,12 @@ Config effective_config(const ExecutorKind &kind, Config config) {
   return config;
 }
 
-std::unique_ptr<Scheduler> make_scheduler(std::string_view name, const Workload &workload, const Config &config) {
+std::unique_ptr<sched::Scheduler> make_scheduler(std::string_view name, const Workload &workload,
+                                                 const sched::Config &config) {
   const ExecutorKind *kind = find_executor(name);
   REDAG_CHECK(kind != nullptr, "an executor of that name does not exist");
-  const Config effective = effective_config(*kind, config);
-  if (name == "redag") return std::make_unique<PriorityScheduler>(workload, effective);
+  const sched::Config effective = effective_config(*kind, config);
+  if (name == "redag") return std::make_unique<sched::PriorityScheduler>(workload, effective);
   if (name == "events") {
     return std::make_unique<EventsScheduler>(workload, effective, EventsScheduler::Kind::Events);
   }
@@ -59,4 +60,4 @@ std::unique_ptr<Scheduler> make_scheduler(std::string_view name, const Workload 
                                             name == "static" ? Order::SubscriptionsFirst : Order::TimersFirst);
 }
 
-}  // namespace redag::sched
+}  // namespace redag::executors

@@ -10,7 +10,7 @@
 
 #include "redag/sched/scheduler.hpp"
 
-namespace redag::sched {
+namespace redag::executors {
 
 struct ExecutorKind {
   std::string_view name;         // as the user writes it
@@ -21,17 +21,17 @@ struct ExecutorKind {
 };
 
 /// All executors, ours first.
-[[nodiscard]] std::span<const ExecutorKind> executors();
+[[nodiscard]] std::span<const ExecutorKind> all();
 
 /// Returns nullptr for an unknown name.
 [[nodiscard]] const ExecutorKind *find_executor(std::string_view name);
 
 /// The configuration that the executor makes of `config`. A model of another executor has no preemption, levels or
 /// bound on threads, and some have one worker.
-[[nodiscard]] Config effective_config(const ExecutorKind &kind, Config config);
+[[nodiscard]] sched::Config effective_config(const ExecutorKind &kind, sched::Config config);
 
 /// Creates a scheduler for effective_config(). Requires a known name and what PriorityScheduler requires.
-[[nodiscard]] std::unique_ptr<Scheduler> make_scheduler(std::string_view name, const Workload &workload,
-                                                        const Config &config);
+[[nodiscard]] std::unique_ptr<sched::Scheduler> make_scheduler(std::string_view name, const Workload &workload,
+                                                               const sched::Config &config);
 
-}  // namespace redag::sched
+}  // namespace redag::executors

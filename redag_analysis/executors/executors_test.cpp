@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace redag::sched {
+namespace redag::executors {
 namespace {
 
 Workload two_timers() {
@@ -21,8 +21,8 @@ Workload two_timers() {
 }
 
 TEST(Executors, AreFoundByNameOursFirst) {
-  EXPECT_EQ(executors().front().name, "redag");
-  for (const ExecutorKind &kind : executors()) {
+  EXPECT_EQ(all().front().name, "redag");
+  for (const ExecutorKind &kind : all()) {
     EXPECT_EQ(find_executor(kind.name), &kind);
     EXPECT_FALSE(kind.description.empty());
   }
@@ -30,30 +30,30 @@ TEST(Executors, AreFoundByNameOursFirst) {
 }
 
 TEST(Executors, AModelOfRclcppDoesNotPreempt) {
-  const Config config{4, Preemption::Full, PolicyKind::RateMonotonic, 3, 8};
-  const Config mte = effective_config(*find_executor("mte"), config);
-  EXPECT_EQ(mte.preemption, Preemption::None);
+  const sched::Config config{4, sched::Preemption::Full, PolicyKind::RateMonotonic, 3, 8};
+  const sched::Config mte = effective_config(*find_executor("mte"), config);
+  EXPECT_EQ(mte.preemption, sched::Preemption::None);
   EXPECT_EQ(mte.workers, 4U);
   EXPECT_EQ(mte.levels + mte.max_started, 0U);
   EXPECT_EQ(effective_config(*find_executor("ste"), config).workers, 1U);
-  EXPECT_EQ(effective_config(*find_executor("redag"), config).preemption, Preemption::Full);
+  EXPECT_EQ(effective_config(*find_executor("redag"), config).preemption, sched::Preemption::Full);
 }
 
 // The faster of two timers is the second one: only our executor considers the rates.
 TEST(Executors, MakeSchedulersThatDifferInWhoIsFirst) {
-  for (const ExecutorKind &kind : executors()) {
-    const auto scheduler = make_scheduler(kind.name, two_timers(), Config{});
+  for (const ExecutorKind &kind : all()) {
+    const auto scheduler = make_scheduler(kind.name, two_timers(), sched::Config{});
     scheduler->release(TaskId(0), 0, 0);
     scheduler->release(TaskId(1), 0, 0);
-    const Step step = scheduler->dispatch(0);
+    const sched::Step step = scheduler->dispatch(0);
     ASSERT_EQ(step.dispatches.size(), 1U) << kind.name;
     EXPECT_EQ(step.dispatches[0].task, TaskId(kind.name == "redag" ? 1 : 0)) << kind.name;
   }
 }
 
 TEST(ExecutorsDeathTest, AnUnknownNameIsAMistakeOfTheCaller) {
-  EXPECT_DEATH(static_cast<void>(make_scheduler("cfs", two_timers(), Config{})), "does not exist");
+  EXPECT_DEATH(static_cast<void>(make_scheduler("cfs", two_timers(), sched::Config{})), "does not exist");
 }
 
 }  // namespace
-}  // namespace redag::sched
+}  // namespace redag::executors

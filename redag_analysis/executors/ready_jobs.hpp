@@ -10,33 +10,33 @@
 
 #include "redag/sched/job.hpp"
 
-namespace redag::sched {
+namespace redag::executors {
 
 struct ReadyJobs {
-  std::uint32_t first = kNil;
-  std::uint32_t last = kNil;
+  std::uint32_t first = sched::kNil;
+  std::uint32_t last = sched::kNil;
 
-  [[nodiscard]] bool empty() const { return first == kNil; }
+  [[nodiscard]] bool empty() const { return first == sched::kNil; }
 
-  void push(std::vector<Job> &jobs, std::uint32_t slot) {
-    jobs[slot].task_next = kNil;
-    (last == kNil ? first : jobs[last].task_next) = slot;
+  void push(std::vector<sched::Job> &jobs, std::uint32_t slot) {
+    jobs[slot].task_next = sched::kNil;
+    (last == sched::kNil ? first : jobs[last].task_next) = slot;
     last = slot;
   }
 
   /// Removes and returns the oldest job. Requires !empty().
-  std::uint32_t pop(std::vector<Job> &jobs) {
+  std::uint32_t pop(std::vector<sched::Job> &jobs) {
     const std::uint32_t slot = first;
     remove(jobs, slot);
     return slot;
   }
 
-  void remove(std::vector<Job> &jobs, std::uint32_t slot) {
-    std::uint32_t before = kNil;
+  void remove(std::vector<sched::Job> &jobs, std::uint32_t slot) {
+    std::uint32_t before = sched::kNil;
     for (std::uint32_t s = first; s != slot; s = jobs[s].task_next) before = s;
-    (before == kNil ? first : jobs[before].task_next) = jobs[slot].task_next;
+    (before == sched::kNil ? first : jobs[before].task_next) = jobs[slot].task_next;
     if (last == slot) last = before;
   }
 };
 
-}  // namespace redag::sched
+}  // namespace redag::executors

@@ -3,9 +3,9 @@
 
 #include "redag_analysis/executors/wait_set.hpp"
 
-namespace redag::sched {
+namespace redag::executors {
 
-WaitSetScheduler::WaitSetScheduler(const Workload &workload, const Config &config, Order order)
+WaitSetScheduler::WaitSetScheduler(const Workload &workload, const sched::Config &config, Order order)
     : CallbackThreads(config), order_(order) {
   load(workload);
 }
@@ -13,7 +13,7 @@ WaitSetScheduler::WaitSetScheduler(const Workload &workload, const Config &confi
 // Models Executor::get_next_executable: one free thread after the other takes from the window, or else from a new one.
 std::uint32_t WaitSetScheduler::take() {
   const std::uint32_t slot = take_from_window();
-  return slot == kNil && wait() ? take_from_window() : slot;
+  return slot == sched::kNil && wait() ? take_from_window() : slot;
 }
 
 // Models get_next_ready_executable: the first entity of the window whose group is free leaves the window. An entity
@@ -27,7 +27,7 @@ std::uint32_t WaitSetScheduler::take_from_window() {
     --room_[entity.group];
     return entity.ready.pop(jobs_);
   }
-  return kNil;
+  return sched::kNil;
 }
 
 // Models wait_for_work: forgets the old window, and fills the new one with the ready entities of free groups. Returns
@@ -60,13 +60,13 @@ void WaitSetScheduler::on_reconfigured() {
   for (std::uint32_t t = 0; t < tasks_.size(); ++t) {
     const std::uint32_t named = tasks_[t].group;
     Entity &entity = entities_[t];
-    entity.group = named == kNil ? t : static_cast<std::uint32_t>(tasks_.size()) + named;
-    if (named == kNil) room_[t] = tasks_[t].concurrency;
+    entity.group = named == sched::kNil ? t : static_cast<std::uint32_t>(tasks_.size()) + named;
+    if (named == sched::kNil) room_[t] = tasks_[t].concurrency;
     if (entity.ready.empty()) entity.in_window = false;  // this id may now be another task's
   }
-  for (const Job &job : jobs_) {
+  for (const sched::Job &job : jobs_) {
     if (job.started()) --room_[entities_[job.task.value].group];
   }
 }
 
-}  // namespace redag::sched
+}  // namespace redag::executors

@@ -12,7 +12,7 @@
 #include "redag_analysis/executors/callback_threads.hpp"
 #include "redag_analysis/executors/ready_jobs.hpp"
 
-namespace redag::sched {
+namespace redag::executors {
 
 /// Modelled (rclcpp/src/rclcpp/executor.cpp and allocator_memory_strategy.hpp):
 /// - A wait returns the set of ready entities (Executor::wait_for_work, collect_entities, remove_null_handles).
@@ -40,7 +40,7 @@ class WaitSetScheduler final : public CallbackThreads {
 
   /// Requires config.workers > 0 and Preemption::None. With 1 worker it is the SingleThreadedExecutor or, with
   /// subscriptions first, the static one.
-  WaitSetScheduler(const Workload &workload, const Config &config, Order order);
+  WaitSetScheduler(const Workload &workload, const sched::Config &config, Order order);
 
  private:
   /// A task as rclcpp sees it: a timer or a subscription.
@@ -66,4 +66,4 @@ class WaitSetScheduler final : public CallbackThreads {
                                              // named ones
 };
 
-}  // namespace redag::sched
+}  // namespace redag::executors

@@ -17,7 +17,7 @@
 #include "redag_testing/named_executor.hpp"
 #include "redag_testing/random_workloads.hpp"
 
-namespace redag::sched {
+namespace redag::executors {
 namespace {
 
 using testing::NamedExecutor;
@@ -82,7 +82,7 @@ TEST(SingleThreaded, AnEntityIsTakenOnceAWindowSoNobodyStarves) {
 TEST(SingleThreaded, AnAbortedJobFeedsNobody) {
   NamedExecutor ste = single_threaded({{timer("source"), subscription("sink", {0})}});
   EXPECT_EQ(ste.release_and_dispatch({"source"}), Names{"source"});
-  EXPECT_EQ(ste.end("source", Outcome::Threw), Names{});
+  EXPECT_EQ(ste.end("source", sched::Outcome::Threw), Names{});
 }
 
 TEST(SingleThreaded, ARemovedDagLeavesTheWindow) {
@@ -156,15 +156,15 @@ RC_GTEST_PROP(WaitSet, KeepsGroupsApartAndWorkersBusy, (std::uint64_t seed)) {
   const Workload workload = testing::random_workload(rng);
   const std::vector<TaskRef> tasks = flatten(workload);
   const auto workers = static_cast<std::uint32_t>(rng.uniform(1, 3));
-  Config config;
+  sched::Config config;
   config.workers = workers;
   const auto scheduler = make_scheduler("mte", workload, config);
   const auto group_of = [&](TaskId id) {
     const Task &task = *tasks[id.value].task;
     return task.group.empty() ? std::to_string(id.value) : task.group;
   };
-  std::map<std::uint32_t, Dispatch> running;  // by worker
-  std::map<std::uint32_t, int> ready;         // by task
+  std::map<std::uint32_t, sched::Dispatch> running;  // by worker
+  std::map<std::uint32_t, int> ready;                // by task
   std::vector<std::int64_t> next(tasks.size(), 0);
   for (int i = 0; i < 200; ++i) {
     const auto t = static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(tasks.size()) - 1));
@@ -174,19 +174,20 @@ RC_GTEST_PROP(WaitSet, KeepsGroupsApartAndWorkersBusy, (std::uint64_t seed)) {
     } else if (!running.empty()) {
       auto victim = running.begin();
       std::advance(victim, rng.uniform(0, static_cast<std::int64_t>(running.size()) - 1));
-      scheduler->complete(victim->second.job, i, rng.uniform01() < 0.1 ? Outcome::Threw : Outcome::Finished);
+      scheduler->complete(victim->second.job, i,
+                          rng.uniform01() < 0.1 ? sched::Outcome::Threw : sched::Outcome::Finished);
       running.erase(victim);
     }
     if (rng.uniform01() < 0.3) continue;
 
-    const Step step = scheduler->dispatch(i);
+    const sched::Step step = scheduler->dispatch(i);
     for (const JobEvent &event : step.events) {
       if (event.kind == JobEventKind::Ready) ++ready[event.task.value];
       if (event.kind == JobEventKind::Dispatched) --ready[event.task.value];
       if (event.kind == JobEventKind::Skipped && event.reason == Reason::Overrun) --ready[event.task.value];
       RC_ASSERT(event.kind != JobEventKind::Deferred && event.kind != JobEventKind::Preempted);
     }
-    for (const Dispatch &d : step.dispatches) RC_ASSERT(running.emplace(d.worker.value, d).second);
+    for (const sched::Dispatch &d : step.dispatches) RC_ASSERT(running.emplace(d.worker.value, d).second);
     const auto room_of = [&](TaskId id) { return tasks[id.value].task->concurrency; };
     std::map<std::string, std::uint32_t> held;
     for (const auto &[worker, d] : running) RC_ASSERT(++held[group_of(d.task)] <= room_of(d.task));
@@ -196,4 +197,4 @@ RC_GTEST_PROP(WaitSet, KeepsGroupsApartAndWorkersBusy, (std::uint64_t seed)) {
 }
 
 }  // namespace
-}  // namespace redag::sched
+}  // namespace redag::executors

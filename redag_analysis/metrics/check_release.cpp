@@ -26,7 +26,7 @@ std::string expected_and_got(const char *what, std::int64_t expected, std::int64
 
 ReleaseRules::ReleaseRules(CheckContext &context) : context_(context) {
   const Workload &workload = context.info.workload;
-  const sched::ExecutorKind *kind = sched::find_executor(context.info.executor);
+  const executors::ExecutorKind *kind = executors::find_executor(context.info.executor);
   const bool keeps_timers = kind != nullptr && kind->keeps_releases;
   tasks_.resize(workload.task_count());
   removed_.resize(workload.dags.size(), false);

@@ -24,9 +24,9 @@ std::uint32_t pick(Rng &rng, std::int64_t low, std::int64_t high) {
   return static_cast<std::uint32_t>(rng.uniform(low, high));
 }
 
-GenerateOptions random_options(Rng &rng) {
+lab::GenerateOptions random_options(Rng &rng) {
   constexpr std::array kModes = {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Auto};
-  GenerateOptions options;
+  lab::GenerateOptions options;
   options.dags = pick(rng, 1, 4);
   options.min_tasks = 1;
   options.max_tasks = pick(rng, 2, 7);
@@ -36,8 +36,8 @@ GenerateOptions random_options(Rng &rng) {
   // Overload is included, but never more than the smallest number of tasks can have.
   options.utilization = std::min(options.workers * (0.3 + rng.uniform01()), 0.9 * options.dags);
   options.period_max = 50 * kMillisecond;
-  options.rates = coin(rng) ? RateScope::PerDag : RateScope::PerTask;
-  options.shape = static_cast<DagShape>(rng.uniform(0, 4));
+  options.rates = coin(rng) ? lab::RateScope::PerDag : lab::RateScope::PerTask;
+  options.shape = static_cast<lab::DagShape>(rng.uniform(0, 4));
   options.data_share = rng.uniform01();
   options.bcet_min = 0.5;
   options.offsets = coin(rng);
@@ -83,7 +83,7 @@ trace::RunInfo drawn(std::uint64_t seed) {
 
 trace::Trace simulated(trace::RunInfo info, Duration horizon) {
   trace::Trace trace{std::move(info), {}};
-  const auto scheduler = sched::make_scheduler(trace.info.executor, trace.info.workload, trace.info.config);
+  const auto scheduler = executors::make_scheduler(trace.info.executor, trace.info.workload, trace.info.config);
   sim::Options options;
   options.horizon = horizon;
   options.seed = trace.info.seed;
@@ -103,15 +103,15 @@ RC_GTEST_PROP(SimulatedTraces, KeepEveryRule, ()) {
   RC_ASSERT(report.ok());
 }
 
-trace::RunInfo on_peer(trace::RunInfo info, const sched::ExecutorKind &peer) {
+trace::RunInfo on_peer(trace::RunInfo info, const executors::ExecutorKind &peer) {
   info.executor = peer.name;
-  info.config = sched::effective_config(peer, info.config);
+  info.config = executors::effective_config(peer, info.config);
   return info;
 }
 
 RC_GTEST_PROP(SimulatedTraces, OfPeersKeepTheRulesThatPeersHave, ()) {
   const auto seed = *rc::gen::arbitrary<std::uint64_t>();
-  for (const sched::ExecutorKind &kind : sched::executors()) {
+  for (const executors::ExecutorKind &kind : executors::all()) {
     if (kind.ours) continue;
     const trace::Trace trace = simulated(on_peer(drawn(seed), kind), 100 * kMillisecond);
     const CheckReport report = check_trace(trace, rules_for(trace.info));
@@ -134,7 +134,7 @@ TEST(SimulatedTraces, AnExecutorThatLosesPeriodsIsNotTheEventsExecutor) {
   info.workload.dags[1].tasks = {heavy};
   info.driver = trace::Driver::Simulator;
   for (const char *executor : {"ste", "events"}) {
-    trace::Trace trace = simulated(on_peer(info, *sched::find_executor(executor)), 100 * kMillisecond);
+    trace::Trace trace = simulated(on_peer(info, *executors::find_executor(executor)), 100 * kMillisecond);
     EXPECT_TRUE(check_trace(trace, rules_for(trace.info)).ok()) << executor;
     trace.info.executor = trace.info.executor == "ste" ? "events" : "ste";
     EXPECT_GT(check_trace(trace, rules_for(trace.info)).violated(Rule::Admission), 0U) << executor;

@@ -107,7 +107,7 @@ class Checker {
 };
 
 bool is_peer(const std::string &executor) {
-  const sched::ExecutorKind *kind = sched::find_executor(executor);
+  const executors::ExecutorKind *kind = executors::find_executor(executor);
   return kind != nullptr && !kind->ours;
 }
 

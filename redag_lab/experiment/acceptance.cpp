@@ -56,8 +56,8 @@ std::string describe(const AcceptancePoint &point) {
 
 std::uint64_t unit_count(const AcceptancePlan &plan) { return points_of(plan).size() * plan.sets; }
 
-GenerateOptions generate_options(const AcceptancePlan &plan, const AcceptancePoint &point) {
-  GenerateOptions options = plan.workload;
+lab::GenerateOptions generate_options(const AcceptancePlan &plan, const AcceptancePoint &point) {
+  lab::GenerateOptions options = plan.workload;
   options.dags = point.dags;
   options.workers = point.workers;
   options.preemption = point.preemption;

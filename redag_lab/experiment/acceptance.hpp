@@ -27,7 +27,7 @@ inline constexpr char kAcceptedUnsound = 'u';  // accepted by the paper's equati
 [[nodiscard]] std::uint64_t unit_count(const AcceptancePlan &plan);
 
 /// Returns the generator's options at a point.
-[[nodiscard]] GenerateOptions generate_options(const AcceptancePlan &plan, const AcceptancePoint &point);
+[[nodiscard]] lab::GenerateOptions generate_options(const AcceptancePlan &plan, const AcceptancePoint &point);
 
 /// Draws workload number `repetition` of a point. Points that differ only in preemption have the same workloads. In a
 /// DAG of several tasks the deadline is end to end. Errors: those of generate().

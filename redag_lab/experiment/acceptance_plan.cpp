@@ -108,8 +108,8 @@ class Checker {
     }
     std::uint64_t to_draw = 100'000;  // tasks, about a third of a second of drawing
     for (const AcceptancePoint &point : points_of(plan_)) {
-      const GenerateOptions options = generate_options(plan_, point);
-      Diagnostics mistakes = redag::find_mistakes(options);
+      const lab::GenerateOptions options = generate_options(plan_, point);
+      Diagnostics mistakes = lab::find_mistakes(options);
       const std::uint64_t tasks = std::uint64_t{options.dags} * options.max_tasks;
       if (mistakes.empty() && tasks > kMostTasks) {
         say("dags", fmt::format("{}: up to {} tasks a workload, more than {}", describe(point), tasks, kMostTasks));

@@ -37,7 +37,7 @@ struct AcceptancePlan {
   std::vector<PreemptionMode> preemption = {PreemptionMode::None, PreemptionMode::Os};
   std::vector<std::string> methods = {std::string(kAnyMethod), std::string(kSimulationMethod)};
   /// Common to all points; a point's own values replace these.
-  GenerateOptions workload;
+  lab::GenerateOptions workload;
   SimulationEffort simulation;
 
   /// The default plan has single-task DAGs and utilizations from 0.05 to 1 in steps of 0.05.

@@ -34,11 +34,11 @@ TEST(AcceptancePlan, TextReadsBackAsTheSamePlan) {
   plan.simulation = {0, 3};
   plan.workload.min_tasks = 3;
   plan.workload.max_tasks = 8;
-  plan.workload.shape = DagShape::ForkJoin;
+  plan.workload.shape = lab::DagShape::ForkJoin;
   plan.workload.edge_probability = 0.1;
   plan.workload.max_active_max = 2;
   plan.workload.max_active_min = 2;
-  plan.workload.periods = PeriodModel::Robot;
+  plan.workload.periods = lab::PeriodModel::Robot;
   plan.workload.period_min = 1'500'000;
   plan.workload.jitter = 0.05;
   const Result<AcceptancePlan> read = parse_acceptance_plan(to_yaml(plan), "plan.yaml");

@@ -99,7 +99,7 @@ Result<Workload> Factorial::workload_of(const FactorialPoint &point, std::uint64
   const double wanted =
       utilization_level == kNoLevel ? 0 : share(plan_.utilization[utilization_level]) * static_cast<double>(workers);
   if (source.random) {
-    GenerateOptions options = *source.random;
+    lab::GenerateOptions options = *source.random;
     options.workers = workers;
     options.utilization = wanted;
     Result<Workload> drawn = generate(options, derive_seed(plan_.seed, {source_level, repetition}));

@@ -51,7 +51,7 @@ bool is_redag(std::string_view executor) { return family_of(executor) == "redag"
 // True if this factor affects this executor.
 bool applies(const FactorialPlan &plan, FactorKind kind, std::string_view executor) {
   const std::string_view family = family_of(executor);
-  const sched::ExecutorKind *kind_of = sched::find_executor(family);
+  const executors::ExecutorKind *kind_of = executors::find_executor(family);
   const bool has_workers = family != kUnlimited && (kind_of == nullptr || !kind_of->single_worker);
   switch (kind) {
     case FactorKind::Policy:

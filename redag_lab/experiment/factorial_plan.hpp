@@ -41,7 +41,7 @@ inline constexpr std::string_view kUnlimited = "unlimited";
 struct WorkloadSource {
   std::string name;
   Workload workload;
-  std::optional<GenerateOptions> random;
+  std::optional<lab::GenerateOptions> random;
 };
 
 /// Numbers with a fraction are in millionths (kMillion is 1). An empty list means the workload's own value.

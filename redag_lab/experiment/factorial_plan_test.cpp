@@ -78,7 +78,7 @@ TEST(FactorialPlan, CanonicalTextGivesThePlanBack) {
   const FactorialPlan again = parsed(text);
   EXPECT_EQ(to_yaml(again), text);
   EXPECT_EQ(again.workloads.at(0).workload, plan.workloads.at(0).workload);
-  EXPECT_EQ(again.workloads.at(1).random->shape, DagShape::Chain);
+  EXPECT_EQ(again.workloads.at(1).random->shape, lab::DagShape::Chain);
   EXPECT_EQ(again.workloads.at(1).random->deadline_min, 0.6);
   EXPECT_EQ(points_of(again), points_of(plan));
 }

@@ -123,7 +123,7 @@ class Reader : private PlanReader {
     std::vector<std::string_view> keys = generation_keys();
     keys.insert(keys.begin(), {"dags", "workers", "bcet", "deadline"});
     if (!check_map(node, "random", keys)) return std::nullopt;
-    WorkloadSource source{std::move(name), {}, GenerateOptions{}};
+    WorkloadSource source{std::move(name), {}, lab::GenerateOptions{}};
     take_count(node, "dags", source.random->dags, 1);
     take_count(node, "workers", source.random->workers, 1);
     take_number(node, "bcet", source.random->bcet_min);

@@ -42,10 +42,10 @@ trace::Trace simulated(Workload workload, const std::string &executor, std::uint
   trace::Trace trace;
   trace.info.workload = workload;
   trace.info.executor = executor;
-  trace.info.config = sched::effective_config(*sched::find_executor(executor), sched::config_of(workload));
+  trace.info.config = executors::effective_config(*executors::find_executor(executor), sched::config_of(workload));
   trace.info.seed = seed;
   trace.info.end = duration;
-  const auto scheduler = sched::make_scheduler(executor, workload, trace.info.config);
+  const auto scheduler = executors::make_scheduler(executor, workload, trace.info.config);
   sim::Options options;
   options.horizon = duration;
   options.seed = seed;

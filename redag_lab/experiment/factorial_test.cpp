@@ -44,15 +44,15 @@ Result<FinishedRun> simulate_run(const PlannedRun &planned) {
   Workload workload = planned.workload;
   const std::string name = planned.executor.substr(0, planned.executor.find('-'));
   if (name != planned.executor || name != "redag") workload.platform.preemption = PreemptionMode::None;
-  const sched::ExecutorKind *kind = sched::find_executor(name);
+  const executors::ExecutorKind *kind = executors::find_executor(name);
   FinishedRun run;
   run.trace.info.workload = workload;
   run.trace.info.executor = name;
-  run.trace.info.config = sched::effective_config(*kind, sched::config_of(workload));
+  run.trace.info.config = executors::effective_config(*kind, sched::config_of(workload));
   run.trace.info.preemption = trace::preemption_name(run.trace.info.config.preemption);
   run.trace.info.seed = planned.seed;
   run.trace.info.end = planned.duration;
-  const auto scheduler = sched::make_scheduler(name, workload, run.trace.info.config);
+  const auto scheduler = executors::make_scheduler(name, workload, run.trace.info.config);
   sim::Options options;
   options.horizon = planned.duration;
   options.seed = planned.seed;
@@ -144,7 +144,7 @@ TEST(Factorial, RepetitionsHaveTheirOwnJobsTheSameForEveryExecutor) {
 
 TEST(Factorial, RandomWorkloadsAreDrawnByRepetition) {
   FactorialPlan plan = plan_of("repetitions: 2\nexecutors: [redag, mte]\nutilization: [0.5, 0.9]\nworkers: 2\n");
-  plan.workloads = {WorkloadSource{"drawn", {}, GenerateOptions{}}};
+  plan.workloads = {WorkloadSource{"drawn", {}, lab::GenerateOptions{}}};
   const Factorial factorial(plan, simulate_run);
   EXPECT_EQ(planned(factorial, 0).workload, planned(factorial, 1).workload);
   EXPECT_NE(planned(factorial, 0).workload, planned(factorial, 4).workload);

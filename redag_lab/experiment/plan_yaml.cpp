@@ -21,11 +21,11 @@ using yaml::find;
 constexpr double kMillionth = 1e6;
 constexpr std::array<std::string_view, 2> kExperiments = {"acceptance", "factorial"};
 
-constexpr std::array kShapes = {DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain,
-                                DagShape::Independent};
-constexpr std::array kPeriods = {PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive,
-                                 PeriodModel::Robot};
-constexpr std::array kUtilizations = {UtilizationMethod::Drs, UtilizationMethod::UUniFastDiscard};
+constexpr std::array kShapes = {lab::DagShape::Layered, lab::DagShape::ErdosRenyi, lab::DagShape::ForkJoin,
+                                lab::DagShape::Chain, lab::DagShape::Independent};
+constexpr std::array kPeriods = {lab::PeriodModel::LogUniform, lab::PeriodModel::Harmonic, lab::PeriodModel::Automotive,
+                                 lab::PeriodModel::Robot};
+constexpr std::array kUtilizations = {lab::UtilizationMethod::Drs, lab::UtilizationMethod::UUniFastDiscard};
 
 // Parses a number into millionths; numbers above 1000 are refused.
 std::optional<std::uint32_t> millionths(std::string_view text) {
@@ -138,7 +138,7 @@ const std::vector<std::string_view> &PlanReader::generation_keys() {
   return kKeys;
 }
 
-void PlanReader::take_generation(const Node &map, GenerateOptions &out) {
+void PlanReader::take_generation(const Node &map, lab::GenerateOptions &out) {
   take_tasks(map, out);
   take_enum(map, "shape", out.shape, kShapes);
   take_number(map, "edge_probability", out.edge_probability);
@@ -154,7 +154,7 @@ void PlanReader::take_generation(const Node &map, GenerateOptions &out) {
   take_enum(map, "utilization_method", out.method, kUtilizations);
 }
 
-void PlanReader::take_tasks(const Node &map, GenerateOptions &out) {
+void PlanReader::take_tasks(const Node &map, lab::GenerateOptions &out) {
   const Node *node = find(map, "tasks");
   if (node == nullptr) return;
   if (node->kind == Node::Kind::Map) {
@@ -184,7 +184,7 @@ Result<std::vector<std::uint32_t>> parse_range(std::string_view text) {
   return range;
 }
 
-std::string generation_yaml(const GenerateOptions &options, std::string_view indentation) {
+std::string generation_yaml(const lab::GenerateOptions &options, std::string_view indentation) {
   std::string text;
   const auto line = [&](std::string_view key, const std::string &value) {
     text += fmt::format("{}{}: {}\n", indentation, key, value);

@@ -86,19 +86,19 @@ class PlanReader : protected yaml::ValueReader {
   /// Returns the keys of take_generation().
   [[nodiscard]] static const std::vector<std::string_view> &generation_keys();
   /// Takes the options of random workloads, except those that an experiment varies.
-  void take_generation(const Node &map, GenerateOptions &out);
+  void take_generation(const Node &map, lab::GenerateOptions &out);
 
  private:
   /// True if the root can be read as a plan. A wrong kind is reported, but does not prevent reading.
   bool is_plan(const Node &root, std::string_view kind, const std::vector<std::string_view> &keys);
-  void take_tasks(const Node &map, GenerateOptions &out);
+  void take_tasks(const Node &map, lab::GenerateOptions &out);
 };
 
 /// Parses "0.05:1:0.05" (from:to:step) or "0.1,0.5" into millionths. Error: another form.
 [[nodiscard]] Result<std::vector<std::uint32_t>> parse_range(std::string_view text);
 
 /// Writes the keys of take_generation(), one per line.
-[[nodiscard]] std::string generation_yaml(const GenerateOptions &options, std::string_view indentation);
+[[nodiscard]] std::string generation_yaml(const lab::GenerateOptions &options, std::string_view indentation);
 
 /// Returns the list as "[1, 2]".
 template <class Values, class Text>

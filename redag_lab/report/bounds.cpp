@@ -45,7 +45,7 @@ std::vector<BoundOf> by_id(const std::vector<analysis::Tightest> &all) {
 }  // namespace
 
 RunBounds bounds_of(const trace::RunInfo &run) {
-  const sched::ExecutorKind *executor = sched::find_executor(run.executor);
+  const executors::ExecutorKind *executor = executors::find_executor(run.executor);
   if (executor == nullptr) return none("there is no analysis of the executor '" + run.executor + "'");
   if (run.workload.task_count() > kMostTasks) {
     return none(fmt::format("more than {} tasks: 'redag analyze' takes its time for them", kMostTasks));

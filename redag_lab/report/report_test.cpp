@@ -31,12 +31,12 @@ trace::Trace simulated(const Workload &workload, Duration length, const std::str
   trace::Trace trace = TraceBuilder(workload).until(length / kMillisecond);
   trace.info.executor = executor;
   trace.info.seed = seed;
-  trace.info.config = sched::effective_config(*sched::find_executor(executor), trace.info.config);
+  trace.info.config = executors::effective_config(*executors::find_executor(executor), trace.info.config);
   trace.info.preemption = trace::preemption_name(trace.info.config.preemption);
   sim::Options options;
   options.horizon = length;
   options.seed = seed;
-  const auto scheduler = sched::make_scheduler(executor, workload, trace.info.config);
+  const auto scheduler = executors::make_scheduler(executor, workload, trace.info.config);
   sim::simulate(workload, *scheduler, trace.info.config.workers, options, [&](std::span<const JobEvent> events) {
     trace.events.insert(trace.events.end(), events.begin(), events.end());
     return true;

@@ -28,7 +28,7 @@
 #include "redag_lab/run/run_workload.hpp"
 #include "redag_lab/run/stall_probe.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 namespace {
 
 constexpr Duration kShortestSlice = 250 * kMillisecond;
@@ -160,7 +160,7 @@ class TimerWatch {
       const JobEvent &event = events[seen_];
       if (event.kind == JobEventKind::Released && is_timer_[event.task.value]) ++releases_;
     }
-    const Duration used = cpu_now(*clock_);
+    const Duration used = runtime::cpu_now(*clock_);
     constexpr std::uint64_t kEnough = 20;  // releases, for a meaningful mean
     if (last_used_ && releases_ >= kEnough) {
       each_.push_back((used - *last_used_) / static_cast<Duration>(releases_));
@@ -189,11 +189,11 @@ class Noted {
  public:
   explicit Noted(std::size_t tasks) : absences_(tasks) {}
 
-  Body body(const Task &task, TaskId id, const Now &now) {
+  runtime::Body body(const Task &task, TaskId id, const Now &now) {
     std::vector<Absence> &absences = absences_[id.value];
     constexpr std::size_t kMost = std::size_t{1} << 15U;
     absences.reserve(kMost);
-    return [&absences, now, demand = task.wcet](const Job & /*job*/) {
+    return [&absences, now, demand = task.wcet](const runtime::Job & /*job*/) {
       Time last = now();
       Duration next_point = kRegion;
       for (Duration used = job_cpu_time(); used < demand; used = job_cpu_time()) {
@@ -219,15 +219,15 @@ class Noted {
 
 Duration clock_cost(std::vector<Duration> &thread_clock, std::vector<Duration> &steady_clock) {
   constexpr int kReadings = 20'000;
-  Duration before = thread_cpu_now();
+  Duration before = runtime::thread_cpu_now();
   for (int i = 0; i < kReadings; ++i) {
-    const Duration now = thread_cpu_now();
+    const Duration now = runtime::thread_cpu_now();
     thread_clock.push_back(now - before);
     before = now;
   }
-  Time earlier = monotonic_now();
+  Time earlier = runtime::monotonic_now();
   for (int i = 0; i < kReadings; ++i) {
-    const Time now = monotonic_now();
+    const Time now = runtime::monotonic_now();
     steady_clock.push_back(now - earlier);
     earlier = now;
   }
@@ -237,19 +237,19 @@ Duration clock_cost(std::vector<Duration> &thread_clock, std::vector<Duration> &
 
 class Calibrating {
  public:
-  explicit Calibrating(const CalibrateOptions &options) : options_(options), band_(probe_priority_band()) {}
+  explicit Calibrating(const CalibrateOptions &options) : options_(options), band_(runtime::probe_priority_band()) {}
 
   Result<Calibration> run() {
-    const std::size_t cpus = usable_cpus().size();
+    const std::size_t cpus = runtime::usable_cpus().size();
     workload_ = calibration_workload(static_cast<std::uint32_t>(cpus));
     std::vector<Duration> thread_clock;
     std::vector<Duration> steady_clock;
     clock_ = clock_cost(thread_clock, steady_clock);
     result_.measured.push_back(measured("thread_clock", "any", "idle", std::move(thread_clock)));
     result_.measured.push_back(measured("steady_clock", "any", "idle", std::move(steady_clock)));
-    const Time begun = monotonic_now();
+    const Time begun = runtime::monotonic_now();
     if (Result<void> done = measure(cpus); !done) return tl::unexpected(done.error());
-    result_.duration = monotonic_now() - begun;
+    result_.duration = runtime::monotonic_now() - begun;
     return conclude(cpus);
   }
 
@@ -322,7 +322,7 @@ class Calibrating {
     run.preemption = slice.realtime ? PreemptionMode::Os : PreemptionMode::Cooperative;
     run.stop = options_.stop;
     run.seed = ++seed_;
-    run.bodies = [&](std::vector<Body> bodies, const Now &now) {
+    run.bodies = [&](std::vector<runtime::Body> bodies, const Now &now) {
       for (const TaskRef &ref : flatten(workload_)) {
         if (ref.task->name == kLong) bodies[ref.id.value] = noted.body(*ref.task, ref.id, now);
       }
@@ -396,7 +396,7 @@ class Calibrating {
   }
 
   const CalibrateOptions &options_;
-  PriorityBand band_;
+  runtime::PriorityBand band_;
   Workload workload_;
   Duration clock_ = 0;
   std::uint64_t seed_ = 0;
@@ -487,4 +487,4 @@ Duration usual_delay(std::span<const LossSample> delays, Duration watched, Loss 
 
 Result<Calibration> calibrate(const CalibrateOptions &options) { return Calibrating(options).run(); }
 
-}  // namespace redag::runtime
+}  // namespace redag::lab

@@ -18,7 +18,7 @@
 #include "redag/model/workload.hpp"
 #include "redag_lab/run/stall_probe.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 
 struct CalibrateOptions {
   Duration duration = 30 * kSecond;
@@ -62,4 +62,4 @@ struct TraceFigures {
 [[nodiscard]] TraceFigures figures_of(const Workload &workload, std::span<const JobEvent> events,
                                       const std::vector<std::vector<Absence>> &absences);
 
-}  // namespace redag::runtime
+}  // namespace redag::lab

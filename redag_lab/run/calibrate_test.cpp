@@ -11,7 +11,7 @@
 #include "redag_lab/run/stall_probe.hpp"
 #include "redag_testing/trace_builder.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 namespace {
 
 constexpr Duration kUs = kMicrosecond;
@@ -130,4 +130,4 @@ TEST(Calibration, EndsWhenTold) {
 }
 
 }  // namespace
-}  // namespace redag::runtime
+}  // namespace redag::lab

@@ -7,7 +7,7 @@
 #include <set>
 #include <string_view>
 
-namespace redag {
+namespace redag::lab {
 
 std::uint64_t most_started(const Workload &workload) {
   std::set<std::string_view> all_groups;
@@ -31,4 +31,4 @@ std::uint64_t most_started(const Workload &workload) {
   return std::min(by_dag, ungrouped + all_groups.size());
 }
 
-}  // namespace redag
+}  // namespace redag::lab

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace redag {
+namespace redag::lab {
 namespace {
 
 Task task(std::uint32_t concurrency, std::string group = "") {
@@ -45,4 +45,4 @@ TEST(MostStarted, CountsAGroupOnce) {
 }
 
 }  // namespace
-}  // namespace redag
+}  // namespace redag::lab

@@ -38,7 +38,7 @@ trace::Trace run_of(const Workload &workload, sched::Preemption mode, std::uint6
   trace.info.config.preemption = mode;
   trace.info.end = length;
   trace.info.warm_up = warm_up;
-  const auto scheduler = sched::make_scheduler("redag", workload, trace.info.config);
+  const auto scheduler = executors::make_scheduler("redag", workload, trace.info.config);
   sim::Options options;
   options.seed = seed;
   options.horizon = length;

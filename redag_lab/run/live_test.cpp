@@ -15,7 +15,7 @@
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_lab/run/run_workload.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 namespace {
 
 using namespace std::chrono_literals;
@@ -35,11 +35,13 @@ Dag dag(const char *name, std::vector<Task> tasks) {
   return dag;
 }
 
-std::unique_ptr<Engine> make_engine(const Workload &workload, bool measure, std::vector<Body> bodies) {
-  EngineOptions options;
+std::unique_ptr<runtime::Engine> make_engine(const Workload &workload, bool measure,
+                                             std::vector<runtime::Body> bodies) {
+  runtime::EngineOptions options;
   options.config.workers = 1;
   options.measure = measure;
-  auto engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+  auto engine =
+      std::make_unique<runtime::Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
   engine->bind(workload, std::move(bodies));
   return engine;
 }
@@ -50,18 +52,18 @@ TEST(Figures, SayWhereJobsAre) {
   Task after = timer("after", kSecond);
   after.predecessors = {1};
   workload.dags[0].tasks.push_back(after);
-  Event started;
-  Event go;
-  const Body nothing = [](const Job &) { return sched::Outcome::Finished; };
+  runtime::Event started;
+  runtime::Event go;
+  const runtime::Body nothing = [](const runtime::Job &) { return sched::Outcome::Finished; };
   const auto engine = make_engine(workload, true,
-                                  {[&](const Job &) {
+                                  {[&](const runtime::Job &) {
                                      started.set();
                                      go.wait();
                                      return sched::Outcome::Finished;
                                    },
                                    nothing, nothing});
   ASSERT_TRUE(engine->start());
-  engine->set_origin(monotonic_now() - 10 * kSecond);
+  engine->set_origin(runtime::monotonic_now() - 10 * kSecond);
   const Time now = engine->now();
   engine->release(TaskId(0), now - 5 * kSecond);  // five seconds late, and therefore past its deadline
   started.wait();
@@ -104,9 +106,9 @@ TEST(Figures, AJobThatThrowsIsAMissWithoutAResponse) {
   Workload workload;
   workload.dags = {dag("d", {timer("bad", kSecond)})};
   const auto engine =
-      make_engine(workload, true, {[](const Job &) -> sched::Outcome { throw std::runtime_error("no"); }});
+      make_engine(workload, true, {[](const runtime::Job &) -> sched::Outcome { throw std::runtime_error("no"); }});
   ASSERT_TRUE(engine->start());
-  engine->set_origin(monotonic_now());
+  engine->set_origin(runtime::monotonic_now());
   engine->release(TaskId(0), 0);
   while (engine->figures(TaskId(0)).jobs.aborted == 0) std::this_thread::yield();
   live::TaskSample task;
@@ -118,7 +120,7 @@ TEST(Figures, AJobThatThrowsIsAMissWithoutAResponse) {
 TEST(Figures, AreNotMeasuredUnasked) {
   Workload workload;
   workload.dags = {dag("d", {timer("t", kSecond)})};
-  const auto engine = make_engine(workload, false, {[](const Job &) { return sched::Outcome::Finished; }});
+  const auto engine = make_engine(workload, false, {[](const runtime::Job &) { return sched::Outcome::Finished; }});
   EXPECT_EQ(engine->figures(TaskId(0)).response, nullptr);
 }
 
@@ -130,18 +132,18 @@ std::optional<live::Page> own_page(const std::string &name) {
 }
 
 TEST(LiveExecutor, IsSeenWhileItRuns) {
-  ExecutorOptions options;
+  runtime::ExecutorOptions options;
   options.name = "live-test";
   options.workers = 1;
   options.preemption = PreemptionMode::None;
   options.live = true;
-  Executor executor(options);
+  runtime::Executor executor(options);
   EXPECT_TRUE(executor.warnings().empty()) << executor.warnings().front();
-  DagBuilder control("control", {.max_active = 2});
-  const TaskHandle imu = control.timer("imu", 5ms, [] {}, {.wcet = 300us});
+  runtime::DagBuilder control("control", {.max_active = 2});
+  const runtime::TaskHandle imu = control.timer("imu", 5ms, [] {}, {.wcet = 300us});
   control.data("ekf", {imu}, [] {});
   executor.add(std::move(control));
-  DagBuilder gone("gone");
+  runtime::DagBuilder gone("gone");
   gone.timer("t", 5ms, [] {});
   executor.remove(executor.add(std::move(gone)));
   executor.start();
@@ -165,11 +167,11 @@ TEST(LiveExecutor, IsSeenWhileItRuns) {
 }
 
 TEST(LiveExecutor, IsNotSeenUnasked) {
-  ExecutorOptions options;
+  runtime::ExecutorOptions options;
   options.name = "hidden-test";
   options.workers = 1;
   options.preemption = PreemptionMode::None;
-  Executor executor(options);
+  runtime::Executor executor(options);
   executor.start();
   EXPECT_FALSE(std::filesystem::exists(live::page_path(live::kFolder, ::getpid(), 0)));
 }
@@ -205,4 +207,4 @@ TEST(LiveRun, ShowsTheBoundsItIsGiven) {
 }
 
 }  // namespace
-}  // namespace redag::runtime
+}  // namespace redag::lab

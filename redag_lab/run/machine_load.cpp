@@ -11,16 +11,16 @@
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/parker.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 
 MachineLoad::~MachineLoad() {
   stop_.store(true);
-  for (ThreadHandle &thread : threads_) thread.join();
+  for (runtime::ThreadHandle &thread : threads_) thread.join();
 }
 
 Result<void> MachineLoad::start(std::size_t threads) {
   for (std::size_t i = 0; i < threads; ++i) {
-    Result<ThreadHandle> started = start_thread({"redag-load", 0, {}}, [this] { main(); });
+    Result<runtime::ThreadHandle> started = runtime::start_thread({"redag-load", 0, {}}, [this] { main(); });
     if (!started) return tl::unexpected(started.error());
     threads_.push_back(*std::move(started));
   }
@@ -30,13 +30,13 @@ Result<void> MachineLoad::start(std::size_t threads) {
 void MachineLoad::main() noexcept {
   // The memory exceeds a processor's caches, which evicts the jobs' data.
   std::vector<std::uint64_t> memory(std::size_t{1} << 20U);
-  Event never;
+  runtime::Event never;
   for (std::uint64_t round = 0; !stop_.load(); ++round) {
     for (std::uint64_t &word : memory) word = word * 3 + round;
     for (int i = 0; i < 100; ++i) (void)getppid();
     sched_yield();
-    if (round % 16 == 0) never.wait_until(monotonic_now() + 100 * kMicrosecond);
+    if (round % 16 == 0) never.wait_until(runtime::monotonic_now() + 100 * kMicrosecond);
   }
 }
 
-}  // namespace redag::runtime
+}  // namespace redag::lab

@@ -12,7 +12,7 @@
 #include "redag/base/result.hpp"
 #include "redag/runtime/threads.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 
 class MachineLoad {
  public:
@@ -28,7 +28,7 @@ class MachineLoad {
   void main() noexcept;
 
   std::atomic<bool> stop_{false};
-  std::vector<ThreadHandle> threads_;
+  std::vector<runtime::ThreadHandle> threads_;
 };
 
-}  // namespace redag::runtime
+}  // namespace redag::lab

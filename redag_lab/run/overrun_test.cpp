@@ -11,7 +11,7 @@
 #include "redag_lab/run/synthetic.hpp"
 #include "redag_testing/timeline.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 namespace {
 
 using redag::testing::make_dag;
@@ -25,8 +25,8 @@ metrics::AssumptionCheck run(Duration extra_of_first) {
   RunOptions options;
   options.duration = 600 * kMillisecond;
   options.preemption = PreemptionMode::None;
-  options.bodies = [&](std::vector<Body> bodies, const Now &) {
-    bodies[0] = [&give_up, extra_of_first](const Job &) {
+  options.bodies = [&](std::vector<runtime::Body> bodies, const Now &) {
+    bodies[0] = [&give_up, extra_of_first](const runtime::Job &) {
       burn(2 * kMillisecond + extra_of_first, 0, give_up);
       return sched::Outcome::Finished;
     };
@@ -54,4 +54,4 @@ TEST(Overrun, SyntheticBodiesKeepTheirWcet) {
 }
 
 }  // namespace
-}  // namespace redag::runtime
+}  // namespace redag::lab

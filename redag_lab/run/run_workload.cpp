@@ -21,7 +21,7 @@
 #include "redag_lab/run/concurrency.hpp"
 #include "redag_lab/run/synthetic.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 namespace {
 
 constexpr Duration kStartMargin = 20 * kMillisecond;  // from the threads being ready to time 0
@@ -52,7 +52,7 @@ class Run {
 
  private:
   Result<void> prepare() {
-    const sched::ExecutorKind *kind = sched::find_executor(options_.executor);
+    const executors::ExecutorKind *kind = executors::find_executor(options_.executor);
     if (kind == nullptr && !options_.scheduler) {
       return make_error(fmt::format("there is no executor '{}'", options_.executor));
     }
@@ -61,19 +61,19 @@ class Run {
     if (!mistakes.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes));
     const bool preemptive = kind == nullptr || kind->ours;
     const auto wanted = options_.preemption.value_or(workload_.platform.preemption);
-    Result<Setup> setup = set_up({.preemption = preemptive ? wanted : PreemptionMode::None,
-                                  .policy = workload_.policy,
-                                  .ties = workload_.ties,
-                                  .workers = workload_.platform.workers,
-                                  .threads = pool_size(workload_, options_),
-                                  .cpus = options_.cpus});
+    Result<runtime::Setup> setup = runtime::set_up({.preemption = preemptive ? wanted : PreemptionMode::None,
+                                                    .policy = workload_.policy,
+                                                    .ties = workload_.ties,
+                                                    .workers = workload_.platform.workers,
+                                                    .threads = pool_size(workload_, options_),
+                                                    .cpus = options_.cpus});
     if (!setup) return tl::unexpected(setup.error());
     result_.mode = setup->mode;
     if (!preemptive && wanted != PreemptionMode::None) {
       result_.mode.reason = "executor " + options_.executor + " has no other";
     }
     if (options_.realtime_threads && setup->band.top_job == 0) {
-      return make_error("the workers cannot be SCHED_FIFO threads: this process may not", realtime_hint());
+      return make_error("the workers cannot be SCHED_FIFO threads: this process may not", runtime::realtime_hint());
     }
     const std::uint32_t spins = spins_before_sleep(*setup, options_.spin);
     result_.warnings = std::move(setup->warnings);
@@ -91,7 +91,7 @@ class Run {
       }
     }
 
-    EngineOptions engine;
+    runtime::EngineOptions engine;
     engine.config = setup->config;
     engine.band = setup->band;
     engine.throttling = setup->throttling;
@@ -100,16 +100,17 @@ class Run {
     engine.trace_capacity = options_.trace_capacity;
     engine.measure = options_.live;
     engine.spins = spins;
-    if (options_.lock_memory) engine.touched_stack = kTouchedStack;
-    if (kind != nullptr) engine.config = sched::effective_config(*kind, engine.config);
+    if (options_.lock_memory) engine.touched_stack = runtime::kTouchedStack;
+    if (kind != nullptr) engine.config = executors::effective_config(*kind, engine.config);
     auto scheduler = options_.scheduler ? options_.scheduler(workload_, engine.config)
-                                        : sched::make_scheduler(options_.executor, workload_, engine.config);
-    engine_ = std::make_unique<Engine>(std::move(scheduler), std::move(engine));
-    std::vector<Body> bodies = synthetic_bodies(workload_, options_.seed, give_up_);
+                                        : executors::make_scheduler(options_.executor, workload_, engine.config);
+    engine_ = std::make_unique<runtime::Engine>(std::move(scheduler), std::move(engine));
+    std::vector<runtime::Body> bodies = synthetic_bodies(workload_, options_.seed, give_up_);
     if (options_.bodies)
       bodies = options_.bodies(std::move(bodies), [engine_ptr = engine_.get()] { return engine_ptr->now(); });
     engine_->bind(workload_, std::move(bodies));
-    timer_ = std::make_unique<ReleaseTimer>([this](auto releases) { engine_->release(releases); }, options_.seed);
+    timer_ =
+        std::make_unique<runtime::ReleaseTimer>([this](auto releases) { engine_->release(releases); }, options_.seed);
     std::size_t next = 0;
     for (const Dag &dag : workload_.dags) {
       std::vector<TaskId> tasks;
@@ -151,13 +152,13 @@ class Run {
 
   Result<void> start() {
     if (Result<void> started = engine_->start(); !started) return started;
-    origin_ = monotonic_now() + kStartMargin;
+    origin_ = runtime::monotonic_now() + kStartMargin;
     engine_->set_origin(origin_);
     const bool realtime = options_.realtime_threads || result_.mode.mode == PreemptionMode::Os;
     const int priority = realtime ? engine_->options().band.timer : 0;
     if (options_.watchdog) {
-      watchdog_ =
-          std::make_unique<Watchdog>(*engine_, *options_.watchdog, [this](const OverdueJob &job) { note(job); });
+      watchdog_ = std::make_unique<runtime::Watchdog>(*engine_, *options_.watchdog,
+                                                      [this](const runtime::OverdueJob &job) { note(job); });
       if (Result<void> started = watchdog_->start({"redag-watch", priority, {}}); !started) return started;
     }
     return timer_->start(origin_, options_.duration, {"redag-timer", priority, {}});
@@ -190,7 +191,7 @@ class Run {
     result_.trace.events.clear();
   }
 
-  void note(const OverdueJob &job) {
+  void note(const runtime::OverdueJob &job) {
     std::string text = fmt::format("{} #{} is overdue: {}", trace::task_name(workload_, job.job.task), job.job.number,
                                    runtime::describe(job));
     const LockGuard guard(notes_lock_);
@@ -211,8 +212,8 @@ class Run {
 
   // Returns false if started jobs remain after drain_timeout.
   bool wait_idle() {
-    const Time give_up = monotonic_now() + options_.drain_timeout;
-    for (Time now = monotonic_now();; now = monotonic_now()) {
+    const Time give_up = runtime::monotonic_now() + options_.drain_timeout;
+    for (Time now = runtime::monotonic_now();; now = runtime::monotonic_now()) {
       const bool idle = engine_->wait_idle(std::min(now + kCollectEvery, give_up));
       report_overdue();
       if (idle || now >= give_up) return idle;
@@ -221,8 +222,8 @@ class Run {
 
   void collect_until_horizon() {
     const Time end = origin_ + options_.duration;
-    Event never;
-    for (Time now = monotonic_now(); now < end; now = monotonic_now()) {
+    runtime::Event never;
+    for (Time now = runtime::monotonic_now(); now < end; now = runtime::monotonic_now()) {
       if (options_.stop != nullptr && options_.stop->load()) {
         result_.stopped = true;
         break;
@@ -241,7 +242,7 @@ class Run {
     timer_->join();
     engine_->halt();
     if (!wait_idle()) {
-      for (const Job &job : engine_->started()) {
+      for (const runtime::Job &job : engine_->started()) {
         result_.unfinished.push_back(fmt::format("{} #{}", trace::task_name(workload_, job.task), job.number));
       }
       give_up_.store(true);
@@ -316,10 +317,10 @@ class Run {
   std::vector<std::string> notes_ REDAG_GUARDED_BY(notes_lock_);  // from the watchdog, not yet reported
   std::atomic<bool> give_up_{false};
   std::optional<trace::FlightRecorder> flight_;
-  std::unique_ptr<Engine> engine_;
-  std::unique_ptr<ReleaseTimer> timer_;    // after the engine: it is destroyed first
-  std::unique_ptr<Watchdog> watchdog_;     // likewise
-  std::unique_ptr<live::Publisher> live_;  // after the engine, whose figures it reads until it is destroyed
+  std::unique_ptr<runtime::Engine> engine_;
+  std::unique_ptr<runtime::ReleaseTimer> timer_;  // after the engine: it is destroyed first
+  std::unique_ptr<runtime::Watchdog> watchdog_;   // likewise
+  std::unique_ptr<live::Publisher> live_;         // after the engine, whose figures it reads until it is destroyed
   Time origin_ = 0;
   Time end_ = 0;
 };
@@ -330,4 +331,4 @@ Result<RunResult> run_workload(const Workload &workload, const RunOptions &optio
   return Run(workload, options).execute();
 }
 
-}  // namespace redag::runtime
+}  // namespace redag::lab

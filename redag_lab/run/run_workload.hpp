@@ -22,7 +22,7 @@
 #include "redag/trace/flight_recorder.hpp"
 #include "redag/trace/trace.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 
 /// Creates the scheduler of a run: ours, or a model of another executor.
 using SchedulerFactory = std::function<std::unique_ptr<sched::Scheduler>(const Workload &, const sched::Config &)>;
@@ -47,9 +47,9 @@ struct RunOptions {
   std::size_t trace_capacity = std::size_t{1} << 17;  // events between two collections
   Duration drain_timeout = 5 * kSecond;               // for started jobs to end after the horizon
   /// Adds to the jobs' work or replaces it: receives the synthetic bodies by TaskId and returns as many.
-  std::function<std::vector<Body>(std::vector<Body> synthetic, const Now &now)> bodies;
+  std::function<std::vector<runtime::Body>(std::vector<runtime::Body> synthetic, const Now &now)> bodies;
   /// Reports overdue jobs while they still run, to on_overdue on the calling thread and in the result's `overdue`.
-  std::optional<WatchdogOptions> watchdog;
+  std::optional<runtime::WatchdogOptions> watchdog;
   std::function<void(const std::string &text)> on_overdue;
   bool live = false;  // publishes a live page for `redag top`
   /// For the live page: proven bounds on response times by task, 0 where there is none. Called once, before the start.
@@ -69,8 +69,8 @@ struct RunOptions {
 
 struct RunResult {
   trace::Trace trace;  // from 0 to trace.info.end; unfinished jobs are in flight; no events with a sink
-  Mode mode;
-  std::vector<Usage> usage;             // by task
+  runtime::Mode mode;
+  std::vector<runtime::Usage> usage;    // by task
   std::vector<std::string> unfinished;  // jobs that were told to give up after drain_timeout
   std::vector<std::string> overdue;     // the watchdog's reports
   std::vector<std::string> warnings;    // caveats for a reader of the figures
@@ -81,4 +81,4 @@ struct RunResult {
 /// that cannot be created.
 [[nodiscard]] Result<RunResult> run_workload(const Workload &workload, const RunOptions &options);
 
-}  // namespace redag::runtime
+}  // namespace redag::lab

@@ -14,7 +14,7 @@
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 namespace {
 
 Task timer(std::string name, Duration period, Duration wcet) {
@@ -68,7 +68,7 @@ bool has_preemption(const RunResult &result) {
 class EveryMode : public testing::TestWithParam<std::tuple<PreemptionMode, std::uint32_t>> {
  protected:
   void SetUp() override {
-    if (mode() == PreemptionMode::Os && probe_priority_band().top_job == 0) {
+    if (mode() == PreemptionMode::Os && runtime::probe_priority_band().top_job == 0) {
       GTEST_SKIP() << "this process may not use SCHED_FIFO";
     }
   }
@@ -145,7 +145,7 @@ TEST(RunWorkload, TheWatchdogNamesAJobWhileItRuns) {
   options.duration = 3600 * kSecond;
   options.drain_timeout = kMillisecond;
   options.stop = &stop;
-  options.watchdog = WatchdogOptions{{20 * kMillisecond, 0}, 5 * kMillisecond};
+  options.watchdog = runtime::WatchdogOptions{{20 * kMillisecond, 0}, 5 * kMillisecond};
   // On a stalling machine other jobs may be reported as well, and earlier jobs skipped. Only this report ends the run.
   const auto is_it = [](const std::string &text) {
     return text.starts_with("slow.slow0 #") && text.find(" is overdue") != std::string::npos;
@@ -179,7 +179,7 @@ TEST(RunWorkload, ABudgetCutsAJobOff) {
 
 // Each of two long jobs of one task keeps its thread while it is preempted. A third job needs another thread.
 TEST(RunWorkload, ThereIsAThreadForEveryJobThatCanBeInProgress) {
-  if (probe_priority_band().top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+  if (runtime::probe_priority_band().top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
   Workload workload = two_rates(2, PreemptionMode::Os);
   workload.dags[1].tasks = {timer("long", 100 * kMillisecond, 30 * kMillisecond)};
   workload.dags[1].tasks[0].concurrency = 2;
@@ -202,11 +202,11 @@ TEST(RunWorkload, ThereIsAThreadForEveryJobThatCanBeInProgress) {
 }
 
 TEST(RunWorkload, EveryExecutorRunsOnThreads) {
-  for (const sched::ExecutorKind &kind : sched::executors()) {
+  for (const executors::ExecutorKind &kind : executors::all()) {
     RunOptions options;
     options.duration = 150 * kMillisecond;
     options.executor = kind.name;
-    options.realtime_threads = probe_priority_band().top_job > 0;
+    options.realtime_threads = runtime::probe_priority_band().top_job > 0;
     const RunResult result = run(two_rates(2, PreemptionMode::Auto), options);
     EXPECT_EQ(result.mode.mode == PreemptionMode::None, !kind.ours) << kind.name;
     EXPECT_EQ(result.trace.info.config.workers, kind.single_worker ? 1U : 2U);
@@ -225,9 +225,9 @@ TEST(RunWorkload, BodiesOfOnesOwn) {
   std::size_t offered = 0;
   RunOptions options;
   options.duration = 200 * kMillisecond;
-  options.bodies = [&](std::vector<Body> synthetic, const Now &now) {
+  options.bodies = [&](std::vector<runtime::Body> synthetic, const Now &now) {
     offered = synthetic.size();
-    synthetic[0] = [&, now](const Job & /*job*/) {
+    synthetic[0] = [&, now](const runtime::Job & /*job*/) {
       ++sensed;
       last = now();
       return sched::Outcome::Finished;
@@ -268,4 +268,4 @@ TEST(RunWorkload, RecordsWhatHappens) {
 }
 
 }  // namespace
-}  // namespace redag::runtime
+}  // namespace redag::lab

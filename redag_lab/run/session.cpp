@@ -35,7 +35,7 @@ trace::RunInfo describe_simulation(const Workload &workload, const Variant &vari
   trace::RunInfo info;
   info.workload = workload;
   info.executor = variant.executor;
-  info.config = sched::effective_config(*sched::find_executor(variant.executor), sched::config_of(workload));
+  info.config = executors::effective_config(*executors::find_executor(variant.executor), sched::config_of(workload));
   info.preemption = mode_name(info.config.preemption);
   const PreemptionMode wanted = workload.platform.preemption;
   if (wanted == PreemptionMode::Os || wanted == PreemptionMode::Auto) {
@@ -117,7 +117,7 @@ class Evaluation {
 Result<Session> simulate(const Workload &workload, const Variant &variant, SessionOptions options,
                          const ProgressHook &progress) {
   if (options.calibration) {
-    const bool ours = sched::find_executor(variant.executor)->ours;
+    const bool ours = executors::find_executor(variant.executor)->ours;
     const Result<Overheads> machine = options.calibration->of(ours && is_realtime(workload.platform.preemption));
     if (!machine) return tl::unexpected(machine.error());
     options.overheads = sim::overheads_of(*machine);
@@ -138,7 +138,7 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, Sessi
   simulator.horizon = options.duration;
   simulator.seed = options.seed;
   simulator.overheads = options.overheads;
-  const auto scheduler = sched::make_scheduler(variant.executor, workload, info.config);
+  const auto scheduler = executors::make_scheduler(variant.executor, workload, info.config);
   const sim::Result result = sim::simulate(workload, *scheduler, info.config.workers, simulator, sink);
 
   session.stopped = result.end < options.duration;
@@ -155,7 +155,7 @@ std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant
   if (bounds.size() > kMostTasks) return bounds;
   Workload configured = workload;
   for (Dag &dag : configured.dags) inherit_periods(dag);
-  const sched::ExecutorKind &executor = *sched::find_executor(variant.executor);
+  const executors::ExecutorKind &executor = *executors::find_executor(variant.executor);
   const Result<analysis::System> system = analysis::compile_for(executor, configured, analysis::platform_of(config));
   if (!system || !system->not_analysable.empty()) return bounds;
   const analysis::Report report = analysis::analyze(*system, analysis::methods_of(executor));
@@ -169,7 +169,7 @@ void check(Session &session) {
 
 Result<Session> run_on_threads(const Workload &workload, const Variant &variant, const SessionOptions &options,
                                const ProgressHook &progress) {
-  runtime::RunOptions run;
+  RunOptions run;
   run.duration = options.duration;
   run.warm_up = options.warm_up;
   run.seed = options.seed;
@@ -187,7 +187,7 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   run.on_overdue = options.on_overdue;
   run.bounds = [&](const sched::Config &config) { return bounds_of(workload, variant, config); };
   run.scheduler = [&](const Workload &w, const sched::Config &config) {
-    return sched::make_scheduler(variant.executor, w, config);
+    return executors::make_scheduler(variant.executor, w, config);
   };
   Session session;
   std::optional<Evaluation> evaluation;
@@ -196,7 +196,7 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
     evaluation->add(events);
   };
   if (progress) run.progress = [&](Time now, std::span<const JobEvent>) { progress(now, evaluation->missed()); };
-  Result<runtime::RunResult> result = runtime::run_workload(workload, run);
+  Result<RunResult> result = run_workload(workload, run);
   if (!result) return tl::unexpected<Diagnostics>(std::move(result.error()));
 
   const bool realtime_threads = run.realtime_threads || result->mode.mode == PreemptionMode::Os;

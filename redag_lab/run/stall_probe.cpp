@@ -12,7 +12,7 @@
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/threads.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 namespace {
 
 constexpr Duration kBurst = 40 * kMillisecond;
@@ -27,8 +27,8 @@ class Watcher {
   }
 
   Result<void> start() {
-    return start_thread({"redag-stalls", options_.fifo_priority, {result_.cpu}}, [this] { main(); })
-        .map([this](ThreadHandle &&thread) { thread_ = std::move(thread); });
+    return runtime::start_thread({"redag-stalls", options_.fifo_priority, {result_.cpu}}, [this] { main(); })
+        .map([this](runtime::ThreadHandle &&thread) { thread_ = std::move(thread); });
   }
   void join() {
     if (thread_.joinable()) thread_.join();
@@ -43,29 +43,30 @@ class Watcher {
   [[nodiscard]] bool stopped() const { return options_.stop != nullptr && options_.stop->load(); }
 
   void main() {
-    const Time end = monotonic_now() + options_.duration;
-    Event never;
-    for (Time now = monotonic_now(); now < end && !stopped(); now = monotonic_now()) {
+    const Time end = runtime::monotonic_now() + options_.duration;
+    runtime::Event never;
+    for (Time now = runtime::monotonic_now(); now < end && !stopped(); now = runtime::monotonic_now()) {
       watch(std::min(now + kBurst, end));
       // Ordinary threads pause as well, and other threads that want to run do so during the pause.
-      never.wait_until(monotonic_now() + kPause);
+      never.wait_until(runtime::monotonic_now() + kPause);
     }
   }
 
   void watch(Time until) {
-    Duration cpu = thread_cpu_now();
-    Time read_at = monotonic_now();
+    Duration cpu = runtime::thread_cpu_now();
+    Time read_at = runtime::monotonic_now();
     const Time begun = read_at;
     Time last = read_at;
-    for (Time now = monotonic_now(); now < until && count_ < kMostGaps; last = now, now = monotonic_now()) {
+    for (Time now = runtime::monotonic_now(); now < until && count_ < kMostGaps;
+         last = now, now = runtime::monotonic_now()) {
       const Duration length = now - last;
       if (length < kShortestGap) continue;
-      const Duration used = thread_cpu_now();
+      const Duration used = runtime::thread_cpu_now();
       const Duration uncharged = (now - read_at) - (used - cpu);
       result_.gaps[count_++] =
           Gap{result_.watched + now - begun, length, std::clamp<Duration>(length - uncharged, 0, length)};
       cpu = used;
-      read_at = now = monotonic_now();
+      read_at = now = runtime::monotonic_now();
     }
     result_.watched += last - begun;
   }
@@ -73,7 +74,7 @@ class Watcher {
   const StallOptions &options_;
   WatchedProcessor result_;
   std::size_t count_ = 0;
-  ThreadHandle thread_;
+  runtime::ThreadHandle thread_;
 };
 
 }  // namespace
@@ -81,7 +82,7 @@ class Watcher {
 Result<std::vector<WatchedProcessor>> watch_for_stalls(const StallOptions &options) {
   std::vector<std::unique_ptr<Watcher>> watchers;
   Result<void> started;
-  for (const int cpu : usable_cpus()) {
+  for (const int cpu : runtime::usable_cpus()) {
     watchers.push_back(std::make_unique<Watcher>(cpu, options));
     started = watchers.back()->start();
     if (!started) break;
@@ -115,4 +116,4 @@ Loss fit_loss(std::span<const LossSample> samples, Duration watched) {
   return loss;
 }
 
-}  // namespace redag::runtime
+}  // namespace redag::lab

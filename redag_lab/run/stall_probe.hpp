@@ -14,7 +14,7 @@
 #include "redag/base/time.hpp"
 #include "redag/model/overheads.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 
 /// Shorter gaps are caused by the loop itself.
 inline constexpr Duration kShortestGap = 2 * kMicrosecond;
@@ -51,4 +51,4 @@ struct LossSample {
 /// and is as large as its highest level. Requires samples in order of time.
 [[nodiscard]] Loss fit_loss(std::span<const LossSample> samples, Duration watched);
 
-}  // namespace redag::runtime
+}  // namespace redag::lab

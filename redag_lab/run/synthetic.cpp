@@ -10,16 +10,16 @@
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/preemption_point.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 namespace {
 
 // Returns the cost of reading the thread's clock, which is a system call: the least of several readings.
 Duration reading_cost() {
   static const Duration kCost = [] {
     Duration least = kMicrosecond;
-    Duration before = thread_cpu_now();
+    Duration before = runtime::thread_cpu_now();
     for (int i = 0; i < 32; ++i) {
-      const Duration now = thread_cpu_now();
+      const Duration now = runtime::thread_cpu_now();
       least = std::min(least, now - before);
       before = now;
     }
@@ -31,8 +31,8 @@ Duration reading_cost() {
 // Spins for `time` on a clock that needs no system call. A preemption shortens the processor time of the spin and
 // never lengthens it.
 void spin_for(Duration time, const std::atomic<bool> &give_up) {
-  const Time end = monotonic_now() + time;
-  while (monotonic_now() < end && !give_up.load(std::memory_order_relaxed)) relax();
+  const Time end = runtime::monotonic_now() + time;
+  while (runtime::monotonic_now() < end && !give_up.load(std::memory_order_relaxed)) relax();
 }
 
 }  // namespace
@@ -52,11 +52,12 @@ void burn(Duration demand, Duration region, const std::atomic<bool> &give_up) {
   }
 }
 
-std::vector<Body> synthetic_bodies(const Workload &workload, std::uint64_t seed, const std::atomic<bool> &give_up) {
+std::vector<runtime::Body> synthetic_bodies(const Workload &workload, std::uint64_t seed,
+                                            const std::atomic<bool> &give_up) {
   (void)reading_cost();  // measures the cost here rather than in a job
-  std::vector<Body> bodies;
+  std::vector<runtime::Body> bodies;
   for (const TaskRef &ref : flatten(workload)) {
-    bodies.emplace_back([task = ref.task, seed, &give_up](const Job &job) {
+    bodies.emplace_back([task = ref.task, seed, &give_up](const runtime::Job &job) {
       const Duration demand = execution_time(*task, job.task, job.number, seed);
       const bool cut_off = task->on_budget == OnBudget::Abort && task->budget > 0 && demand > task->budget;
       burn(cut_off ? task->budget : demand, task->region, give_up);
@@ -66,4 +67,4 @@ std::vector<Body> synthetic_bodies(const Workload &workload, std::uint64_t seed,
   return bodies;
 }
 
-}  // namespace redag::runtime
+}  // namespace redag::lab

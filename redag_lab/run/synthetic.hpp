@@ -12,7 +12,7 @@
 #include "redag/model/workload.hpp"
 #include "redag/runtime/engine.hpp"
 
-namespace redag::runtime {
+namespace redag::lab {
 
 /// Uses `demand` of the calling job's own processor time; preemption does not shorten the work. It uses more only if
 /// the machine stalls at the end, and less by at most two readings of the thread's clock. Calls preemption_point()
@@ -21,7 +21,7 @@ void burn(Duration demand, Duration region, const std::atomic<bool> &give_up);
 
 /// Returns one body per task, in TaskId order. Job k of a task uses execution_time(task, id, k, seed), at most the
 /// task's budget. `workload` and `give_up` must outlive the bodies.
-[[nodiscard]] std::vector<Body> synthetic_bodies(const Workload &workload, std::uint64_t seed,
-                                                 const std::atomic<bool> &give_up);
+[[nodiscard]] std::vector<runtime::Body> synthetic_bodies(const Workload &workload, std::uint64_t seed,
+                                                          const std::atomic<bool> &give_up);
 
-}  // namespace redag::runtime
+}  // namespace redag::lab

@@ -17,7 +17,7 @@ const std::vector<std::string> &variant_names() {
   static const std::vector<std::string> kNames = [] {
     std::vector<std::string> names = {"redag", "redag-none", "redag-cooperative", "redag-os"};
     for (const char *threads : {"", "-fifo"}) {
-      for (const sched::ExecutorKind &kind : sched::executors()) {
+      for (const executors::ExecutorKind &kind : executors::all()) {
         if (!kind.ours) names.push_back(std::string(kind.name) + threads);
       }
     }
@@ -60,7 +60,7 @@ Result<std::vector<Variant>> parse_variants(std::string_view list) {
 }
 
 Result<Workload> configure(const Workload &workload, const Variant &variant) {
-  const sched::ExecutorKind *kind = sched::find_executor(variant.executor);
+  const executors::ExecutorKind *kind = executors::find_executor(variant.executor);
   REDAG_CHECK(kind != nullptr, "an executor that variant_names() lists is unknown");
   Workload configured = workload;
   if (variant.preemption) configured.platform.preemption = *variant.preemption;

@@ -19,7 +19,7 @@ namespace redag::lab {
 
 struct Variant {
   std::string name;                          // as given
-  std::string executor;                      // a name of sched::executors()
+  std::string executor;                      // a name of executors::all()
   std::optional<PreemptionMode> preemption;  // replaces the workload's; other executors: none
   bool realtime_threads = false;
 

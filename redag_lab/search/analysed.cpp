@@ -99,7 +99,7 @@ std::optional<Diagnostics> keep_only(const std::vector<std::string> &only, std::
 Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
                          const analysis::ExplorationOptions *explore, const std::string &executor,
                          const analysis::AnalyzeOptions &limits, const std::vector<std::string> &only) {
-  const sched::ExecutorKind *kind = sched::find_executor(executor);
+  const executors::ExecutorKind *kind = executors::find_executor(executor);
   if (kind == nullptr) return make_error("there is no analysis of the executor '" + executor + "'");
   Result<analysis::System> system = analysis::compile_for(*kind, workload, platform);
   if (!system) return tl::unexpected<Diagnostics>(system.error());

@@ -20,7 +20,7 @@ namespace redag::lab {
 /// A workload with the executor and the platform of its analysis, and the results of the methods.
 struct Analysed {
   Workload workload;
-  const sched::ExecutorKind *executor = nullptr;
+  const executors::ExecutorKind *executor = nullptr;
   analysis::System system;
   analysis::Report report;
   std::shared_ptr<const analysis::Exploration> exploration;  // null: not requested, or not applicable
@@ -30,7 +30,7 @@ struct Analysed {
 inline constexpr std::size_t kMostItemised = 128;
 
 /// Analyses the workload. With `explore`, exploration() is one of the methods (only for our executor). `limits.itemise`
-/// is ignored. `only` selects methods; empty: all. Error: of analysis::compile(), an executor that sched::executors()
+/// is ignored. `only` selects methods; empty: all. Error: of analysis::compile(), an executor that executors::all()
 /// does not list, or a method that is not one of the executor's.
 [[nodiscard]] Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
                                        const analysis::ExplorationOptions *explore = nullptr,

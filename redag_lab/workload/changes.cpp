@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-namespace redag {
+namespace redag::lab {
 namespace {
 
 using Kind = Change::Kind;
@@ -136,4 +136,4 @@ std::vector<Change> changes_between(const Workload &before, const Workload &afte
   return comparer.take();
 }
 
-}  // namespace redag
+}  // namespace redag::lab

@@ -9,7 +9,7 @@
 
 #include "redag/model/workload.hpp"
 
-namespace redag {
+namespace redag::lab {
 
 struct Change {
   enum class Kind : std::uint8_t {
@@ -31,4 +31,4 @@ struct Change {
 /// Returns the bound as text, "none" for 0.
 [[nodiscard]] std::string bound_text(std::uint32_t bound);
 
-}  // namespace redag
+}  // namespace redag::lab

@@ -8,7 +8,7 @@
 
 #include "redag/model/workload_yaml.hpp"
 
-namespace redag {
+namespace redag::lab {
 namespace {
 
 using ::testing::ElementsAre;
@@ -59,4 +59,4 @@ TEST(Changes, WhatOnlyOneHas) {
 }
 
 }  // namespace
-}  // namespace redag
+}  // namespace redag::lab

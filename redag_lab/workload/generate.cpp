@@ -18,7 +18,7 @@
 #include "redag/model/validate.hpp"
 #include "redag_lab/workload/generate_utilization.hpp"
 
-namespace redag {
+namespace redag::lab {
 namespace {
 
 struct Share {
@@ -238,9 +238,9 @@ class Generator {
     const std::size_t count = workload_.task_count();
     if (o_.method == UtilizationMethod::UUniFastDiscard) {
       constexpr int kAttempts = 100'000;
-      return generation::uunifast_discard(count, o_.utilization, o_.max_task_utilization, kAttempts, rng);
+      return uunifast_discard(count, o_.utilization, o_.max_task_utilization, kAttempts, rng);
     }
-    return generation::drs(o_.utilization, std::vector<double>(count, o_.max_task_utilization), rng);
+    return drs(o_.utilization, std::vector<double>(count, o_.max_task_utilization), rng);
   }
 
   void draw_demands(Dag &dag, std::span<const double> utilizations) {
@@ -365,4 +365,4 @@ std::optional<RateScope> rate_scope_from_string(std::string_view name) {
   return from_string(name, std::array{RateScope::PerDag, RateScope::PerTask});
 }
 
-}  // namespace redag
+}  // namespace redag::lab

@@ -12,7 +12,7 @@
 #include "redag/base/result.hpp"
 #include "redag/model/workload.hpp"
 
-namespace redag {
+namespace redag::lab {
 
 /// How the total utilization is shared among the tasks. Both methods draw uniformly from the vectors that keep the
 /// bound.
@@ -101,4 +101,4 @@ struct GenerateOptions {
 [[nodiscard]] std::optional<DagShape> dag_shape_from_string(std::string_view name);
 [[nodiscard]] std::optional<RateScope> rate_scope_from_string(std::string_view name);
 
-}  // namespace redag
+}  // namespace redag::lab

@@ -14,7 +14,7 @@
 #include "redag/model/validate.hpp"
 #include "redag_lab/workload/generate_utilization.hpp"
 
-namespace redag {
+namespace redag::lab {
 namespace {
 
 GenerateOptions arbitrary_options() {
@@ -185,7 +185,7 @@ RC_GTEST_PROP(Drs, KeepsSumAndBounds, (std::uint64_t seed)) {
   const double most = std::accumulate(upper.begin(), upper.end(), 0.0);
   const double total = most * *rc::gen::inRange(1, 101) / 100.0;
   Rng rng(seed);
-  const auto drawn = generation::drs(total, upper, rng);
+  const auto drawn = drs(total, upper, rng);
   RC_ASSERT(drawn.has_value());
   RC_ASSERT(std::abs(std::accumulate(drawn->begin(), drawn->end(), 0.0) - total) <= 1e-7 * total);
   for (std::size_t i = 0; i < count; ++i) RC_ASSERT((*drawn)[i] >= 0 && (*drawn)[i] <= upper[i]);
@@ -217,8 +217,8 @@ TEST_P(DrsAgainstDiscard, HasTheSameDistribution) {
   std::vector<double> by_drs;
   std::vector<double> by_discarding;
   for (std::size_t i = 0; i < kDraws; ++i) {
-    by_drs.push_back(generation::drs(total, std::vector<double>(4, kBound), rng).value()[0]);
-    by_discarding.push_back(generation::uunifast_discard(4, total, kBound, 100'000, rng).value()[0]);
+    by_drs.push_back(drs(total, std::vector<double>(4, kBound), rng).value()[0]);
+    by_discarding.push_back(uunifast_discard(4, total, kBound, 100'000, rng).value()[0]);
   }
   // At the level 0.001, two samples of n differ by 1.95 * sqrt(2 / n) = 0.0195. The seed is fixed.
   EXPECT_LT(largest_difference(by_drs, by_discarding), 0.0195);
@@ -228,16 +228,16 @@ INSTANTIATE_TEST_SUITE_P(Totals, DrsAgainstDiscard, testing::Values(0.5, 0.7, 0.
 
 TEST(Drs, ReachesTheBoundsAndNoFurther) {
   Rng rng(1);
-  EXPECT_EQ(generation::drs(1.0, {0.5, 0.5}, rng), (std::vector<double>{0.5, 0.5}));
-  EXPECT_EQ(generation::drs(1.1, {0.5, 0.5}, rng), std::nullopt);
+  EXPECT_EQ(drs(1.0, {0.5, 0.5}, rng), (std::vector<double>{0.5, 0.5}));
+  EXPECT_EQ(drs(1.1, {0.5, 0.5}, rng), std::nullopt);
 }
 
 TEST(Drs, ManyTasks) {
   Rng rng(2);
-  const auto drawn = generation::drs(16, std::vector<double>(1000, 1.0), rng);
+  const auto drawn = drs(16, std::vector<double>(1000, 1.0), rng);
   ASSERT_TRUE(drawn);
   EXPECT_NEAR(std::accumulate(drawn->begin(), drawn->end(), 0.0), 16, 1e-6);
 }
 
 }  // namespace
-}  // namespace redag
+}  // namespace redag::lab

@@ -10,7 +10,7 @@
 
 #include "redag/base/check.hpp"
 
-namespace redag::generation {
+namespace redag::lab {
 namespace {
 
 using Vector = std::vector<double>;
@@ -118,4 +118,4 @@ std::optional<Vector> uunifast_discard(std::size_t count, double total, double b
   return std::nullopt;
 }
 
-}  // namespace redag::generation
+}  // namespace redag::lab

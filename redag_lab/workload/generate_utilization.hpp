@@ -11,7 +11,7 @@
 
 #include "redag/base/rng.hpp"
 
-namespace redag::generation {
+namespace redag::lab {
 
 /// Draws uniformly from {u : sum u = total, 0 <= u_i <= upper_i}: Dirichlet-Rescale, D. Griffin, I. Bate, R. Davis,
 /// "Generating Utilization Vectors for the Systematic Evaluation of Schedulability Tests", RTSS 2020. Requires
@@ -24,4 +24,4 @@ namespace redag::generation {
 [[nodiscard]] std::optional<std::vector<double>> uunifast_discard(std::size_t count, double total, double bound,
                                                                   int attempts, Rng &rng);
 
-}  // namespace redag::generation
+}  // namespace redag::lab

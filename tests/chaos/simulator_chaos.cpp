@@ -54,14 +54,14 @@ std::string simulator_run(std::uint64_t seed, Survived &survived) {
   stretch(workload, factor);
   if (has_errors(validate(workload))) return "the random workload is not valid: " + to_string(validate(workload));
 
-  const auto executors = sched::executors();
-  const sched::ExecutorKind &kind =
+  const auto executors = executors::all();
+  const executors::ExecutorKind &kind =
       rng.uniform01() < 0.6 ? executors.front()
                             : executors[static_cast<std::size_t>(rng.uniform(0, std::ssize(executors) - 1))];
   const auto preemption = kModes[static_cast<std::size_t>(rng.uniform(0, 2))];
   trace::Trace trace;
-  trace.info.config =
-      sched::effective_config(kind, testing::random_config(rng, workload.policy, preemption, workload.task_count()));
+  trace.info.config = executors::effective_config(
+      kind, testing::random_config(rng, workload.policy, preemption, workload.task_count()));
   trace.info.workload = workload;
   trace.info.executor = kind.name;
   trace.info.driver = trace::Driver::Simulator;
@@ -80,7 +80,7 @@ std::string simulator_run(std::uint64_t seed, Survived &survived) {
     return std::min(task.wcet * dice.uniform(2, 100), kMaxDuration);
   };
   const std::uint64_t most = rng.uniform01() < 0.3 ? static_cast<std::uint64_t>(rng.uniform(1, 60)) : 20'000;
-  const auto scheduler = sched::make_scheduler(kind.name, workload, trace.info.config);
+  const auto scheduler = executors::make_scheduler(kind.name, workload, trace.info.config);
   const sim::Result result =
       sim::simulate(workload, *scheduler, trace.info.config.workers, options, [&](std::span<const JobEvent> events) {
         trace.events.insert(trace.events.end(), events.begin(), events.end());

@@ -38,7 +38,7 @@ struct Options {
 const Choices<std::string> &executor_choices() {
   static const Choices<std::string> kAll = [] {
     Choices<std::string> all;
-    for (const sched::ExecutorKind &kind : sched::executors()) all.emplace_back(kind.name, kind.name);
+    for (const executors::ExecutorKind &kind : executors::all()) all.emplace_back(kind.name, kind.name);
     return all;
   }();
   return kAll;

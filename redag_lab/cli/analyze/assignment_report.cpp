@@ -50,7 +50,7 @@ std::string caps_text(const Workload &workload, const Caps &caps) {
   std::string text;
   for (std::size_t d = 0; d < caps.size(); ++d) {
     if (workload.dags[d].tasks.size() < 2 && caps[d] == 0) continue;
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", workload.dags[d].name, bound_text(caps[d]));
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", workload.dags[d].name, lab::bound_text(caps[d]));
   }
   return text.empty() ? "-" : text;
 }
@@ -158,7 +158,7 @@ Json candidate_json(const Candidate &candidate) {
 
 std::vector<std::string> changes(const Assignment &assignment) {
   std::vector<std::string> list;
-  for (const Change &change : changes_between(assignment.present.workload, assignment.best.workload)) {
+  for (const lab::Change &change : lab::changes_between(assignment.present.workload, assignment.best.workload)) {
     list.push_back(change.text());
   }
   return list;

@@ -111,7 +111,7 @@ class Diffing {
                             first.driver == trace.info.driver &&
                             trace::worker_count(first) == trace::worker_count(trace.info);
       if (!same_way) return "its executor, mode, workers or driver differ";
-      const std::vector<Change> changes = changes_between(first.workload, trace.info.workload);
+      const std::vector<lab::Change> changes = lab::changes_between(first.workload, trace.info.workload);
       if (!changes.empty()) return changes.front().text();
     }
     side.jobs.add(trace);
@@ -120,10 +120,11 @@ class Diffing {
 
   // Only workloads with the same demand can be compared. Otherwise a difference does not describe the scheduling.
   bool compare_workloads() {
-    diffed_.changes = changes_between(diffed_.a.jobs.runs().front().workload, diffed_.b.jobs.runs().front().workload);
+    diffed_.changes =
+        lab::changes_between(diffed_.a.jobs.runs().front().workload, diffed_.b.jobs.runs().front().workload);
     std::vector<std::string> demand;
-    for (const Change &change : diffed_.changes) {
-      if (change.kind == Change::Kind::Demand) demand.push_back(change.text());
+    for (const lab::Change &change : diffed_.changes) {
+      if (change.kind == lab::Change::Kind::Demand) demand.push_back(change.text());
     }
     if (demand.empty()) return true;
     const std::string what = fmt::format("the two ran different workloads: {}", some_of(demand));

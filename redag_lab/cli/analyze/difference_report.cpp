@@ -242,7 +242,7 @@ std::vector<std::string> caveats(const DiffSide &a, const DiffSide &b) {
 
 std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool all) {
   std::string text = "A  " + run_words(diffed.a) + "\nB  " + run_words(diffed.b) + "\n";
-  for (const Change &change : diffed.changes)
+  for (const lab::Change &change : diffed.changes)
     text += tinted("differs ", Tint::Strong, terminal.colour) + change.text() + "\n";
   text += "\n" + differences_table(diffed, terminal, all) + "\n";
   const std::string found = findings(diffed, terminal);
@@ -266,8 +266,8 @@ std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool al
 
 Json to_json(const Diffed &diffed) {
   Json changes = Json::array();
-  for (const Change &change : diffed.changes) {
-    changes.push_back(Json{{"kind", change.kind == Change::Kind::Demand ? "demand" : "setting"},
+  for (const lab::Change &change : diffed.changes) {
+    changes.push_back(Json{{"kind", change.kind == lab::Change::Kind::Demand ? "demand" : "setting"},
                            {"what", change.what},
                            {"a", change.before},
                            {"b", change.after}});

@@ -23,7 +23,7 @@ struct DiffSide {
 struct Diffed {
   DiffSide a;
   DiffSide b;
-  std::vector<Change> changes;  // between the workloads
+  std::vector<lab::Change> changes;  // between the workloads
   lab::Difference difference;
   lab::BootstrapOptions options;
   std::vector<std::string> warnings;

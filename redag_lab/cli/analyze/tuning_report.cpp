@@ -70,7 +70,7 @@ std::vector<Cell> score_cells(const Score &score, bool bounds) {
 std::string point_text(const Workload &workload, const Point &point) {
   std::string text;
   for (std::size_t d = 0; d < workload.dags.size(); ++d) {
-    text += fmt::format("{}{} {}", d == 0 ? "" : ", ", workload.dags[d].name, bound_text(point[1 + d]));
+    text += fmt::format("{}{} {}", d == 0 ? "" : ", ", workload.dags[d].name, lab::bound_text(point[1 + d]));
   }
   return text;
 }
@@ -243,7 +243,7 @@ Json candidate_json(const Candidate &candidate, const Tuning &tuning) {
 
 std::vector<std::string> changes(const Tuned &tuned) {
   std::vector<std::string> list;
-  for (const Change &change : changes_between(tuned.present.workload, tuned.best.workload))
+  for (const lab::Change &change : lab::changes_between(tuned.present.workload, tuned.best.workload))
     list.push_back(change.text());
   return list;
 }

@@ -94,7 +94,8 @@ void PlanOptions::add_points(CLI::App &app) {
          ->type_name("RANGE")
          ->default_str("0.05:1:0.05"),
      group, [this](AcceptancePlan &plan) { plan.utilization = given_.utilization; });
-  on(add_list(app, "--dags", given_.dags, "DAGs; by default each has one task", "10", count_within({1, kMaxTasks})),
+  on(add_list(app, "--dags", given_.dags, "DAGs; by default each has one task", "10",
+              count_within({1, lab::kMaxTasks})),
      group, [this](AcceptancePlan &plan) { plan.dags = given_.dags; });
   on(add_list(app, "--workers", given_.workers, "Workers", "4", count_within({1, kMaxWorkers})), group,
      [this](AcceptancePlan &plan) { plan.workers = given_.workers; });
@@ -121,14 +122,14 @@ void PlanOptions::add_points(CLI::App &app) {
 
 void PlanOptions::add_workloads(CLI::App &app) {
   const std::string group = "Workloads";
-  GenerateOptions &w = given_.workload;
-  on(add_count(app, "--min-tasks", w.min_tasks, {1, kMaxTasks}, "Fewest tasks of a DAG"), group,
+  lab::GenerateOptions &w = given_.workload;
+  on(add_count(app, "--min-tasks", w.min_tasks, {1, lab::kMaxTasks}, "Fewest tasks of a DAG"), group,
      [&w](AcceptancePlan &plan) { plan.workload.min_tasks = w.min_tasks; });
-  on(add_count(app, "--max-tasks", w.max_tasks, {1, kMaxTasks}, "Most tasks of a DAG"), group,
+  on(add_count(app, "--max-tasks", w.max_tasks, {1, lab::kMaxTasks}, "Most tasks of a DAG"), group,
      [&w](AcceptancePlan &plan) { plan.workload.max_tasks = w.max_tasks; });
   on(add_choice(app, "--shape", w.shape,
-                choices_of({DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain,
-                            DagShape::Independent}),
+                choices_of({lab::DagShape::Layered, lab::DagShape::ErdosRenyi, lab::DagShape::ForkJoin,
+                            lab::DagShape::Chain, lab::DagShape::Independent}),
                 "Edges")
          ->default_str(to_string(w.shape)),
      group, [&w](AcceptancePlan &plan) { plan.workload.shape = w.shape; });
@@ -141,10 +142,10 @@ void PlanOptions::add_workloads(CLI::App &app) {
        plan.workload.max_active_min = w.max_active_max;
        plan.workload.max_active_max = w.max_active_max;
      });
-  on(add_choice(
-         app, "--periods", w.periods,
-         choices_of({PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive, PeriodModel::Robot}),
-         "Periods")
+  on(add_choice(app, "--periods", w.periods,
+                choices_of({lab::PeriodModel::LogUniform, lab::PeriodModel::Harmonic, lab::PeriodModel::Automotive,
+                            lab::PeriodModel::Robot}),
+                "Periods")
          ->default_str(to_string(w.periods)),
      group, [&w](AcceptancePlan &plan) { plan.workload.periods = w.periods; });
   on(add_duration(app, "--period-min", w.period_min, "Shortest period (log_uniform, harmonic)"), group,
@@ -158,7 +159,7 @@ void PlanOptions::add_workloads(CLI::App &app) {
   on(add_number(app, "--max-task-utilization", w.max_task_utilization, {1e-9, 1}, "Of one task"), group,
      [&w](AcceptancePlan &plan) { plan.workload.max_task_utilization = w.max_task_utilization; });
   on(add_choice(app, "--utilization-method", w.method,
-                choices_of({UtilizationMethod::Drs, UtilizationMethod::UUniFastDiscard}), "How it is shared")
+                choices_of({lab::UtilizationMethod::Drs, lab::UtilizationMethod::UUniFastDiscard}), "How it is shared")
          ->default_str(to_string(w.method)),
      group, [&w](AcceptancePlan &plan) { plan.workload.method = w.method; });
 }

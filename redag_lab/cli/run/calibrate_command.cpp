@@ -95,7 +95,7 @@ Result<Calibration> measure(const Options &options, Console &console) {
   Progress progress(console);
   progress.set_label("calibrate");
   const Stopwatch watch;
-  runtime::CalibrateOptions run;
+  lab::CalibrateOptions run;
   run.duration = options.duration;
   run.loaded = options.loaded;
   run.stop = &InterruptGuard::flag();
@@ -103,7 +103,7 @@ Result<Calibration> measure(const Options &options, Console &console) {
     const Duration left = std::max<Duration>(0, options.duration - watch.elapsed());
     progress.draw(done, fmt::format("{:.0f} s left: {}", static_cast<double>(left) * 1e-9, next));
   };
-  return runtime::calibrate(run);
+  return lab::calibrate(run);
 }
 
 int calibrate(const Options &options, Console &console) {

@@ -17,7 +17,7 @@ namespace redag::cli {
 namespace {
 
 struct Options {
-  GenerateOptions generate;
+  lab::GenerateOptions generate;
   std::uint64_t seed = 1;
   std::string file;
   std::string folder;
@@ -36,15 +36,15 @@ Choices<Value> choices_of(std::initializer_list<Value> values) {
   return choices;
 }
 
-void add_structure(CLI::App &app, GenerateOptions &g) {
+void add_structure(CLI::App &app, lab::GenerateOptions &g) {
   const std::string group = "DAGs";
-  add_count(app, "--dags", g.dags, {1, kMaxTasks}, "DAGs")->group(group);
-  add_count(app, "--min-tasks", g.min_tasks, {1, kMaxTasks}, "Fewest tasks of a DAG")->group(group);
-  add_count(app, "--max-tasks", g.max_tasks, {1, kMaxTasks}, "Most tasks of a DAG")->group(group);
-  add_choice(
-      app, "--shape", g.shape,
-      choices_of({DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain, DagShape::Independent}),
-      "Edges")
+  add_count(app, "--dags", g.dags, {1, lab::kMaxTasks}, "DAGs")->group(group);
+  add_count(app, "--min-tasks", g.min_tasks, {1, lab::kMaxTasks}, "Fewest tasks of a DAG")->group(group);
+  add_count(app, "--max-tasks", g.max_tasks, {1, lab::kMaxTasks}, "Most tasks of a DAG")->group(group);
+  add_choice(app, "--shape", g.shape,
+             choices_of({lab::DagShape::Layered, lab::DagShape::ErdosRenyi, lab::DagShape::ForkJoin,
+                         lab::DagShape::Chain, lab::DagShape::Independent}),
+             "Edges")
       ->default_str(to_string(g.shape))
       ->group(group);
   add_number(app, "--edge-probability", g.edge_probability, kShare, "Of each further edge (layered, erdos_renyi)")
@@ -55,7 +55,7 @@ void add_structure(CLI::App &app, GenerateOptions &g) {
       ->group(group);
   add_count(app, "--max-active-max", g.max_active_max, {0, kMaxBound}, "Largest max_active of a DAG; 0: no bound")
       ->group(group);
-  add_count(app, "--groups", g.groups, {0, kMaxTasks}, "Exclusive groups in the workload")->group(group);
+  add_count(app, "--groups", g.groups, {0, lab::kMaxTasks}, "Exclusive groups in the workload")->group(group);
   add_number(app, "--group-share", g.group_share, kShare, "Of the tasks: in a group")->group(group);
   add_number(app, "--queue-share", g.queue_share, kShare, "Of the tasks: overrun queue")->group(group);
   add_count(app, "--queue-depth", g.queue_depth, {1, kMaxQueueDepth}, "Largest queue_depth of those")->group(group);
@@ -63,16 +63,18 @@ void add_structure(CLI::App &app, GenerateOptions &g) {
   add_number(app, "--low-share", g.low_share, kShare, "Of the DAGs: criticality low")->group(group);
 }
 
-void add_timing(CLI::App &app, GenerateOptions &g) {
+void add_timing(CLI::App &app, lab::GenerateOptions &g) {
   const std::string group = "Time";
-  add_number(app, "--utilization", g.utilization, {kLeastShare, kMaxTasks}, "Of all tasks together")->group(group);
+  add_number(app, "--utilization", g.utilization, {kLeastShare, lab::kMaxTasks}, "Of all tasks together")->group(group);
   add_number(app, "--max-task-utilization", g.max_task_utilization, {kLeastShare, 1}, "Of one task")->group(group);
-  add_choice(app, "--method", g.method, choices_of({UtilizationMethod::Drs, UtilizationMethod::UUniFastDiscard}),
+  add_choice(app, "--method", g.method,
+             choices_of({lab::UtilizationMethod::Drs, lab::UtilizationMethod::UUniFastDiscard}),
              "How the utilization is shared")
       ->default_str(to_string(g.method))
       ->group(group);
   add_choice(app, "--periods", g.periods,
-             choices_of({PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive, PeriodModel::Robot}),
+             choices_of({lab::PeriodModel::LogUniform, lab::PeriodModel::Harmonic, lab::PeriodModel::Automotive,
+                         lab::PeriodModel::Robot}),
              "Periods")
       ->default_str(to_string(g.periods))
       ->group(group);
@@ -80,7 +82,8 @@ void add_timing(CLI::App &app, GenerateOptions &g) {
   add_duration(app, "--period-max", g.period_max, "Longest period (log_uniform, harmonic)")->group(group);
   add_duration(app, "--period-granularity", g.period_granularity, "Periods are multiples of it (log_uniform)")
       ->group(group);
-  add_choice(app, "--rates", g.rates, choices_of({RateScope::PerDag, RateScope::PerTask}), "Who draws a period")
+  add_choice(app, "--rates", g.rates, choices_of({lab::RateScope::PerDag, lab::RateScope::PerTask}),
+             "Who draws a period")
       ->default_str(to_string(g.rates))
       ->group(group);
   add_number(app, "--deadline-min", g.deadline_min, {kLeastShare, 4}, "Smallest deadline / period")->group(group);
@@ -91,7 +94,7 @@ void add_timing(CLI::App &app, GenerateOptions &g) {
   app.add_flag("--offsets", g.offsets, "Timer tasks start anywhere in their first period")->group(group);
 }
 
-void add_platform(CLI::App &app, GenerateOptions &g) {
+void add_platform(CLI::App &app, lab::GenerateOptions &g) {
   const std::string group = "Platform";
   add_count(app, "--workers", g.workers, {1, kMaxWorkers}, "Workers")->group(group);
   add_choice(app, "--preemption", g.preemption, preemption_choices(), "Preemption")
@@ -115,7 +118,7 @@ std::string provenance(const CLI::App &app, std::uint64_t seed) {
   return line + fmt::format(" --seed {}\n", seed);
 }
 
-// Replaces the names of GenerateOptions in a message by options: "period_min" by --period-min.
+// Replaces the names of lab::GenerateOptions in a message by options: "period_min" by --period-min.
 std::string in_options(const CLI::App &app, const std::string &message) {
   std::string text;
   for (std::size_t at = 0; at < message.size();) {

@@ -145,7 +145,7 @@ bool takes_arguments(const std::vector<lab::Variant> &variants, const RunArgumen
     return false;
   }
   const auto has_workers = [](const lab::Variant &variant) {
-    return !sched::find_executor(variant.executor)->single_worker;
+    return !executors::find_executor(variant.executor)->single_worker;
   };
   if (arguments.workers > 1 && none(has_workers)) {
     console.error(fmt::format("--workers {}: '{}' has one worker", arguments.workers, first.name),
