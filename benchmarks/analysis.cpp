@@ -24,9 +24,9 @@ using analysis::global::GlobalUnit;
 constexpr std::uint32_t kWorkers = 4;
 constexpr std::size_t kSets = 256;  // more than the branch predictor can memorize
 
-std::vector<analysis::System> systems(lab::DagShape shape, std::uint32_t percent) {
+std::vector<analysis::TaskSet> task_sets(lab::DagShape shape, std::uint32_t percent) {
   const bool graphs = shape != lab::DagShape::Independent;
-  std::vector<analysis::System> result;
+  std::vector<analysis::TaskSet> result;
   for (std::uint64_t seed = 0; result.size() < kSets; ++seed) {
     lab::GenerateOptions options;
     options.shape = shape;
@@ -43,10 +43,10 @@ std::vector<analysis::System> systems(lab::DagShape shape, std::uint32_t percent
   return result;
 }
 
-std::vector<std::vector<GlobalUnit>> bare(const std::vector<analysis::System> &sets) {
+std::vector<std::vector<GlobalUnit>> bare(const std::vector<analysis::TaskSet> &sets) {
   std::vector<std::vector<GlobalUnit>> result;
   result.reserve(sets.size());
-  for (const analysis::System &system : sets) result.push_back(analysis::global::units_of(system, {}).units);
+  for (const analysis::TaskSet &task_set : sets) result.push_back(analysis::global::units_of(task_set, {}).units);
   return result;
 }
 
@@ -67,21 +67,21 @@ void run_bare(benchmark::State &state, std::vector<std::vector<GlobalUnit>> sets
 }
 
 void run_method(benchmark::State &state, const analysis::Method &method, lab::DagShape shape) {
-  const auto sets = systems(shape, static_cast<std::uint32_t>(state.range(0)));
+  const auto sets = task_sets(shape, static_cast<std::uint32_t>(state.range(0)));
   std::size_t next = 0;
   for (auto _ : state) benchmark::DoNotOptimize(method.apply(sets[next++ % kSets]));
   state.SetItemsProcessed(state.iterations());
 }
 
 void BM_GuanBare(benchmark::State &state) {
-  const auto sets = systems(lab::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
+  const auto sets = task_sets(lab::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
   run_bare(state, bare(sets), [](std::vector<GlobalUnit> &units, std::size_t k) {
     return analysis::global::guan_response(units, k, kWorkers, analysis::global::start_after(units, k));
   });
 }
 
 void BM_BertognaCirineiBare(benchmark::State &state) {
-  const auto sets = systems(lab::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
+  const auto sets = task_sets(lab::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
   run_bare(state, bare(sets), [](std::vector<GlobalUnit> &units, std::size_t k) {
     return analysis::global::bertogna_cirinei_response(units, k, kWorkers, analysis::global::start_after(units, k));
   });
@@ -90,7 +90,7 @@ void BM_BertognaCirineiBare(benchmark::State &state) {
 void BM_Guan(benchmark::State &state) { run_method(state, analysis::guan(), lab::DagShape::Independent); }
 
 void BM_MelaniBare(benchmark::State &state) {
-  const auto sets = systems(lab::DagShape::Layered, static_cast<std::uint32_t>(state.range(0)));
+  const auto sets = task_sets(lab::DagShape::Layered, static_cast<std::uint32_t>(state.range(0)));
   auto units = bare(sets);
   for (auto &set : units) {
     for (GlobalUnit &unit : set) analysis::global::set_width(unit, kWorkers);

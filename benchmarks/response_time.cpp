@@ -19,7 +19,7 @@ struct SimpleTask {
   redag::Duration period = 0;
 };
 
-std::vector<SimpleTask> task_set(redag::Rng &rng, std::size_t count, double utilization) {
+std::vector<SimpleTask> random_tasks(redag::Rng &rng, std::size_t count, double utilization) {
   std::vector<SimpleTask> tasks;
   for (std::size_t i = 0; i < count; ++i) {
     const double rest =
@@ -33,18 +33,18 @@ std::vector<SimpleTask> task_set(redag::Rng &rng, std::size_t count, double util
   return tasks;
 }
 
-std::vector<std::vector<SimpleTask>> task_sets(std::size_t count, double utilization) {
+std::vector<std::vector<SimpleTask>> random_sets(std::size_t count, double utilization) {
   redag::Rng rng(1);
   std::vector<std::vector<SimpleTask>> sets;
-  for (int i = 0; i < 1000; ++i) sets.push_back(task_set(rng, count, utilization));
+  for (int i = 0; i < 1000; ++i) sets.push_back(random_tasks(rng, count, utilization));
   return sets;
 }
 
 // The arguments are the number of tasks and the utilization in percent.
 void response_times(benchmark::State &state) {
-  std::vector<redag::analysis::System> systems;
+  std::vector<redag::analysis::TaskSet> task_sets;
   for (const auto &set :
-       task_sets(static_cast<std::size_t>(state.range(0)), static_cast<double>(state.range(1)) / 100)) {
+       random_sets(static_cast<std::size_t>(state.range(0)), static_cast<double>(state.range(1)) / 100)) {
     redag::Workload workload;
     workload.dags.emplace_back();
     for (const SimpleTask &numbers : set) {
@@ -55,15 +55,15 @@ void response_times(benchmark::State &state) {
       workload.dags[0].tasks.push_back(task);
     }
     workload.name = workload.dags[0].name = "d";
-    const auto system = redag::analysis::compile(workload, {});
-    if (!system) return state.SkipWithError("a set that does not compile");
-    systems.push_back(*system);
+    const auto task_set = redag::analysis::compile(workload, {});
+    if (!task_set) return state.SkipWithError("a set that does not compile");
+    task_sets.push_back(*task_set);
   }
   const redag::analysis::Method method = redag::analysis::rta_preemptive();
   for (auto _ : state) {
-    for (const auto &system : systems) benchmark::DoNotOptimize(method.apply(system));
+    for (const auto &task_set : task_sets) benchmark::DoNotOptimize(method.apply(task_set));
   }
-  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(systems.size()));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(task_sets.size()));
 }
 BENCHMARK(response_times)->Name("ResponseTimes")->ArgsProduct({{20}, {80}});
 

@@ -52,15 +52,15 @@ void BM_ShownSchedulable(benchmark::State &state) {
 
 void BM_CriticalScalingFactor(benchmark::State &state) {
   on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
-    const auto system = analysis::compile(workload, platform);
-    benchmark::DoNotOptimize(analysis::margin_of(workload, platform, analysis::knobs_of(workload, *system).front()));
+    const auto task_set = analysis::compile(workload, platform);
+    benchmark::DoNotOptimize(analysis::margin_of(workload, platform, analysis::knobs_of(workload, *task_set).front()));
   });
 }
 
 void BM_Sensitivity(benchmark::State &state) {
   on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
-    const auto system = analysis::compile(workload, platform);
-    for (const analysis::Knob &knob : analysis::knobs_of(workload, *system)) {
+    const auto task_set = analysis::compile(workload, platform);
+    for (const analysis::Knob &knob : analysis::knobs_of(workload, *task_set)) {
       benchmark::DoNotOptimize(analysis::margin_of(workload, platform, knob));
     }
   });

@@ -30,23 +30,23 @@ struct Run {
   enum class Jitter : std::uint8_t { None, First, Largest, Random } jitter = Jitter::None;
 };
 
-Run draw_run(const analysis::System &system, std::uint32_t index, Rng &rng) {
+Run draw_run(const analysis::TaskSet &task_set, std::uint32_t index, Rng &rng) {
   Run run;
   run.seed = rng();
   const auto random_offsets = [&] {
-    for (const analysis::Unit &unit : system.units) run.offsets.push_back(rng.uniform(0, unit.period));
+    for (const analysis::Unit &unit : task_set.units) run.offsets.push_back(rng.uniform(0, unit.period));
   };
   switch (index % 5) {
     case 0:  // all at once
-      run.offsets.assign(system.units.size(), 0);
+      run.offsets.assign(task_set.units.size(), 0);
       run.jitter = Run::Jitter::First;
       break;
     case 1: {  // less urgent jobs start an instant before one task and all above it are released, each as late as
                // allowed
-      const auto pivot = static_cast<std::uint32_t>(rng.uniform(0, static_cast<int>(system.tasks.size()) - 1));
+      const auto pivot = static_cast<std::uint32_t>(rng.uniform(0, static_cast<int>(task_set.tasks.size()) - 1));
       Duration largest = 0;
-      for (const analysis::Unit &unit : system.units) largest = std::max(largest, unit.jitter);
-      for (const analysis::Unit &unit : system.units) {
+      for (const analysis::Unit &unit : task_set.units) largest = std::max(largest, unit.jitter);
+      for (const analysis::Unit &unit : task_set.units) {
         run.offsets.push_back(unit.first_rank > pivot ? largest : largest + 1 - unit.jitter);
       }
       run.jitter = Run::Jitter::First;
@@ -80,13 +80,13 @@ struct Observed {
   std::vector<std::uint64_t> finished;
 };
 
-void observe(const metrics::JudgedJob &job, const analysis::System &system, Observed &observed) {
+void observe(const metrics::JudgedJob &job, const analysis::TaskSet &task_set, Observed &observed) {
   const TaskId task = job.record.task;
-  if (task.value >= system.tasks.size()) return;  // a stall
+  if (task.value >= task_set.tasks.size()) return;  // a stall
   if (job.miss == metrics::Miss::Lost) ++observed.lost[task.value];
   if (job.record.outcome == metrics::JobOutcome::Finished) ++observed.finished[task.value];
   if (job.response) observed.tasks[task.value] = std::max(observed.tasks[task.value], *job.response);
-  Duration &dag = observed.dags[system.tasks[task.value].dag.value];
+  Duration &dag = observed.dags[task_set.tasks[task.value].dag.value];
   if (job.end_to_end) dag = std::max(dag, *job.end_to_end);
 }
 
@@ -107,18 +107,19 @@ Duration add_stalls(Workload &workload, const analysis::AnalysisPlatform &platfo
   return (platform.stall.longest * kSecond + platform.stall.per_second - 1) / platform.stall.per_second;
 }
 
-void simulate_run(const BoundCase &bound_case, const analysis::System &system, const Run &run,
+void simulate_run(const BoundCase &bound_case, const analysis::TaskSet &task_set, const Run &run,
                   const BoundPropertyOptions &property, Observed &observed) {
   Workload workload = bound_case.workload;
   std::vector<std::uint32_t> unit_of;
   std::vector<bool> can_pause;  // by TaskId
   Duration longest = 0;
   for (Dag &dag : workload.dags) {
-    const std::vector<std::uint32_t> &units = system.dags[static_cast<std::size_t>(&dag - workload.dags.data())].units;
+    const std::vector<std::uint32_t> &units =
+        task_set.dags[static_cast<std::size_t>(&dag - workload.dags.data())].units;
     const bool joins_rates =
-        std::any_of(units.begin(), units.end(), [&](std::uint32_t u) { return !system.units[u].awaits.empty(); });
+        std::any_of(units.begin(), units.end(), [&](std::uint32_t u) { return !task_set.units[u].awaits.empty(); });
     for (Task &task : dag.tasks) {
-      unit_of.push_back(system.tasks[unit_of.size()].unit);
+      unit_of.push_back(task_set.tasks[unit_of.size()].unit);
       can_pause.push_back(!joins_rates);
       if (joins_rates) {
         // The analysis uses these offsets; they move together.
@@ -165,7 +166,7 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
   const sched::Config config = analysis::config_of(platform, workload);
   const auto scheduler = executors::make_scheduler(property.executor, workload, config);
   metrics::DeadlineWatch watch(workload);
-  const auto see = [&](const metrics::JudgedJob &job) { observe(job, system, observed); };
+  const auto see = [&](const metrics::JudgedJob &job) { observe(job, task_set, observed); };
   const sim::Result result =
       sim::simulate(workload, *scheduler, platform.workers, options, [&](std::span<const JobEvent> events) {
         watch.add(events, see);
@@ -177,27 +178,27 @@ void simulate_run(const BoundCase &bound_case, const analysis::System &system, c
 // Compares one workload with one bound.
 class Judge {
  public:
-  Judge(const analysis::System &system, const analysis::Bound &bound, BoundPropertyResult &result,
+  Judge(const analysis::TaskSet &task_set, const analysis::Bound &bound, BoundPropertyResult &result,
         std::vector<double> &ratios)
-      : system_(system), bound_(bound), result_(result), ratios_(ratios) {}
+      : task_set_(task_set), bound_(bound), result_(result), ratios_(ratios) {}
 
   // Returns what is broken, or an empty text.
   std::string judge(const Observed &observed) {
     if (bound_.accepts) return judge_accepted(observed);
     std::string broken;
     for (std::size_t t = 0; t < bound_.tasks.size(); ++t) {
-      const analysis::SystemTask &task = system_.tasks[t];
+      const analysis::CompiledTask &task = task_set_.tasks[t];
       if (!bound_.tasks[t].response) continue;
       result_.jobs += observed.finished[t];
       if (observed.lost[t] > 0 && *bound_.tasks[t].response <= task.limit) {
         broken += fmt::format("{}: bounded by {}, and {} of its jobs were skipped\n", task.name,
                               *bound_.tasks[t].response, observed.lost[t]);
       }
-      const bool is_single = system_.units[task.unit].tasks.size() == 1;
+      const bool is_single = task_set_.units[task.unit].tasks.size() == 1;
       compare(task.name, observed.tasks[t], *bound_.tasks[t].response, is_single, broken);
     }
     for (std::size_t d = 0; d < bound_.dags.size(); ++d) {
-      const analysis::SystemDag &dag = system_.dags[d];
+      const analysis::CompiledDag &dag = task_set_.dags[d];
       if (bound_.dags[d].response) {
         compare(dag.name, observed.dags[d], *bound_.dags[d].response, dag.units.size() < dag.tasks.size(), broken);
       }
@@ -218,23 +219,23 @@ class Judge {
     ++result_.bounds;
     std::string broken;
     double worst = 0;
-    for (std::size_t t = 0; t < system_.tasks.size(); ++t) {
-      const analysis::SystemTask &task = system_.tasks[t];
+    for (std::size_t t = 0; t < task_set_.tasks.size(); ++t) {
+      const analysis::CompiledTask &task = task_set_.tasks[t];
       result_.jobs += observed.finished[t];
       worst = std::max(worst, static_cast<double>(observed.tasks[t]) / static_cast<double>(task.deadline));
       if (observed.tasks[t] <= task.deadline && observed.lost[t] == 0) continue;
       broken += fmt::format("{}: accepted with deadline {}, answered after {}, {} skipped\n", task.name, task.deadline,
                             observed.tasks[t], observed.lost[t]);
     }
-    for (std::size_t d = 0; d < system_.dags.size(); ++d) {
-      const Duration deadline = system_.dags[d].deadline;
-      if (deadline > 0 && observed.dags[d] > deadline) broken += system_.dags[d].name + ": end-to-end deadline\n";
+    for (std::size_t d = 0; d < task_set_.dags.size(); ++d) {
+      const Duration deadline = task_set_.dags[d].deadline;
+      if (deadline > 0 && observed.dags[d] > deadline) broken += task_set_.dags[d].name + ": end-to-end deadline\n";
     }
     ratios_.push_back(worst);
     return broken;
   }
 
-  const analysis::System &system_;
+  const analysis::TaskSet &task_set_;
   const analysis::Bound &bound_;
   BoundPropertyResult &result_;
   std::vector<double> &ratios_;
@@ -245,13 +246,13 @@ void check_one(const analysis::Method &method, const BoundGenerator &generator, 
   Rng rng(seed);
   const BoundCase bound_case = generator(rng);
   const executors::ExecutorKind &executor = *executors::find_executor(options.executor);
-  const auto system = analysis::compile_for(executor, bound_case.workload, bound_case.platform);
-  ASSERT_TRUE(system) << to_string(system.error()) << describe(bound_case);
-  if (!system->not_analysable.empty()) {
+  const auto task_set = analysis::compile_for(executor, bound_case.workload, bound_case.platform);
+  ASSERT_TRUE(task_set) << to_string(task_set.error()) << describe(bound_case);
+  if (!task_set->not_analysable.empty()) {
     ++result.not_applicable;
     return;
   }
-  const analysis::Outcome outcome = method.apply(*system);
+  const analysis::Outcome outcome = method.apply(*task_set);
   const auto *bound = std::get_if<analysis::Bound>(&outcome);
   if (bound == nullptr || (!bound->unsound.empty() && !options.include_unsound)) {
     ++result.not_applicable;
@@ -260,16 +261,16 @@ void check_one(const analysis::Method &method, const BoundGenerator &generator, 
   ++result.workloads;
 
   Observed observed;
-  observed.tasks.resize(system->tasks.size());
-  observed.lost.resize(system->tasks.size());
-  observed.finished.resize(system->tasks.size());
-  observed.dags.resize(system->dags.size());
+  observed.tasks.resize(task_set->tasks.size());
+  observed.lost.resize(task_set->tasks.size());
+  observed.finished.resize(task_set->tasks.size());
+  observed.dags.resize(task_set->dags.size());
   if (bound->accepts != false) {
     for (std::uint32_t r = 0; r < options.runs; ++r) {
-      simulate_run(bound_case, *system, draw_run(*system, r, rng), options, observed);
+      simulate_run(bound_case, *task_set, draw_run(*task_set, r, rng), options, observed);
     }
   }
-  const std::string broken = Judge(*system, *bound, result, ratios).judge(observed);
+  const std::string broken = Judge(*task_set, *bound, result, ratios).judge(observed);
   if (broken.empty()) return;
   if (result.violations++ == 0) {
     result.first_violation =
@@ -327,14 +328,14 @@ void expect_bound_holds(const analysis::Method &method, const BoundGenerator &ge
 }
 
 void for_cases(const BoundGenerator &generator, std::uint32_t count,
-               const std::function<void(const BoundCase &, const analysis::System &, Rng &)> &check) {
+               const std::function<void(const BoundCase &, const analysis::TaskSet &, Rng &)> &check) {
   for (std::uint32_t i = 0; i < count; ++i) {
     Rng rng(mix(i));
     const BoundCase bound_case = generator(rng);
-    const auto system = analysis::compile(bound_case.workload, bound_case.platform);
+    const auto task_set = analysis::compile(bound_case.workload, bound_case.platform);
     SCOPED_TRACE(describe(bound_case));
-    ASSERT_TRUE(system);
-    if (system->not_analysable.empty()) check(bound_case, *system, rng);
+    ASSERT_TRUE(task_set);
+    if (task_set->not_analysable.empty()) check(bound_case, *task_set, rng);
     if (::testing::Test::HasFailure()) return;
   }
 }

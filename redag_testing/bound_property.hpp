@@ -75,7 +75,7 @@ struct BoundPropertyResult {
   std::uint64_t workloads = 0;       // workloads to which the method applied
   std::uint64_t not_applicable = 0;  // workloads drawn to which it did not apply
   std::uint64_t bounds = 0;          // bounded response times, of tasks and of DAGs of several tasks; or accepted
-                                     // systems
+                                     // task sets
   std::uint64_t jobs = 0;            // finished jobs with a bound
   std::uint64_t violations = 0;      // workloads with a job that breaks a bound
   double mean_ratio = 0;             // largest observed / bound
@@ -94,10 +94,10 @@ struct BoundPropertyResult {
 void expect_bound_holds(const analysis::Method &method, const BoundGenerator &generator,
                         const BoundPropertyOptions &options = {});
 
-/// Calls `check` for `count` cases that can be analysed, with their compiled systems. The first case that fails an
+/// Calls `check` for `count` cases that can be analysed, with their compiled task sets. The first case that fails an
 /// expectation is described and ends the loop.
 void for_cases(const BoundGenerator &generator, std::uint32_t count,
-               const std::function<void(const BoundCase &, const analysis::System &, Rng &)> &check);
+               const std::function<void(const BoundCase &, const analysis::TaskSet &, Rng &)> &check);
 
 /// Describes one workload: a line per task, and the platform.
 [[nodiscard]] std::string describe(const BoundCase &bound_case);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A day of scheduler time in the simulator, for random systems, to find what a long run could wear out.
-// REDAG_LONG_RUN=<n> runs n systems (24 by default), each for 24 hours (otherwise for 2). REDAG_LONG_RUN_SEED=<s> is
+// A day of scheduler time in the simulator, for random task sets, to find what a long run could wear out.
+// REDAG_LONG_RUN=<n> runs n task sets (24 by default), each for 24 hours (otherwise for 2). REDAG_LONG_RUN_SEED=<s> is
 // the first seed (default 1).
 #include <gtest/gtest.h>
 
@@ -28,9 +28,9 @@ namespace {
 
 constexpr Duration kHour = 3600 * kSecond;
 
-// A random system with a load from far below the workers' capacity to slightly above it, and everything that makes jobs
-// wait.
-Workload random_system(std::uint64_t seed) {
+// A random task set with a load from far below the workers' capacity to slightly above it, and everything that makes
+// jobs wait.
+Workload random_task_set(std::uint64_t seed) {
   Rng rng(seed);
   lab::GenerateOptions options;
   options.dags = static_cast<std::uint32_t>(rng.uniform(2, 4));
@@ -57,7 +57,7 @@ Workload random_system(std::uint64_t seed) {
 }
 
 struct Figures {
-  std::uint64_t systems = 0;
+  std::uint64_t task_sets = 0;
   std::uint64_t jobs = 0;
   std::uint64_t lost = 0;
   std::uint64_t bounded = 0;  // tasks and DAGs with a bound
@@ -136,12 +136,12 @@ class Day {
 };
 
 void run_a_day(std::uint64_t seed, Duration length, Figures &figures) {
-  const Workload workload = random_system(seed);
+  const Workload workload = random_task_set(seed);
   if (workload.dags.empty()) return;
   const sched::Config config = sched::config_of(workload);
-  const auto system = analysis::compile(workload, analysis::platform_of(workload));
-  ASSERT_TRUE(system) << to_string(system.error());
-  const analysis::Report report = analysis::analyze(*system);
+  const auto task_set = analysis::compile(workload, analysis::platform_of(workload));
+  ASSERT_TRUE(task_set) << to_string(task_set.error());
+  const analysis::Report report = analysis::analyze(*task_set);
   const auto scheduler = executors::make_scheduler("redag", workload, config);
   Day day(workload, report);
 
@@ -163,7 +163,7 @@ void run_a_day(std::uint64_t seed, Duration length, Figures &figures) {
     day.finish(result.end);
     day.judge(workload, *scheduler, length, figures);
   }
-  ++figures.systems;
+  ++figures.task_sets;
 }
 
 std::optional<std::uint64_t> environment(const char *name) {
@@ -179,14 +179,14 @@ TEST(LongRun, NothingWearsOut) {
   const std::uint64_t first = environment("REDAG_LONG_RUN_SEED").value_or(1);
   Figures figures;
   std::uint64_t seed = first;
-  for (; figures.systems < wanted; ++seed) {
+  for (; figures.task_sets < wanted; ++seed) {
     run_a_day(seed, length, figures);
     ASSERT_FALSE(HasFailure()) << "seed " << seed;
   }
   fmt::print(
-      "[ figures  ] {} systems (seeds {} to {}), {} each: {} jobs finished, {} skipped; {} bounds, largest "
+      "[ figures  ] {} task sets (seeds {} to {}), {} each: {} jobs finished, {} skipped; {} bounds, largest "
       "observed/bound {:.3f}\n",
-      figures.systems, first, seed - 1, format_duration(length), figures.jobs, figures.lost, figures.bounded,
+      figures.task_sets, first, seed - 1, format_duration(length), figures.jobs, figures.lost, figures.bounded,
       figures.largest_ratio);
   EXPECT_GT(figures.bounded, 0U);
 }

@@ -136,13 +136,13 @@ BoundCase random_criticalities(Rng &rng) {
   return drawn;
 }
 
-void offset_at_random(Workload &workload, const analysis::System &system, bool all_at_once, Rng &rng) {
+void offset_at_random(Workload &workload, const analysis::TaskSet &task_set, bool all_at_once, Rng &rng) {
   std::vector<Duration> offsets;
-  for (const analysis::Unit &unit : system.units) offsets.push_back(all_at_once ? 0 : rng.uniform(0, unit.period));
+  for (const analysis::Unit &unit : task_set.units) offsets.push_back(all_at_once ? 0 : rng.uniform(0, unit.period));
   std::uint32_t id = 0;
   for (Dag &dag : workload.dags) {
     for (Task &task : dag.tasks) {
-      const Duration offset = offsets[system.tasks[id++].unit];
+      const Duration offset = offsets[task_set.tasks[id++].unit];
       if (task.activation == Activation::Timer) task.offset = offset;
     }
   }
@@ -183,17 +183,17 @@ std::vector<JobEvent> simulate_overruns(const BoundCase &drawn, Duration horizon
 void check_amc(std::uint64_t seed, std::uint64_t &judged, std::uint64_t &changes) {
   Rng rng(seed);
   BoundCase drawn = random_criticalities(rng);
-  const auto system = analysis::compile(drawn.workload, drawn.platform);
-  ASSERT_TRUE(system) << to_string(system.error());
-  if (!system->has_modes) return;
-  const analysis::Outcome outcome = analysis::amc_rtb().apply(*system);
+  const auto task_set = analysis::compile(drawn.workload, drawn.platform);
+  ASSERT_TRUE(task_set) << to_string(task_set.error());
+  if (!task_set->has_modes) return;
+  const analysis::Outcome outcome = analysis::amc_rtb().apply(*task_set);
   const auto *bound = std::get_if<analysis::Bound>(&outcome);
   if (bound == nullptr) return;
   ++judged;
   const bool low_is_met = bound->figures.find("LO mode every deadline is met") != std::string::npos;
   constexpr Duration kHorizon = 1500;
   for (int run = 0; run < 4; ++run) {
-    offset_at_random(drawn.workload, *system, run == 0, rng);
+    offset_at_random(drawn.workload, *task_set, run == 0, rng);
     const double overruns = run == 0 ? 0.1 : rng.uniform01();
     const std::vector<JobEvent> events = simulate_overruns(drawn, kHorizon, overruns, rng());
     const HighModeSpans spans(events, kHorizon);
@@ -201,7 +201,7 @@ void check_amc(std::uint64_t seed, std::uint64_t &judged, std::uint64_t &changes
     for (const metrics::JobRecord &job : metrics::fold_jobs(drawn.workload, events)) {
       const std::size_t t = job.task.value;
       const Time end = job.outcome == metrics::JobOutcome::InFlight ? kHorizon : job.finish;
-      const bool high = system->dags[system->tasks[t].dag.value].high;
+      const bool high = task_set->dags[task_set->tasks[t].dag.value].high;
       const auto limit = high ? bound->tasks[t].response : bound->modes[t].low;
       if (!limit || (!high && (!low_is_met || spans.overlap(job.release, end)))) continue;
       ASSERT_LE(end - job.release, *limit)
@@ -233,15 +233,15 @@ void check_overload(std::uint64_t seed, std::uint64_t &judged, std::uint64_t &cu
     if (dag.criticality == Criticality::High) continue;
     for (Task &task : dag.tasks) task.budget = task.wcet;
   }
-  const auto system = analysis::compile(drawn.workload, drawn.platform);
-  ASSERT_TRUE(system) << to_string(system.error());
-  const auto outcome = analysis::amc_rtb().apply(*system);
+  const auto task_set = analysis::compile(drawn.workload, drawn.platform);
+  ASSERT_TRUE(task_set) << to_string(task_set.error());
+  const auto outcome = analysis::amc_rtb().apply(*task_set);
   const auto *bound = std::get_if<analysis::Bound>(&outcome);
   if (bound == nullptr || bound->figures.find("criticality are met in every mode") == std::string::npos) return;
   ++judged;
   constexpr Duration kHorizon = 1500;
   for (int run = 0; run < 2; ++run) {
-    offset_at_random(drawn.workload, *system, run == 0, rng);
+    offset_at_random(drawn.workload, *task_set, run == 0, rng);
     const double overruns = rng.uniform01();
     const std::uint64_t demands = rng();
     const auto demand = [&](const Task &task, TaskId id, std::uint32_t number) {
@@ -253,7 +253,7 @@ void check_overload(std::uint64_t seed, std::uint64_t &judged, std::uint64_t &cu
     changes += count(events, JobEventKind::HighMode);
     cut_off += count(events, JobEventKind::Aborted);
     for (const metrics::JobRecord &job : metrics::fold_jobs(drawn.workload, events)) {
-      if (!system->dags[system->tasks[job.task.value].dag.value].high) continue;
+      if (!task_set->dags[task_set->tasks[job.task.value].dag.value].high) continue;
       const bool missed =
           job.outcome != metrics::JobOutcome::Aborted && metrics::miss_of(job, kHorizon) != metrics::Miss::None;
       ASSERT_FALSE(missed) << "seed " << seed << " run " << run << " task " << job.task.value << " job " << job.number
@@ -288,9 +288,9 @@ TEST(Overload, HighCriticalityMissesNothingBesideTenTimesTheCapacity) {
     limits.max_dags = 3;
     BoundCase high = random_bound_case(rng, limits);
     for (Dag &dag : high.workload.dags) dag.criticality = Criticality::High;
-    const auto system = analysis::compile(high.workload, high.platform);
-    ASSERT_TRUE(system) << to_string(system.error());
-    if (analysis::analyze(*system).verdict != analysis::Verdict::Schedulable) continue;
+    const auto task_set = analysis::compile(high.workload, high.platform);
+    ASSERT_TRUE(task_set) << to_string(task_set.error());
+    if (analysis::analyze(*task_set).verdict != analysis::Verdict::Schedulable) continue;
     ++judged;
 
     RunSpec spec;

@@ -9,18 +9,18 @@
 #include <vector>
 
 #include "redag_analysis/analyze/analyze.hpp"
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 namespace redag::analysis {
 namespace {
 
-std::string doubtful_tasks(const System &system, const Workload &workload, const Report &report) {
+std::string doubtful_tasks(const TaskSet &task_set, const Workload &workload, const Report &report) {
   constexpr std::size_t kMost = 3;
   std::vector<std::string> doubtful;
   for (const TaskRef &ref : flatten(workload)) {
     const auto &response = report.tasks[ref.id.value].response;
     if (response && *response <= ref.task->deadline) continue;
-    doubtful.push_back(fmt::format("{} ({}, deadline {})", system.tasks[ref.id.value].name,
+    doubtful.push_back(fmt::format("{} ({}, deadline {})", task_set.tasks[ref.id.value].name,
                                    response ? "bound " + humanize_duration(*response) : "no bound",
                                    humanize_duration(ref.task->deadline)));
   }
@@ -39,12 +39,12 @@ Result<void> admit_by_bounds(const Workload &workload, const sched::Config &conf
                                   ref.task->name, workload.dags[ref.dag.value].name),
                       "state the longest execution time");
   }
-  const Result<System> system = compile(workload, platform_of(config));
-  if (!system) return tl::unexpected<Diagnostics>(system.error());
-  if (!system->not_analysable.empty() && !system->has_modes) return make_error(system->not_analysable);
-  const Report report = analyze(*system);
+  const Result<TaskSet> task_set = compile(workload, platform_of(config));
+  if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
+  if (!task_set->not_analysable.empty() && !task_set->has_modes) return make_error(task_set->not_analysable);
+  const Report report = analyze(*task_set);
   if (report.verdict == Verdict::Schedulable) return {};
-  const std::string doubtful = doubtful_tasks(*system, workload, report);
+  const std::string doubtful = doubtful_tasks(*task_set, workload, report);
   return make_error("no bound shows that every deadline is met" + (doubtful.empty() ? "" : ": " + doubtful),
                     "'redag analyze --explain' says where a bound comes from");
 }

@@ -16,33 +16,33 @@ void keep_tightest(std::vector<Tightest> &best, const std::vector<ResponseBound>
   }
 }
 
-Outcome apply_within(const System &system, const Method &method, const Effort::Limits &limits) {
+Outcome apply_within(const TaskSet &task_set, const Method &method, const Effort::Limits &limits) {
   const Effort effort(limits);
   try {
-    return method.apply(system);
+    return method.apply(task_set);
   } catch (const Effort::GaveUp &gave_up) {
     if (gave_up.scope != &effort) throw;
     return NotApplicable{gave_up.why, true};
   }
 }
 
-MethodReport run(const System &system, const Method &method, const Effort::Limits &limits) {
+MethodReport run(const TaskSet &task_set, const Method &method, const Effort::Limits &limits) {
   MethodReport report;
   report.method = &method;
-  const bool is_covered = system.not_analysable.empty() || (system.has_modes && method.knows_modes);
-  report.outcome = is_covered ? apply_within(system, method, limits) : NotApplicable{system.not_analysable};
+  const bool is_covered = task_set.not_analysable.empty() || (task_set.has_modes && method.knows_modes);
+  report.outcome = is_covered ? apply_within(task_set, method, limits) : NotApplicable{task_set.not_analysable};
   if (const Bound *bound = report.bound()) {
-    report.verdict = verdict(system, *bound);
+    report.verdict = verdict(task_set, *bound);
     report.trusted = bound->unsound.empty();
   }
   return report;
 }
 
-Bound apply_itemised(const System &system, const Method &method, std::vector<std::uint32_t> units) {
+Bound apply_itemised(const TaskSet &task_set, const Method &method, std::vector<std::uint32_t> units) {
   Effort::Limits limits;
   limits.itemised = {Itemised::Which::Units, std::move(units)};
   const Effort effort(limits);
-  return std::get<Bound>(method.apply(system));
+  return std::get<Bound>(method.apply(task_set));
 }
 
 Bound combine(const std::vector<Tightest> &tasks, const std::vector<Tightest> &dags) {
@@ -53,10 +53,10 @@ Bound combine(const std::vector<Tightest> &tasks, const std::vector<Tightest> &d
 }
 
 // The report points into `methods`.
-Report report_of(const System &system, const std::vector<Method> &methods, const AnalyzeOptions &options) {
+Report report_of(const TaskSet &task_set, const std::vector<Method> &methods, const AnalyzeOptions &options) {
   Report report;
-  report.tasks.resize(system.tasks.size());
-  report.dags.resize(system.dags.size());
+  report.tasks.resize(task_set.tasks.size());
+  report.dags.resize(task_set.dags.size());
   for (const Method &method : methods) {
     Effort::Limits limits;
     limits.steps = options.effort;
@@ -66,7 +66,7 @@ Report report_of(const System &system, const std::vector<Method> &methods, const
         return options.stop(AnalysisProgress{method, report.methods.size(), methods.size(), at});
       };
     }
-    report.methods.push_back(run(system, method, limits));
+    report.methods.push_back(run(task_set, method, limits));
     const MethodReport &last = report.methods.back();
     if (!last.trusted) continue;
     keep_tightest(report.tasks, last.bound()->tasks, method);
@@ -74,7 +74,7 @@ Report report_of(const System &system, const std::vector<Method> &methods, const
     if (last.bound()->accepts == true) report.by.push_back(&method);
   }
 
-  if (verdict(system, combine(report.tasks, report.dags)) == Verdict::Schedulable) {
+  if (verdict(task_set, combine(report.tasks, report.dags)) == Verdict::Schedulable) {
     for (const Tightest &best : report.tasks) {
       if (best.method != nullptr && std::find(report.by.begin(), report.by.end(), best.method) == report.by.end()) {
         report.by.push_back(best.method);
@@ -87,45 +87,47 @@ Report report_of(const System &system, const std::vector<Method> &methods, const
 
 }  // namespace
 
-Report analyze(const System &system, const AnalyzeOptions &options) { return report_of(system, methods(), options); }
+Report analyze(const TaskSet &task_set, const AnalyzeOptions &options) {
+  return report_of(task_set, methods(), options);
+}
 
-Report analyze(const System &system, std::vector<Method> methods, const AnalyzeOptions &options) {
+Report analyze(const TaskSet &task_set, std::vector<Method> methods, const AnalyzeOptions &options) {
   const auto owned = std::make_shared<const std::vector<Method>>(std::move(methods));
-  Report report = report_of(system, *owned, options);
+  Report report = report_of(task_set, *owned, options);
   report.owned = owned;
   return report;
 }
 
-ResponseBound itemised(const System &system, const Tightest &tightest, TaskId task) {
-  const Bound bound = apply_itemised(system, *tightest.method, {system.tasks[task.value].unit});
+ResponseBound itemised(const TaskSet &task_set, const Tightest &tightest, TaskId task) {
+  const Bound bound = apply_itemised(task_set, *tightest.method, {task_set.tasks[task.value].unit});
   return bound.tasks[task.value];
 }
 
-ResponseBound itemised(const System &system, const Tightest &tightest, DagId dag) {
-  const Bound bound = apply_itemised(system, *tightest.method, system.dags[dag.value].units);
+ResponseBound itemised(const TaskSet &task_set, const Tightest &tightest, DagId dag) {
+  const Bound bound = apply_itemised(task_set, *tightest.method, task_set.dags[dag.value].units);
   return bound.dags[dag.value];
 }
 
 Bound tightest_of(const Report &report) { return combine(report.tasks, report.dags); }
 
-bool is_shown_schedulable(const System &system) {
-  if (!system.not_analysable.empty()) return false;
+bool is_shown_schedulable(const TaskSet &task_set) {
+  if (!task_set.not_analysable.empty()) return false;
   Effort::Limits limits;
   limits.steps = kUsualEffort;
   limits.itemised.which = Itemised::Which::None;
-  std::vector<Tightest> tasks(system.tasks.size());
-  std::vector<Tightest> dags(system.dags.size());
+  std::vector<Tightest> tasks(task_set.tasks.size());
+  std::vector<Tightest> dags(task_set.dags.size());
   for (const bool quick : {true, false}) {
     for (const Method &method : methods()) {
       if (method.quick != quick) continue;
-      const MethodReport report = run(system, method, limits);
+      const MethodReport report = run(task_set, method, limits);
       if (!report.trusted) continue;
       if (report.verdict == Verdict::Schedulable) return true;
       keep_tightest(tasks, report.bound()->tasks, method);
       keep_tightest(dags, report.bound()->dags, method);
     }
   }
-  return verdict(system, combine(tasks, dags)) == Verdict::Schedulable;
+  return verdict(task_set, combine(tasks, dags)) == Verdict::Schedulable;
 }
 
 }  // namespace redag::analysis

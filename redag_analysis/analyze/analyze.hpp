@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Applies every method to one system: which apply, why the others do not, and the tightest sound bound of each task and
-// DAG with the method that gave it. A pure function.
+// Applies every method to one task set: which apply, why the others do not, and the tightest sound bound of each task
+// and DAG with the method that gave it. A pure function.
 #pragma once
 
 #include <memory>
@@ -61,21 +61,21 @@ struct AnalyzeOptions {
   bool itemise = false;
 };
 
-/// Runs methods(). Memory is linear in the size of the system unless it itemises. A method that is ended counts as
+/// Runs methods(). Memory is linear in the size of the task set unless it itemises. A method that is ended counts as
 /// NotApplicable with `gave_up`; this does not affect the others.
-[[nodiscard]] Report analyze(const System &system, const AnalyzeOptions &options = {});
+[[nodiscard]] Report analyze(const TaskSet &task_set, const AnalyzeOptions &options = {});
 /// Runs these methods alone; the report keeps them.
-[[nodiscard]] Report analyze(const System &system, std::vector<Method> methods, const AnalyzeOptions &options = {});
+[[nodiscard]] Report analyze(const TaskSet &task_set, std::vector<Method> methods, const AnalyzeOptions &options = {});
 
 /// Runs the method again, and returns the same bound with its terms. Requires a bound with a method.
-[[nodiscard]] ResponseBound itemised(const System &system, const Tightest &tightest, TaskId task);
-[[nodiscard]] ResponseBound itemised(const System &system, const Tightest &tightest, DagId dag);
+[[nodiscard]] ResponseBound itemised(const TaskSet &task_set, const Tightest &tightest, TaskId task);
+[[nodiscard]] ResponseBound itemised(const TaskSet &task_set, const Tightest &tightest, DagId dag);
 
 /// Combines the tightest bounds, as if one method had given them.
 [[nodiscard]] Bound tightest_of(const Report &report);
 
-/// True if analyze(system).verdict is Schedulable. For frequent calls: it runs the quick tests first, and stops at the
-/// first method that shows it. Throws Effort::GaveUp if a scope of the caller ends it.
-[[nodiscard]] bool is_shown_schedulable(const System &system);
+/// True if analyze(task_set).verdict is Schedulable. For frequent calls: it runs the quick tests first, and stops at
+/// the first method that shows it. Throws Effort::GaveUp if a scope of the caller ends it.
+[[nodiscard]] bool is_shown_schedulable(const TaskSet &task_set);
 
 }  // namespace redag::analysis

@@ -12,17 +12,17 @@
 namespace redag::analysis {
 namespace {
 
-bool hands_over(const System &system, TaskId from, TaskId to) {
-  const std::vector<std::uint32_t> &before = system.tasks[to.value].predecessors;
-  return system.tasks[from.value].unit == system.tasks[to.value].unit &&
+bool hands_over(const TaskSet &task_set, TaskId from, TaskId to) {
+  const std::vector<std::uint32_t> &before = task_set.tasks[to.value].predecessors;
+  return task_set.tasks[from.value].unit == task_set.tasks[to.value].unit &&
          std::find(before.begin(), before.end(), from.value) != before.end();
 }
 
 // The response from the unit's release. A task of a larger unit may be bounded only from its own release, but its DAG
 // is bounded from the unit's.
-const ResponseBound *response_of(const System &system, TaskId task, const Bound &bound) {
-  const SystemTask &compiled = system.tasks[task.value];
-  const bool single = system.units[compiled.unit].tasks.size() == 1;
+const ResponseBound *response_of(const TaskSet &task_set, TaskId task, const Bound &bound) {
+  const CompiledTask &compiled = task_set.tasks[task.value];
+  const bool single = task_set.units[compiled.unit].tasks.size() == 1;
   const std::vector<ResponseBound> &responses = single ? bound.tasks : bound.dags;
   const std::uint32_t position = single ? task.value : compiled.dag.value;
   return position < responses.size() && responses[position].response ? &responses[position] : nullptr;
@@ -30,22 +30,22 @@ const ResponseBound *response_of(const System &system, TaskId task, const Bound 
 
 // True if a job of `from` that is released no later than one of `to` always ends before that one starts. It must be
 // ready when released, only its priority may decide, and no job may run beside it.
-bool goes_first(const System &system, const ChainSegment &from, const ChainSegment &to) {
-  const SystemTask &producer = system.tasks[from.last.value];
-  const SystemTask &consumer = system.tasks[to.first.value];
+bool goes_first(const TaskSet &task_set, const ChainSegment &from, const ChainSegment &to) {
+  const CompiledTask &producer = task_set.tasks[from.last.value];
+  const CompiledTask &consumer = task_set.tasks[to.first.value];
   const bool alone = from.first == from.last && producer.predecessors.empty();
-  return system.platform.workers == 1 && is_static(system.policy) && alone && producer.jitter == 0 &&
-         producer.group == kNoGroup && system.dags[producer.dag.value].max_active == 0 &&
-         producer.tier < consumer.tier && system.mode != sched::Preemption::Cooperative;
+  return task_set.platform.workers == 1 && is_static(task_set.policy) && alone && producer.jitter == 0 &&
+         producer.group == kNoGroup && task_set.dags[producer.dag.value].max_active == 0 &&
+         producer.tier < consumer.tier && task_set.mode != sched::Preemption::Cooperative;
 }
 
-Duration one_worker_reaction(const System &system, const std::vector<ChainSegment> &segments) {
+Duration one_worker_reaction(const TaskSet &task_set, const std::vector<ChainSegment> &segments) {
   Duration sum = add(segments.front().period, segments.back().response);
   for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
     const ChainSegment &from = segments[i];
     const ChainSegment &to = segments[i + 1];
     const Duration step =
-        goes_first(system, from, to) ? std::max(from.response, to.period) : add(to.period, from.response);
+        goes_first(task_set, from, to) ? std::max(from.response, to.period) : add(to.period, from.response);
     sum = add(sum, step);
   }
   return sum;
@@ -53,19 +53,19 @@ Duration one_worker_reaction(const System &system, const std::vector<ChainSegmen
 
 }  // namespace
 
-std::variant<NotApplicable, ChainBound> chain_bound(const System &system, std::span<const TaskId> chain,
+std::variant<NotApplicable, ChainBound> chain_bound(const TaskSet &task_set, std::span<const TaskId> chain,
                                                     const Bound &bound) {
   if (chain.empty()) return NotApplicable{"a chain without tasks"};
-  if (!system.not_analysable.empty()) return NotApplicable{system.not_analysable};
-  if (auto reason = why_not_directly(system)) return NotApplicable{*reason};
+  if (!task_set.not_analysable.empty()) return NotApplicable{task_set.not_analysable};
+  if (auto reason = why_not_directly(task_set)) return NotApplicable{*reason};
   ChainBound result;
   for (std::size_t i = 0; i < chain.size(); ++i) {
-    if (i > 0 && hands_over(system, chain[i - 1], chain[i])) {
+    if (i > 0 && hands_over(task_set, chain[i - 1], chain[i])) {
       result.segments.back().last = chain[i];
       continue;
     }
-    const SystemTask &task = system.tasks[chain[i].value];
-    const ResponseBound *response = response_of(system, chain[i], bound);
+    const CompiledTask &task = task_set.tasks[chain[i].value];
+    const ResponseBound *response = response_of(task_set, chain[i], bound);
     if (response == nullptr) return NotApplicable{"task '" + task.name + "' has no response bound"};
     if (*response->response > task.period) {
       return NotApplicable{"task '" + task.name + "': a response above its period can hold data back for longer"};
@@ -75,7 +75,7 @@ std::variant<NotApplicable, ChainBound> chain_bound(const System &system, std::s
   for (const ChainSegment &segment : result.segments) {
     result.sum = add(result.sum, add(segment.period, segment.response));
   }
-  if (system.platform.workers == 1) result.one_worker = one_worker_reaction(system, result.segments);
+  if (task_set.platform.workers == 1) result.one_worker = one_worker_reaction(task_set, result.segments);
   return result;
 }
 

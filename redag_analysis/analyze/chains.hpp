@@ -42,8 +42,8 @@ struct ChainBound {
 /// gaps). Consecutive tasks of one unit hand over job by job if an edge joins them; others hand over by a register (the
 /// latest value). NotApplicable for a chain without tasks, and for a task without a bound in `bound` or with one above
 /// its period.
-[[nodiscard]] std::variant<NotApplicable, ChainBound> chain_bound(const System &system, std::span<const TaskId> chain,
-                                                                  const Bound &bound);
+[[nodiscard]] std::variant<NotApplicable, ChainBound> chain_bound(const TaskSet &task_set,
+                                                                  std::span<const TaskId> chain, const Bound &bound);
 
 /// A task under logical execution time: it reads at its release, and writes `deadline` after it.
 struct LetTask {

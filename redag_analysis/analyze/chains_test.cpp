@@ -89,21 +89,21 @@ struct Tally {
 };
 
 void check_chain(const testing::BoundCase &bound_case, const Method &method, Rng &rng, Tally &tally) {
-  const System system = compile(bound_case.workload, bound_case.platform).value();
-  if (!system.not_analysable.empty()) return;
-  const Outcome outcome = method.apply(system);
+  const TaskSet task_set = compile(bound_case.workload, bound_case.platform).value();
+  if (!task_set.not_analysable.empty()) return;
+  const Outcome outcome = method.apply(task_set);
   if (!std::holds_alternative<Bound>(outcome)) return;
   std::vector<TaskId> chain;
   const auto length = static_cast<std::size_t>(rng.uniform(1, 5));
   for (std::size_t i = 0; i < length; ++i) {
     // Follows an edge, or goes anywhere.
-    const auto &next = chain.empty() ? system.tasks[0].predecessors : system.tasks[chain.back().value].successors;
+    const auto &next = chain.empty() ? task_set.tasks[0].predecessors : task_set.tasks[chain.back().value].successors;
     const bool follow = !next.empty() && rng.uniform(0, 2) > 0;
-    const auto last = static_cast<std::int64_t>(follow ? next.size() : system.tasks.size()) - 1;
+    const auto last = static_cast<std::int64_t>(follow ? next.size() : task_set.tasks.size()) - 1;
     const auto position = static_cast<std::size_t>(rng.uniform(0, last));
     chain.emplace_back(follow ? next[position] : position);
   }
-  const auto bounded = chain_bound(system, chain, std::get<Bound>(outcome));
+  const auto bounded = chain_bound(task_set, chain, std::get<Bound>(outcome));
   const auto *bound = std::get_if<ChainBound>(&bounded);
   if (bound == nullptr) return;
 
@@ -118,10 +118,10 @@ void check_chain(const testing::BoundCase &bound_case, const Method &method, Rng
   for (int run = 0; run < 4; ++run) {
     std::uint32_t id = 0;
     std::vector<Duration> offsets;
-    for (const Unit &unit : system.units) offsets.push_back(run == 0 ? 0 : rng.uniform(0, unit.period));
+    for (const Unit &unit : task_set.units) offsets.push_back(run == 0 ? 0 : rng.uniform(0, unit.period));
     for (Dag &dag : workload.dags) {
       for (Task &task : dag.tasks) {
-        const std::uint32_t unit = system.tasks[id++].unit;
+        const std::uint32_t unit = task_set.tasks[id++].unit;
         if (task.activation == Activation::Timer) task.offset = offsets[unit];
       }
     }
@@ -212,14 +212,14 @@ TEST(Chain, ThePriorityDiscountNeedsOneWorker) {
   const Workload workload = producer_and_consumer(2);
   const std::vector<TaskId> chain{TaskId(0U), TaskId(1U)};
   const AnalysisPlatform platform = platform_of(workload);
-  const System system = compile(workload, platform).value();
-  const auto bound = std::get<ChainBound>(chain_bound(system, chain, std::get<Bound>(dag_bounded().apply(system))));
+  const TaskSet task_set = compile(workload, platform).value();
+  const auto bound = std::get<ChainBound>(chain_bound(task_set, chain, std::get<Bound>(dag_bounded().apply(task_set))));
   EXPECT_EQ(bound.reaction(), 10 + 9 + 10 + 1);
   EXPECT_FALSE(bound.one_worker);
   EXPECT_EQ(observed_reaction(simulated(workload, platform, 200, {}), chain), 29);
 
   const Workload alone = producer_and_consumer(1);
-  const System one = compile(alone, platform_of(alone)).value();
+  const TaskSet one = compile(alone, platform_of(alone)).value();
   const auto discounted = std::get<ChainBound>(chain_bound(one, chain, std::get<Bound>(rta_preemptive().apply(one))));
   EXPECT_EQ(discounted.one_worker, 10 + 10 + 10);  // T_1, max(R_1, T_2), R_2
   EXPECT_EQ(discounted.sum, 39);
@@ -234,19 +234,19 @@ TEST(Chain, EdgesMakeOneSegment) {
   consumer.name = "consumer";
   workload.dags[0].tasks.push_back(consumer);
   workload.dags.pop_back();
-  const System system = compile(workload, platform_of(workload)).value();
+  const TaskSet task_set = compile(workload, platform_of(workload)).value();
   const std::vector<TaskId> chain{TaskId(0U), TaskId(1U)};
-  const auto bound = std::get<ChainBound>(chain_bound(system, chain, std::get<Bound>(dag_bounded().apply(system))));
+  const auto bound = std::get<ChainBound>(chain_bound(task_set, chain, std::get<Bound>(dag_bounded().apply(task_set))));
   ASSERT_EQ(bound.segments.size(), 1U);
   EXPECT_EQ(bound.sum, 10 + 10);
 }
 
 TEST(Chain, WithoutABoundThereIsNone) {
   const Workload workload = producer_and_consumer(1);
-  const System system = compile(workload, platform_of(workload)).value();
+  const TaskSet task_set = compile(workload, platform_of(workload)).value();
   const std::vector<TaskId> chain{TaskId(0U)};
-  EXPECT_TRUE(std::holds_alternative<NotApplicable>(chain_bound(system, chain, Bound{})));
-  EXPECT_TRUE(std::holds_alternative<NotApplicable>(chain_bound(system, {}, Bound{})));
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(chain_bound(task_set, chain, Bound{})));
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(chain_bound(task_set, {}, Bound{})));
 }
 
 // Tries every instant as the arrival of an input.

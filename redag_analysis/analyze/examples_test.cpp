@@ -44,15 +44,15 @@ Workload independent(const std::vector<Numbers> &tasks, PolicyKind policy = Poli
   return workload;
 }
 
-System compiled(const Workload &workload, sched::Preemption preemption, AnalysisPlatform platform = {}) {
+TaskSet compiled(const Workload &workload, sched::Preemption preemption, AnalysisPlatform platform = {}) {
   platform.preemption = preemption;
-  const auto system = compile(workload, platform);
-  EXPECT_TRUE(system) << to_string(system.error());
-  return *system;
+  const auto task_set = compile(workload, platform);
+  EXPECT_TRUE(task_set) << to_string(task_set.error());
+  return *task_set;
 }
 
-std::vector<Duration> responses(const Method &method, const System &system) {
-  const Outcome outcome = method.apply(system);
+std::vector<Duration> responses(const Method &method, const TaskSet &task_set) {
+  const Outcome outcome = method.apply(task_set);
   EXPECT_TRUE(std::holds_alternative<Bound>(outcome)) << std::get<NotApplicable>(outcome).reason;
   std::vector<Duration> found;
   for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) found.push_back(bound.response.value_or(-1));
@@ -63,8 +63,8 @@ std::vector<Duration> responses(const Method &method, const std::vector<Numbers>
   return responses(method, compiled(independent(tasks), preemption));
 }
 
-bool accepts(const Method &method, const System &system) {
-  const Outcome outcome = method.apply(system);
+bool accepts(const Method &method, const TaskSet &task_set) {
+  const Outcome outcome = method.apply(task_set);
   EXPECT_TRUE(std::holds_alternative<Bound>(outcome)) << std::get<NotApplicable>(outcome).reason;
   return std::get<Bound>(outcome).accepts.value();
 }
@@ -82,10 +82,10 @@ TEST(Examples, BurnsWellings) {
 TEST(Examples, LehoczkyShaDing) {
   const std::vector<Numbers> tasks = {{40, 100}, {40, 150}, {100, 350}};
   EXPECT_EQ(responses(rta_preemptive(), tasks, kFull), (Durations{40, 80, 300}));
-  const System system = compiled(independent(tasks), kFull);
-  EXPECT_TRUE(accepts(exact_points(), system));
-  EXPECT_FALSE(accepts(liu_layland(), system));
-  EXPECT_FALSE(accepts(hyperbolic(), system));
+  const TaskSet task_set = compiled(independent(tasks), kFull);
+  EXPECT_TRUE(accepts(exact_points(), task_set));
+  EXPECT_FALSE(accepts(liu_layland(), task_set));
+  EXPECT_FALSE(accepts(hyperbolic(), task_set));
 }
 
 // J. Lehoczky, RTSS 1990: with deadlines above the period the first job is not the worst: 114, 102, 116, 104, 118, ...
@@ -93,9 +93,9 @@ TEST(Examples, LehoczkyArbitraryDeadlines) {
   Workload workload = independent({{26, 70}, {62, 100, 200}});
   workload.dags[0].tasks[1].overrun = Overrun::Queue;
   workload.dags[0].tasks[1].queue_depth = 2;
-  const System system = compiled(workload, kFull);
-  EXPECT_EQ(responses(rta_preemptive(), system), (Durations{26, 118}));
-  const Outcome outcome = rta_preemptive().apply(system);
+  const TaskSet task_set = compiled(workload, kFull);
+  EXPECT_EQ(responses(rta_preemptive(), task_set), (Durations{26, 118}));
+  const Outcome outcome = rta_preemptive().apply(task_set);
   const ResponseBound &bound = std::get<Bound>(outcome).tasks[1];
   EXPECT_EQ(bound.sum(Term::Kind::Earlier), 4 * (62 - 100)) << "the fifth job of the busy period";
   EXPECT_EQ(bound.sum(Term::Kind::Interference), 26 * 8);
@@ -112,24 +112,24 @@ TEST(Examples, DavisBurnsBrilLukkien) {
   Workload workload = independent(tasks);
   EXPECT_EQ(responses(rta_nonpreemptive(), compiled(workload, kNone)), (Durations{1999, 3500, 3500})) << "two equals";
   workload.ties = Ties::Fixed;
-  const System system = compiled(workload, kNone);
-  EXPECT_EQ(responses(rta_nonpreemptive(), system), (Durations{1999, 2999, 3500}));
-  EXPECT_EQ(verdict(system, std::get<Bound>(rta_nonpreemptive().apply(system))), Verdict::NotShown);
+  const TaskSet task_set = compiled(workload, kNone);
+  EXPECT_EQ(responses(rta_nonpreemptive(), task_set), (Durations{1999, 2999, 3500}));
+  EXPECT_EQ(verdict(task_set, std::get<Bound>(rta_nonpreemptive().apply(task_set))), Verdict::NotShown);
 }
 
 // E. Bini, G. Buttazzo, G. Buttazzo 2003: above the limit of Liu and Layland, within the hyperbolic bound.
 TEST(Examples, HyperbolicBeyondLiuLayland) {
-  const System system = compiled(independent({{50, 100}, {43, 130}}), kFull);
-  EXPECT_GT(system.utilization, 0.8285);
-  EXPECT_FALSE(accepts(liu_layland(), system));
-  EXPECT_TRUE(accepts(hyperbolic(), system));
+  const TaskSet task_set = compiled(independent({{50, 100}, {43, 130}}), kFull);
+  EXPECT_GT(task_set.utilization, 0.8285);
+  EXPECT_FALSE(accepts(liu_layland(), task_set));
+  EXPECT_TRUE(accepts(hyperbolic(), task_set));
 }
 
 TEST(Examples, HarmonicPeriodsFillTheProcessor) {
-  const System full = compiled(independent({{1, 3}, {1, 6}, {6, 12}}), kFull);
+  const TaskSet full = compiled(independent({{1, 3}, {1, 6}, {6, 12}}), kFull);
   EXPECT_TRUE(accepts(harmonic_chains(), full)) << "U = 1 exactly, in thirds";
   EXPECT_FALSE(accepts(hyperbolic(), full));
-  const System above = compiled(independent({{1, 3}, {1, 6}, {7, 12}}), kFull);
+  const TaskSet above = compiled(independent({{1, 3}, {1, 6}, {7, 12}}), kFull);
   EXPECT_FALSE(accepts(harmonic_chains(), above));
 }
 
@@ -146,19 +146,19 @@ TEST(Examples, RunToCompletionBlocksTheMostUrgent) {
 TEST(Examples, DeferredPreemption) {
   Workload workload = independent({{2, 20}, {10, 40}});
   workload.dags[0].tasks[1].region = 4;
-  const System system = compiled(workload, sched::Preemption::Cooperative);
-  EXPECT_EQ(system.tasks[1].last_region, 2);
-  EXPECT_EQ(responses(rta_deferred(), system), (Durations{5, 12}));
+  const TaskSet task_set = compiled(workload, sched::Preemption::Cooperative);
+  EXPECT_EQ(task_set.tasks[1].last_region, 2);
+  EXPECT_EQ(responses(rta_deferred(), task_set), (Durations{5, 12}));
 }
 
 TEST(Examples, ThePapersEquationsAreOptimistic) {
-  const System repeats = compiled(independent({{1, 4}, {5, 20}}), kFull);
+  const TaskSet repeats = compiled(independent({{1, 4}, {5, 20}}), kFull);
   EXPECT_EQ(responses(paper_interference(), repeats), (Durations{1, 6}));
   EXPECT_EQ(responses(rta_preemptive(), repeats), (Durations{1, 7}));
   EXPECT_NE(std::get<Bound>(paper_interference().apply(repeats)).unsound, "");
   EXPECT_EQ(std::get<Bound>(paper_rta().apply(repeats)).unsound, "");
 
-  const System ties = compiled(independent({{5, 10}, {5, 10}}), kFull);
+  const TaskSet ties = compiled(independent({{5, 10}, {5, 10}}), kFull);
   EXPECT_EQ(responses(paper_rta(), ties), (Durations{5, 5}));
   EXPECT_EQ(responses(rta_preemptive(), ties), (Durations{10, 10}));
   EXPECT_NE(std::get<Bound>(paper_rta().apply(ties)).unsound, "");
@@ -176,9 +176,9 @@ TEST(Examples, EdfDemand) {
 TEST(Examples, BlockingByAGroupReachesTheTasksBetween) {
   Workload workload = independent({{1, 20}, {2, 40}, {6, 80}});
   workload.dags[0].tasks[0].group = workload.dags[0].tasks[2].group = "shared";
-  const System system = compiled(workload, kFull);
-  EXPECT_EQ(responses(rta_preemptive(), system), (Durations{1 + 5, 2 + 1 + 5, 6 + 1 + 2}));
-  const Bound bound = std::get<Bound>(rta_preemptive().apply(system));
+  const TaskSet task_set = compiled(workload, kFull);
+  EXPECT_EQ(responses(rta_preemptive(), task_set), (Durations{1 + 5, 2 + 1 + 5, 6 + 1 + 2}));
+  const Bound bound = std::get<Bound>(rta_preemptive().apply(task_set));
   const Term blocking{Term::Kind::Blocking, TaskId(2), DagId(0), 5, 1};
   EXPECT_NE(std::find(bound.tasks[1].terms.begin(), bound.tasks[1].terms.end(), blocking), bound.tasks[1].terms.end());
 }
@@ -188,9 +188,9 @@ TEST(Examples, OverheadsAreCharged) {
   platform.release_overhead = 1;
   platform.dispatch_overhead = 2;
   platform.preempt_overhead = 3;
-  const System system = compiled(independent({{4, 30}, {10, 60}}), kFull, platform);
-  EXPECT_EQ(responses(rta_preemptive(), system), (Durations{10, 26}));
-  const Bound bound = std::get<Bound>(rta_preemptive().apply(system));
+  const TaskSet task_set = compiled(independent({{4, 30}, {10, 60}}), kFull, platform);
+  EXPECT_EQ(responses(rta_preemptive(), task_set), (Durations{10, 26}));
+  const Bound bound = std::get<Bound>(rta_preemptive().apply(task_set));
   EXPECT_EQ(bound.tasks[1].sum(Term::Kind::Overhead), 6);
   EXPECT_EQ(bound.tasks[1].sum(Term::Kind::Own), 10);
   EXPECT_EQ(bound.tasks[1].sum(Term::Kind::Interference), 10);
@@ -203,7 +203,7 @@ TEST(Examples, DagsOnOneWorker) {
                                                                          {.name = "d", .wcet_ms = 9, .after = {0}},
                                                                          {.name = "e", .wcet_ms = 4, .after = {0}}})},
                                              1);
-  const System full = compiled(workload, kFull);
+  const TaskSet full = compiled(workload, kFull);
   ASSERT_EQ(full.units.size(), 2U);
   EXPECT_EQ(full.units[1].volume, 18 * kMillisecond);
   EXPECT_EQ(full.units[1].length, 14 * kMillisecond);

@@ -42,8 +42,8 @@ AnalysisPlatform effective_platform(const executors::ExecutorKind &executor, Ana
   return platform;
 }
 
-Result<System> compile_for(const executors::ExecutorKind &executor, const Workload &workload,
-                           const AnalysisPlatform &platform) {
+Result<TaskSet> compile_for(const executors::ExecutorKind &executor, const Workload &workload,
+                            const AnalysisPlatform &platform) {
   const AnalysisPlatform effective = effective_platform(executor, platform);
   if (executor.ours) return compile(workload, effective);
   Workload seen = workload;

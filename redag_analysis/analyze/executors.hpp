@@ -21,7 +21,7 @@ namespace redag::analysis {
 [[nodiscard]] AnalysisPlatform effective_platform(const executors::ExecutorKind &executor, AnalysisPlatform platform);
 
 /// Compiles what the executor sees: peers do not know max_active. Errors: those of compile().
-[[nodiscard]] Result<System> compile_for(const executors::ExecutorKind &executor, const Workload &workload,
-                                         const AnalysisPlatform &platform);
+[[nodiscard]] Result<TaskSet> compile_for(const executors::ExecutorKind &executor, const Workload &workload,
+                                          const AnalysisPlatform &platform);
 
 }  // namespace redag::analysis

@@ -71,8 +71,8 @@ TEST(Executors, TheTightestOfSeveralIsTaken) {
                                                     make_dag("slow", {{.name = "s", .period_ms = 120, .wcet_ms = 20}})},
                                                    1);
   for (const char *name : {"ste", "events"}) {
-    const System system = compile_for(executor(name), workload, platform_of(workload)).value();
-    const Report report = analyze(system, methods_of(executor(name)));
+    const TaskSet task_set = compile_for(executor(name), workload, platform_of(workload)).value();
+    const Report report = analyze(task_set, methods_of(executor(name)));
     ASSERT_TRUE(report.tasks[1].response) << name;
     EXPECT_EQ(*report.tasks[0].response, (20 + 2) * kMillisecond) << name;
     EXPECT_EQ(*report.tasks[1].response, (20 + 2) * kMillisecond) << name << ": f comes once while s waits";
@@ -86,10 +86,10 @@ TEST(Executors, PeersRunOnTheirOwnPlatformAndIgnoreMaxActive) {
   AnalysisPlatform platform = platform_of(workload);
   platform.levels = 2;
   platform.max_started = 7;
-  const System ours = compile_for(executor("redag"), workload, platform).value();
+  const TaskSet ours = compile_for(executor("redag"), workload, platform).value();
   EXPECT_EQ(ours.platform, platform);
   EXPECT_EQ(ours.dags[0].max_active, 1U);
-  const System mte = compile_for(executor("mte"), workload, platform).value();
+  const TaskSet mte = compile_for(executor("mte"), workload, platform).value();
   EXPECT_EQ(mte.platform.workers, 4U);
   EXPECT_EQ(mte.mode, sched::Preemption::None);
   EXPECT_EQ(mte.platform.levels + mte.platform.max_started, 0U);

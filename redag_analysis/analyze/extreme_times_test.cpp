@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Every method on systems with times between a nanosecond and the longest duration: no bound may result from a sum or
+// Every method on task sets with times between a nanosecond and the longest duration: no bound may result from a sum or
 // product that wrapped. UndefinedBehaviorSanitizer (make asan) finds the wrap itself; these tests see only its results.
 #include <gtest/gtest.h>
 
@@ -103,21 +103,21 @@ TEST(ExtremeTimes, NoBoundWraps) {
     const testing::BoundCase drawn = any_case(rng);
     if (has_errors(validate(drawn.workload))) continue;
     for (const executors::ExecutorKind &executor : executors::all()) {
-      const Result<System> system = compile_for(executor, drawn.workload, drawn.platform);
-      if (!system || !system->not_analysable.empty()) continue;
+      const Result<TaskSet> task_set = compile_for(executor, drawn.workload, drawn.platform);
+      if (!task_set || !task_set->not_analysable.empty()) continue;
       ++analysed;
-      const Report report = analyze(*system, methods_of(executor));
+      const Report report = analyze(*task_set, methods_of(executor));
       for (const MethodReport &method : report.methods) {
         if (method.bound() == nullptr) continue;
         expect_in_range(method.bound()->tasks, *method.method);
         expect_in_range(method.bound()->dags, *method.method);
       }
       std::vector<TaskId> chain;
-      for (std::uint32_t task = 0; task < system->tasks.size(); ++task) {
+      for (std::uint32_t task = 0; task < task_set->tasks.size(); ++task) {
         chain.emplace_back(task);
         bounded += report.tasks[task].response.has_value() ? 1U : 0U;
       }
-      const auto end_to_end = chain_bound(*system, chain, tightest_of(report));
+      const auto end_to_end = chain_bound(*task_set, chain, tightest_of(report));
       if (const auto *bound = std::get_if<ChainBound>(&end_to_end)) {
         EXPECT_GT(bound->reaction(), 0);
         EXPECT_LE(bound->reaction(), kMaxDuration);
@@ -146,12 +146,12 @@ TEST(ExtremeTimes, NoSearchWraps) {
     Rng rng(seed);
     const testing::BoundCase drawn = any_case(rng);
     if (has_errors(validate(drawn.workload))) continue;
-    const Result<System> system = compile(drawn.workload, drawn.platform);
-    if (!system) continue;
+    const Result<TaskSet> task_set = compile(drawn.workload, drawn.platform);
+    if (!task_set) continue;
     ++searched;
     int analyses = 0;
     const auto enough = [&analyses] { return ++analyses > 200; };
-    for (const Knob &knob : knobs_of(drawn.workload, *system)) {
+    for (const Knob &knob : knobs_of(drawn.workload, *task_set)) {
       const auto margin = margin_of(drawn.workload, drawn.platform, knob, accepted_by_analysis, {4, enough});
       if (!margin) break;
     }
@@ -162,10 +162,10 @@ TEST(ExtremeTimes, NoSearchWraps) {
     options.stop = enough;
     const Result<Assignment> assignment = assign(drawn.workload, drawn.platform, options);
     EXPECT_TRUE(assignment || !assignment.error().empty());
-    if (!why_not_explore(*system)) {
+    if (!why_not_explore(*task_set)) {
       ExplorationOptions few;
       few.max_states = 1000;
-      expect_in_range(to_bound(*system, explore(*system, few)).tasks, exploration());
+      expect_in_range(to_bound(*task_set, explore(*task_set, few)).tasks, exploration());
     }
   }
   EXPECT_GT(searched, cases / 2);

@@ -106,24 +106,24 @@ TEST(Losses, WhatIsCharged) {
   platform.timer_overhead = 7;
   platform.preempt_overhead = 1000;
   platform.stall = {.longest = 20'000, .per_second = 0};
-  const Result<System> system = compile(one_task(), platform);
-  ASSERT_TRUE(system);
-  EXPECT_EQ(system->not_analysable, "");
+  const Result<TaskSet> task_set = compile(one_task(), platform);
+  ASSERT_TRUE(task_set);
+  EXPECT_EQ(task_set->not_analysable, "");
   // 2 stalls. 2 releases: that of its period and one due to jitter. 4 preemptions: two more, by a job before and by a
   // waiting one. Of 1 s the timer takes 700 ns, preemptions take 100 us.
-  EXPECT_EQ(system->frozen, 44'019) << "ceil((2 * 20'000 + 2 * 7 + 4 * 1000) / (1 - 100'700 / 1e9))";
-  EXPECT_EQ(system->tasks[0].jitter, 5 + 100 + system->frozen);
-  EXPECT_EQ(system->tasks[0].wcet, 2'000'202) << "ceil(2 ms / (1 - 100'700 / 1e9))";
-  EXPECT_EQ(system->tasks[0].overhead, 202);
+  EXPECT_EQ(task_set->frozen, 44'019) << "ceil((2 * 20'000 + 2 * 7 + 4 * 1000) / (1 - 100'700 / 1e9))";
+  EXPECT_EQ(task_set->tasks[0].jitter, 5 + 100 + task_set->frozen);
+  EXPECT_EQ(task_set->tasks[0].wcet, 2'000'202) << "ceil(2 ms / (1 - 100'700 / 1e9))";
+  EXPECT_EQ(task_set->tasks[0].overhead, 202);
 }
 
 TEST(Losses, OnOneWorkerWhoPreemptsPays) {
   AnalysisPlatform platform;
   platform.preempt_overhead = 1000;
-  const Result<System> system = compile(one_task(), platform);
-  ASSERT_TRUE(system);
-  EXPECT_EQ(system->frozen, 0);
-  EXPECT_EQ(system->tasks[0].wcet, 2'001'000);
+  const Result<TaskSet> task_set = compile(one_task(), platform);
+  ASSERT_TRUE(task_set);
+  EXPECT_EQ(task_set->frozen, 0);
+  EXPECT_EQ(task_set->tasks[0].wcet, 2'001'000);
 }
 
 TEST(Losses, NothingIsLeft) {

@@ -29,10 +29,10 @@ constexpr std::uint32_t kCases = 1000;
 
 const Bound *bound_of(const Outcome &outcome) { return std::get_if<Bound>(&outcome); }
 
-bool accepts(const Method &method, const System &system) {
-  const Outcome outcome = method.apply(system);
+bool accepts(const Method &method, const TaskSet &task_set) {
+  const Outcome outcome = method.apply(task_set);
   const Bound *bound = bound_of(outcome);
-  return bound != nullptr && verdict(system, *bound) == Verdict::Schedulable;
+  return bound != nullptr && verdict(task_set, *bound) == Verdict::Schedulable;
 }
 
 BoundCaseLimits blocked() {
@@ -44,12 +44,12 @@ BoundCaseLimits blocked() {
 // The exact test and the response-time analysis agree if only priorities decide.
 TEST(Relations, ExactPointsIsResponseTimeWithinDeadline) {
   std::uint32_t schedulable = 0;
-  for_cases(cases(blocked()), kCases, [&](const BoundCase &, const System &system, Rng &) {
-    const Outcome points = exact_points().apply(system);
-    const Outcome rta = rta_preemptive().apply(system);
+  for_cases(cases(blocked()), kCases, [&](const BoundCase &, const TaskSet &task_set, Rng &) {
+    const Outcome points = exact_points().apply(task_set);
+    const Outcome rta = rta_preemptive().apply(task_set);
     ASSERT_EQ(bound_of(points) != nullptr, bound_of(rta) != nullptr);
     if (bound_of(points) == nullptr) return;
-    EXPECT_EQ(verdict(system, *bound_of(points)), verdict(system, *bound_of(rta)));
+    EXPECT_EQ(verdict(task_set, *bound_of(points)), verdict(task_set, *bound_of(rta)));
     schedulable += *bound_of(points)->accepts ? 1U : 0U;
   });
   EXPECT_GT(schedulable, kCases / 5);
@@ -62,30 +62,30 @@ TEST(Relations, UtilizationTestsAreOrdered) {
   limits.min_deadline = 1.0;
   limits.max_utilization = 0.9;
   std::uint32_t accepted = 0;
-  for_cases(cases(limits), kCases, [&](const BoundCase &, const System &system, Rng &) {
-    const bool liu = accepts(liu_layland(), system);
-    const bool hyper = accepts(hyperbolic(), system);
-    const bool liu_blocked = accepts(liu_layland_blocking(), system);
-    const bool hyper_blocked = accepts(hyperbolic_blocking(), system);
-    const bool rta = accepts(rta_preemptive(), system);
+  for_cases(cases(limits), kCases, [&](const BoundCase &, const TaskSet &task_set, Rng &) {
+    const bool liu = accepts(liu_layland(), task_set);
+    const bool hyper = accepts(hyperbolic(), task_set);
+    const bool liu_blocked = accepts(liu_layland_blocking(), task_set);
+    const bool hyper_blocked = accepts(hyperbolic_blocking(), task_set);
+    const bool rta = accepts(rta_preemptive(), task_set);
     accepted += liu ? 1 : 0;
     EXPECT_LE(liu, hyper);
-    EXPECT_LE(liu, accepts(harmonic_chains(), system));
+    EXPECT_LE(liu, accepts(harmonic_chains(), task_set));
     EXPECT_LE(liu, liu_blocked);
     EXPECT_LE(liu_blocked, hyper_blocked);
     EXPECT_LE(hyper_blocked, rta);
     EXPECT_LE(hyper, rta);
-    EXPECT_LE(accepts(harmonic_chains(), system), rta);
+    EXPECT_LE(accepts(harmonic_chains(), task_set), rta);
   });
   EXPECT_GT(accepted, kCases / 20);
 }
 
 TEST(Relations, LinearBoundIsAboveTheFixedPoint) {
-  for_cases(cases(blocked()), kCases, [](const BoundCase &, const System &system, Rng &) {
-    const Outcome linear = linear_bound().apply(system);
-    const Outcome rta = rta_preemptive().apply(system);
+  for_cases(cases(blocked()), kCases, [](const BoundCase &, const TaskSet &task_set, Rng &) {
+    const Outcome linear = linear_bound().apply(task_set);
+    const Outcome rta = rta_preemptive().apply(task_set);
     if (bound_of(linear) == nullptr) return;
-    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+    for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
       const auto &loose = bound_of(linear)->tasks[t].response;
       const auto &tight = bound_of(rta)->tasks[t].response;
       if (!loose) continue;
@@ -121,7 +121,7 @@ void expect_not_smaller(const std::vector<ResponseBound> &before, const std::vec
 TEST(Relations, MoreExecutionNeverShrinksABound) {
   std::size_t compared = 0;
   for (const BoundCaseLimits &limits : all_kinds()) {
-    for_cases(cases(limits), kCases / 5, [&](const BoundCase &bound_case, const System &system, Rng &rng) {
+    for_cases(cases(limits), kCases / 5, [&](const BoundCase &bound_case, const TaskSet &task_set, Rng &rng) {
       BoundCase longer = bound_case;
       Dag &dag = longer.workload.dags[static_cast<std::size_t>(
           rng.uniform(0, static_cast<std::int64_t>(longer.workload.dags.size()) - 1))];
@@ -132,7 +132,7 @@ TEST(Relations, MoreExecutionNeverShrinksABound) {
       if (!after) return;
       for (const Method &method : {rta_preemptive(), rta_nonpreemptive(), rta_deferred(), dag_one_worker_preemptive(),
                                    dag_one_worker_deferred(), linear_bound()}) {
-        const Outcome first = method.apply(system);
+        const Outcome first = method.apply(task_set);
         const Outcome second = method.apply(*after);
         if (bound_of(first) == nullptr || bound_of(second) == nullptr) continue;
         SCOPED_TRACE(std::string(method.name));
@@ -148,10 +148,10 @@ TEST(Relations, MoreExecutionNeverShrinksABound) {
 TEST(Relations, TermsAddUpToTheResponse) {
   std::size_t checked = 0;
   for (const BoundCaseLimits &limits : all_kinds()) {
-    for_cases(cases(limits), kCases / 5, [&](const BoundCase &, const System &system, Rng &) {
+    for_cases(cases(limits), kCases / 5, [&](const BoundCase &, const TaskSet &task_set, Rng &) {
       AnalyzeOptions options;
       options.itemise = true;
-      const Report report = analyze(system, options);
+      const Report report = analyze(task_set, options);
       for (const MethodReport &method : report.methods) {
         if (method.bound() == nullptr) continue;
         for (const ResponseBound &bound : method.bound()->tasks) {
@@ -174,27 +174,27 @@ TEST(Relations, TermsAddUpToTheResponse) {
 // order the bound is attained. Equals that take turns each have another critical instant.
 TEST(Relations, ResponseTimeIsReachedAtTheCriticalInstant) {
   std::size_t compared = 0;
-  for_cases(cases(BoundCaseLimits{}), kCases, [&](const BoundCase &any, const System &, Rng &) {
+  for_cases(cases(BoundCaseLimits{}), kCases, [&](const BoundCase &any, const TaskSet &, Rng &) {
     BoundCase bound_case = any;
     bound_case.workload.ties = Ties::Fixed;
-    const System system = compile(bound_case.workload, bound_case.platform).value();
-    const Outcome outcome = rta_preemptive().apply(system);
+    const TaskSet task_set = compile(bound_case.workload, bound_case.platform).value();
+    const Outcome outcome = rta_preemptive().apply(task_set);
     ASSERT_NE(bound_of(outcome), nullptr);
     const sched::Config config = config_of(bound_case.platform, bound_case.workload);
     sched::PriorityScheduler scheduler(bound_case.workload, config);
     sim::Options options;
     options.horizon = 200;
-    std::vector<Duration> first(system.tasks.size(), 0);
+    std::vector<Duration> first(task_set.tasks.size(), 0);
     (void)sim::simulate(bound_case.workload, scheduler, 1, options, [&](std::span<const JobEvent> events) {
       for (const JobEvent &event : events) {
         if (event.kind == JobEventKind::Finished && event.job == 0) first[event.task.value] = event.value;
       }
       return true;
     });
-    for (const std::uint32_t t : system.by_rank) {
+    for (const std::uint32_t t : task_set.by_rank) {
       const auto &response = bound_of(outcome)->tasks[t].response;
       if (!response) break;  // its jobs are skipped, and the tasks below see fewer of them than the bound counts
-      EXPECT_EQ(first[t], *response) << system.tasks[t].name;
+      EXPECT_EQ(first[t], *response) << task_set.tasks[t].name;
       ++compared;
     }
   });
@@ -205,8 +205,8 @@ TEST(Report, TrustsNoUnsoundEquationAndNamesWhoSpoke) {
   std::size_t by_response = 0;
   BoundCaseLimits limits;
   limits.policies = {PolicyKind::RateMonotonic};
-  for_cases(cases(limits), kCases, [&](const BoundCase &, const System &system, Rng &) {
-    const Report report = analyze(system);
+  for_cases(cases(limits), kCases, [&](const BoundCase &, const TaskSet &task_set, Rng &) {
+    const Report report = analyze(task_set);
     ASSERT_EQ(report.methods.size(), methods().size());
     for (const MethodReport &method : report.methods) {
       if (method.bound() == nullptr) {
@@ -216,13 +216,13 @@ TEST(Report, TrustsNoUnsoundEquationAndNamesWhoSpoke) {
       }
     }
     // On one worker, preemptive, independent: no bound is below the exact analysis.
-    const Outcome outcome = rta_preemptive().apply(system);
-    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+    const Outcome outcome = rta_preemptive().apply(task_set);
+    for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
       EXPECT_EQ(report.tasks[t].response, bound_of(outcome)->tasks[t].response);
       by_response += report.tasks[t].method != nullptr ? 1U : 0U;
     }
     EXPECT_EQ(report.verdict == Verdict::Schedulable, !report.by.empty());
-    EXPECT_EQ(report.verdict, verdict(system, *bound_of(outcome)));
+    EXPECT_EQ(report.verdict, verdict(task_set, *bound_of(outcome)));
   });
   EXPECT_GT(by_response, 1000U);
 }
@@ -230,8 +230,8 @@ TEST(Report, TrustsNoUnsoundEquationAndNamesWhoSpoke) {
 // A report, and a copy of it, stay valid after the caller's methods are gone.
 TEST(Report, KeepsTheMethodsItWasGiven) {
   std::size_t named = 0;
-  for_cases(cases(BoundCaseLimits{}), kCases, [&](const BoundCase &, const System &system, Rng &) {
-    std::optional<Report> report = analyze(system, {linear_bound(), rta_preemptive()});
+  for_cases(cases(BoundCaseLimits{}), kCases, [&](const BoundCase &, const TaskSet &task_set, Rng &) {
+    std::optional<Report> report = analyze(task_set, {linear_bound(), rta_preemptive()});
     const Report copy = *report;
     report.reset();
     ASSERT_EQ(copy.methods.size(), 2U);

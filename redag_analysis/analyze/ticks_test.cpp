@@ -42,8 +42,8 @@ struct Count {
   std::uint64_t fine = 0;
 };
 
-std::uint64_t bounded(const Method &method, const System &system) {
-  const Outcome outcome = system.not_analysable.empty() ? method.apply(system) : Outcome(NotApplicable{});
+std::uint64_t bounded(const Method &method, const TaskSet &task_set) {
+  const Outcome outcome = task_set.not_analysable.empty() ? method.apply(task_set) : Outcome(NotApplicable{});
   const auto *bound = std::get_if<Bound>(&outcome);
   if (bound == nullptr) return 0;
   return static_cast<std::uint64_t>(std::count_if(bound->tasks.begin(), bound->tasks.end(),

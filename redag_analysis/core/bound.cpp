@@ -20,7 +20,7 @@ const char *to_string(Subject subject) {
   switch (subject) {
     case Subject::Task: return "task";
     case Subject::Dag: return "dag";
-    case Subject::System: return "system";
+    case Subject::TaskSet: return "system";
   }
   return "?";
 }
@@ -43,18 +43,18 @@ const char *to_string(Verdict verdict) {
   return verdict == Verdict::Schedulable ? "schedulable" : "not shown schedulable";
 }
 
-bool meets_deadline(const SystemTask &task, const ResponseBound &bound) {
+bool meets_deadline(const CompiledTask &task, const ResponseBound &bound) {
   return bound.response && *bound.response <= std::min(task.deadline, task.limit);
 }
 
-Verdict verdict(const System &system, const Bound &bound) {
+Verdict verdict(const TaskSet &task_set, const Bound &bound) {
   if (bound.accepts) return *bound.accepts ? Verdict::Schedulable : Verdict::NotShown;
-  if (bound.tasks.size() != system.tasks.size()) return Verdict::NotShown;
-  for (std::size_t t = 0; t < system.tasks.size(); ++t) {
-    if (!meets_deadline(system.tasks[t], bound.tasks[t])) return Verdict::NotShown;
+  if (bound.tasks.size() != task_set.tasks.size()) return Verdict::NotShown;
+  for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
+    if (!meets_deadline(task_set.tasks[t], bound.tasks[t])) return Verdict::NotShown;
   }
-  for (std::size_t d = 0; d < system.dags.size(); ++d) {
-    const Duration deadline = system.dags[d].deadline;
+  for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
+    const Duration deadline = task_set.dags[d].deadline;
     if (deadline == 0) continue;
     if (d >= bound.dags.size() || bound.dags[d].response.value_or(kNever) > deadline) return Verdict::NotShown;
   }
@@ -68,13 +68,13 @@ ResponseBound if_bounded(ResponseBound bound) {
   return none;
 }
 
-Bound from_units(const System &system, std::vector<ResponseBound> units) {
+Bound from_units(const TaskSet &task_set, std::vector<ResponseBound> units) {
   for (ResponseBound &unit : units) unit = if_bounded(std::move(unit));
   Bound bound;
-  bound.tasks.resize(system.tasks.size());
-  bound.dags.resize(system.dags.size());
-  for (std::size_t d = 0; d < system.dags.size(); ++d) {
-    const std::vector<std::uint32_t> &own = system.dags[d].units;
+  bound.tasks.resize(task_set.tasks.size());
+  bound.dags.resize(task_set.dags.size());
+  for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
+    const std::vector<std::uint32_t> &own = task_set.dags[d].units;
     if (own.empty()) continue;
     // The DAG takes the bound of the unit that ends last. If any unit has no bound, neither has the DAG.
     const auto last = *std::max_element(own.begin(), own.end(), [&](std::uint32_t a, std::uint32_t b) {
@@ -82,7 +82,7 @@ Bound from_units(const System &system, std::vector<ResponseBound> units) {
     });
     bound.dags[d] = units[last];
   }
-  for (std::size_t t = 0; t < system.tasks.size(); ++t) bound.tasks[t] = units[system.tasks[t].unit];
+  for (std::size_t t = 0; t < task_set.tasks.size(); ++t) bound.tasks[t] = units[task_set.tasks[t].unit];
   return bound;
 }
 

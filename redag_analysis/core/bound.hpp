@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The interface of the schedulability methods. A method is a pure function of a System. It answers with a bound or says
-// why it does not apply; in doubt it says no. Response times run from the nominal release.
+// The interface of the schedulability methods. A method is a pure function of a TaskSet. It answers with a bound or
+// says why it does not apply; in doubt it says no. Response times run from the nominal release.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 #include <variant>
 #include <vector>
 
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 namespace redag::analysis {
 
@@ -78,7 +78,7 @@ struct Bound {
 
 using Outcome = std::variant<NotApplicable, Bound>;
 
-enum class Subject : std::uint8_t { Task, Dag, System };
+enum class Subject : std::uint8_t { Task, Dag, TaskSet };
 
 [[nodiscard]] const char *to_string(Subject subject);
 [[nodiscard]] const char *to_string(Term::Kind kind);
@@ -91,8 +91,8 @@ struct Method {
   std::string_view complexity{};
   std::string_view sound_only_if{};  // what the paper's own equations need to be sound; empty: nothing more
   bool quick = false;                // its time is about linear in the tasks, so it is worth asking first
-  bool knows_modes = false;          // it applies where there is a HI mode (System::has_modes)
-  std::function<Outcome(const System &system)> apply{};
+  bool knows_modes = false;          // it applies where there is a HI mode (TaskSet::has_modes)
+  std::function<Outcome(const TaskSet &task_set)> apply{};
 
   [[nodiscard]] bool is_paper() const { return !sound_only_if.empty(); }
 };
@@ -102,17 +102,17 @@ enum class Verdict : std::uint8_t { Schedulable, NotShown };
 [[nodiscard]] const char *to_string(Verdict verdict);
 
 /// True if every job of the task meets its deadline and none is skipped.
-[[nodiscard]] bool meets_deadline(const SystemTask &task, const ResponseBound &bound);
+[[nodiscard]] bool meets_deadline(const CompiledTask &task, const ResponseBound &bound);
 /// Schedulable if the test accepts, or if the bound covers every task and every DAG with a deadline and each deadline
 /// is met. The verdict ignores `unsound`.
-[[nodiscard]] Verdict verdict(const System &system, const Bound &bound);
+[[nodiscard]] Verdict verdict(const TaskSet &task_set, const Bound &bound);
 
 /// Returns the bound, or one without a response if its response is kUnbounded.
 [[nodiscard]] ResponseBound if_bounded(ResponseBound bound);
 
 /// Turns the responses of units (by unit) into those of their tasks and DAGs. A task answers no later than its unit,
 /// and a DAG with its last unit.
-[[nodiscard]] Bound from_units(const System &system, std::vector<ResponseBound> units);
+[[nodiscard]] Bound from_units(const TaskSet &task_set, std::vector<ResponseBound> units);
 
 /// Every method, in the order in which a report shows them. To add one, add a file pair and a line in methods.cpp.
 [[nodiscard]] const std::vector<Method> &methods();

@@ -20,7 +20,7 @@ inline constexpr std::uint64_t kUsualEffort = 500'000'000;
 struct Itemised {
   enum class Which : std::uint8_t { None, Units, All };
   Which which = Which::All;
-  std::vector<std::uint32_t> units;  // positions in System::units, for Units
+  std::vector<std::uint32_t> units;  // positions in TaskSet::units, for Units
 };
 
 /// The progress of the running method, to show to a reader.

@@ -21,7 +21,7 @@ using testing::BoundCase;
 using testing::BoundCaseLimits;
 
 // Independent tasks of three periods that use half of the workers.
-System many_tasks(std::size_t count, std::uint32_t workers, Ties ties = Ties::Share) {
+TaskSet many_tasks(std::size_t count, std::uint32_t workers, Ties ties = Ties::Share) {
   Workload workload;
   workload.ties = ties;
   workload.platform = Platform{workers, PreemptionMode::Os};
@@ -59,19 +59,19 @@ const MethodReport &report_of(const Report &report, std::string_view name) {
                        [&](const MethodReport &method) { return method.method->name == name; });
 }
 
-std::uint64_t steps_of(const Method &method, const System &system) {
+std::uint64_t steps_of(const Method &method, const TaskSet &task_set) {
   Effort::Limits limits;
   limits.itemised.which = Itemised::Which::None;
   const Effort effort(limits);
-  EXPECT_TRUE(std::holds_alternative<Bound>(method.apply(system)));
+  EXPECT_TRUE(std::holds_alternative<Bound>(method.apply(task_set)));
   return effort.steps();
 }
 
 TEST(Effort, AMethodGivesUpAtItsLimitAndTheOthersAnswer) {
-  const System system = many_tasks(3000, 2);
+  const TaskSet task_set = many_tasks(3000, 2);
   AnalyzeOptions options;
   options.effort = 1'000'000;
-  const Report report = analyze(system, options);
+  const Report report = analyze(task_set, options);
   const MethodReport &dear = report_of(report, "bertogna_cirinei");
   EXPECT_TRUE(dear.gave_up());
   EXPECT_EQ(std::get<NotApplicable>(dear.outcome).reason, "more than 1 million steps");
@@ -79,11 +79,11 @@ TEST(Effort, AMethodGivesUpAtItsLimitAndTheOthersAnswer) {
   EXPECT_TRUE(report_of(report, "global_rm_light").bound()->accepts.value());
   EXPECT_FALSE(report_of(report, "dag_groups").gave_up()) << "does not apply";
   EXPECT_EQ(report.verdict, Verdict::Schedulable);
-  EXPECT_FALSE(report_of(analyze(system), "bertogna_cirinei").gave_up()) << "the usual effort is enough";
+  EXPECT_FALSE(report_of(analyze(task_set), "bertogna_cirinei").gave_up()) << "the usual effort is enough";
 }
 
 TEST(Effort, TheCallerEndsAMethodForAReason) {
-  const System system = many_tasks(3000, 2, Ties::Fixed);
+  const TaskSet task_set = many_tasks(3000, 2, Ties::Fixed);
   std::map<std::string, int> asked;
   AnalyzeOptions options;
   options.stop = [&](const AnalysisProgress &progress) {
@@ -94,7 +94,7 @@ TEST(Effort, TheCallerEndsAMethodForAReason) {
     EXPECT_LT(progress.index, progress.count);
     return std::string(progress.method.name == "guan" ? "enough" : "");
   };
-  const Report report = analyze(system, options);
+  const Report report = analyze(task_set, options);
   EXPECT_EQ(std::get<NotApplicable>(report_of(report, "guan").outcome).reason, "enough");
   EXPECT_EQ(asked["guan"], 1);
   EXPECT_GT(asked["bertogna_cirinei"], 1);
@@ -102,12 +102,12 @@ TEST(Effort, TheCallerEndsAMethodForAReason) {
 }
 
 TEST(Effort, AScopeOfTheCallerEndsWhatIsInside) {
-  const System system = many_tasks(3000, 2);
+  const TaskSet task_set = many_tasks(3000, 2);
   Effort::Limits limits;
   limits.steps = 1'000'000;
   const Effort effort(limits);
   try {
-    (void)analyze(system);
+    (void)analyze(task_set);
     FAIL() << "nothing was thrown";
   } catch (const Effort::GaveUp &gave_up) {
     EXPECT_EQ(gave_up.scope, &effort);
@@ -117,9 +117,9 @@ TEST(Effort, AScopeOfTheCallerEndsWhatIsInside) {
 // The size of an answer grows with the tasks, not with their pairs.
 TEST(Effort, TermsAreMadeOnDemandAlone) {
   for (const std::uint32_t workers : {1U, 2U}) {
-    const System system = many_tasks(150, workers);
-    EXPECT_EQ(terms_in(analyze(system)), 0U);
-    EXPECT_GT(terms_in(analyze(system, itemising())), std::size_t{150} * 150 / 2);
+    const TaskSet task_set = many_tasks(150, workers);
+    EXPECT_EQ(terms_in(analyze(task_set)), 0U);
+    EXPECT_GT(terms_in(analyze(task_set, itemising())), std::size_t{150} * 150 / 2);
   }
 }
 
@@ -131,19 +131,19 @@ TEST(Effort, ABoundItemisedAloneIsTheSameAsAmongAll) {
   Rng rng(5);
   for (int i = 0; i < 300; ++i) {
     const BoundCase one = random_bound_case(rng, limits);
-    const Result<System> system = compile(one.workload, one.platform);
-    if (!system || !system->not_analysable.empty()) continue;
-    const Report all = analyze(*system, itemising());
-    const Report none = analyze(*system);
+    const Result<TaskSet> task_set = compile(one.workload, one.platform);
+    if (!task_set || !task_set->not_analysable.empty()) continue;
+    const Report all = analyze(*task_set, itemising());
+    const Report none = analyze(*task_set);
     for (std::size_t t = 0; t < all.tasks.size(); ++t) {
       EXPECT_EQ(none.tasks[t].response, all.tasks[t].response);
       if (all.tasks[t].method == nullptr) continue;
-      EXPECT_EQ(itemised(*system, none.tasks[t], TaskId(t)).terms, all.tasks[t].bound.terms);
+      EXPECT_EQ(itemised(*task_set, none.tasks[t], TaskId(t)).terms, all.tasks[t].bound.terms);
       ++compared;
     }
     for (std::size_t d = 0; d < all.dags.size(); ++d) {
       if (all.dags[d].method == nullptr) continue;
-      EXPECT_EQ(itemised(*system, none.dags[d], DagId(d)).terms, all.dags[d].bound.terms);
+      EXPECT_EQ(itemised(*task_set, none.dags[d], DagId(d)).terms, all.dags[d].bound.terms);
       ++compared;
     }
   }

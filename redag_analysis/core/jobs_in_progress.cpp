@@ -18,10 +18,10 @@ namespace {
 // chains (Kuhn).
 class Antichain {
  public:
-  Antichain(const System &system, const std::vector<std::uint32_t> &tasks)
+  Antichain(const TaskSet &task_set, const std::vector<std::uint32_t> &tasks)
       : count_(tasks.size()), follows_(count_, std::vector<bool>(count_, false)), next_(count_, kNone) {
     for (std::size_t b = 0; b < count_; ++b) {
-      for (const std::uint32_t p : system.tasks[tasks[b]].predecessors) {
+      for (const std::uint32_t p : task_set.tasks[tasks[b]].predecessors) {
         const auto a = std::find(tasks.begin(), tasks.end(), p);
         if (a != tasks.end()) follows_[static_cast<std::size_t>(a - tasks.begin())][b] = true;
       }
@@ -68,13 +68,13 @@ class Antichain {
 
 }  // namespace
 
-std::size_t most_jobs_in_progress(const System &system, DagId dag) {
+std::size_t most_jobs_in_progress(const TaskSet &task_set, DagId dag) {
   std::map<std::pair<Duration, Duration>, std::vector<std::uint32_t>> grids;
-  for (const std::uint32_t t : system.dags[dag.value].tasks) {
-    grids[{system.tasks[t].period, system.tasks[t].offset}].push_back(t);
+  for (const std::uint32_t t : task_set.dags[dag.value].tasks) {
+    grids[{task_set.tasks[t].period, task_set.tasks[t].offset}].push_back(t);
   }
   std::size_t most = 0;
-  for (const auto &[grid, tasks] : grids) most += Antichain(system, tasks).size();
+  for (const auto &[grid, tasks] : grids) most += Antichain(task_set, tasks).size();
   return most;
 }
 

@@ -7,7 +7,7 @@
 
 #include <cstddef>
 
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 namespace redag::analysis {
 
@@ -15,6 +15,6 @@ namespace redag::analysis {
 /// answer before its next point, and therefore those in progress belong to one point. In a grid with a single task or
 /// without edges, responses above the period do no harm: jobs of a task still never overlap. O(tasks^3). Proof:
 /// docs/analysis.md, "Jobs in progress".
-[[nodiscard]] std::size_t most_jobs_in_progress(const System &system, DagId dag);
+[[nodiscard]] std::size_t most_jobs_in_progress(const TaskSet &task_set, DagId dag);
 
 }  // namespace redag::analysis

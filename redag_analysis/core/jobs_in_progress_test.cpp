@@ -15,8 +15,8 @@ using redag::testing::make_workload;
 using redag::testing::TestTask;
 
 std::size_t most(const std::vector<TestTask> &tasks) {
-  const auto system = compile(make_workload({make_dag("d", tasks)}, 1), AnalysisPlatform{});
-  return most_jobs_in_progress(system.value(), DagId(0));
+  const auto task_set = compile(make_workload({make_dag("d", tasks)}, 1), AnalysisPlatform{});
+  return most_jobs_in_progress(task_set.value(), DagId(0));
 }
 
 TEST(JobsInProgress, TasksThatFollowEachOtherAreNeverInProgressTogether) {

@@ -56,11 +56,12 @@ std::optional<Duration> wait_for(const Unit &unit, Duration seen, const std::vec
 
 class Resolver {
  public:
-  Resolver(const System &system, Outcome (*apply)(const System &)) : system_(system), alone_(system), apply_(apply) {
+  Resolver(const TaskSet &task_set, Outcome (*apply)(const TaskSet &))
+      : task_set_(task_set), alone_(task_set), apply_(apply) {
     take_away();
-    absent_.resize(system.units.size());
-    responses_.resize(system.units.size());
-    for (std::uint32_t u = 0; u < system.units.size(); ++u) responses_[u] = system.units[u].length;
+    absent_.resize(task_set.units.size());
+    responses_.resize(task_set.units.size());
+    for (std::uint32_t u = 0; u < task_set.units.size(); ++u) responses_[u] = task_set.units[u].length;
   }
 
   Outcome run() {
@@ -69,7 +70,7 @@ class Resolver {
       const Bound *bound = std::get_if<Bound>(&outcome);
       if (bound == nullptr) return outcome;
       found_ = *bound;
-      for (std::uint32_t u = 0; u < system_.units.size(); ++u) {
+      for (std::uint32_t u = 0; u < task_set_.units.size(); ++u) {
         responses_[u] = absent_[u].empty() ? of_unit(u).response : std::nullopt;
       }
     }
@@ -78,22 +79,22 @@ class Resolver {
 
  private:
   [[nodiscard]] const ResponseBound &of_unit(std::uint32_t u) const {
-    return found_.tasks[system_.units[u].tasks.front()];
+    return found_.tasks[task_set_.units[u].tasks.front()];
   }
 
   void take_away() {
     alone_.threads_suffice_if_bounded = false;
-    if (system_.threads_suffice_if_bounded) alone_.platform.max_started = 0;
-    conditional_.resize(system_.dags.size());
-    for (std::uint32_t d = 0; d < system_.dags.size(); ++d) {
-      SystemDag &dag = alone_.dags[d];
+    if (task_set_.threads_suffice_if_bounded) alone_.platform.max_started = 0;
+    conditional_.resize(task_set_.dags.size());
+    for (std::uint32_t d = 0; d < task_set_.dags.size(); ++d) {
+      CompiledDag &dag = alone_.dags[d];
       if (dag.max_active == 0 || dag.units.size() < 2) continue;
-      if (most_jobs_in_progress(system_, DagId(d)) > dag.max_active) continue;
+      if (most_jobs_in_progress(task_set_, DagId(d)) > dag.max_active) continue;
       dag.max_active = 0;
       conditional_[d] = true;
     }
     const auto leaves_unit = [&](std::uint32_t t) {
-      return [&, t](std::uint32_t other) { return system_.tasks[other].unit != system_.tasks[t].unit; };
+      return [&, t](std::uint32_t other) { return task_set_.tasks[other].unit != task_set_.tasks[t].unit; };
     };
     for (std::uint32_t t = 0; t < alone_.tasks.size(); ++t) {
       std::erase_if(alone_.tasks[t].predecessors, leaves_unit(t));
@@ -110,8 +111,8 @@ class Resolver {
   // that has lost its wait never regains one.
   bool update_waits(int round) {
     bool changed = round == 0;  // the method has not been applied yet
-    for (std::uint32_t u = 0; u < system_.units.size(); ++u) {
-      const Unit &unit = system_.units[u];
+    for (std::uint32_t u = 0; u < task_set_.units.size(); ++u) {
+      const Unit &unit = task_set_.units[u];
       if (unit.awaits.empty() || !absent_[u].empty()) continue;
       std::optional<Duration> wait = round < kMaxRounds ? wait_of(u) : std::nullopt;
       if (!wait && round >= kMaxRounds) absent_[u] = kGaveUp;
@@ -129,12 +130,12 @@ class Resolver {
 
   // Returns the wait of a unit; sets absent_ if there is none.
   std::optional<Duration> wait_of(std::uint32_t u) {
-    const Unit &unit = system_.units[u];
-    const SystemTask &first = system_.tasks[unit.tasks.front()];
+    const Unit &unit = task_set_.units[u];
+    const CompiledTask &first = task_set_.tasks[unit.tasks.front()];
     Duration seen = unit.jitter;
     std::vector<Data> others;
     for (const std::uint32_t p : unit.awaits) {
-      const SystemTask &before = system_.tasks[p];
+      const CompiledTask &before = task_set_.tasks[p];
       if (before.period > first.period) {
         absent_[u] = kFasterThanData;
         return std::nullopt;
@@ -155,17 +156,17 @@ class Resolver {
 
   // The jitter that explains how many jobs become ready in any interval, for any responses. It is at least the period.
   Duration jitter_of_number(std::uint32_t u) const {
-    const Unit &unit = system_.units[u];
-    const SystemTask &first = system_.tasks[unit.tasks.front()];
+    const Unit &unit = task_set_.units[u];
+    const CompiledTask &first = task_set_.tasks[unit.tasks.front()];
     // A timer's job becomes ready before the next release is seen, or is skipped.
     if (!first.data) return add(unit.period, unit.jitter);
     // Each job takes a datum of every predecessor, of which one can be from before the interval. The jobs that complete
     // in the interval became ready in it, were ready before, or had started.
     Duration least = kUnbounded;
     for (const std::uint32_t p : unit.awaits) {
-      const SystemTask &before = system_.tasks[p];
+      const CompiledTask &before = task_set_.tasks[p];
       if (before.period != unit.period) continue;
-      const Unit &from = system_.units[before.unit];
+      const Unit &from = task_set_.units[before.unit];
       const Duration number = from.awaits.empty() ? from.jitter : std::max(from.jitter, jitter_of_number(before.unit));
       const auto hops = static_cast<Duration>(from.tasks.size());
       const Duration ready = std::max<Duration>(1, before.limit / before.period);
@@ -178,18 +179,18 @@ class Resolver {
 
   Outcome result() {
     const bool all = std::all_of(responses_.begin(), responses_.end(), [](const auto &r) { return r.has_value(); });
-    if (system_.threads_suffice_if_bounded && !all) return nothing(kFewThreads);
-    for (std::uint32_t u = 0; u < system_.units.size(); ++u) {
-      if (conditional_[system_.units[u].dag.value] && !responses_[u]) return nothing(kBinds);
+    if (task_set_.threads_suffice_if_bounded && !all) return nothing(kFewThreads);
+    for (std::uint32_t u = 0; u < task_set_.units.size(); ++u) {
+      if (conditional_[task_set_.units[u].dag.value] && !responses_[u]) return nothing(kBinds);
     }
     Bound bound = found_;
-    for (std::uint32_t u = 0; u < system_.units.size(); ++u) {
-      if (!system_.units[u].awaits.empty()) bound_tasks(u, bound);
+    for (std::uint32_t u = 0; u < task_set_.units.size(); ++u) {
+      if (!task_set_.units[u].awaits.empty()) bound_tasks(u, bound);
     }
-    ages_.resize(system_.units.size());
-    for (std::uint32_t d = 0; d < system_.dags.size(); ++d) {
-      const auto waits = [&](std::uint32_t u) { return !system_.units[u].awaits.empty(); };
-      const std::vector<std::uint32_t> &units = system_.dags[d].units;
+    ages_.resize(task_set_.units.size());
+    for (std::uint32_t d = 0; d < task_set_.dags.size(); ++d) {
+      const auto waits = [&](std::uint32_t u) { return !task_set_.units[u].awaits.empty(); };
+      const std::vector<std::uint32_t> &units = task_set_.dags[d].units;
       if (std::any_of(units.begin(), units.end(), waits)) bound.dags[d] = if_bounded(end_to_end(d));
     }
     return bound;
@@ -198,20 +199,20 @@ class Resolver {
   [[nodiscard]] Bound nothing(std::string_view why) const {
     ResponseBound none;
     none.absent = why;
-    return from_units(system_, std::vector<ResponseBound>(system_.units.size(), none));
+    return from_units(task_set_, std::vector<ResponseBound>(task_set_.units.size(), none));
   }
 
   // The longest time from the first task's readiness to the end of the unit. Further timers of the unit can be seen
   // later than that task; the unit's window then need not have begun at its readiness.
   [[nodiscard]] Duration from_ready(std::uint32_t u) const {
     const ResponseBound &bound = of_unit(u);
-    const std::vector<std::uint32_t> &tasks = system_.units[u].tasks;
+    const std::vector<std::uint32_t> &tasks = task_set_.units[u].tasks;
     const bool is_seen_later = std::any_of(tasks.begin() + 1, tasks.end(), [&](std::uint32_t t) {
-      return !system_.tasks[t].data && system_.tasks[t].jitter > 0;
+      return !task_set_.tasks[t].data && task_set_.tasks[t].jitter > 0;
     });
     if (is_seen_later) return *bound.response;
     // A timer's jitter also counts the time that the machine can take during the response.
-    return add(std::max(bound.from_ready, *bound.response - alone_.units[u].jitter), system_.frozen);
+    return add(std::max(bound.from_ready, *bound.response - alone_.units[u].jitter), task_set_.frozen);
   }
 
   // Returns the unit's bound for the given `response`: one Wait term replaces the jitter and covers the time before
@@ -220,21 +221,21 @@ class Resolver {
     ResponseBound bound = of_unit(u);
     std::erase_if(bound.terms, [](const Term &term) { return term.kind == Term::Kind::Jitter; });
     const Duration wait = response - (*bound.response - alone_.units[u].jitter);
-    const TaskId first(system_.units[u].tasks.front());
+    const TaskId first(task_set_.units[u].tasks.front());
     if (wait > 0 && Effort::itemises(u))
-      bound.terms.push_back(Term{Term::Kind::Wait, first, system_.units[u].dag, wait, 0});
+      bound.terms.push_back(Term{Term::Kind::Wait, first, task_set_.units[u].dag, wait, 0});
     bound.response = response;
     return bound;
   }
 
   void bound_tasks(std::uint32_t u, Bound &bound) const {
-    for (const std::uint32_t t : system_.units[u].tasks) {
+    for (const std::uint32_t t : task_set_.units[u].tasks) {
       ResponseBound &task = bound.tasks[t];
       if (!absent_[u].empty()) {
         task = ResponseBound{};
         task.absent = absent_[u];
       } else if (task.response) {
-        task = if_bounded(with_wait(u, system_.tasks[t].data ? from_ready(u) : *task.response));
+        task = if_bounded(with_wait(u, task_set_.tasks[t].data ? from_ready(u) : *task.response));
       }
     }
   }
@@ -242,10 +243,10 @@ class Resolver {
   // How long before its grid point the data of a unit's job can have been released.
   Duration age_of(std::uint32_t u) {
     if (ages_[u]) return *ages_[u];
-    const Unit &unit = system_.units[u];
+    const Unit &unit = task_set_.units[u];
     Duration age = 0;
     for (const std::uint32_t p : unit.awaits) {
-      const std::uint32_t before = system_.tasks[p].unit;
+      const std::uint32_t before = task_set_.tasks[p].unit;
       const Duration origin = age_of(before);
       age = std::max(age, is_on_grid(u, p) ? origin : add(origin, oldest(before)));
     }
@@ -254,17 +255,17 @@ class Resolver {
   }
 
   [[nodiscard]] bool is_on_grid(std::uint32_t u, std::uint32_t task) const {
-    const SystemTask &before = system_.tasks[task];
-    return before.period == system_.units[u].period && before.offset == system_.units[u].offset;
+    const CompiledTask &before = task_set_.tasks[task];
+    return before.period == task_set_.units[u].period && before.offset == task_set_.units[u].offset;
   }
 
   // The greatest age of a predecessor's latest datum. The next one arrives later, or at the same instant after it.
-  [[nodiscard]] Duration oldest(std::uint32_t u) const { return add(system_.units[u].period, *responses_[u]); }
+  [[nodiscard]] Duration oldest(std::uint32_t u) const { return add(task_set_.units[u].period, *responses_[u]); }
 
   ResponseBound end_to_end(std::uint32_t dag) {
     ResponseBound worst;
-    for (const std::uint32_t u : system_.dags[dag].units) {
-      const Unit &unit = system_.units[u];
+    for (const std::uint32_t u : task_set_.dags[dag].units) {
+      const Unit &unit = task_set_.units[u];
       if (!responses_[u] || !absent_[u].empty()) {
         worst = ResponseBound{};
         worst.absent = absent_[u].empty() ? of_unit(u).absent : absent_[u];
@@ -274,7 +275,7 @@ class Resolver {
       if (!unit.awaits.empty()) {
         Duration response = 0;
         for (const std::uint32_t p : unit.awaits) {
-          const std::uint32_t before = system_.tasks[p].unit;
+          const std::uint32_t before = task_set_.tasks[p].unit;
           const Duration since_data = is_on_grid(u, p) ? *responses_[u] : add(from_ready(u), oldest(before));
           response = std::max(response, add(since_data, age_of(before)));
         }
@@ -285,9 +286,9 @@ class Resolver {
     return worst;
   }
 
-  const System &system_;
-  System alone_;  // without rate edges; the jitter of a waiting unit includes its wait
-  Outcome (*apply_)(const System &);
+  const TaskSet &task_set_;
+  TaskSet alone_;  // without rate edges; the jitter of a waiting unit includes its wait
+  Outcome (*apply_)(const TaskSet &);
   std::vector<bool> conditional_;                   // by DagId: its max_active was removed
   std::vector<std::optional<Duration>> responses_;  // by unit
   std::vector<std::string_view> absent_;            // by unit: why it has no wait
@@ -295,24 +296,24 @@ class Resolver {
   Bound found_;
 };
 
-bool shares_max_active(const System &system) {
-  return std::any_of(system.dags.begin(), system.dags.end(),
-                     [](const SystemDag &dag) { return dag.max_active > 0 && dag.units.size() > 1; });
+bool shares_max_active(const TaskSet &task_set) {
+  return std::any_of(task_set.dags.begin(), task_set.dags.end(),
+                     [](const CompiledDag &dag) { return dag.max_active > 0 && dag.units.size() > 1; });
 }
 
 }  // namespace
 
-std::optional<std::string> why_not_directly(const System &system) {
-  if (system.has_rate_edges()) return "edges join tasks of different periods or offsets: see the bounds for DAGs";
-  if (system.threads_suffice_if_bounded) return "fewer threads than tasks: see the bounds on response times";
+std::optional<std::string> why_not_directly(const TaskSet &task_set) {
+  if (task_set.has_rate_edges()) return "edges join tasks of different periods or offsets: see the bounds for DAGs";
+  if (task_set.threads_suffice_if_bounded) return "fewer threads than tasks: see the bounds on response times";
   return std::nullopt;
 }
 
-bool is_across_rates(const System &system) { return why_not_directly(system) || shares_max_active(system); }
+bool is_across_rates(const TaskSet &task_set) { return why_not_directly(task_set) || shares_max_active(task_set); }
 
-Outcome across_rates(const System &system, Outcome (*apply)(const System &system)) {
-  if (!is_across_rates(system)) return apply(system);
-  return Resolver(system, apply).run();
+Outcome across_rates(const TaskSet &task_set, Outcome (*apply)(const TaskSet &task_set)) {
+  if (!is_across_rates(task_set)) return apply(task_set);
+  return Resolver(task_set, apply).run();
 }
 
 }  // namespace redag::analysis

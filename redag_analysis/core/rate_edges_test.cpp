@@ -134,17 +134,17 @@ TEST(BoundProperty, RatesOfSingleTasks) {
 using redag::testing::make_dag;
 using redag::testing::make_workload;
 
-System compiled(const Workload &workload, std::uint32_t workers = 1, std::uint32_t threads = 0) {
+TaskSet compiled(const Workload &workload, std::uint32_t workers = 1, std::uint32_t threads = 0) {
   AnalysisPlatform platform;
   platform.workers = workers;
   platform.max_started = threads;
-  const auto system = compile(workload, platform);
-  EXPECT_TRUE(system) << to_string(system.error());
-  return system.value_or(System{});
+  const auto task_set = compile(workload, platform);
+  EXPECT_TRUE(task_set) << to_string(task_set.error());
+  return task_set.value_or(TaskSet{});
 }
 
-Bound bound_of(const Method &method, const System &system) {
-  const Outcome outcome = method.apply(system);
+Bound bound_of(const Method &method, const TaskSet &task_set) {
+  const Outcome outcome = method.apply(task_set);
   const auto *bound = std::get_if<Bound>(&outcome);
   EXPECT_NE(bound, nullptr) << std::get<NotApplicable>(outcome).reason;
   return bound == nullptr ? Bound{} : *bound;
@@ -168,13 +168,13 @@ TEST(RateEdges, DataOfAFastPredecessorAreThereWhenTheSlowOneEnds) {
                     1);
   EXPECT_EQ(milliseconds(bound_of(rta_preemptive(), compiled(workload)).tasks[1]), 8) << "fuse is its equal";
   workload.ties = Ties::Fixed;
-  const System system = compiled(workload);
-  const Bound bound = bound_of(rta_preemptive(), system);
+  const TaskSet task_set = compiled(workload);
+  const Bound bound = bound_of(rta_preemptive(), task_set);
   EXPECT_EQ(milliseconds(bound.tasks[0]), 1);
   EXPECT_EQ(milliseconds(bound.tasks[1]), 5);
   // Camera and lidar can arrive while it executes; from its own release, R = 3 + 1 + 4.
   EXPECT_EQ(milliseconds(bound.tasks[2]), 8);
-  EXPECT_FALSE(meets_deadline(system.tasks[2], bound.tasks[2]));
+  EXPECT_FALSE(meets_deadline(task_set.tasks[2], bound.tasks[2]));
   // It takes the latest picture: the next one comes at most 10 + 1 after the release of that one.
   EXPECT_EQ(milliseconds(bound.dags[0]), 8 + 11);
   EXPECT_EQ(bound.dags[0].sum(Term::Kind::Wait), 11 * kMillisecond);
@@ -186,8 +186,8 @@ TEST(RateEdges, ATimerWaitsForDataOfAnotherOffset) {
                                                     {.name = "b", .period_ms = 20, .wcet_ms = 4, .after = {0}}})},
                                     1);
   workload.ties = Ties::Fixed;  // with shared ties b would also delay a
-  const System system = compiled(workload);
-  const Bound bound = bound_of(rta_preemptive(), system);
+  const TaskSet task_set = compiled(workload);
+  const Bound bound = bound_of(rta_preemptive(), task_set);
   EXPECT_EQ(milliseconds(bound.tasks[1]), 5 + 4 + 2);
   EXPECT_EQ(bound.tasks[1].sum(Term::Kind::Wait), 5 * kMillisecond);
 }
@@ -195,17 +195,17 @@ TEST(RateEdges, ATimerWaitsForDataOfAnotherOffset) {
 // The fast timer's jobs are skipped for lack of data by design. The others are bounded with as many of its jobs as can
 // become ready.
 TEST(RateEdges, ATimerThatIsFasterThanItsDataIsNotBoundedAndOthersAre) {
-  const System system =
+  const TaskSet task_set =
       compiled(make_workload({make_dag("d", {{.name = "a", .period_ms = 20, .wcet_ms = 2},
                                              {.name = "b", .period_ms = 10, .wcet_ms = 1, .after = {0}}}),
                               make_dag("e", {{.name = "c", .period_ms = 40, .wcet_ms = 1}})},
                              1));
-  const Bound bound = bound_of(rta_preemptive(), system);
+  const Bound bound = bound_of(rta_preemptive(), task_set);
   EXPECT_FALSE(bound.tasks[1].response);
   EXPECT_THAT(bound.tasks[1].absent, ::testing::HasSubstr("skipped by design"));
   EXPECT_EQ(milliseconds(bound.tasks[2]), 1 + 2 + 2) << "two jobs of b: one was released a period before";
   EXPECT_FALSE(bound.dags[0].response);
-  EXPECT_EQ(verdict(system, bound), Verdict::NotShown);
+  EXPECT_EQ(verdict(task_set, bound), Verdict::NotShown);
 }
 
 // Two chains with one job in progress each: two threads, or a max_active of two, suffice if all tasks are bounded.
@@ -219,7 +219,7 @@ TEST(RateEdges, WhatCannotBindIsNoObstacle) {
                                    max_active)},
                          2);
   };
-  const System two = compiled(workload(2), 2, 2);
+  const TaskSet two = compiled(workload(2), 2, 2);
   EXPECT_EQ(verdict(two, bound_of(dag_bounded(), two)), Verdict::Schedulable);
   const Outcome one = dag_bounded().apply(compiled(workload(1), 2));
   ASSERT_TRUE(std::holds_alternative<NotApplicable>(one));
@@ -249,9 +249,9 @@ TEST(RateEdges, TheProjectsOwnWorkloadsAreSchedulable) {
        {"contention", "paper/harmonic_u06", "paper/harmonic_u08", "paper/nonharmonic_u06", "paper/nonharmonic_u08"}) {
     const auto loaded = load_workload(std::string(REDAG_SOURCE_DIR) + "/workloads/" + name + ".yaml");
     ASSERT_TRUE(loaded) << name;
-    const auto system = compile(loaded->workload, platform_of(loaded->workload));
-    ASSERT_TRUE(system) << name;
-    EXPECT_EQ(analyze(*system).verdict, Verdict::Schedulable) << name;
+    const auto task_set = compile(loaded->workload, platform_of(loaded->workload));
+    ASSERT_TRUE(task_set) << name;
+    EXPECT_EQ(analyze(*task_set).verdict, Verdict::Schedulable) << name;
   }
 }
 

@@ -13,7 +13,7 @@ namespace redag::analysis {
 namespace {
 
 // Splits the response into own execution and waiting. The causes of the wait differ from schedule to schedule.
-ResponseBound bound_of(const SystemTask &task, std::uint32_t t, Duration response) {
+ResponseBound bound_of(const CompiledTask &task, std::uint32_t t, Duration response) {
   ResponseBound bound;
   bound.response = response;
   bound.terms.push_back(Term{Term::Kind::Own, TaskId(t), DagId(), task.wcet - task.overhead, 1});
@@ -34,7 +34,7 @@ std::string_view why_absent(Exploration::End end) {
   return {};
 }
 
-std::string describe(const System &system, const Exploration &exploration) {
+std::string describe(const TaskSet &task_set, const Exploration &exploration) {
   if (exploration.states == 0) {
     return fmt::format("gave up at 0 states: {} jobs in a hyperperiod", exploration.jobs);
   }
@@ -44,7 +44,7 @@ std::string describe(const System &system, const Exploration &exploration) {
       return fmt::format("{}, {} jobs a hyperperiod, {}; for the stated offsets", states, exploration.jobs,
                          exploration.exact ? "exact" : "safe, not exact");
     case Exploration::End::Overrun:
-      return fmt::format("{}; {} {} end after its next release", states, system.tasks[exploration.late.value].name,
+      return fmt::format("{}; {} {} end after its next release", states, task_set.tasks[exploration.late.value].name,
                          exploration.exact ? "can" : "cannot be shown not to");
     case Exploration::End::GaveUp: return "gave up at " + states;
     case Exploration::End::Stopped: return "stopped at " + states;
@@ -63,39 +63,40 @@ ResponseRange Exploration::of(TaskId task) const {
   return all;
 }
 
-std::optional<std::string> why_not_explore(const System &system) {
-  if (!system.not_analysable.empty()) return system.not_analysable;
-  if (system.has_rate_edges()) return "edges join tasks of different periods or offsets: see the bounds for DAGs";
-  if (system.mode != sched::Preemption::None) return "for jobs that run to completion; here they can be preempted";
-  if (system.policy == PolicyKind::Fifo) return "fifo: the order of two jobs depends on when they became ready";
-  if (system.frozen > 0) return "stalls of the machine: they can come at any time";
+std::optional<std::string> why_not_explore(const TaskSet &task_set) {
+  if (!task_set.not_analysable.empty()) return task_set.not_analysable;
+  if (task_set.has_rate_edges()) return "edges join tasks of different periods or offsets: see the bounds for DAGs";
+  if (task_set.mode != sched::Preemption::None) return "for jobs that run to completion; here they can be preempted";
+  if (task_set.policy == PolicyKind::Fifo) return "fifo: the order of two jobs depends on when they became ready";
+  if (task_set.frozen > 0) return "stalls of the machine: they can come at any time";
   const bool has_data =
-      std::any_of(system.tasks.begin(), system.tasks.end(), [](const SystemTask &task) { return task.data; });
-  if (system.policy == PolicyKind::Edf && has_data) {
+      std::any_of(task_set.tasks.begin(), task_set.tasks.end(), [](const CompiledTask &task) { return task.data; });
+  if (task_set.policy == PolicyKind::Edf && has_data) {
     return "edf with data tasks: their deadlines depend on when they are released";
   }
-  const auto too_late = [](const SystemTask &task) {
+  const auto too_late = [](const CompiledTask &task) {
     return task.offset > kLongestExplored || task.jitter > kLongestExplored;
   };
-  if (hyperperiod_of(system) > kLongestExplored || std::any_of(system.tasks.begin(), system.tasks.end(), too_late)) {
+  if (hyperperiod_of(task_set) > kLongestExplored ||
+      std::any_of(task_set.tasks.begin(), task_set.tasks.end(), too_late)) {
     return "the hyperperiod, an offset or a jitter is too long";
   }
   return std::nullopt;
 }
 
-Bound to_bound(const System &system, const Exploration &exploration) {
+Bound to_bound(const TaskSet &task_set, const Exploration &exploration) {
   Bound bound;
-  bound.figures = describe(system, exploration);
-  bound.tasks.resize(system.tasks.size());
-  bound.dags.resize(system.dags.size());
+  bound.figures = describe(task_set, exploration);
+  bound.tasks.resize(task_set.tasks.size());
+  bound.dags.resize(task_set.dags.size());
   if (exploration.end != Exploration::End::Complete) {
     for (ResponseBound &task : bound.tasks) task.absent = why_absent(exploration.end);
     for (ResponseBound &dag : bound.dags) dag.absent = why_absent(exploration.end);
     return bound;
   }
-  for (std::uint32_t t = 0; t < system.tasks.size(); ++t) {
-    bound.tasks[t] = bound_of(system.tasks[t], t, exploration.of(TaskId(t)).worst);
-    ResponseBound &dag = bound.dags[system.tasks[t].dag.value];
+  for (std::uint32_t t = 0; t < task_set.tasks.size(); ++t) {
+    bound.tasks[t] = bound_of(task_set.tasks[t], t, exploration.of(TaskId(t)).worst);
+    ResponseBound &dag = bound.dags[task_set.tasks[t].dag.value];
     if (dag.response.value_or(-1) < *bound.tasks[t].response) dag = bound.tasks[t];
   }
   return bound;
@@ -117,9 +118,9 @@ Method exploration(ExplorationOptions options) {
           "without "
           "data tasks; exact on one worker, but for data tasks among equals",
       .complexity = "up to max_states states, O(n) each",
-      .apply = [options = std::move(options)](const System &system) -> Outcome {
-        if (auto reason = why_not_explore(system)) return NotApplicable{*std::move(reason)};
-        return to_bound(system, explore(system, options));
+      .apply = [options = std::move(options)](const TaskSet &task_set) -> Outcome {
+        if (auto reason = why_not_explore(task_set)) return NotApplicable{*std::move(reason)};
+        return to_bound(task_set, explore(task_set, options));
       },
   };
 }

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Explores all schedules of a strictly periodic system whose jobs run to completion. Gives the least and the largest
+// Explores all schedules of a strictly periodic task set whose jobs run to completion. Gives the least and the largest
 // response of every job, over all release jitters in [0, J] and execution times in [bcet, wcet]. Unlike the other
 // methods it relies on the stated offsets. What is explored and why that suffices: docs/analysis.md, "Exploration". M.
 // Nasri, B. Brandenburg, An exact and sustainable analysis of non-preemptive scheduling, RTSS 2017; M. Nasri, G.
@@ -62,17 +62,17 @@ struct Exploration {
   [[nodiscard]] ResponseRange of(TaskId task) const;
 };
 
-/// Why the system cannot be explored: preemption, fifo, edf with data tasks, or a system that is not analysable. Empty
-/// if it can.
-[[nodiscard]] std::optional<std::string> why_not_explore(const System &system);
+/// Why the task set cannot be explored: preemption, fifo, edf with data tasks, or a task set that is not analysable.
+/// Empty if it can.
+[[nodiscard]] std::optional<std::string> why_not_explore(const TaskSet &task_set);
 
-/// Explores the system. Requires !why_not_explore(system). Follows at most max_states states in a time of O(n) each;
-/// with edges or gates O(n^2) at worst. On one worker the number of states is pseudo-polynomial only if few jobs are
-/// pending at a time.
-[[nodiscard]] Exploration explore(const System &system, const ExplorationOptions &options = {});
+/// Explores the task set. Requires !why_not_explore(task_set). Follows at most max_states states in a time of O(n)
+/// each; with edges or gates O(n^2) at worst. On one worker the number of states is pseudo-polynomial only if few jobs
+/// are pending at a time.
+[[nodiscard]] Exploration explore(const TaskSet &task_set, const ExplorationOptions &options = {});
 
 /// Turns an exploration into a bound: the largest responses if it is complete.
-[[nodiscard]] Bound to_bound(const System &system, const Exploration &exploration);
+[[nodiscard]] Bound to_bound(const TaskSet &task_set, const Exploration &exploration);
 
 /// explore() as a method. It is not in methods(), because it can take long.
 [[nodiscard]] Method exploration(ExplorationOptions options = {});

@@ -13,27 +13,27 @@ namespace redag::analysis {
 namespace {
 
 // A unit is released as a whole, with the offset of its timers.
-Time offset_of(const System &system, const Unit &unit) {
+Time offset_of(const TaskSet &task_set, const Unit &unit) {
   for (const std::uint32_t t : unit.tasks) {
-    if (!system.tasks[t].data) return system.tasks[t].offset;
+    if (!task_set.tasks[t].data) return task_set.tasks[t].offset;
   }
   return 0;
 }
 
-std::uint32_t workers_of(const System &system) {
-  const AnalysisPlatform &platform = system.platform;
+std::uint32_t workers_of(const TaskSet &task_set) {
+  const AnalysisPlatform &platform = task_set.platform;
   return platform.max_started > 0 ? std::min(platform.workers, platform.max_started) : platform.workers;
 }
 
 class Builder {
  public:
-  Builder(const System &system, std::uint64_t max_jobs) : system_(system), max_jobs_(max_jobs) {}
+  Builder(const TaskSet &task_set, std::uint64_t max_jobs) : task_set_(task_set), max_jobs_(max_jobs) {}
 
   ExplorationModel run() {
-    model_.workers = workers_of(system_);
-    model_.hyperperiod = hyperperiod_of(system_);
-    model_.tasks.resize(system_.tasks.size());
-    for (const Unit &unit : system_.units) {
+    model_.workers = workers_of(task_set_);
+    model_.hyperperiod = hyperperiod_of(task_set_);
+    model_.tasks.resize(task_set_.tasks.size());
+    for (const Unit &unit : task_set_.units) {
       for (const std::uint32_t t : unit.tasks) add_task(unit, t);
     }
     layout();
@@ -42,9 +42,9 @@ class Builder {
 
  private:
   void add_task(const Unit &unit, std::uint32_t t) {
-    const SystemTask &task = system_.tasks[t];
+    const CompiledTask &task = task_set_.tasks[t];
     ExploredTask &added = model_.tasks[t];
-    added.offset = offset_of(system_, unit);
+    added.offset = offset_of(task_set_, unit);
     added.period = unit.period;
     added.bcet = task.bcet;
     added.wcet = task.wcet;
@@ -65,13 +65,13 @@ class Builder {
   void layout() {
     model_.width = model_.workers;
     if (model_.workers == 1) return;
-    std::vector<Gate> groups(system_.groups.size());
-    for (const SystemDag &dag : system_.dags) {
+    std::vector<Gate> groups(task_set_.groups.size());
+    for (const CompiledDag &dag : task_set_.dags) {
       if (dag.max_active == 0 || dag.max_active >= model_.workers) continue;
       const Gate gate = new_gate(dag.max_active);
       for (const std::uint32_t t : dag.tasks) model_.tasks[t].gates.push_back(gate);
     }
-    for (const std::vector<std::uint32_t> &group : system_.groups) {
+    for (const std::vector<std::uint32_t> &group : task_set_.groups) {
       if (group.empty()) continue;
       const Gate gate = new_gate(1);
       for (const std::uint32_t t : group) model_.tasks[t].gates.push_back(gate);
@@ -87,24 +87,24 @@ class Builder {
     return gate;
   }
 
-  const System &system_;
+  const TaskSet &task_set_;
   std::uint64_t max_jobs_;
   ExplorationModel model_;
 };
 
 }  // namespace
 
-Duration hyperperiod_of(const System &system) {
+Duration hyperperiod_of(const TaskSet &task_set) {
   Int128 result = 1;
-  for (const Unit &unit : system.units) {
+  for (const Unit &unit : task_set.units) {
     result = result / std::gcd(static_cast<Duration>(result), unit.period) * unit.period;
     if (result > kLongestExplored) return kUnbounded;
   }
   return static_cast<Duration>(result);
 }
 
-ExplorationModel exploration_model(const System &system, std::uint64_t max_jobs) {
-  return Builder(system, max_jobs).run();
+ExplorationModel exploration_model(const TaskSet &task_set, std::uint64_t max_jobs) {
+  return Builder(task_set, max_jobs).run();
 }
 
 }  // namespace redag::analysis

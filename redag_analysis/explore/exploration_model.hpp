@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A system in the form that exploration.cpp follows: numbers by task, and the layout of a state. Plain values,
+// A task set in the form that exploration.cpp follows: numbers by task, and the layout of a state. Plain values,
 // immutable.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 namespace redag::analysis {
 
@@ -51,9 +51,9 @@ struct ExplorationModel {
 };
 
 /// The hyperperiod; kUnbounded if it is above kLongestExplored.
-[[nodiscard]] Duration hyperperiod_of(const System &system);
+[[nodiscard]] Duration hyperperiod_of(const TaskSet &task_set);
 
 /// Builds the model. Requires a hyperperiod of at most kLongestExplored. O(n + edges).
-[[nodiscard]] ExplorationModel exploration_model(const System &system, std::uint64_t max_jobs);
+[[nodiscard]] ExplorationModel exploration_model(const TaskSet &task_set, std::uint64_t max_jobs);
 
 }  // namespace redag::analysis

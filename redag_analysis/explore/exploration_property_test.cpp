@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Compares the exploration with the scheduler that runs for real: on tiny systems with every release jitter and
+// Compares the exploration with the scheduler that runs for real: on tiny task sets with every release jitter and
 // execution time, on larger ones with random ones. Also compares it with the bounds, which hold for more than it does.
 #include "redag_analysis/explore/exploration.hpp"
 
@@ -25,13 +25,13 @@ namespace {
 using testing::BoundCase;
 using testing::describe;
 
-System compiled(const BoundCase &bound_case) {
-  auto system = compile(bound_case.workload, bound_case.platform);
-  EXPECT_TRUE(system);
-  return *std::move(system);
+TaskSet compiled(const BoundCase &bound_case) {
+  auto task_set = compile(bound_case.workload, bound_case.platform);
+  EXPECT_TRUE(task_set);
+  return *std::move(task_set);
 }
 
-// ---- random systems ----
+// ---- random task sets ----
 
 struct Limits {
   std::uint32_t workers = 1;
@@ -102,7 +102,7 @@ struct Seen {
   bool overrun = false;                               // a job was skipped, or answered after its period
 };
 
-void simulate(const BoundCase &bound_case, const System &system, const Demands &demands, Time horizon, Seen &seen) {
+void simulate(const BoundCase &bound_case, const TaskSet &task_set, const Demands &demands, Time horizon, Seen &seen) {
   const sched::Config config = config_of(bound_case.platform, bound_case.workload);
   sched::PriorityScheduler scheduler(bound_case.workload, config);
   sim::Options options;
@@ -112,13 +112,13 @@ void simulate(const BoundCase &bound_case, const System &system, const Demands &
   options.jitter = [&](const Task &, TaskId id, std::uint32_t number) {
     return number < demands[id.value].size() ? demands[id.value][number].jitter : 0;
   };
-  std::vector<Duration> finished(system.tasks.size());  // number of jobs
+  std::vector<Duration> finished(task_set.tasks.size());  // number of jobs
   sim::simulate(bound_case.workload, scheduler, config.workers, options, [&](std::span<const JobEvent> events) {
     for (const JobEvent &event : events) {
       if (event.kind == JobEventKind::Skipped) seen.overrun = true;
       if (event.kind != JobEventKind::Finished) continue;
-      const Unit &unit = system.units[system.tasks[event.task.value].unit];
-      const Time nominal = system.tasks[unit.tasks.front()].offset + event.job * unit.period;
+      const Unit &unit = task_set.units[task_set.tasks[event.task.value].unit];
+      const Time nominal = task_set.tasks[unit.tasks.front()].offset + event.job * unit.period;
       const Duration response = event.value - nominal;
       seen.overrun = seen.overrun || response > unit.period;
       ++finished[event.task.value];
@@ -131,8 +131,8 @@ void simulate(const BoundCase &bound_case, const System &system, const Demands &
   });
   // A job that waits forever causes no event: count the jobs that finished.
   for (std::size_t t = 0; t < finished.size() && !seen.overrun; ++t) {
-    const Unit &unit = system.units[system.tasks[t].unit];
-    seen.overrun = system.tasks[unit.tasks.front()].offset + (finished[t] + 1) * unit.period < horizon;
+    const Unit &unit = task_set.units[task_set.tasks[t].unit];
+    seen.overrun = task_set.tasks[unit.tasks.front()].offset + (finished[t] + 1) * unit.period < horizon;
   }
 }
 
@@ -143,10 +143,10 @@ Seen nothing_seen(const Exploration &exploration) {
 }
 
 // Returns one job of each task for every period that begins before the horizon.
-std::vector<std::size_t> job_counts(const System &system, Time horizon) {
-  std::vector<std::size_t> counts(system.tasks.size());
-  for (const Unit &unit : system.units) {
-    const Time first = system.tasks[unit.tasks.front()].offset;
+std::vector<std::size_t> job_counts(const TaskSet &task_set, Time horizon) {
+  std::vector<std::size_t> counts(task_set.tasks.size());
+  for (const Unit &unit : task_set.units) {
+    const Time first = task_set.tasks[unit.tasks.front()].offset;
     const auto jobs = first >= horizon ? 0 : (horizon - first + unit.period - 1) / unit.period;
     for (const std::uint32_t t : unit.tasks) counts[t] = static_cast<std::size_t>(jobs);
   }
@@ -155,18 +155,18 @@ std::vector<std::size_t> job_counts(const System &system, Time horizon) {
 
 // Simulates every combination of jitters and execution times of the jobs released before the horizon; empty if there
 // are more than `most`.
-std::optional<Seen> enumerate(const BoundCase &bound_case, const System &system, const Exploration &exploration,
+std::optional<Seen> enumerate(const BoundCase &bound_case, const TaskSet &task_set, const Exploration &exploration,
                               Time horizon, std::uint64_t most) {
   struct Choice {
     Duration *value;
     Duration low, high;
   };
-  Demands demands(system.tasks.size());
+  Demands demands(task_set.tasks.size());
   std::vector<Choice> choices;
-  const std::vector<std::size_t> counts = job_counts(system, horizon);
+  const std::vector<std::size_t> counts = job_counts(task_set, horizon);
   std::uint64_t combinations = 1;
-  for (std::size_t t = 0; t < system.tasks.size(); ++t) {
-    const SystemTask &task = system.tasks[t];
+  for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
+    const CompiledTask &task = task_set.tasks[t];
     demands[t].resize(counts[t]);
     for (Demand &demand : demands[t]) {
       choices.push_back({&demand.execution, task.bcet - task.overhead, task.wcet - task.overhead});
@@ -180,7 +180,7 @@ std::optional<Seen> enumerate(const BoundCase &bound_case, const System &system,
   }
   Seen seen = nothing_seen(exploration);
   for (bool more = true; more && !seen.overrun;) {
-    simulate(bound_case, system, demands, horizon, seen);
+    simulate(bound_case, task_set, demands, horizon, seen);
     more = false;
     for (const Choice &choice : choices) {  // count up
       if (*choice.value < choice.high) {
@@ -194,9 +194,9 @@ std::optional<Seen> enumerate(const BoundCase &bound_case, const System &system,
   return seen;
 }
 
-Time last_offset(const System &system) {
+Time last_offset(const TaskSet &task_set) {
   Time last = 0;
-  for (const SystemTask &task : system.tasks) last = std::max(last, task.offset);
+  for (const CompiledTask &task : task_set.tasks) last = std::max(last, task.offset);
   return last;
 }
 
@@ -216,31 +216,31 @@ std::string compare(const Exploration &exploration, const Seen &seen, bool exact
   return wrong;
 }
 
-// Tiny systems: compares what was explored with what all schedules do.
+// Tiny task sets: compares what was explored with what all schedules do.
 template <class Judge>
-void enumerate_systems(const Limits &limits, std::uint64_t systems, Judge judge) {
+void enumerate_task_sets(const Limits &limits, std::uint64_t task_sets, Judge judge) {
   std::uint64_t compared = 0;
   std::uint64_t late = 0;
-  for (std::uint64_t seed = 1; compared < systems && seed < 100 * systems; ++seed) {
+  for (std::uint64_t seed = 1; compared < task_sets && seed < 100 * task_sets; ++seed) {
     Rng rng(mix(seed));
     const BoundCase bound_case = random_case(rng, limits);
-    const System system = compiled(bound_case);
-    ASSERT_FALSE(why_not_explore(system)) << *why_not_explore(system) << describe(bound_case);
-    const Exploration exploration = explore(system);
+    const TaskSet task_set = compiled(bound_case);
+    ASSERT_FALSE(why_not_explore(task_set)) << *why_not_explore(task_set) << describe(bound_case);
+    const Exploration exploration = explore(task_set);
     const bool overruns = exploration.end == Exploration::End::Overrun;
     ASSERT_TRUE(overruns || exploration.end == Exploration::End::Complete) << "seed " << seed << "\n"
                                                                            << describe(bound_case);
     // Long enough for what is new in each hyperperiod, with the offsets before it, and for a late job to end.
     const std::uint32_t rounds = exploration.hyperperiods + (overruns ? 2 : 0);
-    const Time horizon = last_offset(system) + exploration.hyperperiod * rounds;
-    const std::optional<Seen> seen = enumerate(bound_case, system, exploration, horizon, 4000);
+    const Time horizon = last_offset(task_set) + exploration.hyperperiod * rounds;
+    const std::optional<Seen> seen = enumerate(bound_case, task_set, exploration, horizon, 4000);
     if (!seen) continue;
     ++compared;
     if (seen->overrun) ++late;
     judge(exploration, *seen);
     if (::testing::Test::HasFailure()) FAIL() << "seed " << seed << "\n" << describe(bound_case);
   }
-  EXPECT_EQ(compared, systems);
+  EXPECT_EQ(compared, task_sets);
   EXPECT_GT(late, 0U);
   EXPECT_LT(late, compared);
 }
@@ -250,8 +250,8 @@ void enumerate_systems(const Limits &limits, std::uint64_t systems, Judge judge)
 TEST(ExplorationProperty, OneWorkerIsExact) {
   std::uint64_t exact = 0;
   std::uint64_t safe = 0;
-  const std::uint64_t systems = testing::how_many(1000);
-  enumerate_systems(Limits{}, systems, [&](const Exploration &exploration, const Seen &seen) {
+  const std::uint64_t task_sets = testing::how_many(1000);
+  enumerate_task_sets(Limits{}, task_sets, [&](const Exploration &exploration, const Seen &seen) {
     if (seen.overrun || exploration.exact) {
       EXPECT_EQ(exploration.end == Exploration::End::Overrun, seen.overrun);
     }
@@ -259,10 +259,10 @@ TEST(ExplorationProperty, OneWorkerIsExact) {
     EXPECT_EQ(compare(exploration, seen, exploration.exact), "");
     ++(exploration.exact ? exact : safe);
   });
-  fmt::print("[ figures  ] {} systems without an overrun exact, {} safe\n", exact, safe);
-  EXPECT_GT(exact, systems / 10);
-  // A shorter run, as under a sanitizer, need not draw such a system.
-  EXPECT_GT(safe + (systems < 1000 ? 1 : 0), 0U);
+  fmt::print("[ figures  ] {} task sets without an overrun exact, {} safe\n", exact, safe);
+  EXPECT_GT(exact, task_sets / 10);
+  // A shorter run, as under a sanitizer, need not draw such a task set.
+  EXPECT_GT(safe + (task_sets < 1000 ? 1 : 0), 0U);
   EXPECT_LT(safe, exact / 4);
 }
 
@@ -275,7 +275,7 @@ TEST(ExplorationProperty, SeveralWorkersAreSafe) {
     limits.max_dags = 4;
     limits.max_tasks = 4;
     limits.max_wcet = 4;
-    enumerate_systems(limits, testing::how_many(500), [&](const Exploration &exploration, const Seen &seen) {
+    enumerate_task_sets(limits, testing::how_many(500), [&](const Exploration &exploration, const Seen &seen) {
       EXPECT_FALSE(exploration.exact);
       if (seen.overrun) {
         EXPECT_EQ(exploration.end, Exploration::End::Overrun);
@@ -298,8 +298,8 @@ TEST(ExplorationProperty, SeveralWorkersAreSafe) {
 // Longer times and more jobs, at random, for several hyperperiods.
 TEST(ExplorationProperty, NoSimulatedResponseIsOutside) {
   std::uint64_t complete = 0;
-  const std::uint64_t systems = testing::how_many(1000);
-  for (std::uint64_t seed = 1; seed <= systems; ++seed) {
+  const std::uint64_t task_sets = testing::how_many(1000);
+  for (std::uint64_t seed = 1; seed <= task_sets; ++seed) {
     Rng rng(mix(seed) + 1);
     Limits limits;
     limits.workers = static_cast<std::uint32_t>(rng.uniform(1, 4));
@@ -309,36 +309,36 @@ TEST(ExplorationProperty, NoSimulatedResponseIsOutside) {
     limits.scale = 10;
     limits.rich = true;
     const BoundCase bound_case = random_case(rng, limits);
-    const System system = compiled(bound_case);
+    const TaskSet task_set = compiled(bound_case);
     ExplorationOptions options;
     options.max_states = 20'000;
-    const Exploration exploration = explore(system, options);
+    const Exploration exploration = explore(task_set, options);
     if (exploration.end != Exploration::End::Complete) continue;
     ++complete;
     Seen seen = nothing_seen(exploration);
-    const Time horizon = last_offset(system) + 3 * exploration.hyperperiod;
-    const std::vector<std::size_t> counts = job_counts(system, horizon);
+    const Time horizon = last_offset(task_set) + 3 * exploration.hyperperiod;
+    const std::vector<std::size_t> counts = job_counts(task_set, horizon);
     for (int run = 0; run < 20 && !seen.overrun; ++run) {
-      Demands demands(system.tasks.size());
+      Demands demands(task_set.tasks.size());
       const double extreme = rng.uniform01();  // share of jobs at an end of their range
       const auto draw = [&](Duration low, Duration high) {
         if (rng.uniform01() < extreme) return rng.uniform(0, 1) == 0 ? low : high;
         return rng.uniform(low, high);
       };
-      for (std::size_t t = 0; t < system.tasks.size(); ++t) {
-        const SystemTask &task = system.tasks[t];
+      for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
+        const CompiledTask &task = task_set.tasks[t];
         for (std::size_t k = 0; k < counts[t]; ++k) {
           demands[t].push_back(
               {draw(0, task.data ? 0 : task.jitter), draw(task.bcet - task.overhead, task.wcet - task.overhead)});
         }
       }
-      simulate(bound_case, system, demands, horizon, seen);
+      simulate(bound_case, task_set, demands, horizon, seen);
     }
     ASSERT_FALSE(seen.overrun) << "seed " << seed << "\n" << describe(bound_case);
     ASSERT_EQ(compare(exploration, seen, false), "") << "seed " << seed << "\n" << describe(bound_case);
   }
-  fmt::print("[ figures  ] {} of {} systems explored to the end\n", complete, systems);
-  EXPECT_GT(complete, systems / 5);
+  fmt::print("[ figures  ] {} of {} task sets explored to the end\n", complete, task_sets);
+  EXPECT_GT(complete, task_sets / 5);
 }
 
 // The bounds for one worker hold for all offsets and gaps: no explored response exceeds them.
@@ -350,12 +350,12 @@ TEST(ExplorationProperty, OneWorkerIsNeverAboveTheBounds) {
     limits.scale = 10;
     limits.rich = true;
     const BoundCase bound_case = random_case(rng, limits);
-    const System system = compiled(bound_case);
-    const Report report = analyze(system);
+    const TaskSet task_set = compiled(bound_case);
+    const Report report = analyze(task_set);
     if (report.verdict != Verdict::Schedulable) continue;
-    const Exploration exploration = explore(system);
+    const Exploration exploration = explore(task_set);
     ASSERT_EQ(exploration.end, Exploration::End::Complete) << describe(bound_case);
-    for (std::uint32_t t = 0; t < system.tasks.size(); ++t) {
+    for (std::uint32_t t = 0; t < task_set.tasks.size(); ++t) {
       const auto &best = report.tasks[t].response;
       if (!best) continue;
       ++compared;

@@ -26,10 +26,10 @@ bool contains(const std::vector<Value> &values, const Value &value) {
 
 class Explorer {
  public:
-  Explorer(const System &system, const ExplorationOptions &options)
-      : system_(system),
+  Explorer(const TaskSet &task_set, const ExplorationOptions &options)
+      : task_set_(task_set),
         options_(options),
-        model_(exploration_model(system, options.max_states)),
+        model_(exploration_model(task_set, options.max_states)),
         workers_(model_.workers),
         tasks_(model_.tasks) {
     result_.hyperperiod = model_.hyperperiod;
@@ -136,7 +136,7 @@ class Explorer {
   // Sorts most urgent first; among equals, timers are in the order of their turns.
   void find_candidates() {
     candidates_.clear();
-    for (const std::uint32_t t : system_.by_rank) {
+    for (const std::uint32_t t : task_set_.by_rank) {
       if (!is_candidate(t)) continue;
       const ExploredTask &task = tasks_[t];
       Candidate candidate;
@@ -145,14 +145,14 @@ class Explorer {
       candidate.nominal = task.offset + candidate.number * task.period;
       candidate.ready = {candidate.nominal, candidate.nominal + task.jitter};
       candidate.waits = workers_ > 1 && !(task.predecessors.empty() && task.gates.empty());
-      const SystemTask &compiled = system_.tasks[t];
-      const bool is_edf = system_.policy == PolicyKind::Edf;
+      const CompiledTask &compiled = task_set_.tasks[t];
+      const bool is_edf = task_set_.policy == PolicyKind::Edf;
       candidate.data = compiled.data;
       candidate.urgency = is_edf ? candidate.nominal + task.deadline : compiled.tier;
       candidate.rank = compiled.rank;
       candidates_.push_back(candidate);
     }
-    const bool take_turns = system_.ties == Ties::Share;
+    const bool take_turns = task_set_.ties == Ties::Share;
     std::sort(candidates_.begin(), candidates_.end(), [take_turns](const Candidate &a, const Candidate &b) {
       if (a.urgency != b.urgency) return a.urgency < b.urgency;
       if (take_turns && a.nominal != b.nominal) return a.nominal < b.nominal;
@@ -418,7 +418,7 @@ class Explorer {
     }
   }
 
-  const System &system_;
+  const TaskSet &task_set_;
   const ExplorationOptions &options_;
   const ExplorationModel model_;
   const std::uint32_t workers_;
@@ -439,9 +439,9 @@ class Explorer {
 
 }  // namespace
 
-Exploration explore(const System &system, const ExplorationOptions &options) {
-  REDAG_CHECK(!why_not_explore(system), "nothing to explore");
-  return Explorer(system, options).run();
+Exploration explore(const TaskSet &task_set, const ExplorationOptions &options) {
+  REDAG_CHECK(!why_not_explore(task_set), "nothing to explore");
+  return Explorer(task_set, options).run();
 }
 
 }  // namespace redag::analysis

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The exploration on systems that can be solved by hand; exploration_property_test.cpp compares it with the scheduler.
+// The exploration on task sets that can be solved by hand; exploration_property_test.cpp compares it with the
+// scheduler.
 #include "redag_analysis/explore/exploration.hpp"
 
 #include <gtest/gtest.h>
@@ -16,10 +17,10 @@ namespace {
 
 using testing::BoundCase;
 
-System compiled(const BoundCase &bound_case) {
-  auto system = compile(bound_case.workload, bound_case.platform);
-  EXPECT_TRUE(system);
-  return *std::move(system);
+TaskSet compiled(const BoundCase &bound_case) {
+  auto task_set = compile(bound_case.workload, bound_case.platform);
+  EXPECT_TRUE(task_set);
+  return *std::move(task_set);
 }
 
 Task timer(const char *name, Duration bcet, Duration wcet, Duration period, Duration jitter = 0, Time offset = 0) {
@@ -48,8 +49,8 @@ BoundCase one_dag(std::uint32_t workers, std::vector<Task> tasks, std::uint32_t 
 // The short execution of `a` lets `b` start before `c` arrives: an anomaly that the worst case of each job misses.
 TEST(Exploration, FindsAnomalies) {
   const BoundCase bound_case = one_dag(1, {timer("a", 2, 3, 20), timer("c", 4, 4, 20, 0, 3), timer("b", 9, 9, 40)});
-  const System system = compiled(bound_case);
-  const Exploration exploration = explore(system);
+  const TaskSet task_set = compiled(bound_case);
+  const Exploration exploration = explore(task_set);
   ASSERT_EQ(exploration.end, Exploration::End::Complete);
   // a takes 3: c from 3 to 7, b from 7 to 16. a takes 2: b from 2 to 11, c from 11 to 15.
   EXPECT_EQ(exploration.responses[1][0], (ResponseRange{4, 12}));
@@ -62,8 +63,8 @@ TEST(Exploration, FindsAnomalies) {
 TEST(Exploration, HoldsMaxActiveAndGroups) {
   const std::vector<Task> tasks = {timer("a", 3, 3, 20), timer("b", 3, 3, 20), timer("c", 3, 3, 20)};
   const auto worst = [](const BoundCase &bound_case) {
-    const System system = compiled(bound_case);
-    const Exploration exploration = explore(system);
+    const TaskSet task_set = compiled(bound_case);
+    const Exploration exploration = explore(task_set);
     return exploration.of(TaskId(2)).worst;
   };
   EXPECT_EQ(worst(one_dag(3, tasks)), 3);
@@ -77,8 +78,8 @@ TEST(Exploration, HoldsMaxActiveAndGroups) {
 // With offsets beyond the hyperperiod, the differences of a second hyperperiod are found, too.
 TEST(Exploration, FollowsUntilItRepeats) {
   const BoundCase bound_case = one_dag(1, {timer("a", 2, 2, 10, 0, 25), timer("b", 4, 4, 10)});
-  const System system = compiled(bound_case);
-  const Exploration exploration = explore(system);
+  const TaskSet task_set = compiled(bound_case);
+  const Exploration exploration = explore(task_set);
   ASSERT_EQ(exploration.end, Exploration::End::Complete);
   EXPECT_GT(exploration.hyperperiods, 1U);
   EXPECT_EQ(exploration.of(TaskId(0)), (ResponseRange{2, 2}));
@@ -89,23 +90,23 @@ TEST(Exploration, FollowsUntilItRepeats) {
 
 TEST(Exploration, SaysWhenItEndsEarly) {
   const BoundCase bound_case = one_dag(2, {timer("a", 1, 6, 20, 5), timer("b", 1, 6, 30, 5), timer("c", 1, 6, 70, 5)});
-  const System system = compiled(bound_case);
-  const Exploration complete = explore(system);
+  const TaskSet task_set = compiled(bound_case);
+  const Exploration complete = explore(task_set);
   ASSERT_EQ(complete.end, Exploration::End::Complete);
   ASSERT_GT(complete.states, 10U);
 
   ExplorationOptions options;
   options.max_states = complete.states;
-  EXPECT_EQ(explore(system, options).end, Exploration::End::Complete);
+  EXPECT_EQ(explore(task_set, options).end, Exploration::End::Complete);
   options.max_states = complete.states - 1;
-  const Exploration given_up = explore(system, options);
+  const Exploration given_up = explore(task_set, options);
   EXPECT_EQ(given_up.end, Exploration::End::GaveUp);
-  const Bound bound = to_bound(system, given_up);
+  const Bound bound = to_bound(task_set, given_up);
   EXPECT_EQ(bound.figures, fmt::format("gave up at {} states", options.max_states));
-  EXPECT_EQ(verdict(system, bound), Verdict::NotShown);
+  EXPECT_EQ(verdict(task_set, bound), Verdict::NotShown);
   EXPECT_FALSE(bound.tasks[0].response);
   options.max_states = 10;  // fewer than the jobs of a hyperperiod
-  EXPECT_EQ(to_bound(system, explore(system, options)).figures, "gave up at 0 states: 41 jobs in a hyperperiod");
+  EXPECT_EQ(to_bound(task_set, explore(task_set, options)).figures, "gave up at 0 states: 41 jobs in a hyperperiod");
 
   options.max_states = 1'000'000;
   std::uint64_t calls = 0;
@@ -113,11 +114,11 @@ TEST(Exploration, SaysWhenItEndsEarly) {
     EXPECT_EQ(progress.jobs_in_a_round, complete.jobs);
     return ++calls < 5;
   };
-  const Exploration stopped = explore(system, options);
+  const Exploration stopped = explore(task_set, options);
   EXPECT_EQ(stopped.end, Exploration::End::Stopped);
   EXPECT_EQ(calls, 5U);
 
-  const System late = compiled(one_dag(1, {timer("a", 1, 9, 20, 5), timer("b", 1, 12, 30)}));
+  const TaskSet late = compiled(one_dag(1, {timer("a", 1, 9, 20, 5), timer("b", 1, 12, 30)}));
   const Exploration overrun = explore(late);
   EXPECT_EQ(overrun.end, Exploration::End::Overrun);
   EXPECT_EQ(to_bound(late, overrun).figures,
@@ -150,12 +151,12 @@ TEST(Exploration, SaysWhereThereIsNothingToExplore) {
 // Like any other method: it works in analyze(), and its terms add up.
 TEST(Exploration, IsAMethod) {
   const BoundCase bound_case = one_dag(2, {timer("a", 1, 6, 20, 5), timer("b", 1, 6, 30, 5), timer("c", 1, 6, 60, 5)});
-  const System system = compiled(bound_case);
+  const TaskSet task_set = compiled(bound_case);
   std::vector<Method> all = methods();
   all.push_back(exploration());
-  const Report report = analyze(system, all);
+  const Report report = analyze(task_set, all);
   EXPECT_EQ(report.verdict, Verdict::Schedulable);
-  for (std::uint32_t t = 0; t < system.tasks.size(); ++t) {
+  for (std::uint32_t t = 0; t < task_set.tasks.size(); ++t) {
     const Bound &bound = *report.methods.back().bound();
     Duration sum = 0;
     for (const Term &term : bound.tasks[t].terms) sum += term.amount;

@@ -19,7 +19,7 @@ namespace {
 using global::GlobalUnit;
 
 // Returns the tasks of the heaviest path by the weights that are left, and removes their weights.
-std::vector<std::uint32_t> take_heaviest_path(const System &system, const Unit &unit,
+std::vector<std::uint32_t> take_heaviest_path(const TaskSet &task_set, const Unit &unit,
                                               std::map<std::uint32_t, Duration> &left) {
   struct Step {
     Duration length = 0;
@@ -29,7 +29,7 @@ std::vector<std::uint32_t> take_heaviest_path(const System &system, const Unit &
   std::uint32_t last = unit.tasks.front();
   for (const std::uint32_t t : unit.tasks) {
     Step step;
-    for (const std::uint32_t p : system.tasks[t].predecessors) {
+    for (const std::uint32_t p : task_set.tasks[t].predecessors) {
       if (paths[p].length > step.length) step = Step{paths[p].length, p};
     }
     step.length += left[t];
@@ -49,24 +49,24 @@ Duration graham_response(const Unit &unit, std::uint32_t workers) {
   return unit.length + (unit.volume - unit.length) / workers;
 }
 
-std::optional<std::string> why_not_alone(const System &system) {
-  if (auto reason = why_not_directly(system)) return reason;
-  if (system.units.size() != 1) return "for a DAG that has the platform to itself";
-  if (system.mode == sched::Preemption::Cooperative)
+std::optional<std::string> why_not_alone(const TaskSet &task_set) {
+  if (auto reason = why_not_directly(task_set)) return reason;
+  if (task_set.units.size() != 1) return "for a DAG that has the platform to itself";
+  if (task_set.mode == sched::Preemption::Cooperative)
     return "cooperative mode: a suspended job waits beside idle workers";
-  if (!system.groups.empty()) return "exclusive groups: a worker can idle while a job waits";
+  if (!task_set.groups.empty()) return "exclusive groups: a worker can idle while a job waits";
   return std::nullopt;
 }
 
 // Builds the bound; `response` counts from the release as seen.
-ResponseBound bound_of(const System &system, const GlobalUnit &unit, Duration response) {
+ResponseBound bound_of(const TaskSet &task_set, const GlobalUnit &unit, Duration response) {
   ResponseBound bound;
   if (add(response, unit.jitter) > unit.limit) {
     bound.absent = global::kExceedsLimit;
     return bound;
   }
   bound.response = response + unit.jitter;
-  global::SharedTerms terms(system, unit);
+  global::SharedTerms terms(task_set, unit);
   terms.add_path();
   terms.add(Term::Kind::Own, unit, response - unit.length);
   terms.add_jitter();
@@ -75,97 +75,98 @@ ResponseBound bound_of(const System &system, const GlobalUnit &unit, Duration re
 }
 
 template <class Respond>
-Outcome apply_alone(const System &system, Respond respond) {
-  if (auto reason = why_not_alone(system)) return NotApplicable{*reason};
-  const GlobalUnit unit = global::unit_of(system, 0);
-  const std::uint32_t workers = unit.bound > 0 ? unit.bound : system.platform.workers;
-  return from_units(system, {bound_of(system, unit, respond(system.units[0], workers))});
+Outcome apply_alone(const TaskSet &task_set, Respond respond) {
+  if (auto reason = why_not_alone(task_set)) return NotApplicable{*reason};
+  const GlobalUnit unit = global::unit_of(task_set, 0);
+  const std::uint32_t workers = unit.bound > 0 ? unit.bound : task_set.platform.workers;
+  return from_units(task_set, {bound_of(task_set, unit, respond(task_set.units[0], workers))});
 }
 
-Outcome apply_graham(const System &system) {
-  return apply_alone(system, [](const Unit &unit, std::uint32_t workers) { return graham_response(unit, workers); });
+Outcome apply_graham(const TaskSet &task_set) {
+  return apply_alone(task_set, [](const Unit &unit, std::uint32_t workers) { return graham_response(unit, workers); });
 }
 
-Outcome apply_long_paths(const System &system) {
+Outcome apply_long_paths(const TaskSet &task_set) {
   return apply_alone(
-      system, [&](const Unit &unit, std::uint32_t workers) { return long_paths_response(system, unit, workers); });
+      task_set, [&](const Unit &unit, std::uint32_t workers) { return long_paths_response(task_set, unit, workers); });
 }
 
 // The most jobs of the DAG that can be started and unfinished at once.
-std::uint32_t most_started(const SystemDag &dag) {
+std::uint32_t most_started(const CompiledDag &dag) {
   return dag.max_active > 0 ? dag.max_active : static_cast<std::uint32_t>(dag.tasks.size());
 }
 
 // True if a job that starts takes a worker from any less urgent job at once.
-bool preempts_at_once(const System &system) {
-  const auto has_own_level = [](const SystemTask &task) { return task.level == task.tier; };
-  return system.mode == sched::Preemption::Full && is_static(system.policy) &&
-         std::all_of(system.tasks.begin(), system.tasks.end(), has_own_level);
+bool preempts_at_once(const TaskSet &task_set) {
+  const auto has_own_level = [](const CompiledTask &task) { return task.level == task.tier; };
+  return task_set.mode == sched::Preemption::Full && is_static(task_set.policy) &&
+         std::all_of(task_set.tasks.begin(), task_set.tasks.end(), has_own_level);
 }
 
 // The number of workers that no other DAG can keep from this one: as many as it can use, or all, or 0.
-std::uint32_t own_workers(const System &system, std::size_t dag) {
+std::uint32_t own_workers(const TaskSet &task_set, std::size_t dag) {
   std::uint32_t last_tier = 0;
-  for (const std::uint32_t t : system.dags[dag].tasks) last_tier = std::max(last_tier, system.tasks[t].tier);
+  for (const std::uint32_t t : task_set.dags[dag].tasks) last_tier = std::max(last_tier, task_set.tasks[t].tier);
   std::uint64_t others = 0;
-  Effort::spend(system.dags.size());
-  for (std::size_t d = 0; d < system.dags.size(); ++d) {
-    const SystemDag &other = system.dags[d];
+  Effort::spend(task_set.dags.size());
+  for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
+    const CompiledDag &other = task_set.dags[d];
     const bool interferes =
-        !preempts_at_once(system) ||
-        std::any_of(other.tasks.begin(), other.tasks.end(), [&](auto t) { return system.tasks[t].tier <= last_tier; });
+        !preempts_at_once(task_set) || std::any_of(other.tasks.begin(), other.tasks.end(),
+                                                   [&](auto t) { return task_set.tasks[t].tier <= last_tier; });
     if (d != dag && interferes) others += most_started(other);
   }
-  const std::uint32_t wanted = most_started(system.dags[dag]);
-  const std::uint32_t workers = system.platform.workers;
+  const std::uint32_t wanted = most_started(task_set.dags[dag]);
+  const std::uint32_t workers = task_set.platform.workers;
   if (others + wanted <= workers) return wanted;
   // With fewer workers than its own bound it would compete with others for them; a DAG without others does not.
-  const bool alone = others == 0 && system.dags[dag].units.size() == 1 && system.mode != sched::Preemption::Cooperative;
+  const bool alone =
+      others == 0 && task_set.dags[dag].units.size() == 1 && task_set.mode != sched::Preemption::Cooperative;
   return alone ? workers : 0;
 }
 
-Outcome apply_isolated(const System &system) {
-  if (auto reason = why_not_directly(system)) return NotApplicable{*reason};
-  if (!system.groups.empty()) return NotApplicable{"exclusive groups: a worker can idle while a job waits"};
-  std::vector<ResponseBound> responses(system.units.size());
+Outcome apply_isolated(const TaskSet &task_set) {
+  if (auto reason = why_not_directly(task_set)) return NotApplicable{*reason};
+  if (!task_set.groups.empty()) return NotApplicable{"exclusive groups: a worker can idle while a job waits"};
+  std::vector<ResponseBound> responses(task_set.units.size());
   bool any = false;
-  for (std::size_t d = 0; d < system.dags.size(); ++d) {
-    const SystemDag &dag = system.dags[d];
-    const std::uint32_t workers = own_workers(system, d);
+  for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
+    const CompiledDag &dag = task_set.dags[d];
+    const std::uint32_t workers = own_workers(task_set, d);
     any = any || workers > 0;
     for (const std::uint32_t u : dag.units) {
-      const Unit &unit = system.units[u];
+      const Unit &unit = task_set.units[u];
       if (workers == 0) {
         responses[u].absent = "it and what interferes can occupy more than all workers";
       } else if (dag.max_active > 0 && dag.units.size() > 1) {
         responses[u].absent = "several parts of the DAG share one max_active";
       } else {
         const bool one_each = workers >= dag.tasks.size();
-        const Duration own = one_each ? unit.length : long_paths_response(system, unit, workers);
-        responses[u] = bound_of(system, global::unit_of(system, u), own);
+        const Duration own = one_each ? unit.length : long_paths_response(task_set, unit, workers);
+        responses[u] = bound_of(task_set, global::unit_of(task_set, u), own);
       }
     }
   }
   if (!any)
     return NotApplicable{"no DAG has workers to itself: bounds of it and of what interferes sum up to more than m"};
-  return from_units(system, std::move(responses));
+  return from_units(task_set, std::move(responses));
 }
 
 }  // namespace
 
-std::vector<Duration> disjoint_paths(const System &system, const Unit &unit, std::size_t count, Heaviest heaviest) {
+std::vector<Duration> disjoint_paths(const TaskSet &task_set, const Unit &unit, std::size_t count, Heaviest heaviest) {
   std::map<std::uint32_t, Duration> left;
-  for (const std::uint32_t t : unit.tasks) left[t] = heaviest == Heaviest::MostTasks ? 1 : system.tasks[t].wcet;
+  for (const std::uint32_t t : unit.tasks) left[t] = heaviest == Heaviest::MostTasks ? 1 : task_set.tasks[t].wcet;
   std::vector<Duration> paths;
   for (Duration covered = 0; paths.size() < count && covered < unit.volume; covered += paths.back()) {
     paths.push_back(0);
-    for (const std::uint32_t t : take_heaviest_path(system, unit, left)) paths.back() += system.tasks[t].wcet;
+    for (const std::uint32_t t : take_heaviest_path(task_set, unit, left)) paths.back() += task_set.tasks[t].wcet;
   }
   return paths;
 }
 
-Duration long_paths_response(const System &system, const Unit &unit, std::uint32_t workers) {
-  const std::vector<Duration> paths = disjoint_paths(system, unit, workers, Heaviest::Longest);
+Duration long_paths_response(const TaskSet &task_set, const Unit &unit, std::uint32_t workers) {
+  const std::vector<Duration> paths = disjoint_paths(task_set, unit, workers, Heaviest::Longest);
   Duration best = graham_response(unit, workers);
   Duration covered = unit.length;
   for (std::uint32_t j = 1; j < paths.size(); ++j) {
@@ -175,13 +176,13 @@ Duration long_paths_response(const System &system, const Unit &unit, std::uint32
   return best;
 }
 
-std::optional<std::vector<std::uint32_t>> federated_bounds(const System &system) {
+std::optional<std::vector<std::uint32_t>> federated_bounds(const TaskSet &task_set) {
   std::vector<std::uint32_t> bounds;
   std::uint64_t sum = 0;
-  for (const SystemDag &dag : system.dags) {
+  for (const CompiledDag &dag : task_set.dags) {
     auto bound = static_cast<std::uint32_t>(dag.tasks.size());
     if (dag.units.size() == 1) {
-      const Unit &unit = system.units[dag.units.front()];
+      const Unit &unit = task_set.units[dag.units.front()];
       const Duration until = std::min({unit.deadline, unit.limit, unit.period}) - unit.jitter;
       if (until < unit.length) return std::nullopt;
       const Duration rest = unit.volume - unit.length;
@@ -195,7 +196,7 @@ std::optional<std::vector<std::uint32_t>> federated_bounds(const System &system)
     bounds.push_back(bound);
     sum += bound;
   }
-  if (sum > system.platform.workers) return std::nullopt;
+  if (sum > task_set.platform.workers) return std::nullopt;
   return bounds;
 }
 

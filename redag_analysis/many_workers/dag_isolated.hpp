@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Response times of DAGs that nothing else delays. Such a DAG is alone on the platform, or the max_active of all that
-// could interfere leave it enough workers. Also finds the max_active that make a system so (federated scheduling). Pure
-// functions.
+// could interfere leave it enough workers. Also finds the max_active that make a task set so (federated scheduling).
+// Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -19,13 +19,13 @@ enum class Heaviest : std::uint8_t { Longest, MostTasks };
 
 /// Returns the lengths of at most `count` paths that share no task: the heaviest, then the heaviest in the rest, and so
 /// on. A path may lead through tasks of earlier ones without counting them. O(count (tasks + edges)).
-[[nodiscard]] std::vector<Duration> disjoint_paths(const System &system, const Unit &unit, std::size_t count,
+[[nodiscard]] std::vector<Duration> disjoint_paths(const TaskSet &task_set, const Unit &unit, std::size_t count,
                                                    Heaviest heaviest);
 
 /// Bounds the response of a DAG on `workers` of its own: min over j of len(l_0) + floor((vol - sum_{i <= j} len(l_i)) /
 /// (workers - j)). l_0 is the longest path, and l_i the longest in what is left without l_0 .. l_{i-1}. Q. He, N. Guan,
 /// M. Lv, X. Jiang, W. Chang, RTSS 2022, theorem 1; j = 0 is the bound of R. Graham, 1969. O(workers (tasks + edges)).
-[[nodiscard]] Duration long_paths_response(const System &system, const Unit &unit, std::uint32_t workers);
+[[nodiscard]] Duration long_paths_response(const TaskSet &task_set, const Unit &unit, std::uint32_t workers);
 
 /// R = len + floor((vol - len) / m) for the only DAG. R. Graham, SIAM J. Applied Math. 17(2), 1969.
 [[nodiscard]] Method graham();
@@ -41,6 +41,6 @@ enum class Heaviest : std::uint8_t { Longest, MostTasks };
 /// suffice. A DAG that needs several workers gets n_k = ceil((vol - len) / (D - len)). J. Li, J. Chen, K. Agrawal, C.
 /// Lu, C. Gill, A. Saifullah, ECRTS 2014 (D = T); S. Baruah, DATE 2015 (D <= T). DAGs of several parts get as many as
 /// they have tasks.
-[[nodiscard]] std::optional<std::vector<std::uint32_t>> federated_bounds(const System &system);
+[[nodiscard]] std::optional<std::vector<std::uint32_t>> federated_bounds(const TaskSet &task_set);
 
 }  // namespace redag::analysis

@@ -84,7 +84,7 @@ Dag fork_join(std::string name, Duration period = 100) {
   return dag;
 }
 
-System compiled(std::uint32_t workers, std::vector<Dag> dags, sched::Preemption preemption) {
+TaskSet compiled(std::uint32_t workers, std::vector<Dag> dags, sched::Preemption preemption) {
   Workload workload;
   workload.name = "w";
   workload.dags = std::move(dags);
@@ -95,17 +95,17 @@ System compiled(std::uint32_t workers, std::vector<Dag> dags, sched::Preemption 
   return compile(workload, platform).value();
 }
 
-std::optional<Duration> dag_response(const Method &method, const System &system, std::size_t dag) {
-  const Outcome outcome = method.apply(system);
+std::optional<Duration> dag_response(const Method &method, const TaskSet &task_set, std::size_t dag) {
+  const Outcome outcome = method.apply(task_set);
   return std::get<Bound>(outcome).dags[dag].response;
 }
 
 TEST(DagIsolated, LongPathsCountWhatRunsBesideThem) {
   // len 15, vol 32; paths of 15, 9 and 8. On three workers nothing waits; on two, j = 1 leaves 8 for one worker.
-  const System three = compiled(3, {fork_join("d")}, sched::Preemption::Full);
+  const TaskSet three = compiled(3, {fork_join("d")}, sched::Preemption::Full);
   EXPECT_EQ(dag_response(graham(), three, 0), 15 + 17 / 3);
   EXPECT_EQ(dag_response(long_paths(), three, 0), 15);
-  const System two = compiled(2, {fork_join("d")}, sched::Preemption::Full);
+  const TaskSet two = compiled(2, {fork_join("d")}, sched::Preemption::Full);
   EXPECT_EQ(dag_response(long_paths(), two, 0), 15 + std::min(17 / 2, 8));
 }
 
@@ -114,11 +114,11 @@ TEST(DagIsolated, LongPathsAreNeverAboveGraham) {
   for (std::uint64_t seed = 0; seed < 1000; ++seed) {
     Rng rng(mix(seed));
     const testing::BoundCase bound_case = random_bound_case(rng, limits);
-    const System system = compile(bound_case.workload, bound_case.platform).value();
-    if (!std::holds_alternative<Bound>(graham().apply(system))) continue;
-    const auto worse = dag_response(graham(), system, 0);
+    const TaskSet task_set = compile(bound_case.workload, bound_case.platform).value();
+    if (!std::holds_alternative<Bound>(graham().apply(task_set))) continue;
+    const auto worse = dag_response(graham(), task_set, 0);
     if (!worse) continue;
-    EXPECT_LE(dag_response(long_paths(), system, 0).value(), *worse) << describe(bound_case);
+    EXPECT_LE(dag_response(long_paths(), task_set, 0).value(), *worse) << describe(bound_case);
   }
 }
 
@@ -127,25 +127,25 @@ TEST(DagIsolated, BoundsThatSumUpToTheWorkersShareNothing) {
   Dag second = fork_join("second", 110);
   first.max_active = 2;
   second.max_active = 1;
-  const System enough = compiled(3, {first, second}, sched::Preemption::None);
+  const TaskSet enough = compiled(3, {first, second}, sched::Preemption::None);
   EXPECT_EQ(dag_response(isolated(), enough, 0), 15 + 8);
   EXPECT_EQ(dag_response(isolated(), enough, 1), 32);
 
   // Two workers suffice for the first DAG only if it can take them from the second.
-  const System preemptive = compiled(2, {first, second}, sched::Preemption::Full);
+  const TaskSet preemptive = compiled(2, {first, second}, sched::Preemption::Full);
   EXPECT_EQ(dag_response(isolated(), preemptive, 0), 15 + 8);
   EXPECT_FALSE(dag_response(isolated(), preemptive, 1));
-  const System nonpreemptive = compiled(2, {first, second}, sched::Preemption::None);
+  const TaskSet nonpreemptive = compiled(2, {first, second}, sched::Preemption::None);
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(isolated().apply(nonpreemptive)));
   // They do not suffice if the second takes turns with it.
-  const System equals = compiled(2, {first, fork_join("second")}, sched::Preemption::Full);
+  const TaskSet equals = compiled(2, {first, fork_join("second")}, sched::Preemption::Full);
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(isolated().apply(equals)));
 }
 
 TEST(DagIsolated, TheMostUrgentHasAllWorkersWhereItPreempts) {
-  const System system = compiled(2, {fork_join("first"), fork_join("second", 110)}, sched::Preemption::Full);
-  EXPECT_EQ(dag_response(isolated(), system, 0), 15 + 8);
-  EXPECT_FALSE(dag_response(isolated(), system, 1));
+  const TaskSet task_set = compiled(2, {fork_join("first"), fork_join("second", 110)}, sched::Preemption::Full);
+  EXPECT_EQ(dag_response(isolated(), task_set, 0), 15 + 8);
+  EXPECT_FALSE(dag_response(isolated(), task_set, 1));
 }
 
 TEST(DagIsolated, FederatedBoundsMeetTheDeadlines) {
@@ -159,9 +159,9 @@ TEST(DagIsolated, FederatedBoundsMeetTheDeadlines) {
 
   std::vector<Dag> dags{heavy, light};
   for (std::size_t d = 0; d < dags.size(); ++d) dags[d].max_active = (*bounds)[d];
-  const System system = compiled(3, dags, sched::Preemption::None);
-  EXPECT_LE(dag_response(isolated(), system, 0).value(), 24);
-  EXPECT_EQ(verdict(system, std::get<Bound>(isolated().apply(system))), Verdict::Schedulable);
+  const TaskSet task_set = compiled(3, dags, sched::Preemption::None);
+  EXPECT_LE(dag_response(isolated(), task_set, 0).value(), 24);
+  EXPECT_EQ(verdict(task_set, std::get<Bound>(isolated().apply(task_set))), Verdict::Schedulable);
 }
 
 }  // namespace

@@ -16,17 +16,17 @@
 namespace redag::analysis {
 namespace global {
 
-Shape::Shape(const System &system, const Unit &unit, std::uint32_t workers) {
+Shape::Shape(const TaskSet &task_set, const Unit &unit, std::uint32_t workers) {
   // Each task runs from `start` to `end`: as early as possible on an unlimited number of workers.
   std::map<std::uint32_t, Duration> end;
   std::map<Duration, Duration> steps;  // by the time before the DAG's end, going back: change in the number of
                                        // executing tasks
   for (const std::uint32_t t : unit.tasks) {
     Duration start = 0;
-    for (const std::uint32_t p : system.tasks[t].predecessors) {
+    for (const std::uint32_t p : task_set.tasks[t].predecessors) {
       if (const auto found = end.find(p); found != end.end()) start = std::max(start, found->second);
     }
-    end[t] = start + system.tasks[t].wcet;
+    end[t] = start + task_set.tasks[t].wcet;
     ++steps[unit.length - end[t]];
     --steps[unit.length - start];
   }
@@ -40,7 +40,7 @@ Shape::Shape(const System &system, const Unit &unit, std::uint32_t workers) {
   left_ = limited(left, workers);
 
   // The choice of paths does not depend on execution times. More execution is thus never less work.
-  std::vector<Duration> paths = disjoint_paths(system, unit, unit.tasks.size(), Heaviest::MostTasks);
+  std::vector<Duration> paths = disjoint_paths(task_set, unit, unit.tasks.size(), Heaviest::MostTasks);
   std::sort(paths.begin(), paths.end());
   Points done = {{0, 0}};
   for (std::size_t i = 0; i < paths.size(); ++i) {
@@ -125,7 +125,7 @@ Duration least_window(const GlobalUnit &unit, std::uint32_t workers) {
 }
 
 // Sets `response` of units[k], given those of units[0 .. k), and `work` of these. Returns false above its limit, or
-// after too many steps. `shapes` is by position in System::units. Below `start` there is no fixed point.
+// after too many steps. `shapes` is by position in TaskSet::units. Below `start` there is no fixed point.
 bool respond(std::span<GlobalUnit> units, std::span<const global::Shape> shapes, std::size_t k, std::uint32_t workers,
              Duration start) {
   GlobalUnit &own = units[k];
@@ -146,11 +146,12 @@ bool respond(std::span<GlobalUnit> units, std::span<const global::Shape> shapes,
   return found;
 }
 
-ResponseBound explain(const System &system, std::span<const GlobalUnit> units, std::size_t k, std::uint32_t workers) {
+ResponseBound explain(const TaskSet &task_set, std::span<const GlobalUnit> units, std::size_t k,
+                      std::uint32_t workers) {
   const GlobalUnit &own = units[k];
   ResponseBound bound;
   bound.response = own.response;
-  SharedTerms terms(system, own);
+  SharedTerms terms(task_set, own);
   terms.add_path();
   terms.add_share(Term::Kind::Own, own, own.volume - own.length, workers);
   for (std::size_t i = 0; i < k; ++i) terms.add_share(Term::Kind::Interference, units[i], units[i].work, workers);
@@ -159,21 +160,22 @@ ResponseBound explain(const System &system, std::span<const GlobalUnit> units, s
   return bound;
 }
 
-Outcome apply_shapes(const System &system) {
+Outcome apply_shapes(const TaskSet &task_set) {
   // Without edges no DAG has a shape; bertogna_cirinei() is then never above this bound, and quicker.
-  if (!system.has_edges()) return NotApplicable{"no task has predecessors: see the bounds for independent tasks"};
-  global::Units view = global::units_of(system, {.equals = true});
+  if (!task_set.has_edges()) return NotApplicable{"no task has predecessors: see the bounds for independent tasks"};
+  global::Units view = global::units_of(task_set, {.equals = true});
   if (view.reason) return NotApplicable{*view.reason};
   std::vector<global::Shape> shapes;
-  shapes.reserve(system.units.size());
-  for (const Unit &unit : system.units) shapes.emplace_back(system, unit, view.workers);
+  shapes.reserve(task_set.units.size());
+  for (const Unit &unit : task_set.units) shapes.emplace_back(task_set, unit, view.workers);
   return global::from_most_urgent(
-      system, view.units, [&view](GlobalUnit &unit) { unit.response = least_window(unit, view.workers) + unit.jitter; },
+      task_set, view.units,
+      [&view](GlobalUnit &unit) { unit.response = least_window(unit, view.workers) + unit.jitter; },
       [&](std::size_t k, bool alone) {
         const Duration start = alone ? 0 : view.units[k].response - view.units[k].jitter;
         return respond(view.units, shapes, k, view.workers, start);
       },
-      [&](std::size_t k) { return explain(system, view.units, k, view.workers); });
+      [&](std::size_t k) { return explain(task_set, view.units, k, view.workers); });
 }
 
 }  // namespace
@@ -192,7 +194,7 @@ Method dag_shapes() {
           "m workers, full preemption, static priorities that keep DAGs together, some edges, R <= T; release jitter, "
           "shared levels; no max_active, no shared groups",
       .complexity = "pseudo-polynomial; O(tasks log tasks) a step",
-      .apply = [](const System &system) { return across_rates(system, apply_shapes); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_shapes); },
   };
 }
 

@@ -18,7 +18,7 @@ namespace global {
 /// The most work of one job of a DAG on m workers, at the two ends of a window. Both functions end at the volume.
 class Shape {
  public:
-  Shape(const System &system, const Unit &unit, std::uint32_t workers);
+  Shape(const TaskSet &task_set, const Unit &unit, std::uint32_t workers);
 
   /// The most work that can be left `time` before the end of the job's response. It is at most what is left in the
   /// schedule that ends then, with all tasks as early as possible on an unlimited number of workers. J. Fonseca, G.

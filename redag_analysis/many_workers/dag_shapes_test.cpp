@@ -85,8 +85,8 @@ Workload fork_and_join(std::uint32_t workers) {
 
 TEST(Shape, IsThatOfTheDag) {
   const Workload workload = fork_and_join(2);
-  const System system = compile(workload, platform_of(workload)).value();
-  const Shape shape(system, system.units[0], 2);
+  const TaskSet task_set = compile(workload, platform_of(workload)).value();
+  const Shape shape(task_set, task_set.units[0], 2);
   // Going back from the end: the join, the longer branch alone for two, both branches for two, the fork.
   const Duration left[] = {0, 1, 2, 3, 5, 7, 8, 8, 8};
   // Two paths, of 6 and of 2.
@@ -99,8 +99,8 @@ TEST(Shape, IsThatOfTheDag) {
 
 TEST(Shape, OneWorkerDoesOneThingAtATime) {
   const Workload workload = fork_and_join(1);
-  const System system = compile(workload, platform_of(workload)).value();
-  const Shape shape(system, system.units[0], 1);
+  const TaskSet task_set = compile(workload, platform_of(workload)).value();
+  const Shape shape(task_set, task_set.units[0], 1);
   for (Duration time = 0; time < 12; ++time) {
     EXPECT_EQ(shape.left(time), std::min<Duration>(time, 8));
     EXPECT_EQ(shape.done(time), std::min<Duration>(time, 8));
@@ -126,15 +126,15 @@ Workload wide(std::uint32_t parallel, Duration wcet, std::uint32_t workers) {
 }
 
 // Compares both functions with their definitions, instant by instant.
-void expect_shape_is_right(const System &system, const Unit &unit, std::uint32_t m) {
+void expect_shape_is_right(const TaskSet &task_set, const Unit &unit, std::uint32_t m) {
   std::map<std::uint32_t, std::pair<Duration, Duration>> times;  // as early as possible
   for (const std::uint32_t t : unit.tasks) {
     Duration start = 0;
-    for (const std::uint32_t p : system.tasks[t].predecessors) start = std::max(start, times[p].second);
-    times[t] = {start, start + system.tasks[t].wcet};
+    for (const std::uint32_t p : task_set.tasks[t].predecessors) start = std::max(start, times[p].second);
+    times[t] = {start, start + task_set.tasks[t].wcet};
   }
-  const std::vector<Duration> paths = disjoint_paths(system, unit, unit.tasks.size(), Heaviest::MostTasks);
-  const Shape shape(system, unit, m);
+  const std::vector<Duration> paths = disjoint_paths(task_set, unit, unit.tasks.size(), Heaviest::MostTasks);
+  const Shape shape(task_set, unit, m);
   for (Duration time = 0; time <= unit.volume + 1; ++time) {
     const Duration cut = m * time;
     Duration left = 0;
@@ -153,13 +153,13 @@ TEST(Shape, IsWhatItSaysAtEveryInstant) {
     for (std::uint32_t parallel = 1; parallel < 10; ++parallel) {
       for (const Duration wcet : {1, 2, 5}) {
         const Workload workload = wide(parallel, wcet, workers);
-        const System system = compile(workload, platform_of(workload)).value();
-        expect_shape_is_right(system, system.units[0], workers);
+        const TaskSet task_set = compile(workload, platform_of(workload)).value();
+        expect_shape_is_right(task_set, task_set.units[0], workers);
       }
     }
   }
-  for_cases(cases(graphs()), 300, [&](const testing::BoundCase &bound_case, const System &system, Rng &) {
-    for (const Unit &unit : system.units) expect_shape_is_right(system, unit, bound_case.platform.workers);
+  for_cases(cases(graphs()), 300, [&](const testing::BoundCase &bound_case, const TaskSet &task_set, Rng &) {
+    for (const Unit &unit : task_set.units) expect_shape_is_right(task_set, unit, bound_case.platform.workers);
   });
 }
 
@@ -167,11 +167,11 @@ TEST(Shape, IsWhatItSaysAtEveryInstant) {
 TEST(Shape, WorkIsTheMostOverAllPlacements) {
   std::uint64_t checked = 0;
   std::uint64_t single = 0;
-  for_cases(cases(graphs()), 400, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
-    for (const Unit &unit : system.units) {
+  for_cases(cases(graphs()), 400, [&](const testing::BoundCase &bound_case, const TaskSet &task_set, Rng &rng) {
+    for (const Unit &unit : task_set.units) {
       single += unit.tasks.size() == 1 ? 1U : 0U;
       const std::uint32_t m = bound_case.platform.workers;
-      const Shape shape(system, unit, m);
+      const Shape shape(task_set, unit, m);
       const Duration least = unit.length + (unit.volume - unit.length) / m;
       if (least > unit.period) continue;
       const Duration response = rng.uniform(least, unit.period);
@@ -196,12 +196,12 @@ TEST(Shape, WorkIsTheMostOverAllPlacements) {
 TEST(DagShapes, AreNeverAboveMelani) {
   std::uint64_t smaller = 0;
   std::uint64_t bounds = 0;
-  for_cases(cases(graphs()), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
-    const Outcome melanis = melani().apply(system);
-    const Outcome shapes = dag_shapes().apply(system);
-    ASSERT_EQ(std::holds_alternative<Bound>(shapes), std::holds_alternative<Bound>(melanis) && system.has_edges());
+  for_cases(cases(graphs()), 3000, [&](const testing::BoundCase &, const TaskSet &task_set, Rng &) {
+    const Outcome melanis = melani().apply(task_set);
+    const Outcome shapes = dag_shapes().apply(task_set);
+    ASSERT_EQ(std::holds_alternative<Bound>(shapes), std::holds_alternative<Bound>(melanis) && task_set.has_edges());
     if (!std::holds_alternative<Bound>(shapes)) return;
-    for (std::size_t d = 0; d < system.dags.size(); ++d) {
+    for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
       const auto worse = std::get<Bound>(melanis).dags[d].response;
       const auto better = std::get<Bound>(shapes).dags[d].response;
       if (!worse) continue;
@@ -219,11 +219,11 @@ TEST(DagShapes, AreNeverAboveMelani) {
 TEST(DagShapes, AndWidthsAreIncomparable) {
   std::uint64_t smaller = 0;
   std::uint64_t larger = 0;
-  for_cases(cases(graphs()), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
-    const Outcome bounded = dag_bounded().apply(system);
-    const Outcome shapes = dag_shapes().apply(system);
+  for_cases(cases(graphs()), 3000, [&](const testing::BoundCase &, const TaskSet &task_set, Rng &) {
+    const Outcome bounded = dag_bounded().apply(task_set);
+    const Outcome shapes = dag_shapes().apply(task_set);
     if (!std::holds_alternative<Bound>(shapes)) return;
-    for (std::size_t d = 0; d < system.dags.size(); ++d) {
+    for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
       const Duration one = std::get<Bound>(shapes).dags[d].response.value_or(kNever);
       const Duration other = std::get<Bound>(bounded).dags[d].response.value_or(kNever);
       smaller += one < other ? 1U : 0U;
@@ -236,8 +236,8 @@ TEST(DagShapes, AndWidthsAreIncomparable) {
 
 TEST(DagShapes, MoreExecutionNeverShrinksABound) {
   std::uint64_t compared = 0;
-  for_cases(cases(graphs()), 1500, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
-    const Outcome before = dag_shapes().apply(system);
+  for_cases(cases(graphs()), 1500, [&](const testing::BoundCase &bound_case, const TaskSet &task_set, Rng &rng) {
+    const Outcome before = dag_shapes().apply(task_set);
     if (!std::holds_alternative<Bound>(before)) return;
     Workload more = bound_case.workload;
     Dag &dag = more.dags[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(more.dags.size()) - 1))];
@@ -245,7 +245,7 @@ TEST(DagShapes, MoreExecutionNeverShrinksABound) {
     const auto larger = compile(more, bound_case.platform);
     if (!larger) return;  // above its deadline
     const Outcome after = dag_shapes().apply(*larger);
-    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+    for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
       const Duration grown = std::get<Bound>(after).tasks[t].response.value_or(kNever);
       ASSERT_LE(std::get<Bound>(before).tasks[t].response.value_or(kNever), grown);
     }
@@ -255,8 +255,8 @@ TEST(DagShapes, MoreExecutionNeverShrinksABound) {
 }
 
 TEST(DagShapes, TermsAddUp) {
-  for_cases(cases(graphs()), 1000, [](const testing::BoundCase &, const System &system, Rng &) {
-    const Outcome outcome = dag_shapes().apply(system);
+  for_cases(cases(graphs()), 1000, [](const testing::BoundCase &, const TaskSet &task_set, Rng &) {
+    const Outcome outcome = dag_shapes().apply(task_set);
     if (!std::holds_alternative<Bound>(outcome)) return;
     for (const ResponseBound &bound : std::get<Bound>(outcome).dags) {
       Duration sum = 0;

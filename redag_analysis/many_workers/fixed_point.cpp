@@ -11,7 +11,7 @@
 namespace redag::analysis::global {
 namespace {
 
-constexpr int kMaxRounds = 1000;  // of all values together; ordinary systems need about ten
+constexpr int kMaxRounds = 1000;  // of all values together; ordinary task sets need about ten
 
 }  // namespace
 
@@ -43,16 +43,16 @@ auto as_last(std::vector<GlobalUnit> &units, Peers peers, std::size_t k, F f) {
 
 }  // namespace
 
-Bound from_most_urgent(const System &system, std::vector<GlobalUnit> &units,
+Bound from_most_urgent(const TaskSet &task_set, std::vector<GlobalUnit> &units,
                        const std::function<void(GlobalUnit &)> &start,
                        const std::function<bool(std::size_t, bool)> &respond,
                        const std::function<ResponseBound(std::size_t)> &explain) {
-  std::vector<ResponseBound> responses(system.units.size());
+  std::vector<ResponseBound> responses(task_set.units.size());
   bool known = true;
   Peers peers;
   for (; peers.begin < units.size(); peers.begin = peers.end) {
     Effort::reached(peers.begin, units.size());
-    peers.end = peers_of(system, units, peers.begin).end;
+    peers.end = peers_of(task_set, units, peers.begin).end;
     const bool alone = peers.end == peers.begin + 1;
     std::vector<Duration *> values;
     for (std::size_t k = peers.begin; k < peers.end && known && !alone; ++k) {
@@ -82,18 +82,18 @@ Bound from_most_urgent(const System &system, std::vector<GlobalUnit> &units,
       });
     }
   }
-  return from_units(system, std::move(responses));
+  return from_units(task_set, std::move(responses));
 }
 
-Bound all_that_agree(const System &system, std::vector<GlobalUnit> &units, std::string_view exceeds,
+Bound all_that_agree(const TaskSet &task_set, std::vector<GlobalUnit> &units, std::string_view exceeds,
                      const std::function<bool(std::size_t)> &respond,
                      const std::function<ResponseBound(std::size_t)> &explain) {
   std::vector<Duration *> values;
   values.reserve(units.size());
   for (GlobalUnit &unit : units) values.push_back(&unit.response);
   const std::string_view absent =
-      is_any_hopeless(units, system.platform.workers) ? exceeds : agree(values, exceeds, respond);
-  std::vector<ResponseBound> responses(system.units.size());
+      is_any_hopeless(units, task_set.platform.workers) ? exceeds : agree(values, exceeds, respond);
+  std::vector<ResponseBound> responses(task_set.units.size());
   for (std::size_t k = 0; k < units.size(); ++k) {
     ResponseBound &response = responses[units[k].unit];
     if (absent.empty()) {
@@ -102,7 +102,7 @@ Bound all_that_agree(const System &system, std::vector<GlobalUnit> &units, std::
       response.absent = absent;
     }
   }
-  return from_units(system, std::move(responses));
+  return from_units(task_set, std::move(responses));
 }
 
 }  // namespace redag::analysis::global

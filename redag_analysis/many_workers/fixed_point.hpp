@@ -57,14 +57,14 @@ template <class Next>
 /// k), and returns false above its limit; explain(k) follows a call of it. Each of several peers (peers_of()) is
 /// treated as the last of them, with `alone` false. Their responses are the least that agree, beginning with those that
 /// start() sets; otherwise none of them has one.
-[[nodiscard]] Bound from_most_urgent(const System &system, std::vector<GlobalUnit> &units,
+[[nodiscard]] Bound from_most_urgent(const TaskSet &task_set, std::vector<GlobalUnit> &units,
                                      const std::function<void(GlobalUnit &unit)> &start,
                                      const std::function<bool(std::size_t k, bool alone)> &respond,
                                      const std::function<ResponseBound(std::size_t k)> &explain);
 
 /// Applies agree() to the responses of `units`, which respond(k) sets. All units have the bound that explain(k) gives,
 /// or none has; none has if one unit is hopeless.
-[[nodiscard]] Bound all_that_agree(const System &system, std::vector<GlobalUnit> &units, std::string_view exceeds,
+[[nodiscard]] Bound all_that_agree(const TaskSet &task_set, std::vector<GlobalUnit> &units, std::string_view exceeds,
                                    const std::function<bool(std::size_t k)> &respond,
                                    const std::function<ResponseBound(std::size_t k)> &explain);
 

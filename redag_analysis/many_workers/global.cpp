@@ -16,30 +16,30 @@
 namespace redag::analysis::global {
 namespace {
 
-std::optional<std::string> why_not_mode(const System &system, const Needs &needs) {
-  if (!needs.any_policy && !is_static(system.policy)) {
-    return std::string("for static priorities; the policy is ") + to_string(system.policy);
+std::optional<std::string> why_not_mode(const TaskSet &task_set, const Needs &needs) {
+  if (!needs.any_policy && !is_static(task_set.policy)) {
+    return std::string("for static priorities; the policy is ") + to_string(task_set.policy);
   }
-  if (system.mode == needs.mode) return std::nullopt;
+  if (task_set.mode == needs.mode) return std::nullopt;
   return needs.mode == sched::Preemption::Full
              ? "for full preemption; here jobs keep the worker until they end or reach a preemption point"
              : "for jobs that run to completion; here they can be preempted";
 }
 
 // True if the max_active can bind while R <= T. One that the DAG's tasks reach only if its instances overlap cannot.
-bool can_bind(const System &system, DagId id) {
-  const SystemDag &dag = system.dags[id.value];
+bool can_bind(const TaskSet &task_set, DagId id) {
+  const CompiledDag &dag = task_set.dags[id.value];
   if (dag.max_active == 0) return false;
-  return dag.units.size() > 1 || most_jobs_in_progress(system, id) > dag.max_active;
+  return dag.units.size() > 1 || most_jobs_in_progress(task_set, id) > dag.max_active;
 }
 
-std::optional<std::string> why_not_structure(const System &system, const Needs &needs) {
-  if (auto reason = why_not_directly(system)) return reason;
-  if (!needs.edges && system.has_edges()) return "tasks have predecessors: see the bounds for DAGs";
-  if (!needs.groups && !system.groups.empty()) return "exclusive groups: a worker can idle while a job waits";
-  for (std::size_t d = 0; d < system.dags.size(); ++d) {
-    const SystemDag &dag = system.dags[d];
-    if (!can_bind(system, DagId(d))) continue;
+std::optional<std::string> why_not_structure(const TaskSet &task_set, const Needs &needs) {
+  if (auto reason = why_not_directly(task_set)) return reason;
+  if (!needs.edges && task_set.has_edges()) return "tasks have predecessors: see the bounds for DAGs";
+  if (!needs.groups && !task_set.groups.empty()) return "exclusive groups: a worker can idle while a job waits";
+  for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
+    const CompiledDag &dag = task_set.dags[d];
+    if (!can_bind(task_set, DagId(d))) continue;
     if (!needs.bounds) return "DAG '" + dag.name + "' has a max_active: a worker can idle while a job waits";
     if (dag.units.size() > 1) return "DAG '" + dag.name + "': several of its parts share one max_active";
   }
@@ -47,26 +47,26 @@ std::optional<std::string> why_not_structure(const System &system, const Needs &
 }
 
 // The place that two tasks share if either can go before the other: the level under full preemption, else the tier.
-std::uint32_t shared_place(const System &system, std::uint32_t rank) {
-  const SystemTask &task = system.tasks[system.by_rank[rank]];
-  return system.mode == sched::Preemption::Full ? task.level : task.tier;
+std::uint32_t shared_place(const TaskSet &task_set, std::uint32_t rank) {
+  const CompiledTask &task = task_set.tasks[task_set.by_rank[rank]];
+  return task_set.mode == sched::Preemption::Full ? task.level : task.tier;
 }
 
-bool are_equals(const System &system, const GlobalUnit &upper, const GlobalUnit &lower) {
-  return shared_place(system, system.units[upper.unit].last_rank) >=
-         shared_place(system, system.units[lower.unit].first_rank);
+bool are_equals(const TaskSet &task_set, const GlobalUnit &upper, const GlobalUnit &lower) {
+  return shared_place(task_set, task_set.units[upper.unit].last_rank) >=
+         shared_place(task_set, task_set.units[lower.unit].first_rank);
 }
 
-std::optional<std::string> why_not_order(const System &system, const std::vector<GlobalUnit> &units, bool equals) {
+std::optional<std::string> why_not_order(const TaskSet &task_set, const std::vector<GlobalUnit> &units, bool equals) {
   for (std::size_t i = 0; i + 1 < units.size(); ++i) {
-    const Unit &upper = system.units[units[i].unit];
-    const Unit &lower = system.units[units[i + 1].unit];
+    const Unit &upper = task_set.units[units[i].unit];
+    const Unit &lower = task_set.units[units[i + 1].unit];
     if (upper.last_rank > lower.first_rank) {
-      return "priorities of '" + system.dags[upper.dag.value].name + "' and '" + system.dags[lower.dag.value].name +
+      return "priorities of '" + task_set.dags[upper.dag.value].name + "' and '" + task_set.dags[lower.dag.value].name +
              "' are interleaved";
     }
-    if (!equals && are_equals(system, units[i], units[i + 1])) {
-      return "'" + system.dags[upper.dag.value].name + "' and '" + system.dags[lower.dag.value].name +
+    if (!equals && are_equals(task_set, units[i], units[i + 1])) {
+      return "'" + task_set.dags[upper.dag.value].name + "' and '" + task_set.dags[lower.dag.value].name +
              "' share a priority level: either can go first";
     }
   }
@@ -82,9 +82,9 @@ bool fits(const std::vector<GlobalUnit> &units, std::uint32_t workers) {
 }
 
 // Sets the overhead of the longest path, and the most tasks on any path.
-void measure_paths(const System &system, const Unit &unit, GlobalUnit &result) {
+void measure_paths(const TaskSet &task_set, const Unit &unit, GlobalUnit &result) {
   if (unit.tasks.size() == 1) {
-    result.path_overhead = system.tasks[unit.tasks.front()].overhead;
+    result.path_overhead = task_set.tasks[unit.tasks.front()].overhead;
     return;
   }
   struct Path {
@@ -94,7 +94,7 @@ void measure_paths(const System &system, const Unit &unit, GlobalUnit &result) {
   };
   std::map<std::uint32_t, Path> paths;
   for (const std::uint32_t t : unit.tasks) {
-    const SystemTask &task = system.tasks[t];
+    const CompiledTask &task = task_set.tasks[t];
     Path longest;
     std::uint32_t most = 0;
     for (const std::uint32_t p : task.predecessors) {
@@ -111,10 +111,10 @@ void measure_paths(const System &system, const Unit &unit, GlobalUnit &result) {
 
 }  // namespace
 
-GlobalUnit unit_of(const System &system, std::uint32_t id) {
-  const Unit &unit = system.units[id];
-  const SystemDag &dag = system.dags[unit.dag.value];
-  const std::uint32_t workers = system.platform.workers;
+GlobalUnit unit_of(const TaskSet &task_set, std::uint32_t id) {
+  const Unit &unit = task_set.units[id];
+  const CompiledDag &dag = task_set.dags[unit.dag.value];
+  const std::uint32_t workers = task_set.platform.workers;
   GlobalUnit result;
   result.unit = id;
   result.volume = unit.volume;
@@ -125,34 +125,34 @@ GlobalUnit unit_of(const System &system, std::uint32_t id) {
   result.tasks = static_cast<std::uint32_t>(unit.tasks.size());
   result.bound = dag.max_active > 0 && dag.max_active < result.tasks ? std::min(dag.max_active, workers) : 0;
   set_width(result, std::min({workers, result.tasks, result.bound > 0 ? result.bound : result.tasks}));
-  measure_paths(system, unit, result);
+  measure_paths(task_set, unit, result);
   return result;
 }
 
-Units units_of(const System &system, const Needs &needs) {
+Units units_of(const TaskSet &task_set, const Needs &needs) {
   Units result;
-  result.workers = system.platform.workers;
-  result.reason = why_not_mode(system, needs);
-  if (!result.reason) result.reason = why_not_structure(system, needs);
+  result.workers = task_set.platform.workers;
+  result.reason = why_not_mode(task_set, needs);
+  if (!result.reason) result.reason = why_not_structure(task_set, needs);
   if (result.reason) return result;
-  result.units.reserve(system.units.size());
-  for (std::uint32_t u = 0; u < system.units.size(); ++u) {
-    result.units.push_back(unit_of(system, u));
+  result.units.reserve(task_set.units.size());
+  for (std::uint32_t u = 0; u < task_set.units.size(); ++u) {
+    result.units.push_back(unit_of(task_set, u));
     GlobalUnit &unit = result.units.back();
-    if (unit.bound > 0 && !can_bind(system, system.units[u].dag)) unit.bound = 0;
+    if (unit.bound > 0 && !can_bind(task_set, task_set.units[u].dag)) unit.bound = 0;
   }
   std::sort(result.units.begin(), result.units.end(), [&](const GlobalUnit &a, const GlobalUnit &b) {
-    return system.units[a.unit].first_rank < system.units[b.unit].first_rank;
+    return task_set.units[a.unit].first_rank < task_set.units[b.unit].first_rank;
   });
-  if (!needs.any_policy) result.reason = why_not_order(system, result.units, needs.equals);
+  if (!needs.any_policy) result.reason = why_not_order(task_set, result.units, needs.equals);
   if (!result.reason && !fits(result.units, result.workers)) result.reason = "times too long for exact sums";
   return result;
 }
 
-Peers peers_of(const System &system, const std::vector<GlobalUnit> &units, std::size_t k) {
+Peers peers_of(const TaskSet &task_set, const std::vector<GlobalUnit> &units, std::size_t k) {
   Peers peers{k, k + 1};
-  while (peers.begin > 0 && are_equals(system, units[peers.begin - 1], units[peers.begin])) --peers.begin;
-  while (peers.end < units.size() && are_equals(system, units[peers.end - 1], units[peers.end])) ++peers.end;
+  while (peers.begin > 0 && are_equals(task_set, units[peers.begin - 1], units[peers.begin])) --peers.begin;
+  while (peers.end < units.size() && are_equals(task_set, units[peers.end - 1], units[peers.end])) ++peers.end;
   return peers;
 }
 
@@ -170,12 +170,12 @@ void set_width(GlobalUnit &unit, std::uint32_t width) {
   unit.rate = 1.0 / static_cast<double>(unit.turn);
 }
 
-SharedTerms::SharedTerms(const System &system, const GlobalUnit &unit)
-    : system_(system), unit_(unit), wanted_(Effort::itemises(unit.unit)) {}
+SharedTerms::SharedTerms(const TaskSet &task_set, const GlobalUnit &unit)
+    : task_set_(task_set), unit_(unit), wanted_(Effort::itemises(unit.unit)) {}
 
 void SharedTerms::push(Term::Kind kind, const GlobalUnit &whose, Duration amount, std::int64_t jobs) {
   if (!wanted_) return;
-  const Unit &unit = system_.units[whose.unit];
+  const Unit &unit = task_set_.units[whose.unit];
   const TaskId task = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
   terms_.push_back(Term{kind, task, unit.dag, amount, jobs});
 }
@@ -210,14 +210,14 @@ void SharedTerms::add_share(Term::Kind kind, const GlobalUnit &whose, Duration n
   if (numerator != 0) push(kind, whose, whole, jobs);
 }
 
-Duration largest_remaining(const System &system, const std::vector<GlobalUnit> &units, std::size_t from,
+Duration largest_remaining(const TaskSet &task_set, const std::vector<GlobalUnit> &units, std::size_t from,
                            std::uint32_t count) {
   std::vector<Duration> all;
   std::vector<Duration> own;
   Effort::spend(units.size() - from);
   for (std::size_t u = from; u < units.size(); ++u) {
     own.clear();
-    for (const std::uint32_t t : system.units[units[u].unit].tasks) own.push_back(system.tasks[t].wcet - 1);
+    for (const std::uint32_t t : task_set.units[units[u].unit].tasks) own.push_back(task_set.tasks[t].wcet - 1);
     std::sort(own.begin(), own.end(), std::greater<>());
     own.resize(std::min<std::size_t>(own.size(), units[u].width));
     all.insert(all.end(), own.begin(), own.end());

@@ -34,10 +34,10 @@ struct GlobalUnit {
   std::uint32_t tasks = 1;       // their number
   std::uint32_t path_tasks = 1;  // most tasks on a path
   Duration path_overhead = 0;    // the platform's part of `length`
-  std::uint32_t unit = 0;        // position in System::units
+  std::uint32_t unit = 0;        // position in TaskSet::units
 };
 
-/// The systems that a bound accepts.
+/// The task sets that a bound accepts.
 struct Needs {
   sched::Preemption mode = sched::Preemption::Full;
   bool edges = true;        // units of several tasks
@@ -54,7 +54,7 @@ struct Units {
   std::vector<GlobalUnit> units;
   std::uint32_t workers = 1;
 };
-[[nodiscard]] Units units_of(const System &system, const Needs &needs);
+[[nodiscard]] Units units_of(const TaskSet &task_set, const Needs &needs);
 
 /// The range of units that share levels with units[k]: any of them can go before any other. Where jobs can be preempted
 /// levels count, else tiers, because a job that has started then counts as blocking. Nearly always units[k] alone.
@@ -62,10 +62,10 @@ struct Peers {
   std::size_t begin = 0;
   std::size_t end = 0;
 };
-[[nodiscard]] Peers peers_of(const System &system, const std::vector<GlobalUnit> &units, std::size_t k);
+[[nodiscard]] Peers peers_of(const TaskSet &task_set, const std::vector<GlobalUnit> &units, std::size_t k);
 
 /// One unit alone; its place among the others is not determined.
-[[nodiscard]] GlobalUnit unit_of(const System &system, std::uint32_t unit);
+[[nodiscard]] GlobalUnit unit_of(const TaskSet &task_set, std::uint32_t unit);
 
 /// True if no response is within the limit: there is more work than the workers can do until then. Sums of such a unit
 /// can wrap.
@@ -97,7 +97,7 @@ struct Division {
 /// add up to the response. There are none if the unit is not itemised (effort.hpp).
 class SharedTerms {
  public:
-  SharedTerms(const System &system, const GlobalUnit &unit);
+  SharedTerms(const TaskSet &task_set, const GlobalUnit &unit);
 
   /// Adds the unit's own time: `length` of the longest path, of which the platform's overhead is a term of its own.
   void add_path();
@@ -113,7 +113,7 @@ class SharedTerms {
  private:
   void push(Term::Kind kind, const GlobalUnit &whose, Duration amount, std::int64_t jobs);
 
-  const System &system_;
+  const TaskSet &task_set_;
   const GlobalUnit &unit_;
   bool wanted_;
   std::vector<Term> terms_;
@@ -123,8 +123,8 @@ class SharedTerms {
 
 /// Sums the `count` largest remaining times of less urgent jobs that block something that became ready later, at most
 /// `width` of a unit. Each counts with "- 1", because it started at an instant strictly before.
-[[nodiscard]] Duration largest_remaining(const System &system, const std::vector<GlobalUnit> &units, std::size_t from,
-                                         std::uint32_t count);
+[[nodiscard]] Duration largest_remaining(const TaskSet &task_set, const std::vector<GlobalUnit> &units,
+                                         std::size_t from, std::uint32_t count);
 
 inline constexpr std::string_view kExceedsLimit = "its response exceeds the limit: jobs would be skipped";
 inline constexpr std::string_view kMoreUrgent = "something more urgent has no bound";
@@ -132,7 +132,7 @@ inline constexpr std::string_view kPeer = "something of the same priority has no
 inline constexpr std::string_view kNoFixedPoint =
     "no fixed point within its limit, above which jobs would be skipped, in the steps allowed";
 
-/// Limits the evaluations of one fixed point; ordinary systems need tens.
+/// Limits the evaluations of one fixed point; ordinary task sets need tens.
 inline constexpr int kMaxSteps = 10'000;
 
 }  // namespace redag::analysis::global

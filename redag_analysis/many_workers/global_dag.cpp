@@ -110,10 +110,11 @@ bool bounded_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t 
   return found;
 }
 
-Duration blocking_of(const System &system, const std::vector<GlobalUnit> &units, std::size_t k, std::uint32_t workers) {
+Duration blocking_of(const TaskSet &task_set, const std::vector<GlobalUnit> &units, std::size_t k,
+                     std::uint32_t workers) {
   const GlobalUnit &own = units[k];
-  const Duration first = largest_remaining(system, units, k + 1, workers);
-  const Duration later = workers > 1 ? largest_remaining(system, units, k + 1, workers - 1) : 0;
+  const Duration first = largest_remaining(task_set, units, k + 1, workers);
+  const Duration later = workers > 1 ? largest_remaining(task_set, units, k + 1, workers - 1) : 0;
   // While max_active is reached, less urgent jobs start; each end of a job of the DAG can lead to another wait.
   const std::uint32_t ends = (own.bound > 0 ? own.tasks : own.path_tasks) - 1;
   return add(first, multiply(later, ends));
@@ -136,14 +137,14 @@ void start_low(GlobalUnit &unit, std::uint32_t workers) {
 
 // Expects `respond(k, start)` and `explain(k, terms)`.
 template <class Respond, class Explain>
-Bound from_most_urgent(const System &system, global::Units &view, Respond respond, Explain explain) {
+Bound from_most_urgent(const TaskSet &task_set, global::Units &view, Respond respond, Explain explain) {
   return global::from_most_urgent(
-      system, view.units, [&view](GlobalUnit &unit) { start_low(unit, view.workers); },
+      task_set, view.units, [&view](GlobalUnit &unit) { start_low(unit, view.workers); },
       [&](std::size_t k, bool alone) { return respond(k, alone ? 0 : view.units[k].response - view.units[k].jitter); },
       [&](std::size_t k) {
         ResponseBound bound;
         bound.response = view.units[k].response;
-        SharedTerms terms(system, view.units[k]);
+        SharedTerms terms(task_set, view.units[k]);
         terms.add_path();
         if (terms.wanted()) explain(k, terms);
         terms.add_jitter();
@@ -152,14 +153,14 @@ Bound from_most_urgent(const System &system, global::Units &view, Respond respon
       });
 }
 
-Outcome apply_melani(const System &system) {
-  global::Units view = global::units_of(system, {.equals = true});
+Outcome apply_melani(const TaskSet &task_set) {
+  global::Units view = global::units_of(task_set, {.equals = true});
   if (view.reason) return NotApplicable{*view.reason};
   for (GlobalUnit &unit : view.units) global::set_width(unit, view.workers);
   const std::span<GlobalUnit> units(view.units);
   const std::uint32_t m = view.workers;
   return from_most_urgent(
-      system, view, [&](std::size_t k, Duration start) { return global::melani_response(units, k, m, start); },
+      task_set, view, [&](std::size_t k, Duration start) { return global::melani_response(units, k, m, start); },
       [&](std::size_t k, SharedTerms &terms) {
         const GlobalUnit &own = units[k];
         terms.add_share(Term::Kind::Own, own, own.volume - own.length, m);
@@ -192,17 +193,17 @@ void explain_bounded(std::span<const GlobalUnit> units, std::size_t k, std::uint
   }
 }
 
-Outcome apply_bounded(const System &system, sched::Preemption mode) {
-  global::Units view = global::units_of(system, {.mode = mode, .bounds = true, .equals = true});
+Outcome apply_bounded(const TaskSet &task_set, sched::Preemption mode) {
+  global::Units view = global::units_of(task_set, {.mode = mode, .bounds = true, .equals = true});
   if (view.reason) return NotApplicable{*view.reason};
   const std::span<GlobalUnit> units(view.units);
   global::Waiting waiting;
   waiting.works.resize(units.size());
   Duration blocking = 0;
   return from_most_urgent(
-      system, view,
+      task_set, view,
       [&](std::size_t k, Duration start) {
-        if (mode == sched::Preemption::None) blocking = global::blocking_of(system, view.units, k, view.workers);
+        if (mode == sched::Preemption::None) blocking = global::blocking_of(task_set, view.units, k, view.workers);
         return global::bounded_response(units, k, view.workers, blocking, waiting, start);
       },
       [&](std::size_t k, SharedTerms &terms) { explain_bounded(units, k, view.workers, blocking, waiting, terms); });
@@ -211,8 +212,8 @@ Outcome apply_bounded(const System &system, sched::Preemption mode) {
 // Bounds units[k] below all others: the bound if nothing is known of their order.
 class AgainstAll {
  public:
-  AgainstAll(const System &system, std::vector<GlobalUnit> &units, std::uint32_t workers)
-      : system_(system), units_(units), workers_(workers) {
+  AgainstAll(const TaskSet &task_set, std::vector<GlobalUnit> &units, std::uint32_t workers)
+      : task_set_(task_set), units_(units), workers_(workers) {
     waiting_.works.resize(units.size());
     for (GlobalUnit &unit : units) start_low(unit, workers);
   }
@@ -232,7 +233,7 @@ class AgainstAll {
     std::swap(units_[k], units_.back());
     (void)respond();
     const GlobalUnit &own = units_.back();
-    SharedTerms terms(system_, own);
+    SharedTerms terms(task_set_, own);
     terms.add_path();
     explain_bounded(units_, units_.size() - 1, workers_, 0, waiting_, terms);
     terms.add_jitter();
@@ -244,25 +245,25 @@ class AgainstAll {
  private:
   bool respond() { return global::bounded_response(units_, units_.size() - 1, workers_, 0, waiting_); }
 
-  const System &system_;
+  const TaskSet &task_set_;
   std::vector<GlobalUnit> &units_;
   std::uint32_t workers_;
   global::Waiting waiting_;
 };
 
-Outcome apply_any(const System &system) {
+Outcome apply_any(const TaskSet &task_set) {
   // A critical path waits only while all workers execute, or as many of its own tasks as max_active allows.
-  const auto mode = system.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
-  global::Units view = global::units_of(system, {.mode = mode, .bounds = true, .any_policy = true});
+  const auto mode = task_set.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
+  global::Units view = global::units_of(task_set, {.mode = mode, .bounds = true, .any_policy = true});
   if (view.reason) return NotApplicable{*view.reason};
-  AgainstAll all(system, view.units, view.workers);
+  AgainstAll all(task_set, view.units, view.workers);
   return global::all_that_agree(
-      system, view.units, "some DAG's response can exceed its limit, which all others rely on",
+      task_set, view.units, "some DAG's response can exceed its limit, which all others rely on",
       [&](std::size_t k) { return all.respond(k); }, [&](std::size_t k) { return all.explain(k); });
 }
 
-Outcome apply_preemptive(const System &system) { return apply_bounded(system, sched::Preemption::Full); }
-Outcome apply_nonpreemptive(const System &system) { return apply_bounded(system, sched::Preemption::None); }
+Outcome apply_preemptive(const TaskSet &task_set) { return apply_bounded(task_set, sched::Preemption::Full); }
+Outcome apply_nonpreemptive(const TaskSet &task_set) { return apply_bounded(task_set, sched::Preemption::None); }
 
 }  // namespace
 
@@ -278,7 +279,7 @@ Method melani() {
           "levels; "
           "no max_active, no shared groups",
       .complexity = "pseudo-polynomial; O(DAGs) a step",
-      .apply = [](const System &system) { return across_rates(system, apply_melani); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_melani); },
   };
 }
 
@@ -292,7 +293,7 @@ Method dag_bounded() {
           "jitter, "
           "shared levels, max_active of DAGs in one part; no shared groups",
       .complexity = "pseudo-polynomial; O(DAGs) a step",
-      .apply = [](const System &system) { return across_rates(system, apply_preemptive); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_preemptive); },
   };
 }
 
@@ -324,7 +325,7 @@ Method dag_nonpreemptive() {
           "release "
           "jitter, equal priorities, max_active of DAGs in one part; no shared groups",
       .complexity = "pseudo-polynomial; O(DAGs) a step",
-      .apply = [](const System &system) { return across_rates(system, apply_nonpreemptive); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_nonpreemptive); },
   };
 }
 

@@ -44,7 +44,7 @@ struct Waiting {
 /// The time that less urgent jobs that run to completion can execute while units[k]'s critical path waits. The m
 /// largest count once. m - 1 count each time a job of the DAG ends, and its next critical job, or one that max_active
 /// held back, finds them started.
-[[nodiscard]] Duration blocking_of(const System &system, const std::vector<GlobalUnit> &units, std::size_t k,
+[[nodiscard]] Duration blocking_of(const TaskSet &task_set, const std::vector<GlobalUnit> &units, std::size_t k,
                                    std::uint32_t workers);
 
 }  // namespace global

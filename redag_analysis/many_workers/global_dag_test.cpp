@@ -132,15 +132,15 @@ Workload narrow_and_wide() {
   return workload;
 }
 
-System compiled(const Workload &workload, sched::Preemption preemption) {
+TaskSet compiled(const Workload &workload, sched::Preemption preemption) {
   AnalysisPlatform platform;
   platform.workers = workload.platform.workers;
   platform.preemption = preemption;
   return compile(workload, platform).value();
 }
 
-ResponseBound dag_response(const Method &method, const System &system, std::size_t dag) {
-  return std::get<Bound>(method.apply(system)).dags[dag];
+ResponseBound dag_response(const Method &method, const TaskSet &task_set, std::size_t dag) {
+  return std::get<Bound>(method.apply(task_set)).dags[dag];
 }
 
 // DAGs that are narrow and wide in turn, above a wide one with longer tasks. Random graphs hardly ever look like this.
@@ -189,18 +189,18 @@ TEST(BoundProperty, DagBoundedNarrowAndWide) {
 }
 
 TEST(GlobalDag, LessUrgentWorkStartsWheneverTheUpperDagIsNarrow) {
-  const System system = compiled(narrow_and_wide(), sched::Preemption::None);
-  EXPECT_EQ(system.units[0].length, 26);
-  EXPECT_EQ(system.units[0].volume, 46);
-  EXPECT_GE(dag_response(dag_nonpreemptive(), system, 0).response.value(), 52);
+  const TaskSet task_set = compiled(narrow_and_wide(), sched::Preemption::None);
+  EXPECT_EQ(task_set.units[0].length, 26);
+  EXPECT_EQ(task_set.units[0].volume, 46);
+  EXPECT_GE(dag_response(dag_nonpreemptive(), task_set, 0).response.value(), 52);
 }
 
 TEST(GlobalDag, AloneItIsGrahams) {
   Workload workload = narrow_and_wide();
   workload.dags.resize(1);
-  const System system = compiled(workload, sched::Preemption::Full);
-  EXPECT_EQ(dag_response(melani(), system, 0).response, 26 + (46 - 26) / 2);
-  EXPECT_EQ(dag_response(dag_bounded(), system, 0).response, 36);
+  const TaskSet task_set = compiled(workload, sched::Preemption::Full);
+  EXPECT_EQ(dag_response(melani(), task_set, 0).response, 26 + (46 - 26) / 2);
+  EXPECT_EQ(dag_response(dag_bounded(), task_set, 0).response, 36);
 }
 
 TEST(GlobalDag, MaxActiveOfOneIsTheVolume) {
@@ -214,10 +214,10 @@ TEST(GlobalDag, MaxActiveOfOneIsTheVolume) {
 // The upper DAG never has more than two tasks in progress, the lower one eight.
 TEST(GlobalDag, AMaxActiveThatTasksCannotReachIsNone) {
   Workload workload = narrow_and_wide();
-  const System without = compiled(workload, sched::Preemption::Full);
+  const TaskSet without = compiled(workload, sched::Preemption::Full);
   workload.dags[0].max_active = 2;
   workload.dags[1].max_active = 8;
-  const System with = compiled(workload, sched::Preemption::Full);
+  const TaskSet with = compiled(workload, sched::Preemption::Full);
   for (const Method &method : {melani(), dag_bounded()}) {
     for (const std::size_t dag : {0U, 1U}) {
       EXPECT_EQ(dag_response(method, with, dag).response, dag_response(method, without, dag).response) << method.name;
@@ -234,8 +234,8 @@ std::uint64_t compare_all(const BoundCaseLimits &limits, int count, Compare comp
   for (int i = 0; i < count; ++i) {
     Rng rng(mix(static_cast<std::uint64_t>(i)));
     const testing::BoundCase bound_case = random_bound_case(rng, limits);
-    const System system = compile(bound_case.workload, bound_case.platform).value();
-    if (system.not_analysable.empty() && compare(bound_case, system)) ++compared;
+    const TaskSet task_set = compile(bound_case.workload, bound_case.platform).value();
+    if (task_set.not_analysable.empty() && compare(bound_case, task_set)) ++compared;
   }
   return compared;
 }
@@ -243,11 +243,11 @@ std::uint64_t compare_all(const BoundCaseLimits &limits, int count, Compare comp
 TEST(GlobalDag, BoundedIsNeverAboveMelani) {
   std::uint64_t smaller = 0;
   const auto compared = compare_all(graphs(sched::Preemption::Full), 2000,
-                                    [&](const testing::BoundCase &bound_case, const System &system) {
-                                      const Outcome melanis = melani().apply(system);
-                                      const Outcome bounded = dag_bounded().apply(system);
+                                    [&](const testing::BoundCase &bound_case, const TaskSet &task_set) {
+                                      const Outcome melanis = melani().apply(task_set);
+                                      const Outcome bounded = dag_bounded().apply(task_set);
                                       if (!std::holds_alternative<Bound>(melanis)) return false;
-                                      for (std::size_t d = 0; d < system.dags.size(); ++d) {
+                                      for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
                                         const auto worse = std::get<Bound>(melanis).dags[d].response;
                                         const auto better = std::get<Bound>(bounded).dags[d].response;
                                         if (!worse) continue;
@@ -266,11 +266,11 @@ TEST(GlobalDag, OnOneWorkerItIsNotBelowTheExactResponse) {
   limits.max_workers = 1;
   limits.jitter = limits.overheads = false;
   std::uint64_t equal = 0;
-  const auto compared = compare_all(limits, 1000, [&](const testing::BoundCase &bound_case, const System &system) {
-    const Outcome exact = dag_one_worker_preemptive().apply(system);
-    const Outcome outcome = dag_bounded().apply(system);
+  const auto compared = compare_all(limits, 1000, [&](const testing::BoundCase &bound_case, const TaskSet &task_set) {
+    const Outcome exact = dag_one_worker_preemptive().apply(task_set);
+    const Outcome outcome = dag_bounded().apply(task_set);
     if (!std::holds_alternative<Bound>(exact) || !std::holds_alternative<Bound>(outcome)) return false;
-    for (std::size_t d = 0; d < system.dags.size(); ++d) {
+    for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
       const Duration found = std::get<Bound>(outcome).dags[d].response.value_or(kNever);
       const Duration known = std::get<Bound>(exact).dags[d].response.value_or(kNever);
       EXPECT_GE(found, known) << describe(bound_case);
@@ -285,17 +285,17 @@ TEST(GlobalDag, OnOneWorkerItIsNotBelowTheExactResponse) {
 TEST(GlobalDag, MoreExecutionNeverShrinksABound) {
   const auto compared =
       compare_all(with_max_active(graphs(sched::Preemption::Full)), 1000,
-                  [](const testing::BoundCase &bound_case, const System &system) {
+                  [](const testing::BoundCase &bound_case, const TaskSet &task_set) {
                     Workload more = bound_case.workload;
                     Task &grown = more.dags[more.dags.size() / 2].tasks.back();
                     ++grown.wcet;
                     const auto larger = compile(more, bound_case.platform);
                     if (!larger) return false;  // above its deadline
                     for (const Method &method : {dag_bounded(), dag_any()}) {
-                      const Outcome before = method.apply(system);
+                      const Outcome before = method.apply(task_set);
                       if (!std::holds_alternative<Bound>(before)) return false;
                       const Outcome after = method.apply(*larger);
-                      for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+                      for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
                         const Duration grown_response = std::get<Bound>(after).tasks[t].response.value_or(kNever);
                         EXPECT_LE(std::get<Bound>(before).tasks[t].response.value_or(kNever), grown_response)
                             << method.name << describe(bound_case);
@@ -311,11 +311,11 @@ TEST(GlobalDag, AnyOrderIsNeverBelowBounded) {
   std::uint64_t larger = 0;
   const auto compared =
       compare_all(with_max_active(graphs(sched::Preemption::Full)), 1500,
-                  [&](const testing::BoundCase &bound_case, const System &system) {
-                    const Outcome any = dag_any().apply(system);
-                    const Outcome bounded = dag_bounded().apply(system);
+                  [&](const testing::BoundCase &bound_case, const TaskSet &task_set) {
+                    const Outcome any = dag_any().apply(task_set);
+                    const Outcome bounded = dag_bounded().apply(task_set);
                     if (!std::holds_alternative<Bound>(any) || !std::holds_alternative<Bound>(bounded)) return false;
-                    for (std::size_t d = 0; d < system.dags.size(); ++d) {
+                    for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
                       const auto worse = std::get<Bound>(any).dags[d].response;
                       if (!worse) continue;
                       const auto better = std::get<Bound>(bounded).dags[d].response;
@@ -330,9 +330,9 @@ TEST(GlobalDag, AnyOrderIsNeverBelowBounded) {
 
 TEST(GlobalDag, TermsAddUp) {
   for (const auto mode : {sched::Preemption::Full, sched::Preemption::None}) {
-    compare_all(with_max_active(graphs(mode)), 700, [](const testing::BoundCase &bound_case, const System &system) {
+    compare_all(with_max_active(graphs(mode)), 700, [](const testing::BoundCase &bound_case, const TaskSet &task_set) {
       for (const Method &method : {melani(), dag_bounded(), dag_nonpreemptive(), dag_any()}) {
-        const Outcome outcome = method.apply(system);
+        const Outcome outcome = method.apply(task_set);
         if (!std::holds_alternative<Bound>(outcome)) continue;
         for (const ResponseBound &bound : std::get<Bound>(outcome).dags) {
           Duration sum = 0;

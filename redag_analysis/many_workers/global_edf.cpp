@@ -19,8 +19,8 @@ using global::Division;
 using global::GlobalUnit;
 using global::Largest;
 
-Duration deadline_of(const System &system, const GlobalUnit &unit) {
-  return system.tasks[system.units[unit.unit].tasks.front()].deadline;
+Duration deadline_of(const TaskSet &task_set, const GlobalUnit &unit) {
+  return task_set.tasks[task_set.units[unit.unit].tasks.front()].deadline;
 }
 
 // The work after a job's release by jobs of `task` whose deadlines are `later` or more before that job's deadline. The
@@ -33,14 +33,14 @@ Duration due_work(const GlobalUnit &task, Duration later) {
 // The tasks and what is assumed of them, one job at a time.
 class Edf {
  public:
-  Edf(const System &system, std::vector<GlobalUnit> &units) : system_(system), units_(units) {
-    for (const GlobalUnit &unit : units_) deadlines_.push_back(deadline_of(system, unit));
+  Edf(const TaskSet &task_set, std::vector<GlobalUnit> &units) : task_set_(task_set), units_(units) {
+    for (const GlobalUnit &unit : units_) deadlines_.push_back(deadline_of(task_set, unit));
     for (GlobalUnit &unit : units_) unit.response = unit.volume + unit.jitter;
   }
 
   bool respond(std::size_t k) {
     GlobalUnit &own = units_[k];
-    global::FirstWindow first(system_.platform.workers, 0);
+    global::FirstWindow first(task_set_.platform.workers, 0);
     for (std::size_t i = 0; i < units_.size(); ++i) {
       if (i != k) first.add(std::min(units_[i].volume, due_work(units_[i], later(k, i))));
     }
@@ -63,13 +63,13 @@ class Edf {
     const Duration waiting = own.response - own.jitter - own.volume + 1;
     ResponseBound bound;
     bound.response = own.response;
-    global::SharedTerms terms(system_, own);
+    global::SharedTerms terms(task_set_, own);
     terms.add_path();
     terms.add_jitter();
     for (std::size_t i = 0; i < units_.size(); ++i) {
       if (i == k) continue;
       const auto kind = units_[i].work > units_[i].carried ? Term::Kind::Blocking : Term::Kind::Interference;
-      terms.add_share(kind, units_[i], std::min(units_[i].work, waiting), system_.platform.workers);
+      terms.add_share(kind, units_[i], std::min(units_[i].work, waiting), task_set_.platform.workers);
     }
     bound.terms = terms.take();
     // With very many workers the fixed point need not be the least one.
@@ -92,9 +92,9 @@ class Edf {
   // in time.
   Duration window(std::size_t k, Duration d) {
     Effort::spend(units_.size());
-    const bool preempts = system_.mode == sched::Preemption::Full;
+    const bool preempts = task_set_.mode == sched::Preemption::Full;
     const GlobalUnit &own = units_[k];
-    const std::uint32_t workers = system_.platform.workers;
+    const std::uint32_t workers = task_set_.platform.workers;
     // A preemptable job waits in d instants before it has executed for C - 1; any other job waits before it starts.
     const Duration length = preempts ? d + own.volume - 1 : d;
     Largest blockers(preempts ? 0 : workers);
@@ -120,28 +120,28 @@ class Edf {
     return global::least_window(sum, largest.entries(), workers);
   }
 
-  const System &system_;
+  const TaskSet &task_set_;
   std::vector<GlobalUnit> &units_;
   std::vector<Duration> deadlines_;
 };
 
-global::Units edf_units(const System &system, sched::Preemption mode) {
-  global::Units view = global::units_of(system, {.mode = mode, .edges = false, .any_policy = true});
-  if (system.policy != PolicyKind::Edf) {
-    view.reason = std::string("for edf; the policy is ") + to_string(system.policy);
+global::Units edf_units(const TaskSet &task_set, sched::Preemption mode) {
+  global::Units view = global::units_of(task_set, {.mode = mode, .edges = false, .any_policy = true});
+  if (task_set.policy != PolicyKind::Edf) {
+    view.reason = std::string("for edf; the policy is ") + to_string(task_set.policy);
   } else if (!view.reason && mode == sched::Preemption::None && view.workers > Largest::kMost) {
     view.reason = "for at most " + std::to_string(Largest::kMost) + " workers where jobs run to completion";
   }
   return view;
 }
 
-Outcome apply_response(const System &system) {
-  const auto mode = system.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
-  global::Units view = edf_units(system, mode);
+Outcome apply_response(const TaskSet &task_set) {
+  const auto mode = task_set.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
+  global::Units view = edf_units(task_set, mode);
   if (view.reason) return NotApplicable{*view.reason};
-  Edf edf(system, view.units);
+  Edf edf(task_set, view.units);
   return global::all_that_agree(
-      system, view.units, "some task's response can exceed its limit, which all others rely on",
+      task_set, view.units, "some task's response can exceed its limit, which all others rely on",
       [&](std::size_t k) { return edf.respond(k); }, [&](std::size_t k) { return edf.explain(k); });
 }
 
@@ -150,20 +150,21 @@ constexpr Int128 kOne = Int128{1} << 40;
 
 double as_double(Int128 value) { return static_cast<double>(value) / static_cast<double>(kOne); }
 
-Outcome apply_density(const System &system) {
-  const global::Units view = edf_units(system, sched::Preemption::Full);
+Outcome apply_density(const TaskSet &task_set) {
+  const global::Units view = edf_units(task_set, sched::Preemption::Full);
   if (view.reason) return NotApplicable{*view.reason};
   Int128 sum = 0;
   Int128 largest = 0;
   for (const GlobalUnit &unit : view.units) {
-    const SystemTask &task = system.tasks[system.units[unit.unit].tasks.front()];
+    const CompiledTask &task = task_set.tasks[task_set.units[unit.unit].tasks.front()];
     if (task.deadline > unit.limit) return NotApplicable{"task '" + task.name + "': its deadline is above its period"};
     if (task.deadline <= task.jitter) {
       return NotApplicable{"task '" + task.name + "': its jitter is as large as its deadline"};
     }
-    const Duration end_to_end = system.dags[task.dag.value].deadline;
+    const Duration end_to_end = task_set.dags[task.dag.value].deadline;
     if (end_to_end > 0 && end_to_end < task.deadline) {
-      return NotApplicable{"DAG '" + system.dags[task.dag.value].name + "': its deadline is below those of its tasks"};
+      return NotApplicable{"DAG '" + task_set.dags[task.dag.value].name +
+                           "': its deadline is below those of its tasks"};
     }
     const Duration until = task.deadline - task.jitter;
     const Int128 density = (unit.volume * kOne + until - 1) / until;
@@ -185,7 +186,7 @@ Outcome apply_density(const System &system) {
 Method edf_global_density() {
   return Method{
       .name = "edf_global_density",
-      .subject = Subject::System,
+      .subject = Subject::TaskSet,
       .cite =
           "J. Goossens, S. Funk, S. Baruah, Priority-driven scheduling of periodic task systems on multiprocessors, "
           "Real-Time Systems 25, 2003; M. Bertogna, M. Cirinei, G. Lipari, Improved schedulability analysis of EDF on "

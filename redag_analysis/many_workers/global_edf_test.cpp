@@ -73,7 +73,7 @@ struct Numbers {
   Duration period;
 };
 
-System edf_system(std::uint32_t workers, std::initializer_list<Numbers> tasks, sched::Preemption preemption) {
+TaskSet edf_task_set(std::uint32_t workers, std::initializer_list<Numbers> tasks, sched::Preemption preemption) {
   Workload workload;
   workload.name = "w";
   workload.policy = PolicyKind::Edf;
@@ -93,50 +93,50 @@ System edf_system(std::uint32_t workers, std::initializer_list<Numbers> tasks, s
   return compile(workload, platform).value();
 }
 
-std::vector<std::optional<Duration>> responses(const Method &method, const System &system) {
+std::vector<std::optional<Duration>> responses(const Method &method, const TaskSet &task_set) {
   std::vector<std::optional<Duration>> result;
-  const Outcome outcome = method.apply(system);
+  const Outcome outcome = method.apply(task_set);
   for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) result.push_back(bound.response);
   return result;
 }
 
 using Responses = std::vector<std::optional<Duration>>;
 
-// Systems exactly on the limit and above it.
+// Task sets exactly on the limit and above it.
 TEST(EdfGlobalDensity, LeavesRoomForTheLargest) {
   const auto full = sched::Preemption::Full;
-  const Outcome three = edf_global_density().apply(edf_system(2, {{2, 4}, {2, 4}, {2, 4}}, full));
+  const Outcome three = edf_global_density().apply(edf_task_set(2, {{2, 4}, {2, 4}, {2, 4}}, full));
   EXPECT_EQ(std::get<Bound>(three).accepts, true) << "1.5 <= 2 - 0.5";
-  const Outcome four = edf_global_density().apply(edf_system(2, {{2, 4}, {2, 4}, {2, 4}, {1, 100}}, full));
+  const Outcome four = edf_global_density().apply(edf_task_set(2, {{2, 4}, {2, 4}, {2, 4}, {1, 100}}, full));
   EXPECT_EQ(std::get<Bound>(four).accepts, false);
   // S. Dhall, C. Liu, Operations Research 26(1), 1978: little work, and one task that needs nearly a whole worker.
-  const Outcome dhall = edf_global_density().apply(edf_system(2, {{1, 9}, {1, 9}, {10, 10}}, full));
+  const Outcome dhall = edf_global_density().apply(edf_task_set(2, {{1, 9}, {1, 9}, {10, 10}}, full));
   EXPECT_EQ(std::get<Bound>(dhall).accepts, false);
 }
 
 // A job with a later deadline does not count. Here this is the other task's next job, which a bound for any order must
 // count.
 TEST(EdfGlobalResponse, CountsWhatIsDueInTime) {
-  const System system = edf_system(1, {{2, 5}, {2, 5}}, sched::Preemption::Full);
-  EXPECT_EQ(responses(edf_global_response(), system), (Responses{4, 4}));
-  EXPECT_EQ(responses(bertogna_cirinei_any(), system), (Responses{std::nullopt, std::nullopt}));
+  const TaskSet task_set = edf_task_set(1, {{2, 5}, {2, 5}}, sched::Preemption::Full);
+  EXPECT_EQ(responses(edf_global_response(), task_set), (Responses{4, 4}));
+  EXPECT_EQ(responses(bertogna_cirinei_any(), task_set), (Responses{std::nullopt, std::nullopt}));
 }
 
 // The short task waits for 19 of the long one, which waits for one job of the short one.
 TEST(EdfGlobalResponse, BlockingWithoutPreemption) {
-  EXPECT_EQ(responses(edf_global_response(), edf_system(1, {{1, 100}, {20, 200}}, sched::Preemption::None)),
+  EXPECT_EQ(responses(edf_global_response(), edf_task_set(1, {{1, 100}, {20, 200}}, sched::Preemption::None)),
             (Responses{20, 21}));
-  EXPECT_EQ(responses(edf_global_response(), edf_system(2, {{1, 100}, {20, 200}}, sched::Preemption::None)),
+  EXPECT_EQ(responses(edf_global_response(), edf_task_set(2, {{1, 100}, {20, 200}}, sched::Preemption::None)),
             (Responses{1, 20}));
 }
 
 // One task needs ten days of every second: its work within ten days is more than a duration can hold.
 TEST(EdfGlobalResponse, ThereIsNoneBesideATaskFarBeyondItsLimit) {
   const Duration second = kSecond;
-  const System system =
-      edf_system(1, {{second / 3, second - 63}, {864'000 * second, second - 71}, {second / 3, second - 107}},
-                 sched::Preemption::Full);
-  EXPECT_EQ(responses(edf_global_response(), system), (Responses{std::nullopt, std::nullopt, std::nullopt}));
+  const TaskSet task_set =
+      edf_task_set(1, {{second / 3, second - 63}, {864'000 * second, second - 71}, {second / 3, second - 107}},
+                   sched::Preemption::Full);
+  EXPECT_EQ(responses(edf_global_response(), task_set), (Responses{std::nullopt, std::nullopt, std::nullopt}));
 }
 
 TEST(EdfGlobalResponse, IsNeverAboveThatForAnyOrder) {
@@ -146,11 +146,11 @@ TEST(EdfGlobalResponse, IsNeverAboveThatForAnyOrder) {
     BoundCaseLimits limits = several_workers(mode);
     limits.min_utilization = 0.1;
     limits.max_utilization = 0.6;
-    for_cases(cases(limits), 2000, [&](const testing::BoundCase &, const System &system, Rng &) {
-      const Outcome any = bertogna_cirinei_any().apply(system);
-      const Outcome edf = edf_global_response().apply(system);
+    for_cases(cases(limits), 2000, [&](const testing::BoundCase &, const TaskSet &task_set, Rng &) {
+      const Outcome any = bertogna_cirinei_any().apply(task_set);
+      const Outcome edf = edf_global_response().apply(task_set);
       if (!std::holds_alternative<Bound>(any)) return;
-      for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+      for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
         const auto worse = std::get<Bound>(any).tasks[t].response;
         const auto better = std::get<Bound>(edf).tasks[t].response;
         if (!worse) continue;
@@ -173,13 +173,13 @@ TEST(EdfGlobal, AcceptsNothingThatTheDemandOfOneWorkerRefuses) {
   limits.max_deadline = 1.0;
   limits.jitter = false;
   std::uint64_t accepted = 0;
-  for_cases(cases(limits), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
-    const Outcome demand = edf_demand().apply(system);
+  for_cases(cases(limits), 3000, [&](const testing::BoundCase &, const TaskSet &task_set, Rng &) {
+    const Outcome demand = edf_demand().apply(task_set);
     if (!std::holds_alternative<Bound>(demand)) return;
     for (const Method &method : {edf_global_density(), edf_global_response()}) {
-      const Outcome outcome = method.apply(system);
+      const Outcome outcome = method.apply(task_set);
       if (!std::holds_alternative<Bound>(outcome)) continue;
-      if (verdict(system, std::get<Bound>(outcome)) != Verdict::Schedulable) continue;
+      if (verdict(task_set, std::get<Bound>(outcome)) != Verdict::Schedulable) continue;
       ASSERT_EQ(std::get<Bound>(demand).accepts, true) << method.name;
       ++accepted;
     }
@@ -193,8 +193,8 @@ TEST(EdfGlobalResponse, MoreExecutionNeverShrinksABoundAndTermsAddUp) {
     BoundCaseLimits limits = several_workers(mode);
     limits.min_utilization = 0.1;
     limits.max_utilization = 0.6;
-    for_cases(cases(limits), 1500, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
-      const Outcome before = edf_global_response().apply(system);
+    for_cases(cases(limits), 1500, [&](const testing::BoundCase &bound_case, const TaskSet &task_set, Rng &rng) {
+      const Outcome before = edf_global_response().apply(task_set);
       if (!std::holds_alternative<Bound>(before)) return;
       for (const ResponseBound &bound : std::get<Bound>(before).tasks) {
         Duration sum = 0;
@@ -208,7 +208,7 @@ TEST(EdfGlobalResponse, MoreExecutionNeverShrinksABoundAndTermsAddUp) {
       const auto larger = compile(more, bound_case.platform);
       if (!larger) return;
       const Outcome after = edf_global_response().apply(*larger);
-      for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+      for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
         const Duration grown = std::get<Bound>(after).tasks[t].response.value_or(kNever);
         ASSERT_LE(std::get<Bound>(before).tasks[t].response.value_or(kNever), grown);
       }

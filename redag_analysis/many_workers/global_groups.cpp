@@ -34,29 +34,29 @@ enum class Beyond : bool { Never, Allowed };
 
 class Analysis {
  public:
-  Analysis(const System &system, Beyond beyond)
-      : system_(system),
-        preempts_(system.mode != sched::Preemption::None),
+  Analysis(const TaskSet &task_set, Beyond beyond)
+      : task_set_(task_set),
+        preempts_(task_set.mode != sched::Preemption::None),
         beyond_(preempts_ ? beyond : Beyond::Never),
-        view_(global::units_of(system, {.mode = preempts_ ? sched::Preemption::Full : sched::Preemption::None,
-                                        .bounds = preempts_,
-                                        .groups = true,
-                                        .any_policy = true})),
-        windows_(system, view_.units),
-        answers_(system.tasks.size()),
+        view_(global::units_of(task_set, {.mode = preempts_ ? sched::Preemption::Full : sched::Preemption::None,
+                                          .bounds = preempts_,
+                                          .groups = true,
+                                          .any_policy = true})),
+        windows_(task_set, view_.units),
+        answers_(task_set.tasks.size()),
         instances_(view_.units.size(), 1) {}
 
   [[nodiscard]] const std::optional<std::string> &reason() const { return view_.reason; }
 
   // A job that waits for a max_active can find another holder each time, and make it preempt.
   [[nodiscard]] bool preempts_too_often() const {
-    return system_.platform.preempt_overhead > 0 &&
+    return task_set_.platform.preempt_overhead > 0 &&
            std::any_of(view_.units.begin(), view_.units.end(), [](const GlobalUnit &unit) { return unit.bound > 0; });
   }
 
   Bound run() {
-    std::vector<ResponseBound> of_units(system_.units.size());
-    std::vector<ResponseBound> of_tasks(system_.tasks.size());
+    std::vector<ResponseBound> of_units(task_set_.units.size());
+    std::vector<ResponseBound> of_tasks(task_set_.tasks.size());
     bool known = true;
     for (std::size_t b = 0; b < windows_.blocks().size(); ++b) {
       const groups::Block &block = windows_.blocks()[b];
@@ -67,15 +67,15 @@ class Analysis {
         const std::uint32_t u = view_.units[k].unit;
         if (absent.empty()) {
           of_units[u] = itemise(b, k, last_of(k), false);
-          for (const std::uint32_t t : system_.units[u].tasks) of_tasks[t] = itemise(b, k, t, answers_readiness(t));
+          for (const std::uint32_t t : task_set_.units[u].tasks) of_tasks[t] = itemise(b, k, t, answers_readiness(t));
           continue;
         }
         of_units[u].absent = known && k != culprit ? global::kPeer : absent;
-        for (const std::uint32_t t : system_.units[u].tasks) of_tasks[t].absent = of_units[u].absent;
+        for (const std::uint32_t t : task_set_.units[u].tasks) of_tasks[t].absent = of_units[u].absent;
       }
       known = known && absent.empty();
     }
-    Bound bound = from_units(system_, std::move(of_units));
+    Bound bound = from_units(task_set_, std::move(of_units));
     if (beyond_ == Beyond::Allowed) bound.tasks = std::move(of_tasks);
     return bound;
   }
@@ -89,10 +89,12 @@ class Analysis {
   };
 
   [[nodiscard]] const std::vector<std::uint32_t> &tasks_of(std::size_t k) const {
-    return system_.units[view_.units[k].unit].tasks;
+    return task_set_.units[view_.units[k].unit].tasks;
   }
 
-  [[nodiscard]] bool waits_for_group(std::uint32_t t) const { return preempts_ && system_.tasks[t].group != kNoGroup; }
+  [[nodiscard]] bool waits_for_group(std::uint32_t t) const {
+    return preempts_ && task_set_.tasks[t].group != kNoGroup;
+  }
 
   [[nodiscard]] Duration latest(const GlobalUnit &unit) const {
     return beyond_ == Beyond::Allowed ? multiply(unit.period, groups::kMostInstances) : unit.limit;
@@ -111,7 +113,7 @@ class Analysis {
       }
     }
     for (culprit = block.begin; culprit < block.end; ++culprit) {
-      if (binds_now(culprit)) return system_.platform.preempt_overhead > 0 ? kBinds : solve(b, culprit);
+      if (binds_now(culprit)) return task_set_.platform.preempt_overhead > 0 ? kBinds : solve(b, culprit);
       const std::string_view why = why_overlap_harms(b, culprit);
       if (!why.empty()) return why;
       for (const std::uint32_t t : tasks_of(culprit)) find_answer_from_ready(b, culprit, t);
@@ -175,7 +177,7 @@ class Analysis {
     const GlobalUnit &unit = view_.units[k];
     if (longest_of(k) <= unit.limit) return {};
     for (const std::uint32_t t : tasks_of(k)) {
-      const SystemTask &task = system_.tasks[t];
+      const CompiledTask &task = task_set_.tasks[t];
       const bool joins = task.predecessors.size() > 1 || (!task.data && !task.predecessors.empty());
       for (const std::uint32_t p : task.predecessors) {
         if (joins && windows_.of(p).response >= unit.period) return kMixed;
@@ -188,12 +190,12 @@ class Analysis {
   // True if overlapping instances can reach a max_active that one instance cannot. From then on the max_active counts.
   bool binds_now(std::size_t k) {
     GlobalUnit &unit = view_.units[k];
-    const DagId dag = system_.units[unit.unit].dag;
-    const std::uint32_t max_active = system_.dags[dag.value].max_active;
+    const DagId dag = task_set_.units[unit.unit].dag;
+    const std::uint32_t max_active = task_set_.dags[dag.value].max_active;
     if (max_active == 0 || unit.bound > 0) return false;
     const Duration together = ceil_div(longest_of(k), unit.period);
     if (together < 2) return false;
-    if (multiply(together, static_cast<Duration>(most_jobs_in_progress(system_, dag))) <= max_active) return false;
+    if (multiply(together, static_cast<Duration>(most_jobs_in_progress(task_set_, dag))) <= max_active) return false;
     unit.bound = std::min(max_active, view_.workers);
     return true;
   }
@@ -203,10 +205,10 @@ class Analysis {
   // True if each job starts before the release that would skip it.
   bool starts_in_time(std::size_t b, std::size_t k, std::uint32_t task) {
     const GlobalUnit &unit = view_.units[k];
-    const Duration limit = system_.tasks[task].limit - unit.jitter;
+    const Duration limit = task_set_.tasks[task].limit - unit.jitter;
     for (std::uint32_t instances = 1; instances <= instances_[k]; ++instances) {
       const Question question = {
-          .task = task, .instances = instances, .first_tick = true, .until = system_.tasks[task].limit};
+          .task = task, .instances = instances, .first_tick = true, .until = task_set_.tasks[task].limit};
       const Duration since = static_cast<Duration>(instances - 1) * unit.period;
       if (!windows_.window_of(b, windows_.chain_of(b, k, question), add(limit, since))) return false;
     }
@@ -219,11 +221,11 @@ class Analysis {
   }
 
   void find_answer_from_ready(std::size_t b, std::size_t k, std::uint32_t t) {
-    if (beyond_ == Beyond::Never || !system_.tasks[t].data) return;
+    if (beyond_ == Beyond::Never || !task_set_.tasks[t].data) return;
     const auto window =
         windows_.window_of(b, windows_.chain_of(b, k, {.task = t, .from_ready = true}), windows_.bound_of(t).response);
     // The jitter of releases contains what the machine takes in the window; a window from readiness does not.
-    if (window && *window > answers_[t].repeated) answers_[t].from_ready = add(*window, system_.frozen);
+    if (window && *window > answers_[t].repeated) answers_[t].from_ready = add(*window, task_set_.frozen);
   }
 
   [[nodiscard]] std::uint32_t last_of(std::size_t k) const {
@@ -244,9 +246,9 @@ class Analysis {
     (void)windows_.window_of(b, chain, kUnbounded);
     const groups::Shares &shares = windows_.shares();
     const std::uint32_t m = view_.workers;
-    SharedTerms terms(system_, unit);
+    SharedTerms terms(task_set_, unit);
     const TaskId self = tasks_of(k).size() == 1 || from_ready ? TaskId(task) : TaskId();
-    const DagId dag = system_.units[unit.unit].dag;
+    const DagId dag = task_set_.units[unit.unit].dag;
     terms.add(Term{Term::Kind::Own, self, dag, chain.path - chain.overhead, 1});
     terms.add(Term{Term::Kind::Overhead, self, dag, chain.overhead, 0});
     const Duration since = static_cast<Duration>(instances - 1) * unit.period;
@@ -260,18 +262,18 @@ class Analysis {
     }
     for (const Chain::Group &group : chain.groups) {
       if (!group.holder) continue;
-      const DagId whose = system_.tasks[*group.holder].dag;
+      const DagId whose = task_set_.tasks[*group.holder].dag;
       terms.add(
           Term{Term::Kind::Blocking, TaskId(*group.holder), whose, multiply(group.found, group.held), group.found});
     }
     terms.add_share(Term::Kind::Blocking, unit, shares.less_urgent, m);
     if (!from_ready) terms.add_jitter();
-    if (from_ready) terms.add(Term{Term::Kind::Overhead, self, dag, system_.frozen, 0});
+    if (from_ready) terms.add(Term{Term::Kind::Overhead, self, dag, task_set_.frozen, 0});
     bound.terms = terms.take();
     return bound;
   }
 
-  const System &system_;
+  const TaskSet &task_set_;
   bool preempts_;
   Beyond beyond_;
   global::Units view_;
@@ -281,8 +283,8 @@ class Analysis {
   bool changed_ = false;                  // in this round
 };
 
-Outcome apply(const System &system, Beyond beyond) {
-  Analysis analysis(system, beyond);
+Outcome apply(const TaskSet &task_set, Beyond beyond) {
+  Analysis analysis(task_set, beyond);
   if (analysis.reason()) return NotApplicable{*analysis.reason()};
   if (analysis.preempts_too_often()) {
     return NotApplicable{"groups and a max_active that binds, together with an overhead of preemption"};
@@ -290,15 +292,15 @@ Outcome apply(const System &system, Beyond beyond) {
   return analysis.run();
 }
 
-Outcome apply_units(const System &system) { return apply(system, Beyond::Never); }
+Outcome apply_units(const TaskSet &task_set) { return apply(task_set, Beyond::Never); }
 
-Outcome apply_groups(const System &system) {
-  if (system.groups.empty()) return NotApplicable{"no exclusive group is shared: see the bounds without"};
+Outcome apply_groups(const TaskSet &task_set) {
+  if (task_set.groups.empty()) return NotApplicable{"no exclusive group is shared: see the bounds without"};
   // A job that inherits can preempt once more than when it started. On one worker no charge covers this.
-  if (system.platform.preempt_overhead > 0 && system.platform.workers == 1) {
+  if (task_set.platform.preempt_overhead > 0 && task_set.platform.workers == 1) {
     return NotApplicable{"groups together with an overhead of preemption, on one worker"};
   }
-  return is_across_rates(system) ? across_rates(system, apply_units) : apply(system, Beyond::Allowed);
+  return is_across_rates(task_set) ? across_rates(task_set, apply_units) : apply(task_set, Beyond::Allowed);
 }
 
 }  // namespace

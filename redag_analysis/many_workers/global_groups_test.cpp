@@ -176,8 +176,8 @@ TEST(GlobalGroups, AHolderThatInheritsIsInTheWayOfOthers) {
   EXPECT_EQ(bound_of(workload, sched::Preemption::Full).tasks[0].response, 10 + 9);
   workload.dags[1].tasks[0].group.clear();
   workload.dags[0].tasks[0].group.clear();
-  const System system = compile(workload, platform_of(workload)).value();
-  EXPECT_TRUE(std::holds_alternative<NotApplicable>(dag_groups().apply(system)));
+  const TaskSet task_set = compile(workload, platform_of(workload)).value();
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(dag_groups().apply(task_set)));
 }
 
 // The properties above cover the cases that they are meant for.
@@ -186,14 +186,14 @@ TEST(GlobalGroups, ResponsesAboveThePeriodAreBounded) {
   std::uint32_t binding = 0;
   BoundCaseLimits limits = overlapping(true);
   limits.caps = true;
-  testing::for_cases(cases(limits), 3000, [&](const testing::BoundCase &, const System &system, Rng &) {
-    const Outcome outcome = dag_groups().apply(system);
+  testing::for_cases(cases(limits), 3000, [&](const testing::BoundCase &, const TaskSet &task_set, Rng &) {
+    const Outcome outcome = dag_groups().apply(task_set);
     const Bound *bound = std::get_if<Bound>(&outcome);
     if (bound == nullptr) return;
     for (std::size_t d = 0; d < bound->dags.size(); ++d) {
-      const SystemDag &dag = system.dags[d];
+      const CompiledDag &dag = task_set.dags[d];
       if (!bound->dags[d].response) continue;
-      beyond += *bound->dags[d].response > system.tasks[dag.tasks.front()].period ? 1U : 0U;
+      beyond += *bound->dags[d].response > task_set.tasks[dag.tasks.front()].period ? 1U : 0U;
       binding += dag.max_active > 0 && dag.tasks.size() > dag.max_active ? 1U : 0U;
     }
   });
@@ -207,8 +207,8 @@ TEST(GlobalGroups, TermsAddUp) {
     Rng rng(mix(seed));
     const testing::BoundCase bound_case =
         random_bound_case(rng, seed % 4 < 2 ? with_groups(seed % 2 == 0) : preempted(with_groups(seed % 2 == 0)));
-    const System system = compile(bound_case.workload, bound_case.platform).value();
-    const Outcome outcome = dag_groups().apply(system);
+    const TaskSet task_set = compile(bound_case.workload, bound_case.platform).value();
+    const Outcome outcome = dag_groups().apply(task_set);
     if (!std::holds_alternative<Bound>(outcome)) continue;
     ++applied;
     for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) {

@@ -166,12 +166,12 @@ using global::GlobalUnit;
 using global::SharedTerms;
 
 // Lists the interference terms of one fixed point, whose last step left the work of each more urgent task in `work`.
-ResponseBound itemise(const System &system, std::span<const GlobalUnit> units, std::size_t k, std::uint32_t workers,
+ResponseBound itemise(const TaskSet &task_set, std::span<const GlobalUnit> units, std::size_t k, std::uint32_t workers,
                       Duration remaining) {
   const GlobalUnit &own = units[k];
   ResponseBound bound;
   bound.response = own.response;
-  SharedTerms terms(system, own);
+  SharedTerms terms(task_set, own);
   terms.add_path();
   terms.add_jitter();
   if (!terms.wanted()) return bound;
@@ -193,19 +193,19 @@ ResponseBound itemise(const System &system, std::span<const GlobalUnit> units, s
 // `respond(units, k, alone, remaining)` says whether units[k] has a response, and may set `remaining`, its less urgent
 // work (0 by default).
 template <class Respond>
-Outcome from_most_urgent(const System &system, const global::Needs &needs, Respond respond) {
-  global::Units view = global::units_of(system, needs);
+Outcome from_most_urgent(const TaskSet &task_set, const global::Needs &needs, Respond respond) {
+  global::Units view = global::units_of(task_set, needs);
   if (view.reason) return NotApplicable{*view.reason};
   Duration remaining = 0;
   return global::from_most_urgent(
-      system, view.units, [](GlobalUnit &unit) { unit.response = unit.volume + unit.jitter; },
+      task_set, view.units, [](GlobalUnit &unit) { unit.response = unit.volume + unit.jitter; },
       [&](std::size_t k, bool alone) { return respond(view, k, alone, remaining); },
-      [&](std::size_t k) { return itemise(system, view.units, k, view.workers, remaining); });
+      [&](std::size_t k) { return itemise(task_set, view.units, k, view.workers, remaining); });
 }
 
-Outcome apply_bertogna_cirinei(const System &system) {
+Outcome apply_bertogna_cirinei(const TaskSet &task_set) {
   return from_most_urgent(
-      system, {.edges = false, .equals = true}, [](global::Units &view, std::size_t k, bool alone, Duration &) {
+      task_set, {.edges = false, .equals = true}, [](global::Units &view, std::size_t k, bool alone, Duration &) {
         const Duration start = alone ? global::start_after(view.units, k) : global::start_again(view.units[k]);
         return global::bertogna_cirinei_response(view.units, k, view.workers, start);
       });
@@ -213,26 +213,26 @@ Outcome apply_bertogna_cirinei(const System &system) {
 
 // An earlier job of the task itself can keep a worker from its equals, and more of them then carry work in. Therefore
 // guan() takes no equals.
-Outcome apply_guan(const System &system) {
-  return from_most_urgent(system, {.edges = false}, [](global::Units &view, std::size_t k, bool, Duration &) {
+Outcome apply_guan(const TaskSet &task_set) {
+  return from_most_urgent(task_set, {.edges = false}, [](global::Units &view, std::size_t k, bool, Duration &) {
     return global::guan_response(view.units, k, view.workers, global::start_after(view.units, k));
   });
 }
 
-Outcome apply_nonpreemptive(const System &system) {
-  return from_most_urgent(system, {.mode = sched::Preemption::None, .edges = false, .equals = true},
-                          [&system](global::Units &view, std::size_t k, bool alone, Duration &remaining) {
-                            remaining = global::largest_remaining(system, view.units, k + 1, view.workers);
+Outcome apply_nonpreemptive(const TaskSet &task_set) {
+  return from_most_urgent(task_set, {.mode = sched::Preemption::None, .edges = false, .equals = true},
+                          [&task_set](global::Units &view, std::size_t k, bool alone, Duration &remaining) {
+                            remaining = global::largest_remaining(task_set, view.units, k + 1, view.workers);
                             const Duration start = alone ? 0 : global::start_again(view.units[k]);
                             return global::sequential_nonpreemptive_response(view.units, k, view.workers, remaining,
                                                                              start);
                           });
 }
 
-ResponseBound any_order_bound(const System &system, const GlobalUnit &unit) {
+ResponseBound any_order_bound(const TaskSet &task_set, const GlobalUnit &unit) {
   ResponseBound bound;
   bound.response = unit.response;
-  SharedTerms terms(system, unit);
+  SharedTerms terms(task_set, unit);
   terms.add_path();
   terms.add_jitter();
   bound.terms = terms.take();
@@ -241,10 +241,10 @@ ResponseBound any_order_bound(const System &system, const GlobalUnit &unit) {
   return bound;
 }
 
-Outcome apply_any(const System &system) {
+Outcome apply_any(const TaskSet &task_set) {
   // A job waits only while all workers execute others, whether those can be preempted or not.
-  const auto mode = system.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
-  global::Units view = global::units_of(system, {.mode = mode, .edges = false, .any_policy = true});
+  const auto mode = task_set.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
+  global::Units view = global::units_of(task_set, {.mode = mode, .edges = false, .any_policy = true});
   if (view.reason) return NotApplicable{*view.reason};
   // At first every task is assumed to keep its limit. If the first round confirms this for all, it holds, and each
   // further round may rely on the last one. The first job ever to break a bound would have to come after another such
@@ -264,11 +264,11 @@ Outcome apply_any(const System &system) {
   if (!possible) {
     ResponseBound none;
     none.absent = "some task's response can exceed its limit, which all others rely on";
-    return from_units(system, std::vector<ResponseBound>(system.units.size(), none));
+    return from_units(task_set, std::vector<ResponseBound>(task_set.units.size(), none));
   }
-  std::vector<ResponseBound> responses(system.units.size());
-  for (const GlobalUnit &unit : view.units) responses[unit.unit] = any_order_bound(system, unit);
-  return from_units(system, std::move(responses));
+  std::vector<ResponseBound> responses(task_set.units.size());
+  for (const GlobalUnit &unit : view.units) responses[unit.unit] = any_order_bound(task_set, unit);
+  return from_units(task_set, std::move(responses));
 }
 
 }  // namespace
@@ -283,7 +283,7 @@ Method bertogna_cirinei() {
           "m workers, full preemption, static priorities, no edges, R <= T; release jitter, shared levels; no shared "
           "groups",
       .complexity = "pseudo-polynomial; O(n) a step",
-      .apply = [](const System &system) { return across_rates(system, apply_bertogna_cirinei); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_bertogna_cirinei); },
   };
 }
 
@@ -308,7 +308,7 @@ Method guan() {
       .assumptions =
           "m workers, full preemption, static priorities, no edges, R <= T; release jitter; no shared groups or levels",
       .complexity = "pseudo-polynomial; O(n m) a step",
-      .apply = [](const System &system) { return across_rates(system, apply_guan); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_guan); },
   };
 }
 
@@ -321,7 +321,7 @@ Method sequential_nonpreemptive() {
           "no "
           "shared groups",
       .complexity = "pseudo-polynomial; O(n) a step",
-      .apply = [](const System &system) { return across_rates(system, apply_nonpreemptive); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_nonpreemptive); },
   };
 }
 

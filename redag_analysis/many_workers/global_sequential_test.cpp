@@ -91,16 +91,16 @@ Workload independent(std::uint32_t workers, std::initializer_list<Numbers> tasks
   return workload;
 }
 
-System compiled(const Workload &workload, sched::Preemption preemption) {
+TaskSet compiled(const Workload &workload, sched::Preemption preemption) {
   AnalysisPlatform platform;
   platform.workers = workload.platform.workers;
   platform.preemption = preemption;
   return compile(workload, platform).value();
 }
 
-std::vector<std::optional<Duration>> responses(const Method &method, const System &system) {
+std::vector<std::optional<Duration>> responses(const Method &method, const TaskSet &task_set) {
   std::vector<std::optional<Duration>> result;
-  const Outcome outcome = method.apply(system);
+  const Outcome outcome = method.apply(task_set);
   for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) result.push_back(bound.response);
   return result;
 }
@@ -108,21 +108,21 @@ std::vector<std::optional<Duration>> responses(const Method &method, const Syste
 // Two tasks in phase leave both workers idle for 2 of 4 ticks, and the third can use only one of them: its 7 take until
 // 15. (A longer T_1 can hurt: B. Andersson, J. Jonsson, 2000.)
 TEST(GlobalSequential, TasksInPhaseWasteWorkers) {
-  const System system = compiled(independent(2, {{2, 4}, {2, 4}, {7, 100}}), sched::Preemption::Full);
-  for (const Method &method : {guan(), bertogna_cirinei()}) EXPECT_GE(responses(method, system)[2].value(), 15);
+  const TaskSet task_set = compiled(independent(2, {{2, 4}, {2, 4}, {7, 100}}), sched::Preemption::Full);
+  for (const Method &method : {guan(), bertogna_cirinei()}) EXPECT_GE(responses(method, task_set)[2].value(), 15);
 }
 
 // An earlier job carries in all of its work but a tick; with less the last response would be 8. The values were
 // computed from the paper's formula, without this code.
 TEST(GlobalSequential, WhatIsCarriedInIsCutByOneTickOnly) {
-  const System system = compiled(independent(2, {{2, 3}, {1, 3}, {4, 6}, {1, 9}}), sched::Preemption::Full);
-  EXPECT_EQ(responses(guan(), system), (std::vector<std::optional<Duration>>{2, 1, 6, 9}));
+  const TaskSet task_set = compiled(independent(2, {{2, 3}, {1, 3}, {4, 6}, {1, 9}}), sched::Preemption::Full);
+  EXPECT_EQ(responses(guan(), task_set), (std::vector<std::optional<Duration>>{2, 1, 6, 9}));
 }
 
 TEST(GlobalSequential, TheMostUrgentOfEachWorkerNeverWait) {
-  const System system = compiled(independent(3, {{4, 9}, {5, 9}, {6, 9}, {1, 90}}), sched::Preemption::Full);
+  const TaskSet task_set = compiled(independent(3, {{4, 9}, {5, 9}, {6, 9}, {1, 90}}), sched::Preemption::Full);
   for (const Method &method : {bertogna_cirinei(), guan()}) {
-    const auto found = responses(method, system);
+    const auto found = responses(method, task_set);
     EXPECT_EQ(found[0], 4);
     EXPECT_EQ(found[1], 5);
     EXPECT_EQ(found[2], 6);
@@ -135,7 +135,7 @@ TEST(GlobalSequential, TheMostUrgentOfEachWorkerNeverWait) {
 TEST(GlobalSequential, EqualsRelyOnEachOther) {
   Workload workload = independent(2, {{2, 10}, {3, 20}, {4, 20}, {5, 40}});
   workload.dags[2].tasks[0].priority = workload.dags[1].tasks[0].priority;
-  const System shared = compiled(workload, sched::Preemption::Full);
+  const TaskSet shared = compiled(workload, sched::Preemption::Full);
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(guan().apply(shared)));
   const auto found = responses(bertogna_cirinei(), shared);
   // The reference: each of the two is last in a fixed order.
@@ -146,7 +146,7 @@ TEST(GlobalSequential, EqualsRelyOnEachOther) {
   EXPECT_GE(found[1].value(), other_last[2].value());
   EXPECT_GE(found[2].value(), found[1].value());
   EXPECT_GE(found[3].value(), found[2].value());
-  const System none = compiled(workload, sched::Preemption::None);
+  const TaskSet none = compiled(workload, sched::Preemption::None);
   EXPECT_TRUE(responses(sequential_nonpreemptive(), none)[3]);
 
   // If one of them has no bound, neither has the other.
@@ -159,10 +159,10 @@ TEST(GlobalSequential, EqualsRelyOnEachOther) {
 
 // Without preemption even the most urgent tasks wait for a job that has just started: m = 2, (1, 10), 2 x (20, 200).
 TEST(GlobalSequential, NonpreemptiveBlockingReachesTheMostUrgent) {
-  const System system = compiled(independent(2, {{1, 100}, {20, 200}, {20, 200}}), sched::Preemption::None);
-  const auto found = responses(sequential_nonpreemptive(), system);
+  const TaskSet task_set = compiled(independent(2, {{1, 100}, {20, 200}, {20, 200}}), sched::Preemption::None);
+  const auto found = responses(sequential_nonpreemptive(), task_set);
   EXPECT_EQ(found[0], 20);  // either has 19 left, then its own 1
-  const System short_period = compiled(independent(2, {{1, 10}, {20, 200}, {20, 200}}), sched::Preemption::None);
+  const TaskSet short_period = compiled(independent(2, {{1, 10}, {20, 200}, {20, 200}}), sched::Preemption::None);
   EXPECT_FALSE(responses(sequential_nonpreemptive(), short_period)[0]);
 }
 
@@ -181,12 +181,12 @@ TEST(GlobalSequential, GuanIsNeverAboveBertognaCirinei) {
   for (std::uint64_t seed = 0; seed < 3000; ++seed) {
     Rng rng(mix(seed));
     const testing::BoundCase bound_case = random_bound_case(rng, limits);
-    const System system = compile(bound_case.workload, bound_case.platform).value();
-    if (!system.not_analysable.empty()) continue;
-    const Outcome guans = guan().apply(system);
-    const Outcome bertognas = bertogna_cirinei().apply(system);
+    const TaskSet task_set = compile(bound_case.workload, bound_case.platform).value();
+    if (!task_set.not_analysable.empty()) continue;
+    const Outcome guans = guan().apply(task_set);
+    const Outcome bertognas = bertogna_cirinei().apply(task_set);
     if (!std::holds_alternative<Bound>(guans)) continue;
-    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
+    for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
       const auto better = std::get<Bound>(guans).tasks[t].response;
       const auto worse = std::get<Bound>(bertognas).tasks[t].response;
       if (!worse) continue;
@@ -205,9 +205,9 @@ TEST(GlobalSequential, WhereTheWindowsBeginDoesNotShow) {
   std::uint64_t compared = 0;
   for (const Respond respond : {&global::guan_response, &global::bertogna_cirinei_response}) {
     testing::for_cases(cases(several_workers(sched::Preemption::Full)), 2000,
-                       [&](const testing::BoundCase &, const System &system, Rng &) {
+                       [&](const testing::BoundCase &, const TaskSet &task_set, Rng &) {
                          global::Units view =
-                             global::units_of(system, {.mode = sched::Preemption::Full, .edges = false});
+                             global::units_of(task_set, {.mode = sched::Preemption::Full, .edges = false});
                          if (view.reason) return;
                          for (std::size_t k = 0; k < view.units.size(); ++k) {
                            const Duration start = global::start_after(view.units, k);
@@ -231,9 +231,9 @@ TEST(GlobalSequential, TermsAddUp) {
     Rng rng(mix(seed));
     limits.preemption = seed % 3 == 0 ? sched::Preemption::None : sched::Preemption::Full;
     const testing::BoundCase bound_case = random_bound_case(rng, limits);
-    const System system = compile(bound_case.workload, bound_case.platform).value();
+    const TaskSet task_set = compile(bound_case.workload, bound_case.platform).value();
     for (const Method &method : {bertogna_cirinei(), bertogna_cirinei_any(), guan(), sequential_nonpreemptive()}) {
-      const Outcome outcome = method.apply(system);
+      const Outcome outcome = method.apply(task_set);
       if (!std::holds_alternative<Bound>(outcome)) continue;
       for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) {
         Duration sum = 0;

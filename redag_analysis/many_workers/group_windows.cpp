@@ -36,45 +36,45 @@ Chain::Group &group_of(Chain &chain, std::uint32_t group) {
   return chain.groups.back();
 }
 
-std::uint32_t last_level(const System &system, const Unit &unit) {
-  return system.tasks[system.by_rank[unit.last_rank]].level;
+std::uint32_t last_level(const TaskSet &task_set, const Unit &unit) {
+  return task_set.tasks[task_set.by_rank[unit.last_rank]].level;
 }
 
 }  // namespace
 
-std::vector<Block> blocks_of(const System &system, const std::vector<GlobalUnit> &units) {
-  if (!is_static(system.policy)) return {Block{0, units.size()}};
+std::vector<Block> blocks_of(const TaskSet &task_set, const std::vector<GlobalUnit> &units) {
+  if (!is_static(task_set.policy)) return {Block{0, units.size()}};
   std::vector<Block> blocks;
   std::uint32_t last_rank = 0;
   std::uint32_t last = 0;
   for (std::size_t k = 0; k < units.size(); ++k) {
-    const Unit &unit = system.units[units[k].unit];
-    const std::uint32_t first = system.tasks[system.by_rank[unit.first_rank]].level;
+    const Unit &unit = task_set.units[units[k].unit];
+    const std::uint32_t first = task_set.tasks[task_set.by_rank[unit.first_rank]].level;
     if (blocks.empty() || (unit.first_rank > last_rank && first > last)) {
       blocks.push_back(Block{k, k});
     }
     blocks.back().end = k + 1;
     last_rank = std::max(last_rank, unit.last_rank);
-    last = std::max(last, last_level(system, unit));
+    last = std::max(last, last_level(task_set, unit));
   }
   return blocks;
 }
 
-Windows::Windows(const System &system, std::vector<GlobalUnit> &units)
-    : system_(system),
+Windows::Windows(const TaskSet &task_set, std::vector<GlobalUnit> &units)
+    : task_set_(task_set),
       units_(units),
-      blocks_(blocks_of(system, units)),
-      preempts_(system.mode != sched::Preemption::None),
-      bounds_(system.tasks.size()),
+      blocks_(blocks_of(task_set, units)),
+      preempts_(task_set.mode != sched::Preemption::None),
+      bounds_(task_set.tasks.size()),
       reachable_(units.size()),
-      place_(system.tasks.size(), 0),
-      parts_(system.groups.size()) {
+      place_(task_set.tasks.size(), 0),
+      parts_(task_set.groups.size()) {
   for (std::size_t k = 0; k < units.size(); ++k) {
-    const std::vector<std::uint32_t> &tasks = system.units[units[k].unit].tasks;
+    const std::vector<std::uint32_t> &tasks = task_set.units[units[k].unit].tasks;
     std::vector<std::vector<bool>> &reachable = reachable_[k];
     reachable.assign(tasks.size() > 1 ? tasks.size() : 0, std::vector<bool>(tasks.size(), false));
     for (std::uint32_t i = 0; i < tasks.size(); ++i) {
-      const SystemTask &task = system.tasks[tasks[i]];
+      const CompiledTask &task = task_set.tasks[tasks[i]];
       place_[tasks[i]] = i;
       for (const std::uint32_t p : task.predecessors) {
         for (std::size_t a = 0; a < i; ++a) {
@@ -89,27 +89,27 @@ Windows::Windows(const System &system, std::vector<GlobalUnit> &units)
     }
   }
   longest_below_.resize(blocks_.size());
-  std::vector<std::optional<std::uint32_t>> longest(system.groups.size());
+  std::vector<std::optional<std::uint32_t>> longest(task_set.groups.size());
   for (std::size_t b = blocks_.size(); b-- > 0;) {
     longest_below_[b] = longest;
     for (std::size_t k = blocks_[b].begin; k < blocks_[b].end; ++k) {
-      for (const std::uint32_t t : system.units[units[k].unit].tasks) {
-        if (system.tasks[t].group != kNoGroup) take_longer(t, longest[system.tasks[t].group]);
+      for (const std::uint32_t t : task_set.units[units[k].unit].tasks) {
+        if (task_set.tasks[t].group != kNoGroup) take_longer(t, longest[task_set.tasks[t].group]);
       }
     }
   }
   if (preempts_) return;
-  const std::uint32_t m = system.platform.workers;
+  const std::uint32_t m = task_set.platform.workers;
   for (const Block &block : blocks_) {
-    first_blocking_.push_back(global::largest_remaining(system, units, block.end, m));
-    later_blocking_.push_back(m > 1 ? global::largest_remaining(system, units, block.end, m - 1) : 0);
+    first_blocking_.push_back(global::largest_remaining(task_set, units, block.end, m));
+    later_blocking_.push_back(m > 1 ? global::largest_remaining(task_set, units, block.end, m - 1) : 0);
   }
 }
 
 // True if an own task that is less urgent than all of the chain does not keep the chain waiting, unless it holds a
 // group. Without preemption, or with a place of the unit's max_active, it can.
 bool Windows::obeys_levels(std::size_t unit) const {
-  return preempts_ && is_static(system_.policy) && units_[unit].bound == 0;
+  return preempts_ && is_static(task_set_.policy) && units_[unit].bound == 0;
 }
 
 bool Windows::follows(std::size_t unit, std::uint32_t before, std::uint32_t after) const {
@@ -117,12 +117,12 @@ bool Windows::follows(std::size_t unit, std::uint32_t before, std::uint32_t afte
 }
 
 void Windows::start(std::size_t unit) {
-  for (const std::uint32_t t : system_.units[units_[unit].unit].tasks) {
+  for (const std::uint32_t t : task_set_.units[units_[unit].unit].tasks) {
     Duration before = 0;
-    for (const std::uint32_t p : system_.tasks[t].predecessors) {
+    for (const std::uint32_t p : task_set_.tasks[t].predecessors) {
       before = std::max(before, bounds_[p].response - units_[unit].jitter);
     }
-    bounds_[t] = TaskBound{before + system_.tasks[t].wcet + units_[unit].jitter, 1};
+    bounds_[t] = TaskBound{before + task_set_.tasks[t].wcet + units_[unit].jitter, 1};
   }
 }
 
@@ -130,10 +130,10 @@ void Windows::start(std::size_t unit) {
 
 // The least urgent level on the chain: own tasks below it go first only as holders that inherit.
 std::uint32_t Windows::threshold(std::size_t unit, const Question &question) const {
-  std::uint32_t level = system_.tasks[question.task].level;
+  std::uint32_t level = task_set_.tasks[question.task].level;
   if (question.from_ready) return level;
-  for (const std::uint32_t t : system_.units[units_[unit].unit].tasks) {
-    if (follows(unit, t, question.task)) level = std::max(level, system_.tasks[t].level);
+  for (const std::uint32_t t : task_set_.units[units_[unit].unit].tasks) {
+    if (follows(unit, t, question.task)) level = std::max(level, task_set_.tasks[t].level);
   }
   return level;
 }
@@ -150,8 +150,8 @@ void Windows::add_own(std::size_t unit, std::uint32_t threshold, Chain &chain) c
   const Duration period = units_[unit].period;
   const Duration until = question.until > 0 ? question.until : bounds_[question.task].response;
   const auto overlapping = [&](Duration response) { return response > period ? (response - 1) / period : 0; };
-  for (const std::uint32_t t : system_.units[units_[unit].unit].tasks) {
-    const SystemTask &task = system_.tasks[t];
+  for (const std::uint32_t t : task_set_.units[units_[unit].unit].tasks) {
+    const CompiledTask &task = task_set_.tasks[t];
     const bool goes_first = !obeys_levels(unit) || task.level <= threshold;
     if (!goes_first && task.group == kNoGroup) continue;
     const bool is_self = t == question.task;
@@ -185,7 +185,7 @@ void Windows::add_own(std::size_t unit, std::uint32_t threshold, Chain &chain) c
     ++group.own_tasks;
     if (is_self || (is_before && !question.from_ready)) group.waiters.push_back(t);
   }
-  if (question.first_tick) chain.own -= system_.tasks[question.task].wcet - 1;
+  if (question.first_tick) chain.own -= task_set_.tasks[question.task].wcet - 1;
 }
 
 // True if the earlier jobs of the task have ended where a job of the chain could start; they then delay only others.
@@ -193,10 +193,10 @@ bool Windows::is_earlier_done(std::size_t unit, const Question &question, std::u
   const bool is_self = task == question.task;
   if (question.from_ready) return is_self || follows(unit, task, question.task);
   if (!is_self) return false;
-  const std::vector<std::uint32_t> &tasks = system_.units[units_[unit].unit].tasks;
+  const std::vector<std::uint32_t> &tasks = task_set_.units[units_[unit].unit].tasks;
   return std::none_of(tasks.begin(), tasks.end(), [&](std::uint32_t other) {
     return follows(unit, other, task) &&
-           (!obeys_levels(unit) || system_.tasks[other].level >= system_.tasks[task].level);
+           (!obeys_levels(unit) || task_set_.tasks[other].level >= task_set_.tasks[task].level);
   });
 }
 
@@ -204,26 +204,26 @@ bool Windows::is_earlier_done(std::size_t unit, const Question &question, std::u
 bool Windows::is_beside(std::size_t unit, const Question &question, std::uint32_t task) const {
   const auto keeps = [&](std::uint32_t other) {
     if (other == task || follows(unit, other, task) || follows(unit, task, other)) return false;
-    const SystemTask &own = system_.tasks[task];
-    return !obeys_levels(unit) || own.group != kNoGroup || own.level <= system_.tasks[other].level;
+    const CompiledTask &own = task_set_.tasks[task];
+    return !obeys_levels(unit) || own.group != kNoGroup || own.level <= task_set_.tasks[other].level;
   };
   if (keeps(question.task)) return true;
-  const std::vector<std::uint32_t> &tasks = system_.units[units_[unit].unit].tasks;
+  const std::vector<std::uint32_t> &tasks = task_set_.units[units_[unit].unit].tasks;
   return !question.from_ready && std::any_of(tasks.begin(), tasks.end(), [&](std::uint32_t other) {
     return follows(unit, other, question.task) && keeps(other);
   });
 }
 
 void Windows::take_longer(std::uint32_t task, std::optional<std::uint32_t> &longest) const {
-  if (!longest || system_.tasks[task].wcet > system_.tasks[*longest].wcet) longest = task;
+  if (!longest || task_set_.tasks[task].wcet > task_set_.tasks[*longest].wcet) longest = task;
 }
 
 // Computes the path to the task that makes the window longest; work that could execute beside other paths counts less
 // on the path. Also computes the longest path with its longest job repeated for each further instance.
 void Windows::add_length(std::size_t unit, Chain &chain) const {
   const Question &question = chain.question;
-  const SystemTask &last = system_.tasks[question.task];
-  const std::vector<std::uint32_t> &tasks = system_.units[units_[unit].unit].tasks;
+  const CompiledTask &last = task_set_.tasks[question.task];
+  const std::vector<std::uint32_t> &tasks = task_set_.units[units_[unit].unit].tasks;
   chain.path = last.wcet;
   chain.overhead = last.overhead;
   chain.length = chain.longest = multiply(question.instances, last.wcet);
@@ -238,10 +238,10 @@ void Windows::add_length(std::size_t unit, Chain &chain) const {
       Duration repeated = 0;  // the same, with its longest job repeated for each further instance
       Duration beside = 0;    // work of its tasks that would count, by its share, if they were off the path
     };
-    const auto m = static_cast<Duration>(system_.platform.workers);
+    const auto m = static_cast<Duration>(task_set_.platform.workers);
     std::vector<Path> paths(tasks.size());
     for (std::size_t i = 0; i <= place_[question.task]; ++i) {
-      const SystemTask &task = system_.tasks[tasks[i]];
+      const CompiledTask &task = task_set_.tasks[tasks[i]];
       Path &path = paths[i];
       Duration repeated = 0;
       Duration longest = 0;
@@ -277,17 +277,17 @@ Chain Windows::chain_of(std::size_t block, std::size_t unit, const Question &que
   Chain chain;
   chain.question = question;
   chain.unit = unit;
-  const std::size_t tasks = system_.units[units_[unit].unit].tasks.size();
-  Effort::spend(tasks * tasks + system_.groups.size());
+  const std::size_t tasks = task_set_.units[units_[unit].unit].tasks.size();
+  Effort::spend(tasks * tasks + task_set_.groups.size());
   const std::uint32_t level = threshold(unit, question);
   add_own(unit, level, chain);
   add_length(unit, chain);
-  for (std::uint32_t g = 0; g < system_.groups.size(); ++g) {
-    if (longest_below_[block][g]) group_of(chain, g).below = system_.tasks[*longest_below_[block][g]].wcet - 1;
+  for (std::uint32_t g = 0; g < task_set_.groups.size(); ++g) {
+    if (longest_below_[block][g]) group_of(chain, g).below = task_set_.tasks[*longest_below_[block][g]].wcet - 1;
   }
   for (Chain::Group &group : chain.groups) {
     if (longest_below_[block][group.group]) take_longer(*longest_below_[block][group.group], group.holder);
-    if (group.holder) group.held = system_.tasks[*group.holder].wcet - 1;
+    if (group.holder) group.held = task_set_.tasks[*group.holder].wcet - 1;
     if (group.waiters.empty()) continue;
     group.found = static_cast<Duration>(group.waiters.size());
     group.own_waiting -= std::min(group.own_waiting, group.found);
@@ -296,7 +296,7 @@ Chain Windows::chain_of(std::size_t block, std::size_t unit, const Question &que
     chain.holders = add(chain.holders, multiply(group.found, group.held));
     if (group.own_tasks == 1) continue;
     Duration least = kUnbounded;
-    for (const std::uint32_t t : group.waiters) least = std::min(least, system_.tasks[t].wcet);
+    for (const std::uint32_t t : group.waiters) least = std::min(least, task_set_.tasks[t].wcet);
     chain.own_serial = add(chain.own_serial, group.own_work - least);
   }
   std::erase_if(chain.groups, [](const Chain::Group &group) { return group.waiters.empty() && group.held == 0; });
@@ -309,9 +309,9 @@ Duration Windows::work(std::size_t unit, Duration x) const {
   const GlobalUnit &other = units_[unit];
   Duration response = 0;
   Duration each = 0;
-  for (const std::uint32_t t : system_.units[other.unit].tasks) {
+  for (const std::uint32_t t : task_set_.units[other.unit].tasks) {
     response = std::max(response, bounds_[t].response);
-    each = add(each, most_work(system_.tasks[t].wcet, other.period, bounds_[t].response, 1, x));
+    each = add(each, most_work(task_set_.tasks[t].wcet, other.period, bounds_[t].response, 1, x));
   }
   return std::min(each, most_work(other.volume, other.period, response, other.width, x));
 }
@@ -330,7 +330,7 @@ Duration Windows::jobs_in_progress(const Part &part, Duration x) const {
   if (unit.bound == 0) return jobs;
   // Adds the jobs that find a holder: once when they arrive, and once for each end that gives a place of the
   // max_active.
-  for (const std::uint32_t t : system_.units[unit.unit].tasks) jobs += in_window(t);
+  for (const std::uint32_t t : task_set_.units[unit.unit].tasks) jobs += in_window(t);
   return jobs;
 }
 
@@ -346,7 +346,7 @@ void Windows::share_own(const Chain &chain, Duration together) {
 
 Duration Windows::evaluate(std::size_t block, const Chain &chain, Duration x) {
   const std::size_t end = blocks_[block].end;
-  const Duration m = system_.platform.workers;
+  const Duration m = task_set_.platform.workers;
   Effort::spend(end + 1);
   const std::uint32_t bound = units_[chain.unit].bound;
   const Duration together = bound > 0 ? bound : m;  // own jobs that execute while one waits
@@ -401,7 +401,7 @@ Duration Windows::evaluate(std::size_t block, const Chain &chain, Duration x) {
 // at least min(volume, x), and at least one job in each group that the chain waits for.
 Duration Windows::least_window(std::size_t block, const Chain &chain) {
   const std::size_t end = blocks_[block].end;
-  const Duration m = system_.platform.workers;
+  const Duration m = task_set_.platform.workers;
   Duration serial = 0;
   for (const Chain::Group &group : chain.groups) {
     if (group.waiters.empty()) continue;

@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 #include "redag_analysis/many_workers/global.hpp"
 
 namespace redag::analysis::groups {
@@ -26,7 +26,7 @@ struct Block {
 };
 
 /// Returns the blocks in order of priority; a single block of all units if priorities are not static.
-[[nodiscard]] std::vector<Block> blocks_of(const System &system, const std::vector<global::GlobalUnit> &units);
+[[nodiscard]] std::vector<Block> blocks_of(const TaskSet &task_set, const std::vector<global::GlobalUnit> &units);
 
 /// What is known of a task.
 struct TaskBound {
@@ -83,7 +83,7 @@ struct Shares {
 
 class Windows {
  public:
-  Windows(const System &system, std::vector<global::GlobalUnit> &units);
+  Windows(const TaskSet &task_set, std::vector<global::GlobalUnit> &units);
 
   [[nodiscard]] const std::vector<Block> &blocks() const { return blocks_; }
   [[nodiscard]] TaskBound &of(std::uint32_t task) { return bounds_[task]; }
@@ -120,7 +120,7 @@ class Windows {
   [[nodiscard]] bool obeys_levels(std::size_t unit) const;
   [[nodiscard]] bool is_beside(std::size_t unit, const Question &question, std::uint32_t task) const;
 
-  const System &system_;
+  const TaskSet &task_set_;
   std::vector<global::GlobalUnit> &units_;
   std::vector<Block> blocks_;
   bool preempts_;

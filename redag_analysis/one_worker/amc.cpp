@@ -21,32 +21,32 @@ constexpr std::string_view kOnlyInLowMode = "HI mode degrades it: bounded in LO 
 
 // True if HI mode can end between the releases of one instance whose first jobs were skipped. The jobs that wait for
 // those are then late, or skipped, in LO mode.
-bool can_be_torn(const System &system) {
-  return std::any_of(system.units.begin(), system.units.end(), [&](const Unit &unit) {
-    return unit.tasks.size() > 1 && unit.jitter > 0 && !system.dags[unit.dag.value].high;
+bool can_be_torn(const TaskSet &task_set) {
+  return std::any_of(task_set.units.begin(), task_set.units.end(), [&](const Unit &unit) {
+    return unit.tasks.size() > 1 && unit.jitter > 0 && !task_set.dags[unit.dag.value].high;
   });
 }
 
-std::optional<std::string> why_not(const System &system) {
-  if (!system.has_modes) return "no task has a wcet_low below its wcet: there is no HI mode";
-  if (auto reason = one_worker::why_not(system)) return reason;
-  if (system.mode != sched::Preemption::Full) {
+std::optional<std::string> why_not(const TaskSet &task_set) {
+  if (!task_set.has_modes) return "no task has a wcet_low below its wcet: there is no HI mode";
+  if (auto reason = one_worker::why_not(task_set)) return reason;
+  if (task_set.mode != sched::Preemption::Full) {
     return "for full preemption; here jobs of lower criticality keep the worker in HI mode";
   }
-  if (system.has_rate_edges()) return "edges between rates";
-  if (can_be_torn(system))
+  if (task_set.has_rate_edges()) return "edges between rates";
+  if (can_be_torn(task_set))
     return "jitter in a DAG of lower criticality: HI mode can end between the releases of one instance";
-  if (system.threads_suffice_if_bounded) return "fewer threads than tasks: a demoted job may hold the last one";
-  if (!system.groups.empty()) return "groups: a job of lower criticality that holds one runs on in HI mode";
-  if (system.frozen > 0) return "stalls of the machine: they can begin or prolong HI mode";
-  if (system.platform.preempt_overhead > 0) return "an overhead of preemption: the change of mode preempts, too";
+  if (task_set.threads_suffice_if_bounded) return "fewer threads than tasks: a demoted job may hold the last one";
+  if (!task_set.groups.empty()) return "groups: a job of lower criticality that holds one runs on in HI mode";
+  if (task_set.frozen > 0) return "stalls of the machine: they can begin or prolong HI mode";
+  if (task_set.platform.preempt_overhead > 0) return "an overhead of preemption: the change of mode preempts, too";
   return std::nullopt;
 }
 
 // The time that a unit executes in LO mode.
-Duration low_volume(const System &system, const Unit &unit) {
+Duration low_volume(const TaskSet &task_set, const Unit &unit) {
   Duration sum = 0;
-  for (const std::uint32_t t : unit.tasks) sum = add(sum, system.tasks[t].wcet_low);
+  for (const std::uint32_t t : unit.tasks) sum = add(sum, task_set.tasks[t].wcet_low);
   return sum;
 }
 
@@ -62,30 +62,30 @@ struct Others {
   std::vector<std::uint32_t> units;  // of `low`
 };
 
-Others others_of(const System &system, const std::vector<std::uint32_t> &more_urgent) {
+Others others_of(const TaskSet &task_set, const std::vector<std::uint32_t> &more_urgent) {
   Others others;
   Effort::spend(more_urgent.size());
   for (const std::uint32_t u : more_urgent) {
-    const Unit &unit = system.units[u];
+    const Unit &unit = task_set.units[u];
     others.units.push_back(u);
-    others.low.push_back(Interferer{low_volume(system, unit), unit.period, unit.jitter});
-    if (system.dags[unit.dag.value].high) others.high.push_back(Interferer{unit.volume, unit.period, unit.jitter});
+    others.low.push_back(Interferer{low_volume(task_set, unit), unit.period, unit.jitter});
+    if (task_set.dags[unit.dag.value].high) others.high.push_back(Interferer{unit.volume, unit.period, unit.jitter});
   }
   return others;
 }
 
 // Lists the terms of the bound across the change. Lower criticality interferes only until HI mode begins.
-std::vector<Term> terms_of(const System &system, const Unit &unit, const View &view, const Others &others,
+std::vector<Term> terms_of(const TaskSet &task_set, const Unit &unit, const View &view, const Others &others,
                            Duration low_window, Duration window) {
   const TaskId self = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
   std::vector<Term> terms = {Term{Term::Kind::Own, self, unit.dag, unit.volume, 1}};
   for (const one_worker::Blocker &blocker : view.blockers) {
     const TaskId task(blocker.task);
-    terms.push_back(Term{Term::Kind::Blocking, task, system.tasks[blocker.task].dag, blocker.amount, 1});
+    terms.push_back(Term{Term::Kind::Blocking, task, task_set.tasks[blocker.task].dag, blocker.amount, 1});
   }
   for (std::size_t i = 0; i < others.units.size(); ++i) {
-    const Unit &other = system.units[others.units[i]];
-    const bool high = system.dags[other.dag.value].high;
+    const Unit &other = task_set.units[others.units[i]];
+    const bool high = task_set.dags[other.dag.value].high;
     const std::int64_t jobs = one_worker::jobs_in(others.low[i], high ? window : low_window, false);
     const TaskId task = other.tasks.size() == 1 ? TaskId(other.tasks.front()) : TaskId();
     terms.push_back(Term{Term::Kind::Interference, task, other.dag, jobs * other.volume, jobs});
@@ -96,26 +96,26 @@ std::vector<Term> terms_of(const System &system, const Unit &unit, const View &v
 
 // HI mode begins at most R(LO) after the start of a busy period in which the unit has a job; in LO mode the period
 // would be over by then. Lower criticality thus contributes only the releases within R(LO).
-void bound_unit(const System &system, one_worker::Views &views, std::uint32_t u, ResponseBound &bound,
+void bound_unit(const TaskSet &task_set, one_worker::Views &views, std::uint32_t u, ResponseBound &bound,
                 ModeResponses &modes) {
-  const Unit &unit = system.units[u];
+  const Unit &unit = task_set.units[u];
   const View view = views.of(u);
-  const Others others = others_of(system, views.more_urgent(u));
+  const Others others = others_of(task_set, views.more_urgent(u));
 
   const FixedPoint low =
-      one_worker::preemptive_response(own_of(unit, low_volume(system, unit), view.blocking), others.low);
-  bound.absent = system.dags[unit.dag.value].high ? low.absent : kOnlyInLowMode;
+      one_worker::preemptive_response(own_of(unit, low_volume(task_set, unit), view.blocking), others.low);
+  bound.absent = task_set.dags[unit.dag.value].high ? low.absent : kOnlyInLowMode;
   if (!low.found) return;
   modes.low = low.found->response;
-  if (!system.dags[unit.dag.value].high) return;
+  if (!task_set.dags[unit.dag.value].high) return;
 
   const FixedPoint high = one_worker::preemptive_response(own_of(unit, unit.volume, view.blocking), others.high);
   if (high.found) modes.high = high.found->response;
 
   Duration before_change = view.blocking;
   for (std::size_t i = 0; i < others.units.size(); ++i) {
-    const Unit &other = system.units[others.units[i]];
-    if (system.dags[other.dag.value].high) continue;
+    const Unit &other = task_set.units[others.units[i]];
+    if (task_set.dags[other.dag.value].high) continue;
     const std::int64_t jobs = one_worker::jobs_in(others.low[i], low.found->window, false);
     before_change = add(before_change, multiply(jobs, other.volume));
   }
@@ -124,26 +124,27 @@ void bound_unit(const System &system, one_worker::Views &views, std::uint32_t u,
   if (!change.found) return;
   modes.change = change.found->response;
   bound.response = change.found->response;
-  if (Effort::itemises(u)) bound.terms = terms_of(system, unit, view, others, low.found->window, change.found->window);
+  if (Effort::itemises(u))
+    bound.terms = terms_of(task_set, unit, view, others, low.found->window, change.found->window);
 }
 
-Outcome apply(const System &system) {
-  if (auto reason = why_not(system)) return NotApplicable{*reason};
-  std::vector<ResponseBound> units(system.units.size());
-  std::vector<ModeResponses> modes(system.units.size());
+Outcome apply(const TaskSet &task_set) {
+  if (auto reason = why_not(task_set)) return NotApplicable{*reason};
+  std::vector<ResponseBound> units(task_set.units.size());
+  std::vector<ModeResponses> modes(task_set.units.size());
   bool low_is_met = true;
   bool high_is_met = true;
-  one_worker::Views views(system);
+  one_worker::Views views(task_set);
   for (std::uint32_t u = 0; u < units.size(); ++u) {
-    bound_unit(system, views, u, units[u], modes[u]);
-    const Duration deadline = std::min(system.units[u].deadline, system.units[u].limit);
+    bound_unit(task_set, views, u, units[u], modes[u]);
+    const Duration deadline = std::min(task_set.units[u].deadline, task_set.units[u].limit);
     low_is_met = low_is_met && modes[u].low.value_or(kNever) <= deadline;
-    if (system.dags[system.units[u].dag.value].high) {
+    if (task_set.dags[task_set.units[u].dag.value].high) {
       high_is_met = high_is_met && units[u].response.value_or(kNever) <= deadline;
     }
   }
-  Bound bound = from_units(system, std::move(units));
-  for (const SystemTask &task : system.tasks) bound.modes.push_back(modes[task.unit]);
+  Bound bound = from_units(task_set, std::move(units));
+  for (const CompiledTask &task : task_set.tasks) bound.modes.push_back(modes[task.unit]);
   bound.figures = std::string("in LO mode ") +
                   (low_is_met ? "every deadline is met" : "not every deadline is shown met") +
                   "; those of high criticality are " + (high_is_met ? "" : "not all shown ") + "met in every mode";

@@ -23,32 +23,32 @@ struct Demand {
   Duration nominal_deadline = 0;
 };
 
-std::optional<std::string> why_not(const System &system) {
-  if (system.platform.workers != 1)
-    return "for one worker; the platform has " + std::to_string(system.platform.workers);
-  if (system.policy != PolicyKind::Edf) return std::string("for edf; the policy is ") + to_string(system.policy);
-  if (system.has_edges()) return "tasks have predecessors";
-  if (auto reason = why_not_directly(system)) return reason;
-  if (system.mode != sched::Preemption::None) {
-    if (!system.groups.empty()) return "groups together with preemption";
-    for (const SystemDag &dag : system.dags) {
+std::optional<std::string> why_not(const TaskSet &task_set) {
+  if (task_set.platform.workers != 1)
+    return "for one worker; the platform has " + std::to_string(task_set.platform.workers);
+  if (task_set.policy != PolicyKind::Edf) return std::string("for edf; the policy is ") + to_string(task_set.policy);
+  if (task_set.has_edges()) return "tasks have predecessors";
+  if (auto reason = why_not_directly(task_set)) return reason;
+  if (task_set.mode != sched::Preemption::None) {
+    if (!task_set.groups.empty()) return "groups together with preemption";
+    for (const CompiledDag &dag : task_set.dags) {
       if (dag.max_active > 0 && dag.tasks.size() > 1) return "DAG '" + dag.name + "' has a max_active";
     }
   }
-  for (const SystemTask &task : system.tasks) {
+  for (const CompiledTask &task : task_set.tasks) {
     if (task.deadline > task.limit) return "task '" + task.name + "': jobs can be skipped before their deadline";
     if (task.deadline <= task.jitter) return "task '" + task.name + "': its jitter is as large as its deadline";
-    const Duration end_to_end = system.dags[task.dag.value].deadline;
+    const Duration end_to_end = task_set.dags[task.dag.value].deadline;
     if (end_to_end > 0 && end_to_end < task.deadline) {
-      return "DAG '" + system.dags[task.dag.value].name + "': its deadline is below those of its tasks";
+      return "DAG '" + task_set.dags[task.dag.value].name + "': its deadline is below those of its tasks";
     }
   }
   return std::nullopt;
 }
 
-std::vector<Demand> demands_of(const System &system) {
+std::vector<Demand> demands_of(const TaskSet &task_set) {
   std::vector<Demand> demands;
-  for (const SystemTask &task : system.tasks) {
+  for (const CompiledTask &task : task_set.tasks) {
     const Duration blocking = std::max<Duration>(0, task.region - 1);
     demands.push_back(Demand{task.wcet, task.period, task.deadline - task.jitter, blocking, task.deadline});
   }
@@ -113,10 +113,10 @@ Bound accept() {
 }
 
 // QPA: steps backwards from the end of the busy period, each time as far as the demand itself reaches.
-Outcome apply_preemptive(const System &system) {
-  if (auto reason = why_not(system)) return NotApplicable{*reason};
-  if (system.mode != sched::Preemption::Full) return NotApplicable{"for full preemption"};
-  const std::vector<Demand> demands = demands_of(system);
+Outcome apply_preemptive(const TaskSet &task_set) {
+  if (auto reason = why_not(task_set)) return NotApplicable{*reason};
+  if (task_set.mode != sched::Preemption::Full) return NotApplicable{"for full preemption"};
+  const std::vector<Demand> demands = demands_of(task_set);
   const auto length = busy_period(demands, 0);
   if (!length) return refuse_overload();
   Duration t = deadline_below(demands, add(*length, 1));
@@ -130,10 +130,10 @@ Outcome apply_preemptive(const System &system) {
   return accept();
 }
 
-Outcome apply_nonpreemptive(const System &system) {
-  if (auto reason = why_not(system)) return NotApplicable{*reason};
-  if (system.mode == sched::Preemption::Full) return NotApplicable{"for jobs that keep the worker"};
-  const std::vector<Demand> demands = demands_of(system);
+Outcome apply_nonpreemptive(const TaskSet &task_set) {
+  if (auto reason = why_not(task_set)) return NotApplicable{*reason};
+  if (task_set.mode == sched::Preemption::Full) return NotApplicable{"for jobs that keep the worker"};
+  const std::vector<Demand> demands = demands_of(task_set);
   Duration longest = 0;
   for (const Demand &task : demands) longest = std::max(longest, task.blocking);
   const auto length = busy_period(demands, longest);
@@ -157,7 +157,7 @@ Outcome apply_nonpreemptive(const System &system) {
 Method edf_demand() {
   return Method{
       .name = "edf_demand",
-      .subject = Subject::System,
+      .subject = Subject::TaskSet,
       .cite =
           "S. Baruah, L. Rosier, R. Howell, Algorithms and complexity concerning the preemptive scheduling of "
           "periodic, "
@@ -175,7 +175,7 @@ Method edf_demand() {
 Method edf_demand_nonpreemptive() {
   return Method{
       .name = "edf_demand_nonpreemptive",
-      .subject = Subject::System,
+      .subject = Subject::TaskSet,
       .cite =
           "K. Jeffay, D. Stanat, C. Martel, On non-preemptive scheduling of periodic and sporadic tasks, RTSS 1991; L. "
           "George, N. Rivierre, M. Spuri, Preemptive and non-preemptive real-time uni-processor scheduling, INRIA "

@@ -40,11 +40,11 @@ bool fits(Duration start, Duration point, const std::vector<one_worker::Interfer
   return demand <= point;
 }
 
-std::optional<std::string> why_not(const System &system) {
-  if (auto reason = one_worker::why_not(system)) return reason;
-  if (system.mode != sched::Preemption::Full) return "for full preemption";
-  for (const Unit &unit : system.units) {
-    const std::string &name = system.tasks[unit.tasks.front()].name;
+std::optional<std::string> why_not(const TaskSet &task_set) {
+  if (auto reason = one_worker::why_not(task_set)) return reason;
+  if (task_set.mode != sched::Preemption::Full) return "for full preemption";
+  for (const Unit &unit : task_set.units) {
+    const std::string &name = task_set.tasks[unit.tasks.front()].name;
     if (unit.jitter > 0) return "task '" + name + "' has release jitter";
     if (unit.deadline > unit.limit || unit.deadline > unit.period) {
       return "task '" + name + "' has a deadline above its period";
@@ -53,15 +53,15 @@ std::optional<std::string> why_not(const System &system) {
   return std::nullopt;
 }
 
-Outcome apply(const System &system) {
-  if (auto reason = why_not(system)) return NotApplicable{*reason};
+Outcome apply(const TaskSet &task_set) {
+  if (auto reason = why_not(task_set)) return NotApplicable{*reason};
   Bound bound;
   bound.accepts = true;
   std::size_t examined = 0;
-  one_worker::Views views(system);
-  for (std::uint32_t u = 0; u < system.units.size(); ++u) {
+  one_worker::Views views(task_set);
+  for (std::uint32_t u = 0; u < task_set.units.size(); ++u) {
     const one_worker::View view = views.of(u);
-    const Unit &unit = system.units[u];
+    const Unit &unit = task_set.units[u];
     const std::vector<Duration> candidates = points(unit.deadline, view.more_urgent);
     if (candidates.empty()) return NotApplicable{"gave up: more than a million points"};
     examined += candidates.size();
@@ -70,7 +70,7 @@ Outcome apply(const System &system) {
                                    [&](Duration point) { return fits(start, point, view.more_urgent); });
     if (found) continue;
     bound.accepts = false;
-    bound.figures = "'" + system.tasks[unit.tasks.front()].name + "' has no point at which its demand fits";
+    bound.figures = "'" + task_set.tasks[unit.tasks.front()].name + "' has no point at which its demand fits";
     return bound;
   }
   bound.figures = std::to_string(examined) + " points";
@@ -82,7 +82,7 @@ Outcome apply(const System &system) {
 Method exact_points() {
   return Method{
       .name = "exact_points",
-      .subject = Subject::System,
+      .subject = Subject::TaskSet,
       .cite =
           "E. Bini, G. C. Buttazzo, Schedulability analysis of periodic fixed priority systems, IEEE Transactions on "
           "Computers 53(11), 2004",

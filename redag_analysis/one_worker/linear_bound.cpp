@@ -35,8 +35,8 @@ struct Line {
 };
 
 // `above` holds the sums of all units of its level and above, including itself.
-ResponseBound bound_unit(const System &system, const one_worker::Views &views, std::uint32_t u, Line above) {
-  const Unit &unit = system.units[u];
+ResponseBound bound_unit(const TaskSet &task_set, const one_worker::Views &views, std::uint32_t u, Line above) {
+  const Unit &unit = task_set.units[u];
   above.add(unit, -1);
   const auto &[utilization, slopes] = above;
   const std::vector<one_worker::Blocker> blockers = views.blockers(u);
@@ -58,11 +58,11 @@ ResponseBound bound_unit(const System &system, const one_worker::Views &views, s
   bound.response = response;
   if (!Effort::itemises(u)) return bound;
   Duration overhead = 0;
-  for (const std::uint32_t t : unit.tasks) overhead += system.tasks[t].overhead;
+  for (const std::uint32_t t : unit.tasks) overhead += task_set.tasks[t].overhead;
   bound.terms.push_back(Term{Term::Kind::Own, TaskId(), unit.dag, unit.volume - overhead, 1});
   if (overhead > 0) bound.terms.push_back(Term{Term::Kind::Overhead, TaskId(), unit.dag, overhead, 0});
   for (const one_worker::Blocker &blocker : blockers) {
-    const DagId dag = system.tasks[blocker.task].dag;
+    const DagId dag = task_set.tasks[blocker.task].dag;
     bound.terms.push_back(Term{Term::Kind::Blocking, TaskId(blocker.task), dag, blocker.amount, 1});
   }
   // The formula has no separate share for each of the others.
@@ -71,25 +71,25 @@ ResponseBound bound_unit(const System &system, const one_worker::Views &views, s
   return bound;
 }
 
-Outcome apply(const System &system) {
-  if (auto reason = one_worker::why_not(system)) return NotApplicable{*reason};
-  if (system.mode != sched::Preemption::Full) return NotApplicable{"for full preemption"};
-  for (const Unit &unit : system.units) {
+Outcome apply(const TaskSet &task_set) {
+  if (auto reason = one_worker::why_not(task_set)) return NotApplicable{*reason};
+  if (task_set.mode != sched::Preemption::Full) return NotApplicable{"for full preemption"};
+  for (const Unit &unit : task_set.units) {
     if (unit.jitter > 0) {
-      return NotApplicable{"task '" + system.tasks[unit.tasks.front()].name + "' has release jitter"};
+      return NotApplicable{"task '" + task_set.tasks[unit.tasks.front()].name + "' has release jitter"};
     }
     if (unit.volume > kLongest) return NotApplicable{"an execution time above 13 days"};
   }
-  std::vector<ResponseBound> units(system.units.size());
-  const one_worker::Views views(system);
+  std::vector<ResponseBound> units(task_set.units.size());
+  const one_worker::Views views(task_set);
   Line above;
   std::size_t counted = 0;
   for (const std::uint32_t u : views.order()) {
     const std::span<const std::uint32_t> level = views.down_to(views.level(u));
-    for (; counted < level.size(); ++counted) above.add(system.units[level[counted]], 1);
-    units[u] = bound_unit(system, views, u, above);
+    for (; counted < level.size(); ++counted) above.add(task_set.units[level[counted]], 1);
+    units[u] = bound_unit(task_set, views, u, above);
   }
-  return from_units(system, std::move(units));
+  return from_units(task_set, std::move(units));
 }
 
 }  // namespace

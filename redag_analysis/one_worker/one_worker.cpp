@@ -51,10 +51,10 @@ Duration stop_of(const Own &own, std::int64_t q) {
   return saturate(Int128{own.limit} - own.jitter + Int128{q} * own.period);
 }
 
-std::vector<Term> terms_of(const System &system, const Unit &unit, const View &view,
+std::vector<Term> terms_of(const TaskSet &task_set, const Unit &unit, const View &view,
                            const std::vector<std::uint32_t> &more_urgent, const Response &response, bool deferred) {
   Duration overhead = 0;
-  for (const std::uint32_t t : unit.tasks) overhead = add(overhead, system.tasks[t].overhead);
+  for (const std::uint32_t t : unit.tasks) overhead = add(overhead, task_set.tasks[t].overhead);
   std::vector<Term> terms;
   const TaskId self = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
   terms.push_back(Term{Term::Kind::Own, self, unit.dag, unit.volume - overhead, 1});
@@ -65,10 +65,10 @@ std::vector<Term> terms_of(const System &system, const Unit &unit, const View &v
   }
   for (const Blocker &blocker : view.blockers) {
     terms.push_back(
-        Term{Term::Kind::Blocking, TaskId(blocker.task), system.tasks[blocker.task].dag, blocker.amount, 1});
+        Term{Term::Kind::Blocking, TaskId(blocker.task), task_set.tasks[blocker.task].dag, blocker.amount, 1});
   }
   for (const std::uint32_t u : more_urgent) {
-    const Unit &other = system.units[u];
+    const Unit &other = task_set.units[u];
     const std::int64_t jobs = jobs_in({other.volume, other.period, other.jitter}, response.window, deferred);
     const TaskId task = other.tasks.size() == 1 ? TaskId(other.tasks.front()) : TaskId();
     terms.push_back(Term{Term::Kind::Interference, task, other.dag, jobs * other.volume, jobs});
@@ -78,48 +78,49 @@ std::vector<Term> terms_of(const System &system, const Unit &unit, const View &v
 }
 
 // Any sink of the unit can end it; the shortest last stretch is the worst.
-Duration last_region_of(const System &system, const Unit &unit) {
+Duration last_region_of(const TaskSet &task_set, const Unit &unit) {
   Duration shortest = kUnbounded;
   for (const std::uint32_t t : unit.tasks) {
-    if (system.tasks[t].successors.empty()) shortest = std::min(shortest, system.tasks[t].last_region);
+    if (task_set.tasks[t].successors.empty()) shortest = std::min(shortest, task_set.tasks[t].last_region);
   }
   return shortest;
 }
 
 }  // namespace
 
-std::optional<std::string> why_not(const System &system) {
-  if (auto reason = why_not_directly(system)) return reason;
-  if (system.platform.workers != 1)
-    return "for one worker; the platform has " + std::to_string(system.platform.workers);
-  if (!is_static(system.policy)) {
-    return std::string("for static priorities; the policy is ") + to_string(system.policy);
+std::optional<std::string> why_not(const TaskSet &task_set) {
+  if (auto reason = why_not_directly(task_set)) return reason;
+  if (task_set.platform.workers != 1)
+    return "for one worker; the platform has " + std::to_string(task_set.platform.workers);
+  if (!is_static(task_set.policy)) {
+    return std::string("for static priorities; the policy is ") + to_string(task_set.policy);
   }
-  if (system.mode == sched::Preemption::None) return std::nullopt;
-  for (const SystemDag &dag : system.dags) {
+  if (task_set.mode == sched::Preemption::None) return std::nullopt;
+  for (const CompiledDag &dag : task_set.dags) {
     if (dag.max_active > 0 && dag.units.size() > 1) {
       return "DAG '" + dag.name +
              "': its max_active can hold up a task for as long as others preempt another task of it";
     }
   }
-  if (system.groups.empty()) return std::nullopt;
-  if (system.mode == sched::Preemption::Cooperative) {
+  if (task_set.groups.empty()) return std::nullopt;
+  if (task_set.mode == sched::Preemption::Cooperative) {
     return "groups in cooperative mode: the holder can lie under less urgent jobs";
   }
-  if (system.platform.preempt_overhead > 0) return "groups together with an overhead of preemption";
+  if (task_set.platform.preempt_overhead > 0) return "groups together with an overhead of preemption";
   return std::nullopt;
 }
 
-Views::Views(const System &system) : system_(system), by_first_rank_(system.units.size()) {
+Views::Views(const TaskSet &task_set) : task_set_(task_set), by_first_rank_(task_set.units.size()) {
   std::iota(by_first_rank_.begin(), by_first_rank_.end(), 0);
-  std::sort(by_first_rank_.begin(), by_first_rank_.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return system.units[a].first_rank < system.units[b].first_rank; });
+  std::sort(by_first_rank_.begin(), by_first_rank_.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return task_set.units[a].first_rank < task_set.units[b].first_rank;
+  });
   close_levels();
   order_ = by_first_rank_;
   std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) { return level(a) < level(b); });
   find_longest();
   std::map<std::pair<Duration, Duration>, std::uint32_t> known;
-  for (const Unit &unit : system.units) {
+  for (const Unit &unit : task_set.units) {
     const auto next = static_cast<std::uint32_t>(classes_.size());
     const auto [found, is_new] = known.emplace(std::pair(unit.period, unit.jitter), next);
     if (is_new) classes_.push_back({unit.period, unit.jitter, 0});
@@ -128,13 +129,13 @@ Views::Views(const System &system) : system_(system), by_first_rank_(system.unit
 }
 
 void Views::close_levels() {
-  const auto ranks = static_cast<std::uint32_t>(system_.by_rank.size());
+  const auto ranks = static_cast<std::uint32_t>(task_set_.by_rank.size());
   std::vector<std::uint32_t> reach(ranks);  // by rank: the least urgent task of units that begin at this rank or above
   std::iota(reach.begin(), reach.end(), 0);
-  for (const Unit &unit : system_.units) reach[unit.first_rank] = std::max(reach[unit.first_rank], unit.last_rank);
+  for (const Unit &unit : task_set_.units) reach[unit.first_rank] = std::max(reach[unit.first_rank], unit.last_rank);
   // Any task of a tier can go before any other of it.
   for (std::uint32_t rank = ranks; rank-- > 1;) {
-    const auto tier_of = [this](std::uint32_t at) { return system_.tasks[system_.by_rank[at]].tier; };
+    const auto tier_of = [this](std::uint32_t at) { return task_set_.tasks[task_set_.by_rank[at]].tier; };
     if (tier_of(rank) == tier_of(rank - 1)) reach[rank - 1] = std::max(reach[rank - 1], reach[rank]);
   }
   for (std::uint32_t rank = 1; rank < ranks; ++rank) reach[rank] = std::max(reach[rank], reach[rank - 1]);
@@ -143,17 +144,17 @@ void Views::close_levels() {
 }
 
 void Views::find_longest() {
-  longest_.resize(system_.by_rank.size() + 1);
-  for (std::size_t rank = system_.by_rank.size(); rank-- > 0;) {
-    const std::uint32_t t = system_.by_rank[rank];
-    const Duration stretch = system_.tasks[t].region - 1;
+  longest_.resize(task_set_.by_rank.size() + 1);
+  for (std::size_t rank = task_set_.by_rank.size(); rank-- > 0;) {
+    const std::uint32_t t = task_set_.by_rank[rank];
+    const Duration stretch = task_set_.tasks[t].region - 1;
     longest_[rank] = stretch > 0 && stretch >= longest_[rank + 1].amount ? Blocker{t, stretch} : longest_[rank + 1];
   }
 }
 
 std::span<const std::uint32_t> Views::down_to(std::uint32_t level) const {
   const auto end = std::partition_point(by_first_rank_.begin(), by_first_rank_.end(),
-                                        [&](std::uint32_t u) { return system_.units[u].first_rank <= level; });
+                                        [&](std::uint32_t u) { return task_set_.units[u].first_rank <= level; });
   return {by_first_rank_.begin(), end};
 }
 
@@ -169,32 +170,32 @@ std::vector<std::uint32_t> Views::more_urgent(std::uint32_t unit) const {
 // started at an instant strictly before, and times are integers.
 std::vector<Blocker> Views::blockers(std::uint32_t unit) const {
   const std::uint32_t last = level(unit);
-  const std::uint32_t platform_level = system_.tasks[system_.by_rank[last]].level;
+  const std::uint32_t platform_level = task_set_.tasks[task_set_.by_rank[last]].level;
   Blocker longest = longest_[last + 1];
-  if (system_.mode != sched::Preemption::None) {
+  if (task_set_.mode != sched::Preemption::None) {
     // Tasks of one platform level are neighbours in the order, and do not preempt each other.
-    for (std::uint32_t rank = last + 1; rank < system_.by_rank.size(); ++rank) {
-      const std::uint32_t t = system_.by_rank[rank];
-      if (system_.tasks[t].level != platform_level) break;
+    for (std::uint32_t rank = last + 1; rank < task_set_.by_rank.size(); ++rank) {
+      const std::uint32_t t = task_set_.by_rank[rank];
+      if (task_set_.tasks[t].level != platform_level) break;
       Effort::spend(1);
-      const Duration amount = system_.tasks[t].wcet - 1;
-      const bool is_first = amount == longest.amount && rank < system_.tasks[longest.task].rank;
+      const Duration amount = task_set_.tasks[t].wcet - 1;
+      const bool is_first = amount == longest.amount && rank < task_set_.tasks[longest.task].rank;
       if (amount > longest.amount || is_first) longest = Blocker{t, amount};
     }
   }
   std::vector<Blocker> found;
-  if (system_.mode == sched::Preemption::Full) {
-    for (const std::vector<std::uint32_t> &group : system_.groups) {
+  if (task_set_.mode == sched::Preemption::Full) {
+    for (const std::vector<std::uint32_t> &group : task_set_.groups) {
       Effort::spend(group.size());
       // While a job holds the group for a task of this platform level or above, no task of the level preempts it.
       bool is_needed = false;
       Blocker holder;
       for (const std::uint32_t t : group) {
-        const SystemTask &task = system_.tasks[t];
+        const CompiledTask &task = task_set_.tasks[t];
         is_needed = is_needed || task.level <= platform_level;
         if (task.rank <= last) continue;
         const bool is_longer = task.wcet - 1 > holder.amount ||
-                               (task.wcet - 1 == holder.amount && task.rank < system_.tasks[holder.task].rank);
+                               (task.wcet - 1 == holder.amount && task.rank < task_set_.tasks[holder.task].rank);
         if (is_longer && task.wcet > 1) holder = Blocker{t, task.wcet - 1};
       }
       if (is_needed && holder.amount > 0) found.push_back(holder);
@@ -214,7 +215,7 @@ void Views::count_down_to(std::uint32_t level) {
   const std::size_t wanted = down_to(level).size();
   const auto change = [&](std::size_t i, Int128 sign) {
     const std::uint32_t u = by_first_rank_[i];
-    classes_[class_of_[u]].wcet += sign * system_.units[u].volume;
+    classes_[class_of_[u]].wcet += sign * task_set_.units[u].volume;
   };
   for (; counted_ < wanted; ++counted_) change(counted_, 1);
   for (; counted_ > wanted; --counted_) change(counted_ - 1, -1);
@@ -226,7 +227,7 @@ View Views::of(std::uint32_t unit) {
   count_down_to(last);
   for (std::uint32_t c = 0; c < classes_.size(); ++c) {
     const Class &one = classes_[c];
-    const Int128 wcet = one.wcet - (c == class_of_[unit] ? system_.units[unit].volume : 0);
+    const Int128 wcet = one.wcet - (c == class_of_[unit] ? task_set_.units[unit].volume : 0);
     if (wcet > 0) view.more_urgent.push_back(Interferer{saturate(wcet), one.period, one.jitter});
   }
   view.blockers = blockers(unit);
@@ -282,16 +283,16 @@ FixedPoint deferred_response(const Own &own, std::span<const Interferer> more_ur
   }
 }
 
-Bound bound_units(const System &system, bool deferred) {
-  std::vector<ResponseBound> responses(system.units.size());
-  Views views(system);
+Bound bound_units(const TaskSet &task_set, bool deferred) {
+  std::vector<ResponseBound> responses(task_set.units.size());
+  Views views(task_set);
   std::size_t done = 0;
   for (const std::uint32_t u : views.order()) {
-    Effort::reached(done++, system.units.size());
-    const Unit &unit = system.units[u];
+    Effort::reached(done++, task_set.units.size());
+    const Unit &unit = task_set.units[u];
     const View view = views.of(u);
     const Own own{unit.volume, unit.period,   unit.jitter,
-                  unit.limit,  view.blocking, deferred ? last_region_of(system, unit) : 0};
+                  unit.limit,  view.blocking, deferred ? last_region_of(task_set, unit) : 0};
     const FixedPoint result =
         deferred ? deferred_response(own, view.more_urgent) : preemptive_response(own, view.more_urgent);
     if (!result.found) {
@@ -301,10 +302,10 @@ Bound bound_units(const System &system, bool deferred) {
     responses[u].response = result.found->response;
     responses[u].from_ready = result.found->from_ready;
     if (Effort::itemises(u)) {
-      responses[u].terms = terms_of(system, unit, view, views.more_urgent(u), *result.found, deferred);
+      responses[u].terms = terms_of(task_set, unit, view, views.more_urgent(u), *result.found, deferred);
     }
   }
-  return from_units(system, std::move(responses));
+  return from_units(task_set, std::move(responses));
 }
 
 }  // namespace redag::analysis::one_worker

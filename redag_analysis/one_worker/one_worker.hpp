@@ -20,7 +20,7 @@ namespace redag::analysis::one_worker {
 /// static policy, and that its priority explains every wait of a started job. They refuse:
 /// - a max_active of a DAG that is several units (a bound is not inherited), where jobs are preempted;
 /// - groups in cooperative mode (a holder lies under others on its stack), or with an overhead of preemption.
-[[nodiscard]] std::optional<std::string> why_not(const System &system);
+[[nodiscard]] std::optional<std::string> why_not(const TaskSet &task_set);
 
 struct Interferer {
   Duration wcet = 0;
@@ -33,7 +33,7 @@ struct Blocker {
   Duration amount = 0;
 };
 
-/// One unit's view of the system.
+/// One unit's view of the task set.
 struct View {
   std::vector<Interferer> more_urgent;  // those of one period and jitter are combined into one
   std::vector<Blocker> blockers;        // each at most once in a busy period
@@ -42,19 +42,19 @@ struct View {
 
 /// The units that can delay each unit. The level of the busy period is the least urgent task of the unit, lowered until
 /// no tier and no other unit lies on both sides of it (docs/analysis.md, "One worker"). Memory is linear in the size of
-/// the system.
+/// the task set.
 class Views {
  public:
-  /// `system` must outlive this object. O(n log n).
-  explicit Views(const System &system);
+  /// `task_set` must outlive this object. O(n log n).
+  explicit Views(const TaskSet &task_set);
 
   /// Units from the most urgent level to the least; of() is cheap in this order.
   [[nodiscard]] const std::vector<std::uint32_t> &order() const { return order_; }
   /// The level of the busy period as a rank: all work of this rank and above belongs to whole units.
-  [[nodiscard]] std::uint32_t level(std::uint32_t unit) const { return closed_[system_.units[unit].last_rank]; }
+  [[nodiscard]] std::uint32_t level(std::uint32_t unit) const { return closed_[task_set_.units[unit].last_rank]; }
   /// Units with a task of this rank or above, including `unit`, most urgent first.
   [[nodiscard]] std::span<const std::uint32_t> down_to(std::uint32_t level) const;
-  /// The units that can interfere, in the order of System::units.
+  /// The units that can interfere, in the order of TaskSet::units.
   [[nodiscard]] std::vector<std::uint32_t> more_urgent(std::uint32_t unit) const;
   /// The blockers, each with its amount. O(members of groups).
   [[nodiscard]] std::vector<Blocker> blockers(std::uint32_t unit) const;
@@ -74,7 +74,7 @@ class Views {
   void close_levels();
   void find_longest();
 
-  const System &system_;
+  const TaskSet &task_set_;
   std::vector<std::uint32_t> by_first_rank_;  // units
   std::vector<std::uint32_t> order_;
   std::vector<std::uint32_t> closed_;  // by rank: the first level at or below it that splits no unit and no tier
@@ -122,6 +122,6 @@ struct FixedPoint {
 [[nodiscard]] std::int64_t jobs_in(const Interferer &task, Duration window, bool deferred);
 
 /// Turns the fixed point of every unit into response bounds with their terms.
-[[nodiscard]] Bound bound_units(const System &system, bool deferred);
+[[nodiscard]] Bound bound_units(const TaskSet &task_set, bool deferred);
 
 }  // namespace redag::analysis::one_worker

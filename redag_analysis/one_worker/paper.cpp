@@ -21,33 +21,33 @@ namespace {
 constexpr int kMaxSteps = 1'000'000;
 
 // Returns the first assumption of the paper's equations that does not hold here; empty if all hold.
-std::string broken_assumption(const System &system, bool with_blocking) {
-  if (system.policy != PolicyKind::RateMonotonic) return "the policy is not rate_monotonic";
-  if (auto reason = one_worker::why_not(system)) return *reason;
-  if (system.has_edges()) return "callbacks have predecessors: the time they wait for them is not counted";
-  for (const SystemTask &task : system.tasks) {
+std::string broken_assumption(const TaskSet &task_set, bool with_blocking) {
+  if (task_set.policy != PolicyKind::RateMonotonic) return "the policy is not rate_monotonic";
+  if (auto reason = one_worker::why_not(task_set)) return *reason;
+  if (task_set.has_edges()) return "callbacks have predecessors: the time they wait for them is not counted";
+  for (const CompiledTask &task : task_set.tasks) {
     if (task.jitter > 0) return "task '" + task.name + "' has release jitter";
   }
-  for (std::size_t rank = 1; rank < system.by_rank.size(); ++rank) {
-    const SystemTask &task = system.tasks[system.by_rank[rank]];
-    if (task.period == system.tasks[system.by_rank[rank - 1]].period) {
+  for (std::size_t rank = 1; rank < task_set.by_rank.size(); ++rank) {
+    const CompiledTask &task = task_set.tasks[task_set.by_rank[rank]];
+    if (task.period == task_set.tasks[task_set.by_rank[rank - 1]].period) {
       return "task '" + task.name + "' has the period of another one, which then counts for neither";
     }
   }
   if (with_blocking) return {};
-  if (system.mode != sched::Preemption::Full) return "less urgent callbacks are not preempted at once";
-  const one_worker::Views views(system);
-  for (std::uint32_t u = 0; u < system.units.size(); ++u) {
+  if (task_set.mode != sched::Preemption::Full) return "less urgent callbacks are not preempted at once";
+  const one_worker::Views views(task_set);
+  for (std::uint32_t u = 0; u < task_set.units.size(); ++u) {
     if (views.blocking(u) > 0) return "less urgent callbacks can block";
   }
   return {};
 }
 
 // hp(i) of the paper: the tasks with strictly smaller periods.
-std::vector<std::uint32_t> more_urgent(const System &system, const SystemTask &task) {
+std::vector<std::uint32_t> more_urgent(const TaskSet &task_set, const CompiledTask &task) {
   std::vector<std::uint32_t> found;
-  for (std::uint32_t j = 0; j < system.tasks.size(); ++j) {
-    if (system.tasks[j].period < task.period) found.push_back(j);
+  for (std::uint32_t j = 0; j < task_set.tasks.size(); ++j) {
+    if (task_set.tasks[j].period < task.period) found.push_back(j);
   }
   return found;
 }
@@ -58,9 +58,9 @@ struct Rate {
   Duration wcet = 0;
 };
 
-std::vector<Rate> rates_of(const System &system) {
+std::vector<Rate> rates_of(const TaskSet &task_set) {
   std::map<Duration, Duration> wcets;
-  for (const SystemTask &task : system.tasks) wcets[task.period] = add(wcets[task.period], task.wcet);
+  for (const CompiledTask &task : task_set.tasks) wcets[task.period] = add(wcets[task.period], task.wcet);
   std::vector<Rate> rates;
   rates.reserve(wcets.size());
   for (const auto &[period, wcet] : wcets) rates.push_back({period, wcet});
@@ -68,7 +68,7 @@ std::vector<Rate> rates_of(const System &system) {
 }
 
 // The rates of hp(i).
-std::span<const Rate> more_urgent(std::span<const Rate> rates, const SystemTask &task) {
+std::span<const Rate> more_urgent(std::span<const Rate> rates, const CompiledTask &task) {
   const auto end =
       std::partition_point(rates.begin(), rates.end(), [&](const Rate &rate) { return rate.period < task.period; });
   return rates.first(static_cast<std::size_t>(end - rates.begin()));
@@ -87,10 +87,10 @@ std::optional<Duration> recurrence(Duration start, std::span<const Rate> others,
   return std::nullopt;
 }
 
-ResponseBound itemise(const System &system, std::uint32_t t, std::optional<Duration> response, bool once,
+ResponseBound itemise(const TaskSet &task_set, std::uint32_t t, std::optional<Duration> response, bool once,
                       const std::vector<one_worker::Blocker> &blockers) {
   ResponseBound bound;
-  const SystemTask &task = system.tasks[t];
+  const CompiledTask &task = task_set.tasks[t];
   if (!response || *response >= kUnbounded || *response > task.limit) {
     bound.absent = one_worker::kExceedsLimit;
     return bound;
@@ -100,11 +100,11 @@ ResponseBound itemise(const System &system, std::uint32_t t, std::optional<Durat
   bound.terms.push_back(Term{Term::Kind::Own, TaskId(t), task.dag, task.wcet - task.overhead, 1});
   if (task.overhead > 0) bound.terms.push_back(Term{Term::Kind::Overhead, TaskId(t), task.dag, task.overhead, 0});
   for (const one_worker::Blocker &blocker : blockers) {
-    const DagId dag = system.tasks[blocker.task].dag;
+    const DagId dag = task_set.tasks[blocker.task].dag;
     bound.terms.push_back(Term{Term::Kind::Blocking, TaskId(blocker.task), dag, blocker.amount, 1});
   }
-  for (const std::uint32_t j : more_urgent(system, task)) {
-    const SystemTask &other = system.tasks[j];
+  for (const std::uint32_t j : more_urgent(task_set, task)) {
+    const CompiledTask &other = task_set.tasks[j];
     const std::int64_t jobs = once ? 1 : ceil_div(*response, other.period);
     bound.terms.push_back(Term{Term::Kind::Interference, TaskId(j), other.dag, multiply(jobs, other.wcet), jobs});
   }
@@ -112,14 +112,14 @@ ResponseBound itemise(const System &system, std::uint32_t t, std::optional<Durat
 }
 
 // A DAG of independent tasks answers with its last one; for other DAGs the paper gives no bound.
-void fill_dags(const System &system, Bound &bound) {
-  bound.dags.resize(system.dags.size());
-  for (std::size_t d = 0; d < system.dags.size(); ++d) {
+void fill_dags(const TaskSet &task_set, Bound &bound) {
+  bound.dags.resize(task_set.dags.size());
+  for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
     bound.dags[d].absent = "the equations bound callbacks, not DAGs";
-    if (system.dags[d].units.size() != system.dags[d].tasks.size() || system.dags[d].tasks.empty()) continue;
-    for (const std::uint32_t t : system.dags[d].tasks) {
+    if (task_set.dags[d].units.size() != task_set.dags[d].tasks.size() || task_set.dags[d].tasks.empty()) continue;
+    for (const std::uint32_t t : task_set.dags[d].tasks) {
       const ResponseBound &task = bound.tasks[t];
-      if (t == system.dags[d].tasks.front() ||
+      if (t == task_set.dags[d].tasks.front() ||
           task.response.value_or(kNever) > bound.dags[d].response.value_or(kNever)) {
         bound.dags[d] = task;
       }
@@ -127,30 +127,30 @@ void fill_dags(const System &system, Bound &bound) {
   }
 }
 
-Outcome apply_rm_bound(const System &system) {
+Outcome apply_rm_bound(const TaskSet &task_set) {
   Bound bound;
-  const auto n = static_cast<double>(system.tasks.size());
+  const auto n = static_cast<double>(task_set.tasks.size());
   const double limit = n * std::expm1(std::log(2.0) / n);
   Shares shares;
-  for (const SystemTask &task : system.tasks) shares.push({static_cast<Uint128>(task.wcet), task.period});
+  for (const CompiledTask &task : task_set.tasks) shares.push({static_cast<Uint128>(task.wcet), task.period});
   bound.accepts = shares.size() > 0 && is_within_liu_layland(shares, shares.size());
   char text[96];
-  std::snprintf(text, sizeof text, "U = %.4f, limit %.4f for %zu callbacks", system.utilization, limit,
-                system.tasks.size());
+  std::snprintf(text, sizeof text, "U = %.4f, limit %.4f for %zu callbacks", task_set.utilization, limit,
+                task_set.tasks.size());
   bound.figures = text;
   // N callbacks are at least as many as tasks or DAGs, and the limit falls with N. The test is thus sound where Liu and
   // Layland's is.
-  const Outcome proper = liu_layland().apply(system);
+  const Outcome proper = liu_layland().apply(task_set);
   if (const auto *reason = std::get_if<NotApplicable>(&proper)) bound.unsound = reason->reason;
   return bound;
 }
 
-Outcome apply_interference(const System &system) {
+Outcome apply_interference(const TaskSet &task_set) {
   Bound bound;
-  bound.unsound = broken_assumption(system, false);
-  const std::vector<Rate> rates = rates_of(system);
-  for (std::uint32_t t = 0; t < system.tasks.size(); ++t) {
-    const SystemTask &task = system.tasks[t];
+  bound.unsound = broken_assumption(task_set, false);
+  const std::vector<Rate> rates = rates_of(task_set);
+  for (std::uint32_t t = 0; t < task_set.tasks.size(); ++t) {
+    const CompiledTask &task = task_set.tasks[t];
     Duration response = task.wcet;
     const std::span<const Rate> others = more_urgent(rates, task);
     Effort::spend(others.size());
@@ -159,35 +159,35 @@ Outcome apply_interference(const System &system) {
     if (bound.unsound.empty() && response > shortest) {
       bound.unsound = "'" + task.name + "': a more urgent task comes again before it ends and is counted once";
     }
-    bound.tasks.push_back(itemise(system, t, response, true, {}));
+    bound.tasks.push_back(itemise(task_set, t, response, true, {}));
   }
-  fill_dags(system, bound);
+  fill_dags(task_set, bound);
   return bound;
 }
 
-Outcome apply_recurrence(const System &system, bool with_blocking) {
+Outcome apply_recurrence(const TaskSet &task_set, bool with_blocking) {
   Bound bound;
-  bound.unsound = broken_assumption(system, with_blocking);
-  const std::vector<Rate> rates = rates_of(system);
-  const one_worker::Views views(system);
-  for (std::uint32_t t = 0; t < system.tasks.size(); ++t) {
-    const SystemTask &task = system.tasks[t];
+  bound.unsound = broken_assumption(task_set, with_blocking);
+  const std::vector<Rate> rates = rates_of(task_set);
+  const one_worker::Views views(task_set);
+  for (std::uint32_t t = 0; t < task_set.tasks.size(); ++t) {
+    const CompiledTask &task = task_set.tasks[t];
     std::vector<one_worker::Blocker> blockers;
     if (with_blocking) blockers = views.blockers(task.unit);
     Duration start = task.wcet;
     for (const one_worker::Blocker &blocker : blockers) start = add(start, blocker.amount);
     const auto response = recurrence(start, more_urgent(rates, task), task.period);
-    bound.tasks.push_back(itemise(system, t, response, false, blockers));
+    bound.tasks.push_back(itemise(task_set, t, response, false, blockers));
   }
-  fill_dags(system, bound);
+  fill_dags(task_set, bound);
   return bound;
 }
 
-Outcome apply_rta(const System &system) { return apply_recurrence(system, false); }
-Outcome apply_rta_blocking(const System &system) { return apply_recurrence(system, true); }
+Outcome apply_rta(const TaskSet &task_set) { return apply_recurrence(task_set, false); }
+Outcome apply_rta_blocking(const TaskSet &task_set) { return apply_recurrence(task_set, true); }
 
 Method make(std::string_view name, Subject subject, std::string_view equation, std::string_view sound_only_if,
-            std::string_view complexity, Outcome (*apply)(const System &)) {
+            std::string_view complexity, Outcome (*apply)(const TaskSet &)) {
   return Method{
       .name = name,
       .subject = subject,
@@ -202,7 +202,7 @@ Method make(std::string_view name, Subject subject, std::string_view equation, s
 }  // namespace
 
 Method paper_rm_bound() {
-  return make("paper_rm_bound", Subject::System, "ReDAG-RT, eq. rm_bound",
+  return make("paper_rm_bound", Subject::TaskSet, "ReDAG-RT, eq. rm_bound",
               "one worker, full preemption, rate-monotonic order, D >= T, no jitter, no blocking; DAGs of one rate",
               "O(n)", apply_rm_bound);
 }

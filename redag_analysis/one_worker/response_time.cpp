@@ -9,11 +9,11 @@
 namespace redag::analysis {
 namespace {
 
-std::optional<std::string> why_not(const System &system, sched::Preemption mode, bool edges) {
-  if (auto reason = one_worker::why_not(system)) return reason;
-  if (edges && !system.has_edges()) return "no task has predecessors: see the bounds for independent tasks";
-  if (!edges && system.has_edges()) return "tasks have predecessors: see the bounds for DAGs";
-  if (system.mode == mode) return std::nullopt;
+std::optional<std::string> why_not(const TaskSet &task_set, sched::Preemption mode, bool edges) {
+  if (auto reason = one_worker::why_not(task_set)) return reason;
+  if (edges && !task_set.has_edges()) return "no task has predecessors: see the bounds for independent tasks";
+  if (!edges && task_set.has_edges()) return "tasks have predecessors: see the bounds for DAGs";
+  if (task_set.mode == mode) return std::nullopt;
   switch (mode) {
     case sched::Preemption::None: return "for jobs that run to completion; here they can be preempted";
     case sched::Preemption::Cooperative: return "for cooperative jobs with preemption points";
@@ -22,32 +22,32 @@ std::optional<std::string> why_not(const System &system, sched::Preemption mode,
   return "for full preemption; here jobs keep the worker until they end or reach a preemption point";
 }
 
-Outcome independent_full(const System &system) {
-  if (auto reason = why_not(system, sched::Preemption::Full, false)) return NotApplicable{*reason};
-  return one_worker::bound_units(system, false);
+Outcome independent_full(const TaskSet &task_set) {
+  if (auto reason = why_not(task_set, sched::Preemption::Full, false)) return NotApplicable{*reason};
+  return one_worker::bound_units(task_set, false);
 }
 
-Outcome independent_none(const System &system) {
-  if (auto reason = why_not(system, sched::Preemption::None, false)) return NotApplicable{*reason};
-  return one_worker::bound_units(system, true);
+Outcome independent_none(const TaskSet &task_set) {
+  if (auto reason = why_not(task_set, sched::Preemption::None, false)) return NotApplicable{*reason};
+  return one_worker::bound_units(task_set, true);
 }
 
-Outcome independent_cooperative(const System &system) {
-  if (auto reason = why_not(system, sched::Preemption::Cooperative, false)) return NotApplicable{*reason};
-  return one_worker::bound_units(system, true);
+Outcome independent_cooperative(const TaskSet &task_set) {
+  if (auto reason = why_not(task_set, sched::Preemption::Cooperative, false)) return NotApplicable{*reason};
+  return one_worker::bound_units(task_set, true);
 }
 
-Outcome dags_full(const System &system) {
-  if (auto reason = why_not(system, sched::Preemption::Full, true)) return NotApplicable{*reason};
-  return one_worker::bound_units(system, false);
+Outcome dags_full(const TaskSet &task_set) {
+  if (auto reason = why_not(task_set, sched::Preemption::Full, true)) return NotApplicable{*reason};
+  return one_worker::bound_units(task_set, false);
 }
 
-Outcome dags_deferred(const System &system) {
+Outcome dags_deferred(const TaskSet &task_set) {
   const auto mode =
-      system.mode == sched::Preemption::Full ? sched::Preemption::None : system.mode;  // both None and Cooperative are
-                                                                                       // accepted
-  if (auto reason = why_not(system, mode, true)) return NotApplicable{*reason};
-  return one_worker::bound_units(system, true);
+      task_set.mode == sched::Preemption::Full ? sched::Preemption::None : task_set.mode;  // both None and Cooperative
+                                                                                           // are accepted
+  if (auto reason = why_not(task_set, mode, true)) return NotApplicable{*reason};
+  return one_worker::bound_units(task_set, true);
 }
 
 }  // namespace
@@ -66,7 +66,7 @@ Method rta_preemptive() {
           "shared "
           "groups with priority inheritance, shared levels",
       .complexity = "pseudo-polynomial; O(n) a step",
-      .apply = [](const System &system) { return across_rates(system, independent_full); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_full); },
   };
 }
 
@@ -82,7 +82,7 @@ Method rta_nonpreemptive() {
           "jitter, "
           "groups",
       .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
-      .apply = [](const System &system) { return across_rates(system, independent_none); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_none); },
   };
 }
 
@@ -98,7 +98,7 @@ Method rta_deferred() {
           "shared groups; any "
           "deadlines, release jitter, shared levels",
       .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
-      .apply = [](const System &system) { return across_rates(system, independent_cooperative); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_cooperative); },
   };
 }
 
@@ -111,7 +111,7 @@ Method dag_one_worker_preemptive() {
           "one worker, full preemption, static priorities; R <= T for DAGs; timers that keep their periods where edges "
           "join rates; jitter, groups with inheritance, shared levels, max_active",
       .complexity = "pseudo-polynomial; O(n) a step",
-      .apply = [](const System &system) { return across_rates(system, dags_full); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, dags_full); },
   };
 }
 
@@ -125,7 +125,7 @@ Method dag_one_worker_deferred() {
           "that "
           "keep their periods where edges join rates; jitter, max_active; groups unless cooperative",
       .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
-      .apply = [](const System &system) { return across_rates(system, dags_deferred); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, dags_deferred); },
   };
 }
 

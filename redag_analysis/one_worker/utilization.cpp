@@ -38,34 +38,35 @@ Bound answer(bool accepts, std::string figures) {
 }
 
 // Returns the units from the most urgent to the least; empty if their priorities are interleaved.
-std::optional<std::vector<std::uint32_t>> units_by_rank(const System &system) {
+std::optional<std::vector<std::uint32_t>> units_by_rank(const TaskSet &task_set) {
   std::vector<std::uint32_t> order;
   std::uint32_t end = 0;  // the ranks below it are covered by whole units
-  for (const std::uint32_t t : system.by_rank) {
-    const std::uint32_t u = system.tasks[t].unit;
-    if (system.units[u].first_rank != system.tasks[t].rank) continue;
-    if (system.units[u].first_rank < end) return std::nullopt;
-    end = system.units[u].last_rank + 1;
+  for (const std::uint32_t t : task_set.by_rank) {
+    const std::uint32_t u = task_set.tasks[t].unit;
+    if (task_set.units[u].first_rank != task_set.tasks[t].rank) continue;
+    if (task_set.units[u].first_rank < end) return std::nullopt;
+    end = task_set.units[u].last_rank + 1;
     order.push_back(u);
   }
   return order;
 }
 
 // True if the units share a tier: each can go before the other.
-bool take_turns(const System &system, const Unit &upper, const Unit &lower) {
-  return system.tasks[system.by_rank[upper.last_rank]].tier == system.tasks[system.by_rank[lower.first_rank]].tier;
+bool take_turns(const TaskSet &task_set, const Unit &upper, const Unit &lower) {
+  return task_set.tasks[task_set.by_rank[upper.last_rank]].tier ==
+         task_set.tasks[task_set.by_rank[lower.first_rank]].tier;
 }
 
 // Returns why a test by utilizations does not apply: jitter, deadlines below the period, or another order than by rate.
 // Equals of one period are allowed. Whichever goes first, each waits for no more than the last one in a fixed order
 // does.
-std::optional<std::string> why_not_by_rate(const System &system, const std::vector<std::uint32_t> &order) {
+std::optional<std::string> why_not_by_rate(const TaskSet &task_set, const std::vector<std::uint32_t> &order) {
   Duration last = 0;
   for (std::size_t i = 0; i < order.size(); ++i) {
-    const Unit &unit = system.units[order[i]];
-    const std::string name = unit.tasks.size() == 1 ? "task '" + system.tasks[unit.tasks.front()].name + "'"
-                                                    : "DAG '" + system.dags[unit.dag.value].name + "'";
-    if (i > 0 && unit.period != last && take_turns(system, system.units[order[i - 1]], unit)) {
+    const Unit &unit = task_set.units[order[i]];
+    const std::string name = unit.tasks.size() == 1 ? "task '" + task_set.tasks[unit.tasks.front()].name + "'"
+                                                    : "DAG '" + task_set.dags[unit.dag.value].name + "'";
+    if (i > 0 && unit.period != last && take_turns(task_set, task_set.units[order[i - 1]], unit)) {
       return name + ": it takes turns with one of another period";
     }
     if (unit.deadline < unit.period) return name + ": its deadline is below its period";
@@ -81,15 +82,15 @@ struct Prepared {
   std::vector<Duration> blocking;
 };
 
-std::optional<std::string> prepare(const System &system, bool with_blocking, Prepared &prepared) {
-  if (auto reason = one_worker::why_not(system)) return reason;
-  const auto order = units_by_rank(system);
+std::optional<std::string> prepare(const TaskSet &task_set, bool with_blocking, Prepared &prepared) {
+  if (auto reason = one_worker::why_not(task_set)) return reason;
+  const auto order = units_by_rank(task_set);
   if (!order) return "tasks of other DAGs stand between those of one DAG in the order of priorities";
-  if (auto reason = why_not_by_rate(system, *order)) return reason;
-  if (!with_blocking && system.mode != sched::Preemption::Full)
+  if (auto reason = why_not_by_rate(task_set, *order)) return reason;
+  if (!with_blocking && task_set.mode != sched::Preemption::Full)
     return "for full preemption: see the test with blocking";
   prepared.order = *order;
-  const one_worker::Views views(system);
+  const one_worker::Views views(task_set);
   for (const std::uint32_t u : *order) {
     prepared.blocking.push_back(views.blocking(u));
     if (!with_blocking && prepared.blocking.back() > 0) {
@@ -103,24 +104,24 @@ Share share_of(const Unit &unit, Duration blocking = 0) {
   return Share{static_cast<Uint128>(unit.volume) + static_cast<Uint128>(blocking), unit.period};
 }
 
-Shares shares_of(const System &system) {
+Shares shares_of(const TaskSet &task_set) {
   Shares shares;
-  for (const Unit &unit : system.units) shares.push(share_of(unit));
+  for (const Unit &unit : task_set.units) shares.push(share_of(unit));
   return shares;
 }
 
-Outcome apply_liu_layland(const System &system) {
+Outcome apply_liu_layland(const TaskSet &task_set) {
   Prepared prepared;
-  if (auto reason = prepare(system, false, prepared)) return NotApplicable{*reason};
-  const Shares shares = shares_of(system);
+  if (auto reason = prepare(task_set, false, prepared)) return NotApplicable{*reason};
+  const Shares shares = shares_of(task_set);
   return answer(is_within_liu_layland(shares, shares.size()),
                 figures("U", rounded(shares.sum()), liu_layland_limit(shares.size())));
 }
 
-Outcome apply_hyperbolic(const System &system) {
+Outcome apply_hyperbolic(const TaskSet &task_set) {
   Prepared prepared;
-  if (auto reason = prepare(system, false, prepared)) return NotApplicable{*reason};
-  const Shares shares = shares_of(system);
+  if (auto reason = prepare(task_set, false, prepared)) return NotApplicable{*reason};
+  const Shares shares = shares_of(task_set);
   return answer(is_within_hyperbolic(shares), figures("prod (U_i + 1)", rounded(shares.product()), 2 * kOne));
 }
 
@@ -128,8 +129,8 @@ Outcome apply_hyperbolic(const System &system) {
 // period are always in one chain, and therefore only different periods matter.
 class ChainCover {
  public:
-  explicit ChainCover(const System &system) {
-    for (const Unit &unit : system.units) periods_.push_back(unit.period);
+  explicit ChainCover(const TaskSet &task_set) {
+    for (const Unit &unit : task_set.units) periods_.push_back(unit.period);
     std::sort(periods_.begin(), periods_.end());
     periods_.erase(std::unique(periods_.begin(), periods_.end()), periods_.end());
     next_.assign(periods_.size(), kNone);
@@ -184,26 +185,26 @@ class ChainCover {
   std::vector<std::size_t> next_;  // by longer period: its predecessor in its chain
 };
 
-Outcome apply_harmonic_chains(const System &system) {
+Outcome apply_harmonic_chains(const TaskSet &task_set) {
   Prepared prepared;
-  if (auto reason = prepare(system, false, prepared)) return NotApplicable{*reason};
-  const std::size_t chains = ChainCover(system).chains();
-  const Shares shares = shares_of(system);
+  if (auto reason = prepare(task_set, false, prepared)) return NotApplicable{*reason};
+  const std::size_t chains = ChainCover(task_set).chains();
+  const Shares shares = shares_of(task_set);
   return answer(is_within_liu_layland(shares, chains), figures("U", rounded(shares.sum()), liu_layland_limit(chains)) +
                                                            ", " + std::to_string(chains) + " harmonic chains");
 }
 
 // Tests level by level, each with its blocking; the answer names the first level above its limit.
 template <class Within, class Figures>
-Outcome apply_by_level(const System &system, Within is_within, Figures figures_of) {
+Outcome apply_by_level(const TaskSet &task_set, Within is_within, Figures figures_of) {
   Prepared prepared;
-  if (auto reason = prepare(system, true, prepared)) return NotApplicable{*reason};
+  if (auto reason = prepare(task_set, true, prepared)) return NotApplicable{*reason};
   Shares shares;
   for (std::size_t i = 0; i < prepared.order.size(); ++i) {
-    const Unit &unit = system.units[prepared.order[i]];
+    const Unit &unit = task_set.units[prepared.order[i]];
     shares.push(share_of(unit, prepared.blocking[i]));
     if (!is_within(shares)) {
-      return answer(false, figures_of(shares) + " at '" + system.tasks[unit.tasks.front()].name + "'");
+      return answer(false, figures_of(shares) + " at '" + task_set.tasks[unit.tasks.front()].name + "'");
     }
     shares.pop();
     shares.push(share_of(unit));
@@ -211,41 +212,41 @@ Outcome apply_by_level(const System &system, Within is_within, Figures figures_o
   return answer(true, "every level within its limit");
 }
 
-Outcome apply_liu_layland_blocking(const System &system) {
+Outcome apply_liu_layland_blocking(const TaskSet &task_set) {
   return apply_by_level(
-      system, [](const Shares &shares) { return is_within_liu_layland(shares, shares.size()); },
+      task_set, [](const Shares &shares) { return is_within_liu_layland(shares, shares.size()); },
       [](const Shares &shares) {
         return figures("U + B / T", rounded(shares.sum()), liu_layland_limit(shares.size()));
       });
 }
 
-Outcome apply_hyperbolic_blocking(const System &system) {
+Outcome apply_hyperbolic_blocking(const TaskSet &task_set) {
   return apply_by_level(
-      system, [](const Shares &shares) { return is_within_hyperbolic(shares); },
+      task_set, [](const Shares &shares) { return is_within_hyperbolic(shares); },
       [](const Shares &shares) { return figures("product", rounded(shares.product()), 2 * kOne); });
 }
 
 // Returns why a global test does not apply. It needs m workers, full preemption and independent tasks, and that only
 // priority delays a job.
-std::optional<std::string> why_not_global(const System &system) {
-  if (auto reason = why_not_directly(system)) return reason;
+std::optional<std::string> why_not_global(const TaskSet &task_set) {
+  if (auto reason = why_not_directly(task_set)) return reason;
   // With m = 1 the limits would be 1 or more, which fixed priorities do not reach.
-  if (system.platform.workers < 2) return "for two workers or more";
-  if (!is_static(system.policy)) {
-    return std::string("for rate-monotonic priorities; the policy is ") + to_string(system.policy);
+  if (task_set.platform.workers < 2) return "for two workers or more";
+  if (!is_static(task_set.policy)) {
+    return std::string("for rate-monotonic priorities; the policy is ") + to_string(task_set.policy);
   }
-  if (system.mode != sched::Preemption::Full) return "for full preemption";
-  if (system.has_edges()) return "tasks have predecessors";
-  if (!system.groups.empty()) return "tasks share groups";
-  for (const SystemDag &dag : system.dags) {
+  if (task_set.mode != sched::Preemption::Full) return "for full preemption";
+  if (task_set.has_edges()) return "tasks have predecessors";
+  if (!task_set.groups.empty()) return "tasks share groups";
+  for (const CompiledDag &dag : task_set.dags) {
     if (dag.max_active > 0 && dag.tasks.size() > 1) return "DAG '" + dag.name + "' has a max_active";
   }
-  for (std::size_t rank = 1; rank < system.by_rank.size(); ++rank) {
-    const SystemTask &upper = system.tasks[system.by_rank[rank - 1]];
-    const SystemTask &lower = system.tasks[system.by_rank[rank]];
+  for (std::size_t rank = 1; rank < task_set.by_rank.size(); ++rank) {
+    const CompiledTask &upper = task_set.tasks[task_set.by_rank[rank - 1]];
+    const CompiledTask &lower = task_set.tasks[task_set.by_rank[rank]];
     if (upper.level == lower.level && upper.tier != lower.tier) return "tasks of different priority share levels";
   }
-  return why_not_by_rate(system, *units_by_rank(system));
+  return why_not_by_rate(task_set, *units_by_rank(task_set));
 }
 
 // The largest share alone.
@@ -256,10 +257,10 @@ Shares largest(const Shares &shares) {
   return one;
 }
 
-Outcome apply_global_rm_light(const System &system) {
-  if (auto reason = why_not_global(system)) return NotApplicable{*reason};
-  const std::uint64_t m = system.platform.workers;
-  const Shares shares = shares_of(system);
+Outcome apply_global_rm_light(const TaskSet &task_set) {
+  if (auto reason = why_not_global(task_set)) return NotApplicable{*reason};
+  const std::uint64_t m = task_set.platform.workers;
+  const Shares shares = shares_of(task_set);
   const Shares most = largest(shares);
   const bool fits = is_sum_within(shares, m * m, 3 * m - 2) && is_sum_within(most, m, 3 * m - 2);
   const auto divisor = static_cast<Int128>(3 * m - 2);
@@ -267,10 +268,10 @@ Outcome apply_global_rm_light(const System &system) {
                           figures("max U_i", rounded(most.sum()), static_cast<Int128>(m) * kOne / divisor));
 }
 
-Outcome apply_global_rm_utilization(const System &system) {
-  if (auto reason = why_not_global(system)) return NotApplicable{*reason};
-  const std::uint64_t m = system.platform.workers;
-  const Shares shares = shares_of(system);
+Outcome apply_global_rm_utilization(const TaskSet &task_set) {
+  if (auto reason = why_not_global(task_set)) return NotApplicable{*reason};
+  const std::uint64_t m = task_set.platform.workers;
+  const Shares shares = shares_of(task_set);
   const Shares most = largest(shares);
   Shares weighted;  // 2 U + (m - 2) u <= m
   for (const Share &share : shares.all()) weighted.push({share.amount * 2, share.period});
@@ -280,10 +281,10 @@ Outcome apply_global_rm_utilization(const System &system) {
 }
 
 Method make(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
-            Outcome (*apply)(const System &)) {
+            Outcome (*apply)(const TaskSet &)) {
   return Method{
       .name = name,
-      .subject = Subject::System,
+      .subject = Subject::TaskSet,
       .cite = cite,
       .assumptions = assumptions,
       .complexity = complexity,

@@ -117,7 +117,7 @@ struct Load {
   Duration period;
 };
 
-System independent(const std::vector<Load> &loads, std::uint32_t workers = 1) {
+TaskSet independent(const std::vector<Load> &loads, std::uint32_t workers = 1) {
   Workload workload;
   workload.name = "w";
   workload.platform.workers = workers;
@@ -135,8 +135,8 @@ System independent(const std::vector<Load> &loads, std::uint32_t workers = 1) {
   return compile(workload, platform_of(workload)).value();
 }
 
-bool accepts(const Method &method, const System &system) {
-  const Outcome outcome = method.apply(system);
+bool accepts(const Method &method, const TaskSet &task_set) {
+  const Outcome outcome = method.apply(task_set);
   const Bound *bound = std::get_if<Bound>(&outcome);
   return bound != nullptr && bound->accepts == true;
 }

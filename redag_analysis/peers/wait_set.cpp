@@ -14,35 +14,35 @@ namespace redag::analysis {
 namespace {
 
 // The responses from readiness to finish, by TaskId.
-std::vector<Duration> responses_from_ready(const System &system) {
+std::vector<Duration> responses_from_ready(const TaskSet &task_set) {
   Duration all = 0;
-  for (const SystemTask &task : system.tasks) all = add(all, task.wcet);
-  std::vector<Duration> result(system.tasks.size());
+  for (const CompiledTask &task : task_set.tasks) all = add(all, task.wcet);
+  std::vector<Duration> result(task_set.tasks.size());
   Duration before = 0;  // timers are registered before subscriptions, each in the order of TaskIds
   for (const bool data : {false, true}) {
-    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
-      const SystemTask &task = system.tasks[t];
+    for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
+      const CompiledTask &task = task_set.tasks[t];
       if (task.data != data) continue;
-      result[t] = add(task.wcet, add(all - task.wcet, before) / system.platform.workers);
+      result[t] = add(task.wcet, add(all - task.wcet, before) / task_set.platform.workers);
       before = add(before, task.wcet);
     }
   }
   return result;
 }
 
-ResponseBound bound_of(const System &system, const Unit &unit, const std::vector<Duration> &from_ready) {
-  std::vector<Duration> paths(system.tasks.size(), 0);  // the longest sum that ends with a task; `own`: its executions
-                                                        // alone
-  std::vector<Duration> own(system.tasks.size(), 0);
+ResponseBound bound_of(const TaskSet &task_set, const Unit &unit, const std::vector<Duration> &from_ready) {
+  std::vector<Duration> paths(task_set.tasks.size(), 0);  // the longest sum that ends with a task; `own`: its
+                                                          // executions alone
+  std::vector<Duration> own(task_set.tasks.size(), 0);
   std::uint32_t last = unit.tasks.front();
   for (const std::uint32_t t : unit.tasks) {
-    for (const std::uint32_t p : system.tasks[t].predecessors) {
+    for (const std::uint32_t p : task_set.tasks[t].predecessors) {
       if (paths[p] <= paths[t]) continue;
       paths[t] = paths[p];
       own[t] = own[p];
     }
     paths[t] = add(paths[t], from_ready[t]);
-    own[t] = add(own[t], system.tasks[t].wcet);
+    own[t] = add(own[t], task_set.tasks[t].wcet);
     if (paths[t] > paths[last]) last = t;
   }
   ResponseBound bound;
@@ -58,14 +58,15 @@ ResponseBound bound_of(const System &system, const Unit &unit, const std::vector
   return bound;
 }
 
-Outcome apply_wait_set(const System &system) {
-  if (auto reason = why_not_directly(system)) return NotApplicable{*reason};
-  if (system.mode != sched::Preemption::None) return NotApplicable{"rclcpp's executors do not preempt"};
-  if (!system.groups.empty()) return NotApplicable{"exclusive groups: a busy group's callbacks can miss every window"};
-  const std::vector<Duration> from_ready = responses_from_ready(system);
+Outcome apply_wait_set(const TaskSet &task_set) {
+  if (auto reason = why_not_directly(task_set)) return NotApplicable{*reason};
+  if (task_set.mode != sched::Preemption::None) return NotApplicable{"rclcpp's executors do not preempt"};
+  if (!task_set.groups.empty())
+    return NotApplicable{"exclusive groups: a busy group's callbacks can miss every window"};
+  const std::vector<Duration> from_ready = responses_from_ready(task_set);
   std::vector<ResponseBound> responses;
-  for (const Unit &unit : system.units) responses.push_back(bound_of(system, unit, from_ready));
-  return from_units(system, std::move(responses));
+  for (const Unit &unit : task_set.units) responses.push_back(bound_of(task_set, unit, from_ready));
+  return from_units(task_set, std::move(responses));
 }
 
 }  // namespace

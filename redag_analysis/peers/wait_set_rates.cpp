@@ -45,28 +45,28 @@ class Executor {
   using Respond =
       std::function<std::optional<FromReady>(const std::vector<Callback> &callbacks, std::size_t i, Duration limit)>;
 
-  Executor(const System &system, Respond respond) : system_(system), respond_(std::move(respond)) {
-    callbacks_.resize(system.tasks.size());
+  Executor(const TaskSet &task_set, Respond respond) : task_set_(task_set), respond_(std::move(respond)) {
+    callbacks_.resize(task_set.tasks.size());
     std::size_t place = 0;
     for (const bool data : {false, true}) {  // timers before subscriptions, each in the order of TaskIds
-      for (std::size_t t = 0; t < system.tasks.size(); ++t) {
-        const SystemTask &task = system.tasks[t];
-        if (task.data == data) callbacks_[t] = {task.wcet, system.units[task.unit].period, 0, task.wcet, place++};
+      for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
+        const CompiledTask &task = task_set.tasks[t];
+        if (task.data == data) callbacks_[t] = {task.wcet, task_set.units[task.unit].period, 0, task.wcet, place++};
       }
     }
   }
 
   Outcome run() {
     const std::string_view absent = solve();
-    std::vector<ResponseBound> responses(system_.units.size());
+    std::vector<ResponseBound> responses(task_set_.units.size());
     for (std::size_t u = 0; u < responses.size(); ++u) {
       if (absent.empty()) {
-        responses[u] = explain(system_.units[u]);
+        responses[u] = explain(task_set_.units[u]);
       } else {
         responses[u].absent = absent;
       }
     }
-    return from_units(system_, std::move(responses));
+    return from_units(task_set_, std::move(responses));
   }
 
  private:
@@ -74,7 +74,7 @@ class Executor {
   std::string_view solve() {
     std::vector<Duration *> values;
     std::vector<std::uint32_t> whose;
-    for (const Unit &unit : system_.units) {
+    for (const Unit &unit : task_set_.units) {
       for (const std::uint32_t t : unit.tasks) {
         values.push_back(&callbacks_[t].ready);
         values.push_back(&callbacks_[t].response);
@@ -92,7 +92,7 @@ class Executor {
 
   bool respond(std::uint32_t t) {
     Callback &callback = callbacks_[t];
-    const Duration limit = limit_of(system_.units[system_.tasks[t].unit]) - callback.ready;
+    const Duration limit = limit_of(task_set_.units[task_set_.tasks[t].unit]) - callback.ready;
     if (limit < callback.wcet) return false;
     Effort::spend(callbacks_.size());
     const auto found = respond_(callbacks_, t, limit);
@@ -104,7 +104,7 @@ class Executor {
   static Duration limit_of(const Unit &unit) { return std::min(unit.limit, unit.period); }
 
   [[nodiscard]] Duration latest_arrival(std::uint32_t t) const {
-    const SystemTask &task = system_.tasks[t];
+    const CompiledTask &task = task_set_.tasks[t];
     Duration latest = task.data ? 0 : task.jitter;
     for (const std::uint32_t p : task.predecessors) {
       latest = std::max(latest, add(callbacks_[p].ready, callbacks_[p].response));
@@ -119,7 +119,7 @@ class Executor {
                                          [&](std::uint32_t a, std::uint32_t b) { return end(a) < end(b); });
     ResponseBound bound;
     bound.response = end(at);
-    if (!Effort::itemises(static_cast<std::uint32_t>(&unit - system_.units.data()))) return bound;
+    if (!Effort::itemises(static_cast<std::uint32_t>(&unit - task_set_.units.data()))) return bound;
     std::map<std::size_t, Duration> shares;
     Duration own = 0;
     Duration earlier = 0;
@@ -133,7 +133,7 @@ class Executor {
       }
       jitter = callbacks_[at].ready;
       more = false;
-      for (const std::uint32_t p : system_.tasks[at].predecessors) {
+      for (const std::uint32_t p : task_set_.tasks[at].predecessors) {
         if (end(p) != jitter) continue;
         at = p;
         jitter = 0;
@@ -144,29 +144,29 @@ class Executor {
     bound.terms.push_back(Term{Term::Kind::Own, TaskId(), unit.dag, own, 1});
     if (earlier != 0) bound.terms.push_back(Term{Term::Kind::Earlier, TaskId(), unit.dag, earlier, 0});
     for (const auto &[j, amount] : shares) {
-      bound.terms.push_back(Term{Term::Kind::Interference, TaskId(j), system_.tasks[j].dag, amount, 0});
+      bound.terms.push_back(Term{Term::Kind::Interference, TaskId(j), task_set_.tasks[j].dag, amount, 0});
     }
     if (jitter > 0) bound.terms.push_back(Term{Term::Kind::Jitter, TaskId(), unit.dag, jitter, 0});
     return bound;
   }
 
-  const System &system_;
+  const TaskSet &task_set_;
   Respond respond_;
   std::vector<Callback> callbacks_;  // by TaskId
 };
 
-std::optional<std::string> why_not(const System &system) {
-  if (auto reason = why_not_directly(system)) return reason;
-  if (system.mode != sched::Preemption::None) return "rclcpp's executors do not preempt";
-  if (!system.groups.empty()) return "exclusive groups: a busy group's callbacks can miss every window";
+std::optional<std::string> why_not(const TaskSet &task_set) {
+  if (auto reason = why_not_directly(task_set)) return reason;
+  if (task_set.mode != sched::Preemption::None) return "rclcpp's executors do not preempt";
+  if (!task_set.groups.empty()) return "exclusive groups: a busy group's callbacks can miss every window";
   return std::nullopt;
 }
 
-std::optional<std::string> why_not_one_thread(const System &system) {
-  if (system.platform.workers != 1) {
-    return "for one thread; the platform has " + std::to_string(system.platform.workers) + " workers";
+std::optional<std::string> why_not_one_thread(const TaskSet &task_set) {
+  if (task_set.platform.workers != 1) {
+    return "for one thread; the platform has " + std::to_string(task_set.platform.workers) + " workers";
   }
-  return why_not(system);
+  return why_not(task_set);
 }
 
 // Where all keep J + R <= T, the published busy window holds one job of each callback (docs/analysis.md, "rclcpp's
@@ -253,25 +253,25 @@ std::optional<FromReady> rates_response(const std::vector<Callback> &callbacks, 
   return result;
 }
 
-Outcome apply_casini(const System &system) {
-  if (auto reason = why_not_one_thread(system)) return NotApplicable{*reason};
-  return Executor(system, casini_response).run();
+Outcome apply_casini(const TaskSet &task_set) {
+  if (auto reason = why_not_one_thread(task_set)) return NotApplicable{*reason};
+  return Executor(task_set, casini_response).run();
 }
 
-Outcome apply_blass(const System &system) {
-  if (auto reason = why_not_one_thread(system)) return NotApplicable{*reason};
-  return Executor(system, blass_response).run();
+Outcome apply_blass(const TaskSet &task_set) {
+  if (auto reason = why_not_one_thread(task_set)) return NotApplicable{*reason};
+  return Executor(task_set, blass_response).run();
 }
 
-Outcome apply_rates(const System &system) {
-  if (auto reason = why_not(system)) return NotApplicable{*reason};
-  const std::uint32_t threads = system.platform.workers;
-  const Duration longest = kUnbounded / 4 / threads / static_cast<Duration>(system.tasks.size() + 2);
-  for (const Unit &unit : system.units) {
+Outcome apply_rates(const TaskSet &task_set) {
+  if (auto reason = why_not(task_set)) return NotApplicable{*reason};
+  const std::uint32_t threads = task_set.platform.workers;
+  const Duration longest = kUnbounded / 4 / threads / static_cast<Duration>(task_set.tasks.size() + 2);
+  for (const Unit &unit : task_set.units) {
     if (std::max(unit.period, unit.volume) > longest) return NotApplicable{"times too long for exact sums"};
   }
-  return Executor(system, [threads](const std::vector<Callback> &callbacks, std::size_t i,
-                                    Duration limit) { return rates_response(callbacks, i, limit, threads); })
+  return Executor(task_set, [threads](const std::vector<Callback> &callbacks, std::size_t i,
+                                      Duration limit) { return rates_response(callbacks, i, limit, threads); })
       .run();
 }
 
@@ -280,7 +280,7 @@ constexpr std::string_view kOneThread =
     "a DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups";
 
 Method make(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
-            Outcome (*apply)(const System &)) {
+            Outcome (*apply)(const TaskSet &)) {
   return Method{
       .name = name,
       .subject = Subject::Dag,

@@ -69,8 +69,8 @@ Workload three_timers(std::uint32_t workers) {
 TEST(WaitSetBound, EveryOtherCallbackOnceAndThoseBeforeTwice) {
   for (const std::uint32_t workers : {1U, 2U}) {
     const Workload workload = three_timers(workers);
-    const System system = compile(workload, platform_of(workload)).value();
-    const Outcome outcome = wait_set().apply(system);
+    const TaskSet task_set = compile(workload, platform_of(workload)).value();
+    const Outcome outcome = wait_set().apply(task_set);
     const auto &bound = std::get<Bound>(outcome);
     EXPECT_EQ(bound.tasks[0].response, 3 + (5 + 7) / workers);
     EXPECT_EQ(bound.tasks[1].response, 5 + (3 + 7 + 3) / workers);
@@ -81,15 +81,15 @@ TEST(WaitSetBound, EveryOtherCallbackOnceAndThoseBeforeTwice) {
 // With rates, the long callback arrives once while the short one waits, and not again before it.
 TEST(WaitSetBound, ACallbackThatSeldomComesCountsOnce) {
   Workload workload = three_timers(1);
-  const System system = compile(workload, platform_of(workload)).value();
+  const TaskSet task_set = compile(workload, platform_of(workload)).value();
   // Registered 3, 5, 7. By windows: 3 + 5 + 7, 5 + 2 * 3 + 7, 7 + 2 * (3 + 5); within 100 each arrives only once.
   for (const Method &method : {casini(), blass(), wait_set_rates()}) {
-    const Outcome outcome = method.apply(system);
+    const Outcome outcome = method.apply(task_set);
     for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) EXPECT_EQ(bound.response, 15) << method.name;
   }
   // With a period of 15 the first arrives twice in a busy window, and windows let it delay the last one twice at most.
   workload.dags[0].tasks[0].period = workload.dags[0].tasks[0].deadline = 15;
-  const System faster = compile(workload, platform_of(workload)).value();
+  const TaskSet faster = compile(workload, platform_of(workload)).value();
   const auto last = [&](const Method &method) {
     const Outcome outcome = method.apply(faster);
     return std::get<Bound>(outcome).tasks[2].response;
@@ -107,9 +107,9 @@ testing::BoundGenerator mixed(std::uint32_t workers) {
 // Where `loose` bounds a DAG, `tight` does too, and not above it.
 void expect_never_above(const Method &tight, const Method &loose, std::uint32_t workers) {
   std::uint64_t smaller = 0;
-  for_cases(mixed(workers), 2000, [&](const testing::BoundCase &, const System &system, Rng &) {
-    const Outcome better = tight.apply(system);
-    const Outcome worse = loose.apply(system);
+  for_cases(mixed(workers), 2000, [&](const testing::BoundCase &, const TaskSet &task_set, Rng &) {
+    const Outcome better = tight.apply(task_set);
+    const Outcome worse = loose.apply(task_set);
     if (!std::holds_alternative<Bound>(worse)) return;
     const std::vector<ResponseBound> &dags = std::get<Bound>(worse).dags;
     const auto is_bounded = [](const ResponseBound &bound) { return bound.response.has_value(); };
@@ -152,13 +152,13 @@ TEST(WaitSetBound, RatesAreNeverAboveWindows) {
 TEST(WaitSetBound, MoreExecutionNeverShrinksABoundAndTermsAddUp) {
   std::uint64_t compared = 0;
   for (const std::uint32_t workers : {1U, 4U}) {
-    for_cases(mixed(workers), 2000, [&](const testing::BoundCase &bound_case, const System &system, Rng &rng) {
+    for_cases(mixed(workers), 2000, [&](const testing::BoundCase &bound_case, const TaskSet &task_set, Rng &rng) {
       Workload more = bound_case.workload;
       Dag &dag = more.dags[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(more.dags.size()) - 1))];
       ++dag.tasks[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(dag.tasks.size()) - 1))].wcet;
       const auto larger = compile(more, bound_case.platform);
       for (const Method &method : executor_methods()) {
-        const Outcome before = method.apply(system);
+        const Outcome before = method.apply(task_set);
         if (!std::holds_alternative<Bound>(before)) continue;
         for (const ResponseBound &bound : std::get<Bound>(before).dags) {
           Duration sum = 0;
@@ -168,7 +168,7 @@ TEST(WaitSetBound, MoreExecutionNeverShrinksABoundAndTermsAddUp) {
         }
         if (!larger) continue;
         const Outcome after = method.apply(*larger);
-        for (std::size_t d = 0; d < system.dags.size(); ++d) {
+        for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
           const Duration grown = std::get<Bound>(after).dags[d].response.value_or(kNever);
           ASSERT_LE(std::get<Bound>(before).dags[d].response.value_or(kNever), grown) << method.name;
           ++compared;
@@ -180,21 +180,21 @@ TEST(WaitSetBound, MoreExecutionNeverShrinksABoundAndTermsAddUp) {
 }
 
 // The published form for callbacks without predecessors: a busy window, and every arrival of i's own in it.
-std::optional<Duration> published_casini(const System &system, std::size_t i) {
+std::optional<Duration> published_casini(const TaskSet &task_set, std::size_t i) {
   const auto arrivals = [&](std::size_t j, Duration length) {
-    const SystemTask &task = system.tasks[j];
+    const CompiledTask &task = task_set.tasks[j];
     return (length + task.jitter + task.period - 1) / task.period;
   };
   const auto work = [&](Duration length, std::size_t skip) {
     Duration sum = 0;
-    for (std::size_t j = 0; j < system.tasks.size(); ++j) {
-      if (j != skip) sum += arrivals(j, length) * system.tasks[j].wcet;
+    for (std::size_t j = 0; j < task_set.tasks.size(); ++j) {
+      if (j != skip) sum += arrivals(j, length) * task_set.tasks[j].wcet;
     }
     return sum;
   };
-  const SystemTask &own = system.tasks[i];
+  const CompiledTask &own = task_set.tasks[i];
   Duration window = 1;
-  for (Duration next = 0; (next = work(window, system.tasks.size())) > window; window = next) {
+  for (Duration next = 0; (next = work(window, task_set.tasks.size())) > window; window = next) {
     if (next > 1'000'000) return std::nullopt;
   }
   Duration worst = 0;
@@ -215,13 +215,13 @@ TEST(WaitSetBound, CasiniIsThePublishedForm) {
   for (std::uint64_t seed = 0; seed < 5000; ++seed) {
     Rng rng(mix(seed));
     const testing::BoundCase bound_case = callbacks(1, 0.9, false)(rng);
-    const System system = compile(bound_case.workload, bound_case.platform).value();
-    const Outcome outcome = casini().apply(system);
-    if (!system.not_analysable.empty() || !std::holds_alternative<Bound>(outcome)) continue;
+    const TaskSet task_set = compile(bound_case.workload, bound_case.platform).value();
+    const Outcome outcome = casini().apply(task_set);
+    if (!task_set.not_analysable.empty() || !std::holds_alternative<Bound>(outcome)) continue;
     bool all = true;
-    for (std::size_t t = 0; t < system.tasks.size(); ++t) {
-      const SystemTask &task = system.tasks[t];
-      const auto published = published_casini(system, t);
+    for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
+      const CompiledTask &task = task_set.tasks[t];
+      const auto published = published_casini(task_set, t);
       const auto ours = std::get<Bound>(outcome).tasks[t].response;
       all = all && published && *published + task.jitter <= task.period;
       if (ours) {
@@ -255,9 +255,9 @@ TEST(WaitSetBound, TimesNearTheLargestDoNotWrap) {
       task.wcet = task.bcet = kMaxDuration / 8;
       task.period = task.deadline = kMaxDuration / 2;
     }
-    const System system = compile(workload, platform_of(workload)).value();
+    const TaskSet task_set = compile(workload, platform_of(workload)).value();
     for (const Method &method : executor_methods()) {
-      const Outcome outcome = method.apply(system);
+      const Outcome outcome = method.apply(task_set);
       if (!std::holds_alternative<Bound>(outcome)) continue;
       for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) {
         const Duration least = kMaxDuration / 8 + kMaxDuration / 4 / workers - 1;

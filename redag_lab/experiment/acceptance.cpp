@@ -95,15 +95,15 @@ Result<std::string> Acceptance::evaluate(std::uint64_t unit) const {
     mistakes.front().message += fmt::format(" ({}, repetition {})", describe(point), repetition);
     return tl::unexpected<Diagnostics>(std::move(mistakes));
   }
-  const Result<analysis::System> system = analysis::compile(*workload, analysis::platform_of(*workload));
-  if (!system) return tl::unexpected<Diagnostics>(system.error());
+  const Result<analysis::TaskSet> task_set = analysis::compile(*workload, analysis::platform_of(*workload));
+  if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
 
   // `any` needs all methods, in the order of the registry. Otherwise only the plan's methods run.
   std::vector<analysis::Method> chosen;
   for (const std::size_t index : registered_) {
     if (!any_ && index != kNone) chosen.push_back(analysis::methods()[index]);
   }
-  const analysis::Report report = any_ ? analysis::analyze(*system) : analysis::analyze(*system, chosen);
+  const analysis::Report report = any_ ? analysis::analyze(*task_set) : analysis::analyze(*task_set, chosen);
   std::string result;
   std::size_t next = 0;
   for (std::size_t i = 0; i < plan_.methods.size(); ++i) {
@@ -111,7 +111,7 @@ Result<std::string> Acceptance::evaluate(std::uint64_t unit) const {
       result += verdict_of(report.methods[any_ ? registered_[i] : next++]);
     } else if (i == simulation_) {
       const std::uint64_t seed = workload_seed(plan_, point, repetition);
-      result += find_miss(*workload, *system, plan_.simulation, seed) ? kNotAccepted : kAccepted;
+      result += find_miss(*workload, *task_set, plan_.simulation, seed) ? kNotAccepted : kAccepted;
     } else {
       result += report.verdict == analysis::Verdict::Schedulable ? kAccepted : kNotAccepted;
     }
@@ -137,10 +137,10 @@ Result<std::string> Acceptance::replay(std::uint64_t unit, std::string_view resu
   const std::uint64_t repetition = unit / points_.size();
   const Result<Workload> workload = draw_workload(plan_, point, repetition);
   if (!workload) return tl::unexpected<Diagnostics>(workload.error());
-  const Result<analysis::System> system = analysis::compile(*workload, analysis::platform_of(*workload));
-  if (!system) return tl::unexpected<Diagnostics>(system.error());
+  const Result<analysis::TaskSet> task_set = analysis::compile(*workload, analysis::platform_of(*workload));
+  if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
   const std::uint64_t seed = workload_seed(plan_, point, repetition);
-  const std::optional<SeenMiss> miss = find_miss(*workload, *system, plan_.simulation, seed);
+  const std::optional<SeenMiss> miss = find_miss(*workload, *task_set, plan_.simulation, seed);
   if (!miss) return make_error(fmt::format("unit {}: the miss is not seen again", unit));
   return fmt::format(
       "# unit {} of '{}': {}, repetition {}; workload seed {}\n"

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "redag/model/workload.hpp"
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 namespace redag::experiment {
 
@@ -30,8 +30,8 @@ struct SeenMiss {
 };
 
 /// Searches for a miss; every job executes for its wcet. A miss is a response above the deadline, a DAG's instance
-/// above its end-to-end deadline, or a skipped job. `system` is `workload` compiled on the platform that it states.
-[[nodiscard]] std::optional<SeenMiss> find_miss(const Workload &workload, const analysis::System &system,
+/// above its end-to-end deadline, or a skipped job. `task_set` is `workload` compiled on the platform that it states.
+[[nodiscard]] std::optional<SeenMiss> find_miss(const Workload &workload, const analysis::TaskSet &task_set,
                                                 const SimulationEffort &effort, std::uint64_t seed);
 
 }  // namespace redag::experiment

@@ -16,9 +16,9 @@ using ::testing::HasSubstr;
 std::optional<SeenMiss> miss_of(const std::string &text, SimulationEffort effort = {}) {
   const Result<LoadedWorkload> loaded = parse_workload(text, "test.yaml");
   EXPECT_TRUE(loaded) << to_string(loaded.error());
-  const auto system = analysis::compile(loaded->workload, analysis::platform_of(loaded->workload));
-  EXPECT_TRUE(system);
-  return find_miss(loaded->workload, *system, effort, 1);
+  const auto task_set = analysis::compile(loaded->workload, analysis::platform_of(loaded->workload));
+  EXPECT_TRUE(task_set);
+  return find_miss(loaded->workload, *task_set, effort, 1);
 }
 
 std::string workload(const std::string &dags, const std::string &preemption = "os") {

@@ -52,10 +52,10 @@ RunBounds bounds_of(const trace::RunInfo &run) {
   }
   const auto executed = analysis::as_executed(run.workload, run.config, run.overheads);
   if (!executed) return none(executed.error().front().message);
-  const auto system = analysis::compile_for(*executor, executed->workload, executed->platform);
-  if (!system) return none(system.error().front().message);
+  const auto task_set = analysis::compile_for(*executor, executed->workload, executed->platform);
+  if (!task_set) return none(task_set.error().front().message);
 
-  const analysis::Report report = analysis::analyze(*system, analysis::methods_of(*executor));
+  const analysis::Report report = analysis::analyze(*task_set, analysis::methods_of(*executor));
   RunBounds bounds;
   bounds.assumes = describe(executed->platform, run);
   bounds.tasks = by_id(report.tasks);
@@ -64,8 +64,9 @@ RunBounds bounds_of(const trace::RunInfo &run) {
   for (const analysis::Method *method : report.by) bounds.by.emplace_back(method->name);
   const auto bounded = [](const BoundOf &bound) { return bound.response.has_value(); };
   if (!bounds.schedulable && std::none_of(bounds.tasks.begin(), bounds.tasks.end(), bounded)) {
-    bounds.absent = system->not_analysable.empty() ? "no sound method bounds a response here; 'redag analyze' says why"
-                                                   : system->not_analysable;
+    bounds.absent = task_set->not_analysable.empty()
+                        ? "no sound method bounds a response here; 'redag analyze' says why"
+                        : task_set->not_analysable;
   }
   return bounds;
 }

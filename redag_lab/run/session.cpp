@@ -156,9 +156,9 @@ std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant
   Workload configured = workload;
   for (Dag &dag : configured.dags) inherit_periods(dag);
   const executors::ExecutorKind &executor = *executors::find_executor(variant.executor);
-  const Result<analysis::System> system = analysis::compile_for(executor, configured, analysis::platform_of(config));
-  if (!system || !system->not_analysable.empty()) return bounds;
-  const analysis::Report report = analysis::analyze(*system, analysis::methods_of(executor));
+  const Result<analysis::TaskSet> task_set = analysis::compile_for(executor, configured, analysis::platform_of(config));
+  if (!task_set || !task_set->not_analysable.empty()) return bounds;
+  const analysis::Report report = analysis::analyze(*task_set, analysis::methods_of(executor));
   for (std::size_t t = 0; t < bounds.size(); ++t) bounds[t] = report.tasks[t].response.value_or(0);
   return bounds;
 }

@@ -8,7 +8,7 @@
 #include <atomic>
 
 #include "redag/model/workload.hpp"
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 namespace redag::lab {
 

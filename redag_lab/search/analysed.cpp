@@ -30,7 +30,7 @@ const Method *accepting_test(const Analysed &analysed) {
 // If a more urgent task prevents this bound, returns the most urgent task without a bound and its reason.
 std::string culprit_of(const Analysed &analysed, const analysis::Bound &bound, const analysis::ResponseBound &asked) {
   if (asked.absent != analysis::global::kMoreUrgent && asked.absent != analysis::global::kPeer) return {};
-  for (const std::uint32_t t : analysed.system.by_rank) {
+  for (const std::uint32_t t : analysed.task_set.by_rank) {
     const std::string_view absent = bound.tasks[t].absent;
     if (absent.empty() || absent == analysis::global::kMoreUrgent || absent == analysis::global::kPeer) continue;
     return fmt::format(" ({}: {})", task_name(analysed, TaskId(t)), absent);
@@ -40,7 +40,8 @@ std::string culprit_of(const Analysed &analysed, const analysis::Bound &bound, c
 
 // Returns the first reason that a trusted method states for the missing bound.
 std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_dag) {
-  if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return analysed.system.not_analysable;
+  if (!analysed.task_set.not_analysable.empty() && !analysed.task_set.has_modes)
+    return analysed.task_set.not_analysable;
   for (const MethodReport &method : analysed.report.methods) {
     const analysis::Bound *bound = method.bound();
     if (!method.trusted || bound == nullptr) continue;
@@ -51,7 +52,7 @@ std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_da
     }
   }
   for (const MethodReport &method : analysed.report.methods) {
-    if (!method.gave_up() || method.method->subject == analysis::Subject::System) continue;
+    if (!method.gave_up() || method.method->subject == analysis::Subject::TaskSet) continue;
     return fmt::format("gave up on {}: {}", method.method->name, std::get<NotApplicable>(method.outcome).reason);
   }
   return "no method that bounds response times applies";
@@ -101,42 +102,42 @@ Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatf
                          const analysis::AnalyzeOptions &limits, const std::vector<std::string> &only) {
   const executors::ExecutorKind *kind = executors::find_executor(executor);
   if (kind == nullptr) return make_error("there is no analysis of the executor '" + executor + "'");
-  Result<analysis::System> system = analysis::compile_for(*kind, workload, platform);
-  if (!system) return tl::unexpected<Diagnostics>(system.error());
+  Result<analysis::TaskSet> task_set = analysis::compile_for(*kind, workload, platform);
+  if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
   std::vector<Method> methods = analysis::methods_of(*kind);
   std::shared_ptr<const analysis::Exploration> exploration;
   if (explore != nullptr && kind->ours) {
-    std::optional<std::string> reason = analysis::why_not_explore(*system);
-    if (!reason) exploration = std::make_shared<analysis::Exploration>(analysis::explore(*system, *explore));
+    std::optional<std::string> reason = analysis::why_not_explore(*task_set);
+    if (!reason) exploration = std::make_shared<analysis::Exploration>(analysis::explore(*task_set, *explore));
     methods.push_back(analysis::exploration());
-    methods.back().apply = [exploration, reason](const analysis::System &asked) -> analysis::Outcome {
+    methods.back().apply = [exploration, reason](const analysis::TaskSet &asked) -> analysis::Outcome {
       if (reason) return NotApplicable{*reason};
       return to_bound(asked, *exploration);
     };
   }
   if (auto missing = keep_only(only, methods)) return tl::unexpected<Diagnostics>(*std::move(missing));
   analysis::AnalyzeOptions options = limits;
-  options.itemise = system->tasks.size() <= kMostItemised;
-  analysis::Report report = analysis::analyze(*system, std::move(methods), options);
-  return Analysed{workload, kind, *std::move(system), std::move(report), std::move(exploration)};
+  options.itemise = task_set->tasks.size() <= kMostItemised;
+  analysis::Report report = analysis::analyze(*task_set, std::move(methods), options);
+  return Analysed{workload, kind, *std::move(task_set), std::move(report), std::move(exploration)};
 }
 
 std::vector<analysis::Term> terms_of(const Analysed &analysed, const Row &row) {
   if (!row.tightest.bound.terms.empty()) return row.tightest.bound.terms;
-  if (row.task.valid()) return itemised(analysed.system, row.tightest, row.task).terms;
-  return itemised(analysed.system, row.tightest, row.dag).terms;
+  if (row.task.valid()) return itemised(analysed.task_set, row.tightest, row.task).terms;
+  return itemised(analysed.task_set, row.tightest, row.dag).terms;
 }
 
 std::string task_name(const Analysed &analysed, TaskId task) {
-  const analysis::SystemTask &found = analysed.system.tasks[task.value];
-  const std::string &dag = analysed.system.dags[found.dag.value].name;
+  const analysis::CompiledTask &found = analysed.task_set.tasks[task.value];
+  const std::string &dag = analysed.task_set.dags[found.dag.value].name;
   return dag + "." + found.name.substr(dag.size() + 1);
 }
 
 std::vector<Row> task_rows(const Analysed &analysed) {
   std::vector<Row> rows;
-  for (std::size_t t = 0; t < analysed.system.tasks.size(); ++t) {
-    const analysis::SystemTask &task = analysed.system.tasks[t];
+  for (std::size_t t = 0; t < analysed.task_set.tasks.size(); ++t) {
+    const analysis::CompiledTask &task = analysed.task_set.tasks[t];
     Row row;
     row.name = task_name(analysed, TaskId(t));
     row.task = TaskId(t);
@@ -151,11 +152,11 @@ std::vector<Row> task_rows(const Analysed &analysed) {
 
 std::vector<Row> dag_rows(const Analysed &analysed) {
   std::vector<Row> rows;
-  for (std::size_t d = 0; d < analysed.system.dags.size(); ++d) {
+  for (std::size_t d = 0; d < analysed.task_set.dags.size(); ++d) {
     Row row;
-    row.name = analysed.system.dags[d].name;
+    row.name = analysed.task_set.dags[d].name;
     row.dag = DagId(d);
-    row.deadline = analysed.system.dags[d].deadline;
+    row.deadline = analysed.task_set.dags[d].deadline;
     if (row.deadline > 0) row.due = row.deadline;
     row.tightest = analysed.report.dags[d];
     judge(analysed, row, d, true);
@@ -178,13 +179,13 @@ std::optional<Row> weakest_row(const Analysed &analysed) {
     weakest = std::move(row);
   };
   const std::vector<Row> tasks = task_rows(analysed);
-  for (std::size_t t = 0; t < tasks.size(); ++t) consider(tasks[t], analysed.system.tasks[t].rank);
+  for (std::size_t t = 0; t < tasks.size(); ++t) consider(tasks[t], analysed.task_set.tasks[t].rank);
   for (Row &row : dag_rows(analysed)) consider(std::move(row), static_cast<double>(tasks.size()));
   return weakest;
 }
 
 std::vector<TaskId> suspects_of(const Analysed &analysed, const Row &row) {
-  const analysis::System &system = analysed.system;
+  const analysis::TaskSet &task_set = analysed.task_set;
   std::vector<TaskId> suspects;
   const auto add = [&](std::uint32_t t) {
     if (std::find(suspects.begin(), suspects.end(), TaskId(t)) == suspects.end()) suspects.emplace_back(t);
@@ -195,13 +196,13 @@ std::vector<TaskId> suspects_of(const Analysed &analysed, const Row &row) {
   for (const analysis::Term &term : terms) {
     if (term.task.valid()) add(term.task.value);
   }
-  for (const analysis::SystemDag &dag : system.dags) {
+  for (const analysis::CompiledDag &dag : task_set.dags) {
     if (row.name != dag.name && row.name.rfind(dag.name + ".", 0) != 0) continue;
     for (const std::uint32_t t : dag.tasks) add(t);
   }
-  std::vector<std::uint32_t> others = system.by_rank;
+  std::vector<std::uint32_t> others = task_set.by_rank;
   const auto load = [&](std::uint32_t t) {
-    return static_cast<double>(system.tasks[t].wcet) / static_cast<double>(system.tasks[t].period);
+    return static_cast<double>(task_set.tasks[t].wcet) / static_cast<double>(task_set.tasks[t].period);
   };
   std::stable_sort(others.begin(), others.end(), [&](auto a, auto b) { return load(a) > load(b); });
   for (const std::uint32_t t : others) add(t);

@@ -21,7 +21,7 @@ namespace redag::lab {
 struct Analysed {
   Workload workload;
   const executors::ExecutorKind *executor = nullptr;
-  analysis::System system;
+  analysis::TaskSet task_set;
   analysis::Report report;
   std::shared_ptr<const analysis::Exploration> exploration;  // null: not requested, or not applicable
 };

@@ -69,9 +69,9 @@ class Search {
       if (workload_.policy != PolicyKind::DeadlineMonotonic) {
         add_order("deadline_monotonic", with_policy(workload_, PolicyKind::DeadlineMonotonic));
       }
-      const Result<System> system = compile(workload_, platform_);
-      if (platform_.workers > 1) add_order("dkc", with_order(workload_, *system, dkc_order(*system)));
-      add_audsley(*system);
+      const Result<TaskSet> task_set = compile(workload_, platform_);
+      if (platform_.workers > 1) add_order("dkc", with_order(workload_, *task_set, dkc_order(*task_set)));
+      add_audsley(*task_set);
     } else {
       result.audsley_reason = "priorities are to stay as they are";
     }
@@ -89,11 +89,11 @@ class Search {
     candidate.order = name;
     candidate.workload = with_caps(ordered, caps);
     candidate.caps = caps;
-    const Result<System> system = compile(candidate.workload, platform_);
+    const Result<TaskSet> task_set = compile(candidate.workload, platform_);
     ++result_.analyses;
-    if (!system) return candidate;  // assign() has compiled the workload; only order and caps differ
-    candidate.units = present_order(*system);
-    candidate.score = score_of(*system);
+    if (!task_set) return candidate;  // assign() has compiled the workload; only order and caps differ
+    candidate.units = present_order(*task_set);
+    candidate.score = score_of(*task_set);
     return candidate;
   }
 
@@ -101,7 +101,7 @@ class Search {
     return is_better(a, b, options_.objective);
   }
 
-  void add_audsley(const System &system) {
+  void add_audsley(const TaskSet &task_set) {
     const TestChoice choice = order_free_test(workload_, platform_);
     if (!choice.test) {
       result_.audsley_reason = choice.reason;
@@ -117,7 +117,7 @@ class Search {
     const auto found = audsley(workload_, platform_, *choice.test, badness, [this] { return stopped(); });
     if (!found) return;
     result_.audsley_found = found->found;
-    add_order("audsley", with_order(workload_, system, found->order));
+    add_order("audsley", with_order(workload_, task_set, found->order));
   }
 
   // Finds the best caps under one order. A smaller sum of bounds alone is no reason to change the user's caps.
@@ -210,14 +210,14 @@ bool improves(const Score &a, const Score &b, Objective objective) {
   return is_better(same_total, b, objective);
 }
 
-Score score_of(const System &system) {
-  const Report report = analyze(system);
+Score score_of(const TaskSet &task_set) {
+  const Report report = analyze(task_set);
   Scorer scorer;
-  for (std::size_t t = 0; t < system.tasks.size(); ++t) {
-    scorer.see(report.tasks[t], std::min(system.tasks[t].deadline, system.tasks[t].limit));
+  for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
+    scorer.see(report.tasks[t], std::min(task_set.tasks[t].deadline, task_set.tasks[t].limit));
   }
-  for (std::size_t d = 0; d < system.dags.size(); ++d) {
-    if (system.dags[d].deadline > 0) scorer.see(report.dags[d], system.dags[d].deadline);
+  for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
+    if (task_set.dags[d].deadline > 0) scorer.see(report.dags[d], task_set.dags[d].deadline);
   }
   Score score = scorer.score();
   score.schedulable = report.verdict == Verdict::Schedulable;
@@ -226,8 +226,8 @@ Score score_of(const System &system) {
 
 Result<Assignment> assign(const Workload &workload, const AnalysisPlatform &platform,
                           const AssignmentOptions &options) {
-  if (const Result<System> system = compile(workload, platform); !system) {
-    return tl::unexpected<Diagnostics>(system.error());
+  if (const Result<TaskSet> task_set = compile(workload, platform); !task_set) {
+    return tl::unexpected<Diagnostics>(task_set.error());
   }
   return Search(workload, platform, options).run();
 }

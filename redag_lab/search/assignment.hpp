@@ -41,7 +41,7 @@ struct Score {
 /// As is_better(), without the sum of bounds; true justifies a change.
 [[nodiscard]] bool improves(const Score &a, const Score &b, Objective objective);
 
-[[nodiscard]] Score score_of(const System &system);
+[[nodiscard]] Score score_of(const TaskSet &task_set);
 
 /// The max_active of each DAG, by DagId; 0: no bound.
 using Caps = std::vector<std::uint32_t>;

@@ -180,11 +180,12 @@ struct UnderTest {
   bool all_fit = true;
   Duration worst = std::numeric_limits<Duration>::min();
 };
-UnderTest under(const OrderFreeTest &test, const BoundCase &bound_case, const System &system, const UnitOrder &order) {
+UnderTest under(const OrderFreeTest &test, const BoundCase &bound_case, const TaskSet &task_set,
+                const UnitOrder &order) {
   UnderTest result;
-  const System ordered = compile(with_order(bound_case.workload, system, order), bound_case.platform).value();
+  const TaskSet ordered = compile(with_order(bound_case.workload, task_set, order), bound_case.platform).value();
   for (const std::uint32_t unit : order) {
-    const Duration due = std::min(system.units[unit].deadline, system.units[unit].limit);
+    const Duration due = std::min(task_set.units[unit].deadline, task_set.units[unit].limit);
     const std::optional<Duration> response = test.response(ordered, unit);
     result.all_fit = result.all_fit && response && *response <= due;
     result.worst = std::max(result.worst, response ? *response - due : kMaxDuration);
@@ -204,27 +205,28 @@ void expect_optimal(BoundCaseLimits limits) {
   for (int i = 0; i < cases; ++i) {
     Rng rng(mix(static_cast<std::uint64_t>(i) + 31));
     const BoundCase bound_case = testing::random_bound_case(rng, limits);
-    const System system = compile(bound_case.workload, bound_case.platform).value();
+    const TaskSet task_set = compile(bound_case.workload, bound_case.platform).value();
     const TestChoice choice = order_free_test(bound_case.workload, bound_case.platform);
-    if (!choice.test || system.units.size() > 5) continue;
+    if (!choice.test || task_set.units.size() > 5) continue;
     ASSERT_TRUE(choice.test->optimal);
     SCOPED_TRACE(describe(bound_case));
     const auto lateness = [](Duration response, Duration due) { return static_cast<double>(response - due); };
     const auto found = audsley(bound_case.workload, bound_case.platform, *choice.test, lateness);
     ASSERT_TRUE(found);
-    const UnderTest best = under(*choice.test, bound_case, system, found->order);
+    const UnderTest best = under(*choice.test, bound_case, task_set, found->order);
     ASSERT_EQ(best.all_fit, found->found);
     ++tried;
-    UnitOrder order(system.units.size());
+    UnitOrder order(task_set.units.size());
     std::iota(order.begin(), order.end(), 0);
     do {
-      const UnderTest other = under(*choice.test, bound_case, system, order);
+      const UnderTest other = under(*choice.test, bound_case, task_set, order);
       ASSERT_LE(best.worst, other.worst);
       ASSERT_TRUE(found->found || !other.all_fit);
     } while (std::next_permutation(order.begin(), order.end()));
     if (!found->found) continue;
     ++found_some;
-    const System ordered = compile(with_order(bound_case.workload, system, found->order), bound_case.platform).value();
+    const TaskSet ordered =
+        compile(with_order(bound_case.workload, task_set, found->order), bound_case.platform).value();
     ASSERT_EQ(analyze(ordered).verdict, Verdict::Schedulable);
   }
   EXPECT_GT(tried, cases / 4);

@@ -23,11 +23,11 @@ using global::GlobalUnit;
 Duration due_of(const Unit &unit) { return std::min(unit.deadline, unit.limit); }
 
 template <class Key>
-UnitOrder sorted_by(const System &system, Key key) {
-  UnitOrder order(system.units.size());
+UnitOrder sorted_by(const TaskSet &task_set, Key key) {
+  UnitOrder order(task_set.units.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(),
-                   [&](std::uint32_t a, std::uint32_t b) { return key(system.units[a]) < key(system.units[b]); });
+                   [&](std::uint32_t a, std::uint32_t b) { return key(task_set.units[a]) < key(task_set.units[b]); });
   return order;
 }
 
@@ -39,13 +39,13 @@ const std::vector<Method> &one_worker_methods() {
 
 // One worker: the fixed points depend only on the set of more urgent units. A unit that moves up past another is
 // blocked by at most C - 1 of it, and before had at least C of interference from it.
-std::optional<Duration> one_worker_response(const System &system, std::uint32_t unit) {
+std::optional<Duration> one_worker_response(const TaskSet &task_set, std::uint32_t unit) {
   std::optional<Duration> best;
   for (const Method &method : one_worker_methods()) {
-    const Outcome outcome = method.apply(system);
+    const Outcome outcome = method.apply(task_set);
     const Bound *bound = std::get_if<Bound>(&outcome);
     if (bound == nullptr) continue;
-    const std::optional<Duration> &found = bound->tasks[system.units[unit].tasks.front()].response;
+    const std::optional<Duration> &found = bound->tasks[task_set.units[unit].tasks.front()].response;
     if (found && (!best || *found < *best)) best = found;
   }
   return best;
@@ -53,12 +53,12 @@ std::optional<Duration> one_worker_response(const System &system, std::uint32_t 
 
 // Several workers: the fixed points of the bounds, with each more urgent unit's deadline in place of its response. Work
 // in a window only grows with a response, and the order among the more urgent units no longer matters.
-std::optional<Duration> global_response(const System &system, std::uint32_t unit) {
-  const bool edges = system.has_edges();
-  const bool bounds =
-      std::any_of(system.dags.begin(), system.dags.end(), [](const SystemDag &dag) { return dag.max_active > 0; });
+std::optional<Duration> global_response(const TaskSet &task_set, std::uint32_t unit) {
+  const bool edges = task_set.has_edges();
+  const bool bounds = std::any_of(task_set.dags.begin(), task_set.dags.end(),
+                                  [](const CompiledDag &dag) { return dag.max_active > 0; });
   const bool sequential = !edges && !bounds;
-  global::Units view = global::units_of(system, {.mode = system.mode, .edges = !sequential, .bounds = !sequential});
+  global::Units view = global::units_of(task_set, {.mode = task_set.mode, .edges = !sequential, .bounds = !sequential});
   if (view.reason) return std::nullopt;
   const auto own = std::find_if(view.units.begin(), view.units.end(),
                                 [&](const GlobalUnit &candidate) { return candidate.unit == unit; });
@@ -67,18 +67,18 @@ std::optional<Duration> global_response(const System &system, std::uint32_t unit
     GlobalUnit &other = view.units[i];
     const Duration least = other.jitter + other.volume;  // the least response that the workload formulas allow
     if (least > other.period) return std::nullopt;
-    other.response = std::clamp(due_of(system.units[other.unit]), least, other.period);
+    other.response = std::clamp(due_of(task_set.units[other.unit]), least, other.period);
   }
   const std::span<GlobalUnit> units(view.units);
   bool found = false;
   if (sequential) {
-    found = system.mode == sched::Preemption::Full
+    found = task_set.mode == sched::Preemption::Full
                 ? global::guan_response(units, k, view.workers)
                 : global::sequential_nonpreemptive_response(
-                      units, k, view.workers, global::largest_remaining(system, view.units, k + 1, view.workers));
+                      units, k, view.workers, global::largest_remaining(task_set, view.units, k + 1, view.workers));
   } else {
     const Duration blocking =
-        system.mode == sched::Preemption::Full ? 0 : global::blocking_of(system, view.units, k, view.workers);
+        task_set.mode == sched::Preemption::Full ? 0 : global::blocking_of(task_set, view.units, k, view.workers);
     global::Waiting waiting;
     waiting.works.resize(units.size());
     found = global::bounded_response(units, k, view.workers, blocking, waiting);
@@ -88,19 +88,19 @@ std::optional<Duration> global_response(const System &system, std::uint32_t unit
 }
 
 // Compiles the workload with priorities in this order. It compiled before and cannot fail now.
-System compiled(const Workload &workload, const AnalysisPlatform &platform, const System &before,
-                const UnitOrder &order) {
-  Result<System> system = compile(with_order(workload, before, order), platform);
-  REDAG_CHECK(system.has_value(), "other priorities make a valid workload invalid");
-  return *std::move(system);
+TaskSet compiled(const Workload &workload, const AnalysisPlatform &platform, const TaskSet &before,
+                 const UnitOrder &order) {
+  Result<TaskSet> task_set = compile(with_order(workload, before, order), platform);
+  REDAG_CHECK(task_set.has_value(), "other priorities make a valid workload invalid");
+  return *std::move(task_set);
 }
 
 }  // namespace
 
-Workload with_order(const Workload &workload, const System &system, const UnitOrder &order) {
-  std::vector<int> priority(system.tasks.size(), 0);
+Workload with_order(const Workload &workload, const TaskSet &task_set, const UnitOrder &order) {
+  std::vector<int> priority(task_set.tasks.size(), 0);
   for (std::size_t place = 0; place < order.size(); ++place) {
-    for (const std::uint32_t t : system.units[order[place]].tasks) {
+    for (const std::uint32_t t : task_set.units[order[place]].tasks) {
       priority[t] = static_cast<int>(order.size() - place);
     }
   }
@@ -113,34 +113,34 @@ Workload with_order(const Workload &workload, const System &system, const UnitOr
   return result;
 }
 
-UnitOrder present_order(const System &system) {
-  return sorted_by(system, [](const Unit &unit) { return unit.first_rank; });
+UnitOrder present_order(const TaskSet &task_set) {
+  return sorted_by(task_set, [](const Unit &unit) { return unit.first_rank; });
 }
 
-UnitOrder deadline_order(const System &system) {
-  return sorted_by(system, [](const Unit &unit) { return std::tuple(due_of(unit), unit.period); });
+UnitOrder deadline_order(const TaskSet &task_set) {
+  return sorted_by(task_set, [](const Unit &unit) { return std::tuple(due_of(unit), unit.period); });
 }
 
-UnitOrder dkc_order(const System &system) {
-  const double m = system.platform.workers;
+UnitOrder dkc_order(const TaskSet &task_set) {
+  const double m = task_set.platform.workers;
   const double k = (m - 1 + std::sqrt(5 * m * m - 6 * m + 1)) / (2 * m);
-  return sorted_by(system, [k](const Unit &unit) {
+  return sorted_by(task_set, [k](const Unit &unit) {
     return static_cast<double>(due_of(unit)) - k * static_cast<double>(unit.length);
   });
 }
 
 TestChoice order_free_test(const Workload &workload, const AnalysisPlatform &platform) {
-  const Result<System> before = compile(workload, platform);
+  const Result<TaskSet> before = compile(workload, platform);
   if (!before) return {std::nullopt, before.error().front().message};
   if (!before->not_analysable.empty()) return {std::nullopt, before->not_analysable};
-  const System system = compiled(workload, platform, *before, deadline_order(*before));
+  const TaskSet task_set = compiled(workload, platform, *before, deadline_order(*before));
   OrderFreeTest test;
   if (platform.workers == 1) {
     // Which method applies does not depend on the order. With shared levels, a bound depends on which units share a
     // level.
     std::string why;
     for (const Method &method : one_worker_methods()) {
-      const Outcome outcome = method.apply(system);
+      const Outcome outcome = method.apply(task_set);
       if (std::holds_alternative<Bound>(outcome)) {
         test = {std::string(method.name), platform.levels == 0, one_worker_response};
         return {std::move(test), {}};
@@ -149,15 +149,15 @@ TestChoice order_free_test(const Workload &workload, const AnalysisPlatform &pla
     }
     return {std::nullopt, why};
   }
-  const bool full = system.mode == sched::Preemption::Full;
-  if (system.mode == sched::Preemption::Cooperative) {
+  const bool full = task_set.mode == sched::Preemption::Full;
+  if (task_set.mode == sched::Preemption::Cooperative) {
     return {std::nullopt, "no bound for several workers covers cooperative preemption"};
   }
-  const global::Units view = global::units_of(system, {.mode = system.mode, .bounds = true});
+  const global::Units view = global::units_of(task_set, {.mode = task_set.mode, .bounds = true});
   if (view.reason) return {std::nullopt, *view.reason};
   // Without preemption, a unit that moves up past a long one can wait longer for it than before: its deadline may let
   // in less than C - 1 of interference. Optimality is therefore not claimed there.
-  const bool edges = system.has_edges();
+  const bool edges = task_set.has_edges();
   test.name = full ? (edges ? "dag_bounded with deadlines for responses" : "guan with deadlines for responses")
                    : (edges ? "dag_nonpreemptive with deadlines for responses"
                             : "sequential_nonpreemptive with deadlines for responses");
@@ -169,7 +169,7 @@ TestChoice order_free_test(const Workload &workload, const AnalysisPlatform &pla
 std::optional<AudsleyResult> audsley(const Workload &workload, const AnalysisPlatform &platform,
                                      const OrderFreeTest &test, const Badness &badness,
                                      const std::function<bool()> &stop) {
-  const Result<System> before = compile(workload, platform);
+  const Result<TaskSet> before = compile(workload, platform);
   REDAG_CHECK(before.has_value(), "audsley() needs a valid workload");
   AudsleyResult result;
   result.found = true;
@@ -185,8 +185,8 @@ std::optional<AudsleyResult> audsley(const Workload &workload, const AnalysisPla
       order.erase(order.begin() + static_cast<std::ptrdiff_t>(i));
       order.push_back(open[i]);
       order.insert(order.end(), placed.begin(), placed.end());
-      const System system = compiled(workload, platform, *before, order);
-      const std::optional<Duration> response = test.response(system, open[i]);
+      const TaskSet task_set = compiled(workload, platform, *before, order);
+      const std::optional<Duration> response = test.response(task_set, open[i]);
       const Duration due = due_of(before->units[open[i]]);
       const double late = response ? badness(*response, due) : std::numeric_limits<double>::infinity();
       if (late >= least) continue;

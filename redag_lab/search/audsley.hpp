@@ -14,28 +14,28 @@
 #include <vector>
 
 #include "redag/model/workload.hpp"
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 namespace redag::analysis {
 
-/// Units (positions in System::units), most urgent first.
+/// Units (positions in TaskSet::units), most urgent first.
 using UnitOrder = std::vector<std::uint32_t>;
 
-/// Returns the workload under policy `fixed` with priorities that put its units in this order. `system` must be
+/// Returns the workload under policy `fixed` with priorities that put its units in this order. `task_set` must be
 /// compiled from `workload`.
-[[nodiscard]] Workload with_order(const Workload &workload, const System &system, const UnitOrder &order);
+[[nodiscard]] Workload with_order(const Workload &workload, const TaskSet &task_set, const UnitOrder &order);
 
-/// Returns the units as the system's policy orders them, by their most urgent task.
-[[nodiscard]] UnitOrder present_order(const System &system);
+/// Returns the units as the task set's policy orders them, by their most urgent task.
+[[nodiscard]] UnitOrder present_order(const TaskSet &task_set);
 
 /// Orders units by deadline, shortest first, and equal ones by period. Optimal on one worker where D <= T, without
 /// jitter and blocking (J. Leung, J. Whitehead, Performance Evaluation 2(4), 1982).
-[[nodiscard]] UnitOrder deadline_order(const System &system);
+[[nodiscard]] UnitOrder deadline_order(const TaskSet &task_set);
 
 /// Orders units by D - k L, smallest first, with k = (m - 1 + sqrt(5 m^2 - 6 m + 1)) / (2 m). L is the longest path.
 /// This is a heuristic for several workers: R. Davis, A. Burns, Improved priority assignment for global fixed priority
 /// pre-emptive scheduling in multiprocessor real-time systems, Real-Time Systems 47(1), 2011 (DkC).
-[[nodiscard]] UnitOrder dkc_order(const System &system);
+[[nodiscard]] UnitOrder dkc_order(const TaskSet &task_set);
 
 /// A test that bounds one unit's response, given the set of more urgent units but not their order.
 struct OrderFreeTest {
@@ -45,11 +45,11 @@ struct OrderFreeTest {
   /// worse. If Audsley's assignment then finds no order, no order passes this test.
   bool optimal = false;
   /// Returns the response of `unit` if every more urgent unit keeps its deadline; nothing if there is no bound.
-  /// `system` has static priorities.
-  std::function<std::optional<Duration>(const System &system, std::uint32_t unit)> response;
+  /// `task_set` has static priorities.
+  std::function<std::optional<Duration>(const TaskSet &task_set, std::uint32_t unit)> response;
 };
 
-/// The test for systems like this one under static priorities, or the reason why there is none.
+/// The test for task sets like this one under static priorities, or the reason why there is none.
 struct TestChoice {
   std::optional<OrderFreeTest> test;
   std::string reason;

@@ -39,8 +39,8 @@ class Search {
   };
 
   [[nodiscard]] bool suffices(const Workload &changed, const AnalysisPlatform &platform) const {
-    const Result<System> system = compile(changed, platform);
-    return system && is_shown_schedulable(*system);
+    const Result<TaskSet> task_set = compile(changed, platform);
+    return task_set && is_shown_schedulable(*task_set);
   }
 
   [[nodiscard]] std::string name_of(TaskId id) const {

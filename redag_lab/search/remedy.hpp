@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 namespace redag::analysis {
 

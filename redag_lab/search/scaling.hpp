@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "redag/model/workload.hpp"
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 namespace redag::analysis {
 

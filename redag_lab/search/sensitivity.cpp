@@ -21,17 +21,17 @@ constexpr std::int64_t kSlowest = 1024;                // periods grow to at mos
 constexpr Duration kLongestPeriod = 86'400 * kSecond;  // and to at most this length
 
 // True if the utilization exceeds the workers. Exact arithmetic, rounded in favour of the workload.
-bool is_overloaded(const System &system) {
+bool is_overloaded(const TaskSet &task_set) {
   constexpr unsigned kBits = 40;
   Int128 sum = 0;
-  for (const SystemTask &task : system.tasks) sum += (Int128{task.wcet} << kBits) / task.period;
-  return sum > Int128{system.platform.workers} << kBits;
+  for (const CompiledTask &task : task_set.tasks) sum += (Int128{task.wcet} << kBits) / task.period;
+  return sum > Int128{task_set.platform.workers} << kBits;
 }
 
 // Returns "dag.task", the form that the commands use.
-std::string label(const System &system, std::uint32_t task) {
-  const std::string &dag = system.dags[system.tasks[task].dag.value].name;
-  return dag + "." + system.tasks[task].name.substr(dag.size() + 1);
+std::string label(const TaskSet &task_set, std::uint32_t task) {
+  const std::string &dag = task_set.dags[task_set.tasks[task].dag.value].name;
+  return dag + "." + task_set.tasks[task].name.substr(dag.size() + 1);
 }
 
 std::string why_no_bound(const Report &report, std::uint32_t task) {
@@ -45,25 +45,25 @@ std::string why_no_bound(const Report &report, std::uint32_t task) {
 
 // Returns the reason why analyze() does not accept the workload.
 std::string obstacle_of(const Workload &workload, const AnalysisPlatform &platform) {
-  const Result<System> system = compile(workload, platform);
-  if (!system) return system.error().front().message;
-  if (!system->not_analysable.empty()) return system->not_analysable;
-  if (const std::optional<std::string> why = why_impossible(*system)) return *why;
-  const Report report = analyze(*system);
+  const Result<TaskSet> task_set = compile(workload, platform);
+  if (!task_set) return task_set.error().front().message;
+  if (!task_set->not_analysable.empty()) return task_set->not_analysable;
+  if (const std::optional<std::string> why = why_impossible(*task_set)) return *why;
+  const Report report = analyze(*task_set);
   std::optional<std::uint32_t> worst;
   Duration missing = 0;
-  for (std::uint32_t t = 0; t < system->tasks.size(); ++t) {
-    const SystemTask &task = system->tasks[t];
+  for (std::uint32_t t = 0; t < task_set->tasks.size(); ++t) {
+    const CompiledTask &task = task_set->tasks[t];
     if (meets_deadline(task, report.tasks[t].bound)) continue;
-    if (!report.tasks[t].response) return label(*system, t) + ": " + why_no_bound(report, t);
+    if (!report.tasks[t].response) return label(*task_set, t) + ": " + why_no_bound(report, t);
     const Duration late = *report.tasks[t].response - std::min(task.deadline, task.limit);
     if (worst && late <= missing) continue;
     worst = t;
     missing = late;
   }
-  if (worst) return "bound of " + label(*system, *worst) + " above its deadline";
-  for (std::size_t d = 0; d < system->dags.size(); ++d) {
-    const SystemDag &dag = system->dags[d];
+  if (worst) return "bound of " + label(*task_set, *worst) + " above its deadline";
+  for (std::size_t d = 0; d < task_set->dags.size(); ++d) {
+    const CompiledDag &dag = task_set->dags[d];
     if (dag.deadline > 0 && report.dags[d].response.value_or(kNever) > dag.deadline) {
       return "end-to-end deadline of " + dag.name;
     }
@@ -120,14 +120,14 @@ class Search {
     if (stopped_) return false;
     ++margin_.tested;
     const Workload candidate = turned(workload_, margin_.knob, position);
-    const Result<System> system = compile(candidate, platform_);
-    return system && !why_impossible(*system) && accepts_(candidate, *system);
+    const Result<TaskSet> task_set = compile(candidate, platform_);
+    return task_set && !why_impossible(*task_set) && accepts_(candidate, *task_set);
   }
 
   [[nodiscard]] bool is_impossible(std::int64_t position) const {
     if (margin_.knob.kind == Knob::Kind::Period && position >= 0) return true;
-    const Result<System> system = compile(turned(workload_, margin_.knob, position), platform_);
-    return !system || why_impossible(*system);
+    const Result<TaskSet> task_set = compile(turned(workload_, margin_.knob, position), platform_);
+    return !task_set || why_impossible(*task_set);
   }
 
   // Returns the first impossible position by bisection, which is exact: more load never makes an impossible workload
@@ -265,14 +265,14 @@ class Search {
 
 }  // namespace
 
-std::optional<std::string> why_impossible(const System &system) {
-  for (std::uint32_t t = 0; t < system.tasks.size(); ++t) {
-    const SystemTask &task = system.tasks[t];
+std::optional<std::string> why_impossible(const TaskSet &task_set) {
+  for (std::uint32_t t = 0; t < task_set.tasks.size(); ++t) {
+    const CompiledTask &task = task_set.tasks[t];
     // Jobs of a task that can overlap (concurrency) may take longer than the limit; such workloads are not analysed.
-    const Duration due = system.not_analysable.empty() ? std::min(task.deadline, task.limit) : task.deadline;
-    if (task.wcet > due) return label(system, t) + " alone takes longer than it has";
+    const Duration due = task_set.not_analysable.empty() ? std::min(task.deadline, task.limit) : task.deadline;
+    if (task.wcet > due) return label(task_set, t) + " alone takes longer than it has";
   }
-  if (is_overloaded(system)) return fmt::format("utilization above {}", system.platform.workers);
+  if (is_overloaded(task_set)) return fmt::format("utilization above {}", task_set.platform.workers);
   return std::nullopt;
 }
 
@@ -293,19 +293,19 @@ Knob rate_of(const std::vector<TaskRef> &tasks, const std::vector<std::uint32_t>
 
 }  // namespace
 
-std::vector<Knob> knobs_of(const Workload &workload, const System &system) {
+std::vector<Knob> knobs_of(const Workload &workload, const TaskSet &task_set) {
   const std::vector<TaskRef> tasks = flatten(workload);
   std::vector<std::uint32_t> all(tasks.size());
   std::iota(all.begin(), all.end(), 0);
   std::vector<Knob> knobs = {{Knob::Kind::AllWcets, all}, {Knob::Kind::Rates, all}};
   for (const std::uint32_t t : all) knobs.push_back({Knob::Kind::Wcet, {t}});
-  for (const SystemDag &dag : system.dags) {
+  for (const CompiledDag &dag : task_set.dags) {
     Knob knob = rate_of(tasks, dag.tasks);
     // A workload with one DAG has that DAG's rate as the knob of all rates.
     const bool is_there = knob.kind == Knob::Kind::Rates && knob.tasks.size() == all.size();
     if (!is_there) knobs.push_back(std::move(knob));
     if (dag.units.size() < 2) continue;
-    for (const std::uint32_t unit : dag.units) knobs.push_back(rate_of(tasks, system.units[unit].tasks));
+    for (const std::uint32_t unit : dag.units) knobs.push_back(rate_of(tasks, task_set.units[unit].tasks));
   }
   return knobs;
 }

@@ -34,11 +34,11 @@ struct Margin {
 
 /// True if this workload, compiled for the platform, is acceptable. Called only for workloads that why_impossible()
 /// passes.
-using Accepts = std::function<bool(const Workload &, const System &)>;
+using Accepts = std::function<bool(const Workload &, const TaskSet &)>;
 
 /// Accepts the workloads that analyze() calls schedulable.
-[[nodiscard]] inline bool accepted_by_analysis(const Workload & /*workload*/, const System &system) {
-  return is_shown_schedulable(system);
+[[nodiscard]] inline bool accepted_by_analysis(const Workload & /*workload*/, const TaskSet &task_set) {
+  return is_shown_schedulable(task_set);
 }
 
 struct SensitivityOptions {
@@ -51,7 +51,7 @@ struct SensitivityOptions {
 
 /// Returns the first reason why no schedule on this platform meets every deadline; nothing if there is none. Either a
 /// task's own execution exceeds its time, or the utilization exceeds the workers.
-[[nodiscard]] std::optional<std::string> why_impossible(const System &system);
+[[nodiscard]] std::optional<std::string> why_impossible(const TaskSet &task_set);
 
 /// Finds the margin of one knob. Returns nothing if `stop` ended it. `workload` must be valid. Needs about
 /// probes + log2(range) tests.
@@ -61,6 +61,6 @@ struct SensitivityOptions {
 
 /// Returns the knobs of a report, in its order: all wcets, all rates, each task's wcet, and each DAG's rate (its period
 /// where it has one). A DAG with several units also has the period of each unit, after its rate.
-[[nodiscard]] std::vector<Knob> knobs_of(const Workload &workload, const System &system);
+[[nodiscard]] std::vector<Knob> knobs_of(const Workload &workload, const TaskSet &task_set);
 
 }  // namespace redag::analysis

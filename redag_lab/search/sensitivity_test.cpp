@@ -117,7 +117,7 @@ TEST(Sensitivity, AChangeOfOrderEndsTheRoom) {
 // Only the period equal to another task's is refused. Evenly spread probes would not meet it.
 TEST(Sensitivity, EveryChangeOfOrderIsTested) {
   Workload workload = workload_of({single("a", 1, 2003), single("b", 1, 9000)});
-  const Accepts not_equal = [](const Workload &candidate, const System &) {
+  const Accepts not_equal = [](const Workload &candidate, const TaskSet &) {
     return candidate.dags[1].tasks[0].period != 2003;
   };
   const AnalysisPlatform platform = platform_of(workload);
@@ -134,7 +134,7 @@ TEST(Sensitivity, EveryChangeOfOrderIsTested) {
 
 TEST(Sensitivity, AcceptanceThatComesBackIsReported) {
   const Workload workload = workload_of({single("a", 10, 1000)});
-  const Accepts with_gap = [](const Workload &candidate, const System &) {
+  const Accepts with_gap = [](const Workload &candidate, const TaskSet &) {
     const Duration wcet = candidate.dags[0].tasks[0].wcet;
     return wcet <= 100 || (wcet > 400 && wcet <= 600);
   };
@@ -159,12 +159,12 @@ TEST(Sensitivity, KnobsAreThoseOfTasksAndRates) {
   workload.dags[0].tasks.push_back(workload.dags[0].tasks[0]);
   workload.dags[0].tasks[1].name = "u";
   workload.dags[0].tasks[1].period = workload.dags[0].tasks[1].deadline = 30;
-  const auto system = compile(workload, platform_of(workload));
-  ASSERT_TRUE(system);
+  const auto task_set = compile(workload, platform_of(workload));
+  ASSERT_TRUE(task_set);
   const std::vector<Knob> expected = {{Kind::AllWcets, {0, 1, 2}}, {Kind::Rates, {0, 1, 2}}, {Kind::Wcet, {0}},
                                       {Kind::Wcet, {1}},           {Kind::Wcet, {2}},        {Kind::Rates, {0, 1}},
                                       {Kind::Period, {0}},         {Kind::Period, {1}},      {Kind::Period, {2}}};
-  EXPECT_EQ(knobs_of(workload, *system), expected);
+  EXPECT_EQ(knobs_of(workload, *task_set), expected);
 }
 
 TEST(Sensitivity, TheRatesOfTheOnlyDagAreAllRates) {
@@ -221,11 +221,11 @@ void expect_consistent(const BoundCaseLimits &limits) {
     Rng rng(mix(static_cast<std::uint64_t>(i) + 77));
     const BoundCase bound_case = testing::random_bound_case(rng, limits);
     SCOPED_TRACE(describe(bound_case));
-    const auto system = compile(bound_case.workload, bound_case.platform);
-    ASSERT_TRUE(system);
-    const bool nominal = analyze(*system).verdict == Verdict::Schedulable;
-    EXPECT_EQ(is_shown_schedulable(*system), nominal);
-    for (const Knob &knob : knobs_of(bound_case.workload, *system)) {
+    const auto task_set = compile(bound_case.workload, bound_case.platform);
+    ASSERT_TRUE(task_set);
+    const bool nominal = analyze(*task_set).verdict == Verdict::Schedulable;
+    EXPECT_EQ(is_shown_schedulable(*task_set), nominal);
+    for (const Knob &knob : knobs_of(bound_case.workload, *task_set)) {
       const auto result = margin_of(bound_case.workload, bound_case.platform, knob, accepted_by_analysis, {4, {}});
       ASSERT_TRUE(result);
       if (!result->position) {

@@ -101,8 +101,8 @@ class Tuner {
     if (options_.machine) {
       platform = analysis::charge(analysis::platform_of(workload), *options_.machine);
     }
-    const Result<analysis::System> system = analysis::compile(workload, platform);
-    return system && analysis::analyze(*system).verdict == analysis::Verdict::Schedulable;
+    const Result<analysis::TaskSet> task_set = analysis::compile(workload, platform);
+    return task_set && analysis::analyze(*task_set).verdict == analysis::Verdict::Schedulable;
   }
 
   std::vector<Score> scores_of(std::span<const Point> points) {

@@ -100,20 +100,20 @@ void Bounds::analyse(const Workload &workload, const redag::sched::Config &confi
     machine_ = *machine;
   }
   const auto executed = redag::analysis::as_executed(workload, config, machine_ ? to_string(*machine_) : "");
-  const auto system = redag::analysis::compile(executed->workload, executed->platform);
-  if (!system) {
-    absent_ = to_string(system.error());
+  const auto task_set = redag::analysis::compile(executed->workload, executed->platform);
+  if (!task_set) {
+    absent_ = to_string(task_set.error());
     return;
   }
-  if (!system->not_analysable.empty()) {
-    absent_ = system->not_analysable;
+  if (!task_set->not_analysable.empty()) {
+    absent_ = task_set->not_analysable;
     return;
   }
-  if (system->has_rate_edges()) {
+  if (task_set->has_rate_edges()) {
     absent_ = "edges join tasks of different periods, whose waits depend on when the nodes' timers were created";
     return;
   }
-  const redag::analysis::Report report = redag::analysis::analyze(*system);
+  const redag::analysis::Report report = redag::analysis::analyze(*task_set);
   std::vector<std::string> without;
   for (const redag::TaskRef &ref : redag::flatten(workload)) {
     const std::string name = name_of(workload.dags[ref.dag.value], *ref.task);

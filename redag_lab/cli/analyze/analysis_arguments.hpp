@@ -11,7 +11,7 @@
 
 #include "redag/model/workload.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 #include "redag_lab/cli/run/run_arguments.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 

@@ -20,7 +20,7 @@ using analysis::NotApplicable;
 Result<TaskId> find_task(const lab::Analysed &analysed, const std::string &name) {
   const Result<lab::Row> row = find_row(analysed, name);
   if (!row) return tl::unexpected<Diagnostics>(row.error());
-  for (std::size_t t = 0; t < analysed.system.tasks.size(); ++t) {
+  for (std::size_t t = 0; t < analysed.task_set.tasks.size(); ++t) {
     if (task_name(analysed, TaskId(t)) == row->name) return TaskId(t);
   }
   return make_error("'" + name + "' is a DAG", "a chain is of tasks: dag.task,dag.task");
@@ -29,7 +29,7 @@ Result<TaskId> find_task(const lab::Analysed &analysed, const std::string &name)
 std::optional<Duration> let_reaction_of(const lab::Analysed &analysed, const std::vector<TaskId> &tasks) {
   std::vector<analysis::LetTask> chain;
   for (const TaskId id : tasks) {
-    const analysis::SystemTask &task = analysed.system.tasks[id.value];
+    const analysis::CompiledTask &task = analysed.task_set.tasks[id.value];
     if (task.data) return std::nullopt;
     chain.push_back({task.period, task.offset, task.deadline});
   }
@@ -59,7 +59,7 @@ Result<ChainRow> find_chain(const lab::Analysed &analysed, const std::string &ch
     row.tasks.push_back(*task);
     begin = end + 1;
   }
-  row.bound = analysis::chain_bound(analysed.system, row.tasks, analysis::tightest_of(analysed.report));
+  row.bound = analysis::chain_bound(analysed.task_set, row.tasks, analysis::tightest_of(analysed.report));
   row.let = let_reaction_of(analysed, row.tasks);
   return row;
 }

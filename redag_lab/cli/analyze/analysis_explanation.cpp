@@ -20,7 +20,7 @@ using analysis::Term;
 // Names the owner of a term. A unit of several tasks has its DAG's name.
 std::string owner(const lab::Analysed &analysed, const Term &term) {
   if (term.task.valid()) return task_name(analysed, term.task);
-  if (term.dag.valid()) return analysed.system.dags[term.dag.value].name;
+  if (term.dag.valid()) return analysed.task_set.dags[term.dag.value].name;
   switch (term.kind) {
     case Term::Kind::Blocking: return "less urgent work";
     case Term::Kind::Interference: return "more urgent work, together";
@@ -44,7 +44,7 @@ std::string what(const Term &term) {
 }
 
 std::string advice_on_blocking(const lab::Analysed &analysed, const std::string &who) {
-  switch (analysed.system.mode) {
+  switch (analysed.task_set.mode) {
     case sched::Preemption::None:
       return fmt::format(
           "{} keeps its worker until it ends: shorten it, or let it be preempted (`region` with "
@@ -111,14 +111,14 @@ std::string explain_bound(const lab::Analysed &analysed, const lab::Row &row, co
 // Returns the reason why there is no bound, the methods that gave up or do not apply, and the load.
 std::string explain_absence(const lab::Analysed &analysed, const lab::Row &row) {
   std::string text = fmt::format("why there is no bound: {}\n", row.reason);
-  if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) return text;
+  if (!analysed.task_set.not_analysable.empty() && !analysed.task_set.has_modes) return text;
   text += describe_gave_up(analysed.report);
   const std::string reasons = methods_that_do_not_apply(analysed.report, false);
   if (!reasons.empty()) text += "what does not apply:\n" + reasons;
   std::vector<std::pair<double, std::string>> loads;
-  for (const analysis::Unit &unit : analysed.system.units) {
+  for (const analysis::Unit &unit : analysed.task_set.units) {
     loads.emplace_back(share(unit.volume, unit.period), unit.tasks.size() > 1
-                                                            ? analysed.system.dags[unit.dag.value].name
+                                                            ? analysed.task_set.dags[unit.dag.value].name
                                                             : task_name(analysed, TaskId(unit.tasks.front())));
   }
   std::stable_sort(loads.begin(), loads.end(), [](const auto &a, const auto &b) { return a.first > b.first; });

@@ -18,7 +18,7 @@ Json terms_json(const lab::Analysed &analysed, const analysis::ResponseBound &bo
   Json terms = Json::array();
   for (const analysis::Term &term : bound.terms) {
     terms.push_back(Json{{"kind", to_string(term.kind)},
-                         {"dag", term.dag.valid() ? Json(analysed.system.dags[term.dag.value].name) : Json()},
+                         {"dag", term.dag.valid() ? Json(analysed.task_set.dags[term.dag.value].name) : Json()},
                          {"task", term.task.valid() ? Json(task_name(analysed, term.task)) : Json()},
                          {"amount_ns", term.amount},
                          {"jobs", term.jobs}});
@@ -103,7 +103,7 @@ Json exploration_json(const lab::Analysed &analysed) {
 }  // namespace
 
 Json to_json(const lab::Analysed &analysed, bool each) {
-  const analysis::AnalysisPlatform &platform = analysed.system.platform;
+  const analysis::AnalysisPlatform &platform = analysed.task_set.platform;
   Json document = {
       {"format", "redag.analysis/1"},
       {"workload", analysed.workload.name},
@@ -122,7 +122,7 @@ Json to_json(const lab::Analysed &analysed, bool each) {
         {"lateness", platform.lateness},
         {"stall", platform.stall.longest},
         {"stall_per_second", platform.stall.per_second}}},
-      {"utilization", analysed.system.utilization},
+      {"utilization", analysed.task_set.utilization},
       {"schedulable", analysed.report.verdict == analysis::Verdict::Schedulable},
       {"verdict", verdict_in_words(analysed)},
   };

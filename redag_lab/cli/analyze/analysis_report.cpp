@@ -84,7 +84,7 @@ std::string remark(const lab::Analysed &analysed, const MethodReport &report) {
   if (!bound->tasks.empty()) {
     const auto has_response = [](const analysis::ResponseBound &task) { return task.response.has_value(); };
     const auto bounded = std::count_if(bound->tasks.begin(), bound->tasks.end(), has_response);
-    text = fmt::format("bounds {} of {} tasks", bounded, analysed.system.tasks.size());
+    text = fmt::format("bounds {} of {} tasks", bounded, analysed.task_set.tasks.size());
   }
   if (!bound->figures.empty()) text += (text.empty() ? "" : "; ") + bound->figures;
   if (!bound->unsound.empty()) text += (text.empty() ? "" : "; ") + bound->unsound;
@@ -92,9 +92,9 @@ std::string remark(const lab::Analysed &analysed, const MethodReport &report) {
 }
 
 std::string method_table(const lab::Analysed &analysed, const StreamTraits &terminal) {
-  if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) {
+  if (!analysed.task_set.not_analysable.empty() && !analysed.task_set.has_modes) {
     return fmt::format("none of the {} methods applies: {}\n", analysed.report.methods.size(),
-                       analysed.system.not_analysable);
+                       analysed.task_set.not_analysable);
   }
   std::vector<const MethodReport *> order;  // trusted methods first
   for (const bool trusted : {true, false}) {
@@ -116,7 +116,7 @@ std::string method_table(const lab::Analysed &analysed, const StreamTraits &term
 std::string exploration_table(const lab::Analysed &analysed, const StreamTraits &terminal, bool all) {
   const analysis::Exploration &exploration = *analysed.exploration;
   Table table({{"explored", false, 9}, {"best", true, 5}, {"worst", true, 5}});
-  const std::size_t shown = all ? analysed.system.tasks.size() : std::min(kMostTasks, analysed.system.tasks.size());
+  const std::size_t shown = all ? analysed.task_set.tasks.size() : std::min(kMostTasks, analysed.task_set.tasks.size());
   for (std::size_t t = 0; t < shown; ++t) {
     const analysis::ResponseRange range = exploration.of(TaskId(t));
     table.add({{task_name(analysed, TaskId(t))}, {humanize_duration(range.best)}, {humanize_duration(range.worst)}});
@@ -133,13 +133,13 @@ std::string plural(std::size_t count, const char *noun) {
 }
 
 std::string headline(const lab::Analysed &analysed) {
-  const analysis::AnalysisPlatform &platform = analysed.system.platform;
+  const analysis::AnalysisPlatform &platform = analysed.task_set.platform;
   const std::string reason = mode_reason(analysed);
   // The jobs are ordered by the policy, or by another executor, which ignores policies.
   const std::string order =
       analysed.executor->ours ? to_string(analysed.workload.policy) : std::string(analysed.executor->description);
   std::string text = fmt::format("{}: {}, {}, utilization {:.3f}\n", analysed.workload.name, order,
-                                 plural(platform.workers, "worker"), analysed.system.utilization);
+                                 plural(platform.workers, "worker"), analysed.task_set.utilization);
   text += fmt::format("preemption: {}{}\n", mode_name(analysed), reason.empty() ? "" : " (" + reason + ")");
   if (platform.levels > 0) text += fmt::format("priority levels: {}\n", platform.levels);
   if (platform.release_overhead > 0 || platform.dispatch_overhead > 0 || platform.preempt_overhead > 0) {
@@ -180,19 +180,19 @@ const char *to_string(lab::Standing standing) {
   return "?";
 }
 
-const char *mode_name(const lab::Analysed &analysed) { return lab::mode_name(analysed.system.platform.preemption); }
+const char *mode_name(const lab::Analysed &analysed) { return lab::mode_name(analysed.task_set.platform.preemption); }
 
 std::string mode_reason(const lab::Analysed &analysed) {
-  const analysis::System &system = analysed.system;
-  if (system.platform.preemption == sched::Preemption::Cooperative && system.mode == sched::Preemption::None) {
+  const analysis::TaskSet &task_set = analysed.task_set;
+  if (task_set.platform.preemption == sched::Preemption::Cooperative && task_set.mode == sched::Preemption::None) {
     return "no task has a region: the same as none";
   }
   if (!analysed.executor->ours) return "rclcpp's executors do not preempt";
   if (analysed.workload.platform.preemption != PreemptionMode::Auto) return {};
-  return is_static(system.policy)
+  return is_static(task_set.policy)
              ? "auto is analysed as os; a process without SCHED_FIFO runs it as cooperative: see --preemption"
              : fmt::format("auto is analysed as os, as simulated; threads run {} as cooperative: see --preemption",
-                           to_string(system.policy));
+                           to_string(task_set.policy));
 }
 
 std::string verdict_in_words(const lab::Analysed &analysed) {
@@ -201,13 +201,13 @@ std::string verdict_in_words(const lab::Analysed &analysed) {
     return fmt::format("schedulable: every deadline is met, by {}", listed(report.by));
   }
   const double needed = analysed.workload.utilization();
-  const std::uint32_t workers = analysed.system.platform.workers;
+  const std::uint32_t workers = analysed.task_set.platform.workers;
   if (needed > workers * (1 + 1e-9)) {
     return fmt::format("not schedulable: the utilization, {:.3f}, is above what {} can do", needed,
                        plural(workers, "worker"));
   }
-  if (!analysed.system.not_analysable.empty() && !analysed.system.has_modes) {
-    return "not shown schedulable: no method takes this workload: " + analysed.system.not_analysable;
+  if (!analysed.task_set.not_analysable.empty() && !analysed.task_set.has_modes) {
+    return "not shown schedulable: no method takes this workload: " + analysed.task_set.not_analysable;
   }
   std::size_t late = 0;
   std::size_t unbounded = 0;
@@ -262,8 +262,8 @@ std::string describe(const lab::Analysed &analysed, const StreamTraits &terminal
 
 std::optional<std::string> suggested_change(const lab::Analysed &analysed, const lab::Row &row) {
   if (!analysed.executor->ours) return std::nullopt;
-  if (analysed.system.tasks.size() > analysis::kMostTasksForRemedy) return std::nullopt;
-  auto remedy = analysis::find_remedy(analysed.workload, analysed.system.platform, lab::suspects_of(analysed, row));
+  if (analysed.task_set.tasks.size() > analysis::kMostTasksForRemedy) return std::nullopt;
+  auto remedy = analysis::find_remedy(analysed.workload, analysed.task_set.platform, lab::suspects_of(analysed, row));
   if (!remedy) return std::nullopt;
   return *remedy + ": then every deadline is shown to be met";
 }
@@ -307,7 +307,7 @@ std::string methods_that_do_not_apply(const analysis::Report &report, bool tests
   std::vector<std::pair<std::string, std::string>> reasons;  // each with the methods that state it
   for (const MethodReport &method : report.methods) {
     const auto *reason = std::get_if<NotApplicable>(&method.outcome);
-    if (reason == nullptr || reason->gave_up || (!tests && method.method->subject == analysis::Subject::System))
+    if (reason == nullptr || reason->gave_up || (!tests && method.method->subject == analysis::Subject::TaskSet))
       continue;
     const auto same =
         std::find_if(reasons.begin(), reasons.end(), [&](const auto &known) { return known.first == reason->reason; });

@@ -71,7 +71,7 @@ TEST(SensitivityReport, FactorsAreNeverRoundedUp) {
   Sensitivity sensitivity;
   const analysis::AnalysisPlatform platform = analysis::platform_of(workload);
   sensitivity.analysed = lab::analyse(workload, platform).value();
-  for (const analysis::Knob &knob : analysis::knobs_of(workload, sensitivity.analysed.system)) {
+  for (const analysis::Knob &knob : analysis::knobs_of(workload, sensitivity.analysed.task_set)) {
     sensitivity.results.push_back({analysis::margin_of(workload, platform, knob).value(), {}});
   }
   sensitivity.knobs = sensitivity.results.size();

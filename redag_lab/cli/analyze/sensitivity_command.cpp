@@ -33,7 +33,7 @@ struct Options {
 // Returns the knobs of the named task or DAG only. Returns nothing, with an error, if there is no such task or DAG.
 std::optional<std::vector<analysis::Knob>> chosen_knobs(const lab::Analysed &analysed, const std::string &name,
                                                         Console &console) {
-  std::vector<analysis::Knob> knobs = analysis::knobs_of(analysed.workload, analysed.system);
+  std::vector<analysis::Knob> knobs = analysis::knobs_of(analysed.workload, analysed.task_set);
   if (name.empty()) return knobs;
   const Result<lab::Row> row = find_row(analysed, name);
   if (!row) {
@@ -43,10 +43,10 @@ std::optional<std::vector<analysis::Knob>> chosen_knobs(const lab::Analysed &ana
   // The rate of a task that is released with its whole DAG is the DAG's rate, and counts as the task's.
   std::vector<std::uint32_t> wanted;
   std::vector<std::uint32_t> released;
-  for (std::uint32_t t = 0; t < analysed.system.tasks.size(); ++t) {
-    const analysis::SystemTask &task = analysed.system.tasks[t];
-    if (task_name(analysed, TaskId(t)) == row->name) released = analysed.system.units[task.unit].tasks;
-    if (task_name(analysed, TaskId(t)) == row->name || analysed.system.dags[task.dag.value].name == row->name) {
+  for (std::uint32_t t = 0; t < analysed.task_set.tasks.size(); ++t) {
+    const analysis::CompiledTask &task = analysed.task_set.tasks[t];
+    if (task_name(analysed, TaskId(t)) == row->name) released = analysed.task_set.units[task.unit].tasks;
+    if (task_name(analysed, TaskId(t)) == row->name || analysed.task_set.dags[task.dag.value].name == row->name) {
       wanted.push_back(t);
     }
   }
@@ -72,9 +72,9 @@ Duration simulated_length(const Workload &workload) {
 // Searches every knob. Returns the reason for an early end, or an empty text. Results found before the end remain.
 std::string search(Sensitivity &sensitivity, const std::vector<analysis::Knob> &knobs, const Options &options,
                    AnalysisWatch &watch) {
-  const analysis::AnalysisPlatform &platform = sensitivity.analysed.system.platform;
+  const analysis::AnalysisPlatform &platform = sensitivity.analysed.task_set.platform;
   const Workload &workload = sensitivity.analysed.workload;
-  const analysis::Accepts simulated = [&](const Workload &candidate, const analysis::System &) {
+  const analysis::Accepts simulated = [&](const Workload &candidate, const analysis::TaskSet &) {
     return lab::misses_nothing(candidate, platform, sensitivity.simulated_for, &InterruptGuard::flag());
   };
   Progress &progress = watch.progress();

@@ -28,7 +28,7 @@ bool is_schedulable(const Sensitivity &sensitivity) {
 bool is_of_rates(const Knob &knob) { return knob.kind == Kind::Period || knob.kind == Kind::Rates; }
 
 bool is_of_all(const Sensitivity &sensitivity, const Knob &knob) {
-  const std::size_t tasks = sensitivity.analysed.system.tasks.size();
+  const std::size_t tasks = sensitivity.analysed.task_set.tasks.size();
   return knob.kind == Kind::AllWcets || (knob.kind == Kind::Rates && knob.tasks.size() == tasks);
 }
 
@@ -202,9 +202,9 @@ const char *kind_name(Kind kind) {
 std::string knob_name(const lab::Analysed &analysed, const Knob &knob) {
   if (knob.kind == Kind::AllWcets) return "all wcets";
   if (knob.kind == Kind::Wcet) return "wcet of " + task_name(analysed, TaskId(knob.tasks.front()));
-  if (knob.kind == Kind::Rates && knob.tasks.size() == analysed.system.tasks.size()) return "all rates";
+  if (knob.kind == Kind::Rates && knob.tasks.size() == analysed.task_set.tasks.size()) return "all rates";
   const std::string what = knob.kind == Kind::Period ? "period of " : "rates of ";
-  const analysis::SystemDag &dag = analysed.system.dags[analysed.system.tasks[knob.tasks.front()].dag.value];
+  const analysis::CompiledDag &dag = analysed.task_set.dags[analysed.task_set.tasks[knob.tasks.front()].dag.value];
   if (knob.tasks.size() == dag.tasks.size()) return what + dag.name;
   const std::string more = knob.tasks.size() > 1 ? fmt::format(" and {} more", knob.tasks.size() - 1) : "";
   return what + task_name(analysed, TaskId(knob.tasks.front())) + more;
@@ -234,8 +234,8 @@ std::string describe(const Sensitivity &sensitivity, const StreamTraits &termina
   const lab::Analysed &analysed = sensitivity.analysed;
   const std::string reason = mode_reason(analysed);
   std::string text = fmt::format("{}: {}, {} worker{}, utilization {:.3f}\npreemption: {}{}\n", analysed.workload.name,
-                                 to_string(analysed.workload.policy), analysed.system.platform.workers,
-                                 analysed.system.platform.workers == 1 ? "" : "s", analysed.system.utilization,
+                                 to_string(analysed.workload.policy), analysed.task_set.platform.workers,
+                                 analysed.task_set.platform.workers == 1 ? "" : "s", analysed.task_set.utilization,
                                  mode_name(analysed), reason.empty() ? "" : " (" + reason + ")");
   const std::string verdict = verdict_in_words(analysed);
   const std::size_t colon = verdict.find(':');
@@ -266,10 +266,10 @@ Json to_json(const Sensitivity &sensitivity) {
   Json document = {{"format", "redag.sensitivity/1"},
                    {"workload", analysed.workload.name},
                    {"policy", to_string(analysed.workload.policy)},
-                   {"workers", analysed.system.platform.workers},
+                   {"workers", analysed.task_set.platform.workers},
                    {"preemption", mode_name(analysed)},
                    {"preemption_why", mode_reason(analysed)},
-                   {"utilization", analysed.system.utilization},
+                   {"utilization", analysed.task_set.utilization},
                    {"schedulable", is_schedulable(sensitivity)},
                    {"verdict", verdict_in_words(analysed)},
                    {"resolution", {{"time_ns", 1}, {"factor", 1.0 / analysis::kFactorUnit}}},

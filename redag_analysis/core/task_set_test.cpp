@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -29,10 +29,10 @@ Workload two_dags() {
                        1);
 }
 
-System compiled(const Workload &workload, const AnalysisPlatform &platform) {
-  const auto system = compile(workload, platform);
-  EXPECT_TRUE(system) << to_string(system.error());
-  return system.value_or(System{});
+TaskSet compiled(const Workload &workload, const AnalysisPlatform &platform) {
+  const auto task_set = compile(workload, platform);
+  EXPECT_TRUE(task_set) << to_string(task_set.error());
+  return task_set.value_or(TaskSet{});
 }
 
 AnalysisPlatform mode(sched::Preemption preemption, std::uint32_t workers = 1) {
@@ -48,67 +48,67 @@ std::string refusal(const Method &method, const Workload &workload, const Analys
   return reason == nullptr ? "" : reason->reason;
 }
 
-TEST(System, AGraphOfOneRateIsOneUnit) {
-  const System system = compiled(two_dags(), mode(sched::Preemption::Full));
-  ASSERT_EQ(system.units.size(), 2U);
-  EXPECT_THAT(system.units[0].tasks, ElementsAre(0, 1, 2));
-  EXPECT_EQ(system.units[0].volume, 6 * kMillisecond);
-  EXPECT_EQ(system.units[0].length, 5 * kMillisecond);
-  EXPECT_EQ(system.units[0].limit, 20 * kMillisecond);
-  EXPECT_TRUE(system.units[0].has_edges);
-  EXPECT_THAT(system.tasks[0].successors, ElementsAre(1, 2));
-  EXPECT_THAT(system.by_rank, ElementsAre(3, 0, 1, 2));
-  EXPECT_EQ(system.tasks[1].name, "graph/b");
-  EXPECT_TRUE(system.not_analysable.empty());
+TEST(TaskSet, AGraphOfOneRateIsOneUnit) {
+  const TaskSet task_set = compiled(two_dags(), mode(sched::Preemption::Full));
+  ASSERT_EQ(task_set.units.size(), 2U);
+  EXPECT_THAT(task_set.units[0].tasks, ElementsAre(0, 1, 2));
+  EXPECT_EQ(task_set.units[0].volume, 6 * kMillisecond);
+  EXPECT_EQ(task_set.units[0].length, 5 * kMillisecond);
+  EXPECT_EQ(task_set.units[0].limit, 20 * kMillisecond);
+  EXPECT_TRUE(task_set.units[0].has_edges);
+  EXPECT_THAT(task_set.tasks[0].successors, ElementsAre(1, 2));
+  EXPECT_THAT(task_set.by_rank, ElementsAre(3, 0, 1, 2));
+  EXPECT_EQ(task_set.tasks[1].name, "graph/b");
+  EXPECT_TRUE(task_set.not_analysable.empty());
 }
 
-TEST(System, RatesThatNoEdgeJoinsAreUnitsOfTheirOwn) {
+TEST(TaskSet, RatesThatNoEdgeJoinsAreUnitsOfTheirOwn) {
   const Workload workload = make_workload(
       {make_dag("mixed", {{.name = "a", .period_ms = 20}, {.name = "b", .after = {0}}, {.name = "x", .period_ms = 5}})},
       1);
-  const System system = compiled(workload, mode(sched::Preemption::Full));
-  ASSERT_EQ(system.units.size(), 2U);
-  EXPECT_THAT(system.units[0].tasks, ElementsAre(0, 1));
-  EXPECT_THAT(system.units[1].tasks, ElementsAre(2));
-  EXPECT_THAT(system.dags[0].units, ElementsAre(0, 1));
+  const TaskSet task_set = compiled(workload, mode(sched::Preemption::Full));
+  ASSERT_EQ(task_set.units.size(), 2U);
+  EXPECT_THAT(task_set.units[0].tasks, ElementsAre(0, 1));
+  EXPECT_THAT(task_set.units[1].tasks, ElementsAre(2));
+  EXPECT_THAT(task_set.dags[0].units, ElementsAre(0, 1));
 }
 
 // The tasks that follow the one waiting task belong to its unit, which waits for data of others.
-TEST(System, UnitsAreCutAtRateEdges) {
+TEST(TaskSet, UnitsAreCutAtRateEdges) {
   const Workload workload = make_workload({make_dag("d", {{.name = "fast", .period_ms = 5},
                                                           {.name = "slow", .period_ms = 20, .offset_ms = 3},
                                                           {.name = "fuse", .after = {0, 1}},
                                                           {.name = "track", .after = {2}},
                                                           {.name = "late", .period_ms = 20, .after = {1}}})},
                                           1);
-  const System system = compiled(workload, mode(sched::Preemption::Full));
-  ASSERT_EQ(system.units.size(), 4U);
-  EXPECT_THAT(system.units[0].tasks, ElementsAre(0));
-  EXPECT_THAT(system.units[1].tasks, ElementsAre(1));
-  EXPECT_THAT(system.units[2].tasks, ElementsAre(2, 3));
-  EXPECT_THAT(system.units[2].awaits, ElementsAre(0, 1));
-  EXPECT_EQ(system.units[2].offset, 3 * kMillisecond) << "that of its slowest predecessor";
-  EXPECT_EQ(system.tasks[3].offset, 3 * kMillisecond);
-  EXPECT_THAT(system.units[3].awaits, ElementsAre(1)) << "a timer of another offset";
-  EXPECT_EQ(system.units[3].offset, 0);
-  EXPECT_TRUE(system.has_rate_edges());
+  const TaskSet task_set = compiled(workload, mode(sched::Preemption::Full));
+  ASSERT_EQ(task_set.units.size(), 4U);
+  EXPECT_THAT(task_set.units[0].tasks, ElementsAre(0));
+  EXPECT_THAT(task_set.units[1].tasks, ElementsAre(1));
+  EXPECT_THAT(task_set.units[2].tasks, ElementsAre(2, 3));
+  EXPECT_THAT(task_set.units[2].awaits, ElementsAre(0, 1));
+  EXPECT_EQ(task_set.units[2].offset, 3 * kMillisecond) << "that of its slowest predecessor";
+  EXPECT_EQ(task_set.tasks[3].offset, 3 * kMillisecond);
+  EXPECT_THAT(task_set.units[3].awaits, ElementsAre(1)) << "a timer of another offset";
+  EXPECT_EQ(task_set.units[3].offset, 0);
+  EXPECT_TRUE(task_set.has_rate_edges());
   EXPECT_FALSE(compiled(two_dags(), mode(sched::Preemption::Full)).has_rate_edges());
 }
 
 // `join` brings a second waiting task into the part; therefore the part is not released as a whole.
-TEST(System, SeveralTasksThatWaitAreUnitsOfTheirOwn) {
+TEST(TaskSet, SeveralTasksThatWaitAreUnitsOfTheirOwn) {
   const Workload workload = make_workload({make_dag("d", {{.name = "fast", .period_ms = 5},
                                                           {.name = "slow", .period_ms = 20},
                                                           {.name = "b", .after = {0, 1}},
                                                           {.name = "c", .after = {0, 1}},
                                                           {.name = "join", .after = {2, 3}}})},
                                           1);
-  const System system = compiled(workload, mode(sched::Preemption::Full));
-  ASSERT_EQ(system.units.size(), 5U);
-  EXPECT_THAT(system.units[4].awaits, ElementsAre(2, 3));
+  const TaskSet task_set = compiled(workload, mode(sched::Preemption::Full));
+  ASSERT_EQ(task_set.units.size(), 5U);
+  EXPECT_THAT(task_set.units[4].awaits, ElementsAre(2, 3));
 }
 
-TEST(System, ExecutionTimesThatAddUpToDecadesAreNotAnalysed) {
+TEST(TaskSet, ExecutionTimesThatAddUpToDecadesAreNotAnalysed) {
   Workload workload = two_dags();
   Task &task = workload.dags[0].tasks[0];
   task.wcet = kMaxDuration / 8 - 10 * kMillisecond;
@@ -117,7 +117,7 @@ TEST(System, ExecutionTimesThatAddUpToDecadesAreNotAnalysed) {
   EXPECT_THAT(compiled(workload, mode(sched::Preemption::Full)).not_analysable, HasSubstr("more than 18 years"));
 }
 
-TEST(System, WhatCutsOrRefusesJobsIsNotAnalysed) {
+TEST(TaskSet, WhatCutsOrRefusesJobsIsNotAnalysed) {
   Workload budget = two_dags();
   budget.dags[0].tasks[0].budget = kMillisecond;
   EXPECT_THAT(compiled(budget, mode(sched::Preemption::Full)).not_analysable, HasSubstr("budget"));
@@ -136,20 +136,20 @@ TEST(System, WhatCutsOrRefusesJobsIsNotAnalysed) {
   EXPECT_EQ(compiled(two_dags(), threads).not_analysable, "");
 }
 
-TEST(System, OverlappingJobsOfOneTaskAreNotAnalysed) {
+TEST(TaskSet, OverlappingJobsOfOneTaskAreNotAnalysed) {
   Workload workload = two_dags();
   workload.dags[0].tasks[1].concurrency = 2;
-  const System system = compiled(workload, mode(sched::Preemption::Full, 2));
-  EXPECT_EQ(system.not_analysable, "task 'graph/b': jobs of a task with concurrency above 1 can overlap");
-  EXPECT_TRUE(std::holds_alternative<NotApplicable>(analyze(system).methods.at(0).outcome));
+  const TaskSet task_set = compiled(workload, mode(sched::Preemption::Full, 2));
+  EXPECT_EQ(task_set.not_analysable, "task 'graph/b': jobs of a task with concurrency above 1 can overlap");
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(analyze(task_set).methods.at(0).outcome));
 }
 
-TEST(System, RegionsFollowTheMode) {
+TEST(TaskSet, RegionsFollowTheMode) {
   Workload workload = two_dags();
   workload.dags[0].tasks[1].region = 2 * kMillisecond;
   EXPECT_EQ(compiled(workload, mode(sched::Preemption::Full)).tasks[1].region, 0);
   EXPECT_EQ(compiled(workload, mode(sched::Preemption::None)).tasks[1].region, 3 * kMillisecond);
-  const System cooperative = compiled(workload, mode(sched::Preemption::Cooperative));
+  const TaskSet cooperative = compiled(workload, mode(sched::Preemption::Cooperative));
   EXPECT_EQ(cooperative.tasks[1].region, 2 * kMillisecond);
   EXPECT_EQ(cooperative.tasks[1].last_region, kMillisecond);
   EXPECT_EQ(cooperative.tasks[0].region, 2 * kMillisecond) << "without a region: the whole job";
@@ -158,7 +158,7 @@ TEST(System, RegionsFollowTheMode) {
       << "no task has a preemption point";
 }
 
-TEST(System, BadInputIsAnError) {
+TEST(TaskSet, BadInputIsAnError) {
   EXPECT_FALSE(compile(two_dags(), mode(sched::Preemption::Full, 0)));
   AnalysisPlatform negative = mode(sched::Preemption::Full);
   negative.release_overhead = -1;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_analysis/core/system.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 #include <algorithm>
 #include <map>
@@ -21,55 +21,55 @@ constexpr Duration kLongestSum = kUnbounded / 8;
 class Compiler {
  public:
   Compiler(const Workload &workload, const AnalysisPlatform &platform) : workload_(workload) {
-    system_.platform = platform;
-    system_.policy = workload.policy;
-    system_.ties = workload.ties;
-    system_.mode = platform.preemption;
+    task_set_.platform = platform;
+    task_set_.policy = workload.policy;
+    task_set_.ties = workload.ties;
+    task_set_.mode = platform.preemption;
     const auto has_region = [](const Dag &dag) {
       return std::any_of(dag.tasks.begin(), dag.tasks.end(), [](const Task &task) { return task.region > 0; });
     };
     if (platform.preemption == sched::Preemption::Cooperative &&
         std::none_of(workload.dags.begin(), workload.dags.end(), has_region)) {
-      system_.mode = sched::Preemption::None;
+      task_set_.mode = sched::Preemption::None;
     }
     find_losses();
   }
 
-  System run() {
+  TaskSet run() {
     for (const Dag &dag : workload_.dags) add_dag(dag);
     assign_ranks();
     keep_shared_groups();
-    for (std::uint32_t d = 0; d < system_.dags.size(); ++d) {
+    for (std::uint32_t d = 0; d < task_set_.dags.size(); ++d) {
       find_grids(d);
       form_units(d);
     }
-    for (const SystemTask &task : system_.tasks) {
-      system_.utilization += static_cast<double>(task.wcet) / static_cast<double>(task.period);
+    for (const CompiledTask &task : task_set_.tasks) {
+      task_set_.utilization += static_cast<double>(task.wcet) / static_cast<double>(task.period);
     }
     check_sums();
     check_threads();
     if (lost_.per_second >= kSecond) refuse("stalls, releases and preemptions leave no processor time");
-    system_.has_modes = system_.not_analysable.empty() && !modes_.empty();
-    if (system_.has_modes) refuse(std::move(modes_));
-    return std::move(system_);
+    task_set_.has_modes = task_set_.not_analysable.empty() && !modes_.empty();
+    if (task_set_.has_modes) refuse(std::move(modes_));
+    return std::move(task_set_);
   }
 
  private:
   void refuse(std::string reason) {
-    if (system_.not_analysable.empty()) system_.not_analysable = std::move(reason);
+    if (task_set_.not_analysable.empty()) task_set_.not_analysable = std::move(reason);
   }
 
   // True if preemptions count as time in which nothing runs, as stalls and the release timer do. On several workers the
   // resumed job pays in its own time, which no interference divided by m covers.
   [[nodiscard]] bool preemptions_freeze() const {
-    return system_.platform.workers > 1 && system_.mode != sched::Preemption::None &&
-           system_.platform.preempt_overhead > 0;
+    return task_set_.platform.workers > 1 && task_set_.mode != sched::Preemption::None &&
+           task_set_.platform.preempt_overhead > 0;
   }
 
   // Finds the time in which the bounds assume that nothing runs. It is sound to count each loss on one processor as one
   // on all.
   void find_losses() {
-    const AnalysisPlatform &platform = system_.platform;
+    const AnalysisPlatform &platform = task_set_.platform;
     lost_.longest = multiply(platform.stall.longest, platform.workers);
     lost_.per_second = multiply(platform.stall.per_second, platform.workers);
     // `each` is the loss for every release of a task. `more` counts the releases in a window beyond those that its
@@ -90,7 +90,7 @@ class Compiler {
         if (preemptions_freeze()) add_releases(multiply(platform.preempt_overhead, times), task, late + waiting + 2);
       }
     }
-    system_.frozen = lost_.per_second < kSecond ? lengthened(lost_.longest) : 0;
+    task_set_.frozen = lost_.per_second < kSecond ? lengthened(lost_.longest) : 0;
   }
 
   // Lengthens an execution by the share of the processor that is permanently lost.
@@ -104,53 +104,53 @@ class Compiler {
   // Limits the sums. The bounds can then add up what tasks execute without checking each sum.
   void check_sums() {
     Int128 sum = 0;
-    for (const SystemTask &task : system_.tasks) sum += Int128{task.wcet} + task.jitter;
+    for (const CompiledTask &task : task_set_.tasks) sum += Int128{task.wcet} + task.jitter;
     if (sum > kLongestSum) refuse("execution times and jitter add up to more than 18 years");
   }
 
   // A started job keeps its thread while it is preempted.
   void check_threads() {
-    const std::uint32_t threads = system_.platform.max_started;
-    if (system_.mode != sched::Preemption::Full || threads == 0 || threads >= system_.tasks.size()) return;
+    const std::uint32_t threads = task_set_.platform.max_started;
+    if (task_set_.mode != sched::Preemption::Full || threads == 0 || threads >= task_set_.tasks.size()) return;
     std::size_t most = 0;
-    for (std::uint32_t d = 0; d < system_.dags.size(); ++d) most += most_jobs_in_progress(system_, DagId(d));
+    for (std::uint32_t d = 0; d < task_set_.dags.size(); ++d) most += most_jobs_in_progress(task_set_, DagId(d));
     if (threads < most) {
       refuse(std::to_string(threads) + " threads for up to " + std::to_string(most) +
              " jobs in progress: a job can wait for a thread that less urgent jobs hold");
     }
-    system_.threads_suffice_if_bounded = true;
+    task_set_.threads_suffice_if_bounded = true;
   }
 
   void add_dag(const Dag &dag) {
-    SystemDag compiled;
+    CompiledDag compiled;
     compiled.name = dag.name;
     compiled.deadline = dag.deadline;
     compiled.high = dag.criticality == Criticality::High;
     if (dag.max_active < dag.tasks.size()) compiled.max_active = dag.max_active;
-    const auto first = static_cast<std::uint32_t>(system_.tasks.size());
+    const auto first = static_cast<std::uint32_t>(task_set_.tasks.size());
     std::uint64_t waiting = 0;
     for (const Task &task : dag.tasks) {
-      compiled.tasks.push_back(static_cast<std::uint32_t>(system_.tasks.size()));
-      system_.tasks.push_back(compile_task(dag, task, first));
+      compiled.tasks.push_back(static_cast<std::uint32_t>(task_set_.tasks.size()));
+      task_set_.tasks.push_back(compile_task(dag, task, first));
       waiting += task.overrun == Overrun::Queue ? task.queue_depth : 1;
     }
-    for (std::uint32_t t = first; t < system_.tasks.size(); ++t) {
-      for (const std::uint32_t p : system_.tasks[t].predecessors) system_.tasks[p].successors.push_back(t);
+    for (std::uint32_t t = first; t < task_set_.tasks.size(); ++t) {
+      for (const std::uint32_t p : task_set_.tasks[t].predecessors) task_set_.tasks[p].successors.push_back(t);
     }
     if (dag.max_pending > 0 && dag.max_pending < waiting) {
       refuse("DAG '" + dag.name + "': max_pending can refuse jobs although every deadline is met");
     }
-    system_.dags.push_back(std::move(compiled));
+    task_set_.dags.push_back(std::move(compiled));
   }
 
-  SystemTask compile_task(const Dag &dag, const Task &task, std::uint32_t first) {
-    const AnalysisPlatform &platform = system_.platform;
-    SystemTask compiled;
+  CompiledTask compile_task(const Dag &dag, const Task &task, std::uint32_t first) {
+    const AnalysisPlatform &platform = task_set_.platform;
+    CompiledTask compiled;
     compiled.name = dag.name + "/" + task.name;
-    compiled.dag = DagId(system_.dags.size());
+    compiled.dag = DagId(task_set_.dags.size());
     // The job that preempts pays for the resumption; a job preempts at most once, when it starts.
     const Duration lead = add(platform.release_overhead, platform.dispatch_overhead);
-    const bool pays = system_.mode != sched::Preemption::None && !preemptions_freeze();
+    const bool pays = task_set_.mode != sched::Preemption::None && !preemptions_freeze();
     const Duration overhead = pays ? add(lead, platform.preempt_overhead) : lead;
     compiled.wcet = lengthened(add(task.wcet, overhead));
     compiled.overhead = compiled.wcet - task.wcet;
@@ -160,7 +160,7 @@ class Compiler {
     compiled.deadline = task.deadline;
     compiled.jitter = task.jitter;
     if (task.activation == Activation::Timer) {
-      compiled.jitter = add(add(task.jitter, platform.lateness), system_.frozen);
+      compiled.jitter = add(add(task.jitter, platform.lateness), task_set_.frozen);
     }
     compiled.limit = task.overrun == Overrun::Queue ? multiply(task.period, task.queue_depth) : task.period;
     compiled.data = task.activation == Activation::Data;
@@ -169,9 +169,9 @@ class Compiler {
       const auto next = static_cast<std::uint32_t>(group_ids_.size());
       compiled.group = group_ids_.try_emplace(task.group, next).first->second;
     }
-    if (system_.mode == sched::Preemption::None) {
+    if (task_set_.mode == sched::Preemption::None) {
       compiled.region = compiled.last_region = compiled.wcet;
-    } else if (system_.mode == sched::Preemption::Cooperative) {
+    } else if (task_set_.mode == sched::Preemption::Cooperative) {
       const bool whole = task.region == 0 || task.region >= task.wcet;
       compiled.region = whole ? compiled.wcet : lengthened(add(task.region, overhead));
       // Preemption points are at multiples of the region, strictly inside the job.
@@ -195,39 +195,39 @@ class Compiler {
 
   void assign_ranks() {
     const auto priorities =
-        sched::assign_priorities(workload_.dags, workload_.policy, workload_.ties, system_.platform.levels);
-    system_.by_rank.resize(priorities.size());
+        sched::assign_priorities(workload_.dags, workload_.policy, workload_.ties, task_set_.platform.levels);
+    task_set_.by_rank.resize(priorities.size());
     for (std::uint32_t t = 0; t < priorities.size(); ++t) {
-      system_.tasks[t].rank = priorities[t].rank;
-      system_.tasks[t].tier = priorities[t].tier;
-      system_.tasks[t].level = priorities[t].level;
-      system_.by_rank[priorities[t].rank] = t;
+      task_set_.tasks[t].rank = priorities[t].rank;
+      task_set_.tasks[t].tier = priorities[t].tier;
+      task_set_.tasks[t].level = priorities[t].level;
+      task_set_.by_rank[priorities[t].rank] = t;
     }
   }
 
   void keep_shared_groups() {
     std::vector<std::vector<std::uint32_t>> members(group_ids_.size());
-    for (std::uint32_t t = 0; t < system_.tasks.size(); ++t) {
-      if (system_.tasks[t].group != kNoGroup) members[system_.tasks[t].group].push_back(t);
+    for (std::uint32_t t = 0; t < task_set_.tasks.size(); ++t) {
+      if (task_set_.tasks[t].group != kNoGroup) members[task_set_.tasks[t].group].push_back(t);
     }
     for (const std::vector<std::uint32_t> &group : members) {
       const bool is_shared = group.size() > 1;
-      const auto id = static_cast<std::uint32_t>(system_.groups.size());
-      for (const std::uint32_t t : group) system_.tasks[t].group = is_shared ? id : kNoGroup;
-      if (is_shared) system_.groups.push_back(group);
+      const auto id = static_cast<std::uint32_t>(task_set_.groups.size());
+      for (const std::uint32_t t : group) task_set_.tasks[t].group = is_shared ? id : kNoGroup;
+      if (is_shared) task_set_.groups.push_back(group);
     }
   }
 
   // Splits a DAG into units: one list of tasks per unit, in topological order.
   std::vector<std::vector<std::uint32_t>> split(std::uint32_t dag) const {
-    std::vector<std::uint32_t> order = system_.dags[dag].tasks;
+    std::vector<std::uint32_t> order = task_set_.dags[dag].tasks;
     if (order.empty()) return {};
     const std::uint32_t first = order.front();
     const std::vector<std::uint32_t> ranks = topological_ranks(workload_.dags[dag]);
     std::sort(order.begin(), order.end(),
               [&](std::uint32_t a, std::uint32_t b) { return ranks[a - first] < ranks[b - first]; });
     const bool edges = std::any_of(order.begin(), order.end(),
-                                   [&](std::uint32_t t) { return !system_.tasks[t].predecessors.empty(); });
+                                   [&](std::uint32_t t) { return !task_set_.tasks[t].predecessors.empty(); });
     if (edges && is_released_together(dag, order)) return {order};
 
     const std::vector<std::vector<std::uint32_t>> parts = connected_parts(order);
@@ -254,7 +254,7 @@ class Compiler {
     };
     for (const std::uint32_t t : order) {
       if (joins_rates(t)) continue;
-      for (const std::uint32_t p : system_.tasks[t].predecessors) part[find(t - first)] = find(p - first);
+      for (const std::uint32_t p : task_set_.tasks[t].predecessors) part[find(t - first)] = find(p - first);
     }
     std::map<std::uint32_t, std::vector<std::uint32_t>> parts;
     for (const std::uint32_t t : order) parts[find(t - first)].push_back(t);
@@ -265,9 +265,9 @@ class Compiler {
   }
 
   [[nodiscard]] bool joins_rates(std::uint32_t t) const {
-    const SystemTask &task = system_.tasks[t];
+    const CompiledTask &task = task_set_.tasks[t];
     return std::any_of(task.predecessors.begin(), task.predecessors.end(), [&](std::uint32_t p) {
-      return system_.tasks[p].period != task.period || system_.tasks[p].offset != task.offset;
+      return task_set_.tasks[p].period != task.period || task_set_.tasks[p].offset != task.offset;
     });
   }
 
@@ -275,24 +275,24 @@ class Compiler {
   [[nodiscard]] bool is_unit(const std::vector<std::uint32_t> &part) const {
     if (std::none_of(part.begin(), part.end(), [&](std::uint32_t t) { return joins_rates(t); })) return true;
     return std::all_of(part.begin() + 1, part.end(),
-                       [&](std::uint32_t t) { return !joins_rates(t) && !system_.tasks[t].predecessors.empty(); });
+                       [&](std::uint32_t t) { return !joins_rates(t) && !task_set_.tasks[t].predecessors.empty(); });
   }
 
   // Sets the grids of a DAG's tasks, in topological order. A timer has its own grid. A data task has that of its
   // predecessor with the largest period; of several, the one with the latest offset.
   void find_grids(std::uint32_t dag) {
-    const std::uint32_t first = system_.dags[dag].tasks.empty() ? 0 : system_.dags[dag].tasks.front();
+    const std::uint32_t first = task_set_.dags[dag].tasks.empty() ? 0 : task_set_.dags[dag].tasks.front();
     const std::vector<std::uint32_t> ranks = topological_ranks(workload_.dags[dag]);
-    std::vector<std::uint32_t> order = system_.dags[dag].tasks;
+    std::vector<std::uint32_t> order = task_set_.dags[dag].tasks;
     std::sort(order.begin(), order.end(),
               [&](std::uint32_t a, std::uint32_t b) { return ranks[a - first] < ranks[b - first]; });
     for (const std::uint32_t t : order) {
-      SystemTask &task = system_.tasks[t];
+      CompiledTask &task = task_set_.tasks[t];
       task.offset = workload_.dags[dag].tasks[t - first].offset;
       if (!task.data) continue;
       std::optional<Duration> latest;
       for (const std::uint32_t p : task.predecessors) {
-        const SystemTask &before = system_.tasks[p];
+        const CompiledTask &before = task_set_.tasks[p];
         if (before.period == task.period) latest = std::max(latest.value_or(before.offset), before.offset);
       }
       task.offset = latest.value_or(0);
@@ -300,11 +300,11 @@ class Compiler {
   }
 
   [[nodiscard]] bool is_released_together(std::uint32_t dag, const std::vector<std::uint32_t> &tasks) const {
-    const std::uint32_t first = system_.dags[dag].tasks.front();
+    const std::uint32_t first = task_set_.dags[dag].tasks.front();
     std::optional<Duration> offset;
     for (const std::uint32_t t : tasks) {
       const Task &task = workload_.dags[dag].tasks[t - first];
-      if (task.period != system_.tasks[tasks.front()].period) return false;
+      if (task.period != task_set_.tasks[tasks.front()].period) return false;
       if (task.activation != Activation::Timer) continue;
       if (offset && *offset != task.offset) return false;
       offset = task.offset;
@@ -314,15 +314,15 @@ class Compiler {
 
   void form_units(std::uint32_t dag) {
     for (std::vector<std::uint32_t> &tasks : split(dag)) {
-      const auto id = static_cast<std::uint32_t>(system_.units.size());
-      for (const std::uint32_t t : tasks) system_.tasks[t].unit = id;
-      system_.dags[dag].units.push_back(id);
-      system_.units.push_back(make_unit(DagId(dag), std::move(tasks)));
+      const auto id = static_cast<std::uint32_t>(task_set_.units.size());
+      for (const std::uint32_t t : tasks) task_set_.tasks[t].unit = id;
+      task_set_.dags[dag].units.push_back(id);
+      task_set_.units.push_back(make_unit(DagId(dag), std::move(tasks)));
     }
   }
 
   [[nodiscard]] Unit make_unit(DagId dag, std::vector<std::uint32_t> tasks) const {
-    const SystemTask &first = system_.tasks[tasks.front()];
+    const CompiledTask &first = task_set_.tasks[tasks.front()];
     Unit unit;
     unit.dag = dag;
     unit.period = first.period;
@@ -335,7 +335,7 @@ class Compiler {
     unit.first_rank = unit.last_rank = first.rank;
     std::map<std::uint32_t, Duration> path;  // longest path that ends with the task
     for (const std::uint32_t t : tasks) {
-      const SystemTask &task = system_.tasks[t];
+      const CompiledTask &task = task_set_.tasks[t];
       unit.deadline = std::min(unit.deadline, task.deadline);
       unit.jitter = std::max(unit.jitter, task.data ? 0 : task.jitter);
       unit.volume = add(unit.volume, task.wcet);
@@ -347,7 +347,7 @@ class Compiler {
       path[t] = add(before, task.wcet);
       unit.length = std::max(unit.length, path[t]);
     }
-    const Duration end_to_end = system_.dags[dag.value].deadline;
+    const Duration end_to_end = task_set_.dags[dag.value].deadline;
     if (end_to_end > 0) unit.deadline = std::min(unit.deadline, end_to_end);
     unit.tasks = std::move(tasks);
     return unit;
@@ -355,7 +355,7 @@ class Compiler {
 
   std::string modes_;  // why there is a HI mode
   const Workload &workload_;
-  System system_;
+  TaskSet task_set_;
   Loss lost_;
   std::map<std::string, std::uint32_t> group_ids_;
 };
@@ -418,15 +418,15 @@ sched::Config config_of(const AnalysisPlatform &platform, const Workload &worklo
   return config;
 }
 
-bool System::has_edges() const {
+bool TaskSet::has_edges() const {
   return std::any_of(units.begin(), units.end(), [](const Unit &unit) { return unit.has_edges; });
 }
 
-bool System::has_rate_edges() const {
+bool TaskSet::has_rate_edges() const {
   return std::any_of(units.begin(), units.end(), [](const Unit &unit) { return !unit.awaits.empty(); });
 }
 
-Result<System> compile(const Workload &workload, const AnalysisPlatform &platform) {
+Result<TaskSet> compile(const Workload &workload, const AnalysisPlatform &platform) {
   if (platform.workers == 0) return make_error("a platform has at least one worker");
   if (std::min({platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead, platform.lateness,
                 platform.timer_overhead, platform.stall.longest, platform.stall.per_second}) < 0) {

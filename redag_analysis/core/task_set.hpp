@@ -62,7 +62,7 @@ struct ExecutedRun {
 inline constexpr std::uint32_t kNoGroup = 0xffffffff;
 
 /// One per TaskId.
-struct SystemTask {
+struct CompiledTask {
   std::string name;  // "dag/task"
   DagId dag;
   std::uint32_t unit = 0;
@@ -108,7 +108,7 @@ struct Unit {
   bool has_edges = false;
 };
 
-struct SystemDag {
+struct CompiledDag {
   std::string name;
   std::vector<std::uint32_t> units;
   std::vector<std::uint32_t> tasks;  // TaskIds
@@ -117,13 +117,13 @@ struct SystemDag {
   bool high = false;                 // of high criticality: never degraded
 };
 
-struct System {
+struct TaskSet {
   AnalysisPlatform platform;
   PolicyKind policy = PolicyKind::RateMonotonic;
   Ties ties = Ties::Share;
-  std::vector<SystemTask> tasks;
+  std::vector<CompiledTask> tasks;
   std::vector<Unit> units;
-  std::vector<SystemDag> dags;
+  std::vector<CompiledDag> dags;
   std::vector<std::uint32_t> by_rank;              // TaskIds, most urgent first
   std::vector<std::vector<std::uint32_t>> groups;  // TaskIds of each group
   double utilization = 0;                          // sum of wcet / period, overheads included; only to be shown
@@ -150,6 +150,6 @@ struct System {
 
 /// Compiles a workload. Fails where validate() finds an error (set the periods of data tasks first: inherit_periods()),
 /// and for a platform without workers or with negative overheads. O(n log n + edges).
-[[nodiscard]] Result<System> compile(const Workload &workload, const AnalysisPlatform &platform);
+[[nodiscard]] Result<TaskSet> compile(const Workload &workload, const AnalysisPlatform &platform);
 
 }  // namespace redag::analysis
