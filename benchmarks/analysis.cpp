@@ -19,6 +19,7 @@ namespace {
 using redag::Duration;
 using redag::Workload;
 namespace analysis = redag::analysis;
+namespace lab = redag::lab;
 using analysis::global::GlobalUnit;
 
 constexpr std::uint32_t kWorkers = 4;

@@ -15,6 +15,7 @@ namespace {
 
 using redag::Workload;
 namespace analysis = redag::analysis;
+namespace lab = redag::lab;
 
 std::vector<Workload> sets(std::uint32_t workers) {
   constexpr std::size_t kSets = 32;
@@ -53,22 +54,22 @@ void BM_ShownSchedulable(benchmark::State &state) {
 void BM_CriticalScalingFactor(benchmark::State &state) {
   on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
     const auto task_set = analysis::compile(workload, platform);
-    benchmark::DoNotOptimize(analysis::margin_of(workload, platform, analysis::knobs_of(workload, *task_set).front()));
+    benchmark::DoNotOptimize(lab::margin_of(workload, platform, lab::knobs_of(workload, *task_set).front()));
   });
 }
 
 void BM_Sensitivity(benchmark::State &state) {
   on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
     const auto task_set = analysis::compile(workload, platform);
-    for (const analysis::Knob &knob : analysis::knobs_of(workload, *task_set)) {
-      benchmark::DoNotOptimize(analysis::margin_of(workload, platform, knob));
+    for (const lab::Knob &knob : lab::knobs_of(workload, *task_set)) {
+      benchmark::DoNotOptimize(lab::margin_of(workload, platform, knob));
     }
   });
 }
 
 void BM_Assign(benchmark::State &state) {
   on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
-    benchmark::DoNotOptimize(analysis::assign(workload, platform));
+    benchmark::DoNotOptimize(lab::assign(workload, platform));
   });
 }
 

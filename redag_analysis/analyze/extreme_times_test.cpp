@@ -151,16 +151,16 @@ TEST(ExtremeTimes, NoSearchWraps) {
     ++searched;
     int analyses = 0;
     const auto enough = [&analyses] { return ++analyses > 200; };
-    for (const Knob &knob : knobs_of(drawn.workload, *task_set)) {
-      const auto margin = margin_of(drawn.workload, drawn.platform, knob, accepted_by_analysis, {4, enough});
+    for (const lab::Knob &knob : lab::knobs_of(drawn.workload, *task_set)) {
+      const auto margin = lab::margin_of(drawn.workload, drawn.platform, knob, lab::accepted_by_analysis, {4, enough});
       if (!margin) break;
     }
     analyses = 0;
-    AssignmentOptions options;
+    lab::AssignmentOptions options;
     options.exhaustive = 8;
     options.restarts = 0;
     options.stop = enough;
-    const Result<Assignment> assignment = assign(drawn.workload, drawn.platform, options);
+    const Result<lab::Assignment> assignment = lab::assign(drawn.workload, drawn.platform, options);
     EXPECT_TRUE(assignment || !assignment.error().empty());
     if (!why_not_explore(*task_set)) {
       ExplorationOptions few;

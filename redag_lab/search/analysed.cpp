@@ -19,8 +19,8 @@ using analysis::MethodReport;
 using analysis::NotApplicable;
 
 // Returns a trusted test that accepts all tasks at once, or null.
-const Method *accepting_test(const Analysed &analysed) {
-  for (const MethodReport &method : analysed.report.methods) {
+const analysis::Method *accepting_test(const Analysed &analysed) {
+  for (const analysis::MethodReport &method : analysed.report.methods) {
     const analysis::Bound *bound = method.bound();
     if (method.trusted && bound != nullptr && bound->accepts == true) return method.method;
   }
@@ -42,7 +42,7 @@ std::string culprit_of(const Analysed &analysed, const analysis::Bound &bound, c
 std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_dag) {
   if (!analysed.task_set.not_analysable.empty() && !analysed.task_set.has_modes)
     return analysed.task_set.not_analysable;
-  for (const MethodReport &method : analysed.report.methods) {
+  for (const analysis::MethodReport &method : analysed.report.methods) {
     const analysis::Bound *bound = method.bound();
     if (!method.trusted || bound == nullptr) continue;
     const auto &bounds = is_dag ? bound->dags : bound->tasks;
@@ -51,9 +51,10 @@ std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_da
                          culprit_of(analysed, *bound, bounds[index]));
     }
   }
-  for (const MethodReport &method : analysed.report.methods) {
+  for (const analysis::MethodReport &method : analysed.report.methods) {
     if (!method.gave_up() || method.method->subject == analysis::Subject::TaskSet) continue;
-    return fmt::format("gave up on {}: {}", method.method->name, std::get<NotApplicable>(method.outcome).reason);
+    return fmt::format("gave up on {}: {}", method.method->name,
+                       std::get<analysis::NotApplicable>(method.outcome).reason);
   }
   return "no method that bounds response times applies";
 }
@@ -62,7 +63,7 @@ void judge(const Analysed &analysed, Row &row, std::size_t index, bool is_dag) {
   row.says = row.tightest.method;
   if (row.tightest.response && row.due) row.slack = *row.due - *row.tightest.response;
   if (!row.tightest.response) row.reason = why_no_bound(analysed, index, is_dag);
-  const Method *test = accepting_test(analysed);
+  const analysis::Method *test = accepting_test(analysed);
   const bool is_met = row.slack.value_or(-1) >= 0;
   if (!is_met && row.due && test != nullptr) {
     // A yes-or-no test can accept where the bounds are too coarse. A bound above the deadline is then dropped.
@@ -81,17 +82,18 @@ void judge(const Analysed &analysed, Row &row, std::size_t index, bool is_dag) {
 }
 
 // Keeps the methods with these names. Error: an unknown name.
-std::optional<Diagnostics> keep_only(const std::vector<std::string> &only, std::vector<Method> &methods) {
+std::optional<Diagnostics> keep_only(const std::vector<std::string> &only, std::vector<analysis::Method> &methods) {
   if (only.empty()) return std::nullopt;
   std::vector<std::string> names;
   names.reserve(methods.size());
-  for (const Method &method : methods) names.emplace_back(method.name);
+  for (const analysis::Method &method : methods) names.emplace_back(method.name);
   for (const std::string &name : only) {
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
     return make_error("--method: there is no method '" + name + "'", suggestion(name, names)).value();
   }
-  std::erase_if(methods,
-                [&](const Method &method) { return std::find(only.begin(), only.end(), method.name) == only.end(); });
+  std::erase_if(methods, [&](const analysis::Method &method) {
+    return std::find(only.begin(), only.end(), method.name) == only.end();
+  });
   return std::nullopt;
 }
 
@@ -104,14 +106,14 @@ Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatf
   if (kind == nullptr) return make_error("there is no analysis of the executor '" + executor + "'");
   Result<analysis::TaskSet> task_set = analysis::compile_for(*kind, workload, platform);
   if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
-  std::vector<Method> methods = analysis::methods_of(*kind);
+  std::vector<analysis::Method> methods = analysis::methods_of(*kind);
   std::shared_ptr<const analysis::Exploration> exploration;
   if (explore != nullptr && kind->ours) {
     std::optional<std::string> reason = analysis::why_not_explore(*task_set);
     if (!reason) exploration = std::make_shared<analysis::Exploration>(analysis::explore(*task_set, *explore));
     methods.push_back(analysis::exploration());
     methods.back().apply = [exploration, reason](const analysis::TaskSet &asked) -> analysis::Outcome {
-      if (reason) return NotApplicable{*reason};
+      if (reason) return analysis::NotApplicable{*reason};
       return to_bound(asked, *exploration);
     };
   }

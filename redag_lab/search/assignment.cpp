@@ -9,30 +9,8 @@
 #include "redag_analysis/core/arithmetic.hpp"
 #include "redag_lab/search/coordinate_search.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 namespace {
-
-class Scorer {
- public:
-  void see(const Tightest &tightest, Duration due) {
-    if (!tightest.response) {
-      ++score_.unbounded;
-      return;
-    }
-    const Duration lateness = *tightest.response - due;
-    const double slack = -static_cast<double>(lateness) / static_cast<double>(due);
-    score_.worst_lateness = any_ ? std::max(score_.worst_lateness, lateness) : lateness;
-    score_.least_slack = any_ ? std::min(score_.least_slack, slack) : slack;
-    score_.total = add(score_.total, *tightest.response);
-    any_ = true;
-  }
-
-  [[nodiscard]] const Score &score() const { return score_; }
-
- private:
-  Score score_;
-  bool any_ = false;
-};
 
 // Sets the policy. Drops priorities where the workload relied on them and the new policy would ignore them.
 Workload with_policy(Workload workload, PolicyKind policy) {
@@ -47,7 +25,7 @@ Workload with_policy(Workload workload, PolicyKind policy) {
 
 class Search {
  public:
-  Search(const Workload &workload, const AnalysisPlatform &platform, const AssignmentOptions &options)
+  Search(const Workload &workload, const analysis::AnalysisPlatform &platform, const AssignmentOptions &options)
       : workload_(workload), platform_(platform), options_(options) {
     const Caps present = caps_of(workload);
     for (const Dag &dag : workload.dags) {
@@ -69,7 +47,7 @@ class Search {
       if (workload_.policy != PolicyKind::DeadlineMonotonic) {
         add_order("deadline_monotonic", with_policy(workload_, PolicyKind::DeadlineMonotonic));
       }
-      const Result<TaskSet> task_set = compile(workload_, platform_);
+      const Result<analysis::TaskSet> task_set = analysis::compile(workload_, platform_);
       if (platform_.workers > 1) add_order("dkc", with_order(workload_, *task_set, dkc_order(*task_set)));
       add_audsley(*task_set);
     } else {
@@ -84,12 +62,12 @@ class Search {
     return result_.stopped;
   }
 
-  Candidate judged(const std::string &name, const Workload &ordered, const Caps &caps) {
-    Candidate candidate;
+  OrderCandidate judged(const std::string &name, const Workload &ordered, const Caps &caps) {
+    OrderCandidate candidate;
     candidate.order = name;
     candidate.workload = with_caps(ordered, caps);
     candidate.caps = caps;
-    const Result<TaskSet> task_set = compile(candidate.workload, platform_);
+    const Result<analysis::TaskSet> task_set = analysis::compile(candidate.workload, platform_);
     ++result_.analyses;
     if (!task_set) return candidate;  // assign() has compiled the workload; only order and caps differ
     candidate.units = present_order(*task_set);
@@ -97,11 +75,11 @@ class Search {
     return candidate;
   }
 
-  [[nodiscard]] bool is_better_than(const Score &a, const Score &b) const {
+  [[nodiscard]] bool is_better_than(const BoundScore &a, const BoundScore &b) const {
     return is_better(a, b, options_.objective);
   }
 
-  void add_audsley(const TaskSet &task_set) {
+  void add_audsley(const analysis::TaskSet &task_set) {
     const TestChoice choice = order_free_test(workload_, platform_);
     if (!choice.test) {
       result_.audsley_reason = choice.reason;
@@ -123,34 +101,34 @@ class Search {
   // Finds the best caps under one order. A smaller sum of bounds alone is no reason to change the user's caps.
   void add_order(const std::string &name, const Workload &ordered) {
     if (stopped()) return;
-    Candidate start;
-    Candidate best;
+    OrderCandidate start;
+    OrderCandidate best;
     const auto evaluate = [&](std::span<const Point> points) {
-      std::vector<Score> scores;
+      std::vector<BoundScore> scores;
       for (const Point &caps : points) {
         if (!start.caps.empty() && stopped()) break;
-        Candidate candidate = judged(name, ordered, caps);
+        OrderCandidate candidate = judged(name, ordered, caps);
         scores.push_back(candidate.score);
         if (start.caps.empty()) start = best = candidate;
         if (is_better_than(candidate.score, best.score)) best = std::move(candidate);
       }
       return scores;
     };
-    CoordinateSearch<Score> search(evaluate, [this](const Score &a, const Score &b) { return is_better_than(a, b); });
+    CoordinateSearch<BoundScore> search(
+        evaluate, [this](const BoundScore &a, const BoundScore &b) { return is_better_than(a, b); });
     const auto found = search.run(space_, {options_.exhaustive, options_.restarts, options_.seed});
     result_.exhaustive = result_.exhaustive && found.exhaustive;
     if (!improves(best.score, start.score, options_.objective)) best = start;
     const bool is_best = improves(best.score, result_.best.score, options_.objective);
     if (is_best || result_.orders.empty()) {
-      result_.trials.clear();
-      for (const auto &[caps, score] : found.trials) result_.trials.push_back(Trial{caps, score});
+      result_.trials = found.trials;
     }
     if (is_best) result_.best = best;
     result_.orders.push_back(std::move(best));
   }
 
   const Workload &workload_;
-  const AnalysisPlatform &platform_;
+  const analysis::AnalysisPlatform &platform_;
   const AssignmentOptions &options_;
   SearchSpace space_;  // of max_active, one dimension per DAG
   Assignment result_;
@@ -192,44 +170,12 @@ std::vector<Caps> cap_starts(const Caps &present, const std::vector<Caps> &choic
   return starts;
 }
 
-const char *to_string(Objective objective) { return objective == Objective::Lateness ? "lateness" : "slack"; }
-
-bool is_better(const Score &a, const Score &b, Objective objective) {
-  if (a.schedulable != b.schedulable) return a.schedulable;
-  if (a.unbounded != b.unbounded) return a.unbounded < b.unbounded;
-  if (objective == Objective::Lateness && a.worst_lateness != b.worst_lateness) {
-    return a.worst_lateness < b.worst_lateness;
-  }
-  if (objective == Objective::Slack && a.least_slack != b.least_slack) return a.least_slack > b.least_slack;
-  return a.total < b.total;
-}
-
-bool improves(const Score &a, const Score &b, Objective objective) {
-  Score same_total = a;
-  same_total.total = b.total;
-  return is_better(same_total, b, objective);
-}
-
-Score score_of(const TaskSet &task_set) {
-  const Report report = analyze(task_set);
-  Scorer scorer;
-  for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
-    scorer.see(report.tasks[t], std::min(task_set.tasks[t].deadline, task_set.tasks[t].limit));
-  }
-  for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
-    if (task_set.dags[d].deadline > 0) scorer.see(report.dags[d], task_set.dags[d].deadline);
-  }
-  Score score = scorer.score();
-  score.schedulable = report.verdict == Verdict::Schedulable;
-  return score;
-}
-
-Result<Assignment> assign(const Workload &workload, const AnalysisPlatform &platform,
+Result<Assignment> assign(const Workload &workload, const analysis::AnalysisPlatform &platform,
                           const AssignmentOptions &options) {
-  if (const Result<TaskSet> task_set = compile(workload, platform); !task_set) {
+  if (const Result<analysis::TaskSet> task_set = analysis::compile(workload, platform); !task_set) {
     return tl::unexpected<Diagnostics>(task_set.error());
   }
   return Search(workload, platform, options).run();
 }
 
-}  // namespace redag::analysis
+}  // namespace redag::lab

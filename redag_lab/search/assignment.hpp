@@ -7,41 +7,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
-#include "redag_analysis/analyze/analyze.hpp"
 #include "redag_lab/search/audsley.hpp"
+#include "redag_lab/search/score.hpp"
 
-namespace redag::analysis {
-
-enum class Objective : std::uint8_t {
-  Lateness,  // minimises the largest bound - deadline over tasks and DAGs
-  Slack,     // maximises the least (deadline - bound) / deadline
-};
-
-[[nodiscard]] const char *to_string(Objective objective);
-
-/// The quality of a workload. The deadline counts as sooner where the next release would skip a job that has not
-/// started.
-struct Score {
-  bool schedulable = false;
-  std::uint32_t unbounded = 0;  // tasks and DAGs with a deadline and no trusted bound
-  /// Over the bounded tasks and DAGs; 0 without any. Both are computed for either objective.
-  Duration worst_lateness = 0;
-  double least_slack = 0;
-  Duration total = 0;  // sum of bounds; breaks ties
-
-  friend bool operator==(const Score &, const Score &) = default;
-};
-
-/// True if `a` is better. The criteria are, in this order: schedulable, fewer without a bound, the objective, the
-/// smaller sum of bounds.
-[[nodiscard]] bool is_better(const Score &a, const Score &b, Objective objective);
-/// As is_better(), without the sum of bounds; true justifies a change.
-[[nodiscard]] bool improves(const Score &a, const Score &b, Objective objective);
-
-[[nodiscard]] Score score_of(const TaskSet &task_set);
+namespace redag::lab {
 
 /// The max_active of each DAG, by DagId; 0: no bound.
 using Caps = std::vector<std::uint32_t>;
@@ -56,12 +29,12 @@ using Caps = std::vector<std::uint32_t>;
 /// Returns the starts of a local search: the present caps, none and all 1, each as far as it is among the choices.
 [[nodiscard]] std::vector<Caps> cap_starts(const Caps &present, const std::vector<Caps> &choices);
 
-struct Candidate {
+struct OrderCandidate {
   std::string order;  // "present", "rate_monotonic", "deadline_monotonic", "dkc", "audsley"
   Workload workload;  // with the order and the caps
   UnitOrder units;    // most urgent first
   Caps caps;
-  Score score;
+  BoundScore score;
 };
 
 struct AssignmentOptions {
@@ -76,17 +49,12 @@ struct AssignmentOptions {
   std::function<bool()> stop;  // asked before every analysis; true ends the search with the best so far
 };
 
-struct Trial {
-  Caps caps;
-  Score score;
-};
-
 struct Assignment {
-  Candidate present;              // the workload as it is
-  Candidate best;                 // equal to `present` if no other is better
-  std::vector<Candidate> orders;  // the best of each order tried, the present order first
-  std::vector<Trial> trials;      // all caps tried under the best order, in order of caps
-  bool exhaustive = true;         // all combinations of caps were tried for every order
+  OrderCandidate present;              // the workload as it is
+  OrderCandidate best;                 // equal to `present` if no other is better
+  std::vector<OrderCandidate> orders;  // the best of each order tried, the present order first
+  std::map<Caps, BoundScore> trials;   // all caps tried under the best order
+  bool exhaustive = true;              // all combinations of caps were tried for every order
   std::uint64_t analyses = 0;
   bool stopped = false;
 
@@ -103,7 +71,7 @@ struct Assignment {
 /// For each order, the max_active of every DAG with several tasks ranges over none and 1 to min(tasks - 1, workers).
 /// The local search changes one DAG at a time to its best value until nothing improves. It starts from the present
 /// caps, none, all 1 and random ones. Error: of compile().
-[[nodiscard]] Result<Assignment> assign(const Workload &workload, const AnalysisPlatform &platform,
+[[nodiscard]] Result<Assignment> assign(const Workload &workload, const analysis::AnalysisPlatform &platform,
                                         const AssignmentOptions &options = {});
 
-}  // namespace redag::analysis
+}  // namespace redag::lab

@@ -10,9 +10,10 @@
 #include <numeric>
 
 #include "redag/model/workload_yaml.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
 #include "redag_testing/bound_property.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 namespace {
 
 using testing::BoundCase;
@@ -43,7 +44,7 @@ Workload workload_of(std::vector<Dag> dags, std::uint32_t workers = 1, Preemptio
 }
 
 Assignment assigned(const Workload &workload, const AssignmentOptions &options = {}) {
-  return assign(workload, platform_of(workload), options).value();
+  return assign(workload, analysis::platform_of(workload), options).value();
 }
 
 // Returns a source and `width` successors, all with one period.
@@ -63,10 +64,10 @@ TEST(Assignment, ShortDeadlinesGoFirst) {
   // By rate, b waits for a and responds after 5. By deadline, it responds after 2.
   const Assignment result = assigned(workload_of({single("a", 3, 10, 10), single("b", 2, 20, 4)}));
   EXPECT_FALSE(result.present.score.schedulable);
-  EXPECT_EQ(result.present.score.worst_lateness, 1);
+  EXPECT_EQ(result.present.score.extremes.worst_lateness, 1);
   EXPECT_TRUE(result.best.score.schedulable);
   EXPECT_EQ(result.best.order, "deadline_monotonic");
-  EXPECT_EQ(result.best.score.worst_lateness, -2);
+  EXPECT_EQ(result.best.score.extremes.worst_lateness, -2);
   EXPECT_EQ(result.best.workload.policy, PolicyKind::DeadlineMonotonic);
 }
 
@@ -80,7 +81,7 @@ TEST(Assignment, AudsleyBeatsDeadlinesLongerThanPeriods) {
   EXPECT_EQ(result.best.order, "audsley");
   EXPECT_TRUE(result.best.score.schedulable);
   EXPECT_EQ(result.best.units, (UnitOrder{1, 0}));
-  EXPECT_EQ(result.best.score.worst_lateness, -2);
+  EXPECT_EQ(result.best.score.extremes.worst_lateness, -2);
   EXPECT_EQ(result.best.workload.policy, PolicyKind::Fixed);
   EXPECT_GT(result.best.workload.dags[1].tasks[0].priority, result.best.workload.dags[0].tasks[0].priority);
 }
@@ -99,13 +100,15 @@ TEST(Assignment, LeavesAloneWhatNothingImproves) {
 TEST(Assignment, ObjectivesDiffer) {
   // With (2, 6) above (2, 20): R = 2 and 4, lateness -4 and -16, slack 4/6 and 16/20. In the other order R = 4 and 2,
   // and the largest lateness is -2.
-  const Score high{true, 0, -4, 0.6, 10};
-  const Score low{true, 0, -2, 0.9, 9};
+  const BoundScore high{true, 0, {-4, 0.6, true}, 10};
+  const BoundScore low{true, 0, {-2, 0.9, true}, 9};
   EXPECT_TRUE(is_better(high, low, Objective::Lateness));
   EXPECT_TRUE(is_better(low, high, Objective::Slack));
-  EXPECT_TRUE(is_better(Score{true, 0, 5, 0, 0}, Score{false, 0, -5, 1, 0}, Objective::Lateness));
-  EXPECT_TRUE(is_better(Score{false, 1, 5, 0, 0}, Score{false, 2, -5, 1, 0}, Objective::Lateness));
-  Score smaller = high;
+  EXPECT_TRUE(
+      is_better(BoundScore{true, 0, {5, 0, true}, 0}, BoundScore{false, 0, {-5, 1, true}, 0}, Objective::Lateness));
+  EXPECT_TRUE(
+      is_better(BoundScore{false, 1, {5, 0, true}, 0}, BoundScore{false, 2, {-5, 1, true}, 0}, Objective::Lateness));
+  BoundScore smaller = high;
   smaller.total = 9;
   EXPECT_TRUE(is_better(smaller, high, Objective::Lateness));
   EXPECT_FALSE(improves(smaller, high, Objective::Lateness));
@@ -180,10 +183,11 @@ struct UnderTest {
   bool all_fit = true;
   Duration worst = std::numeric_limits<Duration>::min();
 };
-UnderTest under(const OrderFreeTest &test, const BoundCase &bound_case, const TaskSet &task_set,
+UnderTest under(const OrderFreeTest &test, const BoundCase &bound_case, const analysis::TaskSet &task_set,
                 const UnitOrder &order) {
   UnderTest result;
-  const TaskSet ordered = compile(with_order(bound_case.workload, task_set, order), bound_case.platform).value();
+  const analysis::TaskSet ordered =
+      analysis::compile(with_order(bound_case.workload, task_set, order), bound_case.platform).value();
   for (const std::uint32_t unit : order) {
     const Duration due = std::min(task_set.units[unit].deadline, task_set.units[unit].limit);
     const std::optional<Duration> response = test.response(ordered, unit);
@@ -205,7 +209,7 @@ void expect_optimal(BoundCaseLimits limits) {
   for (int i = 0; i < cases; ++i) {
     Rng rng(mix(static_cast<std::uint64_t>(i) + 31));
     const BoundCase bound_case = testing::random_bound_case(rng, limits);
-    const TaskSet task_set = compile(bound_case.workload, bound_case.platform).value();
+    const analysis::TaskSet task_set = analysis::compile(bound_case.workload, bound_case.platform).value();
     const TestChoice choice = order_free_test(bound_case.workload, bound_case.platform);
     if (!choice.test || task_set.units.size() > 5) continue;
     ASSERT_TRUE(choice.test->optimal);
@@ -225,9 +229,9 @@ void expect_optimal(BoundCaseLimits limits) {
     } while (std::next_permutation(order.begin(), order.end()));
     if (!found->found) continue;
     ++found_some;
-    const TaskSet ordered =
-        compile(with_order(bound_case.workload, task_set, found->order), bound_case.platform).value();
-    ASSERT_EQ(analyze(ordered).verdict, Verdict::Schedulable);
+    const analysis::TaskSet ordered =
+        analysis::compile(with_order(bound_case.workload, task_set, found->order), bound_case.platform).value();
+    ASSERT_EQ(analysis::analyze(ordered).verdict, analysis::Verdict::Schedulable);
   }
   EXPECT_GT(tried, cases / 4);
   EXPECT_GT(found_some, cases / 20);
@@ -304,7 +308,7 @@ TEST(AssignmentProperty, NeverWorseAndWhatIsWrittenMeansTheSame) {
       // Written to YAML and read again, the workload has the same score. Only order and caps have changed.
       const auto read = parse_workload(to_yaml(result->best.workload), "w.yaml");
       ASSERT_TRUE(read) << to_string(read.error());
-      ASSERT_EQ(score_of(compile(read->workload, bound_case.platform).value()), result->best.score);
+      ASSERT_EQ(score_of(analysis::compile(read->workload, bound_case.platform).value()), result->best.score);
       Workload undone = result->best.workload;
       undone.policy = bound_case.workload.policy;
       for (std::size_t d = 0; d < undone.dags.size(); ++d) {
@@ -320,4 +324,4 @@ TEST(AssignmentProperty, NeverWorseAndWhatIsWrittenMeansTheSame) {
 }
 
 }  // namespace
-}  // namespace redag::analysis
+}  // namespace redag::lab

@@ -15,15 +15,16 @@
 #include "redag_analysis/many_workers/global_sequential.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 namespace {
 
+namespace global = analysis::global;
 using global::GlobalUnit;
 
-Duration due_of(const Unit &unit) { return std::min(unit.deadline, unit.limit); }
+Duration due_of(const analysis::Unit &unit) { return std::min(unit.deadline, unit.limit); }
 
 template <class Key>
-UnitOrder sorted_by(const TaskSet &task_set, Key key) {
+UnitOrder sorted_by(const analysis::TaskSet &task_set, Key key) {
   UnitOrder order(task_set.units.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(),
@@ -31,19 +32,20 @@ UnitOrder sorted_by(const TaskSet &task_set, Key key) {
   return order;
 }
 
-const std::vector<Method> &one_worker_methods() {
-  static const std::vector<Method> kMethods = {rta_preemptive(), rta_nonpreemptive(), rta_deferred(),
-                                               dag_one_worker_preemptive(), dag_one_worker_deferred()};
+const std::vector<analysis::Method> &one_worker_methods() {
+  static const std::vector<analysis::Method> kMethods = {
+      analysis::rta_preemptive(), analysis::rta_nonpreemptive(), analysis::rta_deferred(),
+      analysis::dag_one_worker_preemptive(), analysis::dag_one_worker_deferred()};
   return kMethods;
 }
 
 // One worker: the fixed points depend only on the set of more urgent units. A unit that moves up past another is
 // blocked by at most C - 1 of it, and before had at least C of interference from it.
-std::optional<Duration> one_worker_response(const TaskSet &task_set, std::uint32_t unit) {
+std::optional<Duration> one_worker_response(const analysis::TaskSet &task_set, std::uint32_t unit) {
   std::optional<Duration> best;
-  for (const Method &method : one_worker_methods()) {
-    const Outcome outcome = method.apply(task_set);
-    const Bound *bound = std::get_if<Bound>(&outcome);
+  for (const analysis::Method &method : one_worker_methods()) {
+    const analysis::Outcome outcome = method.apply(task_set);
+    const analysis::Bound *bound = std::get_if<analysis::Bound>(&outcome);
     if (bound == nullptr) continue;
     const std::optional<Duration> &found = bound->tasks[task_set.units[unit].tasks.front()].response;
     if (found && (!best || *found < *best)) best = found;
@@ -53,10 +55,10 @@ std::optional<Duration> one_worker_response(const TaskSet &task_set, std::uint32
 
 // Several workers: the fixed points of the bounds, with each more urgent unit's deadline in place of its response. Work
 // in a window only grows with a response, and the order among the more urgent units no longer matters.
-std::optional<Duration> global_response(const TaskSet &task_set, std::uint32_t unit) {
+std::optional<Duration> global_response(const analysis::TaskSet &task_set, std::uint32_t unit) {
   const bool edges = task_set.has_edges();
   const bool bounds = std::any_of(task_set.dags.begin(), task_set.dags.end(),
-                                  [](const CompiledDag &dag) { return dag.max_active > 0; });
+                                  [](const analysis::CompiledDag &dag) { return dag.max_active > 0; });
   const bool sequential = !edges && !bounds;
   global::Units view = global::units_of(task_set, {.mode = task_set.mode, .edges = !sequential, .bounds = !sequential});
   if (view.reason) return std::nullopt;
@@ -88,16 +90,16 @@ std::optional<Duration> global_response(const TaskSet &task_set, std::uint32_t u
 }
 
 // Compiles the workload with priorities in this order. It compiled before and cannot fail now.
-TaskSet compiled(const Workload &workload, const AnalysisPlatform &platform, const TaskSet &before,
-                 const UnitOrder &order) {
-  Result<TaskSet> task_set = compile(with_order(workload, before, order), platform);
+analysis::TaskSet compiled(const Workload &workload, const analysis::AnalysisPlatform &platform,
+                           const analysis::TaskSet &before, const UnitOrder &order) {
+  Result<analysis::TaskSet> task_set = analysis::compile(with_order(workload, before, order), platform);
   REDAG_CHECK(task_set.has_value(), "other priorities make a valid workload invalid");
   return *std::move(task_set);
 }
 
 }  // namespace
 
-Workload with_order(const Workload &workload, const TaskSet &task_set, const UnitOrder &order) {
+Workload with_order(const Workload &workload, const analysis::TaskSet &task_set, const UnitOrder &order) {
   std::vector<int> priority(task_set.tasks.size(), 0);
   for (std::size_t place = 0; place < order.size(); ++place) {
     for (const std::uint32_t t : task_set.units[order[place]].tasks) {
@@ -113,39 +115,39 @@ Workload with_order(const Workload &workload, const TaskSet &task_set, const Uni
   return result;
 }
 
-UnitOrder present_order(const TaskSet &task_set) {
-  return sorted_by(task_set, [](const Unit &unit) { return unit.first_rank; });
+UnitOrder present_order(const analysis::TaskSet &task_set) {
+  return sorted_by(task_set, [](const analysis::Unit &unit) { return unit.first_rank; });
 }
 
-UnitOrder deadline_order(const TaskSet &task_set) {
-  return sorted_by(task_set, [](const Unit &unit) { return std::tuple(due_of(unit), unit.period); });
+UnitOrder deadline_order(const analysis::TaskSet &task_set) {
+  return sorted_by(task_set, [](const analysis::Unit &unit) { return std::tuple(due_of(unit), unit.period); });
 }
 
-UnitOrder dkc_order(const TaskSet &task_set) {
+UnitOrder dkc_order(const analysis::TaskSet &task_set) {
   const double m = task_set.platform.workers;
   const double k = (m - 1 + std::sqrt(5 * m * m - 6 * m + 1)) / (2 * m);
-  return sorted_by(task_set, [k](const Unit &unit) {
+  return sorted_by(task_set, [k](const analysis::Unit &unit) {
     return static_cast<double>(due_of(unit)) - k * static_cast<double>(unit.length);
   });
 }
 
-TestChoice order_free_test(const Workload &workload, const AnalysisPlatform &platform) {
-  const Result<TaskSet> before = compile(workload, platform);
+TestChoice order_free_test(const Workload &workload, const analysis::AnalysisPlatform &platform) {
+  const Result<analysis::TaskSet> before = analysis::compile(workload, platform);
   if (!before) return {std::nullopt, before.error().front().message};
   if (!before->not_analysable.empty()) return {std::nullopt, before->not_analysable};
-  const TaskSet task_set = compiled(workload, platform, *before, deadline_order(*before));
+  const analysis::TaskSet task_set = compiled(workload, platform, *before, deadline_order(*before));
   OrderFreeTest test;
   if (platform.workers == 1) {
     // Which method applies does not depend on the order. With shared levels, a bound depends on which units share a
     // level.
     std::string why;
-    for (const Method &method : one_worker_methods()) {
-      const Outcome outcome = method.apply(task_set);
-      if (std::holds_alternative<Bound>(outcome)) {
+    for (const analysis::Method &method : one_worker_methods()) {
+      const analysis::Outcome outcome = method.apply(task_set);
+      if (std::holds_alternative<analysis::Bound>(outcome)) {
         test = {std::string(method.name), platform.levels == 0, one_worker_response};
         return {std::move(test), {}};
       }
-      if (why.empty()) why = std::get<NotApplicable>(outcome).reason;
+      if (why.empty()) why = std::get<analysis::NotApplicable>(outcome).reason;
     }
     return {std::nullopt, why};
   }
@@ -166,10 +168,10 @@ TestChoice order_free_test(const Workload &workload, const AnalysisPlatform &pla
   return {std::move(test), {}};
 }
 
-std::optional<AudsleyResult> audsley(const Workload &workload, const AnalysisPlatform &platform,
+std::optional<AudsleyResult> audsley(const Workload &workload, const analysis::AnalysisPlatform &platform,
                                      const OrderFreeTest &test, const Badness &badness,
                                      const std::function<bool()> &stop) {
-  const Result<TaskSet> before = compile(workload, platform);
+  const Result<analysis::TaskSet> before = analysis::compile(workload, platform);
   REDAG_CHECK(before.has_value(), "audsley() needs a valid workload");
   AudsleyResult result;
   result.found = true;
@@ -185,7 +187,7 @@ std::optional<AudsleyResult> audsley(const Workload &workload, const AnalysisPla
       order.erase(order.begin() + static_cast<std::ptrdiff_t>(i));
       order.push_back(open[i]);
       order.insert(order.end(), placed.begin(), placed.end());
-      const TaskSet task_set = compiled(workload, platform, *before, order);
+      const analysis::TaskSet task_set = compiled(workload, platform, *before, order);
       const std::optional<Duration> response = test.response(task_set, open[i]);
       const Duration due = due_of(before->units[open[i]]);
       const double late = response ? badness(*response, due) : std::numeric_limits<double>::infinity();
@@ -202,4 +204,4 @@ std::optional<AudsleyResult> audsley(const Workload &workload, const AnalysisPla
   return result;
 }
 
-}  // namespace redag::analysis
+}  // namespace redag::lab

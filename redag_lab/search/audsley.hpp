@@ -16,26 +16,26 @@
 #include "redag/model/workload.hpp"
 #include "redag_analysis/core/task_set.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 
 /// Units (positions in TaskSet::units), most urgent first.
 using UnitOrder = std::vector<std::uint32_t>;
 
 /// Returns the workload under policy `fixed` with priorities that put its units in this order. `task_set` must be
 /// compiled from `workload`.
-[[nodiscard]] Workload with_order(const Workload &workload, const TaskSet &task_set, const UnitOrder &order);
+[[nodiscard]] Workload with_order(const Workload &workload, const analysis::TaskSet &task_set, const UnitOrder &order);
 
 /// Returns the units as the task set's policy orders them, by their most urgent task.
-[[nodiscard]] UnitOrder present_order(const TaskSet &task_set);
+[[nodiscard]] UnitOrder present_order(const analysis::TaskSet &task_set);
 
 /// Orders units by deadline, shortest first, and equal ones by period. Optimal on one worker where D <= T, without
 /// jitter and blocking (J. Leung, J. Whitehead, Performance Evaluation 2(4), 1982).
-[[nodiscard]] UnitOrder deadline_order(const TaskSet &task_set);
+[[nodiscard]] UnitOrder deadline_order(const analysis::TaskSet &task_set);
 
 /// Orders units by D - k L, smallest first, with k = (m - 1 + sqrt(5 m^2 - 6 m + 1)) / (2 m). L is the longest path.
 /// This is a heuristic for several workers: R. Davis, A. Burns, Improved priority assignment for global fixed priority
 /// pre-emptive scheduling in multiprocessor real-time systems, Real-Time Systems 47(1), 2011 (DkC).
-[[nodiscard]] UnitOrder dkc_order(const TaskSet &task_set);
+[[nodiscard]] UnitOrder dkc_order(const analysis::TaskSet &task_set);
 
 /// A test that bounds one unit's response, given the set of more urgent units but not their order.
 struct OrderFreeTest {
@@ -46,7 +46,7 @@ struct OrderFreeTest {
   bool optimal = false;
   /// Returns the response of `unit` if every more urgent unit keeps its deadline; nothing if there is no bound.
   /// `task_set` has static priorities.
-  std::function<std::optional<Duration>(const TaskSet &task_set, std::uint32_t unit)> response;
+  std::function<std::optional<Duration>(const analysis::TaskSet &task_set, std::uint32_t unit)> response;
 };
 
 /// The test for task sets like this one under static priorities, or the reason why there is none.
@@ -54,7 +54,7 @@ struct TestChoice {
   std::optional<OrderFreeTest> test;
   std::string reason;
 };
-[[nodiscard]] TestChoice order_free_test(const Workload &workload, const AnalysisPlatform &platform);
+[[nodiscard]] TestChoice order_free_test(const Workload &workload, const analysis::AnalysisPlatform &platform);
 
 /// Rates a response against its deadline; smaller is better.
 using Badness = std::function<double(Duration response, Duration due)>;
@@ -66,8 +66,8 @@ struct AudsleyResult {
   UnitOrder order;
   bool found = false;
 };
-[[nodiscard]] std::optional<AudsleyResult> audsley(const Workload &workload, const AnalysisPlatform &platform,
+[[nodiscard]] std::optional<AudsleyResult> audsley(const Workload &workload, const analysis::AnalysisPlatform &platform,
                                                    const OrderFreeTest &test, const Badness &badness,
                                                    const std::function<bool()> &stop = {});
 
-}  // namespace redag::analysis
+}  // namespace redag::lab

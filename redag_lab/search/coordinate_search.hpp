@@ -17,7 +17,7 @@
 
 #include "redag/base/rng.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 
 /// One value for each dimension.
 using Point = std::vector<std::uint32_t>;
@@ -155,4 +155,4 @@ class CoordinateSearch {
   Found found_;
 };
 
-}  // namespace redag::analysis
+}  // namespace redag::lab

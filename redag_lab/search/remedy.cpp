@@ -12,7 +12,7 @@
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_lab/search/sensitivity.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 namespace {
 
 constexpr std::size_t kMostSuspects = 6;
@@ -20,7 +20,8 @@ constexpr double kLittle = 0.9;  // a remedy that keeps at least this share of a
 
 class Search {
  public:
-  Search(const Workload &workload, const AnalysisPlatform &platform) : workload_(workload), platform_(platform) {}
+  Search(const Workload &workload, const analysis::AnalysisPlatform &platform)
+      : workload_(workload), platform_(platform) {}
 
   std::optional<std::string> run(const std::vector<TaskId> &suspects) {
     const std::optional<Shorter> shorter = shorten(suspects);
@@ -38,9 +39,9 @@ class Search {
     std::string words;
   };
 
-  [[nodiscard]] bool suffices(const Workload &changed, const AnalysisPlatform &platform) const {
-    const Result<TaskSet> task_set = compile(changed, platform);
-    return task_set && is_shown_schedulable(*task_set);
+  [[nodiscard]] bool suffices(const Workload &changed, const analysis::AnalysisPlatform &platform) const {
+    const Result<analysis::TaskSet> task_set = analysis::compile(changed, platform);
+    return task_set && analysis::is_shown_schedulable(*task_set);
   }
 
   [[nodiscard]] std::string name_of(TaskId id) const {
@@ -79,7 +80,7 @@ class Search {
 
   [[nodiscard]] std::optional<std::string> preempt() const {
     if (platform_.preemption == sched::Preemption::Full || !is_static(workload_.policy)) return std::nullopt;
-    AnalysisPlatform platform = platform_;
+    analysis::AnalysisPlatform platform = platform_;
     platform.preemption = sched::Preemption::Full;
     if (!suffices(workload_, platform)) return std::nullopt;
     return "preemption: os, so that urgent jobs do not wait for others to end";
@@ -101,22 +102,22 @@ class Search {
 
   [[nodiscard]] std::optional<std::string> add_worker() const {
     Workload changed = workload_;
-    AnalysisPlatform platform = platform_;
+    analysis::AnalysisPlatform platform = platform_;
     changed.platform.workers = ++platform.workers;
     if (!suffices(changed, platform)) return std::nullopt;
     return fmt::format("workers: {} instead of {}", platform.workers, platform_.workers);
   }
 
   const Workload &workload_;
-  const AnalysisPlatform &platform_;
+  const analysis::AnalysisPlatform &platform_;
 };
 
 }  // namespace
 
-std::optional<std::string> find_remedy(const Workload &workload, const AnalysisPlatform &platform,
+std::optional<std::string> find_remedy(const Workload &workload, const analysis::AnalysisPlatform &platform,
                                        const std::vector<TaskId> &suspects) {
   if (workload.task_count() > kMostTasksForRemedy) return std::nullopt;
   return Search(workload, platform).run(suspects);
 }
 
-}  // namespace redag::analysis
+}  // namespace redag::lab

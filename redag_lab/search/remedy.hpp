@@ -11,7 +11,7 @@
 
 #include "redag_analysis/core/task_set.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 
 /// The largest number of tasks for which remedies are tried: every trial is an analysis.
 inline constexpr std::size_t kMostTasksForRemedy = 64;
@@ -20,7 +20,8 @@ inline constexpr std::size_t kMostTasksForRemedy = 64;
 /// that has to shrink by a tenth at most comes first. Then follow a max_active, the preemption, a task's group, one
 /// more worker, and an execution time that has to shrink by more. The execution times of the first six `suspects` are
 /// tried. Requires a valid workload that is not shown to be schedulable.
-[[nodiscard]] std::optional<std::string> find_remedy(const Workload &workload, const AnalysisPlatform &platform,
+[[nodiscard]] std::optional<std::string> find_remedy(const Workload &workload,
+                                                     const analysis::AnalysisPlatform &platform,
                                                      const std::vector<TaskId> &suspects);
 
-}  // namespace redag::analysis
+}  // namespace redag::lab

@@ -8,15 +8,15 @@
 #include "redag/base/check.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 namespace {
 
 Duration scaled_up(Duration value, std::int64_t numerator, std::int64_t denominator) {
-  return saturate((Int128{value} * numerator + denominator - 1) / denominator);
+  return analysis::saturate((Int128{value} * numerator + denominator - 1) / denominator);
 }
 
 Duration scaled_down(Duration value, std::int64_t numerator, std::int64_t denominator) {
-  return saturate(Int128{value} * numerator / denominator);
+  return analysis::saturate(Int128{value} * numerator / denominator);
 }
 
 // Scales the execution times by `numerator` / `denominator`. The wcet becomes exactly `wcet`, which also caps the
@@ -81,4 +81,4 @@ double load_factor(const Workload &workload, const Knob &knob, std::int64_t posi
   return knob.kind == Knob::Kind::Period ? before / now : now / before;
 }
 
-}  // namespace redag::analysis
+}  // namespace redag::lab

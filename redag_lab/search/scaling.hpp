@@ -11,7 +11,7 @@
 #include "redag/model/workload.hpp"
 #include "redag_analysis/core/task_set.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 
 /// The unit of factors, which are counted in millionths.
 inline constexpr std::int64_t kFactorUnit = 1'000'000;
@@ -42,4 +42,4 @@ struct Knob {
 /// Returns the load at `position` relative to the workload's own, above 1 where it grew. For display.
 [[nodiscard]] double load_factor(const Workload &workload, const Knob &knob, std::int64_t position);
 
-}  // namespace redag::analysis
+}  // namespace redag::lab

@@ -14,29 +14,29 @@
 #include "redag_analysis/core/arithmetic.hpp"
 #include "redag_analysis/core/effort.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 namespace {
 
 constexpr std::int64_t kSlowest = 1024;                // periods grow to at most this multiple,
 constexpr Duration kLongestPeriod = 86'400 * kSecond;  // and to at most this length
 
 // True if the utilization exceeds the workers. Exact arithmetic, rounded in favour of the workload.
-bool is_overloaded(const TaskSet &task_set) {
+bool is_overloaded(const analysis::TaskSet &task_set) {
   constexpr unsigned kBits = 40;
   Int128 sum = 0;
-  for (const CompiledTask &task : task_set.tasks) sum += (Int128{task.wcet} << kBits) / task.period;
+  for (const analysis::CompiledTask &task : task_set.tasks) sum += (Int128{task.wcet} << kBits) / task.period;
   return sum > Int128{task_set.platform.workers} << kBits;
 }
 
 // Returns "dag.task", the form that the commands use.
-std::string label(const TaskSet &task_set, std::uint32_t task) {
+std::string label(const analysis::TaskSet &task_set, std::uint32_t task) {
   const std::string &dag = task_set.dags[task_set.tasks[task].dag.value].name;
   return dag + "." + task_set.tasks[task].name.substr(dag.size() + 1);
 }
 
-std::string why_no_bound(const Report &report, std::uint32_t task) {
-  for (const MethodReport &method : report.methods) {
-    const Bound *bound = method.bound();
+std::string why_no_bound(const analysis::Report &report, std::uint32_t task) {
+  for (const analysis::MethodReport &method : report.methods) {
+    const analysis::Bound *bound = method.bound();
     if (!method.trusted || bound == nullptr || task >= bound->tasks.size()) continue;
     if (!bound->tasks[task].absent.empty()) return std::string(bound->tasks[task].absent);
   }
@@ -44,16 +44,16 @@ std::string why_no_bound(const Report &report, std::uint32_t task) {
 }
 
 // Returns the reason why analyze() does not accept the workload.
-std::string obstacle_of(const Workload &workload, const AnalysisPlatform &platform) {
-  const Result<TaskSet> task_set = compile(workload, platform);
+std::string obstacle_of(const Workload &workload, const analysis::AnalysisPlatform &platform) {
+  const Result<analysis::TaskSet> task_set = analysis::compile(workload, platform);
   if (!task_set) return task_set.error().front().message;
   if (!task_set->not_analysable.empty()) return task_set->not_analysable;
   if (const std::optional<std::string> why = why_impossible(*task_set)) return *why;
-  const Report report = analyze(*task_set);
+  const analysis::Report report = analysis::analyze(*task_set);
   std::optional<std::uint32_t> worst;
   Duration missing = 0;
   for (std::uint32_t t = 0; t < task_set->tasks.size(); ++t) {
-    const CompiledTask &task = task_set->tasks[t];
+    const analysis::CompiledTask &task = task_set->tasks[t];
     if (meets_deadline(task, report.tasks[t].bound)) continue;
     if (!report.tasks[t].response) return label(*task_set, t) + ": " + why_no_bound(report, t);
     const Duration late = *report.tasks[t].response - std::min(task.deadline, task.limit);
@@ -63,7 +63,7 @@ std::string obstacle_of(const Workload &workload, const AnalysisPlatform &platfo
   }
   if (worst) return "bound of " + label(*task_set, *worst) + " above its deadline";
   for (std::size_t d = 0; d < task_set->dags.size(); ++d) {
-    const CompiledDag &dag = task_set->dags[d];
+    const analysis::CompiledDag &dag = task_set->dags[d];
     if (dag.deadline > 0 && report.dags[d].response.value_or(kNever) > dag.deadline) {
       return "end-to-end deadline of " + dag.name;
     }
@@ -74,7 +74,7 @@ std::string obstacle_of(const Workload &workload, const AnalysisPlatform &platfo
 // Searches the positions of one knob.
 class Search {
  public:
-  Search(const Workload &workload, const AnalysisPlatform &platform, const Knob &knob, const Accepts &accepts,
+  Search(const Workload &workload, const analysis::AnalysisPlatform &platform, const Knob &knob, const Accepts &accepts,
          const SensitivityOptions &options)
       : workload_(workload), platform_(platform), accepts_(accepts), options_(options) {
     margin_.knob = knob;
@@ -82,13 +82,13 @@ class Search {
   }
 
   std::optional<Margin> run() {
-    Effort::Limits limits;
-    limits.itemised.which = Itemised::Which::None;
-    limits.stop = [this](const EffortAt &) { return std::string(is_stopped() ? "stopped" : ""); };
-    const Effort effort(limits);
+    analysis::Effort::Limits limits;
+    limits.itemised.which = analysis::Itemised::Which::None;
+    limits.stop = [this](const analysis::EffortAt &) { return std::string(is_stopped() ? "stopped" : ""); };
+    const analysis::Effort effort(limits);
     try {
       return search();
-    } catch (const Effort::GaveUp &gave_up) {
+    } catch (const analysis::Effort::GaveUp &gave_up) {
       if (gave_up.scope != &effort) throw;
       return std::nullopt;
     }
@@ -120,13 +120,13 @@ class Search {
     if (stopped_) return false;
     ++margin_.tested;
     const Workload candidate = turned(workload_, margin_.knob, position);
-    const Result<TaskSet> task_set = compile(candidate, platform_);
+    const Result<analysis::TaskSet> task_set = analysis::compile(candidate, platform_);
     return task_set && !why_impossible(*task_set) && accepts_(candidate, *task_set);
   }
 
   [[nodiscard]] bool is_impossible(std::int64_t position) const {
     if (margin_.knob.kind == Knob::Kind::Period && position >= 0) return true;
-    const Result<TaskSet> task_set = compile(turned(workload_, margin_.knob, position), platform_);
+    const Result<analysis::TaskSet> task_set = analysis::compile(turned(workload_, margin_.knob, position), platform_);
     return !task_set || why_impossible(*task_set);
   }
 
@@ -247,7 +247,7 @@ class Search {
       for (const Duration period : own) {
         // Offers the last factors at which the rounded period is still above the other one, and still equal to it.
         for (const Duration edge : {other + 1, other}) {
-          const auto last = static_cast<std::int64_t>(saturate(Int128{period} * kFactorUnit / edge));
+          const auto last = static_cast<std::int64_t>(analysis::saturate(Int128{period} * kFactorUnit / edge));
           offer(last);
           offer(last + 1);
         }
@@ -256,7 +256,7 @@ class Search {
   }
 
   const Workload &workload_;
-  const AnalysisPlatform &platform_;
+  const analysis::AnalysisPlatform &platform_;
   const Accepts &accepts_;
   const SensitivityOptions &options_;
   Margin margin_;
@@ -265,9 +265,9 @@ class Search {
 
 }  // namespace
 
-std::optional<std::string> why_impossible(const TaskSet &task_set) {
+std::optional<std::string> why_impossible(const analysis::TaskSet &task_set) {
   for (std::uint32_t t = 0; t < task_set.tasks.size(); ++t) {
-    const CompiledTask &task = task_set.tasks[t];
+    const analysis::CompiledTask &task = task_set.tasks[t];
     // Jobs of a task that can overlap (concurrency) may take longer than the limit; such workloads are not analysed.
     const Duration due = task_set.not_analysable.empty() ? std::min(task.deadline, task.limit) : task.deadline;
     if (task.wcet > due) return label(task_set, t) + " alone takes longer than it has";
@@ -276,7 +276,7 @@ std::optional<std::string> why_impossible(const TaskSet &task_set) {
   return std::nullopt;
 }
 
-std::optional<Margin> margin_of(const Workload &workload, const AnalysisPlatform &platform, const Knob &knob,
+std::optional<Margin> margin_of(const Workload &workload, const analysis::AnalysisPlatform &platform, const Knob &knob,
                                 const Accepts &accepts, const SensitivityOptions &options) {
   return Search(workload, platform, knob, accepts, options).run();
 }
@@ -293,13 +293,13 @@ Knob rate_of(const std::vector<TaskRef> &tasks, const std::vector<std::uint32_t>
 
 }  // namespace
 
-std::vector<Knob> knobs_of(const Workload &workload, const TaskSet &task_set) {
+std::vector<Knob> knobs_of(const Workload &workload, const analysis::TaskSet &task_set) {
   const std::vector<TaskRef> tasks = flatten(workload);
   std::vector<std::uint32_t> all(tasks.size());
   std::iota(all.begin(), all.end(), 0);
   std::vector<Knob> knobs = {{Knob::Kind::AllWcets, all}, {Knob::Kind::Rates, all}};
   for (const std::uint32_t t : all) knobs.push_back({Knob::Kind::Wcet, {t}});
-  for (const CompiledDag &dag : task_set.dags) {
+  for (const analysis::CompiledDag &dag : task_set.dags) {
     Knob knob = rate_of(tasks, dag.tasks);
     // A workload with one DAG has that DAG's rate as the knob of all rates.
     const bool is_there = knob.kind == Knob::Kind::Rates && knob.tasks.size() == all.size();
@@ -310,4 +310,4 @@ std::vector<Knob> knobs_of(const Workload &workload, const TaskSet &task_set) {
   return knobs;
 }
 
-}  // namespace redag::analysis
+}  // namespace redag::lab

@@ -15,7 +15,7 @@
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_lab/search/scaling.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 
 /// The range of one knob, as far as it was tested. Schedulability under bounds, and under schedulers with several
 /// workers, need not be monotone. `position` is accepted and the next position is not. Every tested position below is
@@ -34,11 +34,11 @@ struct Margin {
 
 /// True if this workload, compiled for the platform, is acceptable. Called only for workloads that why_impossible()
 /// passes.
-using Accepts = std::function<bool(const Workload &, const TaskSet &)>;
+using Accepts = std::function<bool(const Workload &, const analysis::TaskSet &)>;
 
 /// Accepts the workloads that analyze() calls schedulable.
-[[nodiscard]] inline bool accepted_by_analysis(const Workload & /*workload*/, const TaskSet &task_set) {
-  return is_shown_schedulable(task_set);
+[[nodiscard]] inline bool accepted_by_analysis(const Workload & /*workload*/, const analysis::TaskSet &task_set) {
+  return analysis::is_shown_schedulable(task_set);
 }
 
 struct SensitivityOptions {
@@ -51,16 +51,16 @@ struct SensitivityOptions {
 
 /// Returns the first reason why no schedule on this platform meets every deadline; nothing if there is none. Either a
 /// task's own execution exceeds its time, or the utilization exceeds the workers.
-[[nodiscard]] std::optional<std::string> why_impossible(const TaskSet &task_set);
+[[nodiscard]] std::optional<std::string> why_impossible(const analysis::TaskSet &task_set);
 
 /// Finds the margin of one knob. Returns nothing if `stop` ended it. `workload` must be valid. Needs about
 /// probes + log2(range) tests.
-[[nodiscard]] std::optional<Margin> margin_of(const Workload &workload, const AnalysisPlatform &platform,
+[[nodiscard]] std::optional<Margin> margin_of(const Workload &workload, const analysis::AnalysisPlatform &platform,
                                               const Knob &knob, const Accepts &accepts = accepted_by_analysis,
                                               const SensitivityOptions &options = {});
 
 /// Returns the knobs of a report, in its order: all wcets, all rates, each task's wcet, and each DAG's rate (its period
 /// where it has one). A DAG with several units also has the period of each unit, after its rate.
-[[nodiscard]] std::vector<Knob> knobs_of(const Workload &workload, const TaskSet &task_set);
+[[nodiscard]] std::vector<Knob> knobs_of(const Workload &workload, const analysis::TaskSet &task_set);
 
-}  // namespace redag::analysis
+}  // namespace redag::lab

@@ -11,7 +11,7 @@
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_testing/bound_property.hpp"
 
-namespace redag::analysis {
+namespace redag::lab {
 namespace {
 
 using Kind = Knob::Kind;
@@ -45,7 +45,7 @@ std::vector<std::uint32_t> all_tasks(const Workload &workload) {
 }
 
 Margin margin(const Workload &workload, const Knob &knob) {
-  return margin_of(workload, platform_of(workload), knob).value();
+  return margin_of(workload, analysis::platform_of(workload), knob).value();
 }
 
 Margin all_wcets(const Workload &workload) { return margin(workload, {Kind::AllWcets, all_tasks(workload)}); }
@@ -117,10 +117,10 @@ TEST(Sensitivity, AChangeOfOrderEndsTheRoom) {
 // Only the period equal to another task's is refused. Evenly spread probes would not meet it.
 TEST(Sensitivity, EveryChangeOfOrderIsTested) {
   Workload workload = workload_of({single("a", 1, 2003), single("b", 1, 9000)});
-  const Accepts not_equal = [](const Workload &candidate, const TaskSet &) {
+  const Accepts not_equal = [](const Workload &candidate, const analysis::TaskSet &) {
     return candidate.dags[1].tasks[0].period != 2003;
   };
-  const AnalysisPlatform platform = platform_of(workload);
+  const analysis::AnalysisPlatform platform = analysis::platform_of(workload);
   const auto period = margin_of(workload, platform, {Kind::Period, {1}}, not_equal, {0, {}});
   ASSERT_TRUE(period);
   EXPECT_EQ(period->position, -2004);
@@ -134,11 +134,11 @@ TEST(Sensitivity, EveryChangeOfOrderIsTested) {
 
 TEST(Sensitivity, AcceptanceThatComesBackIsReported) {
   const Workload workload = workload_of({single("a", 10, 1000)});
-  const Accepts with_gap = [](const Workload &candidate, const TaskSet &) {
+  const Accepts with_gap = [](const Workload &candidate, const analysis::TaskSet &) {
     const Duration wcet = candidate.dags[0].tasks[0].wcet;
     return wcet <= 100 || (wcet > 400 && wcet <= 600);
   };
-  const auto found = margin_of(workload, platform_of(workload), {Kind::Wcet, {0}}, with_gap);
+  const auto found = margin_of(workload, analysis::platform_of(workload), {Kind::Wcet, {0}}, with_gap);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->position, 100);
   ASSERT_TRUE(found->again);
@@ -151,7 +151,7 @@ TEST(Sensitivity, StopsWhenAsked) {
   SensitivityOptions options;
   int asked = 0;
   options.stop = [&] { return ++asked > 5; };
-  EXPECT_FALSE(margin_of(workload, platform_of(workload), {Kind::Wcet, {0}}, accepted_by_analysis, options));
+  EXPECT_FALSE(margin_of(workload, analysis::platform_of(workload), {Kind::Wcet, {0}}, accepted_by_analysis, options));
 }
 
 TEST(Sensitivity, KnobsAreThoseOfTasksAndRates) {
@@ -159,7 +159,7 @@ TEST(Sensitivity, KnobsAreThoseOfTasksAndRates) {
   workload.dags[0].tasks.push_back(workload.dags[0].tasks[0]);
   workload.dags[0].tasks[1].name = "u";
   workload.dags[0].tasks[1].period = workload.dags[0].tasks[1].deadline = 30;
-  const auto task_set = compile(workload, platform_of(workload));
+  const auto task_set = analysis::compile(workload, analysis::platform_of(workload));
   ASSERT_TRUE(task_set);
   const std::vector<Knob> expected = {{Kind::AllWcets, {0, 1, 2}}, {Kind::Rates, {0, 1, 2}}, {Kind::Wcet, {0}},
                                       {Kind::Wcet, {1}},           {Kind::Wcet, {2}},        {Kind::Rates, {0, 1}},
@@ -171,18 +171,18 @@ TEST(Sensitivity, TheRatesOfTheOnlyDagAreAllRates) {
   Workload workload = workload_of({single("a", 1, 10)});
   workload.dags[0].tasks.push_back(workload.dags[0].tasks[0]);
   workload.dags[0].tasks[1].name = "u";
-  const auto of_one_rate = compile(workload, platform_of(workload));
+  const auto of_one_rate = analysis::compile(workload, analysis::platform_of(workload));
   ASSERT_TRUE(of_one_rate);
   EXPECT_THAT(knobs_of(workload, *of_one_rate), ::testing::Contains(Knob{Kind::Period, {0, 1}}));
   workload.dags[0].tasks[1].period = workload.dags[0].tasks[1].deadline = 30;
-  const auto of_two = compile(workload, platform_of(workload));
+  const auto of_two = analysis::compile(workload, analysis::platform_of(workload));
   ASSERT_TRUE(of_two);
   EXPECT_THAT(knobs_of(workload, *of_two), ::testing::Contains(Knob{Kind::Rates, {0, 1}}).Times(1));
 }
 
 // True if no deadline is missed and no job skipped when all tasks start together and run for their wcet.
 bool simulated_without_a_miss(const BoundCase &bound_case, const Workload &workload) {
-  const sched::Config config = config_of(bound_case.platform, workload);
+  const sched::Config config = analysis::config_of(bound_case.platform, workload);
   sched::PriorityScheduler scheduler(workload, config);
   sim::Options options;
   Duration longest = 0;
@@ -221,10 +221,10 @@ void expect_consistent(const BoundCaseLimits &limits) {
     Rng rng(mix(static_cast<std::uint64_t>(i) + 77));
     const BoundCase bound_case = testing::random_bound_case(rng, limits);
     SCOPED_TRACE(describe(bound_case));
-    const auto task_set = compile(bound_case.workload, bound_case.platform);
+    const auto task_set = analysis::compile(bound_case.workload, bound_case.platform);
     ASSERT_TRUE(task_set);
-    const bool nominal = analyze(*task_set).verdict == Verdict::Schedulable;
-    EXPECT_EQ(is_shown_schedulable(*task_set), nominal);
+    const bool nominal = analysis::analyze(*task_set).verdict == analysis::Verdict::Schedulable;
+    EXPECT_EQ(analysis::is_shown_schedulable(*task_set), nominal);
     for (const Knob &knob : knobs_of(bound_case.workload, *task_set)) {
       const auto result = margin_of(bound_case.workload, bound_case.platform, knob, accepted_by_analysis, {4, {}});
       ASSERT_TRUE(result);
@@ -237,7 +237,8 @@ void expect_consistent(const BoundCaseLimits &limits) {
       EXPECT_EQ(result->factor >= 1.0, nominal);
       const Workload at = turned(bound_case.workload, knob, *result->position);
       EXPECT_TRUE(validate(at).empty() || !has_errors(validate(at)));
-      EXPECT_EQ(analyze(compile(at, bound_case.platform).value()).verdict, Verdict::Schedulable);
+      EXPECT_EQ(analysis::analyze(analysis::compile(at, bound_case.platform).value()).verdict,
+                analysis::Verdict::Schedulable);
       EXPECT_TRUE(simulated_without_a_miss(bound_case, at));
       // A random position between was not tested, but must hold too. Bounds cover shorter executions and later
       // releases, and every change of the order of priorities was tested.
@@ -246,8 +247,9 @@ void expect_consistent(const BoundCaseLimits &limits) {
         EXPECT_TRUE(simulated_without_a_miss(bound_case, turned(bound_case.workload, knob, between))) << between;
       }
       if (knob.kind == Kind::Period && *result->position == -1) continue;
-      const auto beyond = compile(turned(bound_case.workload, knob, *result->position + 1), bound_case.platform);
-      EXPECT_TRUE(!beyond || analyze(*beyond).verdict == Verdict::NotShown);
+      const auto beyond =
+          analysis::compile(turned(bound_case.workload, knob, *result->position + 1), bound_case.platform);
+      EXPECT_TRUE(!beyond || analysis::analyze(*beyond).verdict == analysis::Verdict::NotShown);
     }
     if (::testing::Test::HasFailure()) return;
   }
@@ -299,4 +301,4 @@ TEST(Scaling, KeepsAWorkloadValid) {
 }
 
 }  // namespace
-}  // namespace redag::analysis
+}  // namespace redag::lab

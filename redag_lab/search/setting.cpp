@@ -11,10 +11,8 @@
 
 #include "redag_lab/search/assignment.hpp"
 
-namespace redag::tune {
+namespace redag::lab {
 namespace {
-
-using analysis::Point;
 
 // Returns the value by which the policy orders tasks, larger for more urgent; nothing if it uses several values.
 std::optional<std::int64_t> urgency(const Task &task, PolicyKind policy) {
@@ -92,15 +90,15 @@ SettingSpace::SettingSpace(const Workload &workload, const Freedom &freedom) : w
   const std::uint32_t most_workers = std::max(workers, freedom.most_workers);
   space_.values.push_back(freedom.workers ? range(1, most_workers) : range(workers, workers));
 
-  const analysis::Caps present = analysis::caps_of(workload);
-  std::vector<analysis::Caps> choices;
+  const Caps present = caps_of(workload);
+  std::vector<Caps> choices;
   for (const Dag &dag : workload.dags) {
     if (!freedom.caps) {
       choices.push_back({dag.max_active});
     } else if (freedom.cap_range) {
       choices.push_back(with(range(freedom.cap_range->first, freedom.cap_range->second), dag.max_active));
     } else {
-      choices.push_back(analysis::cap_choices(dag, freedom.workers ? most_workers : workers));
+      choices.push_back(cap_choices(dag, freedom.workers ? most_workers : workers));
     }
   }
   space_.values.insert(space_.values.end(), choices.begin(), choices.end());
@@ -108,7 +106,7 @@ SettingSpace::SettingSpace(const Workload &workload, const Freedom &freedom) : w
   if (freedom.ties) tied_ = tied_dags(workload);
   for (std::uint32_t i = 1; i < tied_.size(); ++i) space_.values.push_back(range(0, i));
 
-  for (const analysis::Caps &caps : analysis::cap_starts(present, choices)) {
+  for (const Caps &caps : cap_starts(present, choices)) {
     Point point = {workers};
     point.insert(point.end(), caps.begin(), caps.end());
     point.resize(space_.values.size(), 0);
@@ -116,7 +114,7 @@ SettingSpace::SettingSpace(const Workload &workload, const Freedom &freedom) : w
   }
 }
 
-analysis::Point SettingSpace::caps(const Point &point) const {
+Point SettingSpace::caps(const Point &point) const {
   const auto first = point.begin() + 1;
   return {first, first + static_cast<std::ptrdiff_t>(workload_.dags.size())};
 }
@@ -132,7 +130,7 @@ std::vector<std::uint32_t> SettingSpace::tie_order(const Point &point) const {
 }
 
 Workload SettingSpace::apply(const Point &point) const {
-  Workload workload = analysis::with_caps(workload_, caps(point));
+  Workload workload = with_caps(workload_, caps(point));
   workload.platform.workers = workers(point);
   const std::vector<std::uint32_t> order = tie_order(point);
   if (order != tied_) {
@@ -151,4 +149,4 @@ std::size_t SettingSpace::changes(const Point &point) const {
   return count;
 }
 
-}  // namespace redag::tune
+}  // namespace redag::lab

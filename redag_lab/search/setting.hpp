@@ -13,14 +13,14 @@
 #include "redag/model/workload.hpp"
 #include "redag_lab/search/coordinate_search.hpp"
 
-namespace redag::tune {
+namespace redag::lab {
 
 struct Freedom {
   bool workers = true;
   bool caps = true;
   bool ties = true;
   std::uint32_t most_workers = 0;  // 0: the workload's number
-  /// Replaces analysis::cap_choices() for every DAG, whatever its present value.
+  /// Replaces cap_choices() for every DAG, whatever its present value.
   std::optional<std::pair<std::uint32_t, std::uint32_t>> cap_range;
 };
 
@@ -32,20 +32,20 @@ class SettingSpace {
   SettingSpace(const Workload &workload, const Freedom &freedom);
 
   /// The first start is the present workload.
-  [[nodiscard]] const analysis::SearchSpace &space() const { return space_; }
+  [[nodiscard]] const SearchSpace &space() const { return space_; }
 
-  [[nodiscard]] Workload apply(const analysis::Point &point) const;
-  [[nodiscard]] std::uint32_t workers(const analysis::Point &point) const { return point.front(); }
-  [[nodiscard]] analysis::Point caps(const analysis::Point &point) const;
+  [[nodiscard]] Workload apply(const Point &point) const;
+  [[nodiscard]] std::uint32_t workers(const Point &point) const { return point.front(); }
+  [[nodiscard]] Point caps(const Point &point) const;
   /// Returns the positions of the DAGs that tie with others, in the order of precedence.
-  [[nodiscard]] std::vector<std::uint32_t> tie_order(const analysis::Point &point) const;
+  [[nodiscard]] std::vector<std::uint32_t> tie_order(const Point &point) const;
   /// Returns the number of coordinates that differ from the present workload.
-  [[nodiscard]] std::size_t changes(const analysis::Point &point) const;
+  [[nodiscard]] std::size_t changes(const Point &point) const;
 
  private:
   const Workload &workload_;
   std::vector<std::uint32_t> tied_;  // DAGs with a choice, in order of position
-  analysis::SearchSpace space_;
+  SearchSpace space_;
 };
 
-}  // namespace redag::tune
+}  // namespace redag::lab

@@ -14,14 +14,12 @@
 #include "redag/model/demand.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 
-namespace redag::tune {
+namespace redag::lab {
 namespace {
-
-using analysis::Point;
 
 class Tuner {
  public:
-  Tuner(const Workload &workload, const Options &options)
+  Tuner(const Workload &workload, const TuneOptions &options)
       : options_(options),
         settings_(workload, options.freedom),
         jobs_(options.jobs == 0 ? tbb::this_task_arena::max_concurrency() : static_cast<int>(options.jobs)),
@@ -29,9 +27,8 @@ class Tuner {
         arena_(jobs_) {}
 
   std::optional<Tuned> run() {
-    const auto better = [this](const Score &a, const Score &b) { return is_better(a, b, options_.goal); };
-    analysis::CoordinateSearch<Score> search([this](std::span<const Point> points) { return scores_of(points); },
-                                             better);
+    const auto better = [this](const RunScore &a, const RunScore &b) { return is_better(a, b, options_.goal); };
+    CoordinateSearch<RunScore> search([this](std::span<const Point> points) { return scores_of(points); }, better);
     auto found = search.run(settings_.space(), options_.effort);
     if (found.trials.empty()) return std::nullopt;
 
@@ -56,8 +53,8 @@ class Tuner {
                        [](const Dag &dag) { return std::any_of(dag.tasks.begin(), dag.tasks.end(), demand_varies); });
   }
 
-  Candidate candidate(const Point &point, const std::map<Point, Score> &trials) const {
-    return Candidate{point, settings_.apply(point), trials.at(point), {}, {}};
+  SettingCandidate candidate(const Point &point, const std::map<Point, RunScore> &trials) const {
+    return SettingCandidate{point, settings_.apply(point), trials.at(point), {}, {}};
   }
 
   // Simulates every workload with every seed, on all processors of the arena. If stopped, the result holds only the
@@ -84,8 +81,8 @@ class Tuner {
     return whole;
   }
 
-  static Score sum(const std::vector<Run> &runs) {
-    Score score;
+  static RunScore sum(const std::vector<Run> &runs) {
+    RunScore score;
     for (const Run &run : runs) {
       for (std::size_t c = 0; c < kCriticalities; ++c) score.of[c].add(run[c]);
     }
@@ -105,10 +102,10 @@ class Tuner {
     return task_set && analysis::analyze(*task_set).verdict == analysis::Verdict::Schedulable;
   }
 
-  std::vector<Score> scores_of(std::span<const Point> points) {
+  std::vector<RunScore> scores_of(std::span<const Point> points) {
     std::vector<Workload> workloads;
     for (const Point &point : points) workloads.push_back(settings_.apply(point));
-    std::vector<Score> scores;
+    std::vector<RunScore> scores;
     for (const std::vector<Run> &runs : simulate(workloads, options_.seed, options_.seeds, options_.stop)) {
       scores.push_back(sum(runs));
       scores.back().changes = static_cast<std::uint32_t>(settings_.changes(points[scores.size() - 1]));
@@ -140,9 +137,9 @@ class Tuner {
     tuned.best = holds ? tuned.found : tuned.present;
   }
 
-  static void judge(Candidate &candidate, const std::vector<Run> &runs) {
+  static void judge(SettingCandidate &candidate, const std::vector<Run> &runs) {
     const auto as_score = [&](const std::vector<Run> &some) {
-      Score score = sum(some);
+      RunScore score = sum(some);
       score.proven = candidate.score.proven;
       score.changes = candidate.score.changes;
       return score;
@@ -151,7 +148,7 @@ class Tuner {
     for (const Run &run : runs) candidate.held_out_runs.push_back(as_score({run}));
   }
 
-  const Options &options_;
+  const TuneOptions &options_;
   SettingSpace settings_;
   int jobs_;
   tbb::global_control allow_;
@@ -161,6 +158,8 @@ class Tuner {
 
 }  // namespace
 
-std::optional<Tuned> tune(const Workload &workload, const Options &options) { return Tuner(workload, options).run(); }
+std::optional<Tuned> tune(const Workload &workload, const TuneOptions &options) {
+  return Tuner(workload, options).run();
+}
 
-}  // namespace redag::tune
+}  // namespace redag::lab

@@ -19,9 +19,9 @@
 #include "redag_lab/search/score.hpp"
 #include "redag_lab/search/setting.hpp"
 
-namespace redag::tune {
+namespace redag::lab {
 
-struct Options {
+struct TuneOptions {
   Goal goal;
   Freedom freedom;
   Simulation simulation;
@@ -29,26 +29,26 @@ struct Options {
   bool bounds = true;                // proven settings win over unproven ones
   std::uint32_t seeds = 5;           // simulated for each candidate: seed, seed + 1, ...
   std::uint32_t held_out = 10;       // the number of unseen seeds after these, for the verdict
-  analysis::SearchEffort effort = {1024, 4, 1};
+  SearchEffort effort = {1024, 4, 1};
   std::uint64_t seed = 1;
   std::uint32_t jobs = 0;                             // processors; 0: all
   const std::atomic<bool> *stop = nullptr;            // ends the search with the best so far
   std::function<void(std::uint64_t tried)> progress;  // called after each batch, on the calling thread
 };
 
-struct Candidate {
-  analysis::Point point;
+struct SettingCandidate {
+  Point point;
   Workload workload;
-  Score score;                       // on the seeds of the search
-  Score held_out;                    // on the unseen seeds; a default Score if there are none
-  std::vector<Score> held_out_runs;  // per unseen seed
+  RunScore score;                       // on the seeds of the search
+  RunScore held_out;                    // on the unseen seeds; a default RunScore if there are none
+  std::vector<RunScore> held_out_runs;  // per unseen seed
 };
 
 struct Tuned {
-  Candidate present;
-  Candidate found;  // best of the search
-  Candidate best;   // `found` if it also holds on the unseen seeds, else `present`
-  std::map<analysis::Point, Score> trials;
+  SettingCandidate present;
+  SettingCandidate found;  // best of the search
+  SettingCandidate best;   // `found` if it also holds on the unseen seeds, else `present`
+  std::map<Point, RunScore> trials;
   bool exhaustive = true;
   bool stopped = false;
   bool varies = true;  // execution times or jitter vary, and runs of different seeds differ
@@ -61,6 +61,6 @@ struct Tuned {
 /// Tunes a workload. Requires a valid workload and at least one seed. The result is never worse than `workload` by the
 /// goal, neither on the seeds of the search nor on the unseen ones. Returns nothing if stopped before `workload` itself
 /// was judged.
-[[nodiscard]] std::optional<Tuned> tune(const Workload &workload, const Options &options);
+[[nodiscard]] std::optional<Tuned> tune(const Workload &workload, const TuneOptions &options);
 
-}  // namespace redag::tune
+}  // namespace redag::lab

@@ -11,10 +11,9 @@
 #include "redag/model/validate.hpp"
 #include "redag_testing/timeline.hpp"
 
-namespace redag::tune {
+namespace redag::lab {
 namespace {
 
-using analysis::Point;
 using testing::make_dag;
 using testing::make_workload;
 
@@ -42,8 +41,8 @@ Workload random_workload(std::uint64_t seed) {
   return workload;
 }
 
-Options quick(Objective objective = Objective::Misses) {
-  Options options;
+TuneOptions quick(Objective objective = Objective::Misses) {
+  TuneOptions options;
   options.goal.objective = objective;
   options.simulation.duration = 400 * kMillisecond;
   options.seeds = 2;
@@ -51,8 +50,8 @@ Options quick(Objective objective = Objective::Misses) {
   return options;
 }
 
-Score score_of(const Workload &workload, const Options &options, std::uint64_t first_seed, std::uint32_t seeds) {
-  Score score;
+RunScore score_of(const Workload &workload, const TuneOptions &options, std::uint64_t first_seed, std::uint32_t seeds) {
+  RunScore score;
   for (std::uint32_t s = 0; s < seeds; ++s) {
     const auto run = simulate_once(workload, first_seed + s, options.simulation, nullptr);
     for (std::size_t c = 0; c < kCriticalities; ++c) score.of[c].add((*run)[c]);
@@ -79,7 +78,7 @@ TEST(Tune, NeverReturnsWorseThanItWasGiven) {
   int changed = 0;
   for (std::uint64_t i = 0; i < 60; ++i) {
     const Workload workload = random_workload(i);
-    Options options = quick(static_cast<Objective>(i % 3));
+    TuneOptions options = quick(static_cast<Objective>(i % 3));
     options.goal.per_criticality = i % 2 == 0;
     options.bounds = i % 5 == 0;
     options.effort.exhaustive = i % 4 == 0 ? 0 : 1024;
@@ -87,8 +86,8 @@ TEST(Tune, NeverReturnsWorseThanItWasGiven) {
     ASSERT_TRUE(tuned);
     EXPECT_EQ(tuned->present.workload, workload);
     // Computes the scores again from the resulting workload alone.
-    const auto judged = [&](const Candidate &candidate, std::uint64_t first, std::uint32_t seeds) {
-      Score score = score_of(candidate.workload, options, first, seeds);
+    const auto judged = [&](const SettingCandidate &candidate, std::uint64_t first, std::uint32_t seeds) {
+      RunScore score = score_of(candidate.workload, options, first, seeds);
       score.proven = candidate.score.proven;
       return score;
     };
@@ -103,13 +102,13 @@ TEST(Tune, NeverReturnsWorseThanItWasGiven) {
 TEST(Tune, TheBestIsThatOfBruteForce) {
   for (std::uint64_t i = 0; i < 15; ++i) {
     const Workload workload = random_workload(100 + i);
-    Options options = quick(static_cast<Objective>(i % 3));
+    TuneOptions options = quick(static_cast<Objective>(i % 3));
     options.bounds = false;
     options.held_out = 0;
     const SettingSpace settings(workload, options.freedom);
-    std::optional<Score> best;
+    std::optional<RunScore> best;
     for (const Point &point : all_points(settings)) {
-      const Score score = score_of(settings.apply(point), options, 1, 2);
+      const RunScore score = score_of(settings.apply(point), options, 1, 2);
       if (!best || improves(score, *best, options.goal)) best = score;
     }
     const auto tuned = tune(workload, options);
@@ -125,7 +124,7 @@ TEST(Tune, LocalSearchIsNeverBelowItsStartsAndMostlyFindsTheBest) {
   int equal = 0;
   for (std::uint64_t i = 0; i < 15; ++i) {
     const Workload workload = random_workload(200 + i);
-    Options options = quick();
+    TuneOptions options = quick();
     options.bounds = false;
     options.held_out = 0;
     const auto exact = tune(workload, options);
@@ -140,7 +139,7 @@ TEST(Tune, LocalSearchIsNeverBelowItsStartsAndMostlyFindsTheBest) {
 
 TEST(Tune, TheSameForEveryNumberOfProcessors) {
   const Workload workload = random_workload(7);
-  Options options = quick();
+  TuneOptions options = quick();
   options.jobs = 1;
   const auto one = tune(workload, options);
   options.jobs = 4;
@@ -157,7 +156,7 @@ Workload tie() {
 }
 
 TEST(Tune, TieOrder) {
-  Options options = quick();
+  TuneOptions options = quick();
   options.freedom.workers = false;
   const auto tuned = tune(tie(), options);
   ASSERT_TRUE(tuned->changed());
@@ -191,7 +190,7 @@ TEST(Tune, WhatVariesIsDecidedByTheWorkload) {
 
 TEST(Tune, WorkersWithinTheLimit) {
   const Workload workload = tie();
-  Options options = quick();
+  TuneOptions options = quick();
   options.bounds = false;
   options.freedom.ties = false;
   EXPECT_FALSE(tune(workload, options)->changed());
@@ -207,7 +206,7 @@ TEST(Tune, TheMostCriticalFirst) {
                                     1);
   workload.dags[0].criticality = Criticality::Low;
   workload.dags[1].criticality = Criticality::High;
-  Options options = quick();
+  TuneOptions options = quick();
   options.goal.per_criticality = true;
   const auto critical = tune(workload, options);
   EXPECT_EQ(critical->best.score.of[static_cast<std::size_t>(Criticality::High)].missed, 0U);
@@ -218,29 +217,29 @@ TEST(Tune, TheMostCriticalFirst) {
 }
 
 TEST(Tune, AProofComesFirst) {
-  Score proven;
+  RunScore proven;
   proven.proven = true;
   proven.of[1] = {10, 0, 0, -1, 0.1, true};
-  Score faster;
+  RunScore faster;
   faster.of[1] = {10, 0, 0, -5, 0.5, true};
-  EXPECT_TRUE(improves(proven, faster, {Objective::MaxLateness, false}));
-  EXPECT_FALSE(improves(faster, proven, {Objective::MaxLateness, false}));
+  EXPECT_TRUE(improves(proven, faster, {Objective::Lateness, false}));
+  EXPECT_FALSE(improves(faster, proven, {Objective::Lateness, false}));
   faster.proven = true;
-  EXPECT_TRUE(improves(faster, proven, {Objective::MaxLateness, false}));
+  EXPECT_TRUE(improves(faster, proven, {Objective::Lateness, false}));
   EXPECT_FALSE(improves(faster, proven, {Objective::Misses, false}));
   EXPECT_TRUE(is_better(faster, proven, {Objective::Misses, false}));
 }
 
 TEST(Tune, StoppedBeforeAnything) {
   const std::atomic<bool> stop{true};
-  Options options = quick();
+  TuneOptions options = quick();
   options.stop = &stop;
   EXPECT_FALSE(tune(random_workload(1), options));
 }
 
 TEST(Tune, StoppedLaterGivesTheBestSoFar) {
   std::atomic<bool> stop{false};
-  Options options = quick();
+  TuneOptions options = quick();
   options.stop = &stop;
   options.effort.exhaustive = 0;
   options.progress = [&stop](std::uint64_t tried) { stop = tried > 1; };
@@ -289,4 +288,4 @@ TEST(Setting, TheRangeOfCaps) {
 }
 
 }  // namespace
-}  // namespace redag::tune
+}  // namespace redag::lab

@@ -262,8 +262,8 @@ std::string describe(const lab::Analysed &analysed, const StreamTraits &terminal
 
 std::optional<std::string> suggested_change(const lab::Analysed &analysed, const lab::Row &row) {
   if (!analysed.executor->ours) return std::nullopt;
-  if (analysed.task_set.tasks.size() > analysis::kMostTasksForRemedy) return std::nullopt;
-  auto remedy = analysis::find_remedy(analysed.workload, analysed.task_set.platform, lab::suspects_of(analysed, row));
+  if (analysed.task_set.tasks.size() > lab::kMostTasksForRemedy) return std::nullopt;
+  auto remedy = lab::find_remedy(analysed.workload, analysed.task_set.platform, lab::suspects_of(analysed, row));
   if (!remedy) return std::nullopt;
   return *remedy + ": then every deadline is shown to be met";
 }

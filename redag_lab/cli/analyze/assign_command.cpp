@@ -24,11 +24,11 @@ struct Options {
   AnalysisArguments analysis;
   std::string output;
   Keep keep = Keep::Nothing;
-  analysis::AssignmentOptions assignment;
+  lab::AssignmentOptions assignment;
 };
 
-Result<analysis::Assignment> search(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                                    analysis::AssignmentOptions options, AnalysisWatch &watch) {
+Result<lab::Assignment> search(const Workload &workload, const analysis::AnalysisPlatform &platform,
+                               lab::AssignmentOptions options, AnalysisWatch &watch) {
   Progress &progress = watch.progress();
   std::uint64_t asked = 0;
   options.stop = [&] {
@@ -36,7 +36,7 @@ Result<analysis::Assignment> search(const Workload &workload, const analysis::An
     if (progress.due()) progress.draw(0, fmt::format("{} assignments", asked));
     return !watch.why_stop().empty();
   };
-  Result<analysis::Assignment> found = analysis::assign(workload, platform, options);
+  Result<lab::Assignment> found = lab::assign(workload, platform, options);
   progress.clear();
   return found;
 }
@@ -62,7 +62,7 @@ int assign_file(const Options &options, Console &console) {
   assigned.options.caps = options.keep != Keep::MaxActive;
   const InterruptGuard guard;  // covers writing the results too
   AnalysisWatch watch(options.analysis, console);
-  Result<analysis::Assignment> found = search(*workload, assigned.platform, assigned.options, watch);
+  Result<lab::Assignment> found = search(*workload, assigned.platform, assigned.options, watch);
   if (!found) {
     console.note(found.error());
     return kExitBad;
@@ -91,15 +91,14 @@ int assign_file(const Options &options, Console &console) {
 
 Action add_assign(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  analysis::AssignmentOptions &assignment = options->assignment;
+  lab::AssignmentOptions &assignment = options->assignment;
   app.add_option("FILE", options->analysis.run.file, "Workload (YAML); - is standard input")->required();
   app.add_option("-o,--output", options->output, "File for the workload with the best assignment; without comments")
       ->type_name("FILE");
-  const auto objective = [](analysis::Objective value) { return std::pair(std::string(to_string(value)), value); };
-  add_choice(
-      app, "--objective", assignment.objective,
-      Choices<analysis::Objective>{objective(analysis::Objective::Lateness), objective(analysis::Objective::Slack)},
-      "The smallest worst bound - deadline, or the largest least share of a deadline that is left")
+  const auto objective = [](lab::Objective value) { return std::pair(std::string(to_string(value)), value); };
+  add_choice(app, "--objective", assignment.objective,
+             Choices<lab::Objective>{objective(lab::Objective::Lateness), objective(lab::Objective::Slack)},
+             "The smallest worst bound - deadline, or the largest least share of a deadline that is left")
       ->default_str(to_string(assignment.objective));
   add_choice(
       app, "--keep", options->keep,

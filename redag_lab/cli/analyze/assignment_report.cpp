@@ -6,44 +6,24 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <utility>
 
 #include "redag/base/text.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_lab/cli/analyze/score_text.hpp"
 #include "redag_lab/workload/changes.hpp"
 
 namespace redag::cli {
 namespace {
 
-using analysis::Assignment;
-using analysis::Candidate;
-using analysis::Caps;
-using analysis::Objective;
-using analysis::Score;
-using analysis::Trial;
+using lab::Assignment;
+using lab::BoundScore;
+using lab::Caps;
+using lab::Extremes;
+using lab::Objective;
+using lab::OrderCandidate;
 
 constexpr std::size_t kMostTrials = 10;
-
-std::string signed_duration(Duration duration) {
-  return duration < 0 ? "-" + humanize_duration(-duration) : humanize_duration(duration);
-}
-
-// Formats a share, rounded down so as not to overstate it.
-std::string percent(double share) { return fmt::format("{:.1f} %", std::floor(share * 1000 + 1e-9) / 10); }
-
-bool has_numbers(const Score &score, const Workload &workload) {
-  std::size_t deadlines = workload.task_count();
-  for (const Dag &dag : workload.dags) deadlines += dag.deadline > 0 ? 1 : 0;
-  return score.unbounded < deadlines;
-}
-
-std::string lateness_text(const Score &score, const Workload &workload) {
-  return has_numbers(score, workload) ? signed_duration(score.worst_lateness) : "-";
-}
-
-std::string slack_text(const Score &score, const Workload &workload) {
-  return has_numbers(score, workload) ? percent(score.least_slack) : "-";
-}
 
 // Lists the bounds of the DAGs with a choice: those with several tasks.
 std::string caps_text(const Workload &workload, const Caps &caps) {
@@ -55,11 +35,11 @@ std::string caps_text(const Workload &workload, const Caps &caps) {
   return text.empty() ? "-" : text;
 }
 
-std::vector<Cell> score_cells(const Score &score, const Workload &workload) {
+std::vector<Cell> score_cells(const BoundScore &score) {
   return {{score.schedulable ? "yes" : "not shown", score.schedulable ? Tint::Good : Tint::Caution},
           {score.unbounded == 0 ? "-" : fmt::format("{}", score.unbounded)},
-          {lateness_text(score, workload), score.worst_lateness > 0 ? Tint::Bad : Tint::Plain},
-          {slack_text(score, workload)}};
+          {lateness_text(score.extremes), score.extremes.worst_lateness > 0 ? Tint::Bad : Tint::Plain},
+          {slack_text(score.extremes)}};
 }
 
 Table score_table(const char *title) {
@@ -73,26 +53,28 @@ Table score_table(const char *title) {
 
 std::string orders_table(const Assignment &assignment, const StreamTraits &terminal) {
   Table table = score_table("order");
-  for (const Candidate &candidate : assignment.orders) {
+  for (const OrderCandidate &candidate : assignment.orders) {
     std::vector<Cell> cells = {{candidate.order}};
-    for (Cell &cell : score_cells(candidate.score, candidate.workload)) cells.push_back(std::move(cell));
+    for (Cell &cell : score_cells(candidate.score)) cells.push_back(std::move(cell));
     cells.push_back({caps_text(candidate.workload, candidate.caps), Tint::Faint});
     table.add(std::move(cells));
   }
   return table.render(terminal.width, terminal.colour);
 }
 
-std::vector<Trial> ranked(const Assigned &assigned) {
-  std::vector<Trial> trials = assigned.assignment.trials;
-  std::stable_sort(trials.begin(), trials.end(), [&](const Trial &a, const Trial &b) {
-    return analysis::is_better(a.score, b.score, assigned.options.objective);
+using Ranked = std::vector<std::pair<Caps, BoundScore>>;
+
+Ranked ranked(const Assigned &assigned) {
+  Ranked trials(assigned.assignment.trials.begin(), assigned.assignment.trials.end());
+  std::stable_sort(trials.begin(), trials.end(), [&](const auto &a, const auto &b) {
+    return lab::is_better(a.second, b.second, assigned.options.objective);
   });
   return trials;
 }
 
 // Returns the combinations of max_active that were tried, best first.
 std::string trials_table(const Assigned &assigned, const StreamTraits &terminal, bool all) {
-  const std::vector<Trial> trials = ranked(assigned);
+  const Ranked trials = ranked(assigned);
   const Workload &workload = assigned.assignment.best.workload;
   const std::size_t shown = all ? trials.size() : std::min(trials.size(), kMostTrials);
   Table table({{"max_active", false, 9},
@@ -100,9 +82,10 @@ std::string trials_table(const Assigned &assigned, const StreamTraits &terminal,
                {"unbounded", true, 3},
                {"worst lateness", true, 7},
                {"least slack", true, 6}});
-  const auto add = [&](const Trial &trial) {
-    std::vector<Cell> cells = {{caps_text(workload, trial.caps)}};
-    for (Cell &cell : score_cells(trial.score, workload)) cells.push_back(std::move(cell));
+  const auto add = [&](const Ranked::value_type &trial) {
+    const auto &[caps, score] = trial;
+    std::vector<Cell> cells = {{caps_text(workload, caps)}};
+    for (Cell &cell : score_cells(score)) cells.push_back(std::move(cell));
     table.add(std::move(cells));
   };
   for (std::size_t i = 0; i < shown; ++i) add(trials[i]);
@@ -128,12 +111,12 @@ std::string audsley_words(const Assignment &assignment) {
   return text + (assignment.audsley_found ? "\n" : "; by this test there is none\n");
 }
 
-Json score_json(const Score &score, const Workload &workload) {
-  const bool numbers = has_numbers(score, workload);
+Json score_json(const BoundScore &score) {
+  const Extremes &extremes = score.extremes;
   return Json{{"schedulable", score.schedulable},
               {"unbounded", score.unbounded},
-              {"worst_lateness_ns", numbers ? Json(score.worst_lateness) : Json()},
-              {"least_slack", numbers ? Json(score.least_slack) : Json()}};
+              {"worst_lateness_ns", extremes.any ? Json(extremes.worst_lateness) : Json()},
+              {"least_slack", extremes.any ? Json(extremes.least_slack) : Json()}};
 }
 
 Json caps_json(const Workload &workload, const Caps &caps) {
@@ -142,9 +125,9 @@ Json caps_json(const Workload &workload, const Caps &caps) {
   return list;
 }
 
-Json candidate_json(const Candidate &candidate) {
+Json candidate_json(const OrderCandidate &candidate) {
   Json json = {{"order", candidate.order}, {"policy", to_string(candidate.workload.policy)}};
-  json.update(score_json(candidate.score, candidate.workload));
+  json.update(score_json(candidate.score));
   json["max_active"] = caps_json(candidate.workload, candidate.caps);
   json["priorities"] = Json::object();
   for (const TaskRef &ref : flatten(candidate.workload)) {
@@ -166,12 +149,11 @@ std::vector<std::string> changes(const Assignment &assignment) {
 
 std::string in_words(const Assigned &assigned) {
   const Assignment &assignment = assigned.assignment;
-  const Score &before = assignment.present.score;
-  const Score &after = assignment.best.score;
-  const Workload &workload = assignment.best.workload;
+  const BoundScore &before = assignment.present.score;
+  const BoundScore &after = assignment.best.score;
   std::string text;
   const bool is_unchanged = assignment.best.workload == assignment.present.workload;
-  if (is_unchanged && !after.schedulable && !has_numbers(after, workload)) {
+  if (is_unchanged && !after.schedulable && !after.extremes.any) {
     text += "nothing to compare: no method bounds any response time, whatever was tried; see redag analyze\n";
   } else if (is_unchanged) {
     text += fmt::format(
@@ -184,10 +166,10 @@ std::string in_words(const Assigned &assigned) {
     if (before.unbounded != after.unbounded) {
       text += fmt::format("gain: deadlines without a bound: {} -> {}\n", before.unbounded, after.unbounded);
     }
-    text += fmt::format("worst lateness (bound - deadline): {} -> {}\n", lateness_text(before, workload),
-                        lateness_text(after, workload));
-    text += fmt::format("least slack (of a deadline): {} -> {}\n", slack_text(before, workload),
-                        slack_text(after, workload));
+    text += fmt::format("worst lateness (bound - deadline): {} -> {}\n", lateness_text(before.extremes),
+                        lateness_text(after.extremes));
+    text +=
+        fmt::format("least slack (of a deadline): {} -> {}\n", slack_text(before.extremes), slack_text(after.extremes));
   }
   if (!after.schedulable) text += "no assignment that was tried is shown schedulable\n";
   text += audsley_words(assignment);
@@ -205,8 +187,8 @@ std::string describe(const Assigned &assigned, const StreamTraits &terminal, boo
                                  assigned.platform.workers, assigned.platform.workers == 1 ? "" : "s",
                                  to_string(assigned.options.objective));
   text += orders_table(assignment, terminal);
-  const Score &best = assignment.best.score;
-  if (assignment.trials.size() > 1 && (best.schedulable || has_numbers(best, workload))) {
+  const BoundScore &best = assignment.best.score;
+  if (assignment.trials.size() > 1 && (best.schedulable || best.extremes.any)) {
     text += fmt::format("\nmax_active under {}, {}\n", assignment.best.order,
                         assignment.exhaustive ? "every combination" : "those met by the local search");
     text += trials_table(assigned, terminal, all);
@@ -230,11 +212,11 @@ Json to_json(const Assigned &assigned) {
                    {"analyses", assignment.analyses},        {"present", candidate_json(assignment.present)},
                    {"best", candidate_json(assignment.best)}};
   document["orders"] = Json::array();
-  for (const Candidate &candidate : assignment.orders) document["orders"].push_back(candidate_json(candidate));
+  for (const OrderCandidate &candidate : assignment.orders) document["orders"].push_back(candidate_json(candidate));
   document["trials"] = Json::array();
-  for (const Trial &trial : assignment.trials) {
-    Json row = {{"max_active", caps_json(assignment.best.workload, trial.caps)}};
-    row.update(score_json(trial.score, assignment.best.workload));
+  for (const auto &[caps, score] : assignment.trials) {
+    Json row = {{"max_active", caps_json(assignment.best.workload, caps)}};
+    row.update(score_json(score));
     document["trials"].push_back(std::move(row));
   }
   document["audsley"] = {{"test", assignment.audsley_test},

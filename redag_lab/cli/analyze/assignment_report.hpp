@@ -14,13 +14,13 @@
 namespace redag::cli {
 
 struct Assigned {
-  analysis::Assignment assignment;
+  lab::Assignment assignment;
   analysis::AnalysisPlatform platform;
-  analysis::AssignmentOptions options;
+  lab::AssignmentOptions options;
 };
 
 /// Returns one line per change: "policy: rate_monotonic -> fixed". Empty if no candidate is better.
-[[nodiscard]] std::vector<std::string> changes(const analysis::Assignment &assignment);
+[[nodiscard]] std::vector<std::string> changes(const lab::Assignment &assignment);
 
 /// Returns the gain, and how certain it is that no better candidate exists. Sentences, one per line.
 [[nodiscard]] std::string in_words(const Assigned &assigned);

@@ -34,7 +34,7 @@ Workload short_deadline() {
 Assigned assigned(const Workload &workload) {
   Assigned result;
   result.platform = analysis::platform_of(workload);
-  result.assignment = analysis::assign(workload, result.platform).value();
+  result.assignment = lab::assign(workload, result.platform).value();
   return result;
 }
 
@@ -71,8 +71,8 @@ TEST(SensitivityReport, FactorsAreNeverRoundedUp) {
   Sensitivity sensitivity;
   const analysis::AnalysisPlatform platform = analysis::platform_of(workload);
   sensitivity.analysed = lab::analyse(workload, platform).value();
-  for (const analysis::Knob &knob : analysis::knobs_of(workload, sensitivity.analysed.task_set)) {
-    sensitivity.results.push_back({analysis::margin_of(workload, platform, knob).value(), {}});
+  for (const lab::Knob &knob : lab::knobs_of(workload, sensitivity.analysed.task_set)) {
+    sensitivity.results.push_back({lab::margin_of(workload, platform, knob).value(), {}});
   }
   sensitivity.knobs = sensitivity.results.size();
   // Harmonic periods with U = 0.4 leave a factor of 2.5, and 14 ms of 20 for b alone.

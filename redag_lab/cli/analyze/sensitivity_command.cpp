@@ -26,14 +26,14 @@ constexpr Duration kPeriods = 20;  // length of a simulation, in longest periods
 struct Options {
   AnalysisArguments analysis;
   std::string task;
-  std::uint32_t probes = analysis::SensitivityOptions{}.probes;
+  std::uint32_t probes = lab::SensitivityOptions{}.probes;
   bool simulate = false;
 };
 
 // Returns the knobs of the named task or DAG only. Returns nothing, with an error, if there is no such task or DAG.
-std::optional<std::vector<analysis::Knob>> chosen_knobs(const lab::Analysed &analysed, const std::string &name,
-                                                        Console &console) {
-  std::vector<analysis::Knob> knobs = analysis::knobs_of(analysed.workload, analysed.task_set);
+std::optional<std::vector<lab::Knob>> chosen_knobs(const lab::Analysed &analysed, const std::string &name,
+                                                   Console &console) {
+  std::vector<lab::Knob> knobs = lab::knobs_of(analysed.workload, analysed.task_set);
   if (name.empty()) return knobs;
   const Result<lab::Row> row = find_row(analysed, name);
   if (!row) {
@@ -54,9 +54,9 @@ std::optional<std::vector<analysis::Knob>> chosen_knobs(const lab::Analysed &ana
     return std::all_of(part.begin(), part.end(),
                        [&](std::uint32_t t) { return std::find(whole.begin(), whole.end(), t) != whole.end(); });
   };
-  const auto is_other = [&](const analysis::Knob &knob) {
-    if (knob.kind == analysis::Knob::Kind::AllWcets) return true;
-    if (knob.kind == analysis::Knob::Kind::Wcet) return !is_within(knob.tasks, wanted);
+  const auto is_other = [&](const lab::Knob &knob) {
+    if (knob.kind == lab::Knob::Kind::AllWcets) return true;
+    if (knob.kind == lab::Knob::Kind::Wcet) return !is_within(knob.tasks, wanted);
     return !is_within(knob.tasks, wanted) && !is_within(knob.tasks, released);
   };
   knobs.erase(std::remove_if(knobs.begin(), knobs.end(), is_other), knobs.end());
@@ -70,15 +70,15 @@ Duration simulated_length(const Workload &workload) {
 }
 
 // Searches every knob. Returns the reason for an early end, or an empty text. Results found before the end remain.
-std::string search(Sensitivity &sensitivity, const std::vector<analysis::Knob> &knobs, const Options &options,
+std::string search(Sensitivity &sensitivity, const std::vector<lab::Knob> &knobs, const Options &options,
                    AnalysisWatch &watch) {
   const analysis::AnalysisPlatform &platform = sensitivity.analysed.task_set.platform;
   const Workload &workload = sensitivity.analysed.workload;
-  const analysis::Accepts simulated = [&](const Workload &candidate, const analysis::TaskSet &) {
+  const lab::Accepts simulated = [&](const Workload &candidate, const analysis::TaskSet &) {
     return lab::misses_nothing(candidate, platform, sensitivity.simulated_for, &InterruptGuard::flag());
   };
   Progress &progress = watch.progress();
-  analysis::SensitivityOptions searching;
+  lab::SensitivityOptions searching;
   searching.probes = options.probes;
   searching.stop = [&] {
     if (progress.due()) {
@@ -88,13 +88,13 @@ std::string search(Sensitivity &sensitivity, const std::vector<analysis::Knob> &
     }
     return !watch.why_stop().empty();
   };
-  for (const analysis::Knob &knob : knobs) {
+  for (const lab::Knob &knob : knobs) {
     KnobResult result;
-    const auto margin = analysis::margin_of(workload, platform, knob, analysis::accepted_by_analysis, searching);
+    const auto margin = lab::margin_of(workload, platform, knob, lab::accepted_by_analysis, searching);
     if (!margin) return watch.why_stop();
     result.margin = *margin;
     if (options.simulate) {
-      result.simulated = analysis::margin_of(workload, platform, knob, simulated, searching);
+      result.simulated = lab::margin_of(workload, platform, knob, simulated, searching);
       if (!result.simulated) return watch.why_stop();
     }
     sensitivity.results.push_back(std::move(result));

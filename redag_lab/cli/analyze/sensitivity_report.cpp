@@ -15,9 +15,9 @@
 namespace redag::cli {
 namespace {
 
-using analysis::Knob;
-using analysis::Margin;
-using Kind = analysis::Knob::Kind;
+using lab::Knob;
+using lab::Margin;
+using Kind = lab::Knob::Kind;
 
 constexpr std::size_t kMostRows = 50;
 
@@ -272,7 +272,7 @@ Json to_json(const Sensitivity &sensitivity) {
                    {"utilization", analysed.task_set.utilization},
                    {"schedulable", is_schedulable(sensitivity)},
                    {"verdict", verdict_in_words(analysed)},
-                   {"resolution", {{"time_ns", 1}, {"factor", 1.0 / analysis::kFactorUnit}}},
+                   {"resolution", {{"time_ns", 1}, {"factor", 1.0 / lab::kFactorUnit}}},
                    {"probes", sensitivity.probes},
                    {"simulated_ns", sensitivity.simulated_for > 0 ? Json(sensitivity.simulated_for) : Json()},
                    {"stopped", sensitivity.results.size() < sensitivity.knobs},

@@ -14,8 +14,8 @@
 namespace redag::cli {
 
 struct KnobResult {
-  analysis::Margin margin;
-  std::optional<analysis::Margin> simulated;  // the same search, judged by the simulator
+  lab::Margin margin;
+  std::optional<lab::Margin> simulated;  // the same search, judged by the simulator
 };
 
 struct Sensitivity {
@@ -27,7 +27,7 @@ struct Sensitivity {
 };
 
 /// Returns "wcet of slow.plan", "all wcets", "period of fast", "rates of fast" or "all rates".
-[[nodiscard]] std::string knob_name(const lab::Analysed &analysed, const analysis::Knob &knob);
+[[nodiscard]] std::string knob_name(const lab::Analysed &analysed, const lab::Knob &knob);
 
 [[nodiscard]] std::string describe(const Sensitivity &sensitivity, const StreamTraits &terminal, bool all);
 

@@ -26,7 +26,7 @@ constexpr std::uint32_t kMostSeeds = 10'000;
 
 struct Options {
   RunArguments run;
-  tune::Options tune;
+  lab::TuneOptions tune;
   std::string output;
   std::string vary = "workers,max_active,order";
   std::string caps;
@@ -35,7 +35,7 @@ struct Options {
 };
 
 // Parses "workers,max_active", the settings that may change. Returns false after printing an error.
-bool parse_vary(const std::string &list, tune::Freedom &freedom, Console &console) {
+bool parse_vary(const std::string &list, lab::Freedom &freedom, Console &console) {
   freedom.workers = freedom.caps = freedom.ties = false;
   std::size_t begin = 0;
   while (begin <= list.size()) {
@@ -58,7 +58,7 @@ bool parse_vary(const std::string &list, tune::Freedom &freedom, Console &consol
 }
 
 // Parses "2-5". Returns false after printing an error.
-bool parse_caps(const std::string &text, tune::Freedom &freedom, Console &console) {
+bool parse_caps(const std::string &text, lab::Freedom &freedom, Console &console) {
   if (text.empty()) return true;
   std::uint32_t low = 0;
   std::uint32_t high = 0;
@@ -75,9 +75,9 @@ bool parse_caps(const std::string &text, tune::Freedom &freedom, Console &consol
   return false;
 }
 
-std::optional<tune::Tuned> search(const Workload &workload, tune::Options options, Console &console) {
+std::optional<lab::Tuned> search(const Workload &workload, lab::TuneOptions options, Console &console) {
   Progress progress(console);
-  const tune::SettingSpace settings(workload, options.freedom);
+  const lab::SettingSpace settings(workload, options.freedom);
   const std::uint64_t size = settings.space().size(options.effort.exhaustive);
   const Stopwatch watch;
   options.stop = &InterruptGuard::flag();
@@ -89,10 +89,10 @@ std::optional<tune::Tuned> search(const Workload &workload, tune::Options option
       progress.draw(0, fmt::format("{} settings", format_count(tried)));
     }
   };
-  return tune::tune(workload, options);
+  return lab::tune(workload, options);
 }
 
-int write(const std::string &path, const tune::Tuned &tuned, Console &console) {
+int write(const std::string &path, const lab::Tuned &tuned, Console &console) {
   if (path.empty()) return kExitOk;
   const Result<void> written =
       write_text(path, provenance_to_comment(current_provenance()) + to_yaml(tuned.best.workload));
@@ -139,7 +139,7 @@ int tune_file(const Options &options, Console &console) {
   tuning.options.simulation.duration = options.run.duration.value_or(lab::sensible_duration(*workload));
 
   const InterruptGuard guard;  // covers writing the results too
-  std::optional<tune::Tuned> tuned = search(*workload, tuning.options, console);
+  std::optional<lab::Tuned> tuned = search(*workload, tuning.options, console);
   if (!tuned) {
     console.error("interrupted before the workload as it is was judged: there is nothing to say");
     return kExitBad;
@@ -149,7 +149,7 @@ int tune_file(const Options &options, Console &console) {
   console.print(options.run.json ? to_text(to_json(tuning))
                                  : describe(tuning, console.out_traits(), options.all_trials));
   if (const int status = write(options.output, tuning.tuned, console); status != kExitOk) return status;
-  const tune::Candidate &best = tuning.tuned.best;
+  const lab::SettingCandidate &best = tuning.tuned.best;
   const bool missed = best.score.all().missed + best.held_out.all().missed > 0;
   return options.run.check && missed ? kExitNo : kExitOk;
 }
@@ -158,15 +158,15 @@ int tune_file(const Options &options, Console &console) {
 
 Action add_tune(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  tune::Options &tune = options->tune;
+  lab::TuneOptions &tune = options->tune;
   app.add_option("FILE", options->run.file, "Workload (YAML); - is standard input")->required();
   app.add_option("-o,--output", options->output, "File for the tuned workload; without comments")->type_name("FILE");
-  const auto objective = [](tune::Objective value) { return std::pair(std::string(to_string(value)), value); };
+  const auto objective = [](lab::Objective value) { return std::pair(std::string(objective_name(value)), value); };
   add_choice(app, "--objective", tune.goal.objective,
-             Choices<tune::Objective>{objective(tune::Objective::Misses), objective(tune::Objective::MaxLateness),
-                                      objective(tune::Objective::Slack)},
+             Choices<lab::Objective>{objective(lab::Objective::Misses), objective(lab::Objective::Lateness),
+                                     objective(lab::Objective::Slack)},
              "Fewest jobs late or lost, smallest largest lateness, or largest least share of a deadline that is left")
-      ->default_str(to_string(tune.goal.objective));
+      ->default_str(objective_name(tune.goal.objective));
   app.add_flag("--per-criticality", tune.goal.per_criticality,
                "What DAGs of higher criticality gain counts before all that others lose");
   app.add_option("--vary", options->vary, "What may change: workers, max_active, order (of DAGs that share a priority)")

@@ -6,35 +6,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 #include "redag/base/text.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_lab/cli/analyze/score_text.hpp"
 #include "redag_lab/workload/changes.hpp"
 
 namespace redag::cli {
 namespace {
 
-using analysis::Point;
-using tune::Candidate;
-using tune::ClassScore;
-using tune::Objective;
-using tune::Score;
-using tune::Tuned;
+using lab::ClassScore;
+using lab::Objective;
+using lab::Point;
+using lab::RunScore;
+using lab::SettingCandidate;
+using lab::Tuned;
 
 constexpr std::size_t kMostTrials = 10;
 constexpr Criticality kByUrgency[] = {Criticality::High, Criticality::Normal, Criticality::Low};
-
-std::string lateness_text(const ClassScore &score) {
-  if (!score.any) return "-";
-  return score.max_lateness < 0 ? "-" + humanize_duration(-score.max_lateness) : humanize_duration(score.max_lateness);
-}
-
-// Formats the slack, rounded down so as not to overstate it.
-std::string slack_text(const ClassScore &score) {
-  return score.any ? fmt::format("{:.1f} %", std::floor(score.least_slack * 1000 + 1e-9) / 10) : "-";
-}
 
 double miss_ratio(const ClassScore &score) {
   return score.released == 0 ? 0 : static_cast<double>(score.missed) / static_cast<double>(score.released);
@@ -48,23 +38,24 @@ std::string miss_text(const ClassScore &score) {
 std::string objective_text(const ClassScore &score, Objective objective) {
   switch (objective) {
     case Objective::Misses: return miss_text(score);
-    case Objective::MaxLateness: return fmt::format("{} lost, {}", format_count(score.lost), lateness_text(score));
-    case Objective::Slack: return fmt::format("{} lost, {}", format_count(score.lost), slack_text(score));
+    case Objective::Lateness:
+      return fmt::format("{} lost, {}", format_count(score.lost), lateness_text(score.extremes));
+    case Objective::Slack: return fmt::format("{} lost, {}", format_count(score.lost), slack_text(score.extremes));
   }
   return "?";
 }
 
-bool has_classes(const Score &score) {
+bool has_classes(const RunScore &score) {
   return std::count_if(score.of.begin(), score.of.end(), [](const ClassScore &each) { return each.released > 0; }) > 1;
 }
 
-std::vector<Cell> score_cells(const Score &score, bool bounds) {
+std::vector<Cell> score_cells(const RunScore &score, bool bounds) {
   const ClassScore all = score.all();
   return {{bounds ? (score.proven ? "yes" : "no") : "-", score.proven ? Tint::Good : Tint::Plain},
           {miss_text(all), all.missed > 0 ? Tint::Bad : Tint::Good},
           {format_count(all.lost)},
-          {lateness_text(all)},
-          {slack_text(all)}};
+          {lateness_text(all.extremes)},
+          {slack_text(all.extremes)}};
 }
 
 std::string point_text(const Workload &workload, const Point &point) {
@@ -90,7 +81,7 @@ std::string scores_table(const Tuning &tuning, const StreamTraits &terminal) {
                {"lost", true, 2},
                {"max lateness", true, 7},
                {"least slack", true, 6}});
-  const auto add = [&](const char *title, const char *seeds, const Score &score) {
+  const auto add = [&](const char *title, const char *seeds, const RunScore &score) {
     std::vector<Cell> cells = {{title}, {seeds}};
     for (Cell &cell : score_cells(score, tuning.options.bounds)) cells.push_back(std::move(cell));
     table.add(std::move(cells));
@@ -105,12 +96,12 @@ std::string scores_table(const Tuning &tuning, const StreamTraits &terminal) {
   return table.render(terminal.width, terminal.colour);
 }
 
-using Ranked = std::vector<std::pair<Point, Score>>;
+using Ranked = std::vector<std::pair<Point, RunScore>>;
 
 Ranked ranked(const Tuning &tuning) {
   Ranked trials(tuning.tuned.trials.begin(), tuning.tuned.trials.end());
   std::stable_sort(trials.begin(), trials.end(), [&](const auto &a, const auto &b) {
-    return tune::is_better(a.second, b.second, tuning.options.goal);
+    return lab::is_better(a.second, b.second, tuning.options.goal);
   });
   return trials;
 }
@@ -137,7 +128,7 @@ std::string trials_table(const Tuning &tuning, const Ranked &trials, const Strea
 std::string tried_tables(const Tuning &tuning, const StreamTraits &terminal, bool all) {
   const Ranked trials = ranked(tuning);
   if (trials.size() < 2) return {};
-  std::map<std::uint32_t, std::pair<Point, Score>> by_workers;
+  std::map<std::uint32_t, std::pair<Point, RunScore>> by_workers;
   for (const auto &trial : trials) by_workers.emplace(trial.first.front(), trial);
   std::string text;
   if (by_workers.size() > 1) {
@@ -161,12 +152,12 @@ struct Pairs {
 // Compares the two settings seed by seed; both had the same jobs.
 Pairs compare_runs(const Tuning &tuning) {
   Pairs pairs;
-  const std::vector<Score> &before = tuning.tuned.present.held_out_runs;
-  const std::vector<Score> &after = tuning.tuned.found.held_out_runs;
+  const std::vector<RunScore> &before = tuning.tuned.present.held_out_runs;
+  const std::vector<RunScore> &after = tuning.tuned.found.held_out_runs;
   for (std::size_t i = 0; i < std::min(before.size(), after.size()); ++i) {
-    if (tune::improves(after[i], before[i], tuning.options.goal)) {
+    if (lab::improves(after[i], before[i], tuning.options.goal)) {
       ++pairs.better;
-    } else if (tune::improves(before[i], after[i], tuning.options.goal)) {
+    } else if (lab::improves(before[i], after[i], tuning.options.goal)) {
       ++pairs.worse;
     } else {
       ++pairs.equal;
@@ -179,12 +170,12 @@ std::string gains(const Tuning &tuning) {
   const Tuned &tuned = tuning.tuned;
   const Objective objective = tuning.options.goal.objective;
   const bool held = tuning.options.held_out > 0;
-  const Score &before = held ? tuned.present.held_out : tuned.present.score;
-  const Score &after = held ? tuned.found.held_out : tuned.found.score;
+  const RunScore &before = held ? tuned.present.held_out : tuned.present.score;
+  const RunScore &after = held ? tuned.found.held_out : tuned.found.score;
   std::string text;
   if (!before.proven && after.proven) text += "gain: every deadline is proven to hold, which it is not as it stands\n";
   text +=
-      fmt::format("{}, {}: {} -> {}\n", to_string(objective),
+      fmt::format("{}, {}: {} -> {}\n", objective_name(objective),
                   held ? "on seeds that the search has not seen" : "on the seeds of the search (none were held out)",
                   objective_text(before.all(), objective), objective_text(after.all(), objective));
   if (has_classes(before)) {
@@ -207,11 +198,11 @@ Json class_json(const ClassScore &score) {
   return Json{{"released", score.released},
               {"missed", score.missed},
               {"lost", score.lost},
-              {"max_lateness_ns", score.any ? Json(score.max_lateness) : Json()},
-              {"least_slack", score.any ? Json(score.least_slack) : Json()}};
+              {"max_lateness_ns", score.extremes.any ? Json(score.extremes.worst_lateness) : Json()},
+              {"least_slack", score.extremes.any ? Json(score.extremes.least_slack) : Json()}};
 }
 
-Json score_json(const Score &score, bool bounds) {
+Json score_json(const RunScore &score, bool bounds) {
   Json json = class_json(score.all());
   json["proven"] = bounds ? Json(score.proven) : Json();
   json["criticality"] = Json::object();
@@ -229,17 +220,21 @@ Json setting_json(const Workload &workload, const Point &point) {
                                 point.begin() + 1 + static_cast<std::ptrdiff_t>(workload.dags.size()), point.end())}};
 }
 
-Json candidate_json(const Candidate &candidate, const Tuning &tuning) {
+Json candidate_json(const SettingCandidate &candidate, const Tuning &tuning) {
   const bool bounds = tuning.options.bounds;
   Json json = setting_json(candidate.workload, candidate.point);
   json["searched"] = score_json(candidate.score, bounds);
   json["held_out"] = tuning.options.held_out > 0 ? score_json(candidate.held_out, bounds) : Json();
   json["held_out_runs"] = Json::array();
-  for (const Score &run : candidate.held_out_runs) json["held_out_runs"].push_back(class_json(run.all()));
+  for (const RunScore &run : candidate.held_out_runs) json["held_out_runs"].push_back(class_json(run.all()));
   return json;
 }
 
 }  // namespace
+
+const char *objective_name(Objective objective) {
+  return objective == Objective::Lateness ? "max_lateness" : to_string(objective);
+}
 
 std::vector<std::string> changes(const Tuned &tuned) {
   std::vector<std::string> list;
@@ -258,7 +253,7 @@ std::string in_words(const Tuning &tuning) {
         "nothing to change: what was better on the seeds of the search was worse on those held out\n" + gains(tuning);
   } else {
     text += fmt::format("nothing to change: no other setting that was tried is better by {}\n",
-                        to_string(tuning.options.goal.objective));
+                        objective_name(tuning.options.goal.objective));
   }
   if (!tuned.varies) {
     text +=
@@ -274,10 +269,10 @@ std::string in_words(const Tuning &tuning) {
 
 std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool all) {
   const Workload &workload = tuning.tuned.present.workload;
-  const tune::Options &options = tuning.options;
+  const lab::TuneOptions &options = tuning.options;
   std::string text = fmt::format("{}: {}, {} worker{}; objective: {}{}\n", workload.name, to_string(workload.policy),
                                  workload.platform.workers, workload.platform.workers == 1 ? "" : "s",
-                                 to_string(options.goal.objective),
+                                 objective_name(options.goal.objective),
                                  options.goal.per_criticality ? ", the most critical DAGs first" : "");
   text += fmt::format("simulated {} with each of {} seeds; {} seeds held out; {}\n\n",
                       humanize_duration(options.simulation.duration), options.seeds, options.held_out,
@@ -292,7 +287,7 @@ std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool al
 
 Json to_json(const Tuning &tuning) {
   const Tuned &tuned = tuning.tuned;
-  const tune::Options &options = tuning.options;
+  const lab::TuneOptions &options = tuning.options;
   Json trials = Json::array();
   for (const auto &[point, score] : tuned.trials) {
     Json row = setting_json(tuned.present.workload, point);
@@ -301,7 +296,7 @@ Json to_json(const Tuning &tuning) {
   }
   return Json{{"format", "redag.tuning/1"},
               {"workload", tuned.present.workload.name},
-              {"objective", to_string(options.goal.objective)},
+              {"objective", objective_name(options.goal.objective)},
               {"per_criticality", options.goal.per_criticality},
               {"duration_ns", options.simulation.duration},
               {"seed", options.seed},

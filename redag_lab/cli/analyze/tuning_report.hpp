@@ -14,12 +14,15 @@
 namespace redag::cli {
 
 struct Tuning {
-  tune::Tuned tuned;
-  tune::Options options;
+  lab::Tuned tuned;
+  lab::TuneOptions options;
 };
 
+/// Returns the objective as `tune` names it: "misses", "max_lateness" or "slack".
+[[nodiscard]] const char *objective_name(lab::Objective objective);
+
 /// Returns one line per change: "max_active of nav: none -> 2". Empty if no setting is better.
-[[nodiscard]] std::vector<std::string> changes(const tune::Tuned &tuned);
+[[nodiscard]] std::vector<std::string> changes(const lab::Tuned &tuned);
 
 /// Returns sentences, one per line.
 [[nodiscard]] std::string in_words(const Tuning &tuning);
