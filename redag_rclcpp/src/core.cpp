@@ -12,7 +12,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "compat.hpp"
 #include "middleware_threads.hpp"
 #include "rclcpp/logging.hpp"
 #include "redag/model/validate.hpp"
@@ -24,15 +23,10 @@
 
 namespace redag_rclcpp {
 
-using redag::CallbackId;
-using redag::DagId;
-using redag::JobEvent;
 using redag::kNever;
-using redag::Task;
 using redag::Workload;
 using redag::runtime::monotonic_now;
 using std::chrono::nanoseconds;
-using Kind = redag::Callback::Kind;
 
 namespace {
 
@@ -78,81 +72,66 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
     : context_(context),
       options_(prepare(std::move(options))),
       setup_(set_up(options_)),
+      origin_(monotonic_now()),
+      engine_(make_engine()),
+      timer_(*engine_, origin_),
       bridge_(context),
       tasks_(redag::Platform{setup_.config.workers, setup_.mode.mode}, options_.policy, options_.ties,
-             options_.workload ? &*options_.workload : nullptr) {
-  redag::runtime::EngineOptions engine;
-  engine.spins = redag::runtime::spins_before_sleep(setup_, options_.spin.count());
-  warnings_ = std::exchange(setup_.warnings, {});
-  if (options_.lock_memory) engine.touched_stack = redag::runtime::kTouchedStack;
-  engine.config = setup_.config;
-  engine.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id stands for one task
-  engine.band = setup_.band;
-  engine.throttling = setup_.throttling;
-  engine.cpus = options_.cpus;
-  engine.trace_capacity = options_.trace_capacity;
-  engine.measure = options_.live;
-  engine.start_paused = true;
-  engine.on_exception = [this](const redag::runtime::Job &job, std::exception_ptr e) { on_exception(job, e); };
-  auto scheduler = std::make_unique<redag::sched::PriorityScheduler>(Workload{}, engine.config);
-  engine_ = std::make_unique<redag::runtime::Engine>(std::move(scheduler), std::move(engine));
-  origin_ = monotonic_now();
-  engine_->set_origin(origin_);
-  for (const redag::Dag &dag : tasks_.dags()) dag_ids_.push_back(engine_->add_dag(dag, {}).dag);
-  if (options_.workload) matcher_ = std::make_unique<redag::CallbackMatcher>(*options_.workload);
+             options_.workload ? &*options_.workload : nullptr),
+      registry_(context, options_, setup_.config.workers,
+                {.engine = *engine_, .timer = timer_, .bridge = bridge_, .tasks = tasks_}) {
+  for (std::string &warning : setup_.warnings) notes_.warn(std::move(warning));
+  setup_.warnings.clear();
   if (options_.live) go_live();
+}
+
+std::unique_ptr<redag::runtime::Engine> ReDAGExecutor::Core::make_engine() {
+  redag::runtime::EngineOptions options;
+  options.spins = redag::runtime::spins_before_sleep(setup_, options_.spin.count());
+  if (options_.lock_memory) options.touched_stack = redag::runtime::kTouchedStack;
+  options.config = setup_.config;
+  options.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id stands for one task
+  options.band = setup_.band;
+  options.throttling = setup_.throttling;
+  options.cpus = options_.cpus;
+  options.trace_capacity = options_.trace_capacity;
+  options.measure = options_.live;
+  options.start_paused = true;
+  options.on_exception = [this](const redag::runtime::Job &job, std::exception_ptr e) { on_exception(job, e); };
+  auto scheduler = std::make_unique<redag::sched::PriorityScheduler>(Workload{}, options.config);
+  auto engine = std::make_unique<redag::runtime::Engine>(std::move(scheduler), std::move(options));
+  engine->set_origin(origin_);
+  return engine;
 }
 
 void ReDAGExecutor::Core::go_live() {
   const std::string name = options_.workload ? options_.workload->name : "";
   auto publisher = redag::live::Publisher::start(
       redag::runtime::live_options(name.empty() ? "ros" : name, "ros", setup_.mode, setup_.config),
-      [this](redag::live::Sample &sample) {
-        std::map<std::string, redag::Duration> bounds;
-        {
-          const redag::LockGuard guard(notes_lock_);
-          bounds = live_bounds_;
-        }
-        tasks_.sample(*engine_, bounds, sample);
-      });
+      [this](redag::live::Sample &sample) { tasks_.sample(*engine_, notes_.live_bounds(), sample); });
   if (publisher) {
     live_ = *std::move(publisher);
   } else {
-    const redag::LockGuard guard(notes_lock_);
-    warnings_.push_back(to_string(publisher.error()));
+    notes_.warn(to_string(publisher.error()));
   }
-}
-
-void ReDAGExecutor::Core::set_live_bounds(std::map<std::string, redag::Duration> bounds) {
-  const redag::LockGuard guard(notes_lock_);
-  live_bounds_ = std::move(bounds);
 }
 
 ReDAGExecutor::Core::~Core() = default;
 
 void ReDAGExecutor::Core::open(ExecutorHooks hooks, const std::vector<const rclcpp::GuardCondition *> &conditions) {
   hooks_ = std::move(hooks);
+  registry_.open(shared_from_this(), hooks_.groups);
   for (const rclcpp::GuardCondition *condition : conditions) bridge_.watch(*condition);
 }
 
 void ReDAGExecutor::Core::close() {
   live_.reset();
-  timer_exit_ = true;
-  timer_parker_.unpark();
-  if (timer_thread_.joinable()) timer_thread_.join();
+  timer_.stop();
   engine_->halt();
   if (watchdog_) (void)engine_->wait_idle(kNever);  // the watchdog still reports a job that delays this
   watchdog_.reset();
   engine_->join();
-  const redag::LockGuard guard(collect_lock_);
-  closed_ = true;
-  while (!callbacks_.empty()) remove(callbacks_.begin()->second);
-  for (const auto &weak : nodes_) {
-    if (const auto node = weak.lock()) node->get_notify_guard_condition().set_on_trigger_callback(nullptr);
-  }
-  for (const auto &[weak, name] : group_names_) {
-    if (const auto group = weak.lock()) watch_group(*group, nullptr);
-  }
+  registry_.close();
   const redag::LockGuard noted_guard(noted_lock_);
   noted_.clear();
 }
@@ -171,8 +150,8 @@ void ReDAGExecutor::Core::wake() {
 }
 
 void ReDAGExecutor::Core::timers_changed() {
-  if (timing_) {
-    timer_parker_.unpark();
+  if (timer_.is_running()) {
+    timer_.changed();
   } else if (waiting_) {
     bridge_.wake();
   }
@@ -182,27 +161,10 @@ void ReDAGExecutor::Core::wait_set_changed() {
   if (waiting_ || direct_) bridge_.wake();
 }
 
-redag::Time ReDAGExecutor::Core::expire_timers() {
-  const redag::LockGuard guard(expire_lock_);
-  due_.clear();
-  missed_.clear();
-  const redag::Time next = timers_.expire_due(engine_->now(), due_, missed_);
-  for (const redag::runtime::Release &release : missed_) {
-    engine_->miss(release.task, release.nominal, redag::Reason::Overrun);
-  }
-  if (!due_.empty()) engine_->release(due_);
-  return next;
-}
-
-void ReDAGExecutor::Core::time_releases() noexcept {
-  while (!timer_exit_) {
-    const redag::Time next = timing_ ? expire_timers() : kNever;
-    if (next == kNever) {
-      timer_parker_.park();
-    } else if (next > engine_->now()) {
-      timer_parker_.park_until(origin_ + next);
-    }
-  }
+void ReDAGExecutor::Core::entities_changed() {
+  if (registry_.set_stale()) return;
+  keeper_parker_.unpark();
+  if (waiting_) bridge_.wake();
 }
 
 void ReDAGExecutor::Core::admit_noted() {
@@ -218,9 +180,9 @@ void ReDAGExecutor::Core::admit_noted() {
 void ReDAGExecutor::Core::admit(bool look_around) {
   begin_learning();
   if (learning_ && engine_->now() >= learn_until_) stop_learning();
-  if (dirty_) collect();
+  if (registry_.is_stale()) registry_.collect();
   if (look_around && !bridge_.empty()) bridge_.wait(nanoseconds(0));
-  expire_timers();
+  (void)timer_.expire();
   admit_noted();
 }
 
@@ -230,14 +192,15 @@ void ReDAGExecutor::Core::start() {
   begin_learning();
   if (started_) return;
   if (!start_error_.empty()) throw std::runtime_error(start_error_);  // an engine can be started only once
-  if (options_.lock_memory) lock_memory();
+  if (options_.lock_memory) {
+    if (const redag::Result<void> locked = redag::runtime::lock_memory(); !locked) {
+      notes_.warn(to_string(locked.error()));
+    }
+  }
   // Starts this thread before the engine's threads, which can be started only once. If it fails, a caller who catches
   // the exception may spin again.
-  if (!timer_thread_.joinable()) {
-    redag::Result<std::thread> timer_thread =
-        redag::runtime::start_thread({"redag-timer", setup_.timer_priority(), {}}, [this] { time_releases(); });
-    if (!timer_thread) throw std::runtime_error(to_string(timer_thread.error()));
-    timer_thread_ = *std::move(timer_thread);
+  if (const redag::Result<void> timer = timer_.start(setup_.timer_priority()); !timer) {
+    throw std::runtime_error(to_string(timer.error()));
   }
   if (const redag::Result<void> ready = engine_->start(); !ready) {
     start_error_ = to_string(ready.error());
@@ -247,21 +210,17 @@ void ReDAGExecutor::Core::start() {
   if (options_.watchdog.count() > 0) watch_jobs();
   RCLCPP_INFO(logger(), "%u workers, preemption %s%s%s", setup_.config.workers, to_string(setup_.mode.mode),
               setup_.mode.reason.empty() ? "" : ", ", setup_.mode.reason.c_str());
-  {
-    const redag::LockGuard guard(notes_lock_);
-    for (const std::string &warning : warnings_) RCLCPP_WARN(logger(), "%s", warning.c_str());
-  }
+  for (const std::string &warning : notes_.warnings()) RCLCPP_WARN(logger(), "%s", warning.c_str());
   if (setup_.mode.mode == redag::PreemptionMode::Os && !locks_inherit()) {
     RCLCPP_INFO(logger(), "the middleware's locks do not inherit priority: preload libredag_pi.so (docs/ros2.md)");
   }
-  if (matcher_) report_unmatched_at_ = engine_->now() + kNodesAppear;
+  if (options_.workload) report_unmatched_at_ = engine_->now() + kNodesAppear;
 }
 
 // Logs the tasks of the workload that still have no callback when nodes and components should have been loaded.
 void ReDAGExecutor::Core::report_unmatched() {
   report_unmatched_at_ = kNever;
-  const redag::LockGuard guard(collect_lock_);
-  for (const std::string &line : matcher_->unmatched()) RCLCPP_WARN(logger(), "%s", line.c_str());
+  for (const std::string &line : registry_.unmatched()) RCLCPP_WARN(logger(), "%s", line.c_str());
 }
 
 void ReDAGExecutor::Core::note_middleware(const RaisedMiddleware &raised) {
@@ -272,18 +231,7 @@ void ReDAGExecutor::Core::note_middleware(const RaisedMiddleware &raised) {
   } else if (raised.refused() > 0) {
     warning = fmt::format("{} threads of the middleware could not be raised above the workers", raised.refused());
   }
-  if (!warning.empty()) note_warning(warning);
-}
-
-void ReDAGExecutor::Core::note_warning(const std::string &warning) {
-  const redag::LockGuard guard(notes_lock_);
-  if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) warnings_.push_back(warning);
-}
-
-void ReDAGExecutor::Core::lock_memory() {
-  if (const redag::Result<void> locked = redag::runtime::lock_memory(); !locked) {
-    note_warning(to_string(locked.error()));
-  }
+  if (!warning.empty()) notes_.warn(std::move(warning));
 }
 
 void ReDAGExecutor::Core::watch_jobs() {
@@ -305,10 +253,9 @@ void ReDAGExecutor::Core::spin() {
     note_middleware(*raised);
   }
   start();
-  collect();
+  registry_.collect();
   direct_ = true;
-  timing_ = true;
-  timer_parker_.unpark();
+  timer_.resume();
   wait_set_done_ = false;
   wait_set_failure_ = nullptr;
   engine_->resume();
@@ -330,18 +277,18 @@ void ReDAGExecutor::Core::spin() {
     // One cause is a context that was shut down while entities were collected.
     stop_workers();
     if (rclcpp::ok(context_)) throw;
-    throw_failure();
+    notes_.throw_failure();
     return;
   }
   stop_workers();
   if (wait_set_failure_ && rclcpp::ok(context_)) std::rethrow_exception(wait_set_failure_);
-  throw_failure();
+  notes_.throw_failure();
 }
 
 // Work of spin() on the calling thread, at that thread's own priority: everything that takes long and is not urgent.
 void ReDAGExecutor::Core::keep_house() {
   while (hooks_.may_spin() && !wait_set_done_) {
-    if (dirty_) collect();
+    if (registry_.is_stale()) registry_.collect();
     const redag::Time now = engine_->now();
     if (learning_ && now >= learn_until_) stop_learning();
     if (now >= report_unmatched_at_) report_unmatched();
@@ -366,14 +313,14 @@ void ReDAGExecutor::Core::watch_wait_set() noexcept {
     // One cause is a context that was shut down while the wait set was filled.
     wait_set_failure_ = std::current_exception();
   }
-  timing_ = false;
+  timer_.pause();
   engine_->pause();
   wait_set_done_ = true;
   keeper_parker_.unpark();
 }
 
 void ReDAGExecutor::Core::stop_workers() {
-  timing_ = false;
+  timer_.pause();
   engine_->pause();
   (void)engine_->wait_paused(kNever);
   direct_ = false;
@@ -396,12 +343,12 @@ void ReDAGExecutor::Core::spin_one(nanoseconds timeout) {
     const redag::Time now = engine_->now();
     if (now >= end) return;
     waiting_ = true;
-    bool idle = !dirty_;
+    bool idle = !registry_.is_stale();
     {
       const redag::LockGuard guard(noted_lock_);
       idle = idle && noted_.empty();
     }
-    const redag::Time next = std::min({end, timers_.next(), learning_ ? learn_until_ : kNever});
+    const redag::Time next = std::min({end, timer_.queue().next(), learning_ ? learn_until_ : kNever});
     if (idle) bridge_.wait(next == kNever ? nanoseconds(-1) : nanoseconds(std::max<redag::Duration>(0, next - now)));
     waiting_ = false;
     admit(false);
@@ -410,7 +357,7 @@ void ReDAGExecutor::Core::spin_one(nanoseconds timeout) {
 
 bool ReDAGExecutor::Core::run_one() {
   const bool ran = engine_->run_one();
-  throw_failure();
+  notes_.throw_failure();
   return ran;
 }
 
@@ -418,20 +365,8 @@ void ReDAGExecutor::Core::on_exception(const redag::runtime::Job &job, std::exce
   if (options_.on_exception) {
     if (options_.on_exception(ExceptionInfo{tasks_.name_of(job.task), exception}) == OnException::Continue) return;
   }
-  {
-    const redag::LockGuard guard(notes_lock_);
-    if (!failure_) failure_ = std::move(exception);
-  }
+  notes_.fail(std::move(exception));
   hooks_.stop();
-}
-
-void ReDAGExecutor::Core::throw_failure() {
-  std::exception_ptr failure;
-  {
-    const redag::LockGuard guard(notes_lock_);
-    failure = std::exchange(failure_, nullptr);
-  }
-  if (failure) std::rethrow_exception(failure);
 }
 
 // ---- learning ----
@@ -444,21 +379,14 @@ void ReDAGExecutor::Core::begin_learning() {
 
 void ReDAGExecutor::Core::stop_learning() {
   learning_ = false;
-  const redag::LockGuard collect_guard(collect_lock_);
-  const auto learned = tasks_.adopt_rates();
-  for (const auto &[task, period] : learned) engine_->set_timing(task, period, period);
-  RCLCPP_INFO(logger(), "learned the rates of %zu callbacks; they are frozen now", learned.size());
+  RCLCPP_INFO(logger(), "learned the rates of %zu callbacks; they are frozen now", registry_.adopt_rates());
 }
 
 // ---- queries ----
 
 std::vector<std::string> ReDAGExecutor::Core::warnings() const {
-  const redag::LockGuard collect_guard(collect_lock_);
-  const redag::LockGuard guard(notes_lock_);
-  std::vector<std::string> all = warnings_;
-  if (matcher_) {
-    for (const std::string &line : matcher_->unmatched()) all.push_back(line);
-  }
+  std::vector<std::string> all = notes_.warnings();
+  for (std::string &line : registry_.unmatched()) all.push_back(std::move(line));
   if (const std::uint64_t waits = engine_->thread_waits(); waits > 0) {
     all.push_back(
         fmt::format("{} times a callback waited for a thread, because all {} had callbacks in progress: "

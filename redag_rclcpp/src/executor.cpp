@@ -74,44 +74,44 @@ ReDAGExecutor::~ReDAGExecutor() { core_->close(); }
 // ---- nodes and groups ----
 
 void ReDAGExecutor::add_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
-  core_->change([&] {
+  core_->registry().change([&] {
     rclcpp::Executor::add_node(node, notify);
-    core_->add_node(node);
+    core_->registry().add_node(node);
   });
 }
 
 void ReDAGExecutor::remove_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
   std::vector<rclcpp::CallbackGroup::SharedPtr> kept;
-  core_->change([&] {
+  core_->registry().change([&] {
 #if RCLCPP_VERSION_MAJOR < 21
     // Keeps all groups alive: rclcpp's remove_node() throws half-way if one of the node's groups is gone.
     for (const auto &group : get_all_callback_groups()) kept.push_back(group.lock());
     forget_expired();
 #endif
     rclcpp::Executor::remove_node(node, notify);
-    core_->remove_node(node);
+    core_->registry().remove_node(node);
   });
 }
 
 // Takes `instance` by value: if no callback is in progress, it is destroyed here, with no lock held.
 void ReDAGExecutor::retire_node(const rclcpp::node_interfaces::NodeBaseInterface::SharedPtr &node,
                                 std::shared_ptr<void> instance) {
-  core_->keep_until_done(*node, instance);
+  core_->registry().keep_until_done(*node, instance);
   remove_node(node);
 }
 
 void ReDAGExecutor::add_callback_group(rclcpp::CallbackGroup::SharedPtr group,
                                        rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
-  core_->change([&] {
+  core_->registry().change([&] {
     rclcpp::Executor::add_callback_group(group, node, notify);
-    core_->add_group(group, node);
+    core_->registry().add_group(group, node);
   });
 }
 
 void ReDAGExecutor::remove_callback_group(rclcpp::CallbackGroup::SharedPtr group, bool notify) {
-  core_->change([&] {
+  core_->registry().change([&] {
     rclcpp::Executor::remove_callback_group(group, notify);
-    core_->remove_group(group);
+    core_->registry().remove_group(group);
   });
 }
 

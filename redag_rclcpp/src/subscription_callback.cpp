@@ -1,21 +1,20 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Callbacks as jobs: takes what arrived and calls the user's function.
-#include <rcl/wait.h>
+// Subscriptions as callbacks: takes a message from the middleware, or from the buffer of its own process, and calls the
+// user's function.
+#include <rcl/subscription.h>
 
+#include <stdexcept>
 #include <utility>
 
-#include "callback.hpp"
+#include "arrival_callback.hpp"
 #include "compat.hpp"
+#include "entities.hpp"
 #include "rclcpp/executor.hpp"
-#include "rclcpp/logging.hpp"
-#include "redag/runtime/running_job.hpp"
+#include "take.hpp"
 
 namespace redag_rclcpp {
-
-using redag::sched::Outcome;
-
 namespace {
 
 // Opens rclcpp's own way of executing a subscription, for the cases that need no other.
@@ -23,125 +22,135 @@ struct Rclcpp : rclcpp::Executor {
   using rclcpp::Executor::execute_subscription;
 };
 
-/// Takes with `take`, then calls `handle`. False: there was nothing to take. Logs a failed take, as rclcpp's executors
-/// do.
-template <class Take, class Handle>
-bool take_and_handle(const char *what, const char *name, Take take, Handle handle) {
-  bool taken = false;
-  try {
-    taken = take();
-  } catch (const rclcpp::exceptions::RCLError &error) {
-    RCLCPP_ERROR(rclcpp::get_logger("redag_rclcpp"), "taking %s '%s' failed: %s", what, name, error.what());
-  }
-  if (taken) handle();
-  return taken;
+std::size_t depth_of(const rclcpp::QoS &qos) {
+  return qos.history() == rclcpp::HistoryPolicy::KeepLast ? qos.depth() : 0;
 }
 
-}  // namespace
-
-// Taking guards the message that a started job is about to take. The middleware keeps this message until begin() and
-// may overwrite it; the job then takes the newer one. begin() is called as late as possible, because creating the
-// message to take into can take long.
-class Callback::Taking {
+class SubscriptionCallback final : public ArrivalCallback {
  public:
-  Taking(Callback &callback, Source source) : callback_(callback), source_(source) {}
-  ~Taking() {
-    if (begun_) return;
-    begin();
-    const redag::LockGuard guard(callback_.lock_);
-    callback_.leftovers_[index_of(source_)] = true;  // the message may still be there
-  }
-  Taking(const Taking &) = delete;
-  Taking &operator=(const Taking &) = delete;
+  /// `intra_process`: the waitable that brings the messages of its own process, or null.
+  SubscriptionCallback(std::shared_ptr<ExecutorContext> context, redag::CallbackId id,
+                       const rclcpp::SubscriptionBase::SharedPtr &subscription,
+                       const rclcpp::Waitable::SharedPtr &intra_process)
+      : ArrivalCallback(std::move(context), std::move(id), depth_of(subscription->get_actual_qos())),
+        subscription_(subscription),
+        intra_process_(intra_process),
+        has_intra_process_(intra_process != nullptr) {}
 
-  void begin() {
-    begun_ = true;
-    const redag::LockGuard guard(callback_.lock_);
-    --callback_.kept_[index_of(source_)];
-  }
+  [[nodiscard]] bool alive() const override { return !subscription_.expired(); }
 
-  void count(bool taken) {
-    const redag::LockGuard guard(callback_.lock_);
-    ++callback_.takes_;
-    if (taken) ++callback_.taken_;
+  // The part of what is held is the waitable.
+  [[nodiscard]] Held hooked() const override {
+    Held held = ArrivalCallback::hooked();
+    if (held.entity) held.part = intra_process_.lock();
+    return held;
+  }
+  void count(const Held &held, WaitSetSizes &sizes) const override {
+    ++sizes.subscriptions;
+    if (held.part) sizes.add(part_of(held));
+  }
+  void add(Held &held, rcl_wait_set_t &set) const override {
+    const auto &subscription = *static_cast<rclcpp::SubscriptionBase *>(held.entity.get());
+    check_rcl(rcl_wait_set_add_subscription(&set, subscription.get_subscription_handle().get(), &held.index),
+              "cannot wait for a subscription");
+    if (held.part) compat::add_to_wait_set(part_of(held), set);
+  }
+  [[nodiscard]] bool is_ready(const Held &held, rcl_wait_set_t &set) const override {
+    return set.subscriptions[held.index] != nullptr;
+  }
+  void take_leftovers(const Held &held, rcl_wait_set_t &set, bool any) override {
+    const bool in_process = held.part && compat::is_ready(part_of(held), set);
+    ArrivalCallback::take_leftovers(held, set, any);
+    if (in_process) release_leftovers(Source::IntraProcess);
   }
 
  private:
-  Callback &callback_;
-  const Source source_;
-  bool begun_ = false;
+  static rclcpp::Waitable &part_of(const Held &held) { return *static_cast<rclcpp::Waitable *>(held.part.get()); }
+
+  [[nodiscard]] std::shared_ptr<void> entity() const override { return subscription_.lock(); }
+  void hook() override;
+  void unhook() override;
+  [[nodiscard]] bool handle(const Token &token, Taking &taking) override;
+  [[nodiscard]] bool handle_intra_process(const Token &token);
+  // Later messages replace earlier ones.
+  [[nodiscard]] bool drops_skipped() const override { return alive(); }
+  void drop_skipped(Source source) override;
+
+  const std::weak_ptr<rclcpp::SubscriptionBase> subscription_;
+  const std::weak_ptr<rclcpp::Waitable> intra_process_;
+  const bool has_intra_process_;
+  Hook hook_;
 };
 
-Outcome Callback::execute(const redag::runtime::Job &job) {
-  Token token;
-  bool executed = false;
-  if (is_timer()) {
-    executed = execute_timer();
-  } else if (take_token(token)) {
-    executed = execute_token(token);
+void SubscriptionCallback::hook() {
+  const auto subscription = subscription_.lock();
+  if (!subscription) return;
+  if (const auto intra_process = intra_process_.lock()) {
+    intra_process->set_on_ready_callback(
+        [self = std::static_pointer_cast<SubscriptionCallback>(shared_from_this())](std::size_t count, int) {
+          self->arrived(count, Source::IntraProcess, 0);
+        });
   }
-  if (!executed) return Outcome::NoData;
-  const Duration response = engine_.now() - job.release;
-  response_.add(response);
-  if (response > deadline_.load(std::memory_order_relaxed)) late_.fetch_add(1, std::memory_order_relaxed);
-  execution_.add(redag::runtime::RunningJob::current()->close());
-  return Outcome::Finished;
+  hook_.set<rclcpp::SubscriptionBase>(
+      subscription,
+      [](rclcpp::SubscriptionBase &entity, rcl_event_callback_t call, const void *ticket) {
+        return rcl_subscription_set_on_new_message_callback(entity.get_subscription_handle().get(), call, ticket);
+      },
+      self());
 }
 
-bool Callback::execute_token(const Token &token) {
-  // Tells the wait set that its arrival was handled, also if an exception leaves this function.
-  struct Watch {
-    ~Watch() {
-      if (!token.seen_only) return;
-      std::shared_ptr<ExecutorContext> intake;
-      {
-        const redag::LockGuard guard(self.lock_);
-        self.seen_ = false;
-        intake = self.intake_;
-      }
-      if (intake) intake->wait_set_changed();
-    }
-    Callback &self;
-    const Token &token;
-  } watch{*this, token};
-
-  Taking taking(*this, token.source);
-  if (token.after_skipped) drop_messages(token.source);
-  const bool taken = execute_arrival(token, taking);
-  bool more = false;
-  {
-    const redag::LockGuard guard(lock_);
-    bool &leftovers = leftovers_[index_of(token.source)];
-    leftovers = leftovers && taken;
-    more = leftovers && kept_[index_of(token.source)] == 0;
+void SubscriptionCallback::unhook() {
+  hook_.clear();
+  const auto waitable = intra_process_.lock();
+  if (!waitable) return;
+  try {
+    waitable->clear_on_ready_callback();
+  } catch (const std::exception &) {
+    // Setting this hook had failed as well.
   }
-  if (more) arrived(1, token.source, 0);
-  return taken;
 }
 
-bool Callback::execute_arrival(const Token &token, Taking &taking) {
-  if (token.source == Source::IntraProcess) {
-    taking.begin();
-    const auto waitable = intra_process_.lock();
-    // Taking from an empty buffer is not allowed.
-    rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
-    return waitable && compat::is_ready(*waitable, unused) && execute_waitable(*waitable, token);
-  }
-  if (const auto subscription = subscription_.lock()) return execute_subscription(*subscription, taking);
-  taking.begin();
-  if (const auto waitable = waitable_.lock()) return execute_waitable(*waitable, token);
-  return execute_service() || execute_client();
-}
-
-bool Callback::execute_waitable(rclcpp::Waitable &waitable, const Token &token) {
-  std::shared_ptr<void> data =
-      token.seen_only ? waitable.take_data() : waitable.take_data_by_entity_id(static_cast<std::size_t>(token.part));
-  compat::execute(waitable, data);
+bool SubscriptionCallback::handle_intra_process(const Token &token) {
+  const auto waitable = intra_process_.lock();
+  // Taking from an empty buffer is not allowed.
+  rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
+  if (!waitable || !compat::is_ready(*waitable, unused)) return false;
+  std::shared_ptr<void> data = waitable->take_data_by_entity_id(static_cast<std::size_t>(token.part));
+  compat::execute(*waitable, data);
   return true;
 }
 
-// Drops the messages whose jobs were skipped.
-void Callback::drop_messages(Source source) {
+bool SubscriptionCallback::handle(const Token &token, Taking &taking) {
+  if (token.source == Source::IntraProcess) {
+    taking.begin();
+    return handle_intra_process(token);
+  }
+  const auto subscription = subscription_.lock();
+  if (!subscription) {
+    taking.begin();
+    return false;
+  }
+  TRACETOOLS_TRACEPOINT(rclcpp_executor_execute,
+                        static_cast<const void *>(subscription->get_subscription_handle().get()));
+  if (subscription->is_serialized() || subscription->can_loan_messages()) {
+    taking.begin();
+    Rclcpp::execute_subscription(subscription);
+    return true;
+  }
+  rclcpp::MessageInfo info;
+  info.get_rmw_message_info().from_intra_process = false;
+  std::shared_ptr<void> message = subscription->create_message();
+  taking.begin();
+  const bool taken = take_and_handle(
+      "a message of topic", subscription->get_topic_name(),
+      [&] { return subscription->take_type_erased(message.get(), info); },
+      [&] { subscription->handle_message(message, info); });
+  if (has_intra_process_) taking.count(taken);
+  subscription->return_message(message);
+  return taken;
+}
+
+void SubscriptionCallback::drop_skipped(Source source) {
   const auto subscription = subscription_.lock();
   if (!subscription) return;
   if (source == Source::IntraProcess) {
@@ -168,61 +177,25 @@ void Callback::drop_messages(Source source) {
   }
 }
 
-// `take` takes one message; false: there is none. Some of the messages to drop may have been overwritten meanwhile.
-template <class Take>
-void Callback::drop_messages(Source source, Take take) {
-  const std::size_t at = index_of(source);
-  for (bool taken = true; taken; taken = take()) {
-    const redag::LockGuard guard(lock_);
-    if (dropping_[at] == 0) return;
-    --dropping_[at];
-    --kept_[at];
+rclcpp::Waitable::SharedPtr intra_process_of(rclcpp::SubscriptionBase &subscription) {
+  try {
+    return subscription.get_intra_process_waitable();
+  } catch (const std::runtime_error &) {
+    return nullptr;  // the intra-process manager is already gone
   }
-  const redag::LockGuard guard(lock_);  // the remaining messages are gone as well
-  kept_[at] -= std::exchange(dropping_[at], 0);
 }
 
-bool Callback::execute_subscription(rclcpp::SubscriptionBase &subscription, Taking &taking) {
-  TRACETOOLS_TRACEPOINT(rclcpp_executor_execute,
-                        static_cast<const void *>(subscription.get_subscription_handle().get()));
-  if (subscription.is_serialized() || subscription.can_loan_messages()) {
-    taking.begin();
-    Rclcpp::execute_subscription(subscription.shared_from_this());
-    return true;
-  }
-  rclcpp::MessageInfo info;
-  info.get_rmw_message_info().from_intra_process = false;
-  std::shared_ptr<void> message = subscription.create_message();
-  taking.begin();
-  const bool taken = take_and_handle(
-      "a message of topic", subscription.get_topic_name(),
-      [&] { return subscription.take_type_erased(message.get(), info); },
-      [&] { subscription.handle_message(message, info); });
-  if (has_intra_process_) taking.count(taken);
-  subscription.return_message(message);
-  return taken;
-}
+}  // namespace
 
-bool Callback::execute_service() {
-  const auto service = service_.lock();
-  if (!service) return false;
-  auto header = service->create_request_header();
-  std::shared_ptr<void> request = service->create_request();
-  return take_and_handle(
-      "a request of service", service->get_service_name(),
-      [&] { return service->take_type_erased_request(request.get(), *header); },
-      [&] { service->handle_request(header, request); });
-}
-
-bool Callback::execute_client() {
-  const auto client = client_.lock();
-  if (!client) return false;
-  auto header = client->create_request_header();
-  std::shared_ptr<void> response = client->create_response();
-  return take_and_handle(
-      "a response of service", client->get_service_name(),
-      [&] { return client->take_type_erased_response(response.get(), *header); },
-      [&] { client->handle_response(header, response); });
+Entity entity_of(const rclcpp::SubscriptionBase::SharedPtr &subscription) {
+  const rclcpp::Waitable::SharedPtr intra_process = intra_process_of(*subscription);
+  return {.key = subscription.get(),
+          .part = intra_process.get(),
+          .id = {.kind = redag::Callback::Kind::Subscription, .node = {}, .name = subscription->get_topic_name()},
+          .make = [subscription, intra_process](std::shared_ptr<ExecutorContext> context, redag::CallbackId id) {
+            return std::make_shared<SubscriptionCallback>(std::move(context), std::move(id), subscription,
+                                                          intra_process);
+          }};
 }
 
 }  // namespace redag_rclcpp

@@ -174,7 +174,7 @@ std::vector<std::pair<TaskId, redag::Duration>> TaskTable::adopt_rates() {
   std::vector<std::pair<TaskId, redag::Duration>> changed;
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry &entry = entries_[i];
-    if (!entry.callback || entry.configured || entry.callback->is_timer()) continue;
+    if (!entry.callback || entry.configured || entry.callback->has_rate()) continue;
     const redag::Duration period = seen_period(entry, 0);
     if (period > 0 && period != entry.task.period) changed.emplace_back(TaskId(i), period);
   }
@@ -191,7 +191,7 @@ std::vector<std::pair<TaskId, redag::Duration>> TaskTable::adopt_rates() {
 // mean time between arrivals; 0: unknown. `depth` ends cycles.
 redag::Duration TaskTable::seen_period(const Entry &entry, int depth) const {
   constexpr int kDeepest = 32;
-  if (entry.configured || entry.callback->is_timer()) return entry.task.period;
+  if (entry.configured || entry.callback->has_rate()) return entry.task.period;
   if (is_ros_internal(entry.id)) return 0;  // nodes are loaded in bursts, which tell no rate
   redag::Duration period = 0;
   for (const TaskId publisher : entry.callback->publishers()) {
@@ -263,7 +263,7 @@ void TaskTable::add_seen_edges(Workload &workload, const Ids &ids) const {
         continue;
       }
       const auto publishers = entry.callback->publishers();
-      if (entry.callback->is_timer() || publishers.size() != 1) continue;
+      if (entry.callback->has_rate() || publishers.size() != 1) continue;
       const auto position = std::find(ids[d].begin(), ids[d].end(), publishers.front().value);
       if (position == ids[d].end() || *position == ids[d][t]) continue;
       dag.tasks[t].predecessors = {static_cast<std::uint32_t>(position - ids[d].begin())};

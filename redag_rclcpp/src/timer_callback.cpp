@@ -5,9 +5,10 @@
 #include <rcl/timer.h>
 
 #include <algorithm>
+#include <utility>
 
-#include "callback.hpp"
 #include "compat.hpp"
+#include "entities.hpp"
 
 namespace redag_rclcpp {
 
@@ -58,53 +59,132 @@ Duration period_of(const rcl_timer_t &timer) {
   return period;
 }
 
-}  // namespace
+class TimerCallback final : public Callback {
+ public:
+  TimerCallback(std::shared_ptr<ExecutorContext> context, redag::CallbackId id,
+                const rclcpp::TimerBase::SharedPtr &timer)
+      : Callback(std::move(context), std::move(id)), timer_(timer), handle_(timer->get_timer_handle()) {}
 
-bool Callback::has_waited_timer() const {
-  return is_timer() && (!compat::kTimersTellOfResets || ros_clock_of(*timer_handle_) != nullptr);
+  void detach() override;
+  void admit() override {}
+  [[nodiscard]] bool alive() const override { return !timer_.expired(); }
+  [[nodiscard]] bool has_rate() const override { return true; }
+  [[nodiscard]] std::vector<TaskId> publishers() const override { return {}; }
+  [[nodiscard]] Duration mean_interval() const override { return 0; }
+
+  Time expire(Time now, std::vector<Release> &releases, std::vector<Release> &missed) override;
+  void skipped(redag::Reason reason) noexcept override {
+    if (reason != redag::Reason::Overrun) drop_expiry();
+  }
+
+  // A wait set watches the guard condition, which reports resets and time jumps.
+  [[nodiscard]] Held watched() const override;
+  [[nodiscard]] Held hooked() const override { return {}; }
+  void count(const Held &, WaitSetSizes &sizes) const override { ++sizes.guard_conditions; }
+  void add(Held &held, rcl_wait_set_t &set) const override;
+  [[nodiscard]] bool is_ready(const Held &held, rcl_wait_set_t &set) const override {
+    return set.guard_conditions[held.index] != nullptr;
+  }
+  void seen_by_wait_set() override { look(); }
+  void take_leftovers(const Held &, rcl_wait_set_t &, bool) override {}
+
+ private:
+  bool connect() override;
+  [[nodiscard]] bool run() override;
+
+  /// True if only the guard condition reports resets, or jumps of the clock.
+  [[nodiscard]] bool needs_wait_set() const;
+  void watch_clock(rclcpp::TimerBase &timer);
+  /// Computes when the timer is due. Called after a reset or a jump of its clock.
+  void look();
+  void reschedule();
+  void drop_expiry();
+  [[nodiscard]] std::shared_ptr<TimerCallback> self() {
+    return std::static_pointer_cast<TimerCallback>(shared_from_this());
+  }
+
+  const std::weak_ptr<rclcpp::TimerBase> timer_;
+  const std::shared_ptr<const rcl_timer_t> handle_;  // the handle alone: the last owner of a timer cancels it
+  rclcpp::JumpHandler::SharedPtr clock_watch_;       // reports that simulated time begins or ends
+  Time last_release_ = kNever;                       // guarded by the timer queue's lock
+  std::atomic<bool> uncalled_{false};                // released, and not called since
+  std::atomic<bool> restarted_{false};               // the timer's grid begins anew
+};
+
+bool TimerCallback::connect() {
+  look();
+  if (const auto timer = timer_.lock()) {
+    watch_clock(*timer);
+    compat::set_on_reset(*timer, [self = self()] { self->look(); });
+    return needs_wait_set();
+  }
+  return false;
 }
 
+void TimerCallback::detach() {
+  std::shared_ptr<ExecutorContext> left;
+  {
+    const redag::LockGuard guard(lock_);
+    left = leave();
+  }
+  clock_watch_.reset();
+  const auto timer = timer_.lock();
+  if (!timer) return;
+  try {
+    compat::clear_on_reset(*timer);
+  } catch (const std::exception &) {
+    // Setting this hook had failed as well.
+  }
+}
+
+WaitSetMember::Held TimerCallback::watched() const {
+  return needs_wait_set() ? Held{.entity = std::const_pointer_cast<rcl_timer_t>(handle_)} : Held{};
+}
+
+void TimerCallback::add(Held &held, rcl_wait_set_t &set) const {
+  check_rcl(rcl_wait_set_add_guard_condition(&set, rcl_timer_get_guard_condition(handle_.get()), &held.index),
+            "cannot wait for a timer's guard condition");
+}
+
+bool TimerCallback::needs_wait_set() const { return !compat::kTimersTellOfResets || ros_clock_of(*handle_) != nullptr; }
+
 // Watches for simulated time being switched on or off: rcl then sets the timer anew without triggering anything.
-void Callback::watch_clock(rclcpp::TimerBase &timer) {
-  if (ros_clock_of(*timer_handle_) == nullptr) return;
+void TimerCallback::watch_clock(rclcpp::TimerBase &timer) {
+  if (ros_clock_of(*handle_) == nullptr) return;
   rcl_jump_threshold_t changes{};
   changes.on_clock_change = true;
   clock_watch_ = compat::clock_of(timer)->create_jump_callback(
       nullptr,
-      [weak = weak_from_this()](const rcl_time_jump_t &) {
-        if (const auto self = weak.lock()) self->look_at_timer();
+      [weak = std::weak_ptr<TimerCallback>(self())](const rcl_time_jump_t &) {
+        if (const auto self = weak.lock()) self->look();
       },
       changes);
 }
 
-void Callback::look_at_timer() {
+void TimerCallback::look() {
   restarted_ = true;
   reschedule();
 }
 
-void Callback::reschedule() {
-  const TimerReading reading = read_timer(*timer_handle_, engine_);
+void TimerCallback::reschedule() {
+  const TimerReading reading = read_timer(*handle_, engine());
   Time due = reading.now + reading.until;
-  if (reading.cancelled || (reading.until > 0 && is_simulated(*timer_handle_))) due = kNever;
+  if (reading.cancelled || (reading.until > 0 && is_simulated(*handle_))) due = kNever;
   const redag::LockGuard guard(lock_);
-  if (intake_ && intake_->timers().schedule(*this, due)) intake_->timers_changed();
+  if (context() && context()->timers().schedule(*this, due)) context()->timers_changed();
 }
 
-Time Callback::expire(Time now, std::vector<Release> &releases, std::vector<Release> &missed) {
-  if (!is_timer()) {  // a repeated release after a skip
-    releases.push_back(Release{task_, now});
-    return kNever;
-  }
-  const bool simulated = is_simulated(*timer_handle_);
-  const TimerReading reading = read_timer(*timer_handle_, engine_);
+Time TimerCallback::expire(Time now, std::vector<Release> &releases, std::vector<Release> &missed) {
+  const bool simulated = is_simulated(*handle_);
+  const TimerReading reading = read_timer(*handle_, engine());
   if (reading.cancelled) return kNever;
   if (reading.until > 0) return simulated ? kNever : reading.now + reading.until;
 
-  const Duration period = period_of(*timer_handle_);
+  const Duration period = period_of(*handle_);
   if (simulated || period == 0) {
     // Simulated time has no points on the engine's clock, and a period of 0 has no grid.
     if (!uncalled_.exchange(true)) {
-      releases.push_back(Release{task_, now});
+      releases.push_back(Release{task(), now});
     }
     return kNever;
   }
@@ -115,46 +195,60 @@ Time Callback::expire(Time now, std::vector<Release> &releases, std::vector<Rele
   if (!again || !uncalled_) {
     if (last_release_ != kNever) {
       const std::int64_t between = (nominal - last_release_ + period / 2) / period - 1;
-      for (std::int64_t i = std::min(between, kMostMissed); i > 0; --i) missed.push_back({task_, nominal - i * period});
+      for (std::int64_t i = std::min(between, kMostMissed); i > 0; --i)
+        missed.push_back({task(), nominal - i * period});
     }
     last_release_ = nominal;
     uncalled_ = true;
-    releases.push_back(Release{task_, nominal});
+    releases.push_back(Release{task(), nominal});
   }
   return nominal + period;
 }
 
 // Consumes the expiry of a skipped job if no other job will. A timer with a grid needs none of this: the next point's
 // job consumes the expiry.
-void Callback::drop_expiry() {
+void TimerCallback::drop_expiry() {
   const auto timer = timer_.lock();
-  if (!timer || (!is_simulated(*timer_handle_) && period_of(*timer_handle_) != 0)) return;
+  if (!timer || (!is_simulated(*handle_) && period_of(*handle_) != 0)) return;
   const compat::TimerCall call(*timer);
   uncalled_ = false;
   reschedule();
 }
 
-bool Callback::execute_timer() {
+bool TimerCallback::run() {
   const auto timer = timer_.lock();
   if (!timer) return false;
   bool due = false;
-  if (rcl_timer_is_ready(timer_handle_.get(), &due) != RCL_RET_OK) rcl_reset_error();
+  if (rcl_timer_is_ready(handle_.get(), &due) != RCL_RET_OK) rcl_reset_error();
   uncalled_ = false;
   if (!due) {
     // The timer was cancelled or reset, or the previous job started so late that its call consumed this expiry as well.
     // In the last case the expiry is lost and counts as a miss.
-    if (!restarted_ && !timer->is_canceled()) late_.fetch_add(1, std::memory_order_relaxed);
+    if (!restarted_ && !timer->is_canceled()) count_late();
     reschedule();
     return false;
   }
-  TRACETOOLS_TRACEPOINT(rclcpp_executor_execute, static_cast<const void *>(timer_handle_.get()));
+  TRACETOOLS_TRACEPOINT(rclcpp_executor_execute, static_cast<const void *>(handle_.get()));
   compat::TimerCall call(*timer);
   if (!call.valid()) return false;
-  const bool always_due = period_of(*timer_handle_) == 0;
+  const bool always_due = period_of(*handle_) == 0;
   if (!always_due) reschedule();
   call.execute();
   if (always_due) reschedule();
   return true;
+}
+
+}  // namespace
+
+Entity entity_of(const rclcpp::TimerBase::SharedPtr &timer) {
+  return {.key = timer.get(),
+          .id = {.kind = redag::Callback::Kind::Timer,
+                 .node = {},
+                 .name = {},
+                 .period = period_of(*timer->get_timer_handle())},
+          .make = [timer](std::shared_ptr<ExecutorContext> context, redag::CallbackId id) {
+            return std::make_shared<TimerCallback>(std::move(context), std::move(id), timer);
+          }};
 }
 
 }  // namespace redag_rclcpp

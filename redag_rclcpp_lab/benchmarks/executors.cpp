@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Compares the latency and cost of executors: ReDAGExecutor in each preemption mode, and its peers
-// (workload/peers.hpp). The executors take turns in one process, round by round. Prints a table of medians over the
+// (peers.hpp). The executors take turns in one process, round by round. Prints a table of medians over the
 // rounds.
 //
-//   ros2 run redag_rclcpp bench_executors [--rounds 5] [--seconds 1] [--only timer_idle,...]
+//   ros2 run redag_rclcpp_lab bench_executors [--rounds 5] [--seconds 1] [--only timer_idle,...]
 #include <sched.h>
 #include <sys/resource.h>
 #include <sys/wait.h>

@@ -6,7 +6,7 @@
 // jitter of the behavior planner, and processor time. Executors take turns, each in a process of its own. Built if the
 // package autoware_reference_system is present.
 //
-//   ros2 run redag_rclcpp bench_reference_system [--rounds 3] [--seconds 20] [--only mte,redag-os]
+//   ros2 run redag_rclcpp_lab bench_reference_system [--rounds 3] [--seconds 20] [--only mte,redag-os]
 //
 // Prefix it with `chrt -f 40` to give rclcpp's executors real-time threads as well.
 #include <fmt/format.h>

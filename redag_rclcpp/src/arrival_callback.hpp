@@ -1,0 +1,156 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// ArrivalCallback keeps the pending arrivals of an entity. An arrival (a message, request, ...) becomes a token. One
+// token at a time is a released job that waits in the scheduler; the others wait here, and cost the scheduler nothing.
+// When the job starts, the next token is released. If the scheduler skips a job, its message is dropped unread. Inputs
+// that later ones do not replace (requests, responses) keep their tokens, which are released again until they are
+// taken. Threads: the middleware's threads and publishing threads call the hooks, with their own locks held. Lock
+// order: the callers' locks, release_lock_, lock_, the timer queue's, the engine's.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "callback.hpp"
+#include "hook.hpp"
+#include "token_queue.hpp"
+
+namespace redag_rclcpp {
+
+class ArrivalCallback : public Callback, public Hooked {
+ public:
+  void detach() override;
+  void admit() override;
+  [[nodiscard]] bool has_rate() const override { return false; }
+  [[nodiscard]] std::vector<TaskId> publishers() const override;
+  [[nodiscard]] Duration mean_interval() const override;
+
+  void arrived_in_middleware(std::size_t count) noexcept override { arrived(count, Source::Middleware, 0); }
+  Time expire(Time now, std::vector<redag::runtime::Release> &releases,
+              std::vector<redag::runtime::Release> &missed) override;
+  void skipped(redag::Reason reason) noexcept override;
+
+  [[nodiscard]] Held watched() const override;
+  [[nodiscard]] Held hooked() const override;
+  void seen_by_wait_set() override;
+  void take_leftovers(const Held &held, rcl_wait_set_t &set, bool any) override;
+
+ protected:
+  enum class Source : std::uint8_t { Middleware, IntraProcess };
+  struct Token {
+    Time arrival = 0;
+    Source source = Source::Middleware;
+    int part = 0;                // number of the waitable's part
+    bool seen_only = false;      // the wait set saw it, no hook
+    bool after_skipped = false;  // set by take_token(): drop messages of skipped jobs first
+  };
+
+  // Taking guards the message that a started job is about to take. The middleware keeps this message until begin() and
+  // may overwrite it; the job then takes the newer one. begin() is called as late as possible, because creating the
+  // message to take into can take long.
+  class Taking {
+   public:
+    Taking(ArrivalCallback &callback, Source source) : callback_(callback), source_(source) {}
+    ~Taking();
+    Taking(const Taking &) = delete;
+    Taking &operator=(const Taking &) = delete;
+
+    void begin();
+    /// Counts an attempt; `taken`: it found a message for the callback.
+    void count(bool taken);
+
+   private:
+    ArrivalCallback &callback_;
+    const Source source_;
+    bool begun_ = false;
+  };
+
+  /// `depth`: arrivals that each source keeps; 0: all. `only_wait_set`: there is no usable hook.
+  ArrivalCallback(std::shared_ptr<ExecutorContext> context, redag::CallbackId id, std::size_t depth,
+                  bool only_wait_set = false)
+      : Callback(std::move(context), std::move(id)), depth_(depth), by_wait_set_(only_wait_set) {}
+
+  [[nodiscard]] std::shared_ptr<ArrivalCallback> self() {
+    return std::static_pointer_cast<ArrivalCallback>(shared_from_this());
+  }
+  void arrived(std::size_t count, Source source, int part, bool seen_only = false);
+  /// There may be more messages of `source` than tokens: releases jobs until nothing is left.
+  void release_leftovers(Source source);
+  /// Drops the messages whose jobs were skipped, for drop_skipped(). `take` takes one message; false: there is none.
+  template <class Take>
+  void drop_messages(Source source, Take take) REDAG_EXCLUDES(lock_) {
+    for (bool taken = true; taken; taken = take()) {
+      if (!begin_drop(source)) return;
+    }
+    forget_dropped(source);
+  }
+
+ private:
+  // ---- what each kind of entity defines ----
+
+  /// Sets the hooks. Throws if the middleware, or a user's waitable, offers none.
+  virtual void hook() = 0;
+  /// Clears the hooks, also where hook() had failed.
+  virtual void unhook() = 0;
+  /// The entity; null once it is gone.
+  [[nodiscard]] virtual std::shared_ptr<void> entity() const = 0;
+  /// Takes what arrived and calls the user's function. False: there was nothing.
+  [[nodiscard]] virtual bool handle(const Token &token, Taking &taking) = 0;
+  /// True if a skipped job's message is dropped. Otherwise its token is released again.
+  [[nodiscard]] virtual bool drops_skipped() const { return false; }
+  /// Drops the messages of skipped jobs, by drop_messages().
+  virtual void drop_skipped(Source) {}
+
+  // ---- tokens ----
+
+  static std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
+
+  bool connect() override;
+  [[nodiscard]] bool run() override;
+  [[nodiscard]] bool execute_token(const Token &token);
+  enum class Overwritten : std::uint8_t {
+    Skipped,   // its job was skipped and counted before
+    Released,  // its job waits in the scheduler
+    Waiting,   // its token waits for a later release
+    Started,   // its job has started, and takes the newer message instead
+  };
+  [[nodiscard]] Overwritten drop_oldest(Source source) REDAG_REQUIRES(lock_);
+  void learn_from_arrival(Time now, std::size_t count, Source source) REDAG_REQUIRES(lock_);
+  [[nodiscard]] bool take_token(Token &token);
+  [[nodiscard]] bool begin_release(Time &arrival) REDAG_REQUIRES(lock_);
+  void release(Time arrival);
+  [[nodiscard]] bool begin_drop(Source source) REDAG_EXCLUDES(lock_);
+  void forget_dropped(Source source) REDAG_EXCLUDES(lock_);
+
+  const std::size_t depth_;
+  std::atomic<bool> by_wait_set_;  // a wait set watches the entity
+
+  // Held while a hook releases a job, which lets detach() wait for the hook. Not held while a worker takes its token: a
+  // worker may wake before the hook is done with the engine, and must not wait for it.
+  redag::PiMutex release_lock_;
+
+  TokenQueue<Token> tokens_ REDAG_GUARDED_BY(lock_);  // if a job is released, the first token is its
+  // Indexed by source. The source keeps a message until the moment before it is taken. Earlier arrivals may overwrite
+  // it.
+  std::size_t kept_[2] REDAG_GUARDED_BY(lock_) = {0, 0};        // messages that the source keeps
+  std::size_t dropped_[2] REDAG_GUARDED_BY(lock_) = {0, 0};     // part of kept_: their jobs were skipped; without token
+  std::size_t dropping_[2] REDAG_GUARDED_BY(lock_) = {0, 0};    // part of kept_: to be dropped by the next job
+  bool leftovers_[2] REDAG_GUARDED_BY(lock_) = {false, false};  // there may be more messages than tokens
+  std::uint32_t released_ REDAG_GUARDED_BY(lock_) = 0;   // jobs in the scheduler, or whose skip it has yet to report
+  std::uint32_t releasers_ REDAG_GUARDED_BY(lock_) = 0;  // number of threads in release()
+  bool noted_ REDAG_GUARDED_BY(lock_) = false;           // noted by note(), not yet admitted
+  bool seen_ REDAG_GUARDED_BY(lock_) = false;            // seen by the wait set, not yet handled
+  std::vector<TaskId> publishers_ REDAG_GUARDED_BY(lock_);
+  std::uint64_t arrivals_[2] REDAG_GUARDED_BY(lock_) = {0, 0};
+  // Messages from the middleware, counted if intra-process communication delivers messages as well.
+  std::uint64_t takes_ REDAG_GUARDED_BY(lock_) = 0;  // attempts to take one
+  std::uint64_t taken_ REDAG_GUARDED_BY(lock_) = 0;  // attempts that found a message for the callback
+  Time first_arrival_ REDAG_GUARDED_BY(lock_) = 0;
+  Time last_arrival_ REDAG_GUARDED_BY(lock_) = 0;
+};
+
+}  // namespace redag_rclcpp

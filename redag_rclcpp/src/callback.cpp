@@ -1,0 +1,29 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "callback.hpp"
+
+#include <utility>
+
+#include "redag/runtime/running_job.hpp"
+
+namespace redag_rclcpp {
+
+using redag::sched::Outcome;
+
+Outcome Callback::execute(const redag::runtime::Job &job) {
+  if (!run()) return Outcome::NoData;
+  const Duration response = engine_.now() - job.release;
+  response_.add(response);
+  if (response > deadline_.load(std::memory_order_relaxed)) count_late();
+  execution_.add(redag::runtime::RunningJob::current()->close());
+  return Outcome::Finished;
+}
+
+std::shared_ptr<ExecutorContext> Callback::leave() {
+  std::shared_ptr<ExecutorContext> context = std::exchange(context_, nullptr);
+  if (context) context->timers().schedule(*this, redag::kNever);
+  return context;
+}
+
+}  // namespace redag_rclcpp

@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Clients as callbacks: takes a response and calls the user's function. Each response is handled, also after a skip.
+#include <rcl/client.h>
+
+#include <utility>
+
+#include "arrival_callback.hpp"
+#include "entities.hpp"
+#include "rclcpp/client.hpp"
+#include "take.hpp"
+
+namespace redag_rclcpp {
+namespace {
+
+class ClientCallback final : public ArrivalCallback {
+ public:
+  ClientCallback(std::shared_ptr<ExecutorContext> context, redag::CallbackId id,
+                 const rclcpp::ClientBase::SharedPtr &client)
+      : ArrivalCallback(std::move(context), std::move(id), 0), client_(client) {}
+
+  [[nodiscard]] bool alive() const override { return !client_.expired(); }
+
+  void count(const Held &, WaitSetSizes &sizes) const override { ++sizes.clients; }
+  void add(Held &held, rcl_wait_set_t &set) const override {
+    auto &client = *static_cast<rclcpp::ClientBase *>(held.entity.get());
+    check_rcl(rcl_wait_set_add_client(&set, client.get_client_handle().get(), &held.index), "cannot wait for a client");
+  }
+  [[nodiscard]] bool is_ready(const Held &held, rcl_wait_set_t &set) const override {
+    return set.clients[held.index] != nullptr;
+  }
+
+ private:
+  [[nodiscard]] std::shared_ptr<void> entity() const override { return client_.lock(); }
+
+  void hook() override {
+    const auto client = client_.lock();
+    if (!client) return;
+    hook_.set<rclcpp::ClientBase>(
+        client,
+        [](rclcpp::ClientBase &entity, rcl_event_callback_t call, const void *ticket) {
+          return rcl_client_set_on_new_response_callback(entity.get_client_handle().get(), call, ticket);
+        },
+        self());
+  }
+  void unhook() override { hook_.clear(); }
+
+  [[nodiscard]] bool handle(const Token &, Taking &taking) override {
+    taking.begin();
+    const auto client = client_.lock();
+    if (!client) return false;
+    auto header = client->create_request_header();
+    std::shared_ptr<void> response = client->create_response();
+    return take_and_handle(
+        "a response of service", client->get_service_name(),
+        [&] { return client->take_type_erased_response(response.get(), *header); },
+        [&] { client->handle_response(header, response); });
+  }
+
+  const std::weak_ptr<rclcpp::ClientBase> client_;
+  Hook hook_;
+};
+
+}  // namespace
+
+Entity entity_of(const rclcpp::ClientBase::SharedPtr &client) {
+  return {.key = client.get(),
+          .id = {.kind = redag::Callback::Kind::Client, .node = {}, .name = client->get_service_name()},
+          .make = [client](std::shared_ptr<ExecutorContext> context, redag::CallbackId id) {
+            return std::make_shared<ClientCallback>(std::move(context), std::move(id), client);
+          }};
+}
+
+}  // namespace redag_rclcpp

@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// ExecutorContext is the part of the executor that its callbacks use. Any thread may call it.
+#pragma once
+
+#include <memory>
+
+#include "redag/runtime/engine.hpp"
+#include "timer_queue.hpp"
+
+namespace redag_rclcpp {
+
+class Callback;
+
+class ExecutorContext {
+ public:
+  virtual ~ExecutorContext() = default;
+
+  virtual redag::runtime::Engine &engine() = 0;
+  virtual TimerQueue &timers() = 0;
+  /// True if arrivals may be released to the scheduler at once. Otherwise note() collects callbacks with arrivals.
+  [[nodiscard]] virtual bool direct() const = 0;
+  /// Adds a callback to be admitted later. Takes no lock but its own.
+  virtual void note(std::shared_ptr<Callback> callback) = 0;
+  /// Wakes the thread that waits for work, after note(). The caller holds no lock of this package.
+  virtual void wake() = 0;
+  /// Called when the queue's next() has become earlier.
+  virtual void timers_changed() = 0;
+  /// Called when a job has handled an arrival that the wait set saw.
+  virtual void wait_set_changed() = 0;
+  /// Called when a node or group may have other entities than before.
+  virtual void entities_changed() = 0;
+  [[nodiscard]] virtual bool learning() const = 0;
+};
+
+}  // namespace redag_rclcpp

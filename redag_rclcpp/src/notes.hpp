@@ -1,0 +1,66 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Notes keeps what threads of the executor tell its users: warnings, the first exception of a callback, and bounds to
+// show. Any thread may call it; its lock is the innermost.
+#pragma once
+
+#include <algorithm>
+#include <exception>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/pi_mutex.hpp"
+#include "redag/base/time.hpp"
+
+namespace redag_rclcpp {
+
+class Notes {
+ public:
+  /// Adds a warning, unless there is the same already.
+  void warn(std::string warning) {
+    const redag::LockGuard guard(lock_);
+    if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) {
+      warnings_.push_back(std::move(warning));
+    }
+  }
+  [[nodiscard]] std::vector<std::string> warnings() const {
+    const redag::LockGuard guard(lock_);
+    return warnings_;
+  }
+
+  /// Keeps the first exception until throw_failure().
+  void fail(std::exception_ptr exception) {
+    const redag::LockGuard guard(lock_);
+    if (!failure_) failure_ = std::move(exception);
+  }
+  void throw_failure() {
+    std::exception_ptr failure;
+    {
+      const redag::LockGuard guard(lock_);
+      failure = std::exchange(failure_, nullptr);
+    }
+    if (failure) std::rethrow_exception(failure);
+  }
+
+  /// Bounds on response times that the live page shows, by task name.
+  void set_live_bounds(std::map<std::string, redag::Duration> bounds) {
+    const redag::LockGuard guard(lock_);
+    live_bounds_ = std::move(bounds);
+  }
+  [[nodiscard]] std::map<std::string, redag::Duration> live_bounds() const {
+    const redag::LockGuard guard(lock_);
+    return live_bounds_;
+  }
+
+ private:
+  mutable redag::PiMutex lock_;
+  std::vector<std::string> warnings_ REDAG_GUARDED_BY(lock_);
+  std::exception_ptr failure_ REDAG_GUARDED_BY(lock_);
+  std::map<std::string, redag::Duration> live_bounds_ REDAG_GUARDED_BY(lock_);
+};
+
+}  // namespace redag_rclcpp

@@ -1,0 +1,111 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Registry keeps the engine's tasks in step with the entities of the executor's nodes and callback groups. It owns the
+// callbacks, and decides which task of which DAG each of them is.
+//
+// Threads: any thread may call it; collect_lock_ serialises collect() and changes. Lock order: collect_lock_, rclcpp's,
+// the callbacks', the timer queue's, the engine's.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bridge.hpp"
+#include "callback.hpp"
+#include "entities.hpp"
+#include "rclcpp/callback_group.hpp"
+#include "rclcpp/context.hpp"
+#include "rclcpp/node_interfaces/node_base_interface.hpp"
+#include "recursive_mutex.hpp"
+#include "redag/base/lock_guard.hpp"
+#include "redag/model/callback_match.hpp"
+#include "redag_rclcpp/executor.hpp"
+#include "release_timer.hpp"
+#include "task_table.hpp"
+
+namespace redag_rclcpp {
+
+using NodeBase = rclcpp::node_interfaces::NodeBaseInterface;
+
+class Registry {
+ public:
+  /// The other parts of the executor, which outlive the registry.
+  struct Parts {
+    redag::runtime::Engine &engine;
+    ReleaseTimer &timer;
+    Bridge &bridge;
+    TaskTable &tasks;
+  };
+  using Groups = std::function<std::vector<rclcpp::CallbackGroup::WeakPtr>()>;
+
+  /// `options` outlive the registry. `workers` of the executor. Adds the DAGs of `parts.tasks` to the engine.
+  Registry(rclcpp::Context::SharedPtr context, const ReDAGOptions &options, std::uint32_t workers, const Parts &parts);
+
+  /// Must be called before everything else. `groups` returns all groups that are to be executed.
+  void open(const std::shared_ptr<ExecutorContext> &executor, Groups groups);
+  /// Removes all callbacks. Later collects do nothing.
+  void close();
+
+  /// Runs `change` as one step: a thread that collects sees all of it or nothing. `change` tells rclcpp and the
+  /// registry (by add_node(), remove_node(), add_group(), remove_group()) what is to be executed. Then collects.
+  void change(const std::function<void()> &change);
+  void add_node(const NodeBase::SharedPtr &node);
+  void remove_node(const NodeBase::SharedPtr &node);
+  /// Holds `instance` until the callbacks of the node are gone and have ended. Call it before remove_node().
+  void keep_until_done(NodeBase &node, const std::shared_ptr<void> &instance);
+  void add_group(const rclcpp::CallbackGroup::SharedPtr &group, const NodeBase::SharedPtr &node);
+  void remove_group(const rclcpp::CallbackGroup::SharedPtr &group);
+
+  /// Adds and removes tasks until they match the entities in the groups.
+  void collect();
+  /// True if entities may have come or gone since the last collect().
+  [[nodiscard]] bool is_stale() const { return stale_; }
+  /// Returns true if it was stale before.
+  bool set_stale() { return stale_.exchange(true); }
+
+  /// Gives callbacks the rates that were learned. Returns their number.
+  std::size_t adopt_rates();
+  /// The tasks of the workload that no callback matches, as text.
+  [[nodiscard]] std::vector<std::string> unmatched() const;
+
+ private:
+  void forget_gone_nodes() REDAG_REQUIRES(collect_lock_);
+  void add(const Entity &found) REDAG_REQUIRES(collect_lock_);
+  void remove(const std::shared_ptr<Callback> &callback) REDAG_REQUIRES(collect_lock_);
+  void place(TaskTable::Entry &entry, const Entity &found) REDAG_REQUIRES(collect_lock_);
+  void watch_group(rclcpp::CallbackGroup &group, const std::function<void(std::size_t)> &callback);
+  [[nodiscard]] std::function<void(std::size_t)> entities_changed() const;
+  [[nodiscard]] std::vector<Entity> find_all() REDAG_REQUIRES(collect_lock_);
+  [[nodiscard]] std::string group_name(const rclcpp::CallbackGroup::SharedPtr &group) REDAG_REQUIRES(collect_lock_);
+
+  const rclcpp::Context::SharedPtr context_;
+  const ReDAGOptions &options_;
+  const std::uint32_t workers_;
+  const Parts parts_;
+  std::vector<redag::DagId> dag_ids_;  // ids of parts_.tasks.dags()
+  std::weak_ptr<ExecutorContext> executor_;
+  Groups groups_;
+  std::atomic<bool> stale_{true};
+
+  template <class T>
+  using ByGroup = std::map<rclcpp::CallbackGroup::WeakPtr, T, std::owner_less<rclcpp::CallbackGroup::WeakPtr>>;
+
+  mutable RecursiveMutex collect_lock_;  // recursive: destructors of users' objects run while it is held
+  std::unique_ptr<redag::CallbackMatcher> matcher_ REDAG_PT_GUARDED_BY(collect_lock_);  // null: no workload
+  std::vector<NodeBase::WeakPtr> nodes_ REDAG_GUARDED_BY(collect_lock_);
+  std::map<const void *, std::shared_ptr<Callback>> callbacks_ REDAG_GUARDED_BY(collect_lock_);  // by entity
+  ByGroup<std::string> group_names_ REDAG_GUARDED_BY(collect_lock_);
+  ByGroup<NodeBase::WeakPtr> manual_groups_ REDAG_GUARDED_BY(collect_lock_);
+  // Next index of a nameless entity, by node and kind.
+  std::map<std::pair<std::string, int>, std::uint32_t> next_index_ REDAG_GUARDED_BY(collect_lock_);
+  std::uint64_t next_group_ REDAG_GUARDED_BY(collect_lock_) = 0;
+  bool closed_ REDAG_GUARDED_BY(collect_lock_) = false;
+};
+
+}  // namespace redag_rclcpp
