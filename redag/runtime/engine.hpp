@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The threaded runtime: owns worker threads, the lock around the scheduler, and the rings of events. It carries out the
-// scheduler's decisions and takes none. Others release jobs (release timer, rclcpp) and provide the bodies.
+// The threaded runtime: owns the lock around the scheduler, the worker threads, and the rings of events. It reports
+// what happens to the scheduler, has its decisions carried out (JobPlacement), and runs the jobs. Others release jobs
+// (release timer, rclcpp) and provide the bodies.
 //
 // Threads: any thread, also a body, may call any member but start(), join(), wait_idle(), wait_paused(), run_one() and
 // drain(). drain() is for one thread at a time. halt() is async-signal-safe. No lock is held while a body runs.
@@ -10,9 +11,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <deque>
-#include <exception>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -27,40 +25,17 @@
 #include "redag/base/thread_annotations.hpp"
 #include "redag/runtime/event_merge.hpp"
 #include "redag/runtime/executor_options.hpp"
+#include "redag/runtime/job_body.hpp"
+#include "redag/runtime/job_placement.hpp"
 #include "redag/runtime/parker.hpp"
-#include "redag/runtime/realtime_share.hpp"
-#include "redag/runtime/running_job.hpp"
 #include "redag/runtime/setup.hpp"
-#include "redag/runtime/thread_priorities.hpp"
+#include "redag/runtime/task_table.hpp"
+#include "redag/runtime/throttling_guard.hpp"
+#include "redag/runtime/worker_pool.hpp"
 #include "redag/sched/scheduler.hpp"
 #include "redag/trace/ring.hpp"
 
 namespace redag::runtime {
-
-/// Describes a job to its body.
-struct Job {
-  TaskId task;
-  std::uint32_t number = 0;  // within its task, from 0
-  Time release = 0;          // nominal
-  JobSlot slot;
-  WorkerId worker;  // the scheduler's: threads are not tied to workers; with `os` the first one of the job
-};
-
-/// Runs one job. The engine turns a thrown redag::BudgetExceeded into Outcome::BudgetExceeded, and any other exception
-/// into Outcome::Threw.
-using Body = std::function<sched::Outcome(const Job &)>;
-
-/// Called for every exception that leaves a body, on the worker's thread, before the job counts as ended. Must not
-/// throw.
-using ExceptionHandler = std::function<void(const Job &, std::exception_ptr)>;
-
-/// Called when a released job is skipped before it starts, even inside release(), but not for miss(). Runs on the
-/// thread that asked the scheduler for decisions, without the engine's lock.
-class SkipListener {
- public:
-  virtual ~SkipListener() = default;
-  virtual void skipped(Reason reason) noexcept = 0;
-};
 
 struct Release {
   TaskId task;
@@ -190,87 +165,56 @@ class Engine {
   /// How often a job could have had a processor but waited for a thread, because all threads had jobs.
   [[nodiscard]] std::uint64_t thread_waits() const;
   /// Priority changes that the system refused while running, because rights were taken away.
-  [[nodiscard]] std::uint64_t refused_priorities() const noexcept { return refused_priorities_.load(); }
+  [[nodiscard]] std::uint64_t refused_priorities() const;
   /// Returns true if the calling thread is inside one of this engine's bodies.
   [[nodiscard]] bool in_body() const noexcept { return current_task().has_value(); }
   /// The task whose job the calling thread runs in this engine, the topmost one of several. Empty outside bodies.
   [[nodiscard]] std::optional<TaskId> current_task() const noexcept;
-  [[nodiscard]] std::uint32_t thread_count() const { return static_cast<std::uint32_t>(threads_.size()); }
+  [[nodiscard]] std::uint32_t thread_count() const { return pool_.size(); }
   [[nodiscard]] const EngineOptions &options() const { return options_; }
 
  private:
   friend struct RunningJob;
-  struct Thread;
-  struct ShareKeeper;
-  struct TaskEntry;
-  struct Assignment;
-  struct Next;
   class Locked;
 
   Result<void> start_threads(const std::vector<int> &cpus);
-  void end_threads();
-  void main(Thread &self) noexcept;
+  void main(WorkerThread &self) noexcept;
   void guard_throttling() noexcept;
-  Next run(Thread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;
+  Next run(WorkerThread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;
   sched::Outcome call(const Assignment &assignment);
-  Duration charge(Thread &self, const TaskEntry &entry, const RunningJob &running, Time at) noexcept;
-  Next finish(Thread &self, const Assignment &assignment, RunningJob &running, sched::Outcome outcome, Time at,
+  Duration charge(WorkerThread &self, const TaskEntry &entry, const RunningJob &running, Time at) noexcept;
+  Next finish(WorkerThread &self, const Assignment &assignment, RunningJob &running, sched::Outcome outcome, Time at,
               Duration used, JobSlot below);
   void preemption_point(RunningJob &job);
   void reach_limit(RunningJob &job, Duration used);
 
   void report_limits(RunningJob &job, Duration used, Time now) REDAG_REQUIRES(lock_);
   bool tell_limits(RunningJob &job, Duration used, Time now, bool from_outside) REDAG_REQUIRES(lock_);
-  Next decide(Locked &locked, Time now, Thread *self, JobSlot below) REDAG_REQUIRES(lock_);
-  Next place(Locked &locked, const sched::Step &step, Thread *self, JobSlot below) REDAG_REQUIRES(lock_);
-  static const sched::Dispatch *choose_own(const sched::Step &step, JobSlot below);
-  Thread *steal(std::uint32_t level) REDAG_REQUIRES(lock_);
-  Assignment move_job(Thread &from, Thread &to) REDAG_REQUIRES(lock_);
-  Duration look_at_share() REDAG_EXCLUDES(lock_);
-  void note_where_realtime_ran() REDAG_REQUIRES(lock_);
-  void set_realtime_busy(Time now) REDAG_REQUIRES(lock_);
-  [[nodiscard]] std::size_t place_of(const Thread &thread) const REDAG_REQUIRES(lock_);
-  void set_priority_for_job(Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
-  [[nodiscard]] bool gives_way(const Thread &thread) const REDAG_REQUIRES(lock_);
-  [[nodiscard]] int priority_of(const Thread &thread) const REDAG_REQUIRES(lock_);
-  void change_level(const sched::Dispatch &dispatch) REDAG_REQUIRES(lock_);
-  Assignment assign(Thread &thread, const sched::Dispatch &dispatch) REDAG_REQUIRES(lock_);
-  void post(Locked &locked, Thread &thread, const Assignment &assignment) REDAG_REQUIRES(lock_);
-  void apply(std::span<const ThreadPriorities::Change> changes) REDAG_REQUIRES(lock_);
+  Next decide(Locked &locked, Time now, WorkerThread *self = nullptr, JobSlot below = JobSlot()) REDAG_REQUIRES(lock_);
+  Duration look_at_throttling() REDAG_EXCLUDES(lock_);
   void refresh_outranked() REDAG_REQUIRES(lock_);
   void register_task(TaskId id, const Task &task, DagId dag, Body &body,
                      std::shared_ptr<SkipListener> listener = nullptr) REDAG_REQUIRES(lock_);
-  void remove_entry(TaskId id, std::vector<Body> &doomed) REDAG_REQUIRES(lock_);
   void withdraw_if_halting() REDAG_REQUIRES(lock_);
   void wake_pause_waiters() REDAG_REQUIRES(lock_);
-  /// Returns true if there are tasks to spare from throttling and others that can bear it.
-  [[nodiscard]] bool can_give_way() const REDAG_REQUIRES(lock_) { return high_tasks_ > 0 && other_tasks_ > 0; }
   [[nodiscard]] bool may_start() const REDAG_REQUIRES(lock_) { return running_ && !paused_; }
 
   [[nodiscard]] bool os() const { return options_.config.preemption == sched::Preemption::Full; }
   [[nodiscard]] bool realtime() const { return os() || options_.realtime_threads; }
 
+  struct GuardThread {
+    Parker parker;
+    ThreadHandle handle;
+  };
+
   EngineOptions options_;
   mutable PiMutex lock_;
   std::unique_ptr<sched::Scheduler> scheduler_ REDAG_PT_GUARDED_BY(lock_);
-  std::vector<std::unique_ptr<Thread>> threads_;
-  std::unique_ptr<Thread> caller_;                                 // stands for the thread in run_one()
-  std::vector<Thread *> idle_ REDAG_GUARDED_BY(lock_);             // threads without a job; the last one is used first
-  std::vector<Thread *> handed_ REDAG_GUARDED_BY(lock_);           // threads that may have mail; each once
-  std::deque<TaskEntry> tasks_ REDAG_GUARDED_BY(lock_);            // by TaskId; entries keep their addresses
-  std::size_t most_started_ REDAG_GUARDED_BY(lock_) = 0;           // jobs that all tasks together can have in progress
-  std::uint32_t unfinished_ REDAG_GUARDED_BY(lock_) = 0;           // jobs dispatched and not ended
-  ThreadPriorities priorities_ REDAG_GUARDED_BY(lock_);            // os
-  std::optional<RealtimeShare> share_ REDAG_GUARDED_BY(lock_);     // os, throttled
-  std::vector<std::size_t> share_places_ REDAG_GUARDED_BY(lock_);  // by processor number: its index in `share_`
-  std::vector<bool> realtime_on_ REDAG_GUARDED_BY(lock_);          // by index in `share_`
-  bool share_is_kept_ REDAG_GUARDED_BY(lock_) = false;             // the throttling guard looks again by itself
-  bool giving_way_ REDAG_GUARDED_BY(lock_) = false;
-  Time giving_way_since_ REDAG_GUARDED_BY(lock_) = 0;
-  Duration gave_way_ REDAG_GUARDED_BY(lock_) = 0;       // total of earlier demotions
-  std::size_t high_tasks_ REDAG_GUARDED_BY(lock_) = 0;  // not removed, of DAGs of high criticality
-  std::size_t other_tasks_ REDAG_GUARDED_BY(lock_) = 0;
-  bool running_ REDAG_GUARDED_BY(lock_) = false;  // the threads have been started
+  WorkerPool pool_;
+  TaskTable tasks_ REDAG_GUARDED_BY(lock_);
+  JobPlacement placement_ REDAG_GUARDED_BY(lock_);
+  std::optional<ThrottlingGuard> guard_ REDAG_GUARDED_BY(lock_);  // os, throttled
+  bool running_ REDAG_GUARDED_BY(lock_) = false;                  // the threads have been started
   bool paused_ REDAG_GUARDED_BY(lock_);
   std::uint32_t pause_waiters_ REDAG_GUARDED_BY(lock_) = 0;
   FutexWord pause_changes_{0};  // counts what wait_paused() waits for; written under the lock
@@ -278,12 +222,10 @@ class Engine {
   trace::Ring decisions_;  // written under the lock
   EventMerge merge_;       // drain() only
   Event idle_event_;
-  std::unique_ptr<ShareKeeper> share_keeper_;  // os, throttled
+  std::unique_ptr<GuardThread> guard_thread_;  // os, throttled
   Atomic<Time> origin_{kNever};
   Atomic<bool> halting_{false};
-  Atomic<bool> exit_{false};
   std::atomic<bool> has_listeners_{false};  // a task has or had a listener; written under the lock
-  Atomic<std::uint64_t> refused_priorities_{0};
 };
 
 }  // namespace redag::runtime

@@ -5,7 +5,7 @@
 #include "redag/base/check.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/runtime/engine.hpp"
-#include "redag/runtime/engine_parts.hpp"
+#include "redag/runtime/engine_locked.hpp"
 
 namespace redag::runtime {
 
@@ -25,7 +25,7 @@ AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
   const std::span<const TaskId> tasks = scheduler_->tasks_of(added.dag);
   added.tasks.assign(tasks.begin(), tasks.end());
   for (std::size_t i = 0; i < bodies.size(); ++i) register_task(added.tasks[i], dag.tasks[i], added.dag, bodies[i]);
-  decide(locked, at, nullptr, JobSlot());
+  decide(locked, at);
   return added;
 }
 
@@ -36,7 +36,7 @@ TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body bo
   withdraw_if_halting();
   const TaskId id = scheduler_->add_task(dag, rank, task, at);
   register_task(id, task, dag, body, std::move(listener));
-  decide(locked, at, nullptr, JobSlot());
+  decide(locked, at);
   return id;
 }
 
@@ -46,9 +46,9 @@ void Engine::remove_dag(DagId dag) {
   Locked locked(*this);
   withdraw_if_halting();
   REDAG_CHECK(dag.value < scheduler_->dag_slots(), "removal of a DAG that does not exist");
-  for (const TaskId task : scheduler_->tasks_of(dag)) remove_entry(task, doomed);
+  for (const TaskId task : scheduler_->tasks_of(dag)) tasks_.remove(task, doomed);
   scheduler_->remove_dag(dag, at);
-  decide(locked, at, nullptr, JobSlot());
+  decide(locked, at);
 }
 
 void Engine::remove_task(TaskId task) {
@@ -56,10 +56,9 @@ void Engine::remove_task(TaskId task) {
   const Time at = now();
   Locked locked(*this);
   withdraw_if_halting();
-  REDAG_CHECK(task.value < tasks_.size(), "removal of a task that does not exist");
-  remove_entry(task, doomed);
+  tasks_.remove(task, doomed);
   scheduler_->remove_task(task, at);
-  decide(locked, at, nullptr, JobSlot());
+  decide(locked, at);
 }
 
 void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
@@ -67,57 +66,31 @@ void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
   Locked locked(*this);
   withdraw_if_halting();
   scheduler_->set_timing(task, period, deadline, at);
-  tasks_[task.value].deadline = deadline;
-  decide(locked, at, nullptr, JobSlot());
+  tasks_[task].deadline = deadline;
+  decide(locked, at);
 }
 
-// A reused id starts with a new entry. Its former body was destroyed when its last job ended.
 void Engine::register_task(TaskId id, const Task &task, DagId dag, Body &body, std::shared_ptr<SkipListener> listener) {
-  REDAG_CHECK(id.value <= tasks_.size(), "the scheduler numbers tasks differently");
-  if (id.value == tasks_.size()) tasks_.emplace_back();
-  TaskEntry &entry = tasks_[id.value];
-  REDAG_CHECK(!entry.body && entry.busy == 0, "a task that is still there is replaced");
-  most_started_ += task.concurrency;
-  most_started_ -= entry.concurrency;
-  entry = TaskEntry{};
-  entry.body.swap(body);
   if (listener != nullptr) has_listeners_.store(true, std::memory_order_relaxed);
-  entry.listener = std::move(listener);
-  entry.wcet = task.wcet;
-  entry.wcet_low = task.wcet_low;
-  entry.budget = task.budget;
-  entry.cuts_off = task.on_budget == OnBudget::Abort;
-  entry.is_high = scheduler_->criticality(dag) == Criticality::High;
-  ++(entry.is_high ? high_tasks_ : other_tasks_);
-  entry.deadline = task.deadline;
-  if (options_.measure) entry.response = std::make_shared<Histogram>();
-  entry.concurrency = task.concurrency;
-  for (auto &thread : threads_) thread->stack.reserve(most_started_);
-}
-
-void Engine::remove_entry(TaskId id, std::vector<Body> &doomed) {
-  TaskEntry &entry = tasks_[id.value];
-  if (!entry.removed) --(entry.is_high ? high_tasks_ : other_tasks_);
-  entry.removed = true;
-  entry.listener.reset();
-  if (entry.busy == 0) doomed.emplace_back().swap(entry.body);
+  tasks_.add(id, task, scheduler_->criticality(dag) == Criticality::High, body, std::move(listener));
+  for (const auto &thread : pool_.threads()) thread->stack.reserve(tasks_.most_started());
 }
 
 sched::Accounting Engine::accounting(TaskId task) const {
   const LockGuard guard(lock_);
   sched::Accounting accounting = scheduler_->accounting(task);
-  accounting.skipped -= tasks_[task.value].withdrawn;
+  accounting.skipped -= tasks_[task].withdrawn;
   return accounting;
 }
 
 Usage Engine::usage(TaskId task) const {
   const LockGuard guard(lock_);
-  return tasks_[task.value].usage;
+  return tasks_[task].usage;
 }
 
 TaskFigures Engine::figures(TaskId task) const {
   const LockGuard guard(lock_);
-  const TaskEntry &entry = tasks_[task.value];
+  const TaskEntry &entry = tasks_[task];
   TaskFigures figures{scheduler_->accounting(task),
                       entry.usage,
                       entry.busy,

@@ -26,7 +26,7 @@ struct RunningJob {
   Time begun = 0;           // on the engine's clock
   CpuMeter::Start start;    // excludes jobs that ran on top
   RunningJob *below = nullptr;
-  Atomic<RunningJob *> *top = nullptr;  // Thread::top of its thread: points here while the body runs
+  Atomic<RunningJob *> *top = nullptr;  // WorkerThread::top of its thread: points here while the body runs
   Duration total = -1;                  // processor time of the whole job; below 0: not known yet
   bool used_wcet_low = false;           // reported to the scheduler; written under the engine's lock
   bool used_budget = false;

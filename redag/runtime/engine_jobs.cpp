@@ -1,0 +1,206 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Jobs on their threads: each is run, measured, limited, and ended here.
+#include <algorithm>
+#include <utility>
+
+#include "redag/base/check.hpp"
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/engine.hpp"
+#include "redag/runtime/engine_locked.hpp"
+#include "redag/runtime/preemption_point.hpp"
+#include "redag/runtime/running_job.hpp"
+
+namespace redag::runtime {
+
+using sched::Outcome;
+
+std::optional<TaskId> Engine::current_task() const noexcept {
+  for (const RunningJob *job = RunningJob::current(); job != nullptr; job = job->below) {
+    if (job->engine == this) return job->task;
+  }
+  return std::nullopt;
+}
+
+// Runs a job to its end, on top of `below` if that is valid. `at` is when it begins, and is set to when it ends. A job
+// that follows another on its thread is charged for the decision between the two, which saves reading clocks. Returns
+// the thread's next action.
+Next Engine::run(WorkerThread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept {
+  const Job &job = assignment.job;
+  if (options_.trace_capacity > 0) {
+    const Time begun = now();
+    self.events.push(
+        JobEvent{begun, begun, job.task, job.number, job.worker.value, JobEventKind::Started, Reason::None, 0});
+  }
+  RunningJob running;
+  running.engine = this;
+  running.thread = self.index;
+  running.outranked = &self.outranked;
+  running.task = job.task;
+  running.slot = job.slot;
+  running.top = &self.top;
+  running.limit = assignment.entry->next_limit(running);
+  running.begun = at;
+  running.start = self.meter.begin(at, !assignment.expected_short);
+  running.below = RunningJob::current();
+  RunningJob::set_current(&running);
+  running.enter();
+  const Outcome outcome = call(assignment);
+  running.leave();
+  RunningJob::set_current(running.below);
+  at = now();
+  const Duration used = charge(self, *assignment.entry, running, at);
+  if (options_.trace_capacity > 0) {
+    self.events.push(
+        JobEvent{at, used, job.task, job.number, job.worker.value, JobEventKind::Executed, Reason::None, 0});
+  }
+  return finish(self, assignment, running, outcome, at, used, below);
+}
+
+// Returns the processor time that a job used which ended at `at`.
+Duration Engine::charge(WorkerThread &self, const TaskEntry &entry, const RunningJob &running, Time at) noexcept {
+  const Duration took = at - running.begun;
+  if (running.total < 0 && took <= CpuMeter::kShort && !entry.always_measured()) {
+    self.meter.pass();
+    return took;
+  }
+  const Duration used = running.total >= 0 ? running.total : running.cpu_time();
+  if (running.start.exact) {
+    self.meter.set(running.start.cpu + used, at);
+  } else {
+    self.meter.pass();
+  }
+  return used;
+}
+
+Outcome Engine::call(const Assignment &assignment) {
+  try {
+    return assignment.entry->body(assignment.job);
+  } catch (const BudgetExceeded &) {
+    return Outcome::BudgetExceeded;
+  } catch (...) {
+    if (options_.on_exception) options_.on_exception(assignment.job, std::current_exception());
+    return Outcome::Threw;
+  }
+}
+
+Next Engine::finish(WorkerThread &self, const Assignment &assignment, RunningJob &running, Outcome outcome, Time at,
+                    Duration used, JobSlot below) {
+  Body doomed;  // of a removed task; destroyed without the lock
+  TaskEntry &entry = *assignment.entry;
+  const bool measured = entry.response && outcome == Outcome::Finished;
+  const Duration response = at - assignment.job.release;
+  if (measured) entry.response->add(response);
+  Locked locked(*this);
+  withdraw_if_halting();
+  entry.count(used, at - running.begun);
+  if (measured && response > entry.deadline) ++entry.late;
+  --entry.busy;
+  if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
+  placement_.end(self);
+  if (used > running.limit) {
+    running.used_budget = running.used_budget || outcome == Outcome::BudgetExceeded;
+    report_limits(running, used, at);
+  }
+  scheduler_->complete(assignment.job.slot, at, outcome);
+  const Next next = decide(locked, at, &self == &pool_.caller() ? nullptr : &self, below);
+  if (placement_.unfinished() == 0 && halted_at_ != kNever) idle_event_.set();
+  if (placement_.unfinished() == 0 && pause_waiters_ > 0) wake_pause_waiters();
+  return next;
+}
+
+Duration RunningJob::cpu_time() const noexcept {
+  const Duration used = thread_cpu_now() - start.cpu;
+  return start.exact ? used : std::min(used, engine->now() - begun);
+}
+
+void RunningJob::reach_preemption_point() { engine->preemption_point(*this); }
+
+void RunningJob::reach_limit(Duration used) { engine->reach_limit(*this, used); }
+
+// At a preemption point: reports the limits that the job has used to the scheduler, or cuts the job off.
+void Engine::reach_limit(RunningJob &job, Duration used) {
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  const TaskEntry &entry = tasks_[job.task];
+  const bool cut_off = entry.cuts_off && entry.budget > 0 && used > entry.budget;
+  job.used_budget = job.used_budget || cut_off;
+  report_limits(job, used, at);
+  decide(locked, at);
+  if (cut_off) throw BudgetExceeded{};
+}
+
+void Engine::report_limits(RunningJob &job, Duration used, Time now) {
+  tell_limits(job, used, now, false);
+  job.limit = tasks_[job.task].next_limit(job);
+}
+
+// From outside, leaves a job that is to be cut off alone until its own preemption point or its end.
+bool Engine::tell_limits(RunningJob &job, Duration used, Time now, bool from_outside) {
+  const TaskEntry &entry = tasks_[job.task];
+  bool told = false;
+  if (entry.wcet_low > 0 && used > entry.wcet_low && !job.used_wcet_low) {
+    job.used_wcet_low = told = true;
+    scheduler_->exceed(job.slot, sched::Limit::WcetLow, now);
+  }
+  if (entry.budget > 0 && used > entry.budget && !job.used_budget && !(from_outside && entry.cuts_off)) {
+    job.used_budget = told = true;
+    scheduler_->exceed(job.slot, sched::Limit::Budget, now);
+  }
+  return told;
+}
+
+// `RunningJob::limit` belongs to the job's thread, which reads it without the lock. watch() does not change it. The
+// next preemption point then finds nothing more to report.
+void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob> &out) {
+  // A job that has just ended can seem to have used up to this much more than it did.
+  constexpr Duration kSlack = 10 * kMicrosecond;
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting();
+  bool told = false;
+  for (const auto &thread : pool_.threads()) {
+    RunningJob *running = thread->stack.empty() ? nullptr : thread->top.load(std::memory_order_acquire);
+    if (running == nullptr || running->slot != thread->stack.back().slot) continue;
+    const Job &job = thread->stack.back();
+    TaskEntry &entry = tasks_[job.task];
+    const Duration elapsed = as_of - running->begun;
+    const bool overdue = !running->reported && entry.is_overdue(elapsed, limits);
+    // A job cannot have used more than the time that has passed.
+    const Duration limit = entry.next_limit(*running);
+    if (!overdue && (limit == kNever || elapsed <= limit)) continue;
+    // For a task with limits the start is exact. For others, `used` only serves the report.
+    const Duration used = cpu_now(thread->cpu_clock) - running->start.cpu;
+    if (thread->top.load(std::memory_order_acquire) != running) continue;  // it has ended and waits for the lock
+    if (used - kSlack > limit) told = tell_limits(*running, used - kSlack, at, true) || told;
+    if (!overdue) continue;
+    running->reported = true;
+    ++entry.usage.overdue;
+    out.push_back(OverdueJob{job, elapsed, used});
+  }
+  if (told) decide(locked, at);
+}
+
+void Engine::preemption_point(RunningJob &job) {
+  WorkerThread &self = pool_[job.thread];
+  Next next;
+  Time at = now();
+  {
+    Locked locked(*this);
+    withdraw_if_halting();
+    if (!scheduler_->outranked(job.slot)) return;
+    scheduler_->preemption_point(job.slot, at);
+    next = decide(locked, at, &self, job.slot);
+  }
+  if (next.kind != Next::Kind::Start) return;
+  const Duration used = job.cpu_time();
+  self.meter.pass();
+  while (next.kind == Next::Kind::Start) next = run(self, next.assignment, job.slot, at);
+  REDAG_CHECK(next.kind == Next::Kind::Resume, "a suspended job was not resumed");
+  job.start = CpuMeter::Start{thread_cpu_now() - used, true};
+  job.enter();
+}
+
+}  // namespace redag::runtime

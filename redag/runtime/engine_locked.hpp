@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// The engine's lock, as all its members take it. For engine*.cpp only.
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "redag/runtime/engine.hpp"
+
+namespace redag::runtime {
+
+/// Holds the engine's lock. Wakes threads and reports skips after releasing it.
+class REDAG_SCOPED_CAPABILITY Engine::Locked {
+ public:
+  explicit Locked(Engine &engine) REDAG_ACQUIRE(engine.lock_) : engine_(engine), wake_ups_(engine.realtime()) {
+    engine_.lock_.lock();
+  }
+  /// For `releases` releases. Each can skip a ready job and one that waits for its predecessors. Allocates room for
+  /// these skips before it takes the lock.
+  Locked(Engine &engine, std::size_t releases) REDAG_ACQUIRE(engine.lock_)
+      : engine_(engine), wake_ups_(engine.realtime()) {
+    if (2 * releases > kFewSkips && engine_.has_listeners_.load(std::memory_order_relaxed)) {
+      more_skips_.reserve(2 * releases - kFewSkips);
+    }
+    engine_.lock_.lock();
+  }
+  ~Locked() REDAG_RELEASE() {
+    engine_.lock_.unlock();
+    wake_ups_.wake_late();
+    for (std::size_t i = 0; i < skip_count_; ++i) {
+      few_skips_[i].listener->skipped(few_skips_[i].reason);
+      std::destroy_at(&few_skips_[i]);
+    }
+    for (const Skip &skip : more_skips_) skip.listener->skipped(skip.reason);
+  }
+  Locked(const Locked &) = delete;
+  Locked &operator=(const Locked &) = delete;
+
+  /// Allocates only if one decision skips more than kFewSkips jobs (HI mode begins).
+  void tell(std::shared_ptr<SkipListener> listener, Reason reason) {
+    if (skip_count_ < kFewSkips) {
+      std::construct_at(&few_skips_[skip_count_++], Skip{std::move(listener), reason});
+    } else {
+      more_skips_.push_back(Skip{std::move(listener), reason});
+    }
+  }
+  /// Drops the skips: the caller itself reported them as missed.
+  void tell_nobody() {
+    std::destroy_n(few_skips_, skip_count_);
+    skip_count_ = 0;
+    more_skips_.clear();
+  }
+
+  [[nodiscard]] WakeUps &wake_ups() { return wake_ups_; }
+
+ private:
+  Engine &engine_;
+  WakeUps wake_ups_;
+  struct Skip {
+    std::shared_ptr<SkipListener> listener;
+    Reason reason = Reason::None;
+  };
+  static constexpr std::size_t kFewSkips = 8;
+  union {
+    // Only the first skip_count_ are constructed; the others cost nothing.
+    Skip few_skips_[kFewSkips];  // NOLINT(readability-identifier-naming): a private member, of a union without a name
+  };
+  std::size_t skip_count_ = 0;
+  std::vector<Skip> more_skips_;
+};
+
+}  // namespace redag::runtime

@@ -1,0 +1,170 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag/runtime/job_placement.hpp"
+
+#include <algorithm>
+
+#include "redag/base/check.hpp"
+
+namespace redag::runtime {
+
+using sched::Dispatch;
+using sched::DispatchKind;
+
+namespace {
+
+// Chooses the job that the calling thread starts: the one on top of the job below, or the most urgent of all.
+const Dispatch *choose_own(const sched::Step &step, JobSlot below) {
+  const Dispatch *own = nullptr;
+  for (const Dispatch &dispatch : step.dispatches) {
+    if (dispatch.kind != DispatchKind::Start || (below.valid() && dispatch.over != below)) continue;
+    if (own == nullptr || dispatch.level < own->level) own = &dispatch;
+  }
+  return own;
+}
+
+}  // namespace
+
+JobPlacement::JobPlacement(WorkerPool &pool, bool os, const PriorityBand &band)
+    : pool_(pool), os_(os), band_(band), priorities_(os ? pool.size() : 0, band.top_job) {
+  idle_.reserve(pool.size());
+  handed_.reserve(pool.size());
+}
+
+void JobPlacement::start(std::size_t processors) {
+  priorities_.set_processors(processors);
+  const auto &threads = pool_.threads();
+  for (auto thread = threads.rbegin(); thread != threads.rend(); ++thread) idle_.push_back(thread->get());
+}
+
+// Threads are alike: any idle thread gets the job. A job that is suspended under others stays on its thread. In `os`
+// mode the kernel decides by priority which job really runs, and a preempted job needs no action. The calling thread
+// takes the most urgent job to start. Therefore none of the threads that it wakes preempts it under the lock.
+Next JobPlacement::place(const sched::Step &step, WorkerThread *self, JobSlot below, TaskTable &tasks,
+                         WakeUps &wake_ups) {
+  const bool is_caller = self == &pool_.caller();
+  const Dispatch *own = self == nullptr ? nullptr : choose_own(step, below);
+  Next next;
+  if (self != nullptr && !below.valid() && !is_caller) {
+    // In `os` mode a thread steals only if it would be idle: two threads that exchange jobs must exchange priorities.
+    const std::uint32_t above = own == nullptr ? sched::kNoLimit : (os_ ? 0 : own->level);
+    if (WorkerThread *other = steal(above)) {
+      next = Next{Next::Kind::Start, move_job(*other, *self)};
+      own = nullptr;
+    } else if (own == nullptr) {
+      idle_.push_back(self);
+    }
+  }
+  if (own != nullptr) {
+    next = Next{Next::Kind::Start, assign(*self, *own, tasks[own->task])};
+    if (!is_caller) set_priority_for_job(*self, next.assignment);
+  }
+  for (const Dispatch &dispatch : step.dispatches) {
+    if (&dispatch == own) continue;
+    if (dispatch.kind != DispatchKind::Start) {
+      if (dispatch.kind == DispatchKind::Resume && dispatch.job == below) next.kind = Next::Kind::Resume;
+      if (os_) change_level(dispatch, tasks);
+      continue;
+    }
+    REDAG_CHECK(!idle_.empty(), "more jobs started than there are threads");
+    WorkerThread &thread = *idle_.back();
+    idle_.pop_back();
+    const Assignment assignment = assign(thread, dispatch, tasks[dispatch.task]);
+    set_priority_for_job(thread, assignment);
+    post(thread, assignment, wake_ups);
+  }
+  return next;
+}
+
+void JobPlacement::end(WorkerThread &thread) {
+  thread.stack.pop_back();
+  if (os_ && &thread != &pool_.caller()) priorities_.end(thread.index);
+  --unfinished_;
+}
+
+// Steals the job of a thread that is not awake yet, if that job is above `level`; waking it takes longer than most
+// jobs. Returns that thread, or null. The thread then finds no mail.
+WorkerThread *JobPlacement::steal(std::uint32_t level) {
+  WorkerThread *victim = nullptr;
+  for (std::size_t i = 0; i < handed_.size();) {
+    WorkerThread &thread = *handed_[i];
+    if (!thread.has_mail.load(std::memory_order_relaxed)) {
+      thread.is_handed = false;
+      handed_[i] = handed_.back();
+      handed_.pop_back();
+      continue;
+    }
+    if (thread.level < level) {
+      victim = &thread;
+      level = thread.level;
+    }
+    ++i;
+  }
+  return victim != nullptr && victim->take_mail() ? victim : nullptr;
+}
+
+Assignment JobPlacement::move_job(WorkerThread &from, WorkerThread &to) {
+  const Assignment assignment = from.mail;
+  to.stack.push_back(from.stack.back());
+  from.stack.pop_back();
+  to.level = from.level;
+  to.is_spared = from.is_spared;
+  if (os_) priorities_.end(from.index);
+  set_priority_for_job(to, assignment);
+  idle_.push_back(&from);
+  return assignment;
+}
+
+Assignment JobPlacement::assign(WorkerThread &thread, const Dispatch &dispatch, TaskEntry &entry) {
+  REDAG_CHECK(entry.busy < entry.concurrency, "more jobs of one task at a time than it allows");
+  ++entry.busy;
+  ++unfinished_;
+  const Job job{dispatch.task, dispatch.number, dispatch.release, dispatch.job, dispatch.worker};
+  thread.stack.push_back(job);
+  thread.level = dispatch.level;
+  thread.is_spared = dispatch.inherits || entry.is_high;
+  return Assignment{job, &entry, entry.expected_short()};
+}
+
+void JobPlacement::post(WorkerThread &thread, const Assignment &assignment, WakeUps &wake_ups) {
+  REDAG_CHECK(!thread.has_mail.load(std::memory_order_relaxed), "a worker was given two jobs");
+  thread.mail = assignment;
+  thread.has_mail.store(true, std::memory_order_release);
+  if (!thread.is_handed) handed_.push_back(&thread);
+  thread.is_handed = true;
+  wake_ups.wake(thread);
+}
+
+void JobPlacement::change_level(const Dispatch &dispatch, const TaskTable &tasks) {
+  const auto runs_it = [&](const WorkerThread &t) { return !t.stack.empty() && t.stack.back().slot == dispatch.job; };
+  if (runs_it(pool_.caller())) return;  // runs at its own priority
+  const auto thread = std::find_if(pool_.threads().begin(), pool_.threads().end(),
+                                   [&](const auto &candidate) { return runs_it(*candidate); });
+  REDAG_CHECK(thread != pool_.threads().end(), "a job goes on that no thread has");
+  (*thread)->level = dispatch.level;
+  (*thread)->is_spared = dispatch.inherits || tasks[dispatch.task].is_high;
+  apply(priorities_.change((*thread)->index, priority_of(**thread)));
+}
+
+void JobPlacement::set_priority_for_job(WorkerThread &thread, const Assignment &assignment) {
+  if (!os_) return;
+  // A demoted thread must not keep the priority of its previous job.
+  const bool is_short = assignment.expected_short && !gives_way(thread);
+  apply(priorities_.start(thread.index, priority_of(thread), is_short));
+}
+
+void JobPlacement::apply(std::span<const ThreadPriorities::Change> changes) {
+  for (const ThreadPriorities::Change &change : changes) {
+    if (!set_fifo_priority(pool_[change.thread].handle.native_handle(), change.priority)) ++refused_priorities_;
+  }
+}
+
+void JobPlacement::give_way(bool give_way) {
+  giving_way_ = give_way;
+  for (const auto &thread : pool_.threads()) {
+    if (!thread->stack.empty()) apply(priorities_.change(thread->index, priority_of(*thread)));
+  }
+}
+
+}  // namespace redag::runtime

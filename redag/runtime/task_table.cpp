@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag/runtime/task_table.hpp"
+
+#include <utility>
+
+#include "redag/base/check.hpp"
+
+namespace redag::runtime {
+
+void TaskTable::add(TaskId id, const Task &task, bool is_high, Body &body, std::shared_ptr<SkipListener> listener) {
+  REDAG_CHECK(id.value <= entries_.size(), "the scheduler numbers tasks differently");
+  if (id.value == entries_.size()) entries_.emplace_back();
+  TaskEntry &entry = entries_[id.value];
+  REDAG_CHECK(!entry.body && entry.busy == 0, "a task that is still there is replaced");
+  most_started_ += task.concurrency;
+  most_started_ -= entry.concurrency;
+  entry = TaskEntry{};
+  entry.body.swap(body);
+  entry.listener = std::move(listener);
+  entry.wcet = task.wcet;
+  entry.wcet_low = task.wcet_low;
+  entry.budget = task.budget;
+  entry.cuts_off = task.on_budget == OnBudget::Abort;
+  entry.is_high = is_high;
+  ++(is_high ? high_ : others_);
+  entry.deadline = task.deadline;
+  if (measure_) entry.response = std::make_shared<Histogram>();
+  entry.concurrency = task.concurrency;
+}
+
+void TaskTable::remove(TaskId id, std::vector<Body> &doomed) {
+  REDAG_CHECK(id.value < entries_.size(), "removal of a task that does not exist");
+  TaskEntry &entry = entries_[id.value];
+  if (!entry.removed) --(entry.is_high ? high_ : others_);
+  entry.removed = true;
+  entry.listener.reset();
+  if (entry.busy == 0) doomed.emplace_back().swap(entry.body);
+}
+
+}  // namespace redag::runtime

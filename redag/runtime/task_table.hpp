@@ -1,0 +1,105 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// The engine's tasks: bodies, limits and counts, by TaskId. Not thread-safe: the engine's lock guards it.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <vector>
+
+#include "redag/base/histogram.hpp"
+#include "redag/runtime/cpu_meter.hpp"
+#include "redag/runtime/executor_options.hpp"
+#include "redag/runtime/job_body.hpp"
+#include "redag/runtime/running_job.hpp"
+
+namespace redag::runtime {
+
+/// What the engine keeps of a task: its body, its limits, and what its jobs used.
+struct TaskEntry {
+  static constexpr std::uint32_t kStreak = 8;
+
+  /// Counts a job that ended, used `used` of processor time and took `took` on the clock.
+  void count(Duration used, Duration took) {
+    short_jobs = took <= CpuMeter::kShort ? std::min(short_jobs + 1, kStreak) : 0;
+    ++usage.jobs;
+    usage.total += used;
+    usage.longest = std::max(usage.longest, used);
+    if (wcet > 0 && used > wcet) ++usage.over_wcet;
+    if (budget > 0 && used > budget) ++usage.over_budget;
+  }
+
+  /// Processor time of the job's next limit, given what was reported before; kNever: none.
+  [[nodiscard]] Duration next_limit(const RunningJob &job) const {
+    Duration next = kNever;
+    if (wcet_low > 0 && !job.used_wcet_low) next = wcet_low;
+    if (budget > 0 && (cuts_off || !job.used_budget)) next = std::min(next, budget);
+    return next;
+  }
+
+  /// Returns true if its jobs are always measured: their limits act at once, or its wcet is below the time charged
+  /// without measuring.
+  [[nodiscard]] bool always_measured() const {
+    return wcet_low > 0 || budget > 0 || (wcet > 0 && wcet < CpuMeter::kShort);
+  }
+  /// Returns true if its last jobs were short: the next one is expected to be short, too.
+  [[nodiscard]] bool expected_short() const { return short_jobs == kStreak && !always_measured(); }
+
+  /// Returns true if a job that has been in progress for `elapsed` is overdue.
+  [[nodiscard]] bool is_overdue(Duration elapsed, const WatchLimits &limits) const {
+    return (limits.longest > 0 && elapsed > limits.longest) ||
+           (limits.deadlines > 0 && deadline > 0 &&
+            static_cast<double>(elapsed) > limits.deadlines * static_cast<double>(deadline));
+  }
+
+  Body body;
+  std::shared_ptr<SkipListener> listener;  // can be null
+  Duration wcet = 0;
+  Duration wcet_low = 0;
+  Duration budget = 0;
+  bool cuts_off = false;  // on_budget: abort
+  bool is_high = false;   // of a DAG of high criticality
+  Usage usage;
+  Duration deadline = 0;
+  std::shared_ptr<Histogram> response;  // null: not measured
+  std::uint64_t late = 0;
+  std::uint64_t preemptions = 0;
+  std::uint64_t withdrawn = 0;    // jobs skipped by halt()
+  std::uint32_t concurrency = 0;  // jobs that can be in progress at once
+  std::uint32_t busy = 0;         // jobs that have started and not ended
+  std::uint32_t short_jobs = 0;   // consecutive short jobs up to now; at most kStreak
+  bool removed = false;
+};
+
+class TaskTable {
+ public:
+  /// measure: entries have a histogram of responses.
+  explicit TaskTable(bool measure) : measure_(measure) {}
+
+  /// Adds a task and takes its body. A reused id starts with a new entry: its former body was destroyed when its last
+  /// job ended. `listener` can be null.
+  void add(TaskId id, const Task &task, bool is_high, Body &body, std::shared_ptr<SkipListener> listener);
+  /// Moves the body to `doomed` unless a job is in progress: destructors are the user's code, to be run without the
+  /// lock.
+  void remove(TaskId id, std::vector<Body> &doomed);
+
+  [[nodiscard]] TaskEntry &operator[](TaskId id) { return entries_[id.value]; }
+  [[nodiscard]] const TaskEntry &operator[](TaskId id) const { return entries_[id.value]; }
+  [[nodiscard]] std::size_t size() const { return entries_.size(); }
+  /// How many jobs all tasks together can have in progress.
+  [[nodiscard]] std::size_t most_started() const { return most_started_; }
+  /// Returns true if there are tasks to spare from throttling and others that can bear it.
+  [[nodiscard]] bool can_give_way() const { return high_ > 0 && others_ > 0; }
+
+ private:
+  bool measure_;
+  std::deque<TaskEntry> entries_;  // entries keep their addresses
+  std::size_t most_started_ = 0;
+  std::size_t high_ = 0;    // not removed, of DAGs of high criticality
+  std::size_t others_ = 0;  // not removed, of other DAGs
+};
+
+}  // namespace redag::runtime
