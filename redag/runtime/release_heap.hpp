@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Computes when timer tasks release next: release grid, jitter and order, without clock or thread. Allocates in add()
-// only. Not thread-safe.
+// Computes when timer tasks release next, without clock or thread: the release queue with the jitter that a seed draws.
+// Allocates in add() only. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "redag/base/ids.hpp"
+#include "redag/model/release_queue.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/runtime/engine.hpp"
 
@@ -26,25 +27,20 @@ class ReleaseHeap {
   void remove(std::span<const TaskId> tasks);
 
   /// When the next release is to be seen; kNever: there is none.
-  [[nodiscard]] Time next() const { return heap_.empty() ? kNever : heap_.front().seen; }
+  [[nodiscard]] Time next() const { return queue_.next(); }
 
   /// Appends every release to be seen at or before `now`, in order, until `out` is full (its capacity). No release is
   /// left out, however late the call.
   void pop_due(Time now, std::vector<Release> &out);
 
  private:
-  struct Entry {
-    Time seen = 0;  // nominal + jitter
-    Time nominal = 0;
-    TaskId id;
-    std::uint32_t number = 0;
+  struct Entry : TimerRelease {
     Duration period = 0;
     Duration jitter = 0;
   };
-  static bool later(const Entry &a, const Entry &b);
-  [[nodiscard]] Duration jitter(const Entry &entry);
+  [[nodiscard]] Duration jitter(const Entry &entry, std::uint32_t number);
 
-  std::vector<Entry> heap_;
+  ReleaseQueue<Entry> queue_;
   Task task_;  // the input of release_jitter()
   std::uint64_t seed_;
 };

@@ -10,45 +10,10 @@
 #include "redag/base/check.hpp"
 #include "redag/base/int128.hpp"
 #include "redag/model/demand.hpp"
+#include "redag/model/release_queue.hpp"
 
 namespace redag::sim {
 namespace {
-
-// The timer tasks' next releases, a binary heap by (time, task). Every timer always has exactly one entry.
-class ReleaseQueue {
- public:
-  struct Entry {
-    Time time = 0;     // when the release is seen
-    Time nominal = 0;  // its point on the grid
-    TaskId task;
-    std::uint32_t number = 0;
-  };
-
-  void push(const Entry &entry) {
-    heap_.push_back(entry);
-    std::push_heap(heap_.begin(), heap_.end(), later);
-  }
-  [[nodiscard]] Time next_time() const { return heap_.empty() ? kNever : heap_.front().time; }
-  [[nodiscard]] const Entry &top() const { return heap_.front(); }
-
-  /// Replaces the first entry; cheaper than removing and adding.
-  void replace_top(const Entry &entry) {
-    std::size_t hole = 0;
-    for (std::size_t child = 1; child < heap_.size(); child = 2 * hole + 1) {
-      if (child + 1 < heap_.size() && later(heap_[child], heap_[child + 1])) ++child;
-      if (!later(entry, heap_[child])) break;
-      heap_[hole] = heap_[child];
-      hole = child;
-    }
-    heap_[hole] = entry;
-  }
-
- private:
-  static bool later(const Entry &a, const Entry &b) {
-    return a.time != b.time ? a.time > b.time : a.task.value > b.task.value;
-  }
-  std::vector<Entry> heap_;
-};
 
 class Simulation {
  public:
@@ -67,14 +32,14 @@ class Simulation {
       has_limits_ = has_limits_ || task.wcet_low > 0 || (task.budget > 0 && task.on_budget != OnBudget::Abort);
       if (task.activation != Activation::Timer || task.offset >= options.horizon) continue;
       const TaskId id(i);
-      releases_.push({task.offset + jitter(task, id, 0), task.offset, id, 0});
+      releases_.push({.seen = task.offset + jitter(task, id, 0), .nominal = task.offset, .task = id});
     }
   }
 
   Result run() {
     bool goes_on = true;
     while (goes_on) {
-      const Time next = std::min(releases_.next_time(), next_processor_event());
+      const Time next = std::min(releases_.next(), next_processor_event());
       if (next > options_.horizon || (next == options_.horizon && next_processor_event() > next)) break;
       now_ = next;
       complete_jobs();
@@ -154,17 +119,16 @@ class Simulation {
   }
 
   void release_jobs() {
-    while (releases_.next_time() <= now_ && now_ < options_.horizon) {
-      const ReleaseQueue::Entry released = releases_.top();
-      const Task &task = *tasks_[released.task.value].task;
+    while (releases_.next() <= now_ && now_ < options_.horizon) {
+      TimerRelease release = releases_.top();
+      const Task &task = *tasks_[release.task.value].task;
       ++result_.released;
-      scheduler_.release(released.task, released.nominal, now_);
-      const std::uint32_t number = released.number + 1;
-      const Duration gap = options_.gap ? options_.gap(task, released.task, number) : 0;
-      const Time nominal = released.nominal + task.period + gap;
-      // A job never overtakes its predecessor, however large the jitter.
-      const Time seen = std::max(now_, nominal + jitter(task, released.task, number));
-      releases_.replace_top({nominal < options_.horizon ? seen : kNever, nominal, released.task, number});
+      scheduler_.release(release.task, release.nominal, now_);
+      const std::uint32_t next = release.number + 1;
+      const Duration gap = options_.gap ? options_.gap(task, release.task, next) : 0;
+      release.advance(task.period + gap, jitter(task, release.task, next));
+      if (release.nominal >= options_.horizon) release.seen = kNever;
+      releases_.replace_top(release);
     }
   }
 
@@ -289,7 +253,7 @@ class Simulation {
   std::vector<Processor> processors_;
   std::vector<Processor *> at_once_;
   std::vector<Progress> progress_;
-  ReleaseQueue releases_;
+  ReleaseQueue<TimerRelease> releases_;
   Result result_;
   Time now_ = 0;
   bool has_regions_ = false;
