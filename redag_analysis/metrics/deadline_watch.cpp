@@ -12,7 +12,7 @@ DeadlineWatch::DeadlineWatch(const Workload &workload) : folder_(workload) {
 
 JudgedJob DeadlineWatch::judge(const JobRecord &record, Time until) const {
   JudgedJob judged{record, std::nullopt, std::nullopt, miss_of(record, until, end_to_end_[record.task.value])};
-  if (record.outcome == JobOutcome::Skipped || record.outcome == JobOutcome::Aborted) return judged;
+  if (has_no_response(record)) return judged;
   judged.response = until - record.release;
   if (record.origin != kNever) judged.end_to_end = until - record.origin;
   return judged;

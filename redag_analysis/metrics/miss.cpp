@@ -9,11 +9,11 @@ namespace {
 // The earliest time at which the job can have answered.
 Time answered(const JobRecord &job, Time end) { return job.outcome == JobOutcome::InFlight ? end : job.finish; }
 
+}  // namespace
+
 bool has_no_response(const JobRecord &job) {
   return job.outcome == JobOutcome::Skipped || job.outcome == JobOutcome::Aborted;
 }
-
-}  // namespace
 
 bool is_lost(const JobRecord &job) { return has_no_response(job) && job.reason != Reason::NoData; }
 

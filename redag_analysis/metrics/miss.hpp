@@ -18,6 +18,9 @@ enum class Miss : std::uint8_t {
   EndToEnd,  // itself in time, but f - origin is above its DAG's end-to-end deadline
 };
 
+/// True if the job was skipped or aborted, whether it had data or not.
+[[nodiscard]] bool has_no_response(const JobRecord &job);
+
 /// True if the job never answers: it was skipped, or aborted although it had data. A job without data had nothing to
 /// answer and is no miss.
 [[nodiscard]] bool is_lost(const JobRecord &job);

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "redag_analysis/metrics/miss.hpp"
-
 namespace redag::metrics {
 namespace {
 
@@ -38,6 +36,29 @@ std::vector<std::uint64_t> answers_due(const Dag &dag, std::span<const JobStats>
 }
 
 }  // namespace
+
+void JobCounts::count(const JobRecord &job, Miss miss) {
+  ++released;
+  if (job.deferred) ++deferred;
+  if (job.exceeded) ++exceeded;
+  preemptions += job.preemptions;
+  if (miss == Miss::Deadline) ++late;
+  switch (job.outcome) {
+    case JobOutcome::InFlight:
+      ++in_flight;
+      if (miss == Miss::Deadline) ++overdue;
+      break;
+    case JobOutcome::Skipped:
+    case JobOutcome::Aborted:
+      ++(job.outcome == JobOutcome::Skipped ? skipped : aborted);
+      ++by_reason[static_cast<std::size_t>(job.reason) % kReasonCount];
+      break;
+    case JobOutcome::Finished:
+      ++finished;
+      max_lateness = std::max(max_lateness.value_or(job.lateness()), job.lateness());
+      break;
+  }
+}
 
 void JobCounts::add_counts(const JobCounts &other) {
   released += other.released;
@@ -79,18 +100,14 @@ Summarizer::Summarizer(const trace::RunInfo &run)
       begin_(run.start + run.warm_up),
       refs_(flatten(run.workload)),
       exact_(exact_jobs_of(refs_.size())),
-      is_sink_(refs_.size(), true),
+      is_sink_(sinks_of(run.workload)),
       stats_(refs_.size()),
       samples_(refs_.size(), Samples(exact_)),
       end_to_end_(refs_.size(), DurationSketch(exact_)),
       end_to_end_late_(refs_.size()),
       missed_(run.workload.dags.size()),
       folder_(run.workload),
-      activity_(run.workload, run.config, begin_) {
-  for (std::size_t t = 0; t < refs_.size(); ++t) {
-    for (const std::uint32_t p : refs_[t].task->predecessors) is_sink_[t - refs_[t].index + p] = false;
-  }
-}
+      activity_(run.workload, run.config, begin_) {}
 
 void Summarizer::add(std::span<const JobEvent> events) {
   activity_.add(events);
@@ -102,31 +119,13 @@ void Summarizer::count(const JobRecord &job, Time end) {
   if (job.release < begin_) return;
   const std::size_t task = job.task.value;
   const std::size_t dag = refs_[task].dag.value;
-  JobStats &stats = stats_[task];
-  ++stats.released;
-  if (job.deferred) ++stats.deferred;
-  if (job.exceeded) ++stats.exceeded;
-  stats.preemptions += job.preemptions;
-  Samples &samples = samples_[task];
-  if (job.has_started() && job.reason != Reason::NoData) samples.start_latency.add(job.start - job.ready);
   const Miss miss = miss_of(job, end);
-  if (miss == Miss::Deadline) ++stats.late;
+  stats_[task].count(job, miss);
   if (miss != Miss::None) ++missed_[dag];
   if (is_sink_[task] && is_late_end_to_end(job, end, run_.workload.dags[dag].deadline)) ++end_to_end_late_[task];
-  switch (job.outcome) {
-    case JobOutcome::InFlight:
-      ++stats.in_flight;
-      if (miss == Miss::Deadline) ++stats.overdue;
-      return;
-    case JobOutcome::Skipped:
-    case JobOutcome::Aborted:
-      ++(job.outcome == JobOutcome::Skipped ? stats.skipped : stats.aborted);
-      ++stats.by_reason[static_cast<std::size_t>(job.reason) % kReasonCount];
-      return;
-    case JobOutcome::Finished: break;
-  }
-  ++stats.finished;
-  stats.max_lateness = std::max(stats.max_lateness.value_or(job.lateness()), job.lateness());
+  Samples &samples = samples_[task];
+  if (job.has_started() && job.reason != Reason::NoData) samples.start_latency.add(job.start - job.ready);
+  if (job.outcome != JobOutcome::Finished) return;
   samples.response.add(job.response());
   samples.response_from_ready.add(job.response_from_ready());
   samples.on_worker.add(job.on_worker);
@@ -196,6 +195,18 @@ Summary Summarizer::finish(Time end) {
   summary.lost_events = run_.lost_events;
   summary.ignored_events = folder_.ignored_events();
   return summary;
+}
+
+std::vector<bool> sinks_of(const Workload &workload) {
+  std::vector<bool> sinks;
+  for (const Dag &dag : workload.dags) {
+    const std::size_t first = sinks.size();
+    sinks.resize(first + dag.tasks.size(), true);
+    for (const Task &task : dag.tasks) {
+      for (const std::uint32_t p : task.predecessors) sinks[first + p] = false;
+    }
+  }
+  return sinks;
 }
 
 Summary summarize(const trace::Trace &trace) {

@@ -18,6 +18,7 @@
 #include "redag_analysis/metrics/distribution.hpp"
 #include "redag_analysis/metrics/duration_sketch.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/miss.hpp"
 
 namespace redag::metrics {
 
@@ -54,6 +55,8 @@ struct JobCounts {
   /// missed / released; 0 where nothing was released.
   [[nodiscard]] double miss_ratio_with_lost() const;
 
+  /// Counts a job, which was judged as `miss`.
+  void count(const JobRecord &job, Miss miss);
   void add_counts(const JobCounts &other);
 };
 
@@ -157,6 +160,9 @@ class Summarizer {
   JobFolder folder_;
   Activity activity_;
 };
+
+/// Returns by TaskId whether the task is a sink: no task waits for it.
+[[nodiscard]] std::vector<bool> sinks_of(const Workload &workload);
 
 /// Summarises a whole trace.
 [[nodiscard]] Summary summarize(const trace::Trace &trace);

@@ -56,11 +56,8 @@ void Group::add(const std::string &path, const trace::Trace &trace) {
 
 void Group::take_first(const trace::Trace &trace, const std::vector<JobRecord> &jobs) {
   const std::vector<TaskRef> refs = flatten(trace.info.workload);
-  is_sink_.assign(refs.size(), true);
-  for (std::size_t t = 0; t < refs.size(); ++t) {
-    dag_of_.push_back(refs[t].dag);
-    for (const std::uint32_t p : refs[t].task->predecessors) is_sink_[t - refs[t].index + p] = false;
-  }
+  is_sink_ = metrics::sinks_of(trace.info.workload);
+  for (const TaskRef &ref : refs) dag_of_.push_back(ref.dag);
   samples_.resize(refs.size());
   end_to_end_.resize(refs.size());
   bounds_ = bounds_of(trace.info);

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "redag_analysis/metrics/verdict.hpp"
+
 namespace redag::lab {
 namespace {
 
@@ -18,9 +20,8 @@ Spread spread_over(const ExecutorResults &results, std::size_t dag, Value value)
 }  // namespace
 
 void ExecutorResults::add(const Session &session) {
-  std::vector<Observation> seen;
-  for (const metrics::DagSummary &dag : session.summary.dags) seen.push_back({dag.jobs, dag.end_to_end});
-  seen.push_back({session.summary.total, {}});
+  std::vector<metrics::DagSummary> seen = session.summary.dags;
+  seen.push_back({.name = "total", .jobs = session.summary.total, .end_to_end = {}});
   repetitions.push_back(std::move(seen));
   preemption = session.info.preemption;
   preemption_why = session.info.preemption_why;
@@ -32,11 +33,11 @@ void ExecutorResults::add(const Session &session) {
 }
 
 Spread ExecutorResults::miss(std::size_t dag) const {
-  return spread_over(*this, dag, [](const Observation &seen) { return seen.jobs.miss_ratio_with_lost(); });
+  return spread_over(*this, dag, [](const metrics::DagSummary &seen) { return seen.jobs.miss_ratio_with_lost(); });
 }
 
 Spread ExecutorResults::late(std::size_t dag) const {
-  return spread_over(*this, dag, [](const Observation &seen) { return seen.jobs.miss_ratio(); });
+  return spread_over(*this, dag, [](const metrics::DagSummary &seen) { return seen.jobs.miss_ratio(); });
 }
 
 std::optional<Spread> ExecutorResults::end_to_end(std::size_t dag, Duration metrics::Distribution::*percentile) const {
@@ -71,12 +72,8 @@ metrics::JobCounts ExecutorResults::jobs(std::size_t dag) const {
 }
 
 bool ExecutorResults::has_misses() const {
-  const std::size_t total = repetitions.front().size() - 1;
-  if (jobs(total).missed() > 0) return true;
-  for (std::size_t dag = 0; dag < total; ++dag) {
-    if (late_end_to_end(dag) > 0) return true;
-  }
-  return false;
+  return std::any_of(repetitions.begin(), repetitions.end(),
+                     [](const auto &dags) { return metrics::has_misses(dags.back().jobs, dags); });
 }
 
 }  // namespace redag::lab

@@ -16,20 +16,14 @@
 
 namespace redag::lab {
 
-/// One DAG in one session; times are in ns. "total" means all DAGs together.
-struct Observation {
-  metrics::JobCounts jobs;
-  metrics::EndToEnd end_to_end;  // empty for the total
-};
-
 using report::Spread;
 
 struct ExecutorResults {
   Variant variant;
-  std::string preemption;                             // the mode that ran
-  std::string preemption_why;                         // of the last repetition
-  std::vector<std::vector<Observation>> repetitions;  // [repetition][DAG]; the last DAG is the total
-  bool realtime = false;                              // on SCHED_FIFO threads
+  std::string preemption;                                     // the mode that ran
+  std::string preemption_why;                                 // of the last repetition
+  std::vector<std::vector<metrics::DagSummary>> repetitions;  // [repetition][DAG]; the last is the total, only counted
+  bool realtime = false;                                      // on SCHED_FIFO threads
   std::uint64_t check_violations = 0;
   std::vector<std::string> warnings;  // each listed once
 

@@ -10,7 +10,6 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/rng.hpp"
-#include "redag_analysis/metrics/miss.hpp"
 
 namespace redag::lab {
 namespace {
@@ -54,21 +53,19 @@ const char *to_string(Verdict verdict) {
 }
 
 void DifferenceSide::make_rows(const Workload &workload) {
+  const std::vector<bool> is_sink = metrics::sinks_of(workload);
   rows_.push_back({});
   for (const Dag &dag : workload.dags) {
     const std::size_t dag_row = rows_.size();
     rows_.emplace_back().dag = dag.name;
-    std::vector<bool> is_sink(dag.tasks.size(), true);
+    const auto first = is_sink.begin() + static_cast<std::ptrdiff_t>(places_.size());
+    const bool one_sink = std::count(first, first + static_cast<std::ptrdiff_t>(dag.tasks.size()), true) == 1;
     for (const Task &task : dag.tasks) {
-      for (const std::uint32_t p : task.predecessors) is_sink[p] = false;
-    }
-    const bool one_sink = std::count(is_sink.begin(), is_sink.end(), true) == 1;
-    for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
-      const bool ends_dag = one_sink && is_sink[i];
+      const bool ends_dag = one_sink && is_sink[places_.size()];
       places_.push_back(Places{dag_row, rows_.size(), ends_dag ? std::optional<std::size_t>(dag_row) : std::nullopt});
       Row &row = rows_.emplace_back();
       row.dag = dag.name;
-      row.task = dag.tasks[i].name;
+      row.task = task.name;
     }
   }
 }
@@ -91,9 +88,7 @@ void DifferenceSide::add(const trace::Trace &trace) {
     const Places &places = places_[job.task.value];
     for (const std::size_t index : {std::size_t{0}, places.dag, places.task}) {
       Row &row = rows_[index];
-      ++row.released;
-      if (miss == metrics::Miss::Deadline) ++row.late;
-      if (miss == metrics::Miss::Lost) ++row.lost;
+      row.jobs.count(job, miss);
       Block &here = row.runs.back()[at];
       ++here.released;
       if (miss != metrics::Miss::None) ++here.missed;

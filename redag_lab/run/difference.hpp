@@ -12,6 +12,7 @@
 
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/summary.hpp"
 #include "redag_lab/run/block_bootstrap.hpp"
 
 namespace redag::lab {
@@ -27,15 +28,12 @@ class DifferenceSide {
   struct Row {
     std::string dag;   // empty: all DAGs together
     std::string task;  // empty: the whole DAG
-    std::uint64_t released = 0;
-    std::uint64_t late = 0;
-    std::uint64_t lost = 0;  // skipped, or aborted although they had data
+    metrics::JobCounts jobs;
     /// For a task the largest f - r; for a DAG with one sink the largest f - origin there (end to end). It is 0 if none
     /// finished, and for rows without a response of their own: all DAGs together, or a DAG with several sinks.
     Duration max = 0;
     BlockedRuns runs;  // with the responses that `max` refers to
 
-    [[nodiscard]] std::uint64_t missed() const { return late + lost; }
     [[nodiscard]] bool has_responses() const;
   };
   /// All jobs, then the DAGs, each followed by its tasks.

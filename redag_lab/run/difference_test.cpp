@@ -68,8 +68,8 @@ TEST(Difference, RowsAreAllJobsThenDagsWithTheirTasks) {
   std::vector<std::string> names;
   for (const DifferenceSide::Row &row : a.rows()) names.push_back(row.dag + "/" + row.task);
   EXPECT_THAT(names, ElementsAre("/", "a/", "a/fast", "b/", "b/slow", "b/after"));
-  EXPECT_EQ(a.rows()[0].released, a.rows()[1].released + a.rows()[3].released);
-  EXPECT_EQ(a.rows()[1].released, 2000U);
+  EXPECT_EQ(a.rows()[0].jobs.released, a.rows()[1].jobs.released + a.rows()[3].jobs.released);
+  EXPECT_EQ(a.rows()[1].jobs.released, 2000U);
   EXPECT_EQ(a.rows()[2].runs.at(0).size(), 28U);  // of 700 ms
   std::uint64_t in_blocks = 0;
   for (const Block &block : a.rows()[2].runs[0]) in_blocks += block.released;
@@ -80,7 +80,7 @@ TEST(Difference, CountsAsTheSummaryDoes) {
   const DifferenceSide a = side(sched::Preemption::None, 1, 1);
   std::uint64_t missed = 0;
   for (const Block &block : a.rows()[2].runs[0]) missed += block.missed;
-  EXPECT_EQ(missed, a.rows()[2].late + a.rows()[2].lost);
+  EXPECT_EQ(missed, a.rows()[2].jobs.missed());
   EXPECT_GT(missed, 100U);  // without preemption, 24 ms delay a task with a period of 10 ms
 }
 
@@ -108,7 +108,7 @@ TEST(Difference, ADagWithSeveralSinksHasNoResponse) {
 TEST(Difference, WarmUpIsNotCounted) {
   DifferenceSide a;
   a.add(run_of(contention(), sched::Preemption::None, 1, 20 * kSecond, 5 * kSecond));
-  EXPECT_EQ(a.rows()[1].released, 1500U);
+  EXPECT_EQ(a.rows()[1].jobs.released, 1500U);
 }
 
 TEST(Difference, PreemptionIsBetterForTheFastTaskAlone) {

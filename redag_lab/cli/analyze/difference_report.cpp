@@ -38,7 +38,7 @@ bool is_miss(const Figure &figure) { return figure.value == &lab::RowDifference:
 
 // Returns the text of one side's figure: a response time, or misses with their count.
 std::string value_text(const Figure &figure, const DifferenceSide::Row &side, double value) {
-  if (is_miss(figure)) return format_count_and_share(side.missed(), side.released);
+  if (is_miss(figure)) return format_count_and_share(side.jobs.missed(), side.jobs.released);
   return side.has_responses() ? humanize_duration(static_cast<Duration>(value)) : "-";
 }
 
@@ -108,9 +108,9 @@ std::string differences_table(const Diffed &diffed, const StreamTraits &terminal
     const std::string indent = row.a->task.empty() ? "" : "  ";
     table.add({{indent + (row.a->task.empty() ? row_name(row) : row.a->task),
                 row.a->dag.empty() ? Tint::Strong : Tint::Plain},
-               {arrow(format_count(row.a->released), format_count(row.b->released)), Tint::Faint},
+               {arrow(format_count(row.a->jobs.released), format_count(row.b->jobs.released)), Tint::Faint},
                figure_cell(row, kFigures[0]),
-               {arrow(format_count(row.a->lost), format_count(row.b->lost))},
+               {arrow(format_count(row.a->jobs.lost()), format_count(row.b->jobs.lost()))},
                figure_cell(row, kFigures[1]),
                figure_cell(row, kFigures[2]),
                figure_cell(row, kFigures[3]),
@@ -185,10 +185,10 @@ Json figure_json(const DifferenceRow &row, const Figure &figure) {
 Json counts_json(const DifferenceSide::Row &row) {
   std::size_t blocks = 0;
   for (const auto &run : row.runs) blocks += run.size();
-  return Json{{"released", row.released},
-              {"late", row.late},
-              {"lost", row.lost},
-              {"missed", row.missed()},
+  return Json{{"released", row.jobs.released},
+              {"late", row.jobs.late},
+              {"lost", row.jobs.lost()},
+              {"missed", row.jobs.missed()},
               {"max_ns", row.has_responses() ? Json(row.max) : Json()},
               {"blocks", blocks}};
 }

@@ -34,7 +34,7 @@ Json counts_json(const metrics::JobCounts &jobs) {
               {"skipped", jobs.skipped},   {"aborted", jobs.aborted},   {"missed", jobs.missed()}};
 }
 
-Json to_json(const lab::Observation &seen, bool is_dag) {
+Json to_json(const metrics::DagSummary &seen, bool is_dag) {
   Json json = counts_json(seen.jobs);
   json["miss_ratio"] = seen.jobs.miss_ratio();
   json["miss_ratio_with_lost"] = seen.jobs.miss_ratio_with_lost();
@@ -112,7 +112,7 @@ std::string legend(const lab::Comparison &comparison, std::size_t repetitions) {
   text += "\np50 to max: end to end, from the release of a source to the finish of a sink";
   const bool several = std::any_of(comparison.executors.front().repetitions.front().begin(),
                                    comparison.executors.front().repetitions.front().end(),
-                                   [](const lab::Observation &seen) { return seen.end_to_end.sinks.size() > 1; });
+                                   [](const metrics::DagSummary &seen) { return seen.end_to_end.sinks.size() > 1; });
   if (several) text += ";\nof several sinks, each figure is that of the worst one";
   if (repetitions > 1) text += ";\nmax is of all repetitions, p50 to p99 are medians over the repetitions";
   return text + "\n\n";
@@ -215,7 +215,7 @@ std::string to_csv(const lab::Comparison &comparison) {
   for (const lab::ExecutorResults &results : comparison.executors) {
     for (std::size_t r = 0; r < results.repetitions.size(); ++r) {
       for (std::size_t dag = 0; dag + 1 < comparison.dags.size(); ++dag) {
-        const lab::Observation &seen = results.repetitions[r][dag];
+        const metrics::DagSummary &seen = results.repetitions[r][dag];
         const metrics::JobCounts &jobs = seen.jobs;
         text += fmt::format("{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{}", results.variant.name,
                             quoted(comparison.dags[dag]), r + 1, jobs.released, jobs.finished, jobs.late, jobs.skipped,

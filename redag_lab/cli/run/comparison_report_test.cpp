@@ -18,7 +18,7 @@ lab::ExecutorResults results(const std::string &name, const std::vector<double> 
   made.variant = *lab::parse_variant(name);
   made.preemption = "none";
   for (const double miss : misses) {
-    lab::Observation seen;
+    metrics::DagSummary seen;
     seen.jobs.released = 1000;
     seen.jobs.finished = 1000;
     seen.jobs.late = static_cast<std::uint64_t>(std::lround(miss * 1000));
@@ -26,7 +26,7 @@ lab::ExecutorResults results(const std::string &name, const std::vector<double> 
     seen.end_to_end.response.p99 = kMillisecond;
     seen.end_to_end.response.max = kMillisecond;
     seen.end_to_end.sinks.resize(1);
-    lab::Observation total = seen;
+    metrics::DagSummary total = seen;
     total.end_to_end = {};
     made.repetitions.push_back({seen, total});
   }
