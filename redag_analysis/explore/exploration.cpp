@@ -108,15 +108,12 @@ Method exploration(ExplorationOptions options) {
       .subject = Subject::Task,
       .cite =
           "M. Nasri, B. Brandenburg, An exact and sustainable analysis of non-preemptive scheduling, RTSS 2017; M. "
-          "Nasri, "
-          "G. Nelissen, B. Brandenburg, Response-time analysis of limited-preemptive parallel DAG tasks under global "
-          "scheduling, ECRTS 2019 (docs/analysis.md, \"Exploration\")",
+          "Nasri, G. Nelissen, B. Brandenburg, Response-time analysis of limited-preemptive parallel DAG tasks under "
+          "global scheduling, ECRTS 2019 (docs/analysis.md, \"Exploration\")",
       .assumptions =
           "any number of workers, jobs run to completion, strictly periodic with the stated offsets; the tasks that "
-          "edges "
-          "join have one rate and one offset; R <= T; jitter, bcet, max_active, groups; static priorities, or edf "
-          "without "
-          "data tasks; exact on one worker, but for data tasks among equals",
+          "edges join have one rate and one offset; R <= T; jitter, bcet, max_active, groups; static priorities, or "
+          "edf without data tasks; exact on one worker, but for data tasks among equals",
       .complexity = "up to max_states states, O(n) each",
       .apply = [options = std::move(options)](const TaskSet &task_set) -> Outcome {
         if (auto reason = why_not_explore(task_set)) return NotApplicable{*std::move(reason)};

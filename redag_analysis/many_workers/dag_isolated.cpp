@@ -207,8 +207,7 @@ Method graham() {
       .cite = "R. Graham, Bounds on multiprocessing timing anomalies, SIAM Journal on Applied Mathematics 17(2), 1969",
       .assumptions =
           "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared "
-          "groups, "
-          "not cooperative",
+          "groups, not cooperative",
       .complexity = "O(tasks + edges)",
       .apply = apply_graham,
   };
@@ -223,8 +222,7 @@ Method long_paths() {
           "2022",
       .assumptions =
           "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared "
-          "groups, "
-          "not cooperative",
+          "groups, not cooperative",
       .complexity = "O(workers (tasks + edges))",
       .apply = apply_long_paths,
   };
@@ -239,8 +237,7 @@ Method isolated() {
           "federated and global scheduling for parallel real-time tasks, ECRTS 2014; RTSS 2022 (see long_paths)",
       .assumptions =
           "the max_active of the DAG and of all that can take a worker from it sum up to at most m; any policy and "
-          "mode; "
-          "one rate a DAG with edges, R <= T; no shared groups",
+          "mode; one rate a DAG with edges, R <= T; no shared groups",
       .complexity = "O(DAGs tasks + workers (tasks + edges))",
       .apply = apply_isolated,
   };

@@ -186,10 +186,8 @@ Method dag_shapes() {
       .subject = Subject::Dag,
       .cite =
           "docs/analysis.md, \"Shapes of DAGs\"; after J. Fonseca, G. Nelissen, V. Nelis, Improved response time "
-          "analysis "
-          "of sporadic DAG tasks for global FP scheduling, RTNS 2017; Schedulability analysis of DAG tasks with "
-          "arbitrary "
-          "deadlines under global fixed-priority scheduling, Real-Time Systems 55, 2019",
+          "analysis of sporadic DAG tasks for global FP scheduling, RTNS 2017; Schedulability analysis of DAG tasks "
+          "with arbitrary deadlines under global fixed-priority scheduling, Real-Time Systems 55, 2019",
       .assumptions =
           "m workers, full preemption, static priorities that keep DAGs together, some edges, R <= T; release jitter, "
           "shared levels; no max_active, no shared groups",

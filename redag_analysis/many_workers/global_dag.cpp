@@ -276,8 +276,7 @@ Method melani() {
           "conditional DAG tasks in multiprocessor systems, ECRTS 2015",
       .assumptions =
           "m workers, full preemption, static priorities that keep DAGs together, R <= T; release jitter, shared "
-          "levels; "
-          "no max_active, no shared groups",
+          "levels; no max_active, no shared groups",
       .complexity = "pseudo-polynomial; O(DAGs) a step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_melani); },
   };
@@ -290,8 +289,7 @@ Method dag_bounded() {
       .cite = "docs/analysis.md, \"Several workers\"; after A. Melani et al., ECRTS 2015",
       .assumptions =
           "m workers, full preemption, static priorities that keep DAGs together, one rate a DAG, R <= T; release "
-          "jitter, "
-          "shared levels, max_active of DAGs in one part; no shared groups",
+          "jitter, shared levels, max_active of DAGs in one part; no shared groups",
       .complexity = "pseudo-polynomial; O(DAGs) a step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_preemptive); },
   };
@@ -306,8 +304,7 @@ Method dag_any() {
           "Cirinei, RTSS 2007",
       .assumptions =
           "m workers, full preemption or none, any work-conserving order (EDF, FIFO, interleaved priorities), one rate "
-          "a "
-          "DAG, R <= T for all; release jitter, shared levels, max_active of DAGs in one part; no shared groups",
+          "a DAG, R <= T for all; release jitter, shared levels, max_active of DAGs in one part; no shared groups",
       .complexity = "pseudo-polynomial; O(DAGs^2) a step, at most 1000 rounds",
       .apply = apply_any,
   };
@@ -322,8 +319,7 @@ Method dag_nonpreemptive() {
           "analysis of DAG tasks under fixed priority scheduling with limited preemptions, DATE 2016",
       .assumptions =
           "m workers, jobs run to completion, static priorities that keep DAGs together, one rate a DAG, R <= T; "
-          "release "
-          "jitter, equal priorities, max_active of DAGs in one part; no shared groups",
+          "release jitter, equal priorities, max_active of DAGs in one part; no shared groups",
       .complexity = "pseudo-polynomial; O(DAGs) a step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_nonpreemptive); },
   };

@@ -193,8 +193,7 @@ Method edf_global_density() {
           "multiprocessor platforms, ECRTS 2005",
       .assumptions =
           "m workers, full preemption, edf, no edges, D <= T and no jobs skipped before it, jitter below the deadline; "
-          "no "
-          "shared groups, no max_active",
+          "no shared groups, no max_active",
       .complexity = "O(n)",
       .quick = true,
       .apply = apply_density,
@@ -206,12 +205,10 @@ Method edf_global_response() {
       .name = "edf_global_response",
       .cite =
           "M. Bertogna, M. Cirinei, Response-time analysis for globally scheduled symmetric multiprocessor platforms, "
-          "RTSS "
-          "2007; without preemption: docs/analysis.md, \"EDF on several workers\"",
+          "RTSS 2007; without preemption: docs/analysis.md, \"EDF on several workers\"",
       .assumptions =
           "m workers, full preemption or none, edf, no edges, R <= T for all tasks; release jitter; no shared groups, "
-          "no "
-          "max_active",
+          "no max_active",
       .complexity = "pseudo-polynomial; O(n^2) a step, at most 1000 rounds",
       .apply = apply_response,
   };

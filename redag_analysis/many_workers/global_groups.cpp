@@ -314,9 +314,8 @@ Method dag_groups() {
           "Melani et al., ECRTS 2015",
       .assumptions =
           "m workers, full preemption (a group's holder inherits) or none, any policy, one rate a DAG; with full "
-          "preemption "
-          "responses up to 16 T where no job is skipped, else R <= T; release jitter, shared levels, exclusive groups "
-          "within and across DAGs; with full preemption max_active of DAGs in one part",
+          "preemption responses up to 16 T where no job is skipped, else R <= T; release jitter, shared levels, "
+          "exclusive groups within and across DAGs; with full preemption max_active of DAGs in one part",
       .complexity = "pseudo-polynomial; O(tasks^2) a step",
       .apply = apply_groups,
   };

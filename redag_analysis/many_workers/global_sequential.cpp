@@ -303,8 +303,7 @@ Method guan() {
       .name = "guan",
       .cite =
           "N. Guan, M. Stigge, W. Yi, G. Yu, New response time bounds for fixed priority multiprocessor scheduling, "
-          "RTSS "
-          "2009",
+          "RTSS 2009",
       .assumptions =
           "m workers, full preemption, static priorities, no edges, R <= T; release jitter; no shared groups or levels",
       .complexity = "pseudo-polynomial; O(n m) a step",
@@ -318,8 +317,7 @@ Method sequential_nonpreemptive() {
       .cite = "docs/analysis.md, \"Several workers\"; after N. Guan, W. Yi, Z. Gu, Q. Deng, G. Yu, RTSS 2008",
       .assumptions =
           "m workers, jobs run to completion, static priorities, no edges, R <= T; release jitter, equal priorities; "
-          "no "
-          "shared groups",
+          "no shared groups",
       .complexity = "pseudo-polynomial; O(n) a step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_nonpreemptive); },
   };

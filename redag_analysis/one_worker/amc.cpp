@@ -161,8 +161,8 @@ Method amc_rtb() {
           "S. Baruah, A. Burns, R. Davis, Response-time analysis for mixed criticality systems, RTSS 2011 (AMC-rtb)",
       .assumptions =
           "one worker, full preemption, static priorities, some wcet_low below its wcet, no groups, R <= T; any "
-          "degrade; "
-          "DAGs of one rate as in dag_one_worker_preemptive, without jitter if of lower criticality; shared levels",
+          "degrade; DAGs of one rate as in dag_one_worker_preemptive, without jitter if of lower criticality; shared "
+          "levels",
       .complexity = "pseudo-polynomial; O(n) a step",
       .knows_modes = true,
       .apply = apply,

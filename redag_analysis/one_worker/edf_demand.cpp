@@ -160,10 +160,8 @@ Method edf_demand() {
       .subject = Subject::TaskSet,
       .cite =
           "S. Baruah, L. Rosier, R. Howell, Algorithms and complexity concerning the preemptive scheduling of "
-          "periodic, "
-          "real-time tasks on one processor, Real-Time Systems 2, 1990; F. Zhang, A. Burns, Schedulability analysis "
-          "for "
-          "real-time systems with EDF scheduling, IEEE Transactions on Computers 58(9), 2009",
+          "periodic, real-time tasks on one processor, Real-Time Systems 2, 1990; F. Zhang, A. Burns, Schedulability "
+          "analysis for real-time systems with EDF scheduling, IEEE Transactions on Computers 58(9), 2009",
       .assumptions =
           "one worker, full preemption, edf, no edges, deadlines before the next release is refused, jitter below the "
           "deadline, no shared groups, no max_active",
@@ -179,12 +177,10 @@ Method edf_demand_nonpreemptive() {
       .cite =
           "K. Jeffay, D. Stanat, C. Martel, On non-preemptive scheduling of periodic and sporadic tasks, RTSS 1991; L. "
           "George, N. Rivierre, M. Spuri, Preemptive and non-preemptive real-time uni-processor scheduling, INRIA "
-          "RR-2966, "
-          "1996",
+          "RR-2966, 1996",
       .assumptions =
           "one worker, jobs run to completion or to a preemption point, edf, no edges, deadlines before the next "
-          "release "
-          "is refused, jitter below the deadline; groups and max_active where jobs run to completion",
+          "release is refused, jitter below the deadline; groups and max_active where jobs run to completion",
       .complexity = "pseudo-polynomial; O(n) an interval",
       .apply = apply_nonpreemptive,
   };

@@ -88,8 +88,7 @@ Method exact_points() {
           "Computers 53(11), 2004",
       .assumptions =
           "one worker, full preemption, static priorities, D <= T, no jitter; blocking added; a DAG of one rate counts "
-          "as "
-          "one task with C = volume",
+          "as one task with C = volume",
       .complexity = "O(n 2^n) at worst, in practice far less",
       .apply = apply,
   };

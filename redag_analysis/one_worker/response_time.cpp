@@ -57,14 +57,12 @@ Method rta_preemptive() {
       .name = "rta_preemptive",
       .subject = Subject::Task,
       .cite =
-          "M. Joseph, P. Pandya, Finding response times in a real-time system, The Computer Journal 29(5), 1986; "
-          "K. Tindell, A. Burns, A. Wellings, An extendible approach for analysing fixed priority hard real-time "
-          "tasks, "
+          "M. Joseph, P. Pandya, Finding response times in a real-time system, The Computer Journal 29(5), 1986; K. "
+          "Tindell, A. Burns, A. Wellings, An extendible approach for analysing fixed priority hard real-time tasks, "
           "Real-Time Systems 6(2), 1994",
       .assumptions =
           "one worker, full preemption, static priorities, edges only between rates; any deadlines, release jitter, "
-          "shared "
-          "groups with priority inheritance, shared levels",
+          "shared groups with priority inheritance, shared levels",
       .complexity = "pseudo-polynomial; O(n) a step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_full); },
   };
@@ -79,8 +77,7 @@ Method rta_nonpreemptive() {
           "revisited and revised, Real-Time Systems 35(3), 2007",
       .assumptions =
           "one worker, jobs run to completion, static priorities, edges only between rates; any deadlines, release "
-          "jitter, "
-          "groups",
+          "jitter, groups",
       .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_none); },
   };
@@ -95,8 +92,7 @@ Method rta_deferred() {
           "scheduling with deferred preemption, Real-Time Systems 42, 2009",
       .assumptions =
           "one worker, cooperative preemption points every `region`, static priorities, edges only between rates, no "
-          "shared groups; any "
-          "deadlines, release jitter, shared levels",
+          "shared groups; any deadlines, release jitter, shared levels",
       .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_cooperative); },
   };
@@ -122,8 +118,7 @@ Method dag_one_worker_deferred() {
       .cite = "as rta_deferred, with C = volume of the DAG (docs/analysis.md, \"One worker\")",
       .assumptions =
           "one worker, jobs run to completion or to a preemption point, static priorities; R <= T for DAGs; timers "
-          "that "
-          "keep their periods where edges join rates; jitter, max_active; groups unless cooperative",
+          "that keep their periods where edges join rates; jitter, max_active; groups unless cooperative",
       .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, dags_deferred); },
   };

@@ -80,8 +80,7 @@ Method wait_set() {
           "Response-time analysis of ROS 2 processing chains under reservation-based scheduling, ECRTS 2019",
       .assumptions =
           "rclcpp's single- or multi-threaded executor of Humble, m threads with processors of their own; one rate a "
-          "DAG "
-          "with edges, R <= T; no shared exclusive groups",
+          "DAG with edges, R <= T; no shared exclusive groups",
       .complexity = "O(tasks + edges)",
       .apply = apply_wait_set,
   };

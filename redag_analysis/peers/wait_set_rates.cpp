@@ -308,13 +308,12 @@ Method blass() {
 }
 
 Method wait_set_rates() {
-  return make(
-      "wait_set_rates",
-      "docs/analysis.md, \"rclcpp's executors\"; after T. Blass et al., RTSS 2021; in place of X. Jiang et al., "
-      "RTSS 2022, and H. Sobhani, H. Choi, H. Kim, RTAS 2023",
-      "rclcpp's single- or multi-threaded executor of Humble, m threads with processors of their own; one rate "
-      "a DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups",
-      "pseudo-polynomial; O(tasks^2) a step, at most 1000 rounds", apply_rates);
+  return make("wait_set_rates",
+              "docs/analysis.md, \"rclcpp's executors\"; after T. Blass et al., RTSS 2021; in place of X. Jiang et "
+              "al., RTSS 2022, and H. Sobhani, H. Choi, H. Kim, RTAS 2023",
+              "rclcpp's single- or multi-threaded executor of Humble, m threads with processors of their own; one rate "
+              "a DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups",
+              "pseudo-polynomial; O(tasks^2) a step, at most 1000 rounds", apply_rates);
 }
 
 }  // namespace redag::analysis

@@ -188,8 +188,8 @@ class GroupWriter {
     const Schedule &schedule = group.schedule();
     if (schedule.slices_shown < schedule.slices_in_all) {
       cuts.push_back(
-          fmt::format("{}: the schedule shows {} of {} stretches on workers: the beginning, and around the "
-                      "worst jobs; the overview covers the whole run",
+          fmt::format("{}: the schedule shows {} of {} stretches on workers: the beginning, and around the worst jobs; "
+                      "the overview covers the whole run",
                       group.label(), format_count(schedule.slices_shown), format_count(schedule.slices_in_all)));
     }
     if (group.runs().size() > 1) {

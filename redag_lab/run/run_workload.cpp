@@ -274,10 +274,10 @@ class Run {
 
   void warn() {
     if (const Duration gave_way = engine_->gave_way(); gave_way > 0) {
-      result_.warnings.push_back(fmt::format(
-          "jobs of lower criticality were ordinary threads for {}, so that the kernel did not stop those of "
-          "high criticality (real-time throttling)",
-          humanize_duration(gave_way)));
+      result_.warnings.push_back(
+          fmt::format("jobs of lower criticality were ordinary threads for {}, so that the kernel did not stop those "
+                      "of high criticality (real-time throttling)",
+                      humanize_duration(gave_way)));
     }
     if (const std::uint64_t waits = engine_->thread_waits(); waits > 0) {
       result_.warnings.push_back(fmt::format("{} time{} a job waited for a thread: all {} had jobs in progress", waits,

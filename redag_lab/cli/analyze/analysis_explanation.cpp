@@ -47,8 +47,8 @@ std::string advice_on_blocking(const lab::Analysed &analysed, const std::string 
   switch (analysed.task_set.mode) {
     case sched::Preemption::None:
       return fmt::format(
-          "{} keeps its worker until it ends: shorten it, or let it be preempted (`region` with "
-          "--preemption cooperative, or os)",
+          "{} keeps its worker until it ends: shorten it, or let it be preempted (`region` with --preemption "
+          "cooperative, or os)",
           who);
     case sched::Preemption::Cooperative:
       return fmt::format("{} keeps its worker until its next preemption point: give it a shorter `region`", who);

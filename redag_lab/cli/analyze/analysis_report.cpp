@@ -148,8 +148,7 @@ std::string headline(const lab::Analysed &analysed) {
   }
   if (platform.lateness > 0 || platform.timer_overhead > 0 || platform.stall != Loss{}) {
     text += fmt::format(
-        "machine: releases up to {} late, {} of processor time each; a processor stalls for up to {}"
-        " + {} a second\n",
+        "machine: releases up to {} late, {} of processor time each; a processor stalls for up to {} + {} a second\n",
         humanize_duration(platform.lateness), humanize_duration(platform.timer_overhead),
         humanize_duration(platform.stall.longest), humanize_duration(platform.stall.per_second));
   }

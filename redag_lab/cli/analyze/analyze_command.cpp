@@ -184,10 +184,9 @@ Action add_analyze(CLI::App &app) {
       ->expected(1)
       ->take_all()
       ->allow_extra_args(false);
-  app.add_flag(
-      "--methods", options->methods,
-      "Every method's assumptions, citation and complexity; FILE may be missing. With --json every method's bound "
-      "of every task");
+  app.add_flag("--methods", options->methods,
+               "Every method's assumptions, citation and complexity; FILE may be missing. With --json every method's "
+               "bound of every task");
   app.add_option("--method", options->only, "Only this method; can be given several times")
       ->type_name("NAME")
       ->expected(1)

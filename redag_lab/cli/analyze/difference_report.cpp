@@ -161,8 +161,8 @@ std::vector<std::string> cautions(const Diffed &diffed) {
   }
   if (!correlated.empty()) {
     list.push_back(fmt::format(
-        "{}{}: what happens lasts longer than the blocks of time that are compared, so the intervals "
-        "are too narrow; run for longer",
+        "{}{}: what happens lasts longer than the blocks of time that are compared, so the intervals are too narrow; "
+        "run for longer",
         correlated.front(), correlated.size() > 1 ? fmt::format(" and {} more", correlated.size() - 1) : ""));
   }
   return list;
@@ -215,8 +215,7 @@ std::vector<std::string> caveats(const DiffSide &a, const DiffSide &b) {
   const trace::RunInfo &y = b.jobs.runs().front();
   if (x.driver != y.driver) {
     list.push_back(
-        fmt::format("one side comes from '{}', the other from '{}': what the machine adds is part of the "
-                    "difference",
+        fmt::format("one side comes from '{}', the other from '{}': what the machine adds is part of the difference",
                     trace::to_string(x.driver), trace::to_string(y.driver)));
   } else if (x.driver != trace::Driver::Simulator && !(x.machine == y.machine)) {
     list.emplace_back("the sides ran on different machines or kernels: that is part of the difference");
@@ -228,8 +227,8 @@ std::vector<std::string> caveats(const DiffSide &a, const DiffSide &b) {
   const std::size_t fewest = std::min(a.jobs.runs().size(), b.jobs.runs().size());
   if (fewest == 1 && (x.driver != trace::Driver::Simulator || y.driver != trace::Driver::Simulator)) {
     list.emplace_back(
-        "a side has a single run: how runs differ from each other on this machine is not in the intervals; "
-        "repeat them ('redag compare --repeat')");
+        "a side has a single run: how runs differ from each other on this machine is not in the intervals; repeat them "
+        "('redag compare --repeat')");
   }
   for (const DiffSide *side : {&a, &b}) {
     const auto &runs = side->jobs.runs();

@@ -173,8 +173,7 @@ Action add_tune(CLI::App &app) {
       ->type_name("LIST")
       ->capture_default_str();
   app.add_option("--caps", options->caps,
-                 "Values of max_active to try for every DAG; default: none, 1, 2, ... as far as "
-                 "they can matter")
+                 "Values of max_active to try for every DAG; default: none, 1, 2, ... as far as they can matter")
       ->type_name("LOW-HIGH");
   add_count(app, "--most-workers", tune.freedom.most_workers, {0, kMaxWorkers},
             "Try up to so many workers; 0: as many as there are");
