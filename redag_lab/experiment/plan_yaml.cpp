@@ -21,12 +21,6 @@ using yaml::find;
 constexpr double kMillionth = 1e6;
 constexpr std::array<std::string_view, 2> kExperiments = {"acceptance", "factorial"};
 
-constexpr std::array kShapes = {lab::DagShape::Layered, lab::DagShape::ErdosRenyi, lab::DagShape::ForkJoin,
-                                lab::DagShape::Chain, lab::DagShape::Independent};
-constexpr std::array kPeriods = {lab::PeriodModel::LogUniform, lab::PeriodModel::Harmonic, lab::PeriodModel::Automotive,
-                                 lab::PeriodModel::Robot};
-constexpr std::array kUtilizations = {lab::UtilizationMethod::Drs, lab::UtilizationMethod::UUniFastDiscard};
-
 // Parses a number into millionths; numbers above 1000 are refused.
 std::optional<std::uint32_t> millionths(std::string_view text) {
   double value = 0;
@@ -140,18 +134,18 @@ const std::vector<std::string_view> &PlanReader::generation_keys() {
 
 void PlanReader::take_generation(const Node &map, lab::GenerateOptions &out) {
   take_tasks(map, out);
-  take_enum(map, "shape", out.shape, kShapes);
+  take_enum(map, "shape", out.shape, lab::kDagShapes);
   take_number(map, "edge_probability", out.edge_probability);
   take_enum(map, "policy", out.policy, kPolicies);
   take_count(map, "max_active", out.max_active_max, 0);
   out.max_active_min = out.max_active_max;
-  take_enum(map, "periods", out.periods, kPeriods);
+  take_enum(map, "periods", out.periods, lab::kPeriodModels);
   take_duration(map, "period_min", out.period_min);
   take_duration(map, "period_max", out.period_max);
   take_duration(map, "period_granularity", out.period_granularity);
   take_number(map, "jitter", out.jitter);
   take_number(map, "max_task_utilization", out.max_task_utilization);
-  take_enum(map, "utilization_method", out.method, kUtilizations);
+  take_enum(map, "utilization_method", out.method, lab::kUtilizationMethods);
 }
 
 void PlanReader::take_tasks(const Node &map, lab::GenerateOptions &out) {

@@ -266,14 +266,6 @@ class Generator {
   Workload workload_;
 };
 
-template <class Enum, std::size_t N>
-std::optional<Enum> from_string(std::string_view name, const std::array<Enum, N> &values) {
-  for (const Enum value : values) {
-    if (name == to_string(value)) return value;
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 Diagnostics find_mistakes(const GenerateOptions &o) {
@@ -346,23 +338,5 @@ const char *to_string(DagShape value) {
 }
 
 const char *to_string(RateScope value) { return value == RateScope::PerDag ? "per_dag" : "per_task"; }
-
-std::optional<UtilizationMethod> utilization_method_from_string(std::string_view name) {
-  return from_string(name, std::array{UtilizationMethod::Drs, UtilizationMethod::UUniFastDiscard});
-}
-
-std::optional<PeriodModel> period_model_from_string(std::string_view name) {
-  return from_string(
-      name, std::array{PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive, PeriodModel::Robot});
-}
-
-std::optional<DagShape> dag_shape_from_string(std::string_view name) {
-  return from_string(name, std::array{DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain,
-                                      DagShape::Independent});
-}
-
-std::optional<RateScope> rate_scope_from_string(std::string_view name) {
-  return from_string(name, std::array{RateScope::PerDag, RateScope::PerTask});
-}
 
 }  // namespace redag::lab

@@ -5,9 +5,8 @@
 // workload on every machine. Pure functions.
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <optional>
-#include <string_view>
 
 #include "redag/base/result.hpp"
 #include "redag/model/workload.hpp"
@@ -40,6 +39,13 @@ enum class RateScope : std::uint8_t {
   PerDag,   // one period and offset for all timer tasks of a DAG
   PerTask,  // each timer task draws its own
 };
+
+inline constexpr std::array kUtilizationMethods = {UtilizationMethod::Drs, UtilizationMethod::UUniFastDiscard};
+inline constexpr std::array kPeriodModels = {PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive,
+                                             PeriodModel::Robot};
+inline constexpr std::array kDagShapes = {DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain,
+                                          DagShape::Independent};
+inline constexpr std::array kRateScopes = {RateScope::PerDag, RateScope::PerTask};
 
 inline constexpr std::uint32_t kMaxTasks = 10'000'000;  // of a generated workload
 
@@ -94,11 +100,5 @@ struct GenerateOptions {
 [[nodiscard]] const char *to_string(PeriodModel value);
 [[nodiscard]] const char *to_string(DagShape value);
 [[nodiscard]] const char *to_string(RateScope value);
-
-/// The reverse of to_string(); nothing for an unknown name.
-[[nodiscard]] std::optional<UtilizationMethod> utilization_method_from_string(std::string_view name);
-[[nodiscard]] std::optional<PeriodModel> period_model_from_string(std::string_view name);
-[[nodiscard]] std::optional<DagShape> dag_shape_from_string(std::string_view name);
-[[nodiscard]] std::optional<RateScope> rate_scope_from_string(std::string_view name);
 
 }  // namespace redag::lab

@@ -170,12 +170,19 @@ TEST(Generate, SaysWhenDiscardingIsHopeless) {
   EXPECT_TRUE(generate(options, 1));
 }
 
-TEST(GenerateNames, GoBothWays) {
-  EXPECT_EQ(utilization_method_from_string("uunifast_discard"), UtilizationMethod::UUniFastDiscard);
-  EXPECT_EQ(period_model_from_string("automotive"), PeriodModel::Automotive);
-  EXPECT_EQ(dag_shape_from_string("erdos_renyi"), DagShape::ErdosRenyi);
-  EXPECT_EQ(rate_scope_from_string("per_task"), RateScope::PerTask);
-  EXPECT_EQ(dag_shape_from_string("circle"), std::nullopt);
+template <class Enum, std::size_t N>
+std::set<std::string> names_of(const std::array<Enum, N> &values) {
+  std::set<std::string> names;
+  for (const Enum value : values) names.insert(to_string(value));
+  return names;
+}
+
+TEST(GenerateNames, AreThoseOfTheCommandLine) {
+  EXPECT_EQ(names_of(kUtilizationMethods), (std::set<std::string>{"drs", "uunifast_discard"}));
+  EXPECT_EQ(names_of(kPeriodModels), (std::set<std::string>{"log_uniform", "harmonic", "automotive", "robot"}));
+  EXPECT_EQ(names_of(kDagShapes),
+            (std::set<std::string>{"layered", "erdos_renyi", "fork_join", "chain", "independent"}));
+  EXPECT_EQ(names_of(kRateScopes), (std::set<std::string>{"per_dag", "per_task"}));
 }
 
 RC_GTEST_PROP(Drs, KeepsSumAndBounds, (std::uint64_t seed)) {

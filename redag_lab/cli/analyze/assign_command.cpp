@@ -95,9 +95,8 @@ Action add_assign(CLI::App &app) {
   app.add_option("FILE", options->analysis.run.file, "Workload (YAML); - is standard input")->required();
   app.add_option("-o,--output", options->output, "File for the workload with the best assignment; without comments")
       ->type_name("FILE");
-  const auto objective = [](lab::Objective value) { return std::pair(std::string(to_string(value)), value); };
   add_choice(app, "--objective", assignment.objective,
-             Choices<lab::Objective>{objective(lab::Objective::Lateness), objective(lab::Objective::Slack)},
+             choices_of(std::array{lab::Objective::Lateness, lab::Objective::Slack}),
              "The smallest worst bound - deadline, or the largest least share of a deadline that is left")
       ->default_str(to_string(assignment.objective));
   add_choice(

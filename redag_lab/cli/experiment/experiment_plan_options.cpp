@@ -41,13 +41,6 @@ Value choice_of(const std::string &name, const std::string &text, const Choices<
   reject(name, in_quotes(text) + " is not a choice", suggestion(text, names));
 }
 
-template <class Value>
-Choices<Value> choices_of(std::initializer_list<Value> values) {
-  Choices<Value> choices;
-  for (const Value value : values) choices.emplace_back(to_string(value), value);
-  return choices;
-}
-
 auto count_within(Range<std::uint32_t> range) {
   return [range](const std::string &name, const std::string &item) { return parse_count(name, item, range); };
 }
@@ -101,7 +94,7 @@ void PlanOptions::add_points(CLI::App &app) {
      [this](AcceptancePlan &plan) { plan.workers = given_.workers; });
   on(add_list(app, "--deadlines", given_.deadlines, "implicit (D = T), constrained (D / T in 0.5 to 1)", "implicit",
               [](const std::string &name, const std::string &item) {
-                return choice_of(name, item, choices_of({DeadlineKind::Implicit, DeadlineKind::Constrained}));
+                return choice_of(name, item, choices_of(std::array{DeadlineKind::Implicit, DeadlineKind::Constrained}));
               }),
      group, [this](AcceptancePlan &plan) { plan.deadlines = given_.deadlines; });
   on(add_list(
@@ -127,12 +120,8 @@ void PlanOptions::add_workloads(CLI::App &app) {
      [&w](AcceptancePlan &plan) { plan.workload.min_tasks = w.min_tasks; });
   on(add_count(app, "--max-tasks", w.max_tasks, {1, lab::kMaxTasks}, "Most tasks of a DAG"), group,
      [&w](AcceptancePlan &plan) { plan.workload.max_tasks = w.max_tasks; });
-  on(add_choice(app, "--shape", w.shape,
-                choices_of({lab::DagShape::Layered, lab::DagShape::ErdosRenyi, lab::DagShape::ForkJoin,
-                            lab::DagShape::Chain, lab::DagShape::Independent}),
-                "Edges")
-         ->default_str(to_string(w.shape)),
-     group, [&w](AcceptancePlan &plan) { plan.workload.shape = w.shape; });
+  on(add_choice(app, "--shape", w.shape, choices_of(lab::kDagShapes), "Edges")->default_str(to_string(w.shape)), group,
+     [&w](AcceptancePlan &plan) { plan.workload.shape = w.shape; });
   on(add_number(app, "--edge-probability", w.edge_probability, {0, 1}, "Of each further edge (layered, erdos_renyi)"),
      group, [&w](AcceptancePlan &plan) { plan.workload.edge_probability = w.edge_probability; });
   on(add_choice(app, "--policy", w.policy, policy_choices(), "Policy")->default_str(to_string(w.policy)), group,
@@ -142,10 +131,7 @@ void PlanOptions::add_workloads(CLI::App &app) {
        plan.workload.max_active_min = w.max_active_max;
        plan.workload.max_active_max = w.max_active_max;
      });
-  on(add_choice(app, "--periods", w.periods,
-                choices_of({lab::PeriodModel::LogUniform, lab::PeriodModel::Harmonic, lab::PeriodModel::Automotive,
-                            lab::PeriodModel::Robot}),
-                "Periods")
+  on(add_choice(app, "--periods", w.periods, choices_of(lab::kPeriodModels), "Periods")
          ->default_str(to_string(w.periods)),
      group, [&w](AcceptancePlan &plan) { plan.workload.periods = w.periods; });
   on(add_duration(app, "--period-min", w.period_min, "Shortest period (log_uniform, harmonic)"), group,
@@ -158,8 +144,7 @@ void PlanOptions::add_workloads(CLI::App &app) {
      [&w](AcceptancePlan &plan) { plan.workload.jitter = w.jitter; });
   on(add_number(app, "--max-task-utilization", w.max_task_utilization, {1e-9, 1}, "Of one task"), group,
      [&w](AcceptancePlan &plan) { plan.workload.max_task_utilization = w.max_task_utilization; });
-  on(add_choice(app, "--utilization-method", w.method,
-                choices_of({lab::UtilizationMethod::Drs, lab::UtilizationMethod::UUniFastDiscard}), "How it is shared")
+  on(add_choice(app, "--utilization-method", w.method, choices_of(lab::kUtilizationMethods), "How it is shared")
          ->default_str(to_string(w.method)),
      group, [&w](AcceptancePlan &plan) { plan.workload.method = w.method; });
 }

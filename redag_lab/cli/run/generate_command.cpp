@@ -29,22 +29,12 @@ constexpr std::uint32_t kMaxCount = 1'000'000;
 constexpr Range<double> kShare = {0, 1};
 constexpr double kLeastShare = 1e-9;  // minimum of options that must be above 0
 
-template <class Value>
-Choices<Value> choices_of(std::initializer_list<Value> values) {
-  Choices<Value> choices;
-  for (const Value value : values) choices.emplace_back(to_string(value), value);
-  return choices;
-}
-
 void add_structure(CLI::App &app, lab::GenerateOptions &g) {
   const std::string group = "DAGs";
   add_count(app, "--dags", g.dags, {1, lab::kMaxTasks}, "DAGs")->group(group);
   add_count(app, "--min-tasks", g.min_tasks, {1, lab::kMaxTasks}, "Fewest tasks of a DAG")->group(group);
   add_count(app, "--max-tasks", g.max_tasks, {1, lab::kMaxTasks}, "Most tasks of a DAG")->group(group);
-  add_choice(app, "--shape", g.shape,
-             choices_of({lab::DagShape::Layered, lab::DagShape::ErdosRenyi, lab::DagShape::ForkJoin,
-                         lab::DagShape::Chain, lab::DagShape::Independent}),
-             "Edges")
+  add_choice(app, "--shape", g.shape, choices_of(lab::kDagShapes), "Edges")
       ->default_str(to_string(g.shape))
       ->group(group);
   add_number(app, "--edge-probability", g.edge_probability, kShare, "Of each further edge (layered, erdos_renyi)")
@@ -67,23 +57,17 @@ void add_timing(CLI::App &app, lab::GenerateOptions &g) {
   const std::string group = "Time";
   add_number(app, "--utilization", g.utilization, {kLeastShare, lab::kMaxTasks}, "Of all tasks together")->group(group);
   add_number(app, "--max-task-utilization", g.max_task_utilization, {kLeastShare, 1}, "Of one task")->group(group);
-  add_choice(app, "--method", g.method,
-             choices_of({lab::UtilizationMethod::Drs, lab::UtilizationMethod::UUniFastDiscard}),
-             "How the utilization is shared")
+  add_choice(app, "--method", g.method, choices_of(lab::kUtilizationMethods), "How the utilization is shared")
       ->default_str(to_string(g.method))
       ->group(group);
-  add_choice(app, "--periods", g.periods,
-             choices_of({lab::PeriodModel::LogUniform, lab::PeriodModel::Harmonic, lab::PeriodModel::Automotive,
-                         lab::PeriodModel::Robot}),
-             "Periods")
+  add_choice(app, "--periods", g.periods, choices_of(lab::kPeriodModels), "Periods")
       ->default_str(to_string(g.periods))
       ->group(group);
   add_duration(app, "--period-min", g.period_min, "Shortest period (log_uniform, harmonic)")->group(group);
   add_duration(app, "--period-max", g.period_max, "Longest period (log_uniform, harmonic)")->group(group);
   add_duration(app, "--period-granularity", g.period_granularity, "Periods are multiples of it (log_uniform)")
       ->group(group);
-  add_choice(app, "--rates", g.rates, choices_of({lab::RateScope::PerDag, lab::RateScope::PerTask}),
-             "Who draws a period")
+  add_choice(app, "--rates", g.rates, choices_of(lab::kRateScopes), "Who draws a period")
       ->default_str(to_string(g.rates))
       ->group(group);
   add_number(app, "--deadline-min", g.deadline_min, {kLeastShare, 4}, "Smallest deadline / period")->group(group);

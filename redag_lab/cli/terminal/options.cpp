@@ -136,31 +136,20 @@ std::optional<std::vector<int>> parse_cpu_list(std::string_view text) {
 }
 
 const Choices<PolicyKind> &policy_choices() {
-  static const Choices<PolicyKind> kChoices = [] {
-    Choices<PolicyKind> all;
-    for (const PolicyKind kind : {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed,
-                                  PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::ChainAware}) {
-      all.emplace_back(to_string(kind), kind);
-    }
-    return all;
-  }();
+  static const Choices<PolicyKind> kChoices =
+      choices_of(std::array{PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed,
+                            PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::ChainAware});
   return kChoices;
 }
 
 const Choices<Ties> &ties_choices() {
-  static const Choices<Ties> kChoices = {{to_string(Ties::Share), Ties::Share}, {to_string(Ties::Fixed), Ties::Fixed}};
+  static const Choices<Ties> kChoices = choices_of(std::array{Ties::Share, Ties::Fixed});
   return kChoices;
 }
 
 const Choices<PreemptionMode> &preemption_choices() {
-  static const Choices<PreemptionMode> kChoices = [] {
-    Choices<PreemptionMode> all;
-    for (const PreemptionMode mode :
-         {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os, PreemptionMode::Auto}) {
-      all.emplace_back(to_string(mode), mode);
-    }
-    return all;
-  }();
+  static const Choices<PreemptionMode> kChoices = choices_of(
+      std::array{PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os, PreemptionMode::Auto});
   return kChoices;
 }
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -23,6 +24,14 @@ namespace redag::cli {
 
 template <class Value>
 using Choices = std::vector<std::pair<std::string, Value>>;
+
+/// Returns the values with their names, by to_string().
+template <class Value, std::size_t N>
+Choices<Value> choices_of(const std::array<Value, N> &values) {
+  Choices<Value> choices;
+  for (const Value value : values) choices.emplace_back(to_string(value), value);
+  return choices;
+}
 
 /// Throws CLI::ValidationError with a text such as "--period-min: ...".
 [[noreturn]] void reject(const std::string &option, const std::string &message, const std::string &hint = {});
