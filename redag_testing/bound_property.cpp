@@ -340,6 +340,23 @@ void for_cases(const BoundGenerator &generator, std::uint32_t count,
   }
 }
 
+analysis::TaskSet compiled(const Workload &workload, const analysis::AnalysisPlatform &platform) {
+  const Result<analysis::TaskSet> task_set = analysis::compile(workload, platform);
+  EXPECT_TRUE(task_set) << to_string(task_set.error());
+  return task_set.value();
+}
+
+analysis::TaskSet compiled(const Workload &workload) { return compiled(workload, analysis::platform_of(workload)); }
+
+analysis::TaskSet compiled(const Workload &workload, sched::Preemption preemption) {
+  analysis::AnalysisPlatform platform;
+  platform.workers = workload.platform.workers;
+  platform.preemption = preemption;
+  return compiled(workload, platform);
+}
+
+analysis::TaskSet compiled(const BoundCase &bound_case) { return compiled(bound_case.workload, bound_case.platform); }
+
 std::string describe(const BoundCase &bound_case) {
   const analysis::AnalysisPlatform &platform = bound_case.platform;
   std::string text = fmt::format(

@@ -23,6 +23,12 @@ struct BoundCase {
 };
 using BoundGenerator = std::function<BoundCase(Rng &)>;
 
+/// Compiles a workload that can be compiled; otherwise the test fails. Without a platform it is platform_of(workload).
+[[nodiscard]] analysis::TaskSet compiled(const Workload &workload, const analysis::AnalysisPlatform &platform);
+[[nodiscard]] analysis::TaskSet compiled(const Workload &workload);
+[[nodiscard]] analysis::TaskSet compiled(const Workload &workload, sched::Preemption preemption);
+[[nodiscard]] analysis::TaskSet compiled(const BoundCase &bound_case);
+
 /// rate_monotonic, deadline_monotonic and fixed.
 [[nodiscard]] std::vector<PolicyKind> priorities_of_tasks();
 

@@ -17,6 +17,7 @@
 #include "redag/base/rng.hpp"
 #include "redag/sched/degradation.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/reference_scheduler.hpp"
 #include "redag_testing/timeline.hpp"
 

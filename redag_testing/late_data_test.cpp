@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/reference_scheduler.hpp"
-#include "redag_testing/timeline.hpp"
 
 namespace redag::testing {
 namespace {

@@ -12,23 +12,16 @@
 #include <utility>
 #include <vector>
 
+#include "redag_testing/builders.hpp"
+
 #include "redag_analysis/executors/executors.hpp"
 
 namespace redag::testing {
 
-inline Task timer(std::string name, Duration period = 10) {
-  Task task;
-  task.name = std::move(name);
-  task.wcet = 1;
-  task.period = task.deadline = period;
-  return task;
-}
+inline Task timer(std::string name, Duration period = 10) { return tick_task({std::move(name), period}); }
 
 inline Task subscription(std::string name, std::vector<std::uint32_t> after) {
-  Task task = timer(std::move(name), 0);
-  task.activation = Activation::Data;
-  task.predecessors = std::move(after);
-  return task;
+  return tick_task({std::move(name), 0, 1, std::move(after)});
 }
 
 /// Drives an executor by the names of tasks. Time is always 0: only the order of events matters.

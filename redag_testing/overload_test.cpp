@@ -18,6 +18,7 @@
 #include "redag_analysis/one_worker/amc.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/drivers.hpp"
 #include "redag_testing/timeline.hpp"
 

@@ -17,30 +17,6 @@ std::string in_ms(Time time) { return fmt::format("{:g}", static_cast<double>(ti
 
 }  // namespace
 
-Dag make_dag(std::string name, const std::vector<TestTask> &tasks, std::uint32_t max_active) {
-  Dag dag;
-  dag.name = std::move(name);
-  dag.max_active = max_active;
-  for (const TestTask &given : tasks) {
-    Task task;
-    task.name = given.name;
-    task.wcet = task.bcet = given.wcet_ms * kMillisecond;
-    task.period = given.period_ms * kMillisecond;
-    task.offset = given.offset_ms * kMillisecond;
-    task.deadline = given.deadline_ms * kMillisecond;
-    task.activation = given.period_ms == 0 ? Activation::Data : Activation::Timer;
-    task.group = given.group;
-    task.predecessors = given.after;
-    dag.tasks.push_back(std::move(task));
-  }
-  inherit_periods(dag);
-  return dag;
-}
-
-Workload make_workload(std::vector<Dag> dags, std::uint32_t workers, PreemptionMode preemption, PolicyKind policy) {
-  return Workload{.name = "test", .platform = Platform{workers, preemption}, .policy = policy, .dags = std::move(dags)};
-}
-
 std::vector<JobEvent> simulate_events(const Workload &workload, Duration horizon, const sim::Options &options) {
   sim::Options with_horizon = options;
   with_horizon.horizon = horizon;

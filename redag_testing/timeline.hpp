@@ -4,7 +4,6 @@
 // Schedules as text for golden tests: where and when each job ran, a line per job, readable in a failure message.
 #pragma once
 
-#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,23 +12,6 @@
 #include "redag_analysis/sim/simulator.hpp"
 
 namespace redag::testing {
-
-/// A short form of a task, from which tests build workloads. Times are in milliseconds.
-struct TestTask {
-  std::string name;
-  Duration period_ms = 0;  // 0: a data task
-  Duration wcet_ms = 1;
-  std::vector<std::uint32_t> after = {};
-  std::string group = {};
-  Duration offset_ms = 0;
-  Duration deadline_ms = 0;  // 0: the period
-};
-
-/// Builds a DAG. Tasks with period 0 are data tasks; periods are inherited, and deadlines filled in.
-[[nodiscard]] Dag make_dag(std::string name, const std::vector<TestTask> &tasks, std::uint32_t max_active = 0);
-[[nodiscard]] Workload make_workload(std::vector<Dag> dags, std::uint32_t workers,
-                                     PreemptionMode preemption = PreemptionMode::None,
-                                     PolicyKind policy = PolicyKind::RateMonotonic);
 
 /// Returns every event of a simulation with our scheduler.
 [[nodiscard]] std::vector<JobEvent> simulate_events(const Workload &workload, Duration horizon,

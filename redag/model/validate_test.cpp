@@ -6,24 +6,13 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "redag_testing/builders.hpp"
+
 namespace redag {
 namespace {
 
 Workload valid() {
-  Workload workload;
-  workload.dags.resize(1);
-  Dag &dag = workload.dags.front();
-  dag.name = "d";
-  dag.tasks.resize(2);
-  dag.tasks[0].name = "a";
-  dag.tasks[0].wcet = kMillisecond;
-  dag.tasks[0].period = 10 * kMillisecond;
-  dag.tasks[1].name = "b";
-  dag.tasks[1].wcet = kMillisecond;
-  dag.tasks[1].activation = Activation::Data;
-  dag.tasks[1].predecessors = {0};
-  inherit_periods(dag);
-  return workload;
+  return testing::make_workload({testing::make_dag("d", {{"a", 10}, {"b", 0, 1, {0}}})}, 1, PreemptionMode::Auto);
 }
 
 TEST(Validate, AcceptsAValidWorkload) { EXPECT_EQ(to_string(validate(valid())), ""); }

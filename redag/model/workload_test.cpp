@@ -5,21 +5,15 @@
 
 #include <gtest/gtest.h>
 
+#include "redag_testing/builders.hpp"
+
 namespace redag {
 namespace {
 
-Task timer(Duration wcet, Duration period) {
-  Task task;
-  task.wcet = wcet;
-  task.period = period;
-  return task;
-}
+Task timer(Duration wcet, Duration period) { return testing::tick_task({"t", period, wcet}); }
 
 Task data(Duration wcet, std::vector<std::uint32_t> predecessors) {
-  Task task = timer(wcet, 0);
-  task.activation = Activation::Data;
-  task.predecessors = std::move(predecessors);
-  return task;
+  return testing::tick_task({"t", 0, wcet, std::move(predecessors)});
 }
 
 TEST(TopologicalRanks, FollowEdgesAndBreakTiesByPosition) {

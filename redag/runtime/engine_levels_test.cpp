@@ -15,11 +15,13 @@
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::runtime {
 namespace {
 
 using sched::Outcome;
+using testing::make_dag;
 
 // A job whose body waits until it is told to end.
 struct HeldJob {
@@ -37,16 +39,6 @@ struct HeldJob {
   }
   [[nodiscard]] int priority() const { return fifo_priority(thread); }
 };
-
-Dag dag_of(std::vector<Duration> periods, Criticality criticality = Criticality::Normal) {
-  Dag dag;
-  dag.criticality = criticality;
-  for (const Duration period : periods) {
-    Task &task = dag.tasks.emplace_back();
-    task.period = task.deadline = task.wcet = period;
-  }
-  return dag;
-}
 
 // An engine with one worker: of two jobs in progress, the less urgent one is suspended.
 class EngineLevels : public ::testing::Test {
@@ -84,13 +76,13 @@ class EngineLevels : public ::testing::Test {
 };
 
 TEST_F(EngineLevels, AddedTasksKeepTheOrderOfSuspendedAndRunningJobs) {
-  start({dag_of({100 * kMillisecond}), dag_of({50 * kMillisecond})}, {slow_.body(), fast_.body()});
+  start({make_dag("slow", {{"t", 100}}), make_dag("fast", {{"t", 50}})}, {slow_.body(), fast_.body()});
   begin(0, slow_);
   begin(1, fast_);
   EXPECT_EQ(fast_.priority(), band_.of_level(0));
   EXPECT_EQ(slow_.priority(), band_.of_level(1));
   const Body nothing = [](const Job &) { return Outcome::Finished; };
-  engine_->add_dag(dag_of({kMillisecond, 2 * kMillisecond}), {nothing, nothing});
+  engine_->add_dag(make_dag("added", {{"t", 1}, {"u", 2}}), {nothing, nothing});
   engine_->release(TaskId(2), engine_->now());  // the decision at which the levels change
   EXPECT_EQ(fast_.priority(), band_.of_level(2));
   EXPECT_EQ(slow_.priority(), band_.of_level(3));
@@ -100,7 +92,7 @@ TEST_F(EngineLevels, AddedTasksKeepTheOrderOfSuspendedAndRunningJobs) {
 }
 
 TEST_F(EngineLevels, AnotherPeriodReordersASuspendedJob) {
-  start({dag_of({100 * kMillisecond, 70 * kMillisecond, 50 * kMillisecond})},
+  start({make_dag("d", {{"slow", 100}, {"middle", 70}, {"fast", 50}})},
         {slow_.body(), [](const Job &) { return Outcome::Finished; }, fast_.body()});
   begin(0, slow_);
   begin(2, fast_);
@@ -115,19 +107,21 @@ TEST_F(EngineLevels, AnotherPeriodReordersASuspendedJob) {
 }
 
 TEST_F(EngineLevels, HighModeLowersASuspendedJobOfLowerCriticality) {
-  Dag overrunning = dag_of({5 * kMillisecond}, Criticality::High);
+  Dag overrunning = make_dag("overrunning", {{"t", 5, 5}});
+  Dag critical = make_dag("critical", {{"t", 100}});
+  overrunning.criticality = critical.criticality = Criticality::High;
   overrunning.tasks[0].wcet_low = 100 * kMicrosecond;
   int lowered_to = 0;
-  start({dag_of({10 * kMillisecond}), overrunning, dag_of({100 * kMillisecond}, Criticality::High)},
-        {slow_.body(),
-         [&](const Job &) {
-           const Duration used_before = thread_cpu_now();
-           while (thread_cpu_now() - used_before < kMillisecond) preemption_point();
-           lowered_to = slow_.priority();
-           fast_.begun.set();
-           return Outcome::Finished;
-         },
-         [](const Job &) { return Outcome::Finished; }});
+  start({make_dag("low", {{"t", 10}}), overrunning, critical}, {slow_.body(),
+                                                                [&](const Job &) {
+                                                                  const Duration used_before = thread_cpu_now();
+                                                                  while (thread_cpu_now() - used_before < kMillisecond)
+                                                                    preemption_point();
+                                                                  lowered_to = slow_.priority();
+                                                                  fast_.begun.set();
+                                                                  return Outcome::Finished;
+                                                                },
+                                                                [](const Job &) { return Outcome::Finished; }});
   begin(0, slow_);
   EXPECT_EQ(slow_.priority(), band_.of_level(1));
   begin(1, fast_);

@@ -16,6 +16,7 @@
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -33,15 +34,8 @@ class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
   static PreemptionMode mode() { return GetParam(); }
 
   void start(std::vector<Body> bodies) {
-    Workload workload;
-    workload.policy = PolicyKind::Fixed;
-    workload.dags.emplace_back();
-    for (std::size_t t = 0; t < bodies.size(); ++t) {
-      Task task;
-      task.period = task.deadline = task.wcet = kSecond;
-      task.priority = -static_cast<int>(t);
-      workload.dags[0].tasks.push_back(task);
-    }
+    Workload workload = redag::testing::ladder(bodies.size());
+    for (Task &task : workload.dags[0].tasks) task.priority = -*task.priority;
     EngineOptions options;
     options.config = make_config(Mode{mode(), {}}, 1, workload.policy, band_, 4);
     options.band = band_;

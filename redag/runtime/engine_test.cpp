@@ -15,27 +15,13 @@
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_testing/allocation_counter.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::runtime {
 namespace {
 
 using sched::Outcome;
-
-// One DAG of independent timer tasks. Task t has priority t: the last one is the most urgent.
-Workload ladder(std::size_t tasks) {
-  Workload workload;
-  workload.policy = PolicyKind::Fixed;
-  workload.dags.emplace_back();
-  for (std::size_t t = 0; t < tasks; ++t) {
-    Task task;
-    task.name = "t" + std::to_string(t);
-    task.period = task.deadline = kSecond;
-    task.wcet = kSecond;
-    task.priority = static_cast<int>(t);
-    workload.dags[0].tasks.push_back(task);
-  }
-  return workload;
-}
+using testing::ladder;
 
 // An engine whose jobs write into one log: "+t" when a body begins, "-t" when it ends.
 class Bench {

@@ -7,16 +7,13 @@
 #include <array>
 
 #include "redag/model/demand.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::runtime {
 namespace {
 
 Task timer(Duration period, Duration offset = 0, Duration jitter = 0) {
-  Task task;
-  task.period = period;
-  task.offset = offset;
-  task.jitter = jitter;
-  return task;
+  return testing::tick_task({.period = period, .offset = offset, .jitter = jitter});
 }
 
 std::vector<Release> due(ReleaseHeap &heap, Time now, std::size_t room = 100) {

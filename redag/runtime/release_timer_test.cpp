@@ -7,16 +7,12 @@
 #include <array>
 
 #include "redag/runtime/clock.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::runtime {
 namespace {
 
-Dag one_timer(Duration period) {
-  Dag dag;
-  dag.tasks.emplace_back();
-  dag.tasks[0].period = period;
-  return dag;
-}
+Dag one_timer(Duration period) { return testing::tick_dag("d", {{"t", period}}); }
 
 struct Collector {
   std::vector<Release> releases;

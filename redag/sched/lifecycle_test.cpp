@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::sched {
 namespace {

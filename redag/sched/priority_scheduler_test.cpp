@@ -12,8 +12,8 @@
 
 #include "redag/base/rng.hpp"
 #include "redag_testing/allocation_counter.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/manual_workers.hpp"
-#include "redag_testing/timeline.hpp"
 
 namespace redag::sched {
 namespace {
@@ -440,12 +440,7 @@ TEST(PriorityScheduler, CountsJobsThatWaitForAThread) {
   EXPECT_EQ(scheduler.thread_waits(), 1U);
 }
 
-Task lone_task(Duration period) {
-  Task task;
-  task.wcet = 1;
-  task.period = task.deadline = period;
-  return task;
-}
+Task lone_task(Duration period) { return testing::tick_task({.period = period, .deadline = period}); }
 
 // Tasks and DAGs with edges and groups come and go while jobs run. Memory grows only to what exists at one time.
 TEST(PriorityScheduler, ReusedIdsKeepMemoryFlat) {

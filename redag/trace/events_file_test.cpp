@@ -10,7 +10,7 @@
 
 #include "redag/base/rng.hpp"
 #include "redag/trace/run_info_json.hpp"
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::trace {
 namespace {

@@ -13,7 +13,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::trace {
 namespace {

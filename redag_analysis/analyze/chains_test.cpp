@@ -14,6 +14,7 @@
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -187,23 +188,8 @@ TEST(ChainProperty, OneWorkerWithThePriorityDiscount) {
 }
 
 Workload producer_and_consumer(std::uint32_t workers) {
-  Workload workload;
-  workload.name = "w";
-  workload.platform.workers = workers;
-  workload.policy = PolicyKind::Fixed;
-  int priority = 2;
-  for (const Duration wcet : {9, 1}) {
-    Task task;
-    task.name = "t";
-    task.wcet = task.bcet = wcet;
-    task.period = task.deadline = 10;
-    task.priority = priority--;
-    task.offset = wcet == 1 && workers > 1 ? 8 : 0;
-    Dag dag;
-    dag.name = "d" + std::to_string(wcet);
-    dag.tasks.push_back(task);
-    workload.dags.push_back(dag);
-  }
+  Workload workload = testing::independent({{9, 10}, {1, 10}}, workers, PolicyKind::Fixed);
+  if (workers > 1) workload.dags[1].tasks[0].offset = 8;
   return workload;
 }
 
@@ -212,14 +198,14 @@ TEST(Chain, ThePriorityDiscountNeedsOneWorker) {
   const Workload workload = producer_and_consumer(2);
   const std::vector<TaskId> chain{TaskId(0U), TaskId(1U)};
   const AnalysisPlatform platform = platform_of(workload);
-  const TaskSet task_set = compile(workload, platform).value();
+  const TaskSet task_set = testing::compiled(workload);
   const auto bound = std::get<ChainBound>(chain_bound(task_set, chain, std::get<Bound>(dag_bounded().apply(task_set))));
   EXPECT_EQ(bound.reaction(), 10 + 9 + 10 + 1);
   EXPECT_FALSE(bound.one_worker);
   EXPECT_EQ(observed_reaction(simulated(workload, platform, 200, {}), chain), 29);
 
   const Workload alone = producer_and_consumer(1);
-  const TaskSet one = compile(alone, platform_of(alone)).value();
+  const TaskSet one = testing::compiled(alone);
   const auto discounted = std::get<ChainBound>(chain_bound(one, chain, std::get<Bound>(rta_preemptive().apply(one))));
   EXPECT_EQ(discounted.one_worker, 10 + 10 + 10);  // T_1, max(R_1, T_2), R_2
   EXPECT_EQ(discounted.sum, 39);
@@ -234,7 +220,7 @@ TEST(Chain, EdgesMakeOneSegment) {
   consumer.name = "consumer";
   workload.dags[0].tasks.push_back(consumer);
   workload.dags.pop_back();
-  const TaskSet task_set = compile(workload, platform_of(workload)).value();
+  const TaskSet task_set = testing::compiled(workload);
   const std::vector<TaskId> chain{TaskId(0U), TaskId(1U)};
   const auto bound = std::get<ChainBound>(chain_bound(task_set, chain, std::get<Bound>(dag_bounded().apply(task_set))));
   ASSERT_EQ(bound.segments.size(), 1U);
@@ -243,7 +229,7 @@ TEST(Chain, EdgesMakeOneSegment) {
 
 TEST(Chain, WithoutABoundThereIsNone) {
   const Workload workload = producer_and_consumer(1);
-  const TaskSet task_set = compile(workload, platform_of(workload)).value();
+  const TaskSet task_set = testing::compiled(workload);
   const std::vector<TaskId> chain{TaskId(0U)};
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(chain_bound(task_set, chain, Bound{})));
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(chain_bound(task_set, {}, Bound{})));

@@ -14,41 +14,21 @@
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_analysis/one_worker/utilization.hpp"
 #include "redag_testing/bound_property.hpp"
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
 
-struct Numbers {
-  Duration wcet;
-  Duration period;
-  Duration deadline = 0;  // 0: the period
-};
+using testing::compiled;
+using testing::Load;
 
-Workload independent(const std::vector<Numbers> &tasks, PolicyKind policy = PolicyKind::RateMonotonic) {
-  Workload workload;
-  workload.name = "example";
-  workload.policy = policy;
-  Dag dag;
-  dag.name = "d";
-  for (const Numbers &numbers : tasks) {
-    Task task;
-    task.name = "t" + std::to_string(dag.tasks.size());
-    task.wcet = task.bcet = numbers.wcet;
-    task.period = numbers.period;
-    task.deadline = numbers.deadline > 0 ? numbers.deadline : numbers.period;
-    task.priority = 100 - static_cast<int>(dag.tasks.size());
-    dag.tasks.push_back(task);
+Workload in_one_dag(const std::vector<Load> &loads, PolicyKind policy = PolicyKind::RateMonotonic) {
+  std::vector<testing::TestTask> tasks;
+  for (const Load &load : loads) {
+    const std::string name = "t" + std::to_string(tasks.size());
+    tasks.push_back({.name = name, .period = load.period, .wcet = load.wcet, .deadline = load.deadline});
   }
-  workload.dags.push_back(dag);
-  return workload;
-}
-
-TaskSet compiled(const Workload &workload, sched::Preemption preemption, AnalysisPlatform platform = {}) {
-  platform.preemption = preemption;
-  const auto task_set = compile(workload, platform);
-  EXPECT_TRUE(task_set) << to_string(task_set.error());
-  return *task_set;
+  return testing::make_workload({testing::tick_dag("d", tasks)}, 1, PreemptionMode::Auto, policy);
 }
 
 std::vector<Duration> responses(const Method &method, const TaskSet &task_set) {
@@ -59,8 +39,8 @@ std::vector<Duration> responses(const Method &method, const TaskSet &task_set) {
   return found;
 }
 
-std::vector<Duration> responses(const Method &method, const std::vector<Numbers> &tasks, sched::Preemption preemption) {
-  return responses(method, compiled(independent(tasks), preemption));
+std::vector<Duration> responses(const Method &method, const std::vector<Load> &tasks, sched::Preemption preemption) {
+  return responses(method, compiled(in_one_dag(tasks), preemption));
 }
 
 bool accepts(const Method &method, const TaskSet &task_set) {
@@ -80,9 +60,9 @@ TEST(Examples, BurnsWellings) {
 
 // J. Lehoczky, L. Sha, Y. Ding, RTSS 1989, the example of the exact criterion: accepted although U = 0.953.
 TEST(Examples, LehoczkyShaDing) {
-  const std::vector<Numbers> tasks = {{40, 100}, {40, 150}, {100, 350}};
+  const std::vector<Load> tasks = {{40, 100}, {40, 150}, {100, 350}};
   EXPECT_EQ(responses(rta_preemptive(), tasks, kFull), (Durations{40, 80, 300}));
-  const TaskSet task_set = compiled(independent(tasks), kFull);
+  const TaskSet task_set = compiled(in_one_dag(tasks), kFull);
   EXPECT_TRUE(accepts(exact_points(), task_set));
   EXPECT_FALSE(accepts(liu_layland(), task_set));
   EXPECT_FALSE(accepts(hyperbolic(), task_set));
@@ -90,7 +70,7 @@ TEST(Examples, LehoczkyShaDing) {
 
 // J. Lehoczky, RTSS 1990: with deadlines above the period the first job is not the worst: 114, 102, 116, 104, 118, ...
 TEST(Examples, LehoczkyArbitraryDeadlines) {
-  Workload workload = independent({{26, 70}, {62, 100, 200}});
+  Workload workload = in_one_dag({{26, 70}, {62, 100, 200}});
   workload.dags[0].tasks[1].overrun = Overrun::Queue;
   workload.dags[0].tasks[1].queue_depth = 2;
   const TaskSet task_set = compiled(workload, kFull);
@@ -108,8 +88,8 @@ TEST(Examples, LehoczkyArbitraryDeadlines) {
 // R. Davis, A. Burns, R. Bril, J. Lukkien, RTS 35(3), 2007: the flaw of the old CAN analysis. R = 2, 3, 3.5 in dense
 // time. In units of 1/1000 blocking is one unit less, because its cause starts at an instant strictly before.
 TEST(Examples, DavisBurnsBrilLukkien) {
-  const std::vector<Numbers> tasks = {{1000, 2500, 2500}, {1000, 3500, 3250}, {1000, 3500, 3250}};
-  Workload workload = independent(tasks);
+  const std::vector<Load> tasks = {{1000, 2500, 2500}, {1000, 3500, 3250}, {1000, 3500, 3250}};
+  Workload workload = in_one_dag(tasks);
   EXPECT_EQ(responses(rta_nonpreemptive(), compiled(workload, kNone)), (Durations{1999, 3500, 3500})) << "two equals";
   workload.ties = Ties::Fixed;
   const TaskSet task_set = compiled(workload, kNone);
@@ -119,23 +99,23 @@ TEST(Examples, DavisBurnsBrilLukkien) {
 
 // E. Bini, G. Buttazzo, G. Buttazzo 2003: above the limit of Liu and Layland, within the hyperbolic bound.
 TEST(Examples, HyperbolicBeyondLiuLayland) {
-  const TaskSet task_set = compiled(independent({{50, 100}, {43, 130}}), kFull);
+  const TaskSet task_set = compiled(in_one_dag({{50, 100}, {43, 130}}), kFull);
   EXPECT_GT(task_set.utilization, 0.8285);
   EXPECT_FALSE(accepts(liu_layland(), task_set));
   EXPECT_TRUE(accepts(hyperbolic(), task_set));
 }
 
 TEST(Examples, HarmonicPeriodsFillTheProcessor) {
-  const TaskSet full = compiled(independent({{1, 3}, {1, 6}, {6, 12}}), kFull);
+  const TaskSet full = compiled(in_one_dag({{1, 3}, {1, 6}, {6, 12}}), kFull);
   EXPECT_TRUE(accepts(harmonic_chains(), full)) << "U = 1 exactly, in thirds";
   EXPECT_FALSE(accepts(hyperbolic(), full));
-  const TaskSet above = compiled(independent({{1, 3}, {1, 6}, {7, 12}}), kFull);
+  const TaskSet above = compiled(in_one_dag({{1, 3}, {1, 6}, {7, 12}}), kFull);
   EXPECT_FALSE(accepts(harmonic_chains(), above));
 }
 
 // By hand: a job of 20 that started just before holds the only worker for 19 more.
 TEST(Examples, RunToCompletionBlocksTheMostUrgent) {
-  const std::vector<Numbers> tasks = {{1, 10}, {20, 100}};
+  const std::vector<Load> tasks = {{1, 10}, {20, 100}};
   EXPECT_EQ(responses(rta_nonpreemptive(), tasks, kNone)[0], -1) << "20 > 10: jobs would be skipped";
   EXPECT_EQ(responses(rta_nonpreemptive(), {{1, 30}, {20, 100}}, kNone)[0], 20);
   EXPECT_EQ(responses(paper_rta(), {{1, 30}, {20, 100}}, kNone)[0], 1) << "what the paper's equation says";
@@ -144,7 +124,7 @@ TEST(Examples, RunToCompletionBlocksTheMostUrgent) {
 
 // Regions of 4 in a job of 10: 3 units of blocking, and the last region of 2 is not interrupted.
 TEST(Examples, DeferredPreemption) {
-  Workload workload = independent({{2, 20}, {10, 40}});
+  Workload workload = in_one_dag({{2, 20}, {10, 40}});
   workload.dags[0].tasks[1].region = 4;
   const TaskSet task_set = compiled(workload, sched::Preemption::Cooperative);
   EXPECT_EQ(task_set.tasks[1].last_region, 2);
@@ -152,13 +132,13 @@ TEST(Examples, DeferredPreemption) {
 }
 
 TEST(Examples, ThePapersEquationsAreOptimistic) {
-  const TaskSet repeats = compiled(independent({{1, 4}, {5, 20}}), kFull);
+  const TaskSet repeats = compiled(in_one_dag({{1, 4}, {5, 20}}), kFull);
   EXPECT_EQ(responses(paper_interference(), repeats), (Durations{1, 6}));
   EXPECT_EQ(responses(rta_preemptive(), repeats), (Durations{1, 7}));
   EXPECT_NE(std::get<Bound>(paper_interference().apply(repeats)).unsound, "");
   EXPECT_EQ(std::get<Bound>(paper_rta().apply(repeats)).unsound, "");
 
-  const TaskSet ties = compiled(independent({{5, 10}, {5, 10}}), kFull);
+  const TaskSet ties = compiled(in_one_dag({{5, 10}, {5, 10}}), kFull);
   EXPECT_EQ(responses(paper_rta(), ties), (Durations{5, 5}));
   EXPECT_EQ(responses(rta_preemptive(), ties), (Durations{10, 10}));
   EXPECT_NE(std::get<Bound>(paper_rta().apply(ties)).unsound, "");
@@ -166,15 +146,15 @@ TEST(Examples, ThePapersEquationsAreOptimistic) {
 
 // U = 1 fits; 13 units due within 12 do not, nor does a blocking job that is one unit too long.
 TEST(Examples, EdfDemand) {
-  EXPECT_TRUE(accepts(edf_demand(), compiled(independent({{2, 4}, {7, 14}}, PolicyKind::Edf), kFull)));
-  EXPECT_FALSE(accepts(edf_demand(), compiled(independent({{2, 4}, {7, 14, 12}}, PolicyKind::Edf), kFull)));
-  EXPECT_TRUE(accepts(edf_demand_nonpreemptive(), compiled(independent({{1, 2}, {2, 10}}, PolicyKind::Edf), kNone)));
-  EXPECT_FALSE(accepts(edf_demand_nonpreemptive(), compiled(independent({{1, 2}, {3, 10}}, PolicyKind::Edf), kNone)));
+  EXPECT_TRUE(accepts(edf_demand(), compiled(in_one_dag({{2, 4}, {7, 14}}, PolicyKind::Edf), kFull)));
+  EXPECT_FALSE(accepts(edf_demand(), compiled(in_one_dag({{2, 4}, {7, 14, 12}}, PolicyKind::Edf), kFull)));
+  EXPECT_TRUE(accepts(edf_demand_nonpreemptive(), compiled(in_one_dag({{1, 2}, {2, 10}}, PolicyKind::Edf), kNone)));
+  EXPECT_FALSE(accepts(edf_demand_nonpreemptive(), compiled(in_one_dag({{1, 2}, {3, 10}}, PolicyKind::Edf), kNone)));
 }
 
 // Groups: the holder finishes at the priority of the waiting task, and delays the tasks between the two.
 TEST(Examples, BlockingByAGroupReachesTheTasksBetween) {
-  Workload workload = independent({{1, 20}, {2, 40}, {6, 80}});
+  Workload workload = in_one_dag({{1, 20}, {2, 40}, {6, 80}});
   workload.dags[0].tasks[0].group = workload.dags[0].tasks[2].group = "shared";
   const TaskSet task_set = compiled(workload, kFull);
   EXPECT_EQ(responses(rta_preemptive(), task_set), (Durations{1 + 5, 2 + 1 + 5, 6 + 1 + 2}));
@@ -188,7 +168,7 @@ TEST(Examples, OverheadsAreCharged) {
   platform.release_overhead = 1;
   platform.dispatch_overhead = 2;
   platform.preempt_overhead = 3;
-  const TaskSet task_set = compiled(independent({{4, 30}, {10, 60}}), kFull, platform);
+  const TaskSet task_set = compiled(in_one_dag({{4, 30}, {10, 60}}), platform);
   EXPECT_EQ(responses(rta_preemptive(), task_set), (Durations{10, 26}));
   const Bound bound = std::get<Bound>(rta_preemptive().apply(task_set));
   EXPECT_EQ(bound.tasks[1].sum(Term::Kind::Overhead), 6);
@@ -197,12 +177,12 @@ TEST(Examples, OverheadsAreCharged) {
 }
 
 TEST(Examples, DagsOnOneWorker) {
-  Workload workload = testing::make_workload({testing::make_dag("fast", {{.name = "a", .period_ms = 20, .wcet_ms = 2},
-                                                                         {.name = "b", .wcet_ms = 1, .after = {0}}}),
-                                              testing::make_dag("slow", {{.name = "c", .period_ms = 100, .wcet_ms = 5},
-                                                                         {.name = "d", .wcet_ms = 9, .after = {0}},
-                                                                         {.name = "e", .wcet_ms = 4, .after = {0}}})},
-                                             1);
+  Workload workload = testing::make_workload(
+      {testing::make_dag("fast", {{.name = "a", .period = 20, .wcet = 2}, {.name = "b", .wcet = 1, .after = {0}}}),
+       testing::make_dag("slow", {{.name = "c", .period = 100, .wcet = 5},
+                                  {.name = "d", .wcet = 9, .after = {0}},
+                                  {.name = "e", .wcet = 4, .after = {0}}})},
+      1);
   const TaskSet full = compiled(workload, kFull);
   ASSERT_EQ(full.units.size(), 2U);
   EXPECT_EQ(full.units[1].volume, 18 * kMillisecond);

@@ -12,7 +12,7 @@
 #include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_analysis/many_workers/global_sequential.hpp"
 #include "redag_testing/bound_property.hpp"
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -67,8 +67,8 @@ TEST(Executors, OursHasAllMethodsAndPeersHaveTheirs) {
 // Both windows and work limit how much others can do: each bound is somewhere the tightest.
 TEST(Executors, TheTightestOfSeveralIsTaken) {
   using testing::make_dag;
-  const Workload workload = testing::make_workload({make_dag("fast", {{.name = "f", .period_ms = 100, .wcet_ms = 2}}),
-                                                    make_dag("slow", {{.name = "s", .period_ms = 120, .wcet_ms = 20}})},
+  const Workload workload = testing::make_workload({make_dag("fast", {{.name = "f", .period = 100, .wcet = 2}}),
+                                                    make_dag("slow", {{.name = "s", .period = 120, .wcet = 20}})},
                                                    1);
   for (const char *name : {"ste", "events"}) {
     const TaskSet task_set = compile_for(executor(name), workload, platform_of(workload)).value();

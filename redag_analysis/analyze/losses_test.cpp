@@ -13,6 +13,7 @@
 #include "redag_analysis/many_workers/global_sequential.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -87,15 +88,8 @@ TEST(Losses, SeveralWorkersGroups) {
 }
 
 Workload one_task() {
-  Workload workload;
-  Task task;
-  task.name = "t";
-  task.period = task.deadline = 10 * kMillisecond;
-  task.wcet = 2 * kMillisecond;
-  task.jitter = 5;
-  workload.dags.push_back(Dag{});
-  workload.dags.back().name = "d";
-  workload.dags.back().tasks.push_back(task);
+  Workload workload = testing::make_workload({testing::make_dag("d", {{"t", 10, 2}})});
+  workload.dags[0].tasks[0].jitter = 5;
   return workload;
 }
 

@@ -13,6 +13,7 @@
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_analysis/one_worker/utilization.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -22,20 +23,14 @@ using testing::BoundCaseLimits;
 
 // Independent tasks of three periods that use half of the workers.
 TaskSet many_tasks(std::size_t count, std::uint32_t workers, Ties ties = Ties::Share) {
-  Workload workload;
-  workload.ties = ties;
-  workload.platform = Platform{workers, PreemptionMode::Os};
+  std::vector<testing::Load> loads;
   for (std::size_t i = 0; i < count; ++i) {
-    Task task;
-    task.name = "t";
-    task.period = task.deadline = Duration{10} * static_cast<Duration>(i % 3 + 1) * kMillisecond;
-    task.wcet = task.bcet = task.period * workers / 2 / static_cast<Duration>(count);
-    Dag dag;
-    dag.name = "d" + std::to_string(i);
-    dag.tasks = {task};
-    workload.dags.push_back(dag);
+    const Duration period = Duration{10} * static_cast<Duration>(i % 3 + 1) * kMillisecond;
+    loads.push_back({period * workers / 2 / static_cast<Duration>(count), period});
   }
-  return compile(workload, platform_of(workload)).value();
+  Workload workload = testing::independent(loads, workers);
+  workload.ties = ties;
+  return testing::compiled(workload);
 }
 
 AnalyzeOptions itemising() {

@@ -4,8 +4,7 @@
 #include "redag_analysis/core/jobs_in_progress.hpp"
 
 #include <gtest/gtest.h>
-
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -20,14 +19,14 @@ std::size_t most(const std::vector<TestTask> &tasks) {
 }
 
 TEST(JobsInProgress, TasksThatFollowEachOtherAreNeverInProgressTogether) {
-  EXPECT_EQ(most({{.name = "a", .period_ms = 10}}), 1U);
-  EXPECT_EQ(most({{.name = "a", .period_ms = 10}, {.name = "b", .after = {0}}, {.name = "c", .after = {1}}}), 1U);
-  EXPECT_EQ(most({{.name = "a", .period_ms = 10}, {.name = "b", .period_ms = 10}}), 2U) << "no edge";
+  EXPECT_EQ(most({{.name = "a", .period = 10}}), 1U);
+  EXPECT_EQ(most({{.name = "a", .period = 10}, {.name = "b", .after = {0}}, {.name = "c", .after = {1}}}), 1U);
+  EXPECT_EQ(most({{.name = "a", .period = 10}, {.name = "b", .period = 10}}), 2U) << "no edge";
 }
 
 // The graph a -> {b, c} -> d and b -> e. The largest antichains are {b, c} and {c, e}; d follows b and c but not e.
 TEST(JobsInProgress, TheWidthOfAGraph) {
-  const std::vector<TestTask> graph = {{.name = "a", .period_ms = 10},
+  const std::vector<TestTask> graph = {{.name = "a", .period = 10},
                                        {.name = "b", .after = {0}},
                                        {.name = "c", .after = {0}},
                                        {.name = "d", .after = {1, 2}},
@@ -40,9 +39,8 @@ TEST(JobsInProgress, TheWidthOfAGraph) {
 
 // A fused task has the grid of its slowest predecessor, which it follows. Another offset is another grid.
 TEST(JobsInProgress, OneChainAGrid) {
-  EXPECT_EQ(most({{.name = "fast", .period_ms = 5}, {.name = "slow", .period_ms = 20}, {.name = "f", .after = {0, 1}}}),
-            2U);
-  EXPECT_EQ(most({{.name = "a", .period_ms = 20}, {.name = "b", .period_ms = 20, .after = {0}, .offset_ms = 1}}), 2U);
+  EXPECT_EQ(most({{.name = "fast", .period = 5}, {.name = "slow", .period = 20}, {.name = "f", .after = {0, 1}}}), 2U);
+  EXPECT_EQ(most({{.name = "a", .period = 20}, {.name = "b", .period = 20, .after = {0}, .offset = 1}}), 2U);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@
 #include "redag_analysis/many_workers/global_sequential.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_testing/bound_property.hpp"
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -138,9 +138,7 @@ TaskSet compiled(const Workload &workload, std::uint32_t workers = 1, std::uint3
   AnalysisPlatform platform;
   platform.workers = workers;
   platform.max_started = threads;
-  const auto task_set = compile(workload, platform);
-  EXPECT_TRUE(task_set) << to_string(task_set.error());
-  return task_set.value_or(TaskSet{});
+  return testing::compiled(workload, platform);
 }
 
 Bound bound_of(const Method &method, const TaskSet &task_set) {
@@ -161,11 +159,10 @@ std::optional<Duration> milliseconds(const ResponseBound &bound) {
 // A camera every 10 ms (R = 1) and a lidar every 40 ms (R = 5) are fused. A picture comes within 10 + 1 of the last
 // one, and therefore only the first wait counts: the fusion is ready as soon as the lidar's data are there.
 TEST(RateEdges, DataOfAFastPredecessorAreThereWhenTheSlowOneEnds) {
-  Workload workload =
-      make_workload({make_dag("d", {{.name = "camera", .period_ms = 10},
-                                    {.name = "lidar", .period_ms = 40, .wcet_ms = 4},
-                                    {.name = "fuse", .wcet_ms = 3, .after = {0, 1}, .deadline_ms = 5}})},
-                    1);
+  Workload workload = make_workload({make_dag("d", {{.name = "camera", .period = 10},
+                                                    {.name = "lidar", .period = 40, .wcet = 4},
+                                                    {.name = "fuse", .wcet = 3, .after = {0, 1}, .deadline = 5}})},
+                                    1);
   EXPECT_EQ(milliseconds(bound_of(rta_preemptive(), compiled(workload)).tasks[1]), 8) << "fuse is its equal";
   workload.ties = Ties::Fixed;
   const TaskSet task_set = compiled(workload);
@@ -182,8 +179,8 @@ TEST(RateEdges, DataOfAFastPredecessorAreThereWhenTheSlowOneEnds) {
 
 // b is released 3 before its predecessor, which answers after 2. It waits 5 in its first period, and thus in all.
 TEST(RateEdges, ATimerWaitsForDataOfAnotherOffset) {
-  Workload workload = make_workload({make_dag("d", {{.name = "a", .period_ms = 20, .wcet_ms = 2, .offset_ms = 3},
-                                                    {.name = "b", .period_ms = 20, .wcet_ms = 4, .after = {0}}})},
+  Workload workload = make_workload({make_dag("d", {{.name = "a", .period = 20, .wcet = 2, .offset = 3},
+                                                    {.name = "b", .period = 20, .wcet = 4, .after = {0}}})},
                                     1);
   workload.ties = Ties::Fixed;  // with shared ties b would also delay a
   const TaskSet task_set = compiled(workload);
@@ -195,11 +192,10 @@ TEST(RateEdges, ATimerWaitsForDataOfAnotherOffset) {
 // The fast timer's jobs are skipped for lack of data by design. The others are bounded with as many of its jobs as can
 // become ready.
 TEST(RateEdges, ATimerThatIsFasterThanItsDataIsNotBoundedAndOthersAre) {
-  const TaskSet task_set =
-      compiled(make_workload({make_dag("d", {{.name = "a", .period_ms = 20, .wcet_ms = 2},
-                                             {.name = "b", .period_ms = 10, .wcet_ms = 1, .after = {0}}}),
-                              make_dag("e", {{.name = "c", .period_ms = 40, .wcet_ms = 1}})},
-                             1));
+  const TaskSet task_set = compiled(make_workload(
+      {make_dag("d", {{.name = "a", .period = 20, .wcet = 2}, {.name = "b", .period = 10, .wcet = 1, .after = {0}}}),
+       make_dag("e", {{.name = "c", .period = 40, .wcet = 1}})},
+      1));
   const Bound bound = bound_of(rta_preemptive(), task_set);
   EXPECT_FALSE(bound.tasks[1].response);
   EXPECT_THAT(bound.tasks[1].absent, ::testing::HasSubstr("skipped by design"));
@@ -212,9 +208,9 @@ TEST(RateEdges, ATimerThatIsFasterThanItsDataIsNotBoundedAndOthersAre) {
 TEST(RateEdges, WhatCannotBindIsNoObstacle) {
   const auto workload = [](std::uint32_t max_active) {
     return make_workload({make_dag("d",
-                                   {{.name = "a", .period_ms = 10},
+                                   {{.name = "a", .period = 10},
                                     {.name = "b", .after = {0}},
-                                    {.name = "c", .period_ms = 30},
+                                    {.name = "c", .period = 30},
                                     {.name = "e", .after = {2, 0}}},
                                    max_active)},
                          2);
@@ -233,7 +229,7 @@ TEST(RateEdges, WhatCannotBindIsNoObstacle) {
 
 TEST(RateEdges, OtherMethodsRefuseThem) {
   const Workload workload =
-      make_workload({make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 10, .after = {0}}})}, 1);
+      make_workload({make_dag("d", {{.name = "a", .period = 5}, {.name = "b", .period = 10, .after = {0}}})}, 1);
   constexpr std::string_view kKnow[] = {"rta_preemptive", "dag_one_worker_preemptive", "melani",    "dag_bounded",
                                         "guan",           "bertogna_cirinei",          "dag_shapes"};
   for (const std::uint32_t workers : {1U, 2U}) {

@@ -10,11 +10,13 @@
 #include "redag_analysis/one_worker/edf_demand.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_analysis/one_worker/utilization.hpp"
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
 
+using redag::testing::compiled;
 using redag::testing::make_dag;
 using redag::testing::make_workload;
 using ::testing::ElementsAre;
@@ -22,17 +24,11 @@ using ::testing::HasSubstr;
 
 // Two DAGs: a -> b, a -> c at 20 ms; x alone at 5 ms.
 Workload two_dags() {
-  return make_workload({make_dag("graph", {{.name = "a", .period_ms = 20, .wcet_ms = 2},
-                                           {.name = "b", .wcet_ms = 3, .after = {0}},
-                                           {.name = "c", .wcet_ms = 1, .after = {0}}}),
-                        make_dag("single", {{.name = "x", .period_ms = 5}})},
+  return make_workload({make_dag("graph", {{.name = "a", .period = 20, .wcet = 2},
+                                           {.name = "b", .wcet = 3, .after = {0}},
+                                           {.name = "c", .wcet = 1, .after = {0}}}),
+                        make_dag("single", {{.name = "x", .period = 5}})},
                        1);
-}
-
-TaskSet compiled(const Workload &workload, const AnalysisPlatform &platform) {
-  const auto task_set = compile(workload, platform);
-  EXPECT_TRUE(task_set) << to_string(task_set.error());
-  return task_set.value_or(TaskSet{});
 }
 
 AnalysisPlatform mode(sched::Preemption preemption, std::uint32_t workers = 1) {
@@ -64,8 +60,7 @@ TEST(TaskSet, AGraphOfOneRateIsOneUnit) {
 
 TEST(TaskSet, RatesThatNoEdgeJoinsAreUnitsOfTheirOwn) {
   const Workload workload = make_workload(
-      {make_dag("mixed", {{.name = "a", .period_ms = 20}, {.name = "b", .after = {0}}, {.name = "x", .period_ms = 5}})},
-      1);
+      {make_dag("mixed", {{.name = "a", .period = 20}, {.name = "b", .after = {0}}, {.name = "x", .period = 5}})}, 1);
   const TaskSet task_set = compiled(workload, mode(sched::Preemption::Full));
   ASSERT_EQ(task_set.units.size(), 2U);
   EXPECT_THAT(task_set.units[0].tasks, ElementsAre(0, 1));
@@ -75,11 +70,11 @@ TEST(TaskSet, RatesThatNoEdgeJoinsAreUnitsOfTheirOwn) {
 
 // The tasks that follow the one waiting task belong to its unit, which waits for data of others.
 TEST(TaskSet, UnitsAreCutAtRateEdges) {
-  const Workload workload = make_workload({make_dag("d", {{.name = "fast", .period_ms = 5},
-                                                          {.name = "slow", .period_ms = 20, .offset_ms = 3},
+  const Workload workload = make_workload({make_dag("d", {{.name = "fast", .period = 5},
+                                                          {.name = "slow", .period = 20, .offset = 3},
                                                           {.name = "fuse", .after = {0, 1}},
                                                           {.name = "track", .after = {2}},
-                                                          {.name = "late", .period_ms = 20, .after = {1}}})},
+                                                          {.name = "late", .period = 20, .after = {1}}})},
                                           1);
   const TaskSet task_set = compiled(workload, mode(sched::Preemption::Full));
   ASSERT_EQ(task_set.units.size(), 4U);
@@ -97,8 +92,8 @@ TEST(TaskSet, UnitsAreCutAtRateEdges) {
 
 // `join` brings a second waiting task into the part; therefore the part is not released as a whole.
 TEST(TaskSet, SeveralTasksThatWaitAreUnitsOfTheirOwn) {
-  const Workload workload = make_workload({make_dag("d", {{.name = "fast", .period_ms = 5},
-                                                          {.name = "slow", .period_ms = 20},
+  const Workload workload = make_workload({make_dag("d", {{.name = "fast", .period = 5},
+                                                          {.name = "slow", .period = 20},
                                                           {.name = "b", .after = {0, 1}},
                                                           {.name = "c", .after = {0, 1}},
                                                           {.name = "join", .after = {2, 3}}})},
@@ -186,8 +181,8 @@ TEST(NotApplicable, OneWorkerBounds) {
 // wait.
 TEST(NotApplicable, MaxActiveOverSeveralUnits) {
   const auto workload = [](std::uint32_t max_active) {
-    return make_workload({make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 50}}, max_active),
-                          make_dag("e", {{.name = "c", .period_ms = 10}})},
+    return make_workload({make_dag("d", {{.name = "a", .period = 5}, {.name = "b", .period = 50}}, max_active),
+                          make_dag("e", {{.name = "c", .period = 10}})},
                          1);
   };
   EXPECT_THAT(refusal(rta_preemptive(), workload(1), mode(sched::Preemption::Full)), HasSubstr("max_active"));
@@ -196,16 +191,16 @@ TEST(NotApplicable, MaxActiveOverSeveralUnits) {
 }
 
 TEST(NotApplicable, GroupsInCooperativeMode) {
-  Workload workload = make_workload({make_dag("d", {{.name = "a", .period_ms = 5, .group = "g"},
-                                                    {.name = "b", .period_ms = 50, .wcet_ms = 4, .group = "g"}})},
-                                    1);
+  Workload workload = make_workload(
+      {make_dag("d", {{.name = "a", .period = 5, .group = "g"}, {.name = "b", .period = 50, .wcet = 4, .group = "g"}})},
+      1);
   workload.dags[0].tasks[1].region = kMillisecond;
   EXPECT_THAT(refusal(rta_deferred(), workload, mode(sched::Preemption::Cooperative)), HasSubstr("groups"));
   EXPECT_EQ(refusal(rta_nonpreemptive(), workload, mode(sched::Preemption::None)), "");
 }
 
 TEST(NotApplicable, UtilizationNeedsTheOrderByRate) {
-  Workload workload = make_workload({make_dag("d", {{.name = "a", .period_ms = 5}, {.name = "b", .period_ms = 50}})}, 1,
+  Workload workload = make_workload({make_dag("d", {{.name = "a", .period = 5}, {.name = "b", .period = 50}})}, 1,
                                     PreemptionMode::Os, PolicyKind::Fixed);
   workload.dags[0].tasks[1].priority = 7;
   const AnalysisPlatform full = mode(sched::Preemption::Full);

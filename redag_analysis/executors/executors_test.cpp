@@ -5,20 +5,12 @@
 
 #include <gtest/gtest.h>
 
+#include "redag_testing/builders.hpp"
+
 namespace redag::executors {
 namespace {
 
-Workload two_timers() {
-  Task task;
-  task.wcet = 1;
-  task.period = task.deadline = 100;
-  Task faster = task;
-  faster.period = faster.deadline = 10;
-  Workload workload;
-  workload.dags.resize(1);
-  workload.dags[0].tasks = {task, faster};
-  return workload;
-}
+Workload two_timers() { return testing::make_workload({testing::tick_dag("d", {{"a", 100}, {"b", 10}})}); }
 
 TEST(Executors, AreFoundByNameOursFirst) {
   EXPECT_EQ(all().front().name, "redag");

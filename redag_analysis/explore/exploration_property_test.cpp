@@ -23,13 +23,8 @@ namespace redag::analysis {
 namespace {
 
 using testing::BoundCase;
+using testing::compiled;
 using testing::describe;
-
-TaskSet compiled(const BoundCase &bound_case) {
-  auto task_set = compile(bound_case.workload, bound_case.platform);
-  EXPECT_TRUE(task_set);
-  return *std::move(task_set);
-}
 
 // ---- random task sets ----
 

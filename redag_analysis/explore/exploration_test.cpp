@@ -11,38 +11,24 @@
 
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
 
 using testing::BoundCase;
+using testing::compiled;
 
-TaskSet compiled(const BoundCase &bound_case) {
-  auto task_set = compile(bound_case.workload, bound_case.platform);
-  EXPECT_TRUE(task_set);
-  return *std::move(task_set);
+testing::TestTask timer(const char *name, Duration bcet, Duration wcet, Duration period, Duration jitter = 0,
+                        Time offset = 0) {
+  return {.name = name, .period = period, .wcet = wcet, .offset = offset, .bcet = bcet, .jitter = jitter};
 }
 
-Task timer(const char *name, Duration bcet, Duration wcet, Duration period, Duration jitter = 0, Time offset = 0) {
-  Task task;
-  task.name = name;
-  task.bcet = bcet;
-  task.wcet = wcet;
-  task.period = task.deadline = period;
-  task.jitter = jitter;
-  task.offset = offset;
-  return task;
-}
-
-BoundCase one_dag(std::uint32_t workers, std::vector<Task> tasks, std::uint32_t max_active = 0) {
+BoundCase one_dag(std::uint32_t workers, const std::vector<testing::TestTask> &tasks, std::uint32_t max_active = 0) {
   BoundCase result;
   result.platform.workers = workers;
   result.platform.preemption = sched::Preemption::None;
-  Dag dag;
-  dag.name = "d";
-  dag.tasks = std::move(tasks);
-  dag.max_active = max_active;
-  result.workload.dags.push_back(std::move(dag));
+  result.workload.dags = {testing::tick_dag("d", tasks, max_active)};
   return result;
 }
 
@@ -61,7 +47,7 @@ TEST(Exploration, FindsAnomalies) {
 }
 
 TEST(Exploration, HoldsMaxActiveAndGroups) {
-  const std::vector<Task> tasks = {timer("a", 3, 3, 20), timer("b", 3, 3, 20), timer("c", 3, 3, 20)};
+  const std::vector<testing::TestTask> tasks = {timer("a", 3, 3, 20), timer("b", 3, 3, 20), timer("c", 3, 3, 20)};
   const auto worst = [](const BoundCase &bound_case) {
     const TaskSet task_set = compiled(bound_case);
     const Exploration exploration = explore(task_set);
@@ -132,10 +118,7 @@ TEST(Exploration, SaysWhereThereIsNothingToExplore) {
   EXPECT_TRUE(why_not_explore(compiled(bound_case)));
   bound_case.workload.policy = PolicyKind::Edf;
   EXPECT_FALSE(why_not_explore(compiled(bound_case)));
-  Task data = timer("b", 1, 1, 10);
-  data.activation = Activation::Data;
-  data.predecessors = {0};
-  bound_case.workload.dags[0].tasks.push_back(data);
+  bound_case.workload.dags = {testing::tick_dag("d", {timer("a", 1, 2, 10), {"b", 0, 1, {0}}})};
   EXPECT_TRUE(why_not_explore(compiled(bound_case)));
   bound_case.workload.policy = PolicyKind::RateMonotonic;
   EXPECT_FALSE(why_not_explore(compiled(bound_case)));

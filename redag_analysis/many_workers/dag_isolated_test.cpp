@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -64,35 +65,15 @@ TEST(BoundProperty, Isolated) {
   expect_bound_holds(isolated(), isolated_cases(sched::Preemption::Cooperative), {.workloads = 1000});
 }
 
-Task make_task(std::string name, Duration wcet, std::vector<std::uint32_t> after) {
-  Task task;
-  task.name = std::move(name);
-  task.wcet = task.bcet = wcet;
-  task.period = task.deadline = 100;
-  task.predecessors = std::move(after);
-  if (!task.predecessors.empty()) task.activation = Activation::Data;
-  return task;
-}
-
 // A source, three parallel tasks, and a sink.
 Dag fork_join(std::string name, Duration period = 100) {
-  Dag dag;
-  dag.name = std::move(name);
-  dag.tasks = {make_task("source", 2, {}), make_task("a", 10, {0}), make_task("b", 9, {0}), make_task("c", 8, {0}),
-               make_task("sink", 3, {1, 2, 3})};
-  for (Task &task : dag.tasks) task.period = task.deadline = period;
-  return dag;
+  return testing::tick_dag(
+      std::move(name),
+      {{"source", period, 2}, {"a", 0, 10, {0}}, {"b", 0, 9, {0}}, {"c", 0, 8, {0}}, {"sink", 0, 3, {1, 2, 3}}});
 }
 
 TaskSet compiled(std::uint32_t workers, std::vector<Dag> dags, sched::Preemption preemption) {
-  Workload workload;
-  workload.name = "w";
-  workload.dags = std::move(dags);
-  workload.platform.workers = workers;
-  AnalysisPlatform platform;
-  platform.workers = workers;
-  platform.preemption = preemption;
-  return compile(workload, platform).value();
+  return testing::compiled(testing::make_workload(std::move(dags), workers), preemption);
 }
 
 std::optional<Duration> dag_response(const Method &method, const TaskSet &task_set, std::size_t dag) {

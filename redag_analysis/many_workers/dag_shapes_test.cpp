@@ -11,6 +11,7 @@
 #include "redag_analysis/many_workers/dag_isolated.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -18,8 +19,11 @@ namespace {
 using global::Shape;
 using testing::BoundCaseLimits;
 using testing::cases;
+using testing::compiled;
 using testing::expect_bound_holds;
 using testing::for_cases;
+using testing::make_workload;
+using testing::tick_dag;
 
 BoundCaseLimits graphs() {
   BoundCaseLimits limits;
@@ -60,32 +64,15 @@ TEST(BoundProperty, RatesDagShapes) {
   expect_bound_holds(dag_shapes(), cases(limits), {.workloads = 300, .runs = 6});
 }
 
-Task make_task(std::string name, Duration wcet, std::vector<std::uint32_t> after) {
-  Task task;
-  task.name = std::move(name);
-  task.wcet = task.bcet = wcet;
-  task.period = task.deadline = 20;
-  task.predecessors = std::move(after);
-  if (!task.predecessors.empty()) task.activation = Activation::Data;
-  return task;
-}
-
 // Tasks of 1, then 4 and 2 in parallel, then 1.
 Workload fork_and_join(std::uint32_t workers) {
-  Workload workload;
-  workload.name = "w";
-  workload.platform.workers = workers;
-  Dag dag;
-  dag.name = "upper";
-  dag.tasks = {make_task("begin", 1, {}), make_task("left", 4, {0}), make_task("right", 2, {0}),
-               make_task("end", 1, {1, 2})};
-  workload.dags.push_back(dag);
-  return workload;
+  return make_workload(
+      {tick_dag("upper", {{"begin", 20, 1}, {"left", 0, 4, {0}}, {"right", 0, 2, {0}}, {"end", 0, 1, {1, 2}}})},
+      workers);
 }
 
 TEST(Shape, IsThatOfTheDag) {
-  const Workload workload = fork_and_join(2);
-  const TaskSet task_set = compile(workload, platform_of(workload)).value();
+  const TaskSet task_set = compiled(fork_and_join(2));
   const Shape shape(task_set, task_set.units[0], 2);
   // Going back from the end: the join, the longer branch alone for two, both branches for two, the fork.
   const Duration left[] = {0, 1, 2, 3, 5, 7, 8, 8, 8};
@@ -98,8 +85,7 @@ TEST(Shape, IsThatOfTheDag) {
 }
 
 TEST(Shape, OneWorkerDoesOneThingAtATime) {
-  const Workload workload = fork_and_join(1);
-  const TaskSet task_set = compile(workload, platform_of(workload)).value();
+  const TaskSet task_set = compiled(fork_and_join(1));
   const Shape shape(task_set, task_set.units[0], 1);
   for (Duration time = 0; time < 12; ++time) {
     EXPECT_EQ(shape.left(time), std::min<Duration>(time, 8));
@@ -109,20 +95,14 @@ TEST(Shape, OneWorkerDoesOneThingAtATime) {
 
 // One task, then `parallel` tasks side by side, then one more: wider than the workers.
 Workload wide(std::uint32_t parallel, Duration wcet, std::uint32_t workers) {
-  Workload workload;
-  workload.name = "w";
-  workload.platform.workers = workers;
-  Dag dag;
-  dag.name = "wide";
-  dag.tasks = {make_task("begin", 2, {})};
+  std::vector<testing::TestTask> tasks = {{"begin", 20, 2}};
   std::vector<std::uint32_t> all;
   for (std::uint32_t i = 1; i <= parallel; ++i) {
-    dag.tasks.push_back(make_task("t" + std::to_string(i), wcet + i % 3, {0}));
+    tasks.push_back({"t" + std::to_string(i), 0, wcet + i % 3, {0}});
     all.push_back(i);
   }
-  dag.tasks.push_back(make_task("end", 1, all));
-  workload.dags.push_back(dag);
-  return workload;
+  tasks.push_back({"end", 0, 1, all});
+  return make_workload({tick_dag("wide", tasks)}, workers);
 }
 
 // Compares both functions with their definitions, instant by instant.
@@ -152,8 +132,7 @@ TEST(Shape, IsWhatItSaysAtEveryInstant) {
   for (const std::uint32_t workers : {1U, 2U, 3U, 4U}) {
     for (std::uint32_t parallel = 1; parallel < 10; ++parallel) {
       for (const Duration wcet : {1, 2, 5}) {
-        const Workload workload = wide(parallel, wcet, workers);
-        const TaskSet task_set = compile(workload, platform_of(workload)).value();
+        const TaskSet task_set = compiled(wide(parallel, wcet, workers));
         expect_shape_is_right(task_set, task_set.units[0], workers);
       }
     }

@@ -9,13 +9,17 @@
 
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
 
 using testing::BoundCaseLimits;
 using testing::cases;
+using testing::compiled;
 using testing::expect_bound_holds;
+using testing::TestTask;
+using testing::tick_dag;
 
 BoundCaseLimits graphs(sched::Preemption preemption) {
   BoundCaseLimits limits;
@@ -95,48 +99,24 @@ TEST(BoundProperty, DagAnyOrder) {
   }
 }
 
-Task make_task(std::string name, Duration wcet, Duration period, std::vector<std::uint32_t> after) {
-  Task task;
-  task.name = std::move(name);
-  task.wcet = task.bcet = wcet;
-  task.period = task.deadline = period;
-  task.predecessors = std::move(after);
-  if (!task.predecessors.empty()) task.activation = Activation::Data;
-  return task;
-}
-
 // Five stages of one task and two parallel ones, above a wide DAG whose tasks start whenever the upper DAG is narrow.
 // If blocking counted only once per preemption, the bound would be 44; the schedule takes 52.
 Workload narrow_and_wide() {
-  Workload workload;
-  workload.name = "narrow_and_wide";
-  workload.platform.workers = 2;
-  Dag narrow;
-  narrow.name = "narrow";
+  std::vector<TestTask> narrow;
   std::vector<std::uint32_t> before;
   for (int stage = 0; stage < 5; ++stage) {
-    const auto first = static_cast<std::uint32_t>(narrow.tasks.size());
+    const auto first = static_cast<std::uint32_t>(narrow.size());
     const std::string name = std::to_string(stage);
-    narrow.tasks.push_back(make_task("one" + name, 1, 200, before));
-    narrow.tasks.push_back(make_task("left" + name, 4, 200, {first}));
-    narrow.tasks.push_back(make_task("right" + name, 4, 200, {first}));
+    narrow.push_back({"one" + name, stage == 0 ? 200 : 0, 1, before});
+    narrow.push_back({"left" + name, 0, 4, {first}});
+    narrow.push_back({"right" + name, 0, 4, {first}});
     before = {first + 1, first + 2};
   }
-  narrow.tasks.push_back(make_task("end", 1, 200, before));
-  Dag wide;
-  wide.name = "wide";
-  wide.tasks.push_back(make_task("begin", 1, 1000, {}));
-  for (int i = 0; i < 8; ++i) wide.tasks.push_back(make_task("part" + std::to_string(i), 8, 1000, {0}));
-  wide.tasks.push_back(make_task("end", 1, 1000, {1, 2, 3, 4, 5, 6, 7, 8}));
-  workload.dags = {narrow, wide};
-  return workload;
-}
-
-TaskSet compiled(const Workload &workload, sched::Preemption preemption) {
-  AnalysisPlatform platform;
-  platform.workers = workload.platform.workers;
-  platform.preemption = preemption;
-  return compile(workload, platform).value();
+  narrow.push_back({"end", 0, 1, before});
+  std::vector<TestTask> wide = {{"begin", 1000, 1}};
+  for (int i = 0; i < 8; ++i) wide.push_back({"part" + std::to_string(i), 0, 8, {0}});
+  wide.push_back({"end", 0, 1, {1, 2, 3, 4, 5, 6, 7, 8}});
+  return testing::make_workload({tick_dag("narrow", narrow), tick_dag("wide", wide)}, 2);
 }
 
 ResponseBound dag_response(const Method &method, const TaskSet &task_set, std::size_t dag) {
@@ -151,22 +131,21 @@ testing::BoundCase narrow_and_wide_case(Rng &rng, sched::Preemption preemption, 
   result.workload.name = "random";
   result.workload.platform.workers = result.platform.workers;
   const auto add_dag = [&](std::int64_t stages, Duration longest, Duration period) {
-    Dag dag;
-    dag.name = "d" + std::to_string(result.workload.dags.size());
+    std::vector<TestTask> tasks;
     std::vector<std::uint32_t> before;
     for (std::int64_t stage = 0; stage < stages; ++stage) {
-      const auto first = static_cast<std::uint32_t>(dag.tasks.size());
+      const auto first = static_cast<std::uint32_t>(tasks.size());
       const std::int64_t width = stage % 2 == 0 ? 1 : rng.uniform(2, result.platform.workers + 2);
       std::vector<std::uint32_t> now;
       for (std::int64_t i = 0; i < width; ++i) {
         const Duration wcet = rng.uniform(1, stage % 2 == 0 ? 2 : longest);
         now.push_back(first + static_cast<std::uint32_t>(i));
-        dag.tasks.push_back(make_task("t" + std::to_string(now.back()), wcet, period, before));
+        tasks.push_back({"t" + std::to_string(now.back()), stage == 0 ? period : 0, wcet, before});
       }
       before = now;
     }
-    if (bounds && rng.uniform(0, 1) == 0) dag.max_active = static_cast<std::uint32_t>(rng.uniform(1, 3));
-    result.workload.dags.push_back(dag);
+    const auto max_active = static_cast<std::uint32_t>(bounds && rng.uniform(0, 1) == 0 ? rng.uniform(1, 3) : 0);
+    result.workload.dags.push_back(tick_dag("d" + std::to_string(result.workload.dags.size()), tasks, max_active));
   };
   add_dag(rng.uniform(1, 7), 4, 150);
   if (rng.uniform(0, 2) == 0) add_dag(rng.uniform(1, 3), 4, 200);

@@ -10,6 +10,7 @@
 #include "redag_analysis/many_workers/global_sequential.hpp"
 #include "redag_analysis/one_worker/edf_demand.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -68,29 +69,8 @@ TEST(BoundProperty, EdfGlobalResponseOfFewTasks) {
   }
 }
 
-struct Numbers {
-  Duration wcet;
-  Duration period;
-};
-
-TaskSet edf_task_set(std::uint32_t workers, std::initializer_list<Numbers> tasks, sched::Preemption preemption) {
-  Workload workload;
-  workload.name = "w";
-  workload.policy = PolicyKind::Edf;
-  for (const Numbers &numbers : tasks) {
-    Task task;
-    task.name = "t";
-    task.wcet = task.bcet = numbers.wcet;
-    task.period = task.deadline = numbers.period;
-    Dag dag;
-    dag.name = "d" + std::to_string(workload.dags.size());
-    dag.tasks.push_back(task);
-    workload.dags.push_back(dag);
-  }
-  AnalysisPlatform platform;
-  platform.workers = workers;
-  platform.preemption = preemption;
-  return compile(workload, platform).value();
+TaskSet edf_task_set(std::uint32_t workers, const std::vector<testing::Load> &tasks, sched::Preemption preemption) {
+  return testing::compiled(testing::independent(tasks, workers, PolicyKind::Edf), preemption);
 }
 
 std::vector<std::optional<Duration>> responses(const Method &method, const TaskSet &task_set) {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -123,33 +124,14 @@ TEST(BoundProperty, DagGroupsOnOneWorker) {
   expect_bound_holds(dag_groups(), cases(limits), {.workloads = 2000, .runs = 10});
 }
 
-Task in_group(std::string name, Duration wcet, Duration period) {
-  Task task;
-  task.name = std::move(name);
-  task.wcet = task.bcet = wcet;
-  task.period = task.deadline = period;
-  task.group = "driver";
-  return task;
-}
-
 Workload three_of_a_group() {
-  Workload workload;
-  workload.name = "w";
-  workload.platform.workers = 2;
-  for (const Duration period : {100, 200, 300}) {
-    Dag dag;
-    dag.name = "d" + std::to_string(period);
-    dag.tasks.push_back(in_group("t", 10, period));
-    workload.dags.push_back(dag);
-  }
+  Workload workload = testing::independent({{10, 100}, {10, 200}, {10, 300}}, 2);
+  for (Dag &dag : workload.dags) dag.tasks[0].group = "driver";
   return workload;
 }
 
 Bound bound_of(const Workload &workload, sched::Preemption preemption) {
-  AnalysisPlatform platform;
-  platform.workers = workload.platform.workers;
-  platform.preemption = preemption;
-  return std::get<Bound>(dag_groups().apply(compile(workload, platform).value()));
+  return std::get<Bound>(dag_groups().apply(testing::compiled(workload, preemption)));
 }
 
 // More workers do not help a group: the least urgent task waits for both others in full.
@@ -164,20 +146,13 @@ TEST(GlobalGroups, AGroupIsOneWorker) {
 // A holder that inherits takes a worker from a task that is in no group itself.
 TEST(GlobalGroups, AHolderThatInheritsIsInTheWayOfOthers) {
   Workload workload = three_of_a_group();
-  workload.dags.pop_back();
-  Task other = in_group("other", 5, 150);
-  other.group.clear();
-  Dag dag;
-  dag.name = "between";
-  dag.tasks.push_back(other);
-  workload.dags.push_back(dag);
+  workload.dags[2] = testing::tick_dag("between", {{"other", 150, 5}});
   // The task waits for no group. The most urgent task and its holder, of C - 1, take both workers.
   EXPECT_EQ(bound_of(workload, sched::Preemption::Full).tasks[2].response, 5 + (10 + 9) / 2);
   EXPECT_EQ(bound_of(workload, sched::Preemption::Full).tasks[0].response, 10 + 9);
   workload.dags[1].tasks[0].group.clear();
   workload.dags[0].tasks[0].group.clear();
-  const TaskSet task_set = compile(workload, platform_of(workload)).value();
-  EXPECT_TRUE(std::holds_alternative<NotApplicable>(dag_groups().apply(task_set)));
+  EXPECT_TRUE(std::holds_alternative<NotApplicable>(dag_groups().apply(testing::compiled(workload))));
 }
 
 // The properties above cover the cases that they are meant for.

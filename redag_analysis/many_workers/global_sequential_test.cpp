@@ -5,17 +5,18 @@
 
 #include <gtest/gtest.h>
 
-#include <initializer_list>
 #include <utility>
 #include <variant>
 
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
 
 using testing::BoundCaseLimits;
 using testing::cases;
+using testing::compiled;
 using testing::expect_bound_holds;
 
 BoundCaseLimits several_workers(sched::Preemption preemption) {
@@ -67,35 +68,9 @@ TEST(BoundProperty, SequentialNonpreemptive) {
   expect_bound_holds(sequential_nonpreemptive(), cases(several_workers(sched::Preemption::None)), {.workloads = 2000});
 }
 
-struct Numbers {
-  Duration wcet;
-  Duration period;
-};
-
-Workload independent(std::uint32_t workers, std::initializer_list<Numbers> tasks) {
-  Workload workload;
-  workload.name = "w";
-  workload.platform.workers = workers;
-  workload.policy = PolicyKind::Fixed;
-  for (const Numbers &numbers : tasks) {
-    Task task;
-    task.name = "t";
-    task.wcet = task.bcet = numbers.wcet;
-    task.period = task.deadline = numbers.period;
-    task.priority = -static_cast<int>(workload.dags.size());
-    Dag dag;
-    dag.name = "d" + std::to_string(workload.dags.size());
-    dag.tasks.push_back(task);
-    workload.dags.push_back(dag);
-  }
-  return workload;
-}
-
-TaskSet compiled(const Workload &workload, sched::Preemption preemption) {
-  AnalysisPlatform platform;
-  platform.workers = workload.platform.workers;
-  platform.preemption = preemption;
-  return compile(workload, platform).value();
+// Priorities in the order of the tasks.
+Workload independent(std::uint32_t workers, const std::vector<testing::Load> &tasks) {
+  return testing::independent(tasks, workers, PolicyKind::Fixed);
 }
 
 std::vector<std::optional<Duration>> responses(const Method &method, const TaskSet &task_set) {

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::metrics {
 namespace {
@@ -20,8 +20,8 @@ constexpr Duration kMs = kMillisecond;
 constexpr Duration kBound = 3 * kMs;
 
 Workload two_tasks() {
-  return make_workload({make_dag("fast", {{.name = "imu", .period_ms = 10, .wcet_ms = 1}}),
-                        make_dag("slow", {{.name = "plan", .period_ms = 50, .wcet_ms = 20}})},
+  return make_workload({make_dag("fast", {{.name = "imu", .period = 10, .wcet = 1}}),
+                        make_dag("slow", {{.name = "plan", .period = 50, .wcet = 20}})},
                        1, PreemptionMode::Os);
 }
 

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "redag_testing/builders.hpp"
 #include "redag_testing/expect_trace.hpp"
-#include "redag_testing/timeline.hpp"
 #include "redag_testing/trace_builder.hpp"
 
 namespace redag::metrics {

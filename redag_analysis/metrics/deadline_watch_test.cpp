@@ -7,7 +7,7 @@
 
 #include <string>
 
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/trace_builder.hpp"
 
 namespace redag::metrics {

@@ -12,7 +12,7 @@
 
 #include "redag/trace/output_file.hpp"
 #include "redag_analysis/metrics/jobs_csv.hpp"
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/trace_builder.hpp"
 
 namespace redag::metrics {

@@ -5,21 +5,12 @@
 
 #include <gtest/gtest.h>
 
+#include "redag_testing/builders.hpp"
+
 namespace redag::metrics {
 namespace {
 
-Workload one_timer() {
-  Workload workload;
-  Task task;
-  task.name = "t";
-  task.period = task.deadline = 10;
-  task.wcet = 1;
-  Dag dag;
-  dag.name = "d";
-  dag.tasks = {task};
-  workload.dags = {dag};
-  return workload;
-}
+Workload one_timer() { return testing::make_workload({testing::tick_dag("d", {{"t", 10, 1}})}); }
 
 JobRecord job(std::uint32_t number, JobOutcome outcome, Time finish) {
   JobRecord record;

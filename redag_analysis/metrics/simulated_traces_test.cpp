@@ -14,6 +14,7 @@
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_lab/workload/generate.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::metrics {
 namespace {
@@ -122,16 +123,9 @@ RC_GTEST_PROP(SimulatedTraces, OfPeersKeepTheRulesThatPeersHave, ()) {
 
 // Only the events executor keeps every release of a timer, and the checker relies on that.
 TEST(SimulatedTraces, AnExecutorThatLosesPeriodsIsNotTheEventsExecutor) {
-  Task task;
-  task.name = "often";
-  task.wcet = task.period = task.deadline = kMillisecond;
-  Task heavy = task;
-  heavy.name = "heavy";
-  heavy.wcet = 5 * kMillisecond;
   trace::RunInfo info;
-  info.workload.dags.resize(2);
-  info.workload.dags[0].tasks = {task};
-  info.workload.dags[1].tasks = {heavy};
+  info.workload =
+      testing::make_workload({testing::make_dag("a", {{"often", 1}}), testing::make_dag("b", {{"heavy", 1, 5}})});
   info.driver = trace::Driver::Simulator;
   for (const char *executor : {"ste", "events"}) {
     trace::Trace trace = simulated(on_peer(info, *executors::find_executor(executor)), 100 * kMillisecond);
@@ -169,7 +163,7 @@ RC_GTEST_PROP(SimulatedTraces, FullPreemptionHasNoInversion, ()) {
   RC_ASSERT(summarize(trace).inversions.count == 0U);
 }
 
-class DamagedTraces : public testing::TestWithParam<int> {};
+class DamagedTraces : public ::testing::TestWithParam<int> {};
 
 bool notices(const trace::Trace &trace) { return !check_trace(trace).ok(); }
 
@@ -210,7 +204,7 @@ TEST_P(DamagedTraces, AreNoticed) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, DamagedTraces, testing::Range(0, 24));
+INSTANTIATE_TEST_SUITE_P(Seeds, DamagedTraces, ::testing::Range(0, 24));
 
 }  // namespace
 }  // namespace redag::metrics

@@ -13,7 +13,7 @@
 #include "redag/trace/output_file.hpp"
 #include "redag_analysis/metrics/perfetto.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/trace_builder.hpp"
 
 namespace redag::metrics {

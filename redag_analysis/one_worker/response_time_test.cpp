@@ -3,12 +3,12 @@
 
 #include "redag_analysis/one_worker/response_time.hpp"
 
-#include <string>
 #include <variant>
 
 #include <gtest/gtest.h>
 
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -67,24 +67,12 @@ TEST(BoundProperty, DagOneWorkerCooperative) {
 
 // Any of several equals can go first: the one that was released an instant before.
 TEST(ResponseTime, EqualsInterfereBothWays) {
-  Workload workload;
-  for (const Duration wcet : {3, 4}) {
-    Task task;
-    task.name = "t";
-    task.wcet = task.bcet = wcet;
-    task.period = task.deadline = 10;
-    Dag dag;
-    dag.name = "d" + std::to_string(wcet);
-    dag.tasks = {task};
-    workload.dags.push_back(dag);
-  }
+  Workload workload = testing::independent({{3, 10}, {4, 10}});
   for (const sched::Preemption mode : {sched::Preemption::Full, sched::Preemption::None}) {
     for (const Ties ties : {Ties::Share, Ties::Fixed}) {
       workload.ties = ties;
-      AnalysisPlatform platform;
-      platform.preemption = mode;
       const Outcome outcome = (mode == sched::Preemption::Full ? rta_preemptive() : rta_nonpreemptive())
-                                  .apply(compile(workload, platform).value());
+                                  .apply(testing::compiled(workload, mode));
       const Bound &bound = std::get<Bound>(outcome);
       // In the fixed order the first waits for the second only if that cannot be preempted, and not for all of it.
       const Duration first = ties == Ties::Share ? 7 : mode == sched::Preemption::Full ? 3 : 6;

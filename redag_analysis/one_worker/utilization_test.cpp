@@ -5,13 +5,13 @@
 
 #include <gtest/gtest.h>
 
-#include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "redag_analysis/core/exact_utilization.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -19,6 +19,8 @@ namespace {
 using testing::BoundCaseLimits;
 using testing::cases;
 using testing::expect_bound_holds;
+using testing::independent;
+using testing::Load;
 
 BoundCaseLimits rate_monotonic(sched::Preemption preemption) {
   BoundCaseLimits limits;
@@ -112,31 +114,8 @@ TEST(BoundProperty, GlobalRateMonotonic) {
 
 // ---- exactly at the limit, just below it and just above it ----
 
-struct Load {
-  Duration wcet;
-  Duration period;
-};
-
-TaskSet independent(const std::vector<Load> &loads, std::uint32_t workers = 1) {
-  Workload workload;
-  workload.name = "w";
-  workload.platform.workers = workers;
-  workload.platform.preemption = PreemptionMode::Os;
-  for (const Load &load : loads) {
-    Task task;
-    task.name = "t";
-    task.wcet = task.bcet = load.wcet;
-    task.period = task.deadline = load.period;
-    Dag dag;
-    dag.name = "d" + std::to_string(workload.dags.size());
-    dag.tasks.push_back(task);
-    workload.dags.push_back(dag);
-  }
-  return compile(workload, platform_of(workload)).value();
-}
-
-bool accepts(const Method &method, const TaskSet &task_set) {
-  const Outcome outcome = method.apply(task_set);
+bool accepts(const Method &method, const Workload &workload) {
+  const Outcome outcome = method.apply(testing::compiled(workload));
   const Bound *bound = std::get_if<Bound>(&outcome);
   return bound != nullptr && bound->accepts == true;
 }

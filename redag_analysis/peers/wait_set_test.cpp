@@ -11,6 +11,7 @@
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/peers/wait_set_rates.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -50,26 +51,14 @@ TEST(BoundProperty, WaitSetCasini) { expect_holds(casini(), 1, 0.6); }
 TEST(BoundProperty, WaitSetBlass) { expect_holds(blass(), 1, 0.5); }
 
 Workload three_timers(std::uint32_t workers) {
-  Workload workload;
-  workload.name = "w";
-  workload.platform = {workers, PreemptionMode::None};
-  for (const Duration wcet : {3, 5, 7}) {
-    Task task;
-    task.name = "t";
-    task.wcet = task.bcet = wcet;
-    task.period = task.deadline = 100;
-    Dag dag;
-    dag.name = "d" + std::to_string(wcet);
-    dag.tasks.push_back(task);
-    workload.dags.push_back(dag);
-  }
+  Workload workload = testing::independent({{3, 100}, {5, 100}, {7, 100}}, workers);
+  workload.platform.preemption = PreemptionMode::None;
   return workload;
 }
 
 TEST(WaitSetBound, EveryOtherCallbackOnceAndThoseBeforeTwice) {
   for (const std::uint32_t workers : {1U, 2U}) {
-    const Workload workload = three_timers(workers);
-    const TaskSet task_set = compile(workload, platform_of(workload)).value();
+    const TaskSet task_set = testing::compiled(three_timers(workers));
     const Outcome outcome = wait_set().apply(task_set);
     const auto &bound = std::get<Bound>(outcome);
     EXPECT_EQ(bound.tasks[0].response, 3 + (5 + 7) / workers);
@@ -81,7 +70,7 @@ TEST(WaitSetBound, EveryOtherCallbackOnceAndThoseBeforeTwice) {
 // With rates, the long callback arrives once while the short one waits, and not again before it.
 TEST(WaitSetBound, ACallbackThatSeldomComesCountsOnce) {
   Workload workload = three_timers(1);
-  const TaskSet task_set = compile(workload, platform_of(workload)).value();
+  const TaskSet task_set = testing::compiled(workload);
   // Registered 3, 5, 7. By windows: 3 + 5 + 7, 5 + 2 * 3 + 7, 7 + 2 * (3 + 5); within 100 each arrives only once.
   for (const Method &method : {casini(), blass(), wait_set_rates()}) {
     const Outcome outcome = method.apply(task_set);
@@ -89,7 +78,7 @@ TEST(WaitSetBound, ACallbackThatSeldomComesCountsOnce) {
   }
   // With a period of 15 the first arrives twice in a busy window, and windows let it delay the last one twice at most.
   workload.dags[0].tasks[0].period = workload.dags[0].tasks[0].deadline = 15;
-  const TaskSet faster = compile(workload, platform_of(workload)).value();
+  const TaskSet faster = testing::compiled(workload);
   const auto last = [&](const Method &method) {
     const Outcome outcome = method.apply(faster);
     return std::get<Bound>(outcome).tasks[2].response;
@@ -136,7 +125,7 @@ TEST(WaitSetBound, WorkComesCloserWithJitter) {
     often.jitter = jitter;
     Task &seldom = workload.dags[1].tasks[0];
     seldom.wcet = seldom.bcet = 10;
-    const Outcome outcome = wait_set_rates().apply(compile(workload, platform_of(workload)).value());
+    const Outcome outcome = wait_set_rates().apply(testing::compiled(workload));
     return std::get<Bound>(outcome).tasks[1].response;
   };
   EXPECT_EQ(second(0), 10 + 4);
@@ -241,7 +230,7 @@ TEST(WaitSetBound, OverloadIsNotBounded) {
   const auto with_period = [](Duration period) {
     Workload workload = three_timers(1);
     for (Dag &dag : workload.dags) dag.tasks[0].period = dag.tasks[0].deadline = period;
-    return std::get<Bound>(casini().apply(compile(workload, platform_of(workload)).value())).tasks[0].response;
+    return std::get<Bound>(casini().apply(testing::compiled(workload))).tasks[0].response;
   };
   EXPECT_EQ(with_period(15), 15);
   EXPECT_FALSE(with_period(14));
@@ -255,7 +244,7 @@ TEST(WaitSetBound, TimesNearTheLargestDoNotWrap) {
       task.wcet = task.bcet = kMaxDuration / 8;
       task.period = task.deadline = kMaxDuration / 2;
     }
-    const TaskSet task_set = compile(workload, platform_of(workload)).value();
+    const TaskSet task_set = testing::compiled(workload);
     for (const Method &method : executor_methods()) {
       const Outcome outcome = method.apply(task_set);
       if (!std::holds_alternative<Bound>(outcome)) continue;

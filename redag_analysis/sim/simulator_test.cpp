@@ -12,6 +12,7 @@
 #include "redag/base/rng.hpp"
 
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/random_workloads.hpp"
 #include "redag_testing/timeline.hpp"
 
@@ -233,24 +234,10 @@ TEST(EqualRates, AChainTakesTurnsWithATimer) {
 // The worker of a job depends on unrelated tasks; the data that another job reads must not.
 class CompletionsOfOneInstant : public ::testing::Test {
  protected:
-  static Task timer(const char *name, Duration wcet, Duration period, Time offset) {
-    Task task;
-    task.name = name;
-    task.wcet = task.bcet = wcet;
-    task.period = period;
-    task.offset = offset;
-    return task;
-  }
-
   // When q and p end together, x takes the data of both.
   static Dag joined() {
-    Dag dag;
-    dag.name = "d";
-    dag.tasks = {timer("q", 1, 4, 0), timer("p", 2, 8, 3), timer("x", 1, 0, 0)};
-    dag.tasks[2].activation = Activation::Data;
-    dag.tasks[2].predecessors = {1, 0};
-    inherit_periods(dag);
-    return dag;
+    return redag::testing::tick_dag(
+        "d", {{"q", 4, 1}, {.name = "p", .period = 8, .wcet = 2, .offset = 3}, {"x", 0, 1, {1, 0}}});
   }
 
   static std::vector<Time> origins(const Workload &workload, TaskId task) {
@@ -267,10 +254,7 @@ TEST_F(CompletionsOfOneInstant, AreToldInTheOrderOfTasks) {
   const std::vector<Time> origins_alone = origins(alone, TaskId(2));
   ASSERT_FALSE(origins_alone.empty());
   EXPECT_EQ(origins_alone.front(), 3) << "q, which comes first in its DAG, ended first: its second datum is there";
-  Dag unrelated;
-  unrelated.name = "u";
-  unrelated.tasks = {timer("u", 2, 100, 2)};
-  inherit_periods(unrelated);
+  const Dag unrelated = redag::testing::tick_dag("u", {{.name = "u", .period = 100, .wcet = 2, .offset = 2}});
   EXPECT_EQ(origins(make_workload({joined(), unrelated}, 2), TaskId(2)), origins_alone);
   EXPECT_EQ(origins(make_workload({unrelated, joined()}, 2), TaskId(3)), origins_alone);
 }

@@ -10,7 +10,7 @@
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_lab/report/document.hpp"
 #include "redag_lab/report/verdict.hpp"
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/trace_builder.hpp"
 
 namespace redag::report {

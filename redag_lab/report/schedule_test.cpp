@@ -9,6 +9,7 @@
 #include <set>
 
 #include "redag_lab/report/timeline.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/timeline.hpp"
 #include "redag_testing/trace_builder.hpp"
 

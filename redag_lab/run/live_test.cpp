@@ -14,26 +14,14 @@
 #include "redag/runtime/live_sample.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_lab/run/run_workload.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::lab {
 namespace {
 
+using redag::testing::make_dag;
+using redag::testing::make_workload;
 using namespace std::chrono_literals;
-
-Task timer(const std::string &name, Duration period) {
-  Task task;
-  task.name = name;
-  task.period = task.deadline = period;
-  task.wcet = kMillisecond;
-  return task;
-}
-
-Dag dag(const char *name, std::vector<Task> tasks) {
-  Dag dag;
-  dag.name = name;
-  dag.tasks = std::move(tasks);
-  return dag;
-}
 
 std::unique_ptr<runtime::Engine> make_engine(const Workload &workload, bool measure,
                                              std::vector<runtime::Body> bodies) {
@@ -47,11 +35,8 @@ std::unique_ptr<runtime::Engine> make_engine(const Workload &workload, bool meas
 }
 
 TEST(Figures, SayWhereJobsAre) {
-  Workload workload;
-  workload.dags = {dag("d", {timer("urgent", kSecond), timer("later", 2 * kSecond)})};
-  Task after = timer("after", kSecond);
-  after.predecessors = {1};
-  workload.dags[0].tasks.push_back(after);
+  const Workload workload =
+      make_workload({make_dag("d", {{"urgent", 1000}, {"later", 2000}, {"after", 1000, 1, {1}}})});
   runtime::Event started;
   runtime::Event go;
   const runtime::Body nothing = [](const runtime::Job &) { return sched::Outcome::Finished; };
@@ -103,8 +88,7 @@ TEST(Figures, SayWhereJobsAre) {
 }
 
 TEST(Figures, AJobThatThrowsIsAMissWithoutAResponse) {
-  Workload workload;
-  workload.dags = {dag("d", {timer("bad", kSecond)})};
+  const Workload workload = make_workload({make_dag("d", {{"bad", 1000}})});
   const auto engine =
       make_engine(workload, true, {[](const runtime::Job &) -> sched::Outcome { throw std::runtime_error("no"); }});
   ASSERT_TRUE(engine->start());
@@ -118,8 +102,7 @@ TEST(Figures, AJobThatThrowsIsAMissWithoutAResponse) {
 }
 
 TEST(Figures, AreNotMeasuredUnasked) {
-  Workload workload;
-  workload.dags = {dag("d", {timer("t", kSecond)})};
+  const Workload workload = make_workload({make_dag("d", {{"t", 1000}})});
   const auto engine = make_engine(workload, false, {[](const runtime::Job &) { return sched::Outcome::Finished; }});
   EXPECT_EQ(engine->figures(TaskId(0)).response, nullptr);
 }
@@ -177,10 +160,8 @@ TEST(LiveExecutor, IsNotSeenUnasked) {
 }
 
 TEST(LiveRun, ShowsTheBoundsItIsGiven) {
-  Workload workload;
+  Workload workload = make_workload({make_dag("d", {{"a", 20}, {"b", 10'000}})}, 1, PreemptionMode::Cooperative);
   workload.name = "live-run";
-  workload.platform = Platform{1, PreemptionMode::Cooperative};
-  workload.dags = {dag("d", {timer("a", 20 * kMillisecond), timer("b", 10 * kSecond)})};
   RunOptions options;
   options.duration = 20 * kSecond;
   options.live = true;

@@ -9,7 +9,7 @@
 #include "redag_analysis/metrics/assumptions.hpp"
 #include "redag_lab/run/run_workload.hpp"
 #include "redag_lab/run/synthetic.hpp"
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::lab {
 namespace {
@@ -18,8 +18,8 @@ using redag::testing::make_dag;
 using redag::testing::make_workload;
 
 metrics::AssumptionCheck run(Duration extra_of_first) {
-  const Workload workload = make_workload({make_dag("a", {{.name = "a", .period_ms = 10, .wcet_ms = 2}}),
-                                           make_dag("b", {{.name = "b", .period_ms = 20, .wcet_ms = 2}})},
+  const Workload workload = make_workload({make_dag("a", {{.name = "a", .period = 10, .wcet = 2}}),
+                                           make_dag("b", {{.name = "b", .period = 20, .wcet = 2}})},
                                           1);
   std::atomic<bool> give_up{false};
   RunOptions options;

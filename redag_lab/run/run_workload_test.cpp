@@ -13,36 +13,24 @@
 #include "redag/runtime/setup.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::lab {
 namespace {
 
-Task timer(std::string name, Duration period, Duration wcet) {
-  Task task;
-  task.name = std::move(name);
-  task.period = task.deadline = period;
-  task.wcet = task.bcet = wcet;
-  task.region = wcet / 10;
-  return task;
-}
-
 // Returns two DAGs: a fast chain, and a slow one whose jobs are longer than the fast period.
 Workload two_rates(std::uint32_t workers, PreemptionMode mode) {
-  Workload workload;
-  workload.name = "two rates";
-  workload.platform = Platform{workers, mode};
-  Dag fast{"fast", {timer("sense", 10 * kMillisecond, 500 * kMicrosecond)}, 1, 0, 0, Criticality::High, {}};
-  Task act = timer("act", 0, 300 * kMicrosecond);
-  act.deadline = 0;
-  act.activation = Activation::Data;
-  act.predecessors = {0};
-  fast.tasks.push_back(act);
-  Dag slow{"slow", {}, 0, 0, 0, Criticality::Low, {}};
-  for (std::uint32_t i = 0; i < workers; ++i) {
-    slow.tasks.push_back(timer("slow" + std::to_string(i), 100 * kMillisecond, 30 * kMillisecond));
+  using redag::testing::make_dag;
+  std::vector<redag::testing::TestTask> slow;
+  for (std::uint32_t i = 0; i < workers; ++i) slow.push_back({"slow" + std::to_string(i), 100, 30});
+  Workload workload = redag::testing::make_workload(
+      {make_dag("fast", {{"sense", 10'000, 500}, {"act", 0, 300, {0}}}, 1, kMicrosecond), make_dag("slow", slow)},
+      workers, mode);
+  workload.dags[0].criticality = Criticality::High;
+  workload.dags[1].criticality = Criticality::Low;
+  for (Dag &dag : workload.dags) {
+    for (Task &task : dag.tasks) task.region = task.wcet / 10;
   }
-  workload.dags = {fast, slow};
-  for (Dag &dag : workload.dags) inherit_periods(dag);
   return workload;
 }
 
@@ -65,7 +53,7 @@ bool has_preemption(const RunResult &result) {
                      [](const JobEvent &e) { return e.kind == JobEventKind::Preempted; });
 }
 
-class EveryMode : public testing::TestWithParam<std::tuple<PreemptionMode, std::uint32_t>> {
+class EveryMode : public ::testing::TestWithParam<std::tuple<PreemptionMode, std::uint32_t>> {
  protected:
   void SetUp() override {
     if (mode() == PreemptionMode::Os && runtime::probe_priority_band().top_job == 0) {
@@ -96,9 +84,9 @@ TEST_P(EveryMode, RunsAsTheModelSays) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, EveryMode,
-                         testing::Combine(testing::Values(PreemptionMode::None, PreemptionMode::Cooperative,
-                                                          PreemptionMode::Os),
-                                          testing::Values(1U, 2U, 8U)),
+                         ::testing::Combine(::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative,
+                                                              PreemptionMode::Os),
+                                            ::testing::Values(1U, 2U, 8U)),
                          [](const auto &instance) {
                            return std::string(to_string(std::get<0>(instance.param))) + "_" +
                                   std::to_string(std::get<1>(instance.param));
@@ -181,7 +169,7 @@ TEST(RunWorkload, ABudgetCutsAJobOff) {
 TEST(RunWorkload, ThereIsAThreadForEveryJobThatCanBeInProgress) {
   if (runtime::probe_priority_band().top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
   Workload workload = two_rates(2, PreemptionMode::Os);
-  workload.dags[1].tasks = {timer("long", 100 * kMillisecond, 30 * kMillisecond)};
+  workload.dags[1].tasks.resize(1);
   workload.dags[1].tasks[0].concurrency = 2;
   RunOptions options;
   options.duration = 150 * kMillisecond;

@@ -6,26 +6,15 @@
 #include <gtest/gtest.h>
 
 #include "redag_analysis/metrics/summary_json.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::lab {
 namespace {
 
-Task timer(std::string name, Duration period, Duration wcet) {
-  Task task;
-  task.name = std::move(name);
-  task.period = task.deadline = period;
-  task.wcet = task.bcet = wcet;
-  return task;
-}
-
 // Returns two tasks on one worker; `slow` always makes `fast` miss unless it is preempted.
 Workload fast_and_slow() {
-  Workload workload;
-  workload.name = "fast and slow";
-  workload.platform = Platform{1, PreemptionMode::None};
-  workload.dags = {Dag{"fast", {timer("f", 10 * kMillisecond, kMillisecond)}, 0, 0, 0, Criticality::Normal, {}},
-                   Dag{"slow", {timer("s", 100 * kMillisecond, 30 * kMillisecond)}, 0, 0, 0, Criticality::Normal, {}}};
-  return workload;
+  return testing::make_workload(
+      {testing::make_dag("fast", {{"f", 10, 1}}), testing::make_dag("slow", {{"s", 100, 30}})});
 }
 
 SessionOptions simulated(Duration duration) {
@@ -122,8 +111,7 @@ TEST(SensibleDuration, IsWholeHyperperiods) {
 }
 
 TEST(SensibleDuration, HoldsAFewMillionJobs) {
-  Workload workload;
-  workload.dags = {Dag{"fast", {timer("a", 1000, 1), timer("b", 1000, 1)}, 0, 0, 0, Criticality::Normal, {}}};
+  Workload workload = testing::make_workload({testing::tick_dag("fast", {{"a", 1000}, {"b", 1000}})});
   EXPECT_EQ(sensible_duration(workload), 2 * kSecond);
   workload.dags[0].tasks[0].period = 1;
   workload.dags[0].tasks[1].period = 7;

@@ -12,57 +12,23 @@
 #include "redag/model/workload_yaml.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::lab {
 namespace {
 
 using testing::BoundCase;
 using testing::BoundCaseLimits;
-
-Dag single(const std::string &name, Duration wcet, Duration period, Duration deadline) {
-  Task task;
-  task.name = "t";
-  task.wcet = wcet;
-  task.period = period;
-  task.deadline = deadline;
-  if (deadline > period) {
-    task.overrun = Overrun::Queue;
-    task.queue_depth = 2;
-  }
-  Dag dag;
-  dag.name = name;
-  dag.tasks = {task};
-  return dag;
-}
-
-Workload workload_of(std::vector<Dag> dags, std::uint32_t workers = 1, PreemptionMode mode = PreemptionMode::Os) {
-  Workload workload;
-  workload.name = "w";
-  workload.platform = {workers, mode};
-  workload.dags = std::move(dags);
-  return workload;
-}
+using testing::independent;
+using testing::tick_dag;
 
 Assignment assigned(const Workload &workload, const AssignmentOptions &options = {}) {
   return assign(workload, analysis::platform_of(workload), options).value();
 }
 
-// Returns a source and `width` successors, all with one period.
-Dag fork(const std::string &name, Duration wcet, std::uint32_t width, Duration period) {
-  Dag dag = single(name, wcet, period, period);
-  for (std::uint32_t i = 0; i < width; ++i) {
-    Task task = dag.tasks[0];
-    task.name = "f" + std::to_string(i);
-    task.activation = Activation::Data;
-    task.predecessors = {0};
-    dag.tasks.push_back(task);
-  }
-  return dag;
-}
-
 TEST(Assignment, ShortDeadlinesGoFirst) {
   // By rate, b waits for a and responds after 5. By deadline, it responds after 2.
-  const Assignment result = assigned(workload_of({single("a", 3, 10, 10), single("b", 2, 20, 4)}));
+  const Assignment result = assigned(independent({{3, 10}, {2, 20, 4}}));
   EXPECT_FALSE(result.present.score.schedulable);
   EXPECT_EQ(result.present.score.extremes.worst_lateness, 1);
   EXPECT_TRUE(result.best.score.schedulable);
@@ -74,7 +40,12 @@ TEST(Assignment, ShortDeadlinesGoFirst) {
 TEST(Assignment, AudsleyBeatsDeadlinesLongerThanPeriods) {
   // From J. Lehoczky, RTSS 1990: with D > T, neither rates nor deadlines decide. With (52, 100, D = 110) above (52,
   // 140, D = 154), the second responds after 156. In the other order the responses are 108 and 52.
-  const Assignment result = assigned(workload_of({single("a", 52, 100, 110), single("b", 52, 140, 154)}));
+  Workload workload = independent({{52, 100, 110}, {52, 140, 154}});
+  for (Dag &dag : workload.dags) {
+    dag.tasks[0].overrun = Overrun::Queue;
+    dag.tasks[0].queue_depth = 2;
+  }
+  const Assignment result = assigned(workload);
   EXPECT_FALSE(result.present.score.schedulable);
   EXPECT_TRUE(result.audsley_optimal);
   EXPECT_TRUE(result.audsley_found);
@@ -87,7 +58,7 @@ TEST(Assignment, AudsleyBeatsDeadlinesLongerThanPeriods) {
 }
 
 TEST(Assignment, LeavesAloneWhatNothingImproves) {
-  const Workload workload = workload_of({single("a", 1, 4, 4), single("b", 1, 8, 8)});
+  const Workload workload = independent({{1, 4}, {1, 8}});
   for (const Objective objective : {Objective::Lateness, Objective::Slack}) {
     AssignmentOptions options;
     options.objective = objective;
@@ -117,8 +88,9 @@ TEST(Assignment, ObjectivesDiffer) {
 TEST(Assignment, ABoundOfActiveJobsIsolatesADag) {
   // On 3 workers, without preemption, "wide" can fill all workers and block "quick" for 40. With at most 2 active jobs
   // of "wide", "quick" always finds a worker.
-  const Workload workload =
-      workload_of({single("quick", 2, 20, 20), fork("wide", 40, 4, 400)}, 3, PreemptionMode::None);
+  const std::vector<testing::TestTask> wide = {
+      {"source", 400, 40}, {"a", 0, 40, {0}}, {"b", 0, 40, {0}}, {"c", 0, 40, {0}}, {"d", 0, 40, {0}}};
+  const Workload workload = testing::make_workload({tick_dag("quick", {{"t", 20, 2}}), tick_dag("wide", wide)}, 3);
   const Assignment result = assigned(workload);
   EXPECT_FALSE(result.present.score.schedulable);
   EXPECT_TRUE(result.best.score.schedulable);
@@ -164,15 +136,14 @@ TEST(Assignment, StopsWithTheBestSoFar) {
   AssignmentOptions options;
   int asked = 0;
   options.stop = [&] { return ++asked > 1; };
-  const Workload workload = workload_of({single("a", 3, 10, 10), single("b", 2, 20, 4)});
+  const Workload workload = independent({{3, 10}, {2, 20, 4}});
   const Assignment result = assigned(workload, options);
   EXPECT_TRUE(result.stopped);
   EXPECT_EQ(result.best.workload, workload);
 }
 
 TEST(Assignment, OfEdfChangesNoOrderThatWorks) {
-  Workload workload = workload_of({single("a", 3, 10, 10), single("b", 2, 20, 4)}, 1, PreemptionMode::Auto);
-  workload.policy = PolicyKind::Edf;
+  const Workload workload = independent({{3, 10}, {2, 20, 4}}, 1, PolicyKind::Edf);
   const Assignment result = assigned(workload);
   EXPECT_TRUE(result.present.score.schedulable);
   EXPECT_EQ(result.best.workload, workload);

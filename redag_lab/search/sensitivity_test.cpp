@@ -10,6 +10,7 @@
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::lab {
 namespace {
@@ -17,26 +18,7 @@ namespace {
 using Kind = Knob::Kind;
 using testing::BoundCase;
 using testing::BoundCaseLimits;
-
-Dag single(const std::string &name, Duration wcet, Duration period, Duration deadline = 0) {
-  Task task;
-  task.name = "t";
-  task.wcet = wcet;
-  task.period = period;
-  task.deadline = deadline > 0 ? deadline : period;
-  Dag dag;
-  dag.name = name;
-  dag.tasks = {task};
-  return dag;
-}
-
-Workload workload_of(std::vector<Dag> dags, std::uint32_t workers = 1) {
-  Workload workload;
-  workload.name = "w";
-  workload.platform = {workers, PreemptionMode::Os};
-  workload.dags = std::move(dags);
-  return workload;
-}
+using testing::independent;
 
 std::vector<std::uint32_t> all_tasks(const Workload &workload) {
   std::vector<std::uint32_t> all;
@@ -52,9 +34,8 @@ Margin all_wcets(const Workload &workload) { return margin(workload, {Kind::AllW
 
 TEST(Sensitivity, HarmonicPeriodsUseTheWholeWorker) {
   // U = 1/4 + 1/8 + 1/8 = 1/2. With rate-monotonic priorities, harmonic periods reach U = 1.
-  const Workload half =
-      workload_of({single("a", kMillisecond, 4 * kMillisecond), single("b", kMillisecond, 8 * kMillisecond),
-                   single("c", 2 * kMillisecond, 16 * kMillisecond)});
+  const Workload half = independent(
+      {{kMillisecond, 4 * kMillisecond}, {kMillisecond, 8 * kMillisecond}, {2 * kMillisecond, 16 * kMillisecond}});
   const Margin found = all_wcets(half);
   EXPECT_EQ(found.position, 2 * kFactorUnit);
   EXPECT_DOUBLE_EQ(found.factor, 2.0);
@@ -70,19 +51,18 @@ TEST(Sensitivity, TheLargestLoadOfTwoTasksOfLiuAndLayland) {
   // more nanosecond fits. Halved wcets leave a factor of 2.
   const Duration first = 1'000'000'000;
   const Duration second = 1'414'213'562;
-  const Workload full = workload_of({single("a", second - first, first), single("b", 2 * first - second, second)});
+  const Workload full = independent({{second - first, first}, {2 * first - second, second}});
   const Margin exact = margin(full, {Kind::Wcet, {0}});
   EXPECT_EQ(exact.position, exact.nominal);
   EXPECT_EQ(margin(full, {Kind::Wcet, {1}}).position, 2 * first - second);
   EXPECT_EQ(all_wcets(full).position, kFactorUnit);
-  const Workload half =
-      workload_of({single("a", (second - first) / 2, first), single("b", (2 * first - second) / 2, second)});
+  const Workload half = independent({{(second - first) / 2, first}, {(2 * first - second) / 2, second}});
   EXPECT_EQ(all_wcets(half).position, 2 * kFactorUnit);
 }
 
 TEST(Sensitivity, AnOverloadedWorkloadHasToShrink) {
   // Harmonic periods, U = 1/2 + 3/4. All fit when scaled by 4/5, and each task alone has to give up 1/4.
-  const Workload heavy = workload_of({single("a", 4000, 8000), single("b", 12000, 16000)});
+  const Workload heavy = independent({{4000, 8000}, {12000, 16000}});
   const Margin all = all_wcets(heavy);
   ASSERT_TRUE(all.position);
   EXPECT_LT(all.factor, 1.0);
@@ -93,11 +73,11 @@ TEST(Sensitivity, AnOverloadedWorkloadHasToShrink) {
   EXPECT_EQ(margin(heavy, {Kind::Period, {0}}).position, -16000);
   EXPECT_EQ(margin(heavy, {Kind::Period, {1}}).position, -24000);
   // Wcets are rounded up to whole nanoseconds. Small ones therefore leave less: 4 and 10 do not fit, 3 and 9 do.
-  EXPECT_EQ(all_wcets(workload_of({single("a", 4, 8), single("b", 12, 16)})).position, 750'000);
+  EXPECT_EQ(all_wcets(independent({{4, 8}, {12, 16}})).position, 750'000);
 }
 
 TEST(Sensitivity, WhereNoneAloneSufficesItSaysSo) {
-  const Workload hopeless = workload_of({single("a", 9, 8), single("b", 17, 16)});
+  const Workload hopeless = independent({{9, 8}, {17, 16}});
   EXPECT_FALSE(margin(hopeless, {Kind::Wcet, {0}}).position);
   EXPECT_FALSE(margin(hopeless, {Kind::Wcet, {1}}).position);
   EXPECT_EQ(margin(hopeless, {Kind::Wcet, {0}}).obstacle, "b.t alone takes longer than it has");
@@ -106,7 +86,7 @@ TEST(Sensitivity, WhereNoneAloneSufficesItSaysSo) {
 
 // A period that passes another one changes the order of priorities.
 TEST(Sensitivity, AChangeOfOrderEndsTheRoom) {
-  const Workload workload = workload_of({single("a", 5, 20, 6), single("b", 3, 40, 10)});
+  const Workload workload = independent({{5, 20, 6}, {3, 40, 10}});
   // With b at 40, a is first (5 <= 6), then b (8 <= 10). At 20 either can be first, and a responds after 8 > 6.
   const Margin found = margin(workload, {Kind::Period, {1}});
   EXPECT_EQ(found.position, -21);
@@ -116,7 +96,7 @@ TEST(Sensitivity, AChangeOfOrderEndsTheRoom) {
 
 // Only the period equal to another task's is refused. Evenly spread probes would not meet it.
 TEST(Sensitivity, EveryChangeOfOrderIsTested) {
-  Workload workload = workload_of({single("a", 1, 2003), single("b", 1, 9000)});
+  Workload workload = independent({{1, 2003}, {1, 9000}});
   const Accepts not_equal = [](const Workload &candidate, const analysis::TaskSet &) {
     return candidate.dags[1].tasks[0].period != 2003;
   };
@@ -133,7 +113,7 @@ TEST(Sensitivity, EveryChangeOfOrderIsTested) {
 }
 
 TEST(Sensitivity, AcceptanceThatComesBackIsReported) {
-  const Workload workload = workload_of({single("a", 10, 1000)});
+  const Workload workload = independent({{10, 1000}});
   const Accepts with_gap = [](const Workload &candidate, const analysis::TaskSet &) {
     const Duration wcet = candidate.dags[0].tasks[0].wcet;
     return wcet <= 100 || (wcet > 400 && wcet <= 600);
@@ -147,7 +127,7 @@ TEST(Sensitivity, AcceptanceThatComesBackIsReported) {
 }
 
 TEST(Sensitivity, StopsWhenAsked) {
-  const Workload workload = workload_of({single("a", kMillisecond, 4 * kMillisecond)});
+  const Workload workload = independent({{kMillisecond, 4 * kMillisecond}});
   SensitivityOptions options;
   int asked = 0;
   options.stop = [&] { return ++asked > 5; };
@@ -155,7 +135,7 @@ TEST(Sensitivity, StopsWhenAsked) {
 }
 
 TEST(Sensitivity, KnobsAreThoseOfTasksAndRates) {
-  Workload workload = workload_of({single("a", 1, 10), single("b", 1, 20)});
+  Workload workload = independent({{1, 10}, {1, 20}});
   workload.dags[0].tasks.push_back(workload.dags[0].tasks[0]);
   workload.dags[0].tasks[1].name = "u";
   workload.dags[0].tasks[1].period = workload.dags[0].tasks[1].deadline = 30;
@@ -168,7 +148,7 @@ TEST(Sensitivity, KnobsAreThoseOfTasksAndRates) {
 }
 
 TEST(Sensitivity, TheRatesOfTheOnlyDagAreAllRates) {
-  Workload workload = workload_of({single("a", 1, 10)});
+  Workload workload = independent({{1, 10}});
   workload.dags[0].tasks.push_back(workload.dags[0].tasks[0]);
   workload.dags[0].tasks[1].name = "u";
   const auto of_one_rate = analysis::compile(workload, analysis::platform_of(workload));
@@ -280,7 +260,7 @@ TEST(SensitivityProperty, RunToCompletion) {
 }
 
 TEST(Scaling, KeepsAWorkloadValid) {
-  Workload workload = workload_of({single("a", 10, 100)});
+  Workload workload = independent({{10, 100}});
   Task &task = workload.dags[0].tasks[0];
   task.bcet = 4;
   task.region = 3;

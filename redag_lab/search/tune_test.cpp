@@ -9,7 +9,7 @@
 #include <set>
 
 #include "redag/model/validate.hpp"
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::lab {
 namespace {

@@ -20,6 +20,7 @@
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/runtime/running_job.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/explorer.hpp"
 
 namespace redag::model_check {
@@ -30,6 +31,7 @@ using sched::Outcome;
 using sched::Preemption;
 using testing::Exploration;
 using testing::ExploreOptions;
+using testing::ladder;
 namespace explored = testing::explored;
 
 /// Explores all of `scenario`, prints the size of the exploration, and expects that no check fails.
@@ -119,21 +121,6 @@ class Countdown {
   int left_;
   testing::ObjectId object_ = explored::new_object();
 };
-
-/// A DAG of independent timer tasks. Task t has priority t: the last one is the most urgent.
-inline Workload ladder(std::size_t tasks) {
-  Workload workload;
-  workload.policy = PolicyKind::Fixed;
-  workload.dags.emplace_back();
-  for (std::size_t t = 0; t < tasks; ++t) {
-    Task task;
-    task.name = "t" + std::to_string(t);
-    task.period = task.deadline = task.wcet = kSecond;
-    task.priority = static_cast<int>(t);
-    workload.dags[0].tasks.push_back(task);
-  }
-  return workload;
-}
 
 struct Platform {
   Preemption preemption = Preemption::None;

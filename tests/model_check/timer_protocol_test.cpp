@@ -7,6 +7,7 @@
 #include "protocol.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/release_timer.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::model_check {
 namespace {
@@ -111,13 +112,7 @@ TEST(EventProtocol, EveryWaiterSeesIt) {
       kTimed);
 }
 
-Dag one_timer_task(Duration period) {
-  Dag dag;
-  dag.tasks.emplace_back();
-  dag.tasks[0].name = "t";
-  dag.tasks[0].period = dag.tasks[0].deadline = period;
-  return dag;
-}
+Dag one_timer_task(Duration period) { return testing::tick_dag("d", {{"t", period}}); }
 
 // Reports every grid point before the stop, once, in order, and never early.
 TEST(TimerProtocol, ReleasesAreOnTheGridUntilTheStop) {

@@ -5,26 +5,17 @@
 
 #include <gtest/gtest.h>
 
+#include "redag_testing/builders.hpp"
+
 namespace redag::cli {
 namespace {
 
 // Returns on one worker a sensor (T 10, C 3) above a DAG of two tasks (T 20, C 2 and 5), in milliseconds.
 lab::Analysed sensor_and_pipeline() {
-  const auto timer = [](std::string name, Duration period, Duration wcet) {
-    Task task;
-    task.name = std::move(name);
-    task.period = task.deadline = period * kMillisecond;
-    task.wcet = task.bcet = wcet * kMillisecond;
-    return task;
-  };
-  Task second = timer("second", 20, 5);
-  second.activation = Activation::Data;
-  second.predecessors = {0};
-  Workload workload;
-  workload.name = "chains";
-  workload.platform = Platform{1, PreemptionMode::Os};
-  workload.dags = {Dag{"sensor", {timer("read", 10, 3)}, 0, 0, 0, Criticality::Normal, {}},
-                   Dag{"pipeline", {timer("first", 20, 2), second}, 0, 0, 0, Criticality::Normal, {}}};
+  const Workload workload =
+      testing::make_workload({testing::make_dag("sensor", {{"read", 10, 3}}),
+                              testing::make_dag("pipeline", {{"first", 20, 2}, {"second", 0, 5, {0}}})},
+                             1, PreemptionMode::Os);
   Result<lab::Analysed> analysed = lab::analyse(workload, analysis::platform_of(workload));
   EXPECT_TRUE(analysed) << to_string(analysed.error());
   return *std::move(analysed);

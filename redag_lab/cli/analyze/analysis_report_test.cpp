@@ -6,31 +6,16 @@
 #include <gtest/gtest.h>
 
 #include "redag_lab/cli/analyze/analysis_explanation.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::cli {
 namespace {
 
-Task timer(std::string name, Duration period, Duration wcet) {
-  Task task;
-  task.name = std::move(name);
-  task.period = task.deadline = period;
-  task.wcet = task.bcet = wcet;
-  return task;
-}
-
-Dag dag_of(std::string name, std::vector<Task> tasks) {
-  return Dag{std::move(name), std::move(tasks), 0, 0, 0, Criticality::Normal, {}};
-}
-
 // Returns a (T 10, C 3) and b (T 20, C 7) on one worker, in milliseconds. With preemption the responses are 3 and
 // 7 + 3 = 10, when the second job of a arrives.
 Workload two_tasks(PreemptionMode mode) {
-  Workload workload;
-  workload.name = "two";
-  workload.platform = Platform{1, mode};
-  workload.dags = {dag_of("fast", {timer("a", 10 * kMillisecond, 3 * kMillisecond)}),
-                   dag_of("slow", {timer("b", 20 * kMillisecond, 7 * kMillisecond)})};
-  return workload;
+  return testing::make_workload({testing::make_dag("fast", {{"a", 10, 3}}), testing::make_dag("slow", {{"b", 20, 7}})},
+                                1, mode);
 }
 
 lab::Analysed look_at(const Workload &workload) {
@@ -165,7 +150,7 @@ TEST(AnalysisReport, WhatNoMethodTakesIsSaidOnce) {
 TEST(AnalysisReport, ManyTasksAreCutToThoseWithTheLeastSlack) {
   Workload workload = two_tasks(PreemptionMode::Os);
   for (int i = 0; i < 60; ++i) {
-    workload.dags.push_back(dag_of("d" + std::to_string(i), {timer("t", kSecond, kMicrosecond)}));
+    workload.dags.push_back(testing::tick_dag("d" + std::to_string(i), {{"t", kSecond, kMicrosecond}}));
   }
   const lab::Analysed analysed = look_at(workload);
   const std::string few = describe(analysed, StreamTraits{}, false);

@@ -6,29 +6,15 @@
 #include <gtest/gtest.h>
 
 #include "redag_lab/cli/analyze/sensitivity_report.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::cli {
 namespace {
 
-Dag single(const std::string &name, Duration wcet, Duration period, Duration deadline) {
-  Task task;
-  task.name = "t";
-  task.wcet = wcet;
-  task.period = period;
-  task.deadline = deadline;
-  Dag dag;
-  dag.name = name;
-  dag.tasks = {task};
-  return dag;
-}
-
 Workload short_deadline() {
-  Workload workload;
-  workload.name = "w";
-  workload.platform = {1, PreemptionMode::Os};
-  workload.dags = {single("a", 3 * kMillisecond, 10 * kMillisecond, 10 * kMillisecond),
-                   single("b", 2 * kMillisecond, 20 * kMillisecond, 4 * kMillisecond)};
-  return workload;
+  return testing::make_workload({testing::make_dag("a", {{"t", 10, 3}}),
+                                 testing::make_dag("b", {{.name = "t", .period = 20, .wcet = 2, .deadline = 4}})},
+                                1, PreemptionMode::Os);
 }
 
 Assigned assigned(const Workload &workload) {

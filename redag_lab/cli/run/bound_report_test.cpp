@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag_testing/timeline.hpp"
+#include "redag_testing/builders.hpp"
 
 namespace redag::cli {
 namespace {
@@ -28,8 +28,8 @@ Duration bound_of(const lab::BoundCheck &check, std::size_t task) {
 }
 
 Workload fast_and_slow() {
-  return make_workload({make_dag("fast", {{.name = "imu", .period_ms = 10, .wcet_ms = 2}}),
-                        make_dag("slow", {{.name = "plan", .period_ms = 50, .wcet_ms = 20}})},
+  return make_workload({make_dag("fast", {{.name = "imu", .period = 10, .wcet = 2}}),
+                        make_dag("slow", {{.name = "plan", .period = 50, .wcet = 20}})},
                        1, PreemptionMode::Os);
 }
 

@@ -7,6 +7,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "redag_testing/builders.hpp"
+
 namespace redag::cli {
 namespace {
 
@@ -55,16 +57,7 @@ TEST_F(RunArgumentsTest, WorkersAreForExecutorsThatHaveSome) {
 }
 
 TEST(Configure, IsTheWorkloadAsTheExecutorRunsIt) {
-  Workload workload;
-  workload.platform = Platform{4, PreemptionMode::Auto};
-  Task task;
-  task.name = "t";
-  task.wcet = 1;
-  task.period = task.deadline = kMillisecond;
-  Dag dag;
-  dag.name = "d";
-  dag.tasks = {task};
-  workload.dags.push_back(dag);
+  Workload workload = testing::make_workload({testing::make_dag("d", {{"t", 1}})}, 4, PreemptionMode::Auto);
   const auto as = [&](const char *name) { return lab::configure(workload, *lab::parse_variant(name)); };
   EXPECT_EQ(as("redag")->platform, workload.platform);
   EXPECT_EQ(as("redag-os")->platform, (Platform{4, PreemptionMode::Os}));
