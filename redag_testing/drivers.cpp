@@ -12,8 +12,8 @@
 #include "redag/base/rng.hpp"
 #include "redag/model/demand.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag_analysis/sim/simulator.hpp"
 #include "redag_lab/run/run_workload.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::testing {
 namespace {
@@ -164,16 +164,7 @@ sched::Config config_of(const RunSpec &spec) {
 }
 
 trace::Trace SimulatorDriver::run(const RunSpec &spec) {
-  trace::Trace trace = empty_trace(spec, trace::Driver::Simulator);
-  sched::PriorityScheduler scheduler(spec.workload, trace.info.config);
-  sim::Options options;
-  options.horizon = spec.horizon;
-  options.seed = spec.seed;
-  sim::simulate(spec.workload, scheduler, trace.info.config.workers, options, [&](std::span<const JobEvent> batch) {
-    trace.events.insert(trace.events.end(), batch.begin(), batch.end());
-    return true;
-  });
-  return trace;
+  return simulated(empty_trace(spec, trace::Driver::Simulator).info, spec.horizon);
 }
 
 trace::Trace ManualDriver::run(const RunSpec &spec) {

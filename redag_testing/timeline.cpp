@@ -2,13 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "redag_testing/timeline.hpp"
+#include "redag_analysis/executors/executors.hpp"
 
 #include <map>
 #include <utility>
 
 #include <fmt/format.h>
-
-#include "redag/sched/priority_scheduler.hpp"
 
 namespace redag::testing {
 namespace {
@@ -17,16 +16,32 @@ std::string in_ms(Time time) { return fmt::format("{:g}", static_cast<double>(ti
 
 }  // namespace
 
-std::vector<JobEvent> simulate_events(const Workload &workload, Duration horizon, const sim::Options &options) {
-  sim::Options with_horizon = options;
-  with_horizon.horizon = horizon;
-  sched::PriorityScheduler scheduler(workload, sched::config_of(workload));
-  std::vector<JobEvent> events;
-  sim::simulate(workload, scheduler, workload.platform.workers, with_horizon, [&](std::span<const JobEvent> batch) {
-    events.insert(events.end(), batch.begin(), batch.end());
+trace::RunInfo run_info(Workload workload, const std::string &executor, std::uint64_t seed) {
+  trace::RunInfo info;
+  info.executor = executor;
+  info.config = executors::effective_config(*executors::find_executor(executor), sched::config_of(workload));
+  info.preemption = trace::preemption_name(info.config.preemption);
+  info.seed = seed;
+  info.workload = std::move(workload);
+  return info;
+}
+
+trace::Trace simulated(trace::RunInfo info, Duration horizon, sim::Options options) {
+  trace::Trace trace{std::move(info), {}};
+  const Workload &workload = trace.info.workload;
+  options.horizon = horizon;
+  options.seed = trace.info.seed;
+  const auto scheduler = executors::make_scheduler(trace.info.executor, workload, trace.info.config);
+  const auto keep = [&](std::span<const JobEvent> events) {
+    trace.events.insert(trace.events.end(), events.begin(), events.end());
     return true;
-  });
-  return events;
+  };
+  trace.info.end = sim::simulate(workload, *scheduler, trace.info.config.workers, options, keep).end;
+  return trace;
+}
+
+std::vector<JobEvent> simulate_events(const Workload &workload, Duration horizon, const sim::Options &options) {
+  return simulated(run_info(workload, "redag", options.seed), horizon, options).events;
 }
 
 std::string timeline(const Workload &workload, std::span<const JobEvent> events) {

@@ -1,17 +1,26 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Schedules as text for golden tests: where and when each job ran, a line per job, readable in a failure message.
+// Runs of the simulator, and schedules as text for golden tests: where and when each job ran, a line per job, readable
+// in a failure message.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "redag/sched/scheduler.hpp"
+#include "redag/trace/trace.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 
 namespace redag::testing {
+
+/// How an executor runs the workload; without an end.
+[[nodiscard]] trace::RunInfo run_info(Workload workload, const std::string &executor = "redag", std::uint64_t seed = 1);
+
+/// Simulates such a run, with its seed.
+[[nodiscard]] trace::Trace simulated(trace::RunInfo info, Duration horizon, sim::Options options = {});
 
 /// Returns every event of a simulation with our scheduler.
 [[nodiscard]] std::vector<JobEvent> simulate_events(const Workload &workload, Duration horizon,

@@ -7,11 +7,10 @@
 #include <gtest/gtest.h>
 
 #include "redag/model/workload_yaml.hpp"
-#include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
-#include "redag_analysis/sim/simulator.hpp"
 #include "redag_lab/experiment/factorial_results.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::experiment {
 namespace {
@@ -39,22 +38,7 @@ FactorialPlan plan() {
 
 trace::Trace simulated(Workload workload, const std::string &executor, std::uint64_t seed, Duration duration) {
   workload.platform.preemption = PreemptionMode::None;
-  trace::Trace trace;
-  trace.info.workload = workload;
-  trace.info.executor = executor;
-  trace.info.config = executors::effective_config(*executors::find_executor(executor), sched::config_of(workload));
-  trace.info.seed = seed;
-  trace.info.end = duration;
-  const auto scheduler = executors::make_scheduler(executor, workload, trace.info.config);
-  sim::Options options;
-  options.horizon = duration;
-  options.seed = seed;
-  static_cast<void>(
-      sim::simulate(workload, *scheduler, trace.info.config.workers, options, [&](std::span<const JobEvent> events) {
-        trace.events.insert(trace.events.end(), events.begin(), events.end());
-        return true;
-      }));
-  return trace;
+  return testing::simulated(testing::run_info(std::move(workload), executor, seed), duration);
 }
 
 // Returns a run as nodes would record it: with double the demand, on another machine with three workers.

@@ -6,10 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_lab/experiment/factorial_results.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::experiment {
 namespace {
@@ -44,24 +44,10 @@ Result<FinishedRun> simulate_run(const PlannedRun &planned) {
   Workload workload = planned.workload;
   const std::string name = planned.executor.substr(0, planned.executor.find('-'));
   if (name != planned.executor || name != "redag") workload.platform.preemption = PreemptionMode::None;
-  const executors::ExecutorKind *kind = executors::find_executor(name);
-  FinishedRun run;
-  run.trace.info.workload = workload;
-  run.trace.info.executor = name;
-  run.trace.info.config = executors::effective_config(*kind, sched::config_of(workload));
-  run.trace.info.preemption = trace::preemption_name(run.trace.info.config.preemption);
-  run.trace.info.seed = planned.seed;
-  run.trace.info.end = planned.duration;
-  const auto scheduler = executors::make_scheduler(name, workload, run.trace.info.config);
   sim::Options options;
-  options.horizon = planned.duration;
-  options.seed = planned.seed;
   options.overheads = planned.overheads;
-  static_cast<void>(sim::simulate(workload, *scheduler, run.trace.info.config.workers, options,
-                                  [&run](std::span<const JobEvent> events) {
-                                    run.trace.events.insert(run.trace.events.end(), events.begin(), events.end());
-                                    return true;
-                                  }));
+  FinishedRun run;
+  run.trace = testing::simulated(testing::run_info(workload, name, planned.seed), planned.duration, options);
   run.summary = metrics::summarize(run.trace);
   run.check = metrics::check_trace(run.trace, metrics::rules_for(run.trace.info));
   return run;
@@ -267,7 +253,7 @@ TEST(Factorial, MaximaAreOfAllRunsAndAllDagsTogetherHaveNoResponse) {
   EXPECT_EQ(of_slow(Metric::ResponseP99).median, 20) << "of a percentile the median of the runs";
   EXPECT_GT(of_slow(Metric::ResponseMean).low, 0) << "a run that did not answer is no answer after 0 ns";
   EXPECT_EQ(over_runs(factorial, counter.results(), row, 2, Metric::ResponseP99), std::nullopt) << "of all DAGs";
-  EXPECT_THAT(observations_csv(factorial, counter.results()), testing::Not(HasSubstr("-9223372036854775808")));
+  EXPECT_THAT(observations_csv(factorial, counter.results()), ::testing::Not(HasSubstr("-9223372036854775808")));
 }
 
 TEST(Factorial, MistakesNameTheCombination) {

@@ -7,10 +7,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "redag_analysis/executors/executors.hpp"
 #include "redag_lab/report/document.hpp"
 #include "redag_lab/report/verdict.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/timeline.hpp"
 #include "redag_testing/trace_builder.hpp"
 
 namespace redag::report {
@@ -28,20 +28,7 @@ Workload hi_and_lo(PreemptionMode mode) {
 
 trace::Trace simulated(const Workload &workload, Duration length, const std::string &executor = "redag",
                        std::uint64_t seed = 1) {
-  trace::Trace trace = TraceBuilder(workload).until(length / kMillisecond);
-  trace.info.executor = executor;
-  trace.info.seed = seed;
-  trace.info.config = executors::effective_config(*executors::find_executor(executor), trace.info.config);
-  trace.info.preemption = trace::preemption_name(trace.info.config.preemption);
-  sim::Options options;
-  options.horizon = length;
-  options.seed = seed;
-  const auto scheduler = executors::make_scheduler(executor, workload, trace.info.config);
-  sim::simulate(workload, *scheduler, trace.info.config.workers, options, [&](std::span<const JobEvent> events) {
-    trace.events.insert(trace.events.end(), events.begin(), events.end());
-    return true;
-  });
-  return trace;
+  return testing::simulated(testing::run_info(workload, executor, seed), length);
 }
 
 Group group_of(const std::string &label, const std::vector<trace::Trace> &traces, DigestOptions options = {}) {

@@ -27,12 +27,7 @@ Workload hi_and_lo() {
 }
 
 trace::Trace simulated(const Workload &workload, Duration length) {
-  TraceBuilder builder(workload);
-  trace::Trace trace = builder.until(length / kMillisecond);
-  sim::Options options;
-  options.horizon = length;
-  trace.events = testing::simulate_events(workload, length, options);
-  return trace;
+  return testing::simulated(testing::run_info(workload), length);
 }
 
 std::vector<JobRecord> jobs_of(const trace::Trace &trace) {
