@@ -7,16 +7,12 @@
 
 #include <fmt/format.h>
 
+#include "redag_testing/random_workloads.hpp"
+
 #include "redag_testing/bound_property.hpp"
 
 namespace redag::testing {
 namespace {
-
-bool chance(Rng &rng, double probability) { return rng.uniform01() < probability; }
-
-std::uint32_t between(Rng &rng, std::uint32_t low, std::uint32_t high) {
-  return static_cast<std::uint32_t>(rng.uniform(low, high));
-}
 
 // UUniFast: E. Bini, G. Buttazzo, RTS 30, 2005.
 std::vector<double> shares(Rng &rng, std::size_t count, double total) {

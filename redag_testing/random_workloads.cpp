@@ -9,15 +9,10 @@
 #include <fmt/format.h>
 
 #include "redag/sched/policy.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 namespace redag::testing {
 namespace {
-
-bool chance(Rng &rng, double probability) { return rng.uniform01() < probability; }
-
-std::uint32_t between(Rng &rng, std::uint32_t low, std::uint32_t high) {
-  return static_cast<std::uint32_t>(rng.uniform(low, high));
-}
 
 // Few values make equal ones common; all are multiples of one value, which makes releases coincide.
 Duration random_period(Rng &rng) {
@@ -70,7 +65,67 @@ Task random_task(Rng &rng, std::size_t index, const RandomWorkloadLimits &limits
   return task;
 }
 
+Degrade random_degrade(Rng &rng, std::uint32_t most_skipped, double most_stretched) {
+  Degrade degrade;
+  degrade.kind = static_cast<Degrade::Kind>(between(rng, 0, 2));
+  degrade.skip = between(rng, 1, most_skipped);
+  degrade.stretch = 1 + (most_stretched - 1) * rng.uniform01();
+  return degrade;
+}
+
+lab::GenerateOptions random_options(Rng &rng) {
+  constexpr std::array kModes{PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Auto};
+  lab::GenerateOptions options;
+  options.dags = between(rng, 1, 4);
+  options.min_tasks = 1;
+  options.max_tasks = between(rng, 1, 7);
+  options.workers = between(rng, 1, 4);
+  options.preemption = kModes[between(rng, 0, 2)];
+  options.policy = static_cast<PolicyKind>(between(rng, 0, 5));
+  // Never more than the smallest number of tasks can have.
+  options.utilization = std::min((0.2 + 1.2 * rng.uniform01()) * options.workers, 0.9 * options.dags);
+  options.periods = chance(rng, 0.5) ? lab::PeriodModel::Harmonic : lab::PeriodModel::LogUniform;
+  options.period_max = 40 * kMillisecond;
+  options.rates = chance(rng, 0.5) ? lab::RateScope::PerDag : lab::RateScope::PerTask;
+  options.shape = static_cast<lab::DagShape>(between(rng, 0, 4));
+  options.data_share = rng.uniform01();
+  options.bcet_min = 0.2;
+  options.offsets = chance(rng, 0.5);
+  options.deadline_min = chance(rng, 0.5) ? 0.5 : 1.0;
+  options.jitter = chance(rng, 0.3) ? 0.5 : 0.0;
+  options.max_active_max = between(rng, 0, 3);
+  options.groups = between(rng, 0, 2);
+  options.group_share = options.groups > 0 ? 0.4 : 0.0;
+  options.queue_share = chance(rng, 0.5) ? 0.5 : 0.0;
+  return options;
+}
+
+void add_details(Rng &rng, Task &task) {
+  if (chance(rng, 0.7)) task.region = std::max<Duration>(1, task.wcet / rng.uniform(1, 5));
+  if (chance(rng, 0.1)) task.budget = std::max<Duration>(1, task.wcet / 2);
+  if (task.group.empty() && chance(rng, 0.1)) task.concurrency = between(rng, 2, 3);
+  if (chance(rng, 0.5)) task.priority = static_cast<int>(rng.uniform(-2, 2));
+}
+
+void add_overload(Rng &rng, Dag &dag) {
+  dag.criticality = static_cast<Criticality>(between(rng, 0, 2));
+  if (dag.criticality != Criticality::High) dag.degrade = random_degrade(rng, 3, 4);
+  const bool has_modes = dag.criticality == Criticality::High && chance(rng, 0.5);
+  for (Task &task : dag.tasks) {
+    if (has_modes && chance(rng, 0.5)) task.wcet_low = rng.uniform(1, task.wcet);
+    if (task.budget > 0 || !chance(rng, 0.2)) continue;
+    task.on_budget = static_cast<OnBudget>(between(rng, 1, 3));
+    task.budget = rng.uniform(1, task.wcet);
+  }
+}
+
 }  // namespace
+
+bool chance(Rng &rng, double probability) { return rng.uniform01() < probability; }
+
+std::uint32_t between(Rng &rng, std::uint32_t low, std::uint32_t high) {
+  return static_cast<std::uint32_t>(rng.uniform(low, high));
+}
 
 Dag random_dag(Rng &rng, const RandomWorkloadLimits &limits) {
   Dag dag;
@@ -78,11 +133,7 @@ Dag random_dag(Rng &rng, const RandomWorkloadLimits &limits) {
   if (limits.bounds && chance(rng, 0.5)) dag.max_active = between(rng, 1, 3);
   if (limits.bounds && chance(rng, 0.3)) dag.max_pending = between(rng, 1, 4);
   dag.criticality = static_cast<Criticality>(between(rng, 0, 2));
-  if (dag.criticality != Criticality::High) {
-    dag.degrade.kind = static_cast<Degrade::Kind>(between(rng, 0, 2));
-    dag.degrade.skip = between(rng, 1, 2);
-    dag.degrade.stretch = 1 + 2 * rng.uniform01();
-  }
+  if (dag.criticality != Criticality::High) dag.degrade = random_degrade(rng, 2, 3);
   const bool one_rate = chance(rng, 0.5);
   const Duration period = random_period(rng);
   const Duration offset = random_offset(rng);
@@ -110,6 +161,17 @@ Workload random_workload(Rng &rng, const RandomWorkloadLimits &limits) {
   for (std::size_t i = 0; i < count; ++i) {
     workload.dags.push_back(random_dag(rng, limits));
     workload.dags.back().name = fmt::format("d{}", i);
+  }
+  return workload;
+}
+
+Workload contended(Rng &rng, bool overload) {
+  const lab::GenerateOptions options = random_options(rng);
+  Workload workload = lab::generate(options, rng()).value();
+  for (Dag &dag : workload.dags) {
+    if (chance(rng, 0.3)) dag.max_pending = between(rng, 1, 4);
+    for (Task &task : dag.tasks) add_details(rng, task);
+    if (overload) add_overload(rng, dag);
   }
   return workload;
 }

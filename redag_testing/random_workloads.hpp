@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Small workloads with difficult features: equal periods and deadlines, edges between rates, AND-joins, groups across
-// DAGs, tight bounds and queues, several tasks a level. For properties of schedulers; generate.hpp makes realistic
-// ones. Pure functions of their generator.
+// Random workloads for tests. random_workload() makes tiny ones with difficult features: equal periods and deadlines,
+// edges between rates, AND-joins, groups across DAGs, tight bounds and queues, several tasks a level. contended() makes
+// realistic ones with generate(). bound_property.hpp has those that satisfy the assumptions of a bound. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +16,10 @@
 #include "redag/sched/scheduler.hpp"
 
 namespace redag::testing {
+
+[[nodiscard]] bool chance(Rng &rng, double probability);
+/// Draws from the range, which includes both ends.
+[[nodiscard]] std::uint32_t between(Rng &rng, std::uint32_t low, std::uint32_t high);
 
 struct RandomWorkloadLimits {
   std::uint32_t max_dags = 3;
@@ -31,6 +35,11 @@ struct RandomWorkloadLimits {
 
 /// One more DAG like those of random_workload(), for add_dag.
 [[nodiscard]] Dag random_dag(Rng &rng, const RandomWorkloadLimits &limits = {});
+
+/// Up to four DAGs of generate() with much contention, of any shape, policy and mode; the load is from a fifth of the
+/// workers to above them. Adds what generate() does not draw: max_pending, budgets, regions, concurrency, priorities;
+/// with `overload` also wcet_low, degradation, and budgets that do not abort.
+[[nodiscard]] Workload contended(Rng &rng, bool overload = true);
 
 /// Draws 1 to 3 workers. Full preemption with a static policy has limited levels or threads every other time.
 [[nodiscard]] sched::Config random_config(Rng &rng, PolicyKind policy, sched::Preemption preemption,

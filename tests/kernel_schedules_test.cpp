@@ -34,6 +34,7 @@
 #include "redag_lab/run/concurrency.hpp"
 #include "redag_lab/run/run_workload.hpp"
 #include "redag_lab/run/synthetic.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/kernel_judge.hpp"
 #include "redag_testing/reference_scheduler.hpp"
 
@@ -89,7 +90,7 @@ struct Tally {
   std::uint64_t switches = 0;
 };
 
-// ---- random workloads, of some milliseconds ----
+// ---- random workloads: unlike testing::contended(), with jobs long enough for the kernel to switch threads ----
 
 constexpr std::array<Duration, 8> kPeriods{4 * kMillisecond,  5 * kMillisecond,  8 * kMillisecond,  10 * kMillisecond,
                                            15 * kMillisecond, 20 * kMillisecond, 30 * kMillisecond, 60 * kMillisecond};
@@ -411,24 +412,12 @@ TEST_F(KernelSchedules, TheMostUrgentStartedJobsHaveTheProcessors) {
 // Two jobs of one task run for long. Each keeps its thread while it is preempted: the urgent job needs a third thread.
 TEST_F(KernelSchedules, TheMostUrgentOfThreeJobsOfTwoTasksHasAProcessor) {
   if (runtime::usable_cpus().size() < 2) GTEST_SKIP() << "nothing is judged: one processor";
-  const auto task = [](std::string name, Duration period, Duration wcet, std::uint32_t concurrency) {
-    Task one;
-    one.name = std::move(name);
-    one.period = period;
-    one.wcet = one.bcet = wcet;
-    one.deadline = kSecond;
-    one.region = 100 * kMicrosecond;
-    one.concurrency = concurrency;
-    return one;
-  };
-  Workload workload;
-  workload.name = "pool";
-  workload.platform = Platform{2, PreemptionMode::Os};
-  workload.dags.resize(2);
-  workload.dags[0].name = "urgent";
-  workload.dags[0].tasks = {task("a", 4 * kMillisecond, 200 * kMicrosecond, 1)};
-  workload.dags[1].name = "slow";
-  workload.dags[1].tasks = {task("b", 50 * kMillisecond, 90 * kMillisecond, 2)};
+  const TestTask a = {.name = "a", .period = 4'000, .wcet = 200, .deadline = 1'000'000};
+  const TestTask b = {.name = "b", .period = 50'000, .wcet = 90'000, .deadline = 1'000'000};
+  Workload workload = make_workload({make_dag("urgent", {a}, 0, kMicrosecond), make_dag("slow", {b}, 0, kMicrosecond)},
+                                    2, PreemptionMode::Os);
+  for (Dag &dag : workload.dags) dag.tasks[0].region = 100 * kMicrosecond;
+  workload.dags[1].tasks[0].concurrency = 2;
   ASSERT_FALSE(has_errors(validate(workload)));
   run_as_workload(workload, 1, "");
 }

@@ -37,6 +37,7 @@ struct Limits {
   bool rich = false;   // more jitter and more varied execution times than can be enumerated
 };
 
+// Unlike testing::random_bound_case(), with hyperperiods so short that every state of one can be explored.
 BoundCase random_case(Rng &rng, const Limits &limits) {
   constexpr std::array<Duration, 5> kPeriods{4, 6, 8, 12, 24};
   constexpr std::array<PolicyKind, 5> kPolicies{PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic,

@@ -6,94 +6,30 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include <array>
-
 #include "redag/base/rng.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
-#include "redag_analysis/sim/simulator.hpp"
-#include "redag_lab/workload/generate.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/random_workloads.hpp"
+#include "redag_testing/timeline.hpp"
 
 namespace redag::metrics {
 namespace {
 
-bool coin(Rng &rng) { return rng.uniform(0, 1) == 1; }
-
-std::uint32_t pick(Rng &rng, std::int64_t low, std::int64_t high) {
-  return static_cast<std::uint32_t>(rng.uniform(low, high));
-}
-
-lab::GenerateOptions random_options(Rng &rng) {
-  constexpr std::array kModes = {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Auto};
-  lab::GenerateOptions options;
-  options.dags = pick(rng, 1, 4);
-  options.min_tasks = 1;
-  options.max_tasks = pick(rng, 2, 7);
-  options.workers = pick(rng, 1, 3);
-  options.preemption = kModes[pick(rng, 0, 2)];
-  options.policy = static_cast<PolicyKind>(rng.uniform(0, 5));
-  // Overload is included, but never more than the smallest number of tasks can have.
-  options.utilization = std::min(options.workers * (0.3 + rng.uniform01()), 0.9 * options.dags);
-  options.period_max = 50 * kMillisecond;
-  options.rates = coin(rng) ? lab::RateScope::PerDag : lab::RateScope::PerTask;
-  options.shape = static_cast<lab::DagShape>(rng.uniform(0, 4));
-  options.data_share = rng.uniform01();
-  options.bcet_min = 0.5;
-  options.offsets = coin(rng);
-  options.deadline_min = coin(rng) ? 0.5 : 1.0;
-  if (coin(rng)) options.jitter = 0.3;
-  if (coin(rng)) options.max_active_min = 1, options.max_active_max = 3;
-  if (coin(rng)) options.groups = 2, options.group_share = 0.4;
-  if (coin(rng)) options.queue_share = 0.5;
-  return options;
-}
-
-// Adds features that the generator does not draw.
-void add_details(Workload &workload, Rng &rng) {
-  for (Dag &dag : workload.dags) {
-    if (coin(rng)) dag.max_pending = pick(rng, 1, 4);
-    for (Task &task : dag.tasks) {
-      if (coin(rng)) task.priority = static_cast<int>(rng.uniform(0, 4));
-      if (rng.uniform(0, 5) == 0) task.budget = std::max<Duration>(1, task.wcet * 4 / 5);
-      if (workload.platform.preemption == PreemptionMode::Cooperative && coin(rng)) {
-        task.region = std::max<Duration>(1, task.wcet / rng.uniform(1, 5));
-      }
-    }
-  }
-}
+using testing::between;
+using testing::chance;
+using testing::simulated;
 
 /// A random workload and platform, not yet run.
-trace::RunInfo drawn(std::uint64_t seed) {
+trace::RunInfo drawn(std::uint64_t seed, bool overload = true) {
   Rng rng(seed);
-  trace::RunInfo info;
-  Result<Workload> workload = generate(random_options(rng), seed);
-  if (!workload) ADD_FAILURE() << to_string(workload.error());
-  add_details(*workload, rng);
-  info.executor = "redag";
-  info.seed = seed;
-  info.config = sched::config_of(*workload);
-  info.workload = std::move(*workload);
+  trace::RunInfo info = testing::run_info(testing::contended(rng, overload), "redag", seed);
   if (info.config.preemption == sched::Preemption::Full) {
-    if (is_static(info.config.policy) && coin(rng)) info.config.levels = pick(rng, 1, 5);
-    if (coin(rng)) info.config.max_started = info.config.workers + pick(rng, 0, 2);
+    if (is_static(info.config.policy) && chance(rng, 0.5)) info.config.levels = between(rng, 1, 5);
+    if (chance(rng, 0.5)) info.config.max_started = info.config.workers + between(rng, 0, 2);
   }
   return info;
-}
-
-trace::Trace simulated(trace::RunInfo info, Duration horizon) {
-  trace::Trace trace{std::move(info), {}};
-  const auto scheduler = executors::make_scheduler(trace.info.executor, trace.info.workload, trace.info.config);
-  sim::Options options;
-  options.horizon = horizon;
-  options.seed = trace.info.seed;
-  const auto keep = [&](std::span<const JobEvent> events) {
-    trace.events.insert(trace.events.end(), events.begin(), events.end());
-    return true;
-  };
-  trace.info.end = sim::simulate(trace.info.workload, *scheduler, trace.info.config.workers, options, keep).end;
-  return trace;
 }
 
 RC_GTEST_PROP(SimulatedTraces, KeepEveryRule, ()) {
@@ -149,10 +85,10 @@ RC_GTEST_PROP(SimulatedTraces, SummaryAgreesWithTheEvents, ()) {
   for (const double busy : summary.worker_busy) RC_ASSERT(busy >= 0.0 && busy <= 1.0);
 }
 
-// Without exclusive groups a fully preemptive platform has no priority inversion at all.
+// Without exclusive groups and overload a fully preemptive platform has no priority inversion at all.
 RC_GTEST_PROP(SimulatedTraces, FullPreemptionHasNoInversion, ()) {
   const auto seed = *rc::gen::arbitrary<std::uint64_t>();
-  trace::RunInfo info = drawn(seed);
+  trace::RunInfo info = drawn(seed, false);
   info.config.preemption = sched::Preemption::Full;
   info.config.levels = info.config.max_started = 0;
   if (info.config.policy == PolicyKind::Fifo) info.config.policy = PolicyKind::RateMonotonic;
@@ -173,9 +109,9 @@ std::string name_of(const trace::Trace &trace, std::size_t i) {
          std::to_string(event.job) + ", event " + std::to_string(i);
 }
 
-// Each event in turn is dropped, doubled, moved by a nanosecond, or given to the next job.
+// Without overload: each event in turn is dropped, doubled, moved by a nanosecond, or given to the next job.
 TEST_P(DamagedTraces, AreNoticed) {
-  const trace::Trace good = simulated(drawn(static_cast<std::uint64_t>(GetParam())), 60 * kMillisecond);
+  const trace::Trace good = simulated(drawn(static_cast<std::uint64_t>(GetParam()), false), 60 * kMillisecond);
   ASSERT_FALSE(notices(good));
   for (std::size_t i = 0; i < good.events.size(); ++i) {
     const auto at = static_cast<std::ptrdiff_t>(i);
