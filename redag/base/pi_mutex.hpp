@@ -60,9 +60,10 @@ class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
 
   static void initialize(pthread_mutex_t &mutex, bool inherits) {
     pthread_mutexattr_t attributes;
-    REDAG_CHECK(pthread_mutexattr_init(&attributes) == 0, "no mutex attributes");
+    REDAG_CHECK(pthread_mutexattr_init(&attributes) == 0, "cannot initialise mutex attributes");
     const int protocol = inherits ? PTHREAD_PRIO_INHERIT : PTHREAD_PRIO_NONE;
-    REDAG_CHECK(pthread_mutexattr_setprotocol(&attributes, protocol) == 0, "no priority inheritance");
+    REDAG_CHECK(pthread_mutexattr_setprotocol(&attributes, protocol) == 0,
+                "mutexes with priority inheritance are not available");
     REDAG_CHECK(pthread_mutex_init(&mutex, &attributes) == 0, "the kernel has no priority-inheriting futexes");
     pthread_mutexattr_destroy(&attributes);
   }
@@ -71,7 +72,7 @@ class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
     REDAG_CHECK(pthread_mutex_lock(&mutex) == 0, "a mutex cannot be locked");
   }
   static void release(pthread_mutex_t &mutex) noexcept {
-    REDAG_CHECK(pthread_mutex_unlock(&mutex) == 0, "a mutex is unlocked by who does not own it");
+    REDAG_CHECK(pthread_mutex_unlock(&mutex) == 0, "a mutex is unlocked by a thread that does not own it");
   }
 
   /// Tries for longer than a short critical section takes on another processor, with growing pauses.

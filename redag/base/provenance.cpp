@@ -90,7 +90,7 @@ std::string command_line() {
   if (text.size() <= kMostCommandBytes) return text;
   const std::size_t more = text.size() - kMostCommandBytes;
   text.resize(kMostCommandBytes);
-  return text + fmt::format("... ({} bytes more)", more);
+  return text + fmt::format("... ({} more bytes)", more);
 }
 
 std::string as_json(const std::string &text) { return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace); }
@@ -128,7 +128,7 @@ Result<std::optional<std::time_t>> source_date_epoch() {
   const auto [end, error] = std::from_chars(given.data(), given.data() + given.size(), seconds);
   if (error != std::errc() || end != given.data() + given.size() || seconds < 0 || seconds > kEndOfYear9999) {
     return make_error(fmt::format("SOURCE_DATE_EPOCH '{}' is not a time in seconds since 1970", given),
-                      "unset it, or give a whole number: date +%s");
+                      "unset it, or set it to a whole number, as 'date +%s' prints");
   }
   return std::optional<std::time_t>(seconds);
 }
@@ -142,14 +142,14 @@ std::string provenance_to_json(const Provenance &provenance) {
 }
 
 Result<Provenance> provenance_from_json(std::string_view text) {
-  if (json_nests_deeper(text)) return make_error("the provenance is nested too deep");
+  if (json_nests_deeper(text)) return make_error("the provenance is nested too deeply");
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object()) return make_error("the provenance must be an object");
   Provenance provenance;
   for (const Field &field : kFields) {
     const auto found = json.find(field.name);
     if (found == json.end()) continue;
-    if (!found->is_string()) return make_error(fmt::format("'{}' of the provenance must be a text", field.name));
+    if (!found->is_string()) return make_error(fmt::format("'{}' of the provenance must be a string", field.name));
     provenance.*field.value = found->get<std::string>();
   }
   return provenance;

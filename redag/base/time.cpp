@@ -59,7 +59,8 @@ Result<Duration> parse_duration(std::string_view text) {
       after_point = true;
     } else if (is_digit(c)) {
       any_digit = true;
-      if (digits > Int128{kMaxDuration} * 10) return fail(fmt::format("it is too large: at most {}", kMaxDurationText));
+      if (digits > Int128{kMaxDuration} * 10)
+        return fail(fmt::format("it is too large; at most {} is allowed", kMaxDurationText));
       digits = digits * 10 + (c - '0');
       if (after_point) scale *= 10;
       if (scale > Int128{kMaxDuration}) return fail("it has too many decimals");
@@ -81,7 +82,8 @@ Result<Duration> parse_duration(std::string_view text) {
   const Int128 scaled = digits * unit->nanoseconds;
   if (scaled % scale != 0) return fail("it is not a whole number of nanoseconds");
   const Int128 value = scaled / scale;
-  if (value > Int128{kMaxDuration}) return fail(fmt::format("it is too large: at most {}", kMaxDurationText));
+  if (value > Int128{kMaxDuration})
+    return fail(fmt::format("it is too large; at most {} is allowed", kMaxDurationText));
   return static_cast<Duration>(negative ? -value : value);
 }
 

@@ -32,7 +32,7 @@ Result<std::unique_ptr<Publisher>> Publisher::start(const PublisherOptions &opti
     const BlockedSignals inherited;
     publisher->thread_ = std::thread([self = publisher.get()] { self->main(); });
   } catch (const std::system_error &error) {
-    return make_error(std::string("no live page: its thread was refused: ") + error.what());
+    return make_error(std::string("no live page is published, because its thread cannot be created: ") + error.what());
   }
   return publisher;
 }

@@ -65,7 +65,7 @@ class File {
 };
 
 tl::unexpected<Diagnostics> damaged(const std::string &path, const char *what) {
-  return make_error(fmt::format("{} is no live page: {}", path, what), "was it written by another program?");
+  return make_error(fmt::format("{} is not a live page: {}", path, what), "was it written by another program?");
 }
 
 /// Returns UTF-8 that a terminal prints unchanged; all other bytes become '?'.
@@ -117,18 +117,20 @@ std::optional<Diagnostics> problem_with(const File &file, const std::string &pat
     const int error = errno;
     const bool hidden = error == EACCES || error == EPERM;
     return make_error(fmt::format("{}: {}", path, std::generic_category().message(error)),
-                      hidden ? "it is another user's: be that user, or root for one of root's" : "")
+                      hidden ? "it belongs to another user: run as that user or as root" : "")
         .value();
   }
   if (!file.inspect(info)) return make_error(fmt::format("{} cannot be inspected", path)).value();
   if (!S_ISREG(info.st_mode)) return damaged(path, "it is not a file").value();
   if (info.st_uid != ::geteuid() && info.st_uid != 0) {
-    return make_error(fmt::format("{} belongs to user {}: not read", path, info.st_uid), "be that user").value();
+    return make_error(fmt::format("{} is not read, because it belongs to user {}", path, info.st_uid),
+                      "run as that user")
+        .value();
   }
   constexpr mode_t kOthers = S_IRWXG | S_IRWXO;
   if ((info.st_mode & kOthers) != 0) {
-    return make_error(fmt::format("{} can be opened by others than its owner: not read", path),
-                      "no executor makes such a page")
+    return make_error(fmt::format("{} is not read, because other users than its owner can open it", path),
+                      "no executor creates such a page")
         .value();
   }
   return std::nullopt;
@@ -137,10 +139,11 @@ std::optional<Diagnostics> problem_with(const File &file, const std::string &pat
 Result<Header> read_header(const File &file, const std::string &path, std::uint64_t file_size) {
   Header header{};
   if (!file.read(&header, sizeof(header), 0)) return damaged(path, "it is too short");
-  if (std::memcmp(header.magic, page::kMagic, sizeof(header.magic)) != 0) return damaged(path, "its first bytes");
+  if (std::memcmp(header.magic, page::kMagic, sizeof(header.magic)) != 0)
+    return damaged(path, "its first bytes are wrong");
   if (header.version != page::kVersion) {
     return make_error(
-        fmt::format("{} has version {}, this program reads version {}", path, header.version, page::kVersion),
+        fmt::format("{} has version {}, but this program reads version {}", path, header.version, page::kVersion),
         "use the redag that the executor was built with");
   }
   const auto is_row = [](std::uint32_t size, std::size_t least) {
@@ -152,7 +155,7 @@ Result<Header> read_header(const File &file, const std::string &path, std::uint6
                      header.slot_offset <= header.page_size && header.slot_size % 8 == 0 &&
                      header.slot_size >= header.frame_header_size &&
                      header.slot_size <= (header.page_size - header.slot_offset) / 2;
-  if (!sound) return damaged(path, "its sizes do not fit");
+  if (!sound) return damaged(path, "its sizes do not match");
   return header;
 }
 
@@ -206,7 +209,7 @@ Result<Frame> decode(const std::string &path, const Header &header, const FrameH
                 is_duration(row.bound) && is_plausible(row.figures);
     frame.tasks.push_back(TaskFrame{get_name(row.name), row.dag, row.period, row.deadline, row.bound, row.figures});
   }
-  if (!plausible) return damaged(path, "its figures cannot be");
+  if (!plausible) return damaged(path, "its figures are out of range");
   return frame;
 }
 
@@ -271,7 +274,7 @@ Result<Page> read_page(const std::string &path, int tries) {
     if (!frame) return tl::unexpected<Diagnostics>(std::move(frame.error()));
     return Page{{header->pid, header->process_start, header->pid_namespace}, *std::move(frame)};
   }
-  return damaged(path, "it has no whole frame");
+  return damaged(path, "it has no complete frame");
 }
 
 std::vector<Listed> list_pages(const std::string &folder) {

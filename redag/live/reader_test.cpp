@@ -247,7 +247,7 @@ TEST_F(LivePage, OthersPagesAreRefused) {
   EXPECT_EQ(error_of(path), "");
   for (const mode_t mode : {0640U, 0604U, 0620U, 0602U, 0666U}) {
     ASSERT_EQ(::chmod(path.c_str(), mode), 0);
-    EXPECT_THAT(error_of(path), HasSubstr("by others"));
+    EXPECT_THAT(error_of(path), HasSubstr("other users than its owner"));
   }
   ASSERT_EQ(::chmod(path.c_str(), 0600), 0);
   if (::geteuid() == 0) {
@@ -287,10 +287,10 @@ TEST_F(LivePage, DamageIsSaid) {
   EXPECT_THAT(spoilt(offsetof(page::Header, slot_offset), ~std::uint64_t{0}), HasSubstr("sizes"));
   EXPECT_THAT(spoilt(offsetof(page::Header, task_row_size), std::uint32_t{8}), HasSubstr("sizes"));
   EXPECT_THAT(spoilt(offsetof(page::Header, dag_row_size), std::uint32_t{265}), HasSubstr("sizes"));
-  EXPECT_THAT(spoilt(offsetof(page::Header, sequence), std::uint64_t{0}), HasSubstr("no whole frame"));
-  EXPECT_THAT(spoilt(offsetof(page::Header, sequence), std::uint64_t{3}), HasSubstr("no whole frame"));
-  EXPECT_THAT(spoilt(slot + offsetof(page::FrameHeader, tasks), ~std::uint32_t{0}), HasSubstr("no whole frame"));
-  EXPECT_THAT(spoilt(slot + sizeof(page::FrameHeader), 'x'), HasSubstr("no whole frame"));
+  EXPECT_THAT(spoilt(offsetof(page::Header, sequence), std::uint64_t{0}), HasSubstr("no complete frame"));
+  EXPECT_THAT(spoilt(offsetof(page::Header, sequence), std::uint64_t{3}), HasSubstr("no complete frame"));
+  EXPECT_THAT(spoilt(slot + offsetof(page::FrameHeader, tasks), ~std::uint32_t{0}), HasSubstr("no complete frame"));
+  EXPECT_THAT(spoilt(slot + sizeof(page::FrameHeader), 'x'), HasSubstr("no complete frame"));
   const std::string path = copy(*writer);
   std::filesystem::resize_file(path, slot + 100);
   EXPECT_THAT(error_of(path), HasSubstr("sizes"));
@@ -304,15 +304,15 @@ TEST_F(LivePage, LiesAreFound) {
   Frame frame = make_frame();
   frame.tasks[1].figures.response_p99 = -1;
   writer->publish(frame);
-  EXPECT_THAT(error_of(writer->path()), HasSubstr("cannot be"));
+  EXPECT_THAT(error_of(writer->path()), HasSubstr("out of range"));
   frame = make_frame();
   frame.tasks[1].dag = 2;
   writer->publish(frame);
-  EXPECT_THAT(error_of(writer->path()), HasSubstr("cannot be"));
+  EXPECT_THAT(error_of(writer->path()), HasSubstr("out of range"));
   frame = make_frame();
   frame.published = kNever;
   writer->publish(frame);
-  EXPECT_THAT(error_of(writer->path()), HasSubstr("cannot be"));
+  EXPECT_THAT(error_of(writer->path()), HasSubstr("out of range"));
 }
 
 // Random bytes, in a page whose checksum is then corrected, and pages of noise only. Reading always ends, and each

@@ -46,8 +46,8 @@ void put_name(char (&target)[Size], const std::string &name) {
 }
 
 tl::unexpected<Diagnostics> refused(const std::string &what) {
-  return make_error(fmt::format("no live page: {}: {}", what, std::generic_category().message(errno)),
-                    "redag top will not see this executor; all else works");
+  return make_error(fmt::format("no live page is published: {}: {}", what, std::generic_category().message(errno)),
+                    "'redag top' cannot show this executor; everything else works");
 }
 
 /// Creates a new file that only its owner can open; negative, with errno, on an error.

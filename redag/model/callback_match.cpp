@@ -73,7 +73,7 @@ std::string ros_name_mistake(std::string_view pattern) {
     const auto byte = static_cast<unsigned char>(pattern[odd]);
     const bool printable = byte >= 0x20 && byte < 0x7f;
     return (printable ? fmt::format("contains '{}'", pattern[odd]) : fmt::format("contains byte {:#04x}", byte)) +
-           ", as no ROS name does";
+           ", which a ROS name cannot contain";
   }
   if (std::string_view("/*?").find(pattern.front()) == std::string_view::npos) return "does not begin with '/'";
   if (pattern.back() == '/') return "ends with '/'";
@@ -155,7 +155,8 @@ std::string CallbackMatcher::explain(const Entry &entry) const {
   // A callback that fits may have gone to another task.
   for (const Seen &seen : seen_) {
     if (seen.entry && matches(pattern, seen.id)) {
-      return fmt::format("{}: {} is the callback of {}", entry.name, to_string(seen.id), entries_[*seen.entry].name);
+      return fmt::format("{}: its callback, {}, belongs to {} already", entry.name, to_string(seen.id),
+                         entries_[*seen.entry].name);
     }
   }
   std::vector<std::string> texts;

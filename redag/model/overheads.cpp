@@ -107,8 +107,9 @@ Result<Overheads> Calibration::of(bool realtime_threads) const {
   if (found) return *found;
   return realtime_threads
              ? make_error("the calibration has no overheads of SCHED_FIFO threads",
-                          "calibrate with the right to SCHED_FIFO, or use --preemption cooperative or none")
-             : make_error("the calibration has no overheads of ordinary threads", "calibrate anew");
+                          "run 'redag calibrate' in a process that may use SCHED_FIFO, or use --preemption cooperative "
+                          "or none")
+             : make_error("the calibration has no overheads of ordinary threads", "run 'redag calibrate' again");
 }
 
 }  // namespace redag

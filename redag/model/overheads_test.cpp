@@ -92,8 +92,8 @@ TEST(Calibration, OfOneClassOfThreads) {
 
 TEST(Calibration, BadFiles) {
   EXPECT_THAT(mistakes(""), HasSubstr("a map"));
-  EXPECT_THAT(mistakes("provenance: {}"), HasSubstr("there are no 'overheads'"));
-  EXPECT_THAT(mistakes("overheads: {}"), HasSubstr("realtime threads, of normal ones"));
+  EXPECT_THAT(mistakes("provenance: {}"), HasSubstr("the key 'overheads' is missing"));
+  EXPECT_THAT(mistakes("overheads: {}"), HasSubstr("must have 'realtime', 'normal', or both"));
   EXPECT_THAT(mistakes("overheads: {norml: {}}"), HasSubstr("did you mean 'normal'?"));
   EXPECT_THAT(mistakes("overheads: {normal: {timer: 1us}}"), HasSubstr("normal has no 'dispatch'"));
   const std::string begin = std::string("overheads: {normal: {") + kNone;
@@ -103,7 +103,7 @@ TEST(Calibration, BadFiles) {
   EXPECT_THAT(mistakes(begin + "clock: 0}}\nprovenance: {complete: perhaps}"), HasSubstr("true or false"));
   EXPECT_THAT(mistakes("overheads: {normal: {timer: 0, dispatch: 0, preempt: 0, lateness: 0, stall: 0, "
                        "stall_per_second: 1s, noise: 0, noise_per_second: 0, clock: 0}}"),
-              HasSubstr("whole processor"));
+              HasSubstr("must be below one second per second"));
   EXPECT_THAT(to_string(load_calibration("/").error()), HasSubstr("not an overheads file"));
   EXPECT_THAT(to_string(load_calibration("/no/such/file").error()), HasSubstr("cannot open"));
 }

@@ -37,14 +37,14 @@ class Reader : private yaml::ValueReader {
   void read_overheads() {
     const Node *node = find(root_, "overheads");
     if (node == nullptr) {
-      error(root_, "there are no 'overheads'", "'redag calibrate --out FILE' writes them");
+      error(root_, "the key 'overheads' is missing", "'redag calibrate --out FILE' writes an overheads file");
       return;
     }
     if (!check_map(*node, "overheads", {"realtime", "normal"})) return;
     if (const Node *one = find(*node, "realtime")) calibration_.realtime = read_class(*one, "realtime");
     if (const Node *one = find(*node, "normal")) calibration_.normal = read_class(*one, "normal");
     if (find(*node, "realtime") == nullptr && find(*node, "normal") == nullptr) {
-      error(*node, "overheads are of realtime threads, of normal ones, or of both");
+      error(*node, "overheads must have 'realtime', 'normal', or both");
     }
   }
 
@@ -54,7 +54,8 @@ class Reader : private yaml::ValueReader {
     for (const std::string_view name : overhead_names()) {
       const Node *value = find(node, name);
       if (value == nullptr) {
-        error(node, fmt::format("{} has no '{}'", what, name), "what a machine does not cost is 0");
+        error(node, fmt::format("{} has no '{}'", what, name),
+              "write 0 for an overhead that the machine does not have");
         continue;
       }
       const std::optional<Duration> read = duration(*value, name);
@@ -63,7 +64,8 @@ class Reader : private yaml::ValueReader {
       *overhead_named(overheads, name) = *read;
     }
     for (const std::string_view name : {"stall_per_second", "noise_per_second"}) {
-      if (*overhead_named(overheads, name) >= kSecond) error(node, fmt::format("{} takes the whole processor", name));
+      if (*overhead_named(overheads, name) >= kSecond)
+        error(node, fmt::format("{} must be below one second per second", name));
     }
     return overheads;
   }

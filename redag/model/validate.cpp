@@ -83,7 +83,8 @@ class Checker {
     };
     if (workload_.policy == PolicyKind::Fixed &&
         std::none_of(workload_.dags.begin(), workload_.dags.end(), has_priority)) {
-      warning(Field::Policy, Field::Priority, "policy 'fixed', but no task has a priority", "give tasks a 'priority'");
+      warning(Field::Policy, Field::Priority, "policy is 'fixed', but no task has a priority",
+              "give tasks a 'priority', or choose another policy");
     }
   }
 
@@ -99,7 +100,7 @@ class Checker {
     if (value <= kMaxBound) return;
     error(field, {},
           fmt::format("{} of DAG '{}' must be from 1 to {}, not {}", to_string(field), dag.name, kMaxBound, value),
-          "leave it out for no bound");
+          "leave it out if there is no bound");
   }
 
   void check_dag_names() {
@@ -109,7 +110,8 @@ class Checker {
       const std::string &name = workload_.dags[d].name;
       check_name(name, "DAG");
       if (!name.empty() && !seen.emplace(name, d).second) {
-        error(Field::Name, {}, fmt::format("there is another DAG '{}'", name), "names of DAGs are unique");
+        error(Field::Name, {}, fmt::format("the name '{}' is used by another DAG", name),
+              "choose a unique name for each DAG");
       }
     }
     dag_ = DagId::none();
@@ -135,8 +137,8 @@ class Checker {
       const Task &task = dag.tasks[i];
       check_name(task.name, "task");
       if (!task.name.empty() && !seen.emplace(task.name, i).second) {
-        error(Field::Name, {}, fmt::format("there is another task '{}' in DAG '{}'", task.name, dag.name),
-              "names of tasks are unique in their DAG");
+        error(Field::Name, {}, fmt::format("the name '{}' is used by another task of DAG '{}'", task.name, dag.name),
+              "choose a unique name for each task of a DAG");
       }
       check_durations(task);
       check_wcet_low(dag, task);
@@ -162,14 +164,14 @@ class Checker {
       if (rule.field == Field::Deadline && task.period <= 0 && value == task.period) continue;
       if (rule.field == Field::Period && value == 0) {
         error(rule.field, {}, fmt::format("timer task '{}' has no period", task.name),
-              "give it or its DAG a 'period', or 'activation: data'");
+              "add 'period:' to it or to its DAG, or use 'activation: data'");
       } else if (value < rule.smallest) {
         error(rule.field, rule.field == Field::Deadline ? FieldSet(Field::Period) : FieldSet(),
               fmt::format("{} of task '{}' must {}, not {}", name, task.name,
                           rule.smallest == 0 ? "not be negative" : "be greater than zero", format_duration(value)));
       } else if (value > kMaxDuration) {
         error(rule.field, {},
-              fmt::format("{} of task '{}' is too large: at most {}", name, task.name, kMaxDurationText));
+              fmt::format("{} of task '{}' is too large; at most {} is allowed", name, task.name, kMaxDurationText));
       }
     }
     check_against_wcet(task);
@@ -177,7 +179,7 @@ class Checker {
       error(Field::Jitter, Field::Period,
             fmt::format("jitter {} of task '{}' exceeds its period {}", format_duration(task.jitter), task.name,
                         format_duration(task.period)),
-            "a release would overtake the one before");
+            "a release would overtake the previous one");
     }
   }
 
@@ -191,7 +193,7 @@ class Checker {
       warning(
           Field::Wcet, Field::Deadline | Field::Period,
           fmt::format("wcet {} of task '{}' exceeds its deadline {}", wcet, task.name, format_duration(task.deadline)),
-          "it misses whenever it runs that long");
+          "a job that runs for its wcet misses its deadline");
     } else if (task.period > 0 && task.wcet > task.period) {
       warning(Field::Wcet, Field::Period,
               fmt::format("wcet {} of task '{}' exceeds its period {}", wcet, task.name, format_duration(task.period)));
@@ -199,13 +201,13 @@ class Checker {
     if (task.budget > 0 && task.budget < task.wcet && task.on_budget != OnBudget::Log) {
       warning(Field::Budget, Field::Wcet | Field::OnBudget,
               fmt::format("budget {} of task '{}' is below its wcet {}", format_duration(task.budget), task.name, wcet),
-              task.on_budget == OnBudget::Abort ? "jobs within the wcet are cut off"
-                                                : "jobs within the wcet are held to it");
+              task.on_budget == OnBudget::Abort ? "jobs that keep within their wcet are cut off"
+                                                : "the action of 'on_budget' affects jobs that keep within their wcet");
     }
     if (task.on_budget != OnBudget::Abort && task.budget == 0) {
       error(Field::OnBudget, Field::Budget,
-            fmt::format("task '{}' has 'on_budget: {}' and no budget", task.name, to_string(task.on_budget)),
-            "add 'budget:', the processor time after which that happens");
+            fmt::format("task '{}' has 'on_budget: {}', but no budget", task.name, to_string(task.on_budget)),
+            "add 'budget:', the processor time after which that action happens");
     }
   }
 
@@ -214,14 +216,14 @@ class Checker {
     if (task.wcet_low <= 0) return;
     if (dag.criticality != Criticality::High) {
       error(Field::WcetLow, Field::Criticality,
-            fmt::format("task '{}' has a wcet_low, and DAG '{}' is not of high criticality", task.name, dag.name),
-            "add 'criticality: high' to the DAG, or remove it");
+            fmt::format("task '{}' has a wcet_low, but DAG '{}' is not of high criticality", task.name, dag.name),
+            "add 'criticality: high' to the DAG, or remove 'wcet_low:'");
     }
     if (task.wcet > 0 && task.wcet_low > task.wcet) {
       error(Field::WcetLow, Field::Wcet,
             fmt::format("wcet_low {} of task '{}' exceeds its wcet {}", format_duration(task.wcet_low), task.name,
                         format_duration(task.wcet)),
-            "wcet is C(HI), the longest there is; wcet_low is C(LO), the one that is trusted until it is exceeded");
+            "wcet is C(HI), an upper bound on every execution; wcet_low is C(LO), which holds in LO mode");
     }
   }
 
@@ -238,7 +240,7 @@ class Checker {
     if (degrade.kind == Degrade::Kind::Stretch && !(degrade.stretch >= 1 && degrade.stretch <= kMaxDegrade)) {
       error(Field::Degrade, {},
             fmt::format("stretch of DAG '{}' must be from 1 to {}, not {}", dag.name, kMaxDegrade, degrade.stretch),
-            "it is the factor by which periods grow in HI mode");
+            "stretch is the factor by which periods grow in HI mode");
     }
   }
 
@@ -249,7 +251,7 @@ class Checker {
     if (model.kind == Kind::Normal) {
       if (model.mean < task.bcet || model.mean > task.wcet || model.mean <= 0) {
         error(Field::Execution, bounds,
-              fmt::format("mean {} of task '{}' is not between its bcet and wcet", format_duration(model.mean),
+              fmt::format("mean {} of task '{}' is not between its bcet and its wcet", format_duration(model.mean),
                           task.name));
       }
       if (model.stddev < 0 || model.stddev > kMaxDuration) {
@@ -266,7 +268,8 @@ class Checker {
       const Duration sample = model.samples[i];
       if (sample > 0 && sample >= task.bcet && sample <= task.wcet) continue;
       error(Field::Execution, bounds,
-            fmt::format("sample {} of task '{}' is not between its bcet and wcet", format_duration(sample), task.name))
+            fmt::format("sample {} of task '{}' is not between its bcet and its wcet", format_duration(sample),
+                        task.name))
           .item = static_cast<std::uint32_t>(i);
     }
   }
@@ -275,12 +278,12 @@ class Checker {
     if (task.activation == Activation::Timer) return;
     if (task.predecessors.empty()) {
       error(Field::Activation, Field::After, fmt::format("data task '{}' has no predecessor", task.name),
-            "name them with 'after:', or use 'activation: timer'");
+            "name predecessors with 'after:', or use 'activation: timer'");
     }
     for (const auto &[field, value] : {std::pair{Field::Offset, task.offset}, std::pair{Field::Jitter, task.jitter}}) {
       if (value == 0) continue;
       error(field, Field::Activation, fmt::format("data task '{}' has '{}'", task.name, to_string(field)),
-            "only timer tasks have one: its predecessors release it");
+            "only timer tasks can have it, because predecessors release a data task");
     }
   }
 
@@ -299,13 +302,13 @@ class Checker {
                         task.concurrency));
     } else if (task.concurrency > 1 && !task.group.empty()) {
       error(Field::Concurrency, Field::Group,
-            fmt::format("task '{}' has concurrency {} and is in group '{}'", task.name, task.concurrency, task.group),
-            "jobs of one group never overlap: remove one of them");
+            fmt::format("task '{}' has concurrency {}, but is in group '{}'", task.name, task.concurrency, task.group),
+            "jobs of one group never overlap: remove 'concurrency' or 'group'");
     }
     if (task.priority && workload_.policy != PolicyKind::Fixed) {
       warning(Field::Priority, Field::Policy,
               fmt::format("policy '{}' ignores the priority of task '{}'", to_string(workload_.policy), task.name),
-              "use 'policy: fixed', or remove it");
+              "use 'policy: fixed', or remove the priority");
     }
   }
 
@@ -322,30 +325,30 @@ class Checker {
     if (!is_counted) {
       check_callback_name(task, callback.name, kind, kCallbackKind);
     } else if (!callback.name.empty()) {
-      refuse(kCallbackKind, fmt::format("the {} of task '{}' has a name", kind, task.name));
+      refuse(kCallbackKind, fmt::format("the {} of task '{}' cannot have a name", kind, task.name));
     }
     if (callback.period < 0 || callback.period > kMaxDuration || (!is_timer && callback.period != 0)) {
       refuse(kCallbackKind, fmt::format("the {} of task '{}' cannot have period {}", kind, task.name,
                                         format_duration(callback.period)));
     } else if (callback.period != 0 && task.activation == Activation::Timer && callback.period != task.period) {
       warning(Field::Period, Field::Callback,
-              fmt::format("period {} of task '{}' is not that of its timer, {}", format_duration(task.period),
-                          task.name, format_duration(callback.period)),
-              "its priority follows from the period");
+              fmt::format("period {} of task '{}' differs from the period of its timer, {}",
+                          format_duration(task.period), task.name, format_duration(callback.period)),
+              "use the timer's period, because the priority follows from it");
     }
     if (!is_counted && callback.index) {
-      refuse(kCallbackKind, fmt::format("the {} of task '{}' has an index", kind, task.name));
+      refuse(kCallbackKind, fmt::format("the {} of task '{}' cannot have an index", kind, task.name));
     }
     if (is_timer && task.activation == Activation::Data) {
-      error(Field::Callback, Field::Activation, fmt::format("data task '{}' names a timer", task.name),
-            "its predecessors release it: name what takes their data, or use 'activation: timer'")
+      error(Field::Callback, Field::Activation, fmt::format("data task '{}' has a timer as its callback", task.name),
+            "predecessors release it: name the callback that takes their data, or use 'activation: timer'")
           .item = kCallbackKind;
     }
     const auto [other, is_first] = callbacks_.emplace(to_string(callback), task.name);
     if (!is_first) {
       warning(Field::Callback, {},
               fmt::format("task '{}' names the same callback as task '{}'", task.name, other->second),
-              "only the first in the file is used");
+              "only the first of them in the file is used");
     }
   }
 
@@ -353,7 +356,7 @@ class Checker {
     const std::string why = ros_name_mistake(name);
     if (why.empty()) return;
     error(Field::Callback, {}, fmt::format("{} '{}' of the callback of task '{}' {}", what, name, task.name, why),
-          "full names, as 'ros2 node info' prints them; * and ? stand for any characters")
+          "write full names as 'ros2 node info' prints them; * and ? match any characters")
         .item = item;
   }
 
@@ -441,7 +444,7 @@ class Checker {
     if (cycle.size() > kMostNamed) names += fmt::format("({} more) -> ", cycle.size() - kMostNamed);
     task_ = cycle.front();
     error(Field::After, {}, fmt::format("cycle in DAG '{}': {}{}", dag.name, names, dag.tasks[cycle.front()].name),
-          "a task cannot wait for itself");
+          "remove one of these edges: a task cannot wait for itself");
     task_ = Finding::kNone;
   }
 
@@ -455,9 +458,9 @@ class Checker {
       if (task.period == largest) continue;
       task_ = i;
       error(Field::Period, Field::After,
-            fmt::format("period {} of data task '{}' is not the largest of its predecessors', {}",
+            fmt::format("period {} of data task '{}' is not {}, the largest period of its predecessors",
                         format_duration(task.period), task.name, format_duration(largest)),
-            "call inherit_periods()");
+            "call inherit_periods() after changes of periods");
     }
     task_ = Finding::kNone;
   }
@@ -472,9 +475,9 @@ class Checker {
     constexpr double kRounding = 1e-9;
     if (utilization <= static_cast<double>(workload_.platform.workers) * (1 + kRounding)) return;
     warning(Field::Workers, Field::Wcet | Field::Period,
-            fmt::format("utilization {:.4g} exceeds the {} worker{}", utilization, workload_.platform.workers,
-                        workload_.platform.workers == 1 ? "" : "s"),
-            "no schedule meets every deadline if jobs run for their wcet");
+            fmt::format("utilization {:.4g} exceeds the capacity of {} worker{}", utilization,
+                        workload_.platform.workers, workload_.platform.workers == 1 ? "" : "s"),
+            "no schedule meets every deadline if jobs execute for their wcet");
   }
 
   const Workload &workload_;
@@ -489,10 +492,11 @@ class Checker {
 
 std::string name_mistake(std::string_view name) {
   if (name.empty()) return "is empty";
-  if (name.size() > kMaxNameBytes) return fmt::format("has {} bytes: at most {}", name.size(), kMaxNameBytes);
+  if (name.size() > kMaxNameBytes)
+    return fmt::format("has {} bytes; at most {} are allowed", name.size(), kMaxNameBytes);
   if (name.front() == ' ' || name.back() == ' ') return "begins or ends with a space";
   const std::string character = find_unprintable(name);
-  return character.empty() ? std::string() : fmt::format("contains {}, which cannot be shown", character);
+  return character.empty() ? std::string() : fmt::format("contains {}, which cannot be displayed", character);
 }
 
 const char *to_string(Field field) { return kFieldNames[static_cast<std::size_t>(field)]; }

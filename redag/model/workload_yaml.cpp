@@ -135,7 +135,8 @@ class Reader : private yaml::ValueReader {
 
   void read_top() {
     if (root_.node->kind == Node::Kind::Null) {
-      error(Node{}, "there is no workload in it", "the smallest has a DAG with one task: see docs/workload_format.md");
+      error(Node{}, "the file has no workload",
+            "a workload needs at least one DAG with one task, see docs/workload_format.md");
       return;
     }
     if (!check_map(*root_.node, "a workload", names_of(kTopFields))) return;
@@ -226,9 +227,9 @@ class Reader : private yaml::ValueReader {
     if (task.criticality == of_dag) return;
     const Node &at = *find(part, Field::Criticality);
     diagnostics_.push_back(Diagnostic{Severity::Warning, file_, at.line, at.column,
-                                      fmt::format("criticality {} of task '{}' has no effect: its DAG's counts, {}",
+                                      fmt::format("criticality {} of task '{}' has no effect, because its DAG has {}",
                                                   to_string(task.criticality), task.name, to_string(of_dag)),
-                                      "state it for the DAG, or move the task to a DAG of its own"});
+                                      "set the criticality of the DAG, or move the task to a DAG of its own"});
   }
 
   void take_wcet(Task &task, TaskPart &part) {
@@ -240,8 +241,9 @@ class Reader : private yaml::ValueReader {
     take_duration(part, Field::Wcet, task.wcet);
     if (find(part, Field::Wcet) != nullptr) return;
     error(*part.node, fmt::format("task '{}' has no wcet", task.name),
-          is_callback ? "run the node with learning and save what it measured, or state the longest execution time"
-                      : "add 'wcet:', the longest execution time");
+          is_callback
+              ? "run the node with learning and save the measured value, or add 'wcet:', the worst-case execution time"
+              : "add 'wcet:', the worst-case execution time");
     part.broken |= Field::Wcet;
   }
 
@@ -251,7 +253,7 @@ class Reader : private yaml::ValueReader {
     if (task.activation == Activation::Data) {
       if (given == nullptr) return;
       error(*given, fmt::format("data task '{}' has a period", task.name),
-            "it inherits the largest of its predecessors': remove it, or use 'activation: timer'");
+            "a data task inherits its period: remove 'period:', or use 'activation: timer'");
       part.broken |= Field::Period;
     } else if (given != nullptr) {
       take_positive_duration(part, Field::Period, task.period);
@@ -275,7 +277,7 @@ class Reader : private yaml::ValueReader {
       check_map(*node, "overrun", {"queue"});
       const Node *depth = yaml::find(*node, "queue");
       if (depth == nullptr) {
-        error(*node, "overrun has no queue depth", "write {queue: 3}");
+        error(*node, "overrun 'queue' needs a depth", "write {queue: 3}");
       } else if (const auto value = integer<std::uint32_t>(*depth, "queue", 1, kMaxQueueDepth)) {
         task.queue_depth = *value;
         return;
@@ -294,7 +296,7 @@ class Reader : private yaml::ValueReader {
       const Node *skip = yaml::find(*node, "skip");
       const Node *stretch = yaml::find(*node, "stretch");
       if ((skip == nullptr) == (stretch == nullptr)) {
-        error(*node, "degrade is one of skip and stretch", "write {skip: 3} or {stretch: 2.5}");
+        error(*node, "degrade must have either 'skip' or 'stretch'", "write {skip: 3} or {stretch: 2.5}");
       } else if (skip != nullptr) {
         degrade.kind = Degrade::Kind::Skip;
         if (const auto value = integer<std::uint32_t>(*skip, "skip", 1, kMaxDegrade)) {
@@ -345,7 +347,7 @@ class Reader : private yaml::ValueReader {
         return;
       }
       error(item, fmt::format("there is no task {} in DAG '{}'", yaml::describe(item), dag.name),
-            did_you_mean(*name, names, "'after' names tasks of the same DAG"));
+            did_you_mean(*name, names, "'after' can only name tasks of the same DAG"));
     }
     part.broken |= Field::After;
   }
@@ -444,8 +446,13 @@ class Reader : private yaml::ValueReader {
 
 Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_name, LoadOptions options) {
   if (text.size() > kMaxWorkloadBytes) {
-    return tl::unexpected<Diagnostics>(Diagnostics{
-        Diagnostic{Severity::Error, file_name, 0, 0, fmt::format("larger than {} MiB", kMaxWorkloadBytes >> 20U), {}}});
+    return tl::unexpected<Diagnostics>(
+        Diagnostics{Diagnostic{Severity::Error,
+                               file_name,
+                               0,
+                               0,
+                               fmt::format("the file is larger than {} MiB", kMaxWorkloadBytes >> 20U),
+                               {}}});
   }
   const Result<Node> root = yaml::parse(text, file_name);
   if (!root) return tl::unexpected<Diagnostics>(root.error());

@@ -38,8 +38,8 @@ std::optional<Callback> ValueReader::callback(const Node &node) {
       callback.kind = *kind;
       kind_value = &node.children[i + 1];
     } else if (*kind != callback.kind) {
-      error(node.children[i], fmt::format("callback says both {} and {}", to_string(callback.kind), to_string(*kind)),
-            "a task of its own for each callback");
+      error(node.children[i], fmt::format("callback has both {} and {}", to_string(callback.kind), to_string(*kind)),
+            "use one task for each callback");
       sound = false;
     }
   }
@@ -53,7 +53,8 @@ std::optional<Callback> ValueReader::callback(const Node &node) {
   }
   if (kind_value == nullptr) {
     keys.erase(keys.begin());
-    error(node, "callback does not say what it is of its node", fmt::format("add one of {}", fmt::join(keys, ", ")));
+    error(node, "callback does not say which callback of the node it is",
+          fmt::format("add one of {}", fmt::join(keys, ", ")));
     return std::nullopt;
   }
   if (callback.kind == Kind::Timer || callback.kind == Kind::Waitable) {
@@ -91,7 +92,7 @@ bool ValueReader::counted_callback(const Node &node, Callback &callback) {
   const Node *index = find(node, "index");
   if (period != nullptr) callback.period = positive_duration(*period, "period").value_or(0);
   if (index != nullptr) callback.index = integer<std::uint32_t>(*index, "index", 0);
-  if (node.children.empty()) error(node, fmt::format("{} says nothing", kind), "for any of the node's write 'any'");
+  if (node.children.empty()) error(node, fmt::format("{} is empty", kind), "write 'any' to match any one of the node");
   return diagnostics_.size() == mistakes;
 }
 

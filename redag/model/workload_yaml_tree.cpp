@@ -72,14 +72,14 @@ class TreeBuilder : public YAML::EventHandler {
 
  private:
   [[noreturn]] static void refuse_alias(const YAML::Mark &mark) {
-    throw Rejected{mark, "aliases and anchors (* and &) are not read", "write the values out"};
+    throw Rejected{mark, "aliases and anchors (* and &) are not supported", "write out the values"};
   }
 
   static void refuse_extras(const YAML::Mark &mark, YAML::anchor_t anchor, const std::string &tag) {
     if (anchor != YAML::NullAnchor) refuse_alias(mark);
     // yaml-cpp gives "?" to plain and "!" to quoted scalars that have no tag.
     if (!tag.empty() && tag != "?" && tag != "!") {
-      throw Rejected{mark, fmt::format("tags (here '{}') are not read", tag), "leave the tag out"};
+      throw Rejected{mark, fmt::format("tags (here '{}') are not supported", tag), "remove the tag"};
     }
   }
 
@@ -95,7 +95,8 @@ class TreeBuilder : public YAML::EventHandler {
 
   void open(Node::Kind kind, const YAML::Mark &mark) {
     if (open_.size() >= kMaxDepth) {
-      throw Rejected{mark, fmt::format("nested more than {} levels deep", kMaxDepth), "a workload needs seven"};
+      throw Rejected{mark, fmt::format("the file is nested more than {} levels deep", kMaxDepth),
+                     "a workload needs seven levels"};
     }
     open_.push_back(&add(kind, mark));
   }
@@ -125,12 +126,14 @@ std::optional<BadCharacter> find_bad_character(std::string_view text) {
     const auto c = static_cast<unsigned char>(text[i]);
     const auto column = static_cast<int>(i - line_start) + 1;
     const std::size_t length = utf8_length(text, i);
-    if (length == 0) return BadCharacter{line, column, fmt::format("byte 0x{:02x} is not UTF-8", c), "save as UTF-8"};
+    if (length == 0)
+      return BadCharacter{line, column, fmt::format("byte 0x{:02x} is not valid UTF-8", c), "save the file as UTF-8"};
     if (c == '\n') {
       ++line;
       line_start = i + 1;
     } else if ((c < 0x20 && c != '\t' && c != '\r') || c == 0x7F) {
-      return BadCharacter{line, column, fmt::format("control character 0x{:02x}", c), "is this a text file?"};
+      return BadCharacter{line, column, fmt::format("the file contains control character 0x{:02x}", c),
+                          "is it a text file?"};
     }
     i += length;
   }
@@ -179,18 +182,19 @@ Result<Node> parse(std::string_view text, const std::string &file) {
     TreeBuilder builder;
     if (!parser.HandleNextDocument(builder)) return Node{};
     if (const YAML::Mark &mark = builder.last_scalar(); is_unclosed(text, mark.pos)) {
-      return error_at(file, mark.line + 1, mark.column + 1, "not YAML: the quote is never closed", "");
+      return error_at(file, mark.line + 1, mark.column + 1, "invalid YAML: a quote is not closed", "");
     }
     TreeBuilder rest;
     if (parser.HandleNextDocument(rest)) {
       const Node second = rest.take_root();
-      return error_at(file, second.line, second.column, "a second document", "one document a file");
+      return error_at(file, second.line, second.column, "the file has a second document",
+                      "put each document in a file of its own");
     }
     return builder.take_root();
   } catch (const Rejected &rejected) {
     return error_at(file, rejected.mark.line + 1, rejected.mark.column + 1, rejected.message, rejected.hint);
   } catch (const YAML::Exception &exception) {
-    return error_at(file, exception.mark.line + 1, exception.mark.column + 1, "not YAML: " + exception.msg, "");
+    return error_at(file, exception.mark.line + 1, exception.mark.column + 1, "invalid YAML: " + exception.msg, "");
   }
 }
 

@@ -71,7 +71,7 @@ Diagnostics ValueReader::take_diagnostics() {
     const bool errors =
         std::any_of(rest, diagnostics_.end(), [](const Diagnostic &each) { return each.severity == Severity::Error; });
     Diagnostic more{errors ? Severity::Error : Severity::Warning, file_, rest->line, rest->column, {}, {}};
-    more.message = fmt::format("{} more mistakes from here on", diagnostics_.size() - kMostReported);
+    more.message = fmt::format("{} more mistakes are not shown", diagnostics_.size() - kMostReported);
     diagnostics_.erase(rest, diagnostics_.end());
     diagnostics_.push_back(std::move(more));
   }
@@ -100,7 +100,7 @@ std::optional<Duration> ValueReader::positive_duration(const Node &node, std::st
 
 std::optional<std::string> ValueReader::text(const Node &node, std::string_view key) {
   if (node.kind != Node::Kind::Scalar || node.text.empty()) {
-    wrong_type(node, key, "a name");
+    wrong_type(node, key, "a non-empty string");
     return std::nullopt;
   }
   if (const std::string why = name_mistake(node.text); !why.empty()) {
@@ -141,7 +141,7 @@ std::optional<ExecutionTime> ValueReader::execution(const Node &node) {
   const Node *normal = find(node, "normal");
   const Node *empirical = find(node, "empirical");
   if ((normal == nullptr) == (empirical == nullptr)) {
-    error(node, "execution must have one of normal, empirical");
+    error(node, "execution must have either 'normal' or 'empirical'");
     return std::nullopt;
   }
   return normal != nullptr ? normal_execution(*normal) : empirical_execution(*empirical);

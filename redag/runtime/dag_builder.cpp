@@ -31,8 +31,9 @@ TaskHandle DagBuilder::data(std::string name, const std::vector<TaskHandle> &pre
   task.name = std::move(name);
   task.activation = Activation::Data;
   if (!options.after.empty()) {
-    throw std::invalid_argument(place_of(dag_.name, task.activation, task.name) +
-                                ": TaskOptions::after is for timer() (name all predecessors in the second argument)");
+    throw std::invalid_argument(
+        place_of(dag_.name, task.activation, task.name) +
+        ": TaskOptions::after applies to timer() only (name all predecessors in the second argument of data())");
   }
   return append(std::move(task), predecessors, std::move(body), options);
 }
@@ -42,10 +43,10 @@ TaskHandle DagBuilder::append(Task task, const std::vector<TaskHandle> &predeces
   const auto refuse = [&](const char *why) {
     throw std::invalid_argument(place_of(dag_.name, task.activation, task.name) + ": " + why);
   };
-  if (!body) refuse("the task has no body (the function is empty)");
+  if (!body) refuse("the task has no body (pass a function that is not empty)");
   for (const TaskHandle handle : predecessors) {
     if (handle.index_ >= serials_.size() || serials_[handle.index_] != handle.serial_) {
-      refuse("a predecessor is a task of another DagBuilder (edges stay within a DAG: use handles that this one gave)");
+      refuse("a predecessor belongs to another DagBuilder (use handles that this DagBuilder returned)");
     }
     task.predecessors.push_back(handle.index_);
   }

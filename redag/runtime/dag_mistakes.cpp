@@ -22,24 +22,24 @@ struct Remedy {
 };
 
 constexpr std::array kDagRemedies = {
-    Remedy{Field::Name, "the argument of DagBuilder"},
+    Remedy{Field::Name, "change the argument of DagBuilder"},
     Remedy{Field::Tasks, "add tasks with timer() and data()"},
-    Remedy{Field::MaxActive, "DagOptions::max_active; 0: no bound"},
-    Remedy{Field::MaxPending, "DagOptions::max_pending; 0: no bound"},
+    Remedy{Field::MaxActive, "change DagOptions::max_active; 0 means no bound"},
+    Remedy{Field::MaxPending, "change DagOptions::max_pending; 0 means no bound"},
     Remedy{Field::Criticality, "DagOptions::criticality"},
 };
 
 constexpr std::array kTaskRemedies = {
-    Remedy{Field::Name, "the first argument"},
-    Remedy{Field::Wcet, "TaskOptions::wcet; 0: unknown"},
-    Remedy{Field::Period, "the second argument of timer()"},
-    Remedy{Field::Deadline, "TaskOptions::deadline; 0: the period"},
-    Remedy{Field::Offset, "TaskOptions::offset; only timer() takes one"},
-    Remedy{Field::Budget, "TaskOptions::budget; 0: none"},
+    Remedy{Field::Name, "change the first argument"},
+    Remedy{Field::Wcet, "change TaskOptions::wcet; 0 means unknown"},
+    Remedy{Field::Period, "change the second argument of timer()"},
+    Remedy{Field::Deadline, "change TaskOptions::deadline; 0 means the period"},
+    Remedy{Field::Offset, "change TaskOptions::offset, which only timer() uses"},
+    Remedy{Field::Budget, "change TaskOptions::budget; 0 means none"},
     Remedy{Field::Activation, "name predecessors in the second argument of data(), or use timer()"},
     Remedy{Field::Overrun, "TaskOptions::queue_depth"},
     Remedy{Field::Priority, "TaskOptions::priority"},
-    Remedy{Field::Group, "TaskOptions::group; empty: none"},
+    Remedy{Field::Group, "change TaskOptions::group; empty means none"},
 };
 
 std::string text_in_quotes(std::string_view text) {
@@ -50,7 +50,7 @@ std::string text_in_quotes(std::string_view text) {
 
 std::string remedy_for(const Finding &finding, const Task *task) {
   if (task != nullptr && finding.field == Field::After) {
-    return task->activation == Activation::Data ? "the second argument of data()" : "TaskOptions::after";
+    return task->activation == Activation::Data ? "change the second argument of data()" : "TaskOptions::after";
   }
   const auto find = [&](const auto &remedies) -> std::string {
     const auto *const found = std::find_if(remedies.begin(), remedies.end(),
@@ -64,7 +64,8 @@ std::string describe(const Finding &finding, const Dag &dag) {
   const Task *task = finding.task == Finding::kNone ? nullptr : &dag.tasks[finding.task];
   std::string message = finding.message;
   // In a file a period of 0 means that it is absent. Here the caller passed it.
-  if (task != nullptr && finding.field == Field::Period && task->period == 0) message = "the period must be above 0";
+  if (task != nullptr && finding.field == Field::Period && task->period == 0)
+    message = "the period must be greater than 0";
   const std::string place = task == nullptr ? place_of(dag.name) : place_of(dag.name, task->activation, task->name);
   const std::string remedy = remedy_for(finding, task);
   return printable(fmt::format("{}: {}{}", place, message, remedy.empty() ? "" : " (" + remedy + ")"));
@@ -94,7 +95,7 @@ std::string mistakes_of(const Dag &dag, PolicyKind policy) {
   for (const Task &task : dag.tasks) {
     if (task.overrun == Overrun::Queue || task.queue_depth == 1) continue;
     add(place_of(dag.name, task.activation, task.name) +
-        ": TaskOptions::queue_depth without a queue (set TaskOptions::overrun to Overrun::Queue)");
+        ": TaskOptions::queue_depth has no effect without a queue (set TaskOptions::overrun to Overrun::Queue)");
   }
   return text;
 }

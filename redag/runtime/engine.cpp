@@ -29,8 +29,8 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
       paused_(options_.start_paused),
       decisions_(options_.trace_capacity) {
   const sched::Config &config = options_.config;
-  REDAG_CHECK(!os() || config.max_started >= config.workers, "os: a thread for every processor, at least");
-  REDAG_CHECK(!os() || options_.spins == 0, "os: a thread that looks for a job would keep others off its processor");
+  REDAG_CHECK(!os() || config.max_started >= config.workers, "mode os needs at least one thread for every processor");
+  REDAG_CHECK(!os() || options_.spins == 0, "spinning threads would keep others off their processors in mode os");
   if (os() && options_.throttling) {
     guard_.emplace(*options_.throttling, pool_, placement_);
     guard_thread_ = std::make_unique<GuardThread>();

@@ -60,7 +60,8 @@ void check(const ExecutorOptions &options) {
   check_range("workers", options.workers, 0U, kMaxWorkers);
   check_range("threads", options.threads, 0U, 2 * kMaxWorkers);
   if (options.threads > 0 && options.threads < options.workers) {
-    refuse(fmt::format("ExecutorOptions::threads is {}, fewer than the {} workers", options.threads, options.workers));
+    refuse(fmt::format("ExecutorOptions::threads is {}, but must be 0 or at least {}, the number of workers",
+                       options.threads, options.workers));
   }
   check_range("trace_capacity", options.trace_capacity, std::size_t{0}, kMaxTraceCapacity);
   check_duration("spin", options.spin);
@@ -71,7 +72,9 @@ void check(const ExecutorOptions &options) {
   check_duration("watchdog: interval", nanoseconds(options.watchdog->interval));
   check_range("watchdog: limits.deadlines", limits.deadlines, 0.0, kMaxWatchedDeadlines);
   if (limits.longest == 0 && limits.deadlines == 0) {
-    refuse("ExecutorOptions::watchdog: limits.longest or limits.deadlines must be above 0, or no job is ever overdue");
+    refuse(
+        "ExecutorOptions::watchdog: no job would be overdue (set limits.longest or limits.deadlines to a value greater "
+        "than 0)");
   }
 }
 
@@ -209,7 +212,7 @@ DagId Executor::Impl::add(Dag dag, std::vector<DagBuilder::Function> functions) 
   const auto has_name = [&](const auto &added) { return !added.second.removed && added.second.name == dag.name; };
   if (std::any_of(dags_.begin(), dags_.end(), has_name)) {
     refuse("Executor::add(): " + place_of(dag.name) +
-           ": there is another DAG of that name in the executor (remove() that one first, or choose another name)");
+           ": another DAG in the executor has this name (remove() that one first, or choose another name)");
   }
   if (options_.admission) admit(dag);
   const DagId id(next_dag_);
@@ -272,7 +275,7 @@ void Executor::Impl::remove(DagId dag) {
 
 void Executor::Impl::run_for(nanoseconds duration) {
   if (duration.count() < 0) {
-    refuse(fmt::format("Executor::run_for(): {} is negative", format_duration(duration.count())));
+    refuse(fmt::format("Executor::run_for(): the duration {} is negative", format_duration(duration.count())));
   }
   start();
   stop_.wait_until(monotonic_now() + std::min<Duration>(duration.count(), kMaxDuration / 2));
@@ -282,7 +285,8 @@ void Executor::Impl::run_for(nanoseconds duration) {
 
 void Executor::Impl::start() {
   const LockGuard starting(finishing_);  // a concurrent stop() waits until the run has begun
-  if (started_.exchange(true)) throw std::logic_error("Executor::start(): an Executor runs once");
+  if (started_.exchange(true))
+    throw std::logic_error("Executor::start(): the executor was started before (an Executor runs only once)");
   if (const Result<void> ready = start_threads(); !ready) {
     started_ = false;
     throw std::runtime_error(to_string(ready.error()));
@@ -318,7 +322,7 @@ void Executor::Impl::on_overdue(const OverdueJob &job) {
     // The job may have ended since watch() saw it. Its id may be another task's.
     const LockGuard guard(lock_);
     const Owner &owner = owners_[job.job.task.value];
-    info.task = job.job.release < owner.since ? "a task that was removed meanwhile" : name_of(owner);
+    info.task = job.job.release < owner.since ? "a removed task" : name_of(owner);
   }
   info.text = fmt::format("{} #{} is overdue: {}", info.task, info.job, describe(job));
   if (options_.on_overdue) {
@@ -336,9 +340,10 @@ void Executor::Impl::request_stop() noexcept {
 
 void Executor::Impl::wait() {
   if (engine_->in_body()) {
-    throw std::logic_error("Executor::wait(): a body cannot wait for the end of its own executor");
+    throw std::logic_error(
+        "Executor::wait(): a body cannot wait for the end of its own executor (call stop() instead)");
   }
-  if (!started_) throw std::logic_error("Executor::wait() before start()");
+  if (!started_) throw std::logic_error("Executor::wait(): the executor is not started (call start() first)");
   stop_.wait();
   finish();
   std::exception_ptr failure;
@@ -361,7 +366,7 @@ void Executor::Impl::finish() {
   if (!engine_->wait_idle(monotonic_now() + options_.stop_timeout.count())) {
     std::vector<std::string> names;
     for (const Job &job : engine_->started()) names.push_back(task_name(job.task));
-    throw std::runtime_error(fmt::format("still running {} after the stop: {}",
+    throw std::runtime_error(fmt::format("bodies were still running {} after the stop: {}",
                                          format_duration(options_.stop_timeout.count()), fmt::join(names, ", ")));
   }
   watchdog_.reset();
@@ -392,8 +397,7 @@ std::vector<TaskStats> Executor::Impl::stats(DagId dag) const {
   if (found == dags_.end()) throw std::out_of_range(fmt::format("Executor::stats(): there is no DAG {}", dag.value));
   const Added &of = found->second;
   if (of.left < of.tasks.size()) {
-    throw std::out_of_range(
-        fmt::format("Executor::stats(): DAG {} was removed, and another one has its place", dag.value));
+    throw std::out_of_range(fmt::format("Executor::stats(): DAG {} was removed, and its slot is reused", dag.value));
   }
   std::vector<TaskStats> result;
   for (std::size_t i = 0; i < of.tasks.size(); ++i) {

@@ -51,7 +51,7 @@ TEST(DagBuilder, RefusesTasksOfOtherBuilders) {
   DagBuilder other("other");
   const TaskHandle first = one.timer("first", 1ms, kBody);
   const TaskHandle foreign = other.timer("foreign", 1ms, kBody);  // the same index as `first`
-  const std::string says = "a predecessor is a task of another DagBuilder";
+  const std::string says = "a predecessor belongs to another DagBuilder";
   EXPECT_THAT(thrown_by([&] { one.data("next", {foreign}, kBody); }),
               AllOf(HasSubstr("DagBuilder(\"one\").data(\"next\")"), HasSubstr(says)));
   EXPECT_THAT(thrown_by([&] { one.timer("next", 1ms, kBody, {.after = {foreign}}); }),
@@ -72,7 +72,7 @@ TEST(DagBuilder, RefusesTasksWithoutABody) {
               AllOf(HasSubstr("DagBuilder(\"d\").timer(\"t\")"), HasSubstr("no body")));
   const TaskHandle first = dag.timer("first", 1ms, kBody);
   EXPECT_THAT(thrown_by([&] { dag.data("t", {first}, kBody, {.after = {first}}); }),
-              HasSubstr("TaskOptions::after is for timer()"));
+              HasSubstr("TaskOptions::after applies to timer()"));
 }
 
 TEST(Executor, NamesTheCallAndTheOptionOfEveryMistake) {
@@ -88,7 +88,8 @@ TEST(Executor, NamesTheCallAndTheOptionOfEveryMistake) {
   const std::string task = "DagBuilder(\"d\").timer(\"t\")";
   const std::vector<Mistake> mistakes = {
       {[](DagBuilder &) {}, "DagBuilder(\"d\"): ", "has no tasks", "timer() and data()"},
-      {[](DagBuilder &dag) { dag.timer("t", 0ms, kBody); }, task.c_str(), "above 0", "second argument of timer()"},
+      {[](DagBuilder &dag) { dag.timer("t", 0ms, kBody); }, task.c_str(), "greater than 0",
+       "second argument of timer()"},
       {[](DagBuilder &dag) { dag.timer("t", -1ms, kBody); }, task.c_str(), "-1ms", "second argument of timer()"},
       {[](DagBuilder &dag) { dag.timer("t", nanoseconds::max(), kBody); }, task.c_str(), "too large", "timer()"},
       {[](DagBuilder &dag) { dag.timer("", 1ms, kBody); }, "timer(\"\")", "no name", "first argument"},
@@ -123,7 +124,7 @@ TEST(Executor, RefusesABadDagWithEveryMistakeAndChangesNothing) {
   dag.timer("a", -1ms, kBody);
   const std::string said = thrown_by([&] { executor.add(std::move(dag)); });
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 2) << said;
-  EXPECT_THAT(said, AllOf(HasSubstr("above 0"), HasSubstr("-1ms"), HasSubstr("another task 'a'")));
+  EXPECT_THAT(said, AllOf(HasSubstr("greater than 0"), HasSubstr("-1ms"), HasSubstr("used by another task")));
   DagBuilder good("dag");
   good.timer("a", 1ms, kBody);
   EXPECT_EQ(executor.add(std::move(good)), DagId(0));
@@ -138,7 +139,8 @@ TEST(Executor, NamesOfDagsAreUniqueAmongThoseThere) {
   };
   const DagId first = executor.add(dag());
   EXPECT_THAT(thrown_by([&] { executor.add(dag()); }),
-              AllOf(HasSubstr("DagBuilder(\"same\")"), HasSubstr("another DAG of that name"), HasSubstr("remove()")));
+              AllOf(HasSubstr("DagBuilder(\"same\")"), HasSubstr("another DAG in the executor has this name"),
+                    HasSubstr("remove()")));
   executor.remove(first);
   EXPECT_EQ(executor.add(dag()), DagId(1));
 }
@@ -152,24 +154,27 @@ TEST(Executor, RefusesOptionsOutOfRange) {
   EXPECT_THAT(refused_with([](auto &o) { o.workers = kMaxWorkers + 1; }),
               HasSubstr("ExecutorOptions::workers must be from 0 to 4096, not 4097"));
   EXPECT_THAT(refused_with([](auto &o) { o.threads = 1'000'000; }), HasSubstr("ExecutorOptions::threads"));
-  EXPECT_THAT(refused_with([](auto &o) { o.workers = 4, o.threads = 2; }), HasSubstr("fewer than the 4 workers"));
+  EXPECT_THAT(refused_with([](auto &o) { o.workers = 4, o.threads = 2; }),
+              HasSubstr("must be 0 or at least 4, the number of workers"));
   EXPECT_THAT(refused_with([](auto &o) { o.spin = -1ns; }), HasSubstr("ExecutorOptions::spin"));
   EXPECT_THAT(refused_with([](auto &o) { o.stop_timeout = nanoseconds::max(); }), HasSubstr("::stop_timeout"));
   EXPECT_THAT(refused_with([](auto &o) { o.name = "\x1b[2J"; }), HasSubstr("::name '\\u{1B}[2J' contains U+001B"));
   EXPECT_THAT(refused_with([](auto &o) { o.trace_capacity = std::numeric_limits<std::size_t>::max(); }),
               HasSubstr("::trace_capacity"));
-  EXPECT_THAT(refused_with([](auto &o) { o.watchdog = WatchdogOptions{}; }), HasSubstr("no job is ever overdue"));
+  EXPECT_THAT(refused_with([](auto &o) { o.watchdog = WatchdogOptions{}; }), HasSubstr("no job would be overdue"));
   EXPECT_THAT(refused_with([](auto &o) {
                 o.watchdog = WatchdogOptions{{0, std::numeric_limits<double>::quiet_NaN()}, kMillisecond};
               }),
               HasSubstr("limits.deadlines"));
   Executor executor(without_preemption());
-  EXPECT_THAT(thrown_by([&] { executor.run_for(-1ms); }), HasSubstr("Executor::run_for(): -1ms is negative"));
+  EXPECT_THAT(thrown_by([&] { executor.run_for(-1ms); }),
+              HasSubstr("Executor::run_for(): the duration -1ms is negative"));
 }
 
 TEST(Executor, NamesTheCallThatCameTooEarlyOrTooLate) {
   Executor executor(without_preemption());
-  EXPECT_THAT(thrown_by<std::logic_error>([&] { executor.wait(); }), HasSubstr("Executor::wait() before start()"));
+  EXPECT_THAT(thrown_by<std::logic_error>([&] { executor.wait(); }),
+              HasSubstr("Executor::wait(): the executor is not started"));
   EXPECT_THAT(thrown_by<std::out_of_range>([&] { executor.remove(DagId(7)); }),
               HasSubstr("Executor::remove(): there is no DAG 7"));
   EXPECT_THAT(thrown_by<std::out_of_range>([&] { (void)executor.stats(DagId(7)); }), HasSubstr("Executor::stats()"));

@@ -30,7 +30,7 @@ PriorityBand probe_priority_band() {
 Result<Mode> resolve_mode(PreemptionMode wanted, PolicyKind policy, const PriorityBand &band) {
   std::string obstacle;
   if (!is_static(policy)) {
-    obstacle = fmt::format("policy {} orders jobs, not threads", to_string(policy));
+    obstacle = fmt::format("policy {} gives priorities to jobs, but the kernel schedules threads", to_string(policy));
   } else if (band.top_job == 0) {
     obstacle = "this process may not use SCHED_FIFO";
   }
@@ -39,8 +39,8 @@ Result<Mode> resolve_mode(PreemptionMode wanted, PolicyKind policy, const Priori
     case PreemptionMode::Cooperative: return Mode{wanted, {}};
     case PreemptionMode::Os:
       if (obstacle.empty()) return Mode{wanted, {}};
-      return make_error("preemption 'os' cannot be had: " + obstacle,
-                        is_static(policy) ? realtime_hint() : "use a static policy, or preemption cooperative");
+      return make_error("preemption 'os' is not available: " + obstacle,
+                        is_static(policy) ? realtime_hint() : "use a static policy, or preemption 'cooperative'");
     case PreemptionMode::Auto: break;
   }
   if (obstacle.empty()) return Mode{PreemptionMode::Os, "auto: this process may use SCHED_FIFO"};
@@ -86,13 +86,13 @@ std::vector<std::string> mode_warnings(std::uint32_t workers, std::size_t cpus,
   std::vector<std::string> warnings;
   if (workers > cpus) {
     warnings.push_back(
-        fmt::format("{} workers share {} processor(s): jobs that run together slow each other down", workers, cpus));
+        fmt::format("{} workers share {} processor(s), so jobs that run together slow each other down", workers, cpus));
   }
   if (throttling) {
     warnings.push_back(
         fmt::format("real-time throttling is on: SCHED_FIFO threads get at most {} of every {} us of a busy processor; "
-                    "where some DAGs are of high criticality, the others' jobs bear it "
-                    "('sysctl kernel.sched_rt_runtime_us=-1' lifts it)",
+                    "if some DAGs are of high criticality, the throttling affects only the other DAGs (turn it off "
+                    "with 'sysctl kernel.sched_rt_runtime_us=-1')",
                     throttling->runtime_us, throttling->period_us));
   }
   return warnings;

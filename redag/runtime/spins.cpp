@@ -38,7 +38,7 @@ std::uint32_t spins_in(Duration duration) {
 std::uint32_t spins_before_sleep(Setup &setup, Duration spin) {
   if (spin <= 0) return 0;
   if (setup.mode.mode != PreemptionMode::Os) return spins_in(spin);
-  setup.warnings.push_back("workers do not look for jobs before they sleep: that is for modes none and cooperative");
+  setup.warnings.push_back("workers do not spin in this mode: spinning needs preemption none or cooperative");
   return 0;
 }
 

@@ -47,7 +47,7 @@ Result<void> pin(const ThreadSetup &setup) {
   }
   const int error = pthread_setaffinity_np(pthread_self(), sizeof(set), &set);
   if (error == 0) return {};
-  return make_error(fmt::format("thread '{}' cannot be pinned: {}", setup.name, reason(error)),
+  return make_error(fmt::format("thread '{}' cannot be pinned to its processors: {}", setup.name, reason(error)),
                     fmt::format("usable processors are {}", fmt::join(usable_cpus(), ", ")));
 }
 
@@ -139,7 +139,8 @@ Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()
     });
   } catch (const std::system_error &error) {
     return make_error(fmt::format("thread '{}' cannot be created: {}", setup.name, error.what()),
-                      "limits on threads: 'ulimit -u', the container's pids limit, memory for stacks ('ulimit -s')");
+                      "check the limits on threads: 'ulimit -u', the pids limit of the container, and memory for "
+                      "stacks ('ulimit -s')");
   }
   ready.wait();
   if (result) return thread;
@@ -189,9 +190,8 @@ int fifo_priority_above_this_thread() {
 }
 
 const char *realtime_hint() {
-  return "give the process real-time rights: 'setcap cap_sys_nice+ep <program>', or 'rtprio 90' for the user in "
-         "/etc/security/limits.conf (log in again), or in a container 'docker run --cap-add=SYS_NICE --ulimit "
-         "rtprio=90'";
+  return "allow real-time priorities: 'setcap cap_sys_nice+ep PROGRAM'; or 'rtprio 90' for the user in "
+         "/etc/security/limits.conf, then log in again; or 'docker run --cap-add=SYS_NICE --ulimit rtprio=90'";
 }
 
 Result<void> lock_memory() {

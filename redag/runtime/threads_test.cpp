@@ -140,7 +140,7 @@ TEST(ResolveMode, AutoTakesOsWhereItCanAndSaysWhy) {
   const auto dynamic = resolve_mode(PreemptionMode::Auto, PolicyKind::Edf, kBand);
   ASSERT_TRUE(dynamic);
   EXPECT_EQ(dynamic->mode, PreemptionMode::Cooperative);
-  EXPECT_EQ(dynamic->reason, "auto: policy edf orders jobs, not threads");
+  EXPECT_EQ(dynamic->reason, "auto: policy edf gives priorities to jobs, but the kernel schedules threads");
 }
 
 TEST(ResolveMode, OsWithoutRightsIsAnErrorThatSaysHowToGetThem) {

@@ -39,9 +39,9 @@ void Watchdog::main() noexcept {
 
 std::string describe(const OverdueJob &job) {
   const bool mostly_off = job.used < job.elapsed / 2;
-  return fmt::format("in progress for {}, {} of processor time{}", humanize_duration(job.elapsed),
+  return fmt::format("in progress for {}, with {} of processor time{}", humanize_duration(job.elapsed),
                      humanize_duration(job.used),
-                     mostly_off ? ": it waits, or more urgent jobs leave it no processor" : "");
+                     mostly_off ? "; it waits, or more urgent jobs keep it off the processors" : "");
 }
 
 }  // namespace redag::runtime

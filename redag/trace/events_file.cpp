@@ -156,13 +156,14 @@ Result<Trace> parse_trace(std::string_view text, const std::string &file) {
       trace.events.reserve(text.size() / 48);  // length of a typical line
       continue;
     }
-    if (footer) return file_error(file, number, "there is something after the last line");
+    if (footer) return file_error(file, number, "there is text after the last line");
     JobEvent event;
     if (!line.empty() && line.front() == '{') {
       footer = read_footer(line);
       if (!footer) return file_error(file, number, "the last line must have events, end_ns and lost_events");
     } else if (!read_event(line, event) || !has_valid_times(event)) {
-      return file_error(file, number, "not an event", "an event is [time,\"kind\",task,job,worker,value,\"reason\"]");
+      return file_error(file, number, "this line is not an event",
+                        "an event is written as [time,\"kind\",task,job,worker,value,\"reason\"]");
     } else if (event.task.value >= task_count) {
       return file_error(file, number, "task " + std::to_string(event.task.value) + " is not in the workload");
     } else {
@@ -170,7 +171,7 @@ Result<Trace> parse_trace(std::string_view text, const std::string &file) {
     }
   }
   if (number == 0) return file_error(file, 0, "the file is empty");
-  if (!footer) return file_error(file, number, "the file ends too early: its last line is missing");
+  if (!footer) return file_error(file, number, "the file is incomplete: its last line is missing");
   if (footer->events != trace.events.size()) {
     return file_error(file, number,
                       "the file has " + std::to_string(trace.events.size()) + " events, but " +

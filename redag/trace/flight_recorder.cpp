@@ -240,10 +240,10 @@ Result<FlightRecorder> FlightRecorder::create(const std::string &folder, const R
                                               const FlightOptions &options, std::span<const std::uint32_t> positions) {
   if (::mkdir(folder.c_str(), 0777) != 0) {
     const int error = errno;
-    if (error != EEXIST) return system_error(folder, "cannot make the folder", error);
+    if (error != EEXIST) return system_error(folder, "cannot create the folder", error);
     if (has_flight_record(folder)) {
-      return file_error(folder, 0, "there is the record of an earlier run, which did not end by itself",
-                        "'redag recover' makes results of it; or choose another folder");
+      return file_error(folder, 0, "the folder holds the record of an earlier run that did not end normally",
+                        "restore its results with 'redag recover', or choose another folder");
     }
   }
   if (Result<void> written = write_info(folder, info, positions); !written)
@@ -284,8 +284,8 @@ struct Description {
 Result<Description> read_info(const std::string &folder) {
   const std::string path = info_path(folder);
   if (!has_flight_record(folder)) {
-    return file_error(path, 0, "there is no record of a run here",
-                      "'redag run --out DIR' records into DIR/flight while it goes on, and deletes that at the end");
+    return file_error(path, 0, "the folder holds no record of a run",
+                      "'redag run --out DIR' records into DIR/flight while it runs, and deletes the record at the end");
   }
   const Result<std::string> text = read_file(path, kMaxInfoBytes);
   if (!text) return tl::unexpected<Diagnostics>(text.error());
@@ -303,7 +303,7 @@ Result<Description> read_info(const std::string &folder) {
     return entry.is_number_unsigned() && entry.get<std::uint64_t>() < tasks;
   };
   if (!positions.is_array() || !std::all_of(positions.begin(), positions.end(), is_position)) {
-    return file_error(path, 2, "the second line must be a list of positions of tasks in the workload");
+    return file_error(path, 2, "the second line must list the positions of tasks in the workload");
   }
   found.positions = positions.get<std::vector<std::uint32_t>>();
   return found;
@@ -314,8 +314,8 @@ Result<std::vector<Block>> read_blocks(const std::string &path, std::uint64_t &d
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.get() < 0) return system_error(path, "cannot open", errno);
   if (::flock(file.get(), LOCK_SH | LOCK_NB) != 0) {
-    return file_error(path, 0, "the run goes on: its record is being written",
-                      "wait for its end; 'redag top' shows it meanwhile");
+    return file_error(path, 0, "the run is still in progress and writes its record",
+                      "wait for the end of the run; 'redag top' shows it until then");
   }
   const Result<std::string> bytes = read_file(path);
   if (!bytes) return tl::unexpected<Diagnostics>(bytes.error());
@@ -367,7 +367,7 @@ Result<Recovered> recover(const std::string &folder) {
     for (const JobEvent &recorded : std::span(block.events).first(block.header.count)) {
       const auto event = read_event(recorded, *run, tasks, events.empty() ? -kMaxTraceTime : events.back().time);
       if (!event) {
-        return file_error(events_path(folder), 0, "its events are not those of the run that run.json describes");
+        return file_error(events_path(folder), 0, "its events do not belong to the run that run.json describes");
       }
       events.push_back(*event);
     }

@@ -109,7 +109,7 @@ TEST_F(FlightRecord, OutlivesItsProcess) {
   char kept = 0;
   ASSERT_EQ(::read(pipe_ends[0], &kept, 1), 1);
   EXPECT_EQ(kept, 'y');
-  expect_error("the run goes on");
+  expect_error("the run is still in progress");
   ASSERT_EQ(::kill(child, SIGKILL), 0);
   int status = 0;
   ASSERT_EQ(::waitpid(child, &status, 0), child);
@@ -209,7 +209,7 @@ TEST_F(FlightRecord, EventsOfAnotherRunAreAnError) {
     foreign[1].task = TaskId(99);
     ASSERT_TRUE(recorder.append(foreign, 0));
   }
-  expect_error("not those of the run");
+  expect_error("do not belong to the run");
 }
 
 TEST_F(FlightRecord, AFullDiskIsToldOnce) {

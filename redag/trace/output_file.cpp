@@ -100,7 +100,7 @@ Result<std::string> read_file(const std::string &path, std::size_t most) {
   while ((count = ::read(descriptor, block.data(), block.size())) != 0) {
     if (count > 0 && static_cast<std::size_t>(count) > most - text.size()) {
       ::close(descriptor);
-      return file_error(path, 0, "longer than " + std::to_string(most >> 20U) + " MiB");
+      return file_error(path, 0, "is longer than " + std::to_string(most >> 20U) + " MiB");
     }
     if (count > 0) {
       text.append(block, 0, static_cast<std::size_t>(count));

@@ -102,7 +102,7 @@ TEST(ReadFile, DevicesAndLongFilesAreErrors) {
   // The limit holds for any reported size.
   const auto kernel = read_file("/proc/self/maps", 16);
   ASSERT_FALSE(kernel);
-  EXPECT_EQ(kernel.error().front().message, "longer than 0 MiB");
+  EXPECT_EQ(kernel.error().front().message, "is longer than 0 MiB");
 }
 
 TEST(ReadFile, MissingFileIsAnError) {

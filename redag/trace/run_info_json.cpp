@@ -38,7 +38,7 @@ const Json &member(const Json &object, const char *key) {
 
 std::string text_of(const Json &object, const char *key) {
   const Json &value = member(object, key);
-  if (!value.is_string()) throw BadValue(std::string("'") + key + "' must be a text");
+  if (!value.is_string()) throw BadValue(std::string("'") + key + "' must be a string");
   return value.get<std::string>();
 }
 
@@ -60,7 +60,7 @@ std::uint32_t small_of(const Json &object, const char *key, std::uint32_t low, s
 
 std::uint64_t unsigned_of(const Json &object, const char *key) {
   const Json &value = member(object, key);
-  if (!value.is_number_unsigned()) throw BadValue(std::string("'") + key + "' must be a whole number, not negative");
+  if (!value.is_number_unsigned()) throw BadValue(std::string("'") + key + "' must be a whole number of at least 0");
   return value.get<std::uint64_t>();
 }
 
@@ -69,7 +69,7 @@ auto one_of(const Values &values, Name name, const std::string &text, const char
   for (const auto value : values) {
     if (text == name(value)) return value;
   }
-  throw BadValue(std::string("'") + key + "' cannot be '" + text + "'");
+  throw BadValue(std::string("'") + key + "' has the unknown value '" + text + "'");
 }
 
 sched::Config config_from(const Json &json) {
@@ -148,7 +148,7 @@ std::string run_info_to_json(const RunInfo &info) {
 }
 
 Result<RunInfo> run_info_from_json(std::string_view text, const std::string &file, int line) {
-  if (json_nests_deeper(text)) return file_error(file, line, "the description of the run is nested too deep");
+  if (json_nests_deeper(text)) return file_error(file, line, "the description of the run is nested too deeply");
   try {
     const Json json = Json::parse(text);
     if (!json.is_object()) return file_error(file, line, "the description of the run must be an object");
@@ -174,12 +174,12 @@ std::string run_header_to_json(std::string_view format, const RunInfo &info) {
 Result<RunInfo> run_header_from_json(std::string_view text, std::string_view format, const char *what,
                                      const std::string &file) {
   const std::string wrong = std::string("not ") + what + ": ";
-  if (json_nests_deeper(text)) return file_error(file, 1, wrong + "nested too deep");
+  if (json_nests_deeper(text)) return file_error(file, 1, wrong + "nested too deeply");
   const Json json = Json::parse(text, nullptr, false);
   const auto given = json.is_object() ? json.find("format") : json.end();
   if (!json.is_object() || given == json.end() || *given != format || !json.contains("run")) {
     return file_error(file, 1, wrong + "the first line must have \"format\": \"" + std::string(format) + "\"",
-                      "it is written by 'redag run' with --out, and traces by 'redag simulate', too");
+                      "'redag run' and 'redag simulate' write such files with --out");
   }
   Result<RunInfo> info = run_info_from_json(json["run"].dump(), file, 1);
   if (!info || !json.contains("provenance")) return info;
