@@ -35,9 +35,9 @@ std::string doubtful_tasks(const TaskSet &task_set, const Workload &workload, co
 Result<void> admit_by_bounds(const Workload &workload, const sched::Config &config) {
   for (const TaskRef &ref : flatten(workload)) {
     if (ref.task->wcet > 0) continue;
-    return make_error(fmt::format("task '{}' of DAG '{}' has no wcet, so that nothing is known about its share",
-                                  ref.task->name, workload.dags[ref.dag.value].name),
-                      "state the longest execution time");
+    return make_error(fmt::format("task '{}' of DAG '{}' has no wcet, so its demand is unknown", ref.task->name,
+                                  workload.dags[ref.dag.value].name),
+                      "state its worst-case execution time");
   }
   const Result<TaskSet> task_set = compile(workload, platform_of(config));
   if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
@@ -46,7 +46,7 @@ Result<void> admit_by_bounds(const Workload &workload, const sched::Config &conf
   if (report.verdict == Verdict::Schedulable) return {};
   const std::string doubtful = doubtful_tasks(*task_set, workload, report);
   return make_error("no bound shows that every deadline is met" + (doubtful.empty() ? "" : ": " + doubtful),
-                    "'redag analyze --explain' says where a bound comes from");
+                    "'redag analyze --explain TASK' shows what a bound consists of");
 }
 
 }  // namespace redag::analysis

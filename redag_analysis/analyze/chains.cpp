@@ -55,7 +55,7 @@ Duration one_worker_reaction(const TaskSet &task_set, const std::vector<ChainSeg
 
 std::variant<NotApplicable, ChainBound> chain_bound(const TaskSet &task_set, std::span<const TaskId> chain,
                                                     const Bound &bound) {
-  if (chain.empty()) return NotApplicable{"a chain without tasks"};
+  if (chain.empty()) return NotApplicable{"the chain has no tasks"};
   if (!task_set.not_analysable.empty()) return NotApplicable{task_set.not_analysable};
   if (auto reason = why_not_directly(task_set)) return NotApplicable{*reason};
   ChainBound result;
@@ -68,7 +68,8 @@ std::variant<NotApplicable, ChainBound> chain_bound(const TaskSet &task_set, std
     const ResponseBound *response = response_of(task_set, chain[i], bound);
     if (response == nullptr) return NotApplicable{"task '" + task.name + "' has no response bound"};
     if (*response->response > task.period) {
-      return NotApplicable{"task '" + task.name + "': a response above its period can hold data back for longer"};
+      return NotApplicable{"task '" + task.name +
+                           "': its response time can exceed its period, which can hold data back for longer"};
     }
     result.segments.push_back(ChainSegment{chain[i], chain[i], task.period, *response->response});
   }

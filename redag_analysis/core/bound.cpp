@@ -64,7 +64,7 @@ Verdict verdict(const TaskSet &task_set, const Bound &bound) {
 ResponseBound if_bounded(ResponseBound bound) {
   if (bound.response.value_or(0) < kUnbounded) return bound;
   ResponseBound none;
-  none.absent = "longer than any time that can be told";
+  none.absent = "longer than any representable time";
   return none;
 }
 

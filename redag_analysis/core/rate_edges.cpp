@@ -14,13 +14,13 @@ namespace redag::analysis {
 namespace {
 
 constexpr std::string_view kFasterThanData =
-    "a predecessor of a larger period delivers data less often than the task is released: jobs are skipped by design";
+    "a predecessor has a larger period than this task, so data is missing for some jobs, which are skipped by design";
 constexpr std::string_view kNoData = "a predecessor of another rate has no bound";
-constexpr std::string_view kLateData = "data of its predecessors can come later than its next release";
-constexpr std::string_view kGaveUp = "gave up: waits and responses did not agree in a thousand steps";
+constexpr std::string_view kLateData = "data of its predecessors can arrive after its next release";
+constexpr std::string_view kGaveUp = "gave up: waiting times and response times did not converge in a thousand steps";
 constexpr std::string_view kBinds =
-    "a max_active over several parts of the DAG is known not to bind only if all its tasks have a bound";
-constexpr std::string_view kFewThreads = "fewer threads than tasks are known to suffice only if all tasks have a bound";
+    "a max_active over several parts of the DAG is only known not to bind if all its tasks have a bound";
+constexpr std::string_view kFewThreads = "fewer threads than tasks are only known to suffice if all tasks have a bound";
 
 constexpr int kMaxRounds = 1000;
 
@@ -305,7 +305,8 @@ bool shares_max_active(const TaskSet &task_set) {
 
 std::optional<std::string> why_not_directly(const TaskSet &task_set) {
   if (task_set.has_rate_edges()) return "edges join tasks of different periods or offsets: see the bounds for DAGs";
-  if (task_set.threads_suffice_if_bounded) return "fewer threads than tasks: see the bounds on response times";
+  if (task_set.threads_suffice_if_bounded)
+    return "there are fewer threads than tasks: see the bounds on response times";
   return std::nullopt;
 }
 

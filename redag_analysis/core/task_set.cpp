@@ -115,7 +115,7 @@ class Compiler {
     std::size_t most = 0;
     for (std::uint32_t d = 0; d < task_set_.dags.size(); ++d) most += most_jobs_in_progress(task_set_, DagId(d));
     if (threads < most) {
-      refuse(std::to_string(threads) + " threads for up to " + std::to_string(most) +
+      refuse(std::to_string(threads) + " threads serve up to " + std::to_string(most) +
              " jobs in progress: a job can wait for a thread that less urgent jobs hold");
     }
     task_set_.threads_suffice_if_bounded = true;
@@ -138,7 +138,7 @@ class Compiler {
       for (const std::uint32_t p : task_set_.tasks[t].predecessors) task_set_.tasks[p].successors.push_back(t);
     }
     if (dag.max_pending > 0 && dag.max_pending < waiting) {
-      refuse("DAG '" + dag.name + "': max_pending can refuse jobs although every deadline is met");
+      refuse("DAG '" + dag.name + "': max_pending can cause jobs to be skipped although every deadline is met");
     }
     task_set_.dags.push_back(std::move(compiled));
   }
@@ -188,7 +188,7 @@ class Compiler {
     }
     if (task.wcet_low > 0 && task.wcet_low < task.wcet) {
       modes_ = "task '" + compiled.name +
-               "': its wcet_low is below its wcet, so jobs of DAGs of lower criticality can be skipped in HI mode";
+               "': its wcet_low is below its wcet, so jobs of less critical DAGs can be skipped in HI mode";
     }
     return compiled;
   }
@@ -391,7 +391,7 @@ Result<ExecutedRun> as_executed(Workload workload, const sched::Config &config, 
                        : what == "preempt"  ? &run.platform.preempt_overhead
                                             : nullptr;
     if (!value || target == nullptr) {
-      return make_error("the run's overheads are not understood: " + std::string(overheads));
+      return make_error("the overheads in the run's record cannot be parsed: " + std::string(overheads));
     }
     *target = *value;
   }
@@ -427,10 +427,10 @@ bool TaskSet::has_rate_edges() const {
 }
 
 Result<TaskSet> compile(const Workload &workload, const AnalysisPlatform &platform) {
-  if (platform.workers == 0) return make_error("a platform has at least one worker");
+  if (platform.workers == 0) return make_error("a platform needs at least one worker");
   if (std::min({platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead, platform.lateness,
                 platform.timer_overhead, platform.stall.longest, platform.stall.per_second}) < 0) {
-    return make_error("an overhead is negative");
+    return make_error("an overhead must not be negative");
   }
   Diagnostics mistakes = validate(workload);
   if (has_errors(mistakes)) return tl::unexpected<Diagnostics>(std::move(mistakes));

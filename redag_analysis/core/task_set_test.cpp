@@ -121,7 +121,7 @@ TEST(TaskSet, WhatCutsOrRefusesJobsIsNotAnalysed) {
   EXPECT_THAT(compiled(pending, mode(sched::Preemption::Full)).not_analysable, HasSubstr("max_pending"));
   AnalysisPlatform threads = mode(sched::Preemption::Full);
   threads.max_started = 2;
-  EXPECT_THAT(compiled(two_dags(), threads).not_analysable, HasSubstr("2 threads for up to 3 jobs in progress"));
+  EXPECT_THAT(compiled(two_dags(), threads).not_analysable, HasSubstr("2 threads serve up to 3 jobs in progress"));
   threads.max_started = 3;
   EXPECT_EQ(compiled(two_dags(), threads).not_analysable, "");
   EXPECT_TRUE(compiled(two_dags(), threads).threads_suffice_if_bounded);
@@ -204,7 +204,7 @@ TEST(NotApplicable, UtilizationNeedsTheOrderByRate) {
                                     PreemptionMode::Os, PolicyKind::Fixed);
   workload.dags[0].tasks[1].priority = 7;
   const AnalysisPlatform full = mode(sched::Preemption::Full);
-  EXPECT_THAT(refusal(liu_layland(), workload, full), HasSubstr("less urgent than one of a larger period"));
+  EXPECT_THAT(refusal(liu_layland(), workload, full), HasSubstr("less urgent than a task of a larger period"));
   workload.policy = PolicyKind::RateMonotonic;
   EXPECT_EQ(refusal(liu_layland(), workload, full), "");
   EXPECT_THAT(refusal(liu_layland(), workload, mode(sched::Preemption::None)), HasSubstr("with blocking"));

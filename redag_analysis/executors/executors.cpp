@@ -15,7 +15,7 @@ namespace redag::executors {
 namespace {
 
 constexpr std::array<ExecutorKind, 6> kExecutors{{
-    {"redag", "ReDAG-RT: one priority order over all DAGs, per-DAG bounds, preemption", true, false, false},
+    {"redag", "ReDAG-RT: one priority order over all DAGs, bounds for each DAG, preemption", true, false, false},
     {"mte", "model of rclcpp's MultiThreadedExecutor (Humble)", false, false, false},
     {"ste", "model of rclcpp's SingleThreadedExecutor (Humble); one worker", false, true, false},
     {"static", "model of rclcpp's StaticSingleThreadedExecutor (Humble); one worker", false, true, false},
@@ -46,7 +46,7 @@ sched::Config effective_config(const ExecutorKind &kind, sched::Config config) {
 std::unique_ptr<sched::Scheduler> make_scheduler(std::string_view name, const Workload &workload,
                                                  const sched::Config &config) {
   const ExecutorKind *kind = find_executor(name);
-  REDAG_CHECK(kind != nullptr, "an executor of that name does not exist");
+  REDAG_CHECK(kind != nullptr, "there is no executor of this name");
   const sched::Config effective = effective_config(*kind, config);
   if (name == "redag") return std::make_unique<sched::PriorityScheduler>(workload, effective);
   if (name == "events") {

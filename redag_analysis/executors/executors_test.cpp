@@ -44,7 +44,8 @@ TEST(Executors, MakeSchedulersThatDifferInWhoIsFirst) {
 }
 
 TEST(ExecutorsDeathTest, AnUnknownNameIsAMistakeOfTheCaller) {
-  EXPECT_DEATH(static_cast<void>(make_scheduler("cfs", two_timers(), sched::Config{})), "does not exist");
+  EXPECT_DEATH(static_cast<void>(make_scheduler("cfs", two_timers(), sched::Config{})),
+               "there is no executor of this name");
 }
 
 }  // namespace

@@ -26,9 +26,9 @@ ResponseBound bound_of(const CompiledTask &task, std::uint32_t t, Duration respo
 
 std::string_view why_absent(Exploration::End end) {
   switch (end) {
-    case Exploration::End::Overrun: return "a job can end after the next release: jobs would be skipped";
+    case Exploration::End::Overrun: return "a job can end after its task's next release, so jobs would be skipped";
     case Exploration::End::GaveUp: return "gave up: too many states";
-    case Exploration::End::Stopped: return "stopped before it was complete";
+    case Exploration::End::Stopped: return "the exploration was stopped before it was complete";
     case Exploration::End::Complete: break;
   }
   return {};
@@ -36,16 +36,16 @@ std::string_view why_absent(Exploration::End end) {
 
 std::string describe(const TaskSet &task_set, const Exploration &exploration) {
   if (exploration.states == 0) {
-    return fmt::format("gave up at 0 states: {} jobs in a hyperperiod", exploration.jobs);
+    return fmt::format("gave up before the first state: a hyperperiod has {} jobs", exploration.jobs);
   }
   const std::string states = fmt::format("{} states", exploration.states);
   switch (exploration.end) {
     case Exploration::End::Complete:
-      return fmt::format("{}, {} jobs a hyperperiod, {}; for the stated offsets", states, exploration.jobs,
+      return fmt::format("{}, {} jobs per hyperperiod, {}; for the stated offsets", states, exploration.jobs,
                          exploration.exact ? "exact" : "safe, not exact");
     case Exploration::End::Overrun:
       return fmt::format("{}; {} {} end after its next release", states, task_set.tasks[exploration.late.value].name,
-                         exploration.exact ? "can" : "cannot be shown not to");
+                         exploration.exact ? "can" : "is not shown not to");
     case Exploration::End::GaveUp: return "gave up at " + states;
     case Exploration::End::Stopped: return "stopped at " + states;
   }
@@ -66,13 +66,14 @@ ResponseRange Exploration::of(TaskId task) const {
 std::optional<std::string> why_not_explore(const TaskSet &task_set) {
   if (!task_set.not_analysable.empty()) return task_set.not_analysable;
   if (task_set.has_rate_edges()) return "edges join tasks of different periods or offsets: see the bounds for DAGs";
-  if (task_set.mode != sched::Preemption::None) return "for jobs that run to completion; here they can be preempted";
-  if (task_set.policy == PolicyKind::Fifo) return "fifo: the order of two jobs depends on when they became ready";
-  if (task_set.frozen > 0) return "stalls of the machine: they can come at any time";
+  if (task_set.mode != sched::Preemption::None)
+    return "requires jobs that run to completion, but jobs can be preempted here";
+  if (task_set.policy == PolicyKind::Fifo) return "under fifo, the order of two jobs depends on when they became ready";
+  if (task_set.frozen > 0) return "stalls of the machine can occur at any time";
   const bool has_data =
       std::any_of(task_set.tasks.begin(), task_set.tasks.end(), [](const CompiledTask &task) { return task.data; });
   if (task_set.policy == PolicyKind::Edf && has_data) {
-    return "edf with data tasks: their deadlines depend on when they are released";
+    return "under edf, the deadlines of data tasks depend on when they are released";
   }
   const auto too_late = [](const CompiledTask &task) {
     return task.offset > kLongestExplored || task.jitter > kLongestExplored;
@@ -113,8 +114,8 @@ Method exploration(ExplorationOptions options) {
       .assumptions =
           "any number of workers, jobs run to completion, strictly periodic with the stated offsets; the tasks that "
           "edges join have one rate and one offset; R <= T; jitter, bcet, max_active, groups; static priorities, or "
-          "edf without data tasks; exact on one worker, but for data tasks among equals",
-      .complexity = "up to max_states states, O(n) each",
+          "edf without data tasks; exact on one worker, except for data tasks of equal priority",
+      .complexity = "up to max_states states, O(n) per state",
       .apply = [options = std::move(options)](const TaskSet &task_set) -> Outcome {
         if (auto reason = why_not_explore(task_set)) return NotApplicable{*std::move(reason)};
         return to_bound(task_set, explore(task_set, options));

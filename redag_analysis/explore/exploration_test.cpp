@@ -92,7 +92,8 @@ TEST(Exploration, SaysWhenItEndsEarly) {
   EXPECT_EQ(verdict(task_set, bound), Verdict::NotShown);
   EXPECT_FALSE(bound.tasks[0].response);
   options.max_states = 10;  // fewer than the jobs of a hyperperiod
-  EXPECT_EQ(to_bound(task_set, explore(task_set, options)).figures, "gave up at 0 states: 41 jobs in a hyperperiod");
+  EXPECT_EQ(to_bound(task_set, explore(task_set, options)).figures,
+            "gave up before the first state: a hyperperiod has 41 jobs");
 
   options.max_states = 1'000'000;
   std::uint64_t calls = 0;

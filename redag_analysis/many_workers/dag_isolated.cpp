@@ -51,10 +51,10 @@ Duration graham_response(const Unit &unit, std::uint32_t workers) {
 
 std::optional<std::string> why_not_alone(const TaskSet &task_set) {
   if (auto reason = why_not_directly(task_set)) return reason;
-  if (task_set.units.size() != 1) return "for a DAG that has the platform to itself";
+  if (task_set.units.size() != 1) return "requires a DAG that has the platform to itself";
   if (task_set.mode == sched::Preemption::Cooperative)
-    return "cooperative mode: a suspended job waits beside idle workers";
-  if (!task_set.groups.empty()) return "exclusive groups: a worker can idle while a job waits";
+    return "in cooperative mode, a suspended job can wait while workers are idle";
+  if (!task_set.groups.empty()) return "with exclusive groups, a worker can be idle while a job waits";
   return std::nullopt;
 }
 
@@ -127,7 +127,7 @@ std::uint32_t own_workers(const TaskSet &task_set, std::size_t dag) {
 
 Outcome apply_isolated(const TaskSet &task_set) {
   if (auto reason = why_not_directly(task_set)) return NotApplicable{*reason};
-  if (!task_set.groups.empty()) return NotApplicable{"exclusive groups: a worker can idle while a job waits"};
+  if (!task_set.groups.empty()) return NotApplicable{"with exclusive groups, a worker can be idle while a job waits"};
   std::vector<ResponseBound> responses(task_set.units.size());
   bool any = false;
   for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
@@ -137,7 +137,7 @@ Outcome apply_isolated(const TaskSet &task_set) {
     for (const std::uint32_t u : dag.units) {
       const Unit &unit = task_set.units[u];
       if (workers == 0) {
-        responses[u].absent = "it and what interferes can occupy more than all workers";
+        responses[u].absent = "this DAG and those that interfere with it can occupy more than all workers";
       } else if (dag.max_active > 0 && dag.units.size() > 1) {
         responses[u].absent = "several parts of the DAG share one max_active";
       } else {
@@ -148,7 +148,8 @@ Outcome apply_isolated(const TaskSet &task_set) {
     }
   }
   if (!any)
-    return NotApplicable{"no DAG has workers to itself: bounds of it and of what interferes sum up to more than m"};
+    return NotApplicable{
+        "no DAG has workers to itself: its max_active and those of interfering DAGs sum up to more than m"};
   return from_units(task_set, std::move(responses));
 }
 
@@ -237,7 +238,7 @@ Method isolated() {
           "federated and global scheduling for parallel real-time tasks, ECRTS 2014; RTSS 2022 (see long_paths)",
       .assumptions =
           "the max_active of the DAG and of all that can take a worker from it sum up to at most m; any policy and "
-          "mode; one rate a DAG with edges, R <= T; no shared groups",
+          "mode; one rate per DAG with edges, R <= T; no shared groups",
       .complexity = "O(DAGs tasks + workers (tasks + edges))",
       .apply = apply_isolated,
   };

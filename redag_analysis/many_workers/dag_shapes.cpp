@@ -191,7 +191,7 @@ Method dag_shapes() {
       .assumptions =
           "m workers, full preemption, static priorities that keep DAGs together, some edges, R <= T; release jitter, "
           "shared levels; no max_active, no shared groups",
-      .complexity = "pseudo-polynomial; O(tasks log tasks) a step",
+      .complexity = "pseudo-polynomial; O(tasks log tasks) per step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_shapes); },
   };
 }

@@ -19,7 +19,7 @@ std::string_view agree(std::span<Duration *const> values, std::string_view excee
                        const std::function<bool(std::size_t)> &evaluate) {
   bool changed = true;
   for (int round = 0; changed; ++round) {
-    if (round == kMaxRounds) return "gave up: the responses did not agree in a thousand rounds";
+    if (round == kMaxRounds) return "gave up: the response times did not converge in a thousand rounds";
     changed = false;
     for (std::size_t k = 0; k < values.size(); ++k) {
       const Duration before = *values[k];

@@ -18,12 +18,12 @@ namespace {
 
 std::optional<std::string> why_not_mode(const TaskSet &task_set, const Needs &needs) {
   if (!needs.any_policy && !is_static(task_set.policy)) {
-    return std::string("for static priorities; the policy is ") + to_string(task_set.policy);
+    return std::string("requires static priorities, but the policy is ") + to_string(task_set.policy);
   }
   if (task_set.mode == needs.mode) return std::nullopt;
   return needs.mode == sched::Preemption::Full
-             ? "for full preemption; here jobs keep the worker until they end or reach a preemption point"
-             : "for jobs that run to completion; here they can be preempted";
+             ? "requires full preemption, but jobs keep the worker here until they end or reach a preemption point"
+             : "requires jobs that run to completion, but jobs can be preempted here";
 }
 
 // True if the max_active can bind while R <= T. One that the DAG's tasks reach only if its instances overlap cannot.
@@ -36,11 +36,11 @@ bool can_bind(const TaskSet &task_set, DagId id) {
 std::optional<std::string> why_not_structure(const TaskSet &task_set, const Needs &needs) {
   if (auto reason = why_not_directly(task_set)) return reason;
   if (!needs.edges && task_set.has_edges()) return "tasks have predecessors: see the bounds for DAGs";
-  if (!needs.groups && !task_set.groups.empty()) return "exclusive groups: a worker can idle while a job waits";
+  if (!needs.groups && !task_set.groups.empty()) return "with exclusive groups, a worker can be idle while a job waits";
   for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
     const CompiledDag &dag = task_set.dags[d];
     if (!can_bind(task_set, DagId(d))) continue;
-    if (!needs.bounds) return "DAG '" + dag.name + "' has a max_active: a worker can idle while a job waits";
+    if (!needs.bounds) return "DAG '" + dag.name + "' has a max_active, so a worker can be idle while a job waits";
     if (dag.units.size() > 1) return "DAG '" + dag.name + "': several of its parts share one max_active";
   }
   return std::nullopt;
@@ -67,7 +67,7 @@ std::optional<std::string> why_not_order(const TaskSet &task_set, const std::vec
     }
     if (!equals && are_equals(task_set, units[i], units[i + 1])) {
       return "'" + task_set.dags[upper.dag.value].name + "' and '" + task_set.dags[lower.dag.value].name +
-             "' share a priority level: either can go first";
+             "' share a priority level, so either can run first";
     }
   }
   return std::nullopt;
@@ -145,7 +145,7 @@ Units units_of(const TaskSet &task_set, const Needs &needs) {
     return task_set.units[a.unit].first_rank < task_set.units[b.unit].first_rank;
   });
   if (!needs.any_policy) result.reason = why_not_order(task_set, result.units, needs.equals);
-  if (!result.reason && !fits(result.units, result.workers)) result.reason = "times too long for exact sums";
+  if (!result.reason && !fits(result.units, result.workers)) result.reason = "the times are too long for exact sums";
   return result;
 }
 

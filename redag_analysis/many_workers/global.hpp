@@ -126,11 +126,12 @@ class SharedTerms {
 [[nodiscard]] Duration largest_remaining(const TaskSet &task_set, const std::vector<GlobalUnit> &units,
                                          std::size_t from, std::uint32_t count);
 
-inline constexpr std::string_view kExceedsLimit = "its response exceeds the limit: jobs would be skipped";
-inline constexpr std::string_view kMoreUrgent = "something more urgent has no bound";
-inline constexpr std::string_view kPeer = "something of the same priority has no bound";
+inline constexpr std::string_view kExceedsLimit =
+    "its response time exceeds the limit above which jobs would be skipped";
+inline constexpr std::string_view kMoreUrgent = "a more urgent task or DAG has no bound";
+inline constexpr std::string_view kPeer = "a task or DAG of the same priority has no bound";
 inline constexpr std::string_view kNoFixedPoint =
-    "no fixed point within its limit, above which jobs would be skipped, in the steps allowed";
+    "no fixed point was found within the allowed steps and below the limit above which jobs would be skipped";
 
 /// Limits the evaluations of one fixed point; ordinary task sets need tens.
 inline constexpr int kMaxSteps = 10'000;

@@ -258,7 +258,7 @@ Outcome apply_any(const TaskSet &task_set) {
   if (view.reason) return NotApplicable{*view.reason};
   AgainstAll all(task_set, view.units, view.workers);
   return global::all_that_agree(
-      task_set, view.units, "some DAG's response can exceed its limit, which all others rely on",
+      task_set, view.units, "a DAG's response time can exceed its limit, on which the bounds of all others rely",
       [&](std::size_t k) { return all.respond(k); }, [&](std::size_t k) { return all.explain(k); });
 }
 
@@ -276,8 +276,9 @@ Method melani() {
           "conditional DAG tasks in multiprocessor systems, ECRTS 2015",
       .assumptions =
           "m workers, full preemption, static priorities that keep DAGs together, R <= T; release jitter, shared "
-          "levels; no max_active, no shared groups",
-      .complexity = "pseudo-polynomial; O(DAGs) a step",
+          "levels; "
+          "no max_active, no shared groups",
+      .complexity = "pseudo-polynomial; O(DAGs) per step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_melani); },
   };
 }
@@ -288,9 +289,9 @@ Method dag_bounded() {
       .subject = Subject::Dag,
       .cite = "docs/analysis.md, \"Several workers\"; after A. Melani et al., ECRTS 2015",
       .assumptions =
-          "m workers, full preemption, static priorities that keep DAGs together, one rate a DAG, R <= T; release "
+          "m workers, full preemption, static priorities that keep DAGs together, one rate per DAG, R <= T; release "
           "jitter, shared levels, max_active of DAGs in one part; no shared groups",
-      .complexity = "pseudo-polynomial; O(DAGs) a step",
+      .complexity = "pseudo-polynomial; O(DAGs) per step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_preemptive); },
   };
 }
@@ -304,8 +305,8 @@ Method dag_any() {
           "Cirinei, RTSS 2007",
       .assumptions =
           "m workers, full preemption or none, any work-conserving order (EDF, FIFO, interleaved priorities), one rate "
-          "a DAG, R <= T for all; release jitter, shared levels, max_active of DAGs in one part; no shared groups",
-      .complexity = "pseudo-polynomial; O(DAGs^2) a step, at most 1000 rounds",
+          "per DAG, R <= T for all; release jitter, shared levels, max_active of DAGs in one part; no shared groups",
+      .complexity = "pseudo-polynomial; O(DAGs^2) per step, at most 1000 rounds",
       .apply = apply_any,
   };
 }
@@ -318,9 +319,9 @@ Method dag_nonpreemptive() {
           "docs/analysis.md, \"Several workers\"; after M. Serrano, A. Melani, M. Bertogna, E. Quinones, Response-time "
           "analysis of DAG tasks under fixed priority scheduling with limited preemptions, DATE 2016",
       .assumptions =
-          "m workers, jobs run to completion, static priorities that keep DAGs together, one rate a DAG, R <= T; "
+          "m workers, jobs run to completion, static priorities that keep DAGs together, one rate per DAG, R <= T; "
           "release jitter, equal priorities, max_active of DAGs in one part; no shared groups",
-      .complexity = "pseudo-polynomial; O(DAGs) a step",
+      .complexity = "pseudo-polynomial; O(DAGs) per step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_nonpreemptive); },
   };
 }

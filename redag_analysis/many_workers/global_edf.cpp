@@ -128,9 +128,9 @@ class Edf {
 global::Units edf_units(const TaskSet &task_set, sched::Preemption mode) {
   global::Units view = global::units_of(task_set, {.mode = mode, .edges = false, .any_policy = true});
   if (task_set.policy != PolicyKind::Edf) {
-    view.reason = std::string("for edf; the policy is ") + to_string(task_set.policy);
+    view.reason = std::string("requires edf, but the policy is ") + to_string(task_set.policy);
   } else if (!view.reason && mode == sched::Preemption::None && view.workers > Largest::kMost) {
-    view.reason = "for at most " + std::to_string(Largest::kMost) + " workers where jobs run to completion";
+    view.reason = "supports at most " + std::to_string(Largest::kMost) + " workers where jobs run to completion";
   }
   return view;
 }
@@ -141,7 +141,7 @@ Outcome apply_response(const TaskSet &task_set) {
   if (view.reason) return NotApplicable{*view.reason};
   Edf edf(task_set, view.units);
   return global::all_that_agree(
-      task_set, view.units, "some task's response can exceed its limit, which all others rely on",
+      task_set, view.units, "a task's response time can exceed its limit, on which the bounds of all others rely",
       [&](std::size_t k) { return edf.respond(k); }, [&](std::size_t k) { return edf.explain(k); });
 }
 
@@ -157,9 +157,9 @@ Outcome apply_density(const TaskSet &task_set) {
   Int128 largest = 0;
   for (const GlobalUnit &unit : view.units) {
     const CompiledTask &task = task_set.tasks[task_set.units[unit.unit].tasks.front()];
-    if (task.deadline > unit.limit) return NotApplicable{"task '" + task.name + "': its deadline is above its period"};
+    if (task.deadline > unit.limit) return NotApplicable{"task '" + task.name + "': its deadline exceeds its period"};
     if (task.deadline <= task.jitter) {
-      return NotApplicable{"task '" + task.name + "': its jitter is as large as its deadline"};
+      return NotApplicable{"task '" + task.name + "': its jitter is not below its deadline"};
     }
     const Duration end_to_end = task_set.dags[task.dag.value].deadline;
     if (end_to_end > 0 && end_to_end < task.deadline) {
@@ -208,8 +208,9 @@ Method edf_global_response() {
           "RTSS 2007; without preemption: docs/analysis.md, \"EDF on several workers\"",
       .assumptions =
           "m workers, full preemption or none, edf, no edges, R <= T for all tasks; release jitter; no shared groups, "
-          "no max_active",
-      .complexity = "pseudo-polynomial; O(n^2) a step, at most 1000 rounds",
+          "no "
+          "max_active",
+      .complexity = "pseudo-polynomial; O(n^2) per step, at most 1000 rounds",
       .apply = apply_response,
   };
 }

@@ -21,11 +21,11 @@ using global::SharedTerms;
 using groups::Chain;
 using groups::Question;
 
-constexpr std::string_view kOverlap = "its response can exceed 16 of its periods";
-constexpr std::string_view kMixed = "instances overlap, and where paths of its DAG join data of two of them could meet";
-constexpr std::string_view kSkipped = "a job can wait so long to start that the next release skips it";
+constexpr std::string_view kOverlap = "its response time can exceed 16 of its periods";
+constexpr std::string_view kMixed = "instances overlap, and data of two instances can meet where paths of its DAG join";
+constexpr std::string_view kSkipped = "a job can wait for so long that the next release skips it";
 constexpr std::string_view kBinds =
-    "instances overlap, so that its max_active binds: with groups and an overhead of preemption that is not covered";
+    "instances overlap so that its max_active binds, and it has groups and an overhead of preemption";
 constexpr int kMostRounds = 1000;
 
 // Whether a task may answer after its next release. It may not without preemption, nor where other bounds rely on whole
@@ -287,7 +287,7 @@ Outcome apply(const TaskSet &task_set, Beyond beyond) {
   Analysis analysis(task_set, beyond);
   if (analysis.reason()) return NotApplicable{*analysis.reason()};
   if (analysis.preempts_too_often()) {
-    return NotApplicable{"groups and a max_active that binds, together with an overhead of preemption"};
+    return NotApplicable{"a max_active that binds cannot be combined with groups and an overhead of preemption"};
   }
   return analysis.run();
 }
@@ -295,10 +295,10 @@ Outcome apply(const TaskSet &task_set, Beyond beyond) {
 Outcome apply_units(const TaskSet &task_set) { return apply(task_set, Beyond::Never); }
 
 Outcome apply_groups(const TaskSet &task_set) {
-  if (task_set.groups.empty()) return NotApplicable{"no exclusive group is shared: see the bounds without"};
+  if (task_set.groups.empty()) return NotApplicable{"no exclusive group is shared: see the bounds without groups"};
   // A job that inherits can preempt once more than when it started. On one worker no charge covers this.
   if (task_set.platform.preempt_overhead > 0 && task_set.platform.workers == 1) {
-    return NotApplicable{"groups together with an overhead of preemption, on one worker"};
+    return NotApplicable{"groups cannot be combined with an overhead of preemption on one worker"};
   }
   return is_across_rates(task_set) ? across_rates(task_set, apply_units) : apply(task_set, Beyond::Allowed);
 }
@@ -313,10 +313,10 @@ Method dag_groups() {
           "docs/analysis.md, \"Exclusive groups\"; after L. Sha, R. Rajkumar, J. Lehoczky, IEEE TC 39(9), 1990, and A. "
           "Melani et al., ECRTS 2015",
       .assumptions =
-          "m workers, full preemption (a group's holder inherits) or none, any policy, one rate a DAG; with full "
+          "m workers, full preemption (a group's holder inherits) or none, any policy, one rate per DAG; with full "
           "preemption responses up to 16 T where no job is skipped, else R <= T; release jitter, shared levels, "
           "exclusive groups within and across DAGs; with full preemption max_active of DAGs in one part",
-      .complexity = "pseudo-polynomial; O(tasks^2) a step",
+      .complexity = "pseudo-polynomial; O(tasks^2) per step",
       .apply = apply_groups,
   };
 }

@@ -263,7 +263,7 @@ Outcome apply_any(const TaskSet &task_set) {
   }
   if (!possible) {
     ResponseBound none;
-    none.absent = "some task's response can exceed its limit, which all others rely on";
+    none.absent = "a task's response time can exceed its limit, on which the bounds of all others rely";
     return from_units(task_set, std::vector<ResponseBound>(task_set.units.size(), none));
   }
   std::vector<ResponseBound> responses(task_set.units.size());
@@ -282,7 +282,7 @@ Method bertogna_cirinei() {
       .assumptions =
           "m workers, full preemption, static priorities, no edges, R <= T; release jitter, shared levels; no shared "
           "groups",
-      .complexity = "pseudo-polynomial; O(n) a step",
+      .complexity = "pseudo-polynomial; O(n) per step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_bertogna_cirinei); },
   };
 }
@@ -293,7 +293,7 @@ Method bertogna_cirinei_any() {
   method.assumptions =
       "m workers, full preemption or none, any work-conserving order (EDF, FIFO too), no edges, R <= T for all tasks; "
       "release jitter, shared levels; no shared groups";
-  method.complexity = "pseudo-polynomial; O(n^2) a step, at most 50 rounds";
+  method.complexity = "pseudo-polynomial; O(n^2) per step, at most 50 rounds";
   method.apply = apply_any;
   return method;
 }
@@ -306,7 +306,7 @@ Method guan() {
           "RTSS 2009",
       .assumptions =
           "m workers, full preemption, static priorities, no edges, R <= T; release jitter; no shared groups or levels",
-      .complexity = "pseudo-polynomial; O(n m) a step",
+      .complexity = "pseudo-polynomial; O(n m) per step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_guan); },
   };
 }
@@ -317,8 +317,9 @@ Method sequential_nonpreemptive() {
       .cite = "docs/analysis.md, \"Several workers\"; after N. Guan, W. Yi, Z. Gu, Q. Deng, G. Yu, RTSS 2008",
       .assumptions =
           "m workers, jobs run to completion, static priorities, no edges, R <= T; release jitter, equal priorities; "
-          "no shared groups",
-      .complexity = "pseudo-polynomial; O(n) a step",
+          "no "
+          "shared groups",
+      .complexity = "pseudo-polynomial; O(n) per step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_nonpreemptive); },
   };
 }

@@ -165,11 +165,11 @@ std::string plural(std::uint64_t count, const char *noun) {
 }
 
 std::string on_execution(const ExecutionCheck &execution, Duration wcet) {
-  const std::string above = fmt::format("{} of {} above its wcet of {}", format_count(execution.above),
+  const std::string above = fmt::format("{} of {} exceeded its wcet of {}", format_count(execution.above),
                                         plural(execution.jobs, "execution"), humanize_duration(wcet));
   return execution.is_exceeded
              ? fmt::format("wcet exceeded: {} of processor time, {}", humanize_duration(execution.longest), above)
-             : fmt::format("{}, up to {} of processor time: no more than stalls of the machine explain", above,
+             : fmt::format("{}, with up to {} of processor time; stalls of the machine can explain this", above,
                            humanize_duration(execution.longest));
 }
 
@@ -183,17 +183,17 @@ std::string why(const ResponseCheck &response, const AssumptionCheck &check, con
     case Broken::Wcet:
       return fmt::format("wcet exceeded: {} used {} of processor time", trace::task_name(workload, response.task),
                          amount);
-    case Broken::Release: return fmt::format("release late: by {} ({})", amount, charged(check.allowed.lateness));
+    case Broken::Release: return fmt::format("late release: by {} ({})", amount, charged(check.allowed.lateness));
     case Broken::Platform:
-      return fmt::format("platform: jobs that held their workers got no processor for {} ({})", amount,
+      return fmt::format("platform: jobs that held their workers received no processor for {} ({})", amount,
                          charged(check.allowed.stall.longest));
     case Broken::Nothing: break;
   }
-  return "no assumption of the bound was seen broken";
+  return "no assumption of the bound was seen to fail";
 }
 
 std::string on_response(const ResponseCheck &response, const AssumptionCheck &check, const Workload &workload) {
-  return fmt::format("{} above the bound of {}, the longest {}; {}", plural(response.exceeded, "response"),
+  return fmt::format("{} exceeded the bound of {}, the longest is {}; {}", plural(response.exceeded, "response"),
                      humanize_duration(response.bound), humanize_duration(response.worst),
                      why(response, check, workload));
 }
@@ -286,7 +286,8 @@ std::vector<Remark> remarks(const AssumptionCheck &check, const Workload &worklo
 }
 
 const char *not_calibrated_hint() {
-  return "platform overheads not charged; run 'redag calibrate' and use its file with --overheads";
+  return "overheads of the platform are not charged; measure them with 'redag calibrate' and charge them with "
+         "--overheads";
 }
 
 }  // namespace redag::metrics

@@ -36,7 +36,7 @@ void DispatchRules::before(const JobEvent &event) {
 
 void DispatchRules::dispatched(const JobEvent &event, const LiveJob &job) {
   context_.expect(Rule::Deadline, event.value == job.deadline, event.task, event.job, [&] {
-    return "its deadline is " + format_duration(event.value) + ", expected r + D = " + format_duration(job.deadline);
+    return "its deadline is " + format_duration(event.value) + ", but r + D is " + format_duration(job.deadline);
   });
   check_bounds(event);
   check_place(event, job);
@@ -52,8 +52,8 @@ void DispatchRules::check_bounds(const JobEvent &event) {
   context_.expect(Rule::TaskOverlap, replay.task_active(event.task) < concurrency, event.task, event.job, [&] {
     return concurrency == 1 ? "another job of its task has started and not ended"
                             : std::to_string(replay.task_active(event.task)) +
-                                  " jobs of its task have started and not ended, at most " +
-                                  std::to_string(concurrency) + " allowed";
+                                  " jobs of its task have started and not ended; at most " +
+                                  std::to_string(concurrency) + " are allowed";
   });
   const auto jobs = replay.jobs_of(event.task);
   const auto first = std::find_if(jobs.begin(), jobs.end(), [](const LiveJob &j) { return j.state == State::Ready; });
@@ -61,8 +61,8 @@ void DispatchRules::check_bounds(const JobEvent &event) {
                   [&] { return "job " + std::to_string(first->number) + " of its task was released earlier"; });
   if (dag.max_active > 0) {
     context_.expect(Rule::MaxActive, replay.active(dag_id) < dag.max_active, event.task, event.job, [&] {
-      return "DAG " + dag.name + " has " + std::to_string(replay.active(dag_id)) + " jobs started, at most " +
-             std::to_string(dag.max_active) + " allowed";
+      return "DAG " + dag.name + " has " + std::to_string(replay.active(dag_id)) + " jobs started; at most " +
+             std::to_string(dag.max_active) + " are allowed";
     });
   }
   if (context_.info.config.max_started > 0) {
@@ -88,7 +88,7 @@ void DispatchRules::check_place(const JobEvent &event, const LiveJob &job) {
   context_.expect(Rule::Preemption, replay.preempts(job.own, urgency_of(*below, job.own)), event.task, event.job,
                   [&] { return "it runs on top of " + name(stack.back()) + ", which it does not outrank"; });
   context_.expect(Rule::Priority, replay.free_workers() == 0, event.task, event.job,
-                  [&] { return "it runs on top of " + name(stack.back()) + " although a worker is free"; });
+                  [&] { return "it runs on top of " + name(stack.back()) + ", although a worker is free"; });
 }
 
 // Full: the job that gets the worker of a preempted job must outrank that job. The check happens here and not when time
@@ -146,27 +146,27 @@ void DispatchRules::deferred(const JobEvent &event) {
   const Dag &dag = context_.info.workload.dags[dag_id.value];
   const bool at_bound = dag.max_active > 0 && replay.active(dag_id) >= dag.max_active;
   context_.expect(Rule::Deferral, at_bound, event.task, event.job,
-                  [&] { return "deferred although DAG " + dag.name + " is below max_active"; });
+                  [&] { return "it was deferred although DAG " + dag.name + " is below max_active"; });
   context_.expect(Rule::Deferral, replay.task_active(event.task) < replay.task(event.task).concurrency, event.task,
-                  event.job, [] { return std::string("deferred although its own task keeps it from running"); });
+                  event.job, [] { return std::string("it was deferred although its own task keeps it from running"); });
 }
 
 void DispatchRules::preempted(const JobEvent &event, const LiveJob &job) {
   context_.expect(Rule::Preemption, mode() != Preemption::None, event.task, event.job,
-                  [] { return std::string("preempted on a platform without preemption"); });
+                  [] { return std::string("it was preempted on a platform without preemption"); });
   if (mode() == Preemption::Full) evictions_.push_back(Eviction{Replay::JobRef{event.task, event.job}, job.worker});
   if (mode() != Preemption::Cooperative || !exact()) return;
   const Duration region = context_.replay.task(event.task).region;
   const Duration executed = job.executed + (event.time - job.on_worker_since);
   context_.expect(Rule::Preemption, region > 0 && executed % region == 0, event.task, event.job, [&] {
-    return "preempted after " + format_duration(executed) + " of execution, not at a preemption point (region " +
-           format_duration(region) + ")";
+    return "it was preempted after " + format_duration(executed) +
+           " of execution, which is not a preemption point (region " + format_duration(region) + ")";
   });
 }
 
 void DispatchRules::resumed(const JobEvent &event, const LiveJob &job) {
   context_.expect(Rule::Preemption, mode() != Preemption::None, event.task, event.job,
-                  [] { return std::string("resumed on a platform without preemption"); });
+                  [] { return std::string("it was resumed on a platform without preemption"); });
   if (job.state != State::Suspended) return;
   check_eviction(event, job);
   check_choice(job, job.raised);
@@ -177,8 +177,9 @@ void DispatchRules::ended(const JobEvent &event, const LiveJob &job) {
   const bool may_end_suspended = context_.info.driver != trace::Driver::Simulator && mode() == Preemption::Full;
   context_.expect(Rule::Life, job.state != State::Suspended || may_end_suspended, event.task, event.job,
                   [] { return std::string("it ended while it was preempted"); });
-  context_.expect(Rule::Life, event.value >= job.release && event.value <= event.time, event.task, event.job,
-                  [&] { return "it ended at " + format_duration(event.value) + ", which cannot be"; });
+  context_.expect(Rule::Life, event.value >= job.release && event.value <= event.time, event.task, event.job, [&] {
+    return "it ended at " + format_duration(event.value) + ", before the least time that it needs";
+  });
   check_order_of_ends(event);
   if (context_.info.driver != trace::Driver::Simulator || job.state != State::Running) return;
   const Task &task = context_.replay.task(event.task);
@@ -187,11 +188,11 @@ void DispatchRules::ended(const JobEvent &event, const LiveJob &job) {
   if (event.kind == JobEventKind::Aborted && !cut_off) return;
   context_.expect(Rule::Execution,
                   !cut_off || (task.on_budget == OnBudget::Abort && task.budget > 0 && demand > task.budget),
-                  event.task, event.job, [&] { return "cut off although it needs " + format_duration(demand); });
+                  event.task, event.job, [&] { return "it was cut off although it needs " + format_duration(demand); });
   const Duration expected = cut_off ? task.budget : demand;
   const Duration executed = job.executed + (event.value - job.on_worker_since);
   context_.expect(Rule::Execution, exact() ? executed == expected : executed >= expected, event.task, event.job, [&] {
-    return "it executed for " + format_duration(executed) + ", expected " + format_duration(expected);
+    return "it executed for " + format_duration(executed) + "; expected " + format_duration(expected);
   });
 }
 
@@ -202,7 +203,7 @@ void DispatchRules::check_order_of_ends(const JobEvent &event) {
   if (last_ended_ && last_ended_->time == ended.time) {
     const auto order = [](const Ended &one) { return std::pair(one.place, one.job.number); };
     context_.expect(Rule::Precedence, order(*last_ended_) < order(ended), event.task, event.job, [&] {
-      return "it ended at the instant at which " + name(last_ended_->job) + " did, and after it";
+      return "it ended at the same instant as " + name(last_ended_->job) + ", but was reported after it";
     });
   }
   last_ended_ = ended;
@@ -218,7 +219,7 @@ void DispatchRules::end_of_instant() {
   complaints_.clear();
   for (const Eviction &eviction : evictions_) {
     context_.expect(Rule::Preemption, false, eviction.job.task, eviction.job.number,
-                    [] { return std::string("no job took its worker, and it was preempted all the same"); });
+                    [] { return std::string("it was preempted, but no job took its worker"); });
   }
   evictions_.clear();
   check_free_workers();
@@ -262,7 +263,8 @@ void DispatchRules::check_free_workers() {
   const auto &owed = replay.owed_deferral();
   const TaskId undeferred = owed.empty() ? TaskId() : *owed.begin();
   context_.expect(Rule::Deferral, owed.empty() || context_.info.stepped, undeferred, 0, [] {
-    return std::string("its first ready job is kept from a free worker by max_active alone and was not deferred");
+    return std::string(
+        "it was not deferred, although it is the first ready job and only max_active keeps it from a free worker");
   });
 }
 

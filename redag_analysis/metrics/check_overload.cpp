@@ -31,10 +31,10 @@ void OverloadRules::before(const JobEvent &event) {
 void OverloadRules::exceeded(const JobEvent &event, const LiveJob &job) {
   const Task &task = context_.replay.task(event.task);
   context_.expect(Rule::Budget, task.budget > 0, event.task, event.job,
-                  [] { return std::string("it used its budget, and its task has none"); });
+                  [] { return std::string("it was reported to use up its budget, but its task has none"); });
   if (context_.info.driver != trace::Driver::Simulator) return;
   context_.expect(Rule::Budget, task.on_budget != OnBudget::Abort, event.task, event.job,
-                  [] { return std::string("it went on after its budget, at which it had to be cut off"); });
+                  [] { return std::string("it continued after its budget, at which it had to be cut off"); });
   check_used(event, job, task.budget, "budget");
 }
 
@@ -42,7 +42,7 @@ void OverloadRules::high_mode(const JobEvent &event, const LiveJob *job) {
   const Task &task = context_.replay.task(event.task);
   const bool can_begin = job != nullptr && job->started() && task.wcet_low > 0;
   context_.expect(Rule::Budget, can_begin && !context_.replay.is_degradable(event.task), event.task, event.job,
-                  [] { return std::string("it began HI mode, and is no started job with a wcet_low"); });
+                  [] { return std::string("it began HI mode, but is not a started job with a wcet_low"); });
   if (can_begin && context_.info.driver == trace::Driver::Simulator) {
     check_used(event, *job, task.wcet_low, "wcet_low");
   }
@@ -51,7 +51,8 @@ void OverloadRules::high_mode(const JobEvent &event, const LiveJob *job) {
 void OverloadRules::check_used(const JobEvent &event, const LiveJob &job, Duration limit, const char *what) {
   const Duration used = executed_until(job, event.time);
   context_.expect(Rule::Budget, exact() ? used == limit : used >= limit, event.task, event.job, [&] {
-    return std::string("it used its ") + what + " of " + format_duration(limit) + " after " + format_duration(used);
+    return std::string("it was reported to use its ") + what + " of " + format_duration(limit) + " after " +
+           format_duration(used);
   });
 }
 
@@ -70,7 +71,7 @@ void OverloadRules::ended(const JobEvent &event, const LiveJob &job) {
   if (task.budget > 0 && task.on_budget != OnBudget::Abort) {
     context_.expect(Rule::Budget, job.exceeded == (used > task.budget), event.task, event.job, [&] {
       return "it ended after " + format_duration(used) + " with a budget of " + format_duration(task.budget) +
-             (job.exceeded ? ", and was told to have used it" : ", and was not told to have used it");
+             (job.exceeded ? ", but was reported to exceed it" : ", but was not reported to exceed it");
     });
   }
   if (task.wcet_low > 0 && used > task.wcet_low) {
@@ -82,7 +83,7 @@ void OverloadRules::ended(const JobEvent &event, const LiveJob &job) {
 void OverloadRules::end_of_instant() {
   if (!context_.replay.high_mode()) return;
   context_.expect(Rule::Budget, !is_idle(), TaskId(0), 0,
-                  [] { return std::string("HI mode goes on although nothing is ready or started"); });
+                  [] { return std::string("HI mode continues although no job is ready or started"); });
 }
 
 // While nothing has started, every ready job is eligible.

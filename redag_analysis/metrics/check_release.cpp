@@ -19,7 +19,7 @@ bool is_aligned(const Task &from, const Task &to) {
 }
 
 std::string expected_and_got(const char *what, std::int64_t expected, std::int64_t got) {
-  return std::string(what) + " is " + format_duration(got) + ", expected " + format_duration(expected);
+  return std::string(what) + " is " + format_duration(got) + "; expected " + format_duration(expected);
 }
 
 }  // namespace
@@ -91,8 +91,8 @@ void ReleaseRules::check_grid(const JobEvent &event) {
   const bool exact = context_.info.driver == trace::Driver::Simulator;
   const bool in_time = event.time >= event.value && (!exact || event.time <= event.value + task.jitter);
   context_.expect(Rule::Grid, in_time, event.task, event.job, [&] {
-    return "it was released at " + format_duration(event.time) + " for " + format_duration(event.value) +
-           ", outside its jitter of " + format_duration(task.jitter);
+    return "it was released at " + format_duration(event.time) + " for the grid point " + format_duration(event.value) +
+           ", which is outside its jitter of " + format_duration(task.jitter);
   });
 }
 
@@ -100,7 +100,7 @@ void ReleaseRules::check_data_release(const JobEvent &event) {
   TaskState &task = tasks_[event.task.value];
   const TaskId absent = missing(task, event.value);
   context_.expect(Rule::Precedence, !absent.valid(), event.task, event.job, [&] {
-    return "released although " + trace::task_name(context_.info.workload, absent) +
+    return "it was released although " + trace::task_name(context_.info.workload, absent) +
            " has not completed since the task's last release";
   });
   Time finish = 0;
@@ -231,7 +231,8 @@ void ReleaseRules::ready(const JobEvent &event, const LiveJob &job) {
   } else if (!task.in.empty()) {
     const TaskId absent = missing(task, job.release);
     context_.expect(Rule::Precedence, !absent.valid(), event.task, event.job, [&] {
-      return "ready although " + trace::task_name(context_.info.workload, absent) + " has no fresh data for it";
+      return "it became ready although " + trace::task_name(context_.info.workload, absent) +
+             " has no fresh data for it";
     });
     origin = consume(task);
   }
@@ -269,11 +270,11 @@ void ReleaseRules::skipped(const JobEvent &event, const LiveJob *job) {
     return skip.task == event.task && skip.number == event.job;
   });
   context_.expect(Rule::Admission, expected != expected_skips_.end(), event.task, event.job,
-                  [&] { return std::string("skipped (") + to_string(event.reason) + ") without a cause"; });
+                  [&] { return std::string("it was skipped (") + to_string(event.reason) + ") without a cause"; });
   if (expected == expected_skips_.end()) return;
   const Reason reason = expected->reason;
   context_.expect(Rule::Admission, event.reason == reason, event.task, event.job, [&] {
-    return std::string("skipped as ") + to_string(event.reason) + ", but the reason is " + to_string(reason);
+    return std::string("it was skipped as ") + to_string(event.reason) + ", but the reason is " + to_string(reason);
   });
   expected_skips_.erase(expected);
 }
@@ -295,7 +296,7 @@ void ReleaseRules::finished(const JobEvent &event, const LiveJob &job) {
 void ReleaseRules::end_of_instant() {
   for (const ExpectedSkip &skip : expected_skips_) {
     context_.expect(Rule::Admission, false, skip.task, skip.number,
-                    [&] { return std::string("it had to be skipped (") + to_string(skip.reason) + ")"; });
+                    [&] { return std::string("it was not skipped (") + to_string(skip.reason) + ")"; });
   }
   expected_skips_.clear();
   for (const TaskId id : touched_) {
@@ -311,14 +312,14 @@ void ReleaseRules::check_nothing_is_owed(TaskId id) {
   if (!task.timer) {
     const bool owed = !missing(task, 0).valid();
     context_.expect(Rule::Precedence, !owed, id, task.next_number,
-                    [] { return std::string("not released although every predecessor has completed"); });
+                    [] { return std::string("it was not released although every predecessor has completed"); });
     if (owed) consume(task);
   }
   for (const LiveJob &job : context_.replay.jobs_of(id)) {
     if (job.state != LiveJob::State::Waiting) continue;
     const bool owed = !task.timer || !missing(task, job.release).valid();
     context_.expect(Rule::Precedence, !owed, id, job.number,
-                    [] { return std::string("not ready although every predecessor has fresh data"); });
+                    [] { return std::string("it did not become ready although every predecessor has fresh data"); });
   }
 }
 
@@ -331,7 +332,7 @@ void ReleaseRules::end_of_trace() {
     const std::uint32_t next = tasks_[t].next_number;
     const Int128 due = Int128{context_.info.start} + task.offset + Int128{next} * task.period;
     context_.expect(Rule::Grid, due + task.jitter >= context_.info.end, id, next,
-                    [&] { return "it was never released; due at " + format_duration(static_cast<Time>(due)); });
+                    [&] { return "it was never released, but was due at " + format_duration(static_cast<Time>(due)); });
   }
 }
 

@@ -59,7 +59,7 @@ void StartRules::settle(const Replay::JobRef &job, Time begun) {
 
 void StartRules::judge(const Unbegun &job, Time begun) {
   context_.expect(Rule::Start, job.overtaken == kNever || begun <= job.overtaken, job.job.task, job.job.number, [&] {
-    return "it was dispatched at " + format_duration(job.dispatched) + ", and no thread had begun it when " +
+    return "it was dispatched at " + format_duration(job.dispatched) + ", but no thread had begun it when " +
            context_.job_name(job.by.task, job.by.number) + ", which is less urgent, ran at " +
            format_duration(job.overtaken);
   });

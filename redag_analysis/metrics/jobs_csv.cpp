@@ -153,7 +153,7 @@ Result<std::vector<JobRecord>> parse_jobs_csv(std::string_view text, const std::
     for (const Task &task : dag.tasks) ids.emplace(std::pair(dag.name, task.name), TaskId(next_id++));
   }
   if (text.substr(0, text.find('\n')) != kHeader) {
-    return file_error(file, 1, "not a jobs.csv: the first line must be its header", std::string(kHeader));
+    return file_error(file, 1, "this is not a jobs.csv: the first line must be its header", std::string(kHeader));
   }
   text.remove_prefix(std::min(text.size(), kHeader.size() + 1));
 
@@ -164,15 +164,16 @@ Result<std::vector<JobRecord>> parse_jobs_csv(std::string_view text, const std::
     const int line = next_line;
     if (!take_record(text, fields, next_line)) return file_error(file, line, "a quote is not closed");
     if (fields.size() != kColumns) {
-      return file_error(
-          file, line, "a row has " + std::to_string(kColumns) + " columns, this one " + std::to_string(fields.size()));
+      return file_error(file, line,
+                        "each row must have " + std::to_string(kColumns) + " columns, but this one has " +
+                            std::to_string(fields.size()));
     }
     JobRecord job;
     const auto id = ids.find(std::pair(fields[1], fields[2]));
-    if (id == ids.end()) return file_error(file, line, "the workload has no task " + fields[1] + "." + fields[2]);
+    if (id == ids.end()) return file_error(file, line, "there is no task " + fields[1] + "." + fields[2]);
     job.task = id->second;
     if (const char *column = read_row(fields, job)) {
-      return file_error(file, line, std::string("cannot read column ") + column);
+      return file_error(file, line, std::string("cannot parse column ") + column);
     }
     jobs.push_back(job);
   }

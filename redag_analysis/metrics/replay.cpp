@@ -73,7 +73,7 @@ const char *Replay::apply(const JobEvent &event) {
     return nullptr;
   }
   LiveJob *job = find_mutable(event.task, event.job);
-  return job == nullptr ? "no such job is released and not ended" : apply_to(*job, event);
+  return job == nullptr ? "there is no job of this number that is released and not ended" : apply_to(*job, event);
 }
 
 const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
@@ -113,10 +113,10 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
       if (!job.started()) return "its body ended, and it was not dispatched";
       if (job.executed_seen) return "its body ended twice";
       job.executed_seen = true;
-      return event.value >= 0 ? nullptr : "it used less than no processor time";
+      return event.value >= 0 ? nullptr : "it used a negative amount of processor time";
     case JobEventKind::Exceeded:
-      if (!job.started()) return "only a job that has started can use its budget";
-      if (job.exceeded) return "it used its budget before";
+      if (!job.started()) return "a job that has not started cannot use up its budget";
+      if (job.exceeded) return "it used up its budget before";
       job.exceeded = true;
       if (task(job.task).on_budget == OnBudget::Demote) demote(job);
       return nullptr;
@@ -154,7 +154,7 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
       erase(event.task, event.job);
       return problem;
   }
-  return "unknown kind of event";
+  return "the kind of the event is unknown";
 }
 
 // A job that replaces one that has not started also takes its turn.
@@ -167,7 +167,7 @@ void Replay::hand_turn_on(const LiveJob &skipped, Reason reason) {
 // Demotes started jobs of lower criticality; the others are to be skipped.
 const char *Replay::change_mode(const JobEvent &event) {
   const bool begins = event.kind == JobEventKind::HighMode;
-  if (begins == high_mode()) return begins ? "it was HI mode before" : "it was LO mode before";
+  if (begins == high_mode()) return begins ? "HI mode has begun before" : "HI mode has ended before";
   high_since_ = begins ? event.time : kNever;
   if (!begins) return nullptr;
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
@@ -212,7 +212,7 @@ const char *Replay::take_worker(LiveJob &job, const JobEvent &event) {
 
   const char *problem = nullptr;
   if (job.state == State::Suspended && config_.preemption == sched::Preemption::Cooperative) {
-    problem = "a suspended job goes on only where it was suspended, when what ran on top of it has ended";
+    problem = "a suspended job can resume only on its worker, after the job on top of it has ended";
     leave_worker(job);
   }
   if (running(event.worker) != nullptr) problem = "the worker runs another job";

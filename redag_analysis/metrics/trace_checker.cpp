@@ -54,7 +54,7 @@ class Checker {
       if (event.time > time_) end_of_instant();
       context_.at(index, event.time);
       context_.expect(Rule::Stream, event.time >= time_, event.task, event.job,
-                      [&] { return "time goes back from " + format_duration(time_); });
+                      [&] { return "the time goes backwards from " + format_duration(time_); });
       time_ = std::max(time_, event.time);
     } else {
       context_.at(index, event.time);

@@ -47,7 +47,7 @@ TEST(CheckTrace, NamesTheJobTheTimeAndTheRule) {
   trace.events[5].value -= kMillisecond;  // finish of hi#0, as measured
   const CheckReport report = check_trace(trace);
   ASSERT_FALSE(report.ok());
-  EXPECT_EQ(report.violations.front().to_string(), "1ms a.hi#0: execution: it executed for 0s, expected 1ms (event 5)");
+  EXPECT_EQ(report.violations.front().to_string(), "1ms a.hi#0: execution: it executed for 0s; expected 1ms (event 5)");
 }
 
 TEST(CheckTrace, StreamTimesNeverDecrease) {

@@ -41,7 +41,7 @@ std::string by_dag(std::span<const DagSummary> dags) {
     where.push_back(fmt::format("{} other DAG{}", format_count(more), more == 1 ? "" : "s"));
   }
   if (clean == 0) return join(where);
-  return join(where) + (clean == 1 ? ", the other one none" : fmt::format(", the other {} none", clean));
+  return join(where) + (clean == 1 ? ", none in the other one" : fmt::format(", none in the other {}", clean));
 }
 
 // An example: " End to end, control was late 5 times of 1 000 (2ms)."
@@ -50,7 +50,7 @@ std::string late_end_to_end(std::span<const DagSummary> dags) {
   for (const DagSummary &dag : dags) {
     const EndToEnd &end_to_end = dag.end_to_end;
     if (end_to_end.late == 0) continue;
-    parts.push_back(fmt::format("{} came later than its {} {} of {} times", dag.name,
+    parts.push_back(fmt::format("{} exceeded its deadline of {} {} of {} times", dag.name,
                                 humanize_duration(end_to_end.deadline), format_count(end_to_end.late),
                                 format_count(std::max(end_to_end.late, end_to_end.response.count))));
   }
@@ -74,7 +74,7 @@ bool has_misses(const JobCounts &total, std::span<const DagSummary> dags) {
 }
 
 DeadlineVerdict deadline_verdict(const JobCounts &total, std::span<const DagSummary> dags) {
-  if (total.released == 0) return {false, false, "No job was released: there is nothing to judge."};
+  if (total.released == 0) return {false, false, "No job was released: there is no verdict."};
   const std::uint64_t missed = total.missed();
   if (missed > 0) {
     const double share = static_cast<double>(missed) / static_cast<double>(total.released);

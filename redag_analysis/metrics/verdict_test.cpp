@@ -35,8 +35,8 @@ TEST(DeadlineVerdict, OneMissOfManyIsAMiss) {
   EXPECT_FALSE(one.is_met);
   EXPECT_TRUE(has_misses(total_of(dags), dags));
   EXPECT_EQ(one.text,
-            "1 of 23 326 jobs missed their deadline (0.0043 %): 1 late. By DAG: control 0.005 % (1 of 20 000), the "
-            "other one none.");
+            "1 of 23 326 jobs missed their deadline (0.0043 %): 1 late. By DAG: control 0.005 % (1 of 20 000), none in "
+            "the other one.");
 }
 
 TEST(DeadlineVerdict, EveryDeadlineWasMet) {
@@ -52,9 +52,10 @@ TEST(DeadlineVerdict, ADagThatIsLateEndToEndDidNotMeetEveryDeadline) {
   dags[0].end_to_end.late = 3;
   EXPECT_FALSE(verdict(dags).is_met);
   EXPECT_TRUE(has_misses(total_of(dags), dags));
-  EXPECT_EQ(verdict(dags).text,
-            "Every job met its own deadline: 1 000 jobs, none late, none lost. End to end, control came later than its "
-            "2ms 3 of 1 000 times.");
+  EXPECT_EQ(
+      verdict(dags).text,
+      "Every job met its own deadline: 1 000 jobs, none late, none lost. End to end, control exceeded its deadline "
+      "of 2ms 3 of 1 000 times.");
 }
 
 TEST(DeadlineVerdict, LostJobsAreMissesAndThoseWithoutDataAreNot) {

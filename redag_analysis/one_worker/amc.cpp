@@ -17,7 +17,7 @@ using one_worker::Interferer;
 using one_worker::Own;
 using one_worker::View;
 
-constexpr std::string_view kOnlyInLowMode = "HI mode degrades it: bounded in LO mode only";
+constexpr std::string_view kOnlyInLowMode = "HI mode degrades this DAG: it is bounded in LO mode only";
 
 // True if HI mode can end between the releases of one instance whose first jobs were skipped. The jobs that wait for
 // those are then late, or skipped, in LO mode.
@@ -28,18 +28,21 @@ bool can_be_torn(const TaskSet &task_set) {
 }
 
 std::optional<std::string> why_not(const TaskSet &task_set) {
-  if (!task_set.has_modes) return "no task has a wcet_low below its wcet: there is no HI mode";
+  if (!task_set.has_modes) return "no task has a wcet_low below its wcet, so there is no HI mode";
   if (auto reason = one_worker::why_not(task_set)) return reason;
   if (task_set.mode != sched::Preemption::Full) {
-    return "for full preemption; here jobs of lower criticality keep the worker in HI mode";
+    return "requires full preemption, because jobs of lower criticality keep the worker in HI mode otherwise";
   }
-  if (task_set.has_rate_edges()) return "edges between rates";
+  if (task_set.has_rate_edges()) return "edges join tasks of different rates";
   if (can_be_torn(task_set))
-    return "jitter in a DAG of lower criticality: HI mode can end between the releases of one instance";
-  if (task_set.threads_suffice_if_bounded) return "fewer threads than tasks: a demoted job may hold the last one";
-  if (!task_set.groups.empty()) return "groups: a job of lower criticality that holds one runs on in HI mode";
-  if (task_set.frozen > 0) return "stalls of the machine: they can begin or prolong HI mode";
-  if (task_set.platform.preempt_overhead > 0) return "an overhead of preemption: the change of mode preempts, too";
+    return "a DAG of lower criticality has jitter, so HI mode can end between the releases of one instance";
+  if (task_set.threads_suffice_if_bounded)
+    return "there are fewer threads than tasks: a demoted job may hold the last one";
+  if (!task_set.groups.empty())
+    return "with groups, a job of lower criticality that holds one continues to run in HI mode";
+  if (task_set.frozen > 0) return "stalls of the machine can begin or prolong HI mode";
+  if (task_set.platform.preempt_overhead > 0)
+    return "an overhead of preemption is not supported, because the change of mode also preempts";
   return std::nullopt;
 }
 
@@ -145,9 +148,9 @@ Outcome apply(const TaskSet &task_set) {
   }
   Bound bound = from_units(task_set, std::move(units));
   for (const CompiledTask &task : task_set.tasks) bound.modes.push_back(modes[task.unit]);
-  bound.figures = std::string("in LO mode ") +
-                  (low_is_met ? "every deadline is met" : "not every deadline is shown met") +
-                  "; those of high criticality are " + (high_is_met ? "" : "not all shown ") + "met in every mode";
+  bound.figures =
+      std::string("in LO mode, ") + (low_is_met ? "every deadline is met" : "not every deadline is shown to be met") +
+      "; deadlines of high criticality are " + (high_is_met ? "" : "not all shown to be ") + "met in every mode";
   return bound;
 }
 
@@ -161,9 +164,9 @@ Method amc_rtb() {
           "S. Baruah, A. Burns, R. Davis, Response-time analysis for mixed criticality systems, RTSS 2011 (AMC-rtb)",
       .assumptions =
           "one worker, full preemption, static priorities, some wcet_low below its wcet, no groups, R <= T; any "
-          "degrade; DAGs of one rate as in dag_one_worker_preemptive, without jitter if of lower criticality; shared "
-          "levels",
-      .complexity = "pseudo-polynomial; O(n) a step",
+          "degrade; "
+          "DAGs of one rate as in dag_one_worker_preemptive, without jitter if of lower criticality; shared levels",
+      .complexity = "pseudo-polynomial; O(n) per step",
       .knows_modes = true,
       .apply = apply,
   };

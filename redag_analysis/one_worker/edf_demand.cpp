@@ -25,19 +25,20 @@ struct Demand {
 
 std::optional<std::string> why_not(const TaskSet &task_set) {
   if (task_set.platform.workers != 1)
-    return "for one worker; the platform has " + std::to_string(task_set.platform.workers);
-  if (task_set.policy != PolicyKind::Edf) return std::string("for edf; the policy is ") + to_string(task_set.policy);
+    return "requires one worker, but the platform has " + std::to_string(task_set.platform.workers);
+  if (task_set.policy != PolicyKind::Edf)
+    return std::string("requires edf, but the policy is ") + to_string(task_set.policy);
   if (task_set.has_edges()) return "tasks have predecessors";
   if (auto reason = why_not_directly(task_set)) return reason;
   if (task_set.mode != sched::Preemption::None) {
-    if (!task_set.groups.empty()) return "groups together with preemption";
+    if (!task_set.groups.empty()) return "groups cannot be combined with preemption";
     for (const CompiledDag &dag : task_set.dags) {
       if (dag.max_active > 0 && dag.tasks.size() > 1) return "DAG '" + dag.name + "' has a max_active";
     }
   }
   for (const CompiledTask &task : task_set.tasks) {
     if (task.deadline > task.limit) return "task '" + task.name + "': jobs can be skipped before their deadline";
-    if (task.deadline <= task.jitter) return "task '" + task.name + "': its jitter is as large as its deadline";
+    if (task.deadline <= task.jitter) return "task '" + task.name + "': its jitter is not below its deadline";
     const Duration end_to_end = task_set.dags[task.dag.value].deadline;
     if (end_to_end > 0 && end_to_end < task.deadline) {
       return "DAG '" + task_set.dags[task.dag.value].name + "': its deadline is below those of its tasks";
@@ -101,7 +102,7 @@ Bound refuse(Duration t, Duration demand) {
 Bound refuse_overload() {
   Bound bound;
   bound.accepts = false;
-  bound.figures = "no end of the busy period was found: the utilization is about one or above";
+  bound.figures = "the busy period has no bound, because the utilization is about one or more";
   return bound;
 }
 
@@ -115,13 +116,13 @@ Bound accept() {
 // QPA: steps backwards from the end of the busy period, each time as far as the demand itself reaches.
 Outcome apply_preemptive(const TaskSet &task_set) {
   if (auto reason = why_not(task_set)) return NotApplicable{*reason};
-  if (task_set.mode != sched::Preemption::Full) return NotApplicable{"for full preemption"};
+  if (task_set.mode != sched::Preemption::Full) return NotApplicable{"requires full preemption"};
   const std::vector<Demand> demands = demands_of(task_set);
   const auto length = busy_period(demands, 0);
   if (!length) return refuse_overload();
   Duration t = deadline_below(demands, add(*length, 1));
   for (int step = 0; t > 0; ++step) {
-    if (step == kMaxSteps) return NotApplicable{"gave up: too many intervals to examine"};
+    if (step == kMaxSteps) return NotApplicable{"gave up: too many intervals must be examined"};
     const Duration demand = demand_until(demands, t);
     if (demand > t) return refuse(t, demand);
     // Between the demand and t no deadline can be missed; at equality the next deadline decides.
@@ -132,7 +133,7 @@ Outcome apply_preemptive(const TaskSet &task_set) {
 
 Outcome apply_nonpreemptive(const TaskSet &task_set) {
   if (auto reason = why_not(task_set)) return NotApplicable{*reason};
-  if (task_set.mode == sched::Preemption::Full) return NotApplicable{"for jobs that keep the worker"};
+  if (task_set.mode == sched::Preemption::Full) return NotApplicable{"requires jobs that keep the worker"};
   const std::vector<Demand> demands = demands_of(task_set);
   Duration longest = 0;
   for (const Demand &task : demands) longest = std::max(longest, task.blocking);
@@ -141,7 +142,7 @@ Outcome apply_nonpreemptive(const TaskSet &task_set) {
   // Blocking falls with t. The demand can therefore not be followed backwards, and every deadline is examined.
   int step = 0;
   for (Duration t = deadline_below(demands, add(*length, 1)); t > 0; t = deadline_below(demands, t)) {
-    if (++step > kMaxSteps) return NotApplicable{"gave up: too many intervals to examine"};
+    if (++step > kMaxSteps) return NotApplicable{"gave up: too many intervals must be examined"};
     Duration blocking = 0;
     for (const Demand &task : demands) {
       if (task.nominal_deadline > t) blocking = std::max(blocking, task.blocking);
@@ -165,7 +166,7 @@ Method edf_demand() {
       .assumptions =
           "one worker, full preemption, edf, no edges, deadlines before the next release is refused, jitter below the "
           "deadline, no shared groups, no max_active",
-      .complexity = "pseudo-polynomial; O(n) an interval",
+      .complexity = "pseudo-polynomial; O(n) per interval",
       .apply = apply_preemptive,
   };
 }
@@ -180,8 +181,9 @@ Method edf_demand_nonpreemptive() {
           "RR-2966, 1996",
       .assumptions =
           "one worker, jobs run to completion or to a preemption point, edf, no edges, deadlines before the next "
-          "release is refused, jitter below the deadline; groups and max_active where jobs run to completion",
-      .complexity = "pseudo-polynomial; O(n) an interval",
+          "release "
+          "is refused, jitter below the deadline; groups and max_active where jobs run to completion",
+      .complexity = "pseudo-polynomial; O(n) per interval",
       .apply = apply_nonpreemptive,
   };
 }

@@ -42,7 +42,7 @@ bool fits(Duration start, Duration point, const std::vector<one_worker::Interfer
 
 std::optional<std::string> why_not(const TaskSet &task_set) {
   if (auto reason = one_worker::why_not(task_set)) return reason;
-  if (task_set.mode != sched::Preemption::Full) return "for full preemption";
+  if (task_set.mode != sched::Preemption::Full) return "requires full preemption";
   for (const Unit &unit : task_set.units) {
     const std::string &name = task_set.tasks[unit.tasks.front()].name;
     if (unit.jitter > 0) return "task '" + name + "' has release jitter";
@@ -63,7 +63,7 @@ Outcome apply(const TaskSet &task_set) {
     const one_worker::View view = views.of(u);
     const Unit &unit = task_set.units[u];
     const std::vector<Duration> candidates = points(unit.deadline, view.more_urgent);
-    if (candidates.empty()) return NotApplicable{"gave up: more than a million points"};
+    if (candidates.empty()) return NotApplicable{"gave up: there are more than a million points"};
     examined += candidates.size();
     const Duration start = add(view.blocking, unit.volume);
     const bool found = std::any_of(candidates.begin(), candidates.end(),
@@ -88,8 +88,9 @@ Method exact_points() {
           "Computers 53(11), 2004",
       .assumptions =
           "one worker, full preemption, static priorities, D <= T, no jitter; blocking added; a DAG of one rate counts "
-          "as one task with C = volume",
-      .complexity = "O(n 2^n) at worst, in practice far less",
+          "as "
+          "one task with C = volume",
+      .complexity = "O(n 2^n) in the worst case, far less in practice",
       .apply = apply,
   };
 }

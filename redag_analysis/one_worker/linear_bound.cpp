@@ -73,12 +73,12 @@ ResponseBound bound_unit(const TaskSet &task_set, const one_worker::Views &views
 
 Outcome apply(const TaskSet &task_set) {
   if (auto reason = one_worker::why_not(task_set)) return NotApplicable{*reason};
-  if (task_set.mode != sched::Preemption::Full) return NotApplicable{"for full preemption"};
+  if (task_set.mode != sched::Preemption::Full) return NotApplicable{"requires full preemption"};
   for (const Unit &unit : task_set.units) {
     if (unit.jitter > 0) {
       return NotApplicable{"task '" + task_set.tasks[unit.tasks.front()].name + "' has release jitter"};
     }
-    if (unit.volume > kLongest) return NotApplicable{"an execution time above 13 days"};
+    if (unit.volume > kLongest) return NotApplicable{"an execution time exceeds 13 days"};
   }
   std::vector<ResponseBound> units(task_set.units.size());
   const one_worker::Views views(task_set);

@@ -91,22 +91,22 @@ Duration last_region_of(const TaskSet &task_set, const Unit &unit) {
 std::optional<std::string> why_not(const TaskSet &task_set) {
   if (auto reason = why_not_directly(task_set)) return reason;
   if (task_set.platform.workers != 1)
-    return "for one worker; the platform has " + std::to_string(task_set.platform.workers);
+    return "requires one worker, but the platform has " + std::to_string(task_set.platform.workers);
   if (!is_static(task_set.policy)) {
-    return std::string("for static priorities; the policy is ") + to_string(task_set.policy);
+    return std::string("requires static priorities, but the policy is ") + to_string(task_set.policy);
   }
   if (task_set.mode == sched::Preemption::None) return std::nullopt;
   for (const CompiledDag &dag : task_set.dags) {
     if (dag.max_active > 0 && dag.units.size() > 1) {
       return "DAG '" + dag.name +
-             "': its max_active can hold up a task for as long as others preempt another task of it";
+             "': its max_active can delay a task for as long as others preempt another task of the DAG";
     }
   }
   if (task_set.groups.empty()) return std::nullopt;
   if (task_set.mode == sched::Preemption::Cooperative) {
-    return "groups in cooperative mode: the holder can lie under less urgent jobs";
+    return "in cooperative mode with groups, less urgent jobs can run on top of the holder";
   }
-  if (task_set.platform.preempt_overhead > 0) return "groups together with an overhead of preemption";
+  if (task_set.platform.preempt_overhead > 0) return "groups cannot be combined with an overhead of preemption";
   return std::nullopt;
 }
 

@@ -102,8 +102,9 @@ struct Response {
 };
 
 /// Reasons for which a fixed point has no result.
-inline constexpr std::string_view kExceedsLimit = "its response exceeds the limit: jobs would be skipped";
-inline constexpr std::string_view kGaveUp = "gave up: the busy period is too long to examine";
+inline constexpr std::string_view kExceedsLimit =
+    "its response time exceeds the limit above which jobs would be skipped";
+inline constexpr std::string_view kGaveUp = "gave up: the busy period is too long";
 
 struct FixedPoint {
   std::optional<Response> found;

@@ -24,14 +24,15 @@ constexpr int kMaxSteps = 1'000'000;
 std::string broken_assumption(const TaskSet &task_set, bool with_blocking) {
   if (task_set.policy != PolicyKind::RateMonotonic) return "the policy is not rate_monotonic";
   if (auto reason = one_worker::why_not(task_set)) return *reason;
-  if (task_set.has_edges()) return "callbacks have predecessors: the time they wait for them is not counted";
+  if (task_set.has_edges()) return "callbacks have predecessors, and the time they wait for them is not counted";
   for (const CompiledTask &task : task_set.tasks) {
     if (task.jitter > 0) return "task '" + task.name + "' has release jitter";
   }
   for (std::size_t rank = 1; rank < task_set.by_rank.size(); ++rank) {
     const CompiledTask &task = task_set.tasks[task_set.by_rank[rank]];
     if (task.period == task_set.tasks[task_set.by_rank[rank - 1]].period) {
-      return "task '" + task.name + "' has the period of another one, which then counts for neither";
+      return "task '" + task.name +
+             "' has the same period as another one, and the equation counts neither for the other";
     }
   }
   if (with_blocking) return {};
@@ -157,7 +158,8 @@ Outcome apply_interference(const TaskSet &task_set) {
     for (const Rate &rate : others) response = add(response, rate.wcet);
     const Duration shortest = others.empty() ? kNever : others.front().period;
     if (bound.unsound.empty() && response > shortest) {
-      bound.unsound = "'" + task.name + "': a more urgent task comes again before it ends and is counted once";
+      bound.unsound =
+          "'" + task.name + "': a more urgent task is released again before this one ends, but is counted once";
     }
     bound.tasks.push_back(itemise(task_set, t, response, true, {}));
   }
@@ -192,7 +194,7 @@ Method make(std::string_view name, Subject subject, std::string_view equation, s
       .name = name,
       .subject = subject,
       .cite = equation,
-      .assumptions = "none: it computes what the equation says",
+      .assumptions = "none: it evaluates the equation as it is",
       .complexity = complexity,
       .sound_only_if = sound_only_if,
       .apply = apply,
@@ -210,20 +212,20 @@ Method paper_rm_bound() {
 Method paper_interference() {
   return make("paper_interference", Subject::Task, "ReDAG-RT, eq. interference",
               "one worker, full preemption, rate_monotonic, different periods, no edges, jitter or blocking, and no "
-              "more urgent task comes again before the task ends",
-              "O(n) a task", apply_interference);
+              "more urgent task is released again before the task ends",
+              "O(n) per task", apply_interference);
 }
 
 Method paper_rta() {
   return make("paper_rta", Subject::Task, "ReDAG-RT, eqs. rta and rta_convergence",
               "one worker, full preemption, rate_monotonic, different periods, no edges, jitter or blocking; R <= T",
-              "pseudo-polynomial; O(n) a step", apply_rta);
+              "pseudo-polynomial; O(n) per step", apply_rta);
 }
 
 Method paper_rta_blocking() {
   return make("paper_rta_blocking", Subject::Task, "ReDAG-RT, eq. rta_blocking; B_i as on one worker",
               "one worker, rate_monotonic, different periods, no edges or jitter; R <= T",
-              "pseudo-polynomial; O(n) a step", apply_rta_blocking);
+              "pseudo-polynomial; O(n) per step", apply_rta_blocking);
 }
 
 }  // namespace redag::analysis

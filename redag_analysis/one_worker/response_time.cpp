@@ -15,11 +15,11 @@ std::optional<std::string> why_not(const TaskSet &task_set, sched::Preemption mo
   if (!edges && task_set.has_edges()) return "tasks have predecessors: see the bounds for DAGs";
   if (task_set.mode == mode) return std::nullopt;
   switch (mode) {
-    case sched::Preemption::None: return "for jobs that run to completion; here they can be preempted";
-    case sched::Preemption::Cooperative: return "for cooperative jobs with preemption points";
+    case sched::Preemption::None: return "requires jobs that run to completion, but jobs can be preempted here";
+    case sched::Preemption::Cooperative: return "requires cooperative jobs with preemption points";
     case sched::Preemption::Full: break;
   }
-  return "for full preemption; here jobs keep the worker until they end or reach a preemption point";
+  return "requires full preemption, but jobs keep the worker here until they end or reach a preemption point";
 }
 
 Outcome independent_full(const TaskSet &task_set) {
@@ -62,8 +62,9 @@ Method rta_preemptive() {
           "Real-Time Systems 6(2), 1994",
       .assumptions =
           "one worker, full preemption, static priorities, edges only between rates; any deadlines, release jitter, "
-          "shared groups with priority inheritance, shared levels",
-      .complexity = "pseudo-polynomial; O(n) a step",
+          "shared "
+          "groups with priority inheritance, shared levels",
+      .complexity = "pseudo-polynomial; O(n) per step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_full); },
   };
 }
@@ -77,8 +78,9 @@ Method rta_nonpreemptive() {
           "revisited and revised, Real-Time Systems 35(3), 2007",
       .assumptions =
           "one worker, jobs run to completion, static priorities, edges only between rates; any deadlines, release "
-          "jitter, groups",
-      .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
+          "jitter, "
+          "groups",
+      .complexity = "pseudo-polynomial; O(n) per step, all jobs of the busy period",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_none); },
   };
 }
@@ -92,8 +94,9 @@ Method rta_deferred() {
           "scheduling with deferred preemption, Real-Time Systems 42, 2009",
       .assumptions =
           "one worker, cooperative preemption points every `region`, static priorities, edges only between rates, no "
-          "shared groups; any deadlines, release jitter, shared levels",
-      .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
+          "shared groups; any "
+          "deadlines, release jitter, shared levels",
+      .complexity = "pseudo-polynomial; O(n) per step, all jobs of the busy period",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_cooperative); },
   };
 }
@@ -106,7 +109,7 @@ Method dag_one_worker_preemptive() {
       .assumptions =
           "one worker, full preemption, static priorities; R <= T for DAGs; timers that keep their periods where edges "
           "join rates; jitter, groups with inheritance, shared levels, max_active",
-      .complexity = "pseudo-polynomial; O(n) a step",
+      .complexity = "pseudo-polynomial; O(n) per step",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, dags_full); },
   };
 }
@@ -118,8 +121,9 @@ Method dag_one_worker_deferred() {
       .cite = "as rta_deferred, with C = volume of the DAG (docs/analysis.md, \"One worker\")",
       .assumptions =
           "one worker, jobs run to completion or to a preemption point, static priorities; R <= T for DAGs; timers "
-          "that keep their periods where edges join rates; jitter, max_active; groups unless cooperative",
-      .complexity = "pseudo-polynomial; O(n) a step, all jobs of the busy period",
+          "that "
+          "keep their periods where edges join rates; jitter, max_active; groups unless cooperative",
+      .complexity = "pseudo-polynomial; O(n) per step, all jobs of the busy period",
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, dags_deferred); },
   };
 }

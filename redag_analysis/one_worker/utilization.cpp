@@ -67,11 +67,11 @@ std::optional<std::string> why_not_by_rate(const TaskSet &task_set, const std::v
     const std::string name = unit.tasks.size() == 1 ? "task '" + task_set.tasks[unit.tasks.front()].name + "'"
                                                     : "DAG '" + task_set.dags[unit.dag.value].name + "'";
     if (i > 0 && unit.period != last && take_turns(task_set, task_set.units[order[i - 1]], unit)) {
-      return name + ": it takes turns with one of another period";
+      return name + ": it has the same priority as a task of another period";
     }
     if (unit.deadline < unit.period) return name + ": its deadline is below its period";
     if (unit.jitter > 0) return name + ": it has release jitter";
-    if (unit.period < last) return name + ": it is less urgent than one of a larger period";
+    if (unit.period < last) return name + ": it is less urgent than a task of a larger period";
     last = unit.period;
   }
   return std::nullopt;
@@ -85,10 +85,10 @@ struct Prepared {
 std::optional<std::string> prepare(const TaskSet &task_set, bool with_blocking, Prepared &prepared) {
   if (auto reason = one_worker::why_not(task_set)) return reason;
   const auto order = units_by_rank(task_set);
-  if (!order) return "tasks of other DAGs stand between those of one DAG in the order of priorities";
+  if (!order) return "in the order of priorities, tasks of other DAGs stand between those of one DAG";
   if (auto reason = why_not_by_rate(task_set, *order)) return reason;
   if (!with_blocking && task_set.mode != sched::Preemption::Full)
-    return "for full preemption: see the test with blocking";
+    return "requires full preemption: see the test with blocking";
   prepared.order = *order;
   const one_worker::Views views(task_set);
   for (const std::uint32_t u : *order) {
@@ -209,7 +209,7 @@ Outcome apply_by_level(const TaskSet &task_set, Within is_within, Figures figure
     shares.pop();
     shares.push(share_of(unit));
   }
-  return answer(true, "every level within its limit");
+  return answer(true, "every level is within its limit");
 }
 
 Outcome apply_liu_layland_blocking(const TaskSet &task_set) {
@@ -231,11 +231,11 @@ Outcome apply_hyperbolic_blocking(const TaskSet &task_set) {
 std::optional<std::string> why_not_global(const TaskSet &task_set) {
   if (auto reason = why_not_directly(task_set)) return reason;
   // With m = 1 the limits would be 1 or more, which fixed priorities do not reach.
-  if (task_set.platform.workers < 2) return "for two workers or more";
+  if (task_set.platform.workers < 2) return "requires two workers or more";
   if (!is_static(task_set.policy)) {
-    return std::string("for rate-monotonic priorities; the policy is ") + to_string(task_set.policy);
+    return std::string("requires rate-monotonic priorities, but the policy is ") + to_string(task_set.policy);
   }
-  if (task_set.mode != sched::Preemption::Full) return "for full preemption";
+  if (task_set.mode != sched::Preemption::Full) return "requires full preemption";
   if (task_set.has_edges()) return "tasks have predecessors";
   if (!task_set.groups.empty()) return "tasks share groups";
   for (const CompiledDag &dag : task_set.dags) {
@@ -244,7 +244,7 @@ std::optional<std::string> why_not_global(const TaskSet &task_set) {
   for (std::size_t rank = 1; rank < task_set.by_rank.size(); ++rank) {
     const CompiledTask &upper = task_set.tasks[task_set.by_rank[rank - 1]];
     const CompiledTask &lower = task_set.tasks[task_set.by_rank[rank]];
-    if (upper.level == lower.level && upper.tier != lower.tier) return "tasks of different priority share levels";
+    if (upper.level == lower.level && upper.tier != lower.tier) return "tasks of different priorities share a level";
   }
   return why_not_by_rate(task_set, *units_by_rank(task_set));
 }

@@ -62,7 +62,7 @@ Outcome apply_wait_set(const TaskSet &task_set) {
   if (auto reason = why_not_directly(task_set)) return NotApplicable{*reason};
   if (task_set.mode != sched::Preemption::None) return NotApplicable{"rclcpp's executors do not preempt"};
   if (!task_set.groups.empty())
-    return NotApplicable{"exclusive groups: a busy group's callbacks can miss every window"};
+    return NotApplicable{"with exclusive groups, the callbacks of a busy group can miss every window"};
   const std::vector<Duration> from_ready = responses_from_ready(task_set);
   std::vector<ResponseBound> responses;
   for (const Unit &unit : task_set.units) responses.push_back(bound_of(task_set, unit, from_ready));
@@ -79,7 +79,7 @@ Method wait_set() {
           "docs/analysis.md, \"rclcpp's executors\"; windows: D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, "
           "Response-time analysis of ROS 2 processing chains under reservation-based scheduling, ECRTS 2019",
       .assumptions =
-          "rclcpp's single- or multi-threaded executor of Humble, m threads with processors of their own; one rate a "
+          "rclcpp's single- or multi-threaded executor of Humble, m threads with processors of their own; one rate per "
           "DAG with edges, R <= T; no shared exclusive groups",
       .complexity = "O(tasks + edges)",
       .apply = apply_wait_set,

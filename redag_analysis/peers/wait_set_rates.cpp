@@ -81,7 +81,8 @@ class Executor {
         whose.push_back(t);
       }
     }
-    return global::agree(values, "some callback's response can exceed its limit, which all others rely on",
+    return global::agree(values,
+                         "a callback's response time can exceed its limit, on which the bounds of all others rely",
                          [&](std::size_t k) {
                            const std::uint32_t t = whose[k / 2];
                            if (k % 2 == 1) return respond(t);
@@ -158,13 +159,13 @@ class Executor {
 std::optional<std::string> why_not(const TaskSet &task_set) {
   if (auto reason = why_not_directly(task_set)) return reason;
   if (task_set.mode != sched::Preemption::None) return "rclcpp's executors do not preempt";
-  if (!task_set.groups.empty()) return "exclusive groups: a busy group's callbacks can miss every window";
+  if (!task_set.groups.empty()) return "with exclusive groups, the callbacks of a busy group can miss every window";
   return std::nullopt;
 }
 
 std::optional<std::string> why_not_one_thread(const TaskSet &task_set) {
   if (task_set.platform.workers != 1) {
-    return "for one thread; the platform has " + std::to_string(task_set.platform.workers) + " workers";
+    return "requires one thread, but the platform has " + std::to_string(task_set.platform.workers) + " workers";
   }
   return why_not(task_set);
 }
@@ -268,7 +269,7 @@ Outcome apply_rates(const TaskSet &task_set) {
   const std::uint32_t threads = task_set.platform.workers;
   const Duration longest = kUnbounded / 4 / threads / static_cast<Duration>(task_set.tasks.size() + 2);
   for (const Unit &unit : task_set.units) {
-    if (std::max(unit.period, unit.volume) > longest) return NotApplicable{"times too long for exact sums"};
+    if (std::max(unit.period, unit.volume) > longest) return NotApplicable{"the times are too long for exact sums"};
   }
   return Executor(task_set, [threads](const std::vector<Callback> &callbacks, std::size_t i,
                                       Duration limit) { return rates_response(callbacks, i, limit, threads); })
@@ -277,7 +278,7 @@ Outcome apply_rates(const TaskSet &task_set) {
 
 constexpr std::string_view kOneThread =
     "rclcpp's SingleThreadedExecutor of Humble with a processor of its own, timers polled like subscriptions; one rate "
-    "a DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups";
+    "per DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups";
 
 Method make(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
             Outcome (*apply)(const TaskSet &)) {
@@ -297,23 +298,24 @@ Method casini() {
   return make("casini",
               "D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, Response-time analysis of ROS 2 processing chains "
               "under reservation-based scheduling, ECRTS 2019",
-              kOneThread, "O(tasks^2) a round, at most 1000 rounds", apply_casini);
+              kOneThread, "O(tasks^2) per round, at most 1000 rounds", apply_casini);
 }
 
 Method blass() {
   return make("blass",
               "T. Blass, D. Casini, S. Bozhko, B. Brandenburg, A ROS 2 response-time analysis exploiting starvation "
               "freedom and execution-time variance, RTSS 2021 (theorem 2, without execution-time curves)",
-              kOneThread, "pseudo-polynomial; O(tasks^2) a step, at most 1000 rounds", apply_blass);
+              kOneThread, "pseudo-polynomial; O(tasks^2) per step, at most 1000 rounds", apply_blass);
 }
 
 Method wait_set_rates() {
-  return make("wait_set_rates",
-              "docs/analysis.md, \"rclcpp's executors\"; after T. Blass et al., RTSS 2021; in place of X. Jiang et "
-              "al., RTSS 2022, and H. Sobhani, H. Choi, H. Kim, RTAS 2023",
-              "rclcpp's single- or multi-threaded executor of Humble, m threads with processors of their own; one rate "
-              "a DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups",
-              "pseudo-polynomial; O(tasks^2) a step, at most 1000 rounds", apply_rates);
+  return make(
+      "wait_set_rates",
+      "docs/analysis.md, \"rclcpp's executors\"; after T. Blass et al., RTSS 2021; in place of X. Jiang et al., "
+      "RTSS 2022, and H. Sobhani, H. Choi, H. Kim, RTAS 2023",
+      "rclcpp's single- or multi-threaded executor of Humble, m threads with processors of their own; one rate per DAG "
+      "with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups",
+      "pseudo-polynomial; O(tasks^2) per step, at most 1000 rounds", apply_rates);
 }
 
 }  // namespace redag::analysis
