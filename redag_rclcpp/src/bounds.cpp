@@ -66,12 +66,13 @@ bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload
       const auto is_it = [&](const CallbackStats &callback) { return callback.task == name && !callback.dag.empty(); };
       const auto callbacks = std::count_if(stats.begin(), stats.end(), is_it);
       if (callbacks > 1)
-        absent_ = fmt::format("{} is {} callbacks; the analysis takes a task for one", name, callbacks);
+        absent_ =
+            fmt::format("task {} has {} callbacks, but the analysis needs one callback per task", name, callbacks);
       if (callbacks == 1) {
         const CallbackStats &callback = *std::find_if(stats.begin(), stats.end(), is_it);
         const redag::Duration period = callback.id.period;
         if (period > 0 && task.activation == redag::Activation::Timer && period != task.period) {
-          absent_ = fmt::format("the timer of {} has a period of {}, and not the stated {}", name,
+          absent_ = fmt::format("the timer of {} has a period of {}, but the workload states {}", name,
                                 redag::format_duration(period), redag::format_duration(task.period));
         }
         task.group = group_of(learned, name);
@@ -110,7 +111,8 @@ void Bounds::analyse(const Workload &workload, const redag::sched::Config &confi
     return;
   }
   if (task_set->has_rate_edges()) {
-    absent_ = "edges join tasks of different periods, whose waits depend on when the nodes' timers were created";
+    absent_ =
+        "edges join tasks of different periods, and their waiting times depend on when the nodes created their timers";
     return;
   }
   const redag::analysis::Report report = redag::analysis::analyze(*task_set);

@@ -64,7 +64,7 @@ class Bounds {
   std::optional<redag::Overheads> machine_;  // part of calibration_ that the bounds include
   std::vector<std::string> analysed_;        // tasks and callbacks of the last analysis
   std::map<std::string, TaskBound> bounds_;
-  std::string absent_ = "no callback was seen yet";
+  std::string absent_ = "no callback has been seen yet";
 
   redag::metrics::BoundWatch watch_;  // counts against bounds_; starts anew with them
 };

@@ -135,7 +135,7 @@ void find_leftovers(const rclcpp::Context::SharedPtr &context,
   });
   Bridge::fill(set, {}, entries);
   const rcl_ret_t result = rcl_wait(&set, 0);
-  if (result != RCL_RET_TIMEOUT) check_rcl(result, "looking for messages failed");
+  if (result != RCL_RET_TIMEOUT) check_rcl(result, "cannot check for messages");
   for (const Bridge::Entry &entry : entries) {
     entry.member->take_leftovers(entry.held, set, result == RCL_RET_OK);
   }

@@ -38,7 +38,8 @@ rclcpp::Logger logger() { return rclcpp::get_logger("redag_rclcpp"); }
 /// other options.
 ReDAGOptions prepare(ReDAGOptions options) {
   if (options.default_period <= nanoseconds(0)) {
-    throw std::invalid_argument("default_period must be greater than 0: the shortest period goes first");
+    throw std::invalid_argument(
+        "default_period must be greater than 0, because callbacks with shorter periods are more urgent");
   }
   if (options.spin < nanoseconds(0)) throw std::invalid_argument("spin must not be negative");
   if (options.watchdog < nanoseconds(0)) throw std::invalid_argument("watchdog must not be negative");
@@ -212,7 +213,7 @@ void ReDAGExecutor::Core::start() {
               setup_.mode.reason.empty() ? "" : ", ", setup_.mode.reason.c_str());
   for (const std::string &warning : notes_.warnings()) RCLCPP_WARN(logger(), "%s", warning.c_str());
   if (setup_.mode.mode == redag::PreemptionMode::Os && !locks_inherit()) {
-    RCLCPP_INFO(logger(), "the middleware's locks do not inherit priority: preload libredag_pi.so (docs/ros2.md)");
+    RCLCPP_INFO(logger(), "the middleware's locks do not inherit priority: preload libredag_pi.so (see docs/ros2.md)");
   }
   if (options_.workload) report_unmatched_at_ = engine_->now() + kNodesAppear;
 }
@@ -226,10 +227,11 @@ void ReDAGExecutor::Core::report_unmatched() {
 void ReDAGExecutor::Core::note_middleware(const RaisedMiddleware &raised) {
   std::string warning;
   if (raised.found() == 0) {
-    warning = "the middleware's threads are not known by name: give its receive threads SCHED_FIFO priority " +
-              std::to_string(setup_.timer_priority()) + " yourself, or busy workers delay messages (docs/ros2.md)";
+    warning = "the threads of this middleware are not known by name: give its receiving threads SCHED_FIFO priority " +
+              std::to_string(setup_.timer_priority()) + " yourself, or busy workers delay messages (see docs/ros2.md)";
   } else if (raised.refused() > 0) {
-    warning = fmt::format("{} threads of the middleware could not be raised above the workers", raised.refused());
+    warning =
+        fmt::format("{} threads of the middleware could not get a higher priority than the workers", raised.refused());
   }
   if (!warning.empty()) notes_.warn(std::move(warning));
 }
@@ -379,7 +381,7 @@ void ReDAGExecutor::Core::begin_learning() {
 
 void ReDAGExecutor::Core::stop_learning() {
   learning_ = false;
-  RCLCPP_INFO(logger(), "learned the rates of %zu callbacks; they are frozen now", registry_.adopt_rates());
+  RCLCPP_INFO(logger(), "learned the rates of %zu callbacks; they no longer change", registry_.adopt_rates());
 }
 
 // ---- queries ----
@@ -389,8 +391,8 @@ std::vector<std::string> ReDAGExecutor::Core::warnings() const {
   for (std::string &line : registry_.unmatched()) all.push_back(std::move(line));
   if (const std::uint64_t waits = engine_->thread_waits(); waits > 0) {
     all.push_back(
-        fmt::format("{} times a callback waited for a thread, because all {} had callbacks in progress: "
-                    "raise the parameter 'threads'",
+        fmt::format("callbacks waited for a thread {} times, because all {} threads had callbacks in progress: raise "
+                    "the parameter 'threads'",
                     waits, engine_->thread_count()));
   }
   return all;

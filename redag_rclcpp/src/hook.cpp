@@ -78,7 +78,7 @@ void Hook::set(const std::weak_ptr<Hooked> &hooked, Setter setter) {
   ticket_ = Tickets::all().issue(hooked);
   setter_ = std::move(setter);
   if (const rcl_ret_t result = setter_(call, ticket_); result != RCL_RET_OK) {
-    rclcpp::exceptions::throw_from_rcl_error(result, "cannot set a hook");
+    rclcpp::exceptions::throw_from_rcl_error(result, "cannot set a callback for new events");
   }
 }
 

@@ -77,7 +77,7 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
     if (!ready) throw std::runtime_error(to_string(ready.error()));
     if (const auto aside = flight_.prepare(options_.trace)) {
       RCLCPP_WARN(node_->get_logger(),
-                  "an earlier process was killed; 'redag recover %s --out DIR' makes results of its trace",
+                  "an earlier process was killed: restore the results of its trace with 'redag recover %s --out DIR'",
                   aside->c_str());
     }
   }
@@ -238,7 +238,7 @@ void Monitor::Impl::publish() {
     metrics_->publish(message);
   } catch (const rclcpp::exceptions::RCLError &error) {
     if (rclcpp::ok(node_->get_node_base_interface()->get_context())) {
-      RCLCPP_ERROR(node_->get_logger(), "metrics could not be published: %s", error.what());
+      RCLCPP_ERROR(node_->get_logger(), "cannot publish metrics: %s", error.what());
     }
   }
 }
@@ -262,7 +262,7 @@ void Monitor::Impl::look_at_callbacks() {
     const redag::LockGuard guard(bounds_lock_);
     bounds_ = std::move(updated);
   }
-  if (!absent.empty()) RCLCPP_INFO(node_->get_logger(), "bounds on response times: %s", absent.c_str());
+  if (!absent.empty()) RCLCPP_INFO(node_->get_logger(), "bounds on response times are missing: %s", absent.c_str());
 }
 
 void Monitor::Impl::drain() {
@@ -271,13 +271,14 @@ void Monitor::Impl::drain() {
   if (events_.empty()) return;
   if (!options_.trace.empty()) {
     if (const redag::Result<void> recorded = flight_.add(events_, executor_); !recorded) {
-      RCLCPP_WARN(node_->get_logger(), "should this process be killed, its trace is lost: %s",
+      RCLCPP_WARN(node_->get_logger(), "if this process is killed, its trace is lost: %s",
                   to_string(recorded.error()).c_str());
     }
     const bool was_cut = keeper_.is_cut();
     keeper_.add(events_);
     if (keeper_.is_cut() && !was_cut) {
-      RCLCPP_WARN(node_->get_logger(), "the trace ends here, at %zu events; parameter trace_events allows more",
+      RCLCPP_WARN(node_->get_logger(),
+                  "the trace ends here, after %zu events: raise the parameter 'trace_events' for a longer one",
                   keeper_.size());
     }
   }
@@ -287,8 +288,8 @@ void Monitor::Impl::drain() {
       events_, [this](redag::TaskId task) { return executor_.task_name(task); },
       [this](const std::string &name, const TaskBound &bound) {
         RCLCPP_WARN(node_->get_logger(),
-                    "%s responded in %s, above its bound of %s (%s): an execution time or a rate is not what the "
-                    "workload says, or a callback ran that it does not name",
+                    "the response time of %s was %s, which exceeds its bound of %s (%s): an execution time or a rate "
+                    "differs from the workload, or a callback ran that the workload does not contain",
                     name.c_str(), redag::humanize_duration(bound.worst).c_str(),
                     redag::format_duration(bound.response).c_str(), bound.method.c_str());
       });
@@ -337,7 +338,7 @@ redag::Result<void> Monitor::Impl::finish() {
     }
     if (problems.empty()) {
       RCLCPP_INFO(node_->get_logger(),
-                  "wrote %s: metrics.json, summary.json, jobs.csv, events.jsonl, trace.json (open it in "
+                  "wrote %s: metrics.json, summary.json, jobs.csv, events.jsonl, trace.json (open trace.json in "
                   "https://ui.perfetto.dev)",
                   options_.trace.c_str());
     }

@@ -39,7 +39,7 @@ constexpr std::array kTies = {redag::Ties::Share, redag::Ties::Fixed};
 
 [[noreturn]] void refuse(const char *name, const ParameterValue &value, const std::string &allowed) {
   throw rclcpp::exceptions::InvalidParameterValueException(
-      fmt::format("parameter '{}' is {}: {}", name, rclcpp::to_string(value), allowed));
+      fmt::format("parameter '{}' is {}, but must be {}", name, rclcpp::to_string(value), allowed));
 }
 
 struct Spec {
@@ -117,16 +117,16 @@ class Reader {
 
 template <class Values>
 std::string names_of(const Values &values) {
-  std::string text = "allowed are";
+  std::string text = "one of";
   for (const auto value : values) text += fmt::format("{} {}", value == values.front() ? "" : ",", to_string(value));
   return text;
 }
 
 std::vector<int> read_cpus(Reader &reader) {
   const Spec spec{"cpu_affinity",
-                  "Processors that the workers may use; none: all that the process may use (os: as many "
-                  "of them as there are workers)",
-                  "a list of whole numbers, each of a processor that the process may use"};
+                  "Processors that the workers may use; empty: all that the process may use (with preemption os, as "
+                  "many of them as there are workers)",
+                  "a list of processors that the process may use"};
   const ParameterValue value = reader.value(spec, ParameterValue(std::vector<std::int64_t>{}));
   if (value.get_type() != ParameterType::PARAMETER_INTEGER_ARRAY) refuse(spec.name, value, spec.allowed);
   const std::vector<int> usable = redag::runtime::usable_cpus();
@@ -135,7 +135,7 @@ std::vector<int> read_cpus(Reader &reader) {
     const bool known = std::any_of(usable.begin(), usable.end(), [&](int other) { return other == cpu; });
     const bool twice = std::any_of(cpus.begin(), cpus.end(), [&](int other) { return other == cpu; });
     if (!known || twice) {
-      refuse(spec.name, value, spec.allowed + fmt::format(" ({}), once", fmt::join(usable, ", ")));
+      refuse(spec.name, value, spec.allowed + fmt::format(" ({}), each at most once", fmt::join(usable, ", ")));
     }
     cpus.push_back(static_cast<int>(cpu));
   }
@@ -149,7 +149,7 @@ bool states_workers(const std::string &path) {
 }
 
 void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
-  const Spec spec{"config", "Workload file that says which callback is which task of which DAG; empty: none",
+  const Spec spec{"config", "Workload file that maps callbacks to the tasks of DAGs; empty: none",
                   "the path of a workload file (docs/workload_format.md)"};
   const std::string path = reader.text(spec, "");
   if (path.empty()) return;
@@ -176,18 +176,18 @@ bool has_all_wcets(const redag::Workload &workload) {
 
 std::string read_trace(Reader &reader) {
   return reader.text({"trace",
-                      "Folder for events.jsonl, jobs.csv, summary.json and trace.json, written when spinning "
+                      "Folder for events.jsonl, jobs.csv, summary.json and trace.json, which are written when spinning "
                       "ends; empty: none",
                       "the path of a folder"},
                      "");
 }
 
 std::optional<redag::Calibration> read_overheads(Reader &reader) {
-  const std::string path = reader.text({"overheads",
-                                        "File that `redag calibrate` wrote: what this machine adds to jobs, charged to "
-                                        "the bounds; empty: none",
-                                        "the path of an overheads file (docs/calibration.md)"},
-                                       "");
+  const std::string path = reader.text(
+      {"overheads",
+       "File of overheads that `redag calibrate` measured on this machine; they are charged to the bounds; empty: none",
+       "the path of an overheads file (docs/calibration.md)"},
+      "");
   if (path.empty()) return std::nullopt;
   redag::Result<redag::Calibration> loaded = redag::load_calibration(path);
   if (!loaded) {
@@ -198,9 +198,10 @@ std::optional<redag::Calibration> read_overheads(Reader &reader) {
 }
 
 bool read_bounds(Reader &reader) {
-  return reader.flag({"bounds", "Compare response times with their bounds, where `config` states all execution times",
-                      "allowed are true, false"},
-                     true);
+  return reader.flag(
+      {"bounds", "Compare response times with their bounds; needs the execution times of all tasks in `config`",
+       "true or false"},
+      true);
 }
 
 }  // namespace
@@ -209,26 +210,28 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
   Reader reader(node);
   ReDAGOptions options;
   options.workers = static_cast<std::uint32_t>(reader.integer(
-      {"workers", "Callbacks that execute at the same time; 0: what `config` says, or else one a processor",
-       fmt::format("a whole number from 0 to {} is allowed", kMostThreads)},
+      {"workers",
+       "Number of workers: callbacks that execute at the same time; 0: the value in `config`, or one per processor",
+       fmt::format("a whole number from 0 to {}", kMostThreads)},
       0, 0, kMostThreads));
   options.preemption = reader.one_of(
       {"preemption",
-       "What can interrupt a running callback; auto: what `config` says, or else os where the process has "
-       "real-time rights, and cooperative where not",
+       "Preemption mode; auto: the mode in `config`, or os if the process has real-time rights, or else cooperative",
        names_of(kModes)},
       kModes);
-  options.policy = reader.one_of(
-      {"policy", "The order of callbacks; rate_monotonic: what `config` says, if it says", names_of(kPolicies)},
-      kPolicies);
+  options.policy =
+      reader.one_of({"policy", "Priority order of callbacks; rate_monotonic: the policy in `config`, if it states one",
+                     names_of(kPolicies)},
+                    kPolicies);
   options.ties = reader.one_of({"ties",
-                                "Callbacks of equal priority; share: the earlier release first, or what `config` says; "
-                                "fixed: always in the same order",
+                                "Order of callbacks with equal priority; share: earlier release first, or the value in "
+                                "`config`; fixed: always the same order",
                                 names_of(kTies)},
                                kTies);
-  const Spec threads{"threads",
-                     "Callbacks that can be started and unfinished at once, with preemption os; 0: workers + 16",
-                     fmt::format("0, or a whole number from the number of workers to {}, is allowed", kMostThreads)};
+  const Spec threads{
+      "threads",
+      "Number of threads with preemption os: callbacks that can be started and unfinished at once; 0: workers + 16",
+      fmt::format("0, or a whole number from the number of workers to {}", kMostThreads)};
   options.threads = static_cast<std::uint32_t>(reader.integer(threads, 0, 0, kMostThreads));
   options.cpus = read_cpus(reader);
   read_config(node, reader, options);
@@ -237,36 +240,35 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
            threads.allowed + fmt::format(" (there are {} workers)", options.workers));
   }
   options.default_period = reader.seconds(
-      {"default_period", "Seconds: the period, for its priority, of what neither `config` nor a timer gives one",
-       "a number of seconds above 0 is allowed"},
+      {"default_period",
+       "Period in seconds, for the priority of callbacks whose period neither `config` nor a timer states",
+       "a number of seconds above 0"},
       0.1, false);
   options.learn =
-      reader.seconds({"learn", "Seconds after the first spin in which rates and edges are learned; 0: not at all",
-                      "a number of seconds, or 0, is allowed"},
+      reader.seconds({"learn", "Seconds after the first spin in which rates and edges are learned; 0: no learning",
+                      "a number of seconds of at least 0"},
                      10.0, true);
-  options.raise_middleware =
-      reader.flag({"raise_middleware",
-                   "With preemption os: give threads of the middleware that deliver messages a higher priority "
-                   "than the workers",
-                   "allowed are true, false"},
-                  true);
+  options.raise_middleware = reader.flag(
+      {"raise_middleware",
+       "With preemption os, give the middleware's threads that deliver messages a higher priority than the workers",
+       "true or false"},
+      true);
   options.lock_memory = reader.flag({"lock_memory",
-                                     "Lock the memory of the process as it is used, and touch the stacks of the "
-                                     "threads beforehand: no page faults there in callbacks",
-                                     "allowed are true, false"},
+                                     "Lock the memory of the process and touch the stacks of its threads in advance, "
+                                     "to avoid page faults in callbacks",
+                                     "true or false"},
                                     false);
-  options.spin = reader.seconds({"spin",
-                                 "Seconds that an idle worker looks for a callback before it sleeps; not with "
-                                 "preemption os",
-                                 "a number of seconds, or 0, is allowed"},
-                                0.0, true);
-  options.watchdog = reader.seconds({"watchdog",
-                                     "Seconds: callbacks in progress for longer are named by a warning while they "
-                                     "are; 0: none",
-                                     "a number of seconds, or 0, is allowed"},
-                                    0.0, true);
+  options.spin = reader.seconds(
+      {"spin", "Seconds for which an idle worker looks for a callback before it sleeps; not with preemption os",
+       "a number of seconds of at least 0"},
+      0.0, true);
+  options.watchdog = reader.seconds(
+      {"watchdog",
+       "Warn about callbacks that are in progress for longer than these seconds, while they still run; 0: no warnings",
+       "a number of seconds of at least 0"},
+      0.0, true);
   options.live = reader.flag(
-      {"live", "Let `redag top` see the executor: a page of memory, two updates a second", "allowed are true, false"},
+      {"live", "Let `redag top` show the executor; costs a page of memory and two updates a second", "true or false"},
       true);
   const bool counts_responses = read_bounds(reader) && options.workload && has_all_wcets(*options.workload);
   if (!read_trace(reader).empty() || counts_responses) options.trace_capacity = kTraceCapacity;
@@ -277,19 +279,21 @@ MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &e
   Reader reader(node);
   MonitorOptions options;
   options.period =
-      reader.seconds({"metrics_period", "Seconds between two messages on /diagnostics and ~/metrics; 0: none",
-                      "a number of seconds, or 0, is allowed"},
+      reader.seconds({"metrics_period", "Seconds between two messages on /diagnostics and ~/metrics; 0: no messages",
+                      "a number of seconds of at least 0"},
                      1.0, true);
-  options.metrics_file = reader.text(
-      {"metrics_file", "File for the last ~/metrics, written when spinning ends; empty: none", "the path of a file"},
-      "");
-  options.save_path = reader.text({"save_path", "File that ~/save writes what was learned to", "the path of a file"},
-                                  options.save_path, false);
+  options.metrics_file =
+      reader.text({"metrics_file", "File for the last message of ~/metrics, written when spinning ends; empty: none",
+                   "the path of a file"},
+                  "");
+  options.save_path =
+      reader.text({"save_path", "File to which the service ~/save writes the learned workload", "the path of a file"},
+                  options.save_path, false);
   options.trace = read_trace(reader);
-  options.trace_events = static_cast<std::size_t>(
-      reader.integer({"trace_events", "So many of the first events are kept for `trace`, at 32 bytes each",
-                      fmt::format("a whole number from 1 to {} is allowed", kMostTraceEvents)},
-                     static_cast<std::int64_t>(options.trace_events), 1, kMostTraceEvents));
+  options.trace_events = static_cast<std::size_t>(reader.integer(
+      {"trace_events", "Number of events that are kept for `trace`, at 32 bytes each; later events are dropped",
+       fmt::format("a whole number from 1 to {}", kMostTraceEvents)},
+      static_cast<std::int64_t>(options.trace_events), 1, kMostTraceEvents));
   options.default_period = executor.default_period;
   if (read_bounds(reader)) options.workload = executor.workload;
   options.calibration = read_overheads(reader);

@@ -206,12 +206,12 @@ void Diagnoser::add(DiagnosticStatus &status, const TaskFigures &task, const std
                                                         .p99 = stats.execution_p99,
                                                         .longest = stats.execution_max};
   if (stats.wcet > 0 && redag::metrics::is_beyond_noise(executions, stats.wcet, machine)) {
-    warn(status, fmt::format("{} executed for {}, its wcet is {}", name, humanize_duration(stats.execution_max),
+    warn(status, fmt::format("{} executed for {}, but its wcet is {}", name, humanize_duration(stats.execution_max),
                              format_duration(stats.wcet)));
   }
   if (task.bound && task.bound->exceeded > 0) {
-    warn(status, fmt::format("{} of {} responded above the bound of {}, at most in {}", task.bound->exceeded, name,
-                             format_duration(task.bound->response), humanize_duration(task.bound->worst)));
+    warn(status, fmt::format("{} responses of {} exceeded the bound of {}; the longest was {}", task.bound->exceeded,
+                             name, format_duration(task.bound->response), humanize_duration(task.bound->worst)));
   }
 }
 

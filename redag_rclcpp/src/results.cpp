@@ -23,7 +23,7 @@ namespace redag_rclcpp {
 redag::Result<void> prepare_folder(const std::string &path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
-  if (error) return redag::make_error(fmt::format("cannot make folder '{}': {}", path, error.message()));
+  if (error) return redag::make_error(fmt::format("cannot create folder '{}': {}", path, error.message()));
   if (access(path.c_str(), W_OK | X_OK) != 0)
     return redag::make_error(fmt::format("cannot write to folder '{}'", path));
   return {};

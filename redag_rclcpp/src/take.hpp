@@ -17,7 +17,7 @@ bool take_and_handle(const char *what, const char *name, Take take, Handle handl
   try {
     taken = take();
   } catch (const rclcpp::exceptions::RCLError &error) {
-    RCLCPP_ERROR(rclcpp::get_logger("redag_rclcpp"), "taking %s '%s' failed: %s", what, name, error.what());
+    RCLCPP_ERROR(rclcpp::get_logger("redag_rclcpp"), "cannot take %s '%s': %s", what, name, error.what());
   }
   if (taken) handle();
   return taken;

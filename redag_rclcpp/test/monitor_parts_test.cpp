@@ -127,7 +127,7 @@ TEST(Bounds, SayWhyThereAreNone) {
   Bounds any(parse(text));
   any.update({stats_of("control.loop", 10 * kMillisecond, 0), stats_of("control.loop", 10 * kMillisecond, 1)},
              one_worker(), nothing);
-  EXPECT_THAT(any.absent(), HasSubstr("control.loop is 2 callbacks"));
+  EXPECT_THAT(any.absent(), HasSubstr("task control.loop has 2 callbacks"));
   any.update({stats_of("control.loop", 5 * kMillisecond)}, one_worker(), nothing);
   EXPECT_THAT(any.absent(), AllOf(HasSubstr("control.loop"), HasSubstr("5ms"), HasSubstr("10ms")));
 }
@@ -243,8 +243,8 @@ TEST(Diagnoser, SaysWhatWasWrong) {
   const DiagnosticStatus *dag = find_status(statuses, "ReDAG: DAG control");
   ASSERT_NE(dag, nullptr);
   EXPECT_EQ(dag->level, DiagnosticStatus::WARN);
-  EXPECT_THAT(dag->message, AllOf(HasSubstr("loop executed for 5ms, its wcet is 2ms"),
-                                  HasSubstr("2 of loop responded above the bound of 4ms, at most in 6ms")));
+  EXPECT_THAT(dag->message, AllOf(HasSubstr("loop executed for 5ms, but its wcet is 2ms"),
+                                  HasSubstr("2 responses of loop exceeded the bound of 4ms; the longest was 6ms")));
   EXPECT_EQ(value_of(*dag, "loop period"), "10ms");
   EXPECT_EQ(value_of(*dag, "loop wcet"), "2ms");
   EXPECT_EQ(value_of(*dag, "loop bound"), "4ms");

@@ -200,7 +200,8 @@ TEST_F(MonitorTest, AResponseAboveItsBoundIsReportedByNameAndOnceInTheLog) {
   options_.trace_capacity = 1 << 14;
   add_timer(10ms, [] { std::this_thread::sleep_for(5ms); });
   start();
-  EXPECT_TRUE(eventually_status("ReDAG: DAG control", DiagnosticStatus::WARN, "loop responded above the bound of 2ms"));
+  EXPECT_TRUE(
+      eventually_status("ReDAG: DAG control", DiagnosticStatus::WARN, "responses of loop exceeded the bound of 2ms"));
   EXPECT_TRUE(eventually([&] {
     return !metrics_.empty() && !task_of(metrics_.back(), "control.loop")["bound"].is_null() &&
            task_of(metrics_.back(), "control.loop")["bound"]["exceeded"] >= 3;
@@ -208,7 +209,7 @@ TEST_F(MonitorTest, AResponseAboveItsBoundIsReportedByNameAndOnceInTheLog) {
   const Json bound = task_of(metrics_.back(), "control.loop")["bound"];
   EXPECT_EQ(bound["response_ns"], 2 * kMillisecond);
   EXPECT_GE(bound["worst_ns"], 5 * kMillisecond);
-  EXPECT_EQ(LogCapture::warnings_with("control.loop responded in"), 1);
+  EXPECT_EQ(LogCapture::warnings_with("the response time of control.loop was"), 1);
 }
 
 TEST_F(MonitorTest, ServicesAnswer) {
@@ -336,7 +337,7 @@ TEST_F(MonitorTest, ATraceThatIsTooLongEndsEarlier) {
   monitor_options_.trace_events = 25;
   add_timer(10ms, [] {});
   start();
-  ASSERT_TRUE(eventually([] { return LogCapture::warnings_with("the trace ends here, at 25 events") == 1; }));
+  ASSERT_TRUE(eventually([] { return LogCapture::warnings_with("the trace ends here, after 25 events") == 1; }));
   stop();
   ASSERT_TRUE(monitor_->finish());
   const auto trace = redag::trace::read_trace(folder_ / "results" / "events.jsonl");

@@ -202,8 +202,8 @@ TEST_F(OptionsTest, MistakesSayWhichParameterWhatItIsAndWhatIsAllowed) {
   EXPECT_THAT(mistake_with({{"learn", -1.0}}), AllOf(HasSubstr("'learn'"), HasSubstr("-1")));
   EXPECT_THAT(mistake_with({{"learn", "long"}}), AllOf(HasSubstr("'learn'"), HasSubstr("long"), HasSubstr("seconds")));
   EXPECT_THAT(mistake_with({{"raise_middleware", 1}}),
-              AllOf(HasSubstr("'raise_middleware'"), HasSubstr("true, false")));
-  EXPECT_THAT(mistake_with({{"bounds", "yes"}}), AllOf(HasSubstr("'bounds'"), HasSubstr("true, false")));
+              AllOf(HasSubstr("'raise_middleware'"), HasSubstr("true or false")));
+  EXPECT_THAT(mistake_with({{"bounds", "yes"}}), AllOf(HasSubstr("'bounds'"), HasSubstr("true or false")));
   EXPECT_THAT(mistake_with({{"trace", 3}}), AllOf(HasSubstr("'trace'"), HasSubstr("folder")));
   EXPECT_THAT(mistake_with({{"trace_events", 0}}), AllOf(HasSubstr("'trace_events'"), HasSubstr("from 1")));
   EXPECT_THAT(mistake_with({{"metrics_period", std::numeric_limits<double>::quiet_NaN()}}),

@@ -408,7 +408,7 @@ TEST_P(RealtimeTest, TheWatchdogNamesACallbackThatDoesNotEnd) {
 TEST_P(RealtimeTest, AnIdleWorkerThatLooksForWorkFindsIt) {
   options.spin = 100us;
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
-  const auto warning = Contains(HasSubstr("do not look for jobs"));
+  const auto warning = Contains(HasSubstr("do not spin"));
   if (GetParam() == redag::PreemptionMode::Os) {
     EXPECT_THAT(executor.warnings(), warning);
   } else {

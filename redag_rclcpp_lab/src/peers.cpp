@@ -18,13 +18,14 @@ bool has_one_thread(const std::string &peer) { return peer == "ste" || peer == "
 
 redag::Result<void> check_peer(const std::string &name) {
   if (name == "events" && !REDAG_HAS_EVENTS) {
-    return redag::make_error("this ROS 2 has no executor 'events'",
-                             fmt::format("it came with rclcpp 21 (Iron); this is rclcpp {}", RCLCPP_VERSION_MAJOR));
+    return redag::make_error(
+        "this version of ROS 2 has no executor 'events'",
+        fmt::format("it needs rclcpp 21 (Iron) or newer; this is rclcpp {}", RCLCPP_VERSION_MAJOR));
   }
   if (name == "cbg" && !kHasCbg) {
-    return redag::make_error("redag_rclcpp was built without the executor 'cbg'",
-                             "it is the EventsCBGExecutor of the package cm_executors (Jazzy and newer): build that in "
-                             "the workspace, then redag_rclcpp again");
+    return redag::make_error("redag_rclcpp_lab was built without the executor 'cbg'",
+                             "it is the EventsCBGExecutor of the package cm_executors (Jazzy and newer): build that "
+                             "package in the workspace, then redag_rclcpp_lab again");
   }
   return {};
 }
@@ -42,7 +43,7 @@ std::unique_ptr<rclcpp::Executor> make_peer(const std::string &name, std::size_t
     return std::make_unique<rclcpp::executors::EventsCBGExecutor>(rclcpp::ExecutorOptions(), threads);
   }
 #endif
-  REDAG_CHECK(name == "ste", "no such executor");
+  REDAG_CHECK(name == "ste", "there is no such executor");
   return std::make_unique<rclcpp::executors::SingleThreadedExecutor>();
 }
 

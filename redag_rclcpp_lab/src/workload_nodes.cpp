@@ -91,7 +91,7 @@ redag::Diagnostics ros_limits(const redag::Workload &workload) {
   for (const Dag &dag : workload.dags) {
     if (dag.max_pending > 0) {
       found.push_back(diagnostic(redag::Severity::Warning, fmt::format("DAG '{}': max_pending is ignored", dag.name),
-                                 "rclcpp queues what the subscriptions' depths allow"));
+                                 "rclcpp queues as many messages as the subscriptions' depths allow"));
     }
     for (const Task &task : dag.tasks) {
       const std::string name = fmt::format("task '{}.{}'", dag.name, task.name);
@@ -100,12 +100,12 @@ redag::Diagnostics ros_limits(const redag::Workload &workload) {
                                    "remove 'jitter', or use 'redag run'"));
       }
       if (task.concurrency > 1) {
-        found.push_back(diagnostic(redag::Severity::Error, name + ": jobs of one task do not overlap here",
+        found.push_back(diagnostic(redag::Severity::Error, name + ": jobs of one task do not overlap under ROS 2",
                                    "remove 'concurrency'"));
       }
       if (task.activation == Activation::Timer && task.overrun == redag::Overrun::Queue) {
-        found.push_back(diagnostic(redag::Severity::Warning, name + ": a ROS timer does not queue expiries",
-                                   "read 'overrun: queue' as 'skip'"));
+        found.push_back(diagnostic(redag::Severity::Warning, name + ": a ROS timer does not queue releases",
+                                   "'overrun: queue' is treated as 'skip'"));
       }
     }
   }
@@ -261,12 +261,12 @@ redag::Result<void> WorkloadNodes::connect(Duration timeout) {
     if (all) return {};
     const Duration waited = timer_clock_now() - start;
     if (shared != nullptr && waited > std::min(timeout, kForgotten)) {
-      return redag::make_error(fmt::format("somebody else uses the topic '{}'", shared->topic),
+      return redag::make_error(fmt::format("another process uses the topic '{}'", shared->topic),
                                "give each run a ROS_DOMAIN_ID of its own");
     }
     if (waited > timeout) {
       return redag::make_error(
-          fmt::format("the nodes do not find each other within {}", redag::format_duration(timeout)),
+          fmt::format("the nodes do not discover each other within {}", redag::format_duration(timeout)),
           "check the middleware's configuration: 'ros2 doctor --report'");
     }
     std::this_thread::sleep_for(std::chrono::nanoseconds(kConnectLook));

@@ -89,8 +89,9 @@ std::string describe(const WorkloadRun &run) {
                   info.executor, info.workload.platform.workers, info.workload.platform.workers == 1 ? "" : "s",
                   redag::humanize_duration(info.end - info.start), info.seed, info.preemption,
                   info.preemption_why.empty() ? "" : " (" + info.preemption_why + ")", info.overheads);
-  if (info.warm_up > 0) text += fmt::format("the first {} are not counted\n", redag::humanize_duration(info.warm_up));
-  if (run.stopped) text += "stopped early: the results are those of the shorter run\n";
+  if (info.warm_up > 0)
+    text += fmt::format("warm-up: the first {} are not counted\n", redag::humanize_duration(info.warm_up));
+  if (run.stopped) text += "stopped early: the results cover only the time until then\n";
   redag::Table tasks({{"task"},
                       {"jobs", true},
                       {"late", true},
@@ -133,10 +134,11 @@ std::string describe(const WorkloadRun &run) {
   }
   text += "\n" + tasks.render(0, false) + "\n" + dags.render(0, false) + "\n";
   text +=
-      "missed: late, skipped or aborted; times of a task: finish - release; of a DAG, end to end: finish of a sink - "
-      "release of its source\n";
-  text += verdict("trace check, as the nodes saw it", run.check);
-  if (run.scheduler) text += verdict("trace check, the scheduler's decisions", run.scheduler->check);
+      "missed: late, skipped or aborted\n"
+      "times of tasks: finish - release\n"
+      "times of DAGs: end to end, from the release of a source to the finish of a sink\n";
+  text += verdict("trace check of the jobs, as the nodes saw them", run.check);
+  if (run.scheduler) text += verdict("trace check of the scheduler's decisions", run.scheduler->check);
   return text;
 }
 

@@ -104,7 +104,7 @@ class Run {
     const bool bounded = std::any_of(workload_.dags.begin(), workload_.dags.end(),
                                      [](const redag::Dag &dag) { return dag.max_active > 0; });
     if (bounded && !is_redag(options_.executor)) {
-      result_.warnings.push_back(fmt::format("{} has no bounds: max_active is ignored", options_.executor));
+      result_.warnings.push_back(fmt::format("{} does not support max_active, which is ignored", options_.executor));
     }
     return {};
   }
@@ -217,7 +217,7 @@ class Run {
     info.seed = options_.seed;
     info.end = end_;
     info.warm_up = options_.warm_up;
-    info.overheads = fmt::format("ROS 2 {} transport; measuring takes {} a job; timers are within {} of the grid",
+    info.overheads = fmt::format("ROS 2 {} transport; measuring costs {} per job; timers are within {} of the grid",
                                  options_.intra_process ? "intra-process" : "middleware", redag::format_duration(cost),
                                  redag::format_duration(nodes_->phase_error()));
     info.machine = redag::trace::this_machine();

@@ -473,7 +473,7 @@ TEST_F(Nodes, AUserOfATopicWhoLeavesIsNoneWhoStays) {
   const auto staying = publish();
   const auto refused = nodes.connect(20 * redag::kSecond);
   ASSERT_FALSE(refused);
-  EXPECT_THAT(redag::to_string(refused.error()), HasSubstr("somebody else uses the topic '/fast/a/output'"));
+  EXPECT_THAT(redag::to_string(refused.error()), HasSubstr("another process uses the topic '/fast/a/output'"));
 }
 
 TEST_F(Nodes, TasksOfAGroupShareANodeAndDoNotOverlap) {

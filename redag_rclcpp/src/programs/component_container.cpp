@@ -30,34 +30,47 @@ constexpr const char *kHelp = R"(A component container that executes callbacks b
 
   ros2 run redag_rclcpp component_container [--ros-args -p NAME:=VALUE ...]
 
-  config            workload file: which callback is which task of which DAG      ""
-  workers           callbacks at the same time; 0: one a processor                0
-  preemption        auto, os, cooperative, none                                   auto
-  policy            rate_monotonic, deadline_monotonic, fixed, edf, fifo, chain_aware
-                                                                                  rate_monotonic
-  ties              of equal priorities: share (the earlier release first), fixed share
-  threads           os: callbacks started and unfinished at once; 0: workers + 16 0
-  cpu_affinity      processors of the workers                                     []
-  default_period    seconds, where nobody says                                    0.1
-  learn             seconds in which rates and edges are learned                  10.0
-  raise_middleware  os: the middleware's threads above the workers                true
-  lock_memory       lock the memory, touch the stacks: no page faults there       false
-  spin              seconds that an idle worker looks for work; not with os       0.0
-  watchdog          seconds; callbacks in progress for longer are named; 0: none  0.0
-  live              let redag top see it (a page of memory that only its owner   true
-                    can read)
-  metrics_period    seconds between /diagnostics and ~/metrics; 0: none           1.0
-  bounds            compare response times with their bounds                      true
-  trace             folder for results, written at the end                        ""
-  trace_events      events kept for it                                            10000000
-  metrics_file      file for the last metrics, written at the end                 ""
-  save_path         where ~/save writes what was learned                          redag_workload.yaml
+Parameters, with their defaults:
+  config ""              workload file: maps callbacks to the tasks of DAGs
+  workers 0              callbacks that execute at the same time;
+                         0: one per processor
+  preemption auto        auto, os, cooperative or none
+  policy rate_monotonic  rate_monotonic, deadline_monotonic, fixed, edf, fifo
+                         or chain_aware
+  ties share             order of equal priorities: share (earlier release
+                         first) or fixed
+  threads 0              with os: callbacks started and unfinished at once;
+                         0: workers + 16
+  cpu_affinity []        processors of the workers; empty: all
+  default_period 0.1     period in seconds of callbacks without a known one
+  learn 10.0             seconds in which rates and edges are learned
+  raise_middleware true  with os: raise the middleware's threads above the
+                         workers
+  lock_memory false      lock memory and touch stacks, to avoid page faults
+  spin 0.0               seconds for which an idle worker looks for work;
+                         not with os
+  watchdog 0.0           warn about callbacks in progress for longer than
+                         these seconds; 0: no warnings
+  live true              let 'redag top' show the executor (a page of memory
+                         that only its owner can read)
+  metrics_period 1.0     seconds between two messages on /diagnostics and
+                         ~/metrics; 0: no messages
+  bounds true            compare response times with their bounds
+  trace ""               folder for results, written at the end
+  trace_events 10000000  number of events kept for the trace
+  metrics_file ""        file for the last metrics, written at the end
+  save_path redag_workload.yaml
+                         file to which ~/save writes the learned workload
+  overheads ""           file of overheads from 'redag calibrate'
 
-The locks of the process inherit priority where real-time priorities are to be had; REDAG_PI=0 in the environment
-turns that off.
+Locks of the process inherit priority where real-time priorities are available.
+Set REDAG_PI=0 in the environment to turn this off.
 
-Services: ~/_container/load_node and its kin (ros2 component ...), ~/metrics and ~/save (std_srvs/srv/Trigger).
-Ends with SIGINT or SIGTERM: 0; 1 if a callback threw or results could not be written; 2 for bad parameters.
+Services: ~/_container/load_node and the others of 'ros2 component';
+~/metrics and ~/save (std_srvs/srv/Trigger).
+
+The container ends on SIGINT or SIGTERM. Exit status: 0 success; 1 a callback
+threw an exception or results could not be written; 2 invalid parameters.
 )";
 
 /// Keeps an unloaded component alive until its callbacks have ended: another worker may still execute one of them.
@@ -95,7 +108,7 @@ int run() {
   try {
     executor->spin();
   } catch (const std::exception &error) {
-    RCLCPP_FATAL(logger, "a callback threw: %s", error.what());
+    RCLCPP_FATAL(logger, "a callback threw an exception: %s", error.what());
     status = kExitFailed;
   }
   if (const redag::Result<void> written = monitor->finish(); !written) {

@@ -38,33 +38,46 @@ constexpr int kExitOk = 0;
 constexpr int kExitNo = 1;
 constexpr int kExitBad = 2;
 
-constexpr const char *kHelp = R"(Runs a workload as real ROS 2 nodes with synthetic bodies, and measures every job.
+constexpr const char *kHelp = R"(Runs a workload as real ROS 2 nodes with synthetic callbacks, and measures
+every job.
 
-usage: run_workload WORKLOAD.yaml [options]
+Usage: run_workload [OPTIONS] WORKLOAD.yaml
 
-  --executor NAME[,NAME...]  redag (preemption as the workload says), redag-none, redag-cooperative, redag-os,
-                             mte, ste, static, events: rclcpp's own; cbg: EventsCBGExecutor, where it was built with;
-                             default redag. Several: each run in a process of its own, in turn, and compared
-  --duration TIME            releases happen in this time (default 10s)
-  --warm-up TIME             jobs released in this time at the start are not counted (default 0)
-  --seed N                   of execution times: every executor gets the same jobs (default 1)
-  --transport intra|inter    messages within the process, or through the middleware (default intra)
-  --threads N                of the executor (default: the workload's workers; ste, static, events have one)
-  --repeat N                 repetitions, the executors taking turns, and shown together (default 1)
-  --out DIR                  result files as `redag run` writes them; of several runs DIR/EXECUTOR/REPETITION
-  --force                    write into a folder that is not empty
-  --help
+Options:
+  --executor NAME[,NAME...]  Executors (default: redag). ReDAG-RT: redag (with
+                             the workload's preemption), redag-none,
+                             redag-cooperative, redag-os. Of rclcpp: mte, ste,
+                             static, events. EventsCBGExecutor, if built: cbg.
+                             Several run in turn, each in its own process, and
+                             are compared.
+  --duration TIME            Time in which jobs are released (default: 10s)
+  --warm-up TIME             Do not count jobs released in this time at the
+                             start (default: 0)
+  --seed N                   Seed of execution times; every executor gets the
+                             same jobs (default: 1)
+  --transport intra|inter    Send messages within the process, or through the
+                             middleware (default: intra)
+  --threads N                Threads of the executor (default: the workload's
+                             workers; ste, static and events have one)
+  --repeat N                 Repetitions, in which the executors take turns
+                             (default: 1)
+  --out DIR                  Folder for result files, as of 'redag run'; with
+                             several runs, DIR/EXECUTOR/REPETITION
+  --force                    Write into a folder that is not empty
+  --help                     Print this help message and exit
 
-A node per task (/control/ekf), a wall timer per timer task, a topic per task with successors. A release is a point of
-the timer's grid or the end of the last predecessor; a release that never ran is a miss. Ctrl-C ends the run early, with
-the results so far.
+There is a node for each task (such as /control/ekf), a wall timer for each
+timer task, and a topic for each task with successors. A release is a point of
+the timer's grid, or the end of the last predecessor. A release that never ran
+is a miss. Ctrl-C ends the run early and shows the results so far.
 
-examples:
-  ros2 run redag_rclcpp_lab run_workload contention.yaml --executor redag-os --out results
-  ros2 run redag_rclcpp_lab run_workload contention.yaml --executor redag,mte,ste --repeat 5 --duration 20s
+Examples:
+  ros2 run redag_rclcpp_lab run_workload cart.yaml --executor redag-os
+  ros2 run redag_rclcpp_lab run_workload cart.yaml --executor redag,mte,ste
   redag check-trace results/scheduler_events.jsonl
 
-exit code: 0 done; 1 a trace breaks the model's rules; 2 bad input, or the machine or ROS refused
+Exit status: 0 success; 1 a trace breaks rules of the model; 2 bad input, or
+the machine or ROS 2 refused the run.
 )";
 
 struct Arguments {
@@ -95,7 +108,7 @@ void handle_signals() {
   action.sa_flags = SA_RESTART;
   sigemptyset(&action.sa_mask);
   for (const int number : {SIGINT, SIGTERM}) {
-    REDAG_CHECK(sigaction(number, &action, nullptr) == 0, "no handler for a signal");
+    REDAG_CHECK(sigaction(number, &action, nullptr) == 0, "cannot install a signal handler");
   }
 }
 
@@ -105,7 +118,7 @@ redag::Result<std::uint64_t> parse_count(const std::string &option, const std::s
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || value < least) {
-    return redag::make_error(fmt::format("{} '{}' is not a whole number from {}", option, text, least));
+    return redag::make_error(fmt::format("{} '{}' is not a whole number of at least {}", option, text, least));
   }
   return value;
 }
@@ -127,7 +140,7 @@ redag::Result<std::vector<std::string>> parse_executors(std::string_view list) {
     const std::string name(list.substr(0, comma));
     if (auto known = check_executor(name); !known) return tl::unexpected(known.error());
     if (std::find(names.begin(), names.end(), name) != names.end()) {
-      return redag::make_error(fmt::format("executor '{}' is named twice", name));
+      return redag::make_error(fmt::format("executor '{}' is listed twice", name));
     }
     names.push_back(name);
     more = comma != std::string_view::npos;
@@ -152,7 +165,7 @@ redag::Result<void> take_option(const std::string &name, const std::string &valu
   if (name == "--threads") {
     const auto threads = parse_count(name, value, 1);
     if (threads && *threads > kMostThreads) {
-      return redag::make_error(fmt::format("--threads '{}' is more than {}", value, kMostThreads));
+      return redag::make_error(fmt::format("--threads '{}' is more than the maximum of {}", value, kMostThreads));
     }
     return keep(threads, arguments.run.threads);
   }
@@ -182,14 +195,14 @@ redag::Result<Arguments> parse_arguments(const std::vector<std::string> &words) 
       continue;
     }
     if (word.rfind("-", 0) != 0) {
-      if (!arguments.file.empty()) return redag::make_error(fmt::format("a second workload: '{}'", word));
+      if (!arguments.file.empty()) return redag::make_error(fmt::format("there is more than one workload: '{}'", word));
       arguments.file = word;
       continue;
     }
     const std::size_t equals = word.find('=');
     const std::string name = word.substr(0, equals);
     if (std::find(kWithValue.begin(), kWithValue.end(), name) == kWithValue.end()) {
-      return redag::make_error(fmt::format("there is no option '{}'", name), "run_workload --help lists them");
+      return redag::make_error(fmt::format("there is no option '{}'", name), "'run_workload --help' lists the options");
     }
     if (equals == std::string::npos && i + 1 == words.size()) {
       return redag::make_error(fmt::format("{} needs a value", name));
@@ -199,9 +212,9 @@ redag::Result<Arguments> parse_arguments(const std::vector<std::string> &words) 
       return tl::unexpected(taken.error());
     }
   }
-  if (arguments.file.empty()) return redag::make_error("no workload is named", "run_workload --help shows how");
+  if (arguments.file.empty()) return redag::make_error("no workload is given", "see 'run_workload --help'");
   if (arguments.run.warm_up >= arguments.run.duration) {
-    return redag::make_error(fmt::format("the warm-up of {} leaves nothing of a run of {}",
+    return redag::make_error(fmt::format("a warm-up of {} leaves nothing of a run of {}",
                                          redag::format_duration(arguments.run.warm_up),
                                          redag::format_duration(arguments.run.duration)));
   }
@@ -215,9 +228,10 @@ void note(const redag::Diagnostics &diagnostics) {
 redag::Result<void> prepare_folder(const std::string &folder, bool force) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) return redag::make_error(fmt::format("cannot make the folder '{}': {}", folder, error.message()));
+  if (error) return redag::make_error(fmt::format("cannot create the folder '{}': {}", folder, error.message()));
   if (!force && !fs::is_empty(folder, error)) {
-    return redag::make_error(fmt::format("the folder '{}' is not empty", folder), "--force writes into it anyway");
+    return redag::make_error(fmt::format("the folder '{}' is not empty", folder),
+                             "choose another folder, or write into it with --force");
   }
   return {};
 }
@@ -361,13 +375,13 @@ int compare(const redag::Workload &workload, const Arguments &arguments, const s
       const int status = run_child(arguments, executor, place);
       const redag::Result<redag::trace::Trace> trace = redag::trace::read_trace(place + "/events.jsonl");
       if (status == kExitBad || !trace) {
-        fmt::print(stderr, "error: the run on {} failed\n", executor);
+        fmt::print(stderr, "error: the run with executor {} failed\n", executor);
         if (status != kExitBad) note(trace.error());
         failed = true;
         break;
       }
       if (status == kExitNo) {
-        fmt::print(stderr, "{} broke the model's rules: see {}/check.json\n", executor, place);
+        fmt::print(stderr, "error: {} broke the model's rules: see {}/check.json\n", executor, place);
         lawful = false;
       }
       if (interrupted) break;  // a shorter run is not comparable
@@ -381,14 +395,16 @@ int compare(const redag::Workload &workload, const Arguments &arguments, const s
                arguments.run.intra_process ? "intra-process" : "middleware", arguments.run.seed,
                comparison_table(workload, arguments.executors, results));
     fmt::print(
-        "missed: late, skipped or aborted of the released jobs of all runs; lowest, highest: of a run\n"
-        "p50 to max: end to end, from the release of a source to the finish of a sink (of several: the worst one); "
-        "max is of all runs, p50 to p99 are medians of the runs\n");
+        "missed: late, skipped or aborted jobs, of the released jobs of all runs\n"
+        "lowest, highest: smallest and largest share of a run\n"
+        "p50 to max: end to end, from the release of a source to the finish of a sink;\n"
+        "with several sinks, each figure is that of the worst one\n"
+        "max is the largest of all runs; p50 to p99 are medians of the runs\n");
   }
   if (real_time && results.size() > 1) {
     fmt::print(
-        "note: redag with preemption os has real-time (SCHED_FIFO) threads, the others have not: on a busy "
-        "machine part of the difference is that alone\n");
+        "note: redag with preemption os had real-time (SCHED_FIFO) threads, the others not:\non a busy machine, this "
+        "alone explains part of the difference\n");
   }
   if (interrupted) fmt::print("stopped early: only whole runs are shown\n");
   if (failed) return kExitBad;
@@ -399,7 +415,7 @@ int run_all(const redag::Workload &workload, const Arguments &arguments) {
   if (!arguments.folder.empty()) return compare(workload, arguments, arguments.folder);
   std::string folder = (fs::temp_directory_path() / "run_workload.XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr) {
-    fmt::print(stderr, "error: cannot make a folder in {}\n", fs::temp_directory_path().string());
+    fmt::print(stderr, "error: cannot create a folder in {}\n", fs::temp_directory_path().string());
     return kExitBad;
   }
   const int status = compare(workload, arguments, folder);
