@@ -23,8 +23,8 @@ std::string describe(const analysis::AnalysisPlatform &platform, const trace::Ru
   return fmt::format("{} worker{}, {} preemption, {}", platform.workers, platform.workers == 1 ? "" : "s",
                      trace::preemption_name(platform.preemption),
                      run.overheads.empty() ? none
-                     : is_real             ? "with the overheads of the machine"
-                                           : "overheads " + run.overheads);
+                     : is_real             ? "charged with the machine's overheads"
+                                           : "charged with overheads " + run.overheads);
 }
 
 RunBounds none(std::string why) {
@@ -46,9 +46,10 @@ std::vector<BoundOf> by_id(const std::vector<analysis::Tightest> &all) {
 
 RunBounds bounds_of(const trace::RunInfo &run) {
   const executors::ExecutorKind *executor = executors::find_executor(run.executor);
-  if (executor == nullptr) return none("there is no analysis of the executor '" + run.executor + "'");
+  if (executor == nullptr) return none("there is no analysis for the executor '" + run.executor + "'");
   if (run.workload.task_count() > kMostTasks) {
-    return none(fmt::format("more than {} tasks: 'redag analyze' takes its time for them", kMostTasks));
+    return none(fmt::format("there are more than {} tasks, which takes long: run 'redag analyze' for their bounds",
+                            kMostTasks));
   }
   const auto executed = analysis::as_executed(run.workload, run.config, run.overheads);
   if (!executed) return none(executed.error().front().message);
@@ -65,7 +66,7 @@ RunBounds bounds_of(const trace::RunInfo &run) {
   const auto bounded = [](const BoundOf &bound) { return bound.response.has_value(); };
   if (!bounds.schedulable && std::none_of(bounds.tasks.begin(), bounds.tasks.end(), bounded)) {
     bounds.absent = task_set->not_analysable.empty()
-                        ? "no sound method bounds a response here; 'redag analyze' says why"
+                        ? "no sound method bounds a response time here; 'redag analyze' shows why"
                         : task_set->not_analysable;
   }
   return bounds;

@@ -180,22 +180,21 @@ class GroupWriter {
     }
     const auto cut = [&](std::size_t most, const char *what) {
       if (order.size() <= most) return;
-      cuts.push_back(fmt::format("{}: {} of the {} tasks that came closest to a miss, of {}", group.label(), what,
+      cuts.push_back(fmt::format("{}: {} only the {} tasks that came closest to a miss, of {}", group.label(), what,
                                  format_count(most), format_count(order.size())));
     };
-    cut(most_tasks, "the table of tasks has rows");
-    cut(most_curves, "the figures of responses and lateness show those");
+    cut(most_tasks, "the table of tasks shows");
+    cut(most_curves, "the figures of response times and lateness show");
     const Schedule &schedule = group.schedule();
     if (schedule.slices_shown < schedule.slices_in_all) {
       cuts.push_back(
-          fmt::format("{}: the schedule shows {} of {} stretches on workers: the beginning, and around the worst jobs; "
-                      "the overview covers the whole run",
+          fmt::format("{}: the schedule shows {} of {} slices on workers: the beginning, and the time around the worst "
+                      "jobs; the overview covers the whole run",
                       group.label(), format_count(schedule.slices_shown), format_count(schedule.slices_in_all)));
     }
     if (group.runs().size() > 1) {
-      cuts.push_back(
-          fmt::format("{}: the schedule is that of the first of {} runs; all other figures are of all of them",
-                      group.label(), group.runs().size()));
+      cuts.push_back(fmt::format("{}: the schedule is that of the first of {} runs; all other figures cover all runs",
+                                 group.label(), group.runs().size()));
     }
   }
 

@@ -76,11 +76,11 @@ Result<ExperimentDocument> experiment_document(std::string_view text, const std:
                                                const Provenance &provenance) {
   const auto mistake = [&](const std::string &message) {
     return tl::unexpected<Diagnostics>(Diagnostics{
-        Diagnostic{Severity::Error, file, 0, 0, message, "'redag experiment factorial ... --out DIR' writes it"}});
+        Diagnostic{Severity::Error, file, 0, 0, message, "'redag experiment factorial PLAN --out DIR' writes one"}});
   };
   try {
     const Json from = Json::parse(text);
-    if (from.value("format", "") != kFormat) return mistake(fmt::format("is no {} document", kFormat));
+    if (from.value("format", "") != kFormat) return mistake(fmt::format("is not a {} document", kFormat));
     Json to = {{"kind", "factorial"}};
     to["provenance"] = provenance.is_known() ? Json::parse(provenance_to_json(provenance)) : Json();
     to["results_provenance"] = from.value("provenance", Json());

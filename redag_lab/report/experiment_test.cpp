@@ -72,7 +72,8 @@ TEST(ExperimentDocument, OtherFilesAreRefused) {
     return document ? std::string() : to_string(document.error());
   };
   EXPECT_THAT(error_of("{"), HasSubstr("x/factorial.json: error: cannot be read"));
-  EXPECT_THAT(error_of("{\"format\": \"redag.summary/1\"}"), HasSubstr("is no redag.experiment.factorial/2 document"));
+  EXPECT_THAT(error_of("{\"format\": \"redag.summary/1\"}"),
+              HasSubstr("is not a redag.experiment.factorial/2 document"));
   nlohmann::json without = small_document();
   without.erase("factors");
   EXPECT_THAT(error_of(without.dump()), HasSubstr("factors"));

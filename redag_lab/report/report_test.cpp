@@ -87,7 +87,8 @@ TEST(Verdict, ACleanRunIsGoodAndProven) {
   const std::vector<Sentence> sentences = verdict_of(group);
   EXPECT_EQ(sentences[0].tone, Tone::Good);
   EXPECT_EQ(sentences[0].text,
-            "Every deadline was met: 120 jobs, none late, none lost. The closest was lo.l, 24ms before its deadline.");
+            "Every deadline was met: 120 jobs, none late, none lost. The closest to its deadline was lo.l, with 24ms "
+            "to spare.");
   EXPECT_EQ(sentences[1].tone, Tone::Good) << sentences[1].text;
   EXPECT_NE(sentences[1].text.find("every deadline is met"), std::string::npos);
   EXPECT_EQ(sentences[2].tone, Tone::Good) << "the trace checker: " << sentences[2].text;
@@ -98,8 +99,8 @@ TEST(Verdict, MissesAreCountedNamedAndNotProvenAway) {
   const std::vector<Sentence> sentences = verdict_of(group);
   EXPECT_EQ(sentences[0].tone, Tone::Bad);
   EXPECT_NE(sentences[0].text.find("hi "), std::string::npos) << sentences[0].text;
-  EXPECT_NE(sentences[0].text.find(", the other one none."), std::string::npos) << sentences[0].text;
-  EXPECT_NE(sentences[1].text.find("not shown"), std::string::npos) << sentences[1].text;
+  EXPECT_NE(sentences[0].text.find(", none in the other one."), std::string::npos) << sentences[0].text;
+  EXPECT_NE(sentences[1].text.find("not every deadline is shown"), std::string::npos) << sentences[1].text;
 }
 
 // Returns a run in which one job of `hi.h`, whose wcet and bound are 2 ms, took 5 ms and `used_ms` of processor time.
@@ -114,27 +115,30 @@ trace::Trace late_run(Time used_ms) {
 
 TEST(Verdict, AWcetThatWasExceededIsAnAlarm) {
   const std::vector<Sentence> sentences = verdict_of(group_of("late", {late_run(5)}));
-  EXPECT_NE(sentences[1].text.find("platform overheads not charged"), std::string::npos) << sentences[1].text;
+  EXPECT_NE(sentences[1].text.find("overheads of the platform are not charged"), std::string::npos)
+      << sentences[1].text;
   EXPECT_EQ(sentences[1].text.find("within its bound"), std::string::npos) << sentences[1].text;
   EXPECT_EQ(sentences[2].tone, Tone::Bad);
-  EXPECT_NE(sentences[2].text.find("hi.h: wcet exceeded: 5ms of processor time, 1 of 1 execution above"),
+  EXPECT_NE(sentences[2].text.find("hi.h: wcet exceeded: 5ms of processor time, 1 of 1 execution exceeded"),
             std::string::npos)
       << sentences[2].text;
   EXPECT_EQ(sentences[3].tone, Tone::Bad);
-  EXPECT_NE(sentences[3].text.find("hi.h: 1 response above the bound of 2ms"), std::string::npos) << sentences[3].text;
+  EXPECT_NE(sentences[3].text.find("hi.h: 1 response exceeded the bound of 2ms"), std::string::npos)
+      << sentences[3].text;
 }
 
 TEST(Verdict, WhatAMachineMayTakeIsNoAlarmUnlessItWasCalibrated) {
   trace::Trace trace = late_run(2);
   const std::vector<Sentence> noted = verdict_of(group_of("late", {trace}));
   EXPECT_EQ(noted[2].tone, Tone::Plain);
-  EXPECT_NE(noted[2].text.find("No alarm, and within what a machine may take: hi.h: 1 response above"),
+  EXPECT_NE(noted[2].text.find("No alarm; the machine's noise may explain these deviations: hi.h: 1 response exceeded"),
             std::string::npos)
       << noted[2].text;
   trace.info.overheads = to_string(Overheads());
   const std::vector<Sentence> alarmed = verdict_of(group_of("late", {trace}));
   EXPECT_EQ(alarmed[2].tone, Tone::Bad);
-  EXPECT_NE(alarmed[2].text.find("platform: jobs that held their workers got no processor for 3ms"), std::string::npos)
+  EXPECT_NE(alarmed[2].text.find("platform: jobs that held their workers received no processor for 3ms"),
+            std::string::npos)
       << alarmed[2].text;
 }
 
@@ -214,7 +218,7 @@ TEST(Document, TheMaximumIsOfAllRepetitionsAndADagAnswersEndToEnd) {
   EXPECT_FALSE(dag["jobs"].contains("response"));
   const Sentence verdict = verdict_of(all[0]).front();
   EXPECT_EQ(verdict.tone, Tone::Bad) << "every job was in time, and the DAG was not";
-  EXPECT_NE(verdict.text.find("chain came later than its 4ms 1 of 9 times"), std::string::npos) << verdict.text;
+  EXPECT_NE(verdict.text.find("chain exceeded its deadline of 4ms 1 of 9 times"), std::string::npos) << verdict.text;
 }
 
 // One job of 23 326 is late, in the second of three runs.

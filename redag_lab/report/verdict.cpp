@@ -23,10 +23,10 @@ std::string closest(const Group &group) {
   const std::string name = trace::task_name(group.workload(), job.task);
   const Duration lateness = job.lateness();
   if (lateness > 0) {
-    return fmt::format(" The worst for its deadline was {}, {} late at {}.", name, humanize_duration(lateness),
+    return fmt::format(" The worst relative to its deadline was {}, {} late at {}.", name, humanize_duration(lateness),
                        humanize_duration(group.latest()->since));
   }
-  return fmt::format(" The closest was {}, {} before its deadline.", name, humanize_duration(-lateness));
+  return fmt::format(" The closest to its deadline was {}, with {} to spare.", name, humanize_duration(-lateness));
 }
 
 Sentence on_deadlines(const Group &group) {
@@ -44,8 +44,7 @@ std::string first_of(std::vector<std::string> names, std::size_t most) {
 
 Sentence on_bounds(const Group &group) {
   const RunBounds &bounds = group.bounds();
-  if (!bounds.absent.empty())
-    return {Tone::Plain, fmt::format("There are no bounds to compare with: {}.", bounds.absent)};
+  if (!bounds.absent.empty()) return {Tone::Plain, fmt::format("No bounds to compare with: {}.", bounds.absent)};
   std::vector<std::string> above;
   const bool simulated = group.info().driver == trace::Driver::Simulator;
   std::size_t bounded = 0;
@@ -69,26 +68,27 @@ Sentence on_bounds(const Group &group) {
                                 humanize_duration(*bounds.dags[d].response)));
   }
   if (!above.empty()) {
-    return {Tone::Bad, fmt::format("Above its bound: {}. {}", first_of(above, 3),
-                                   simulated ? "A bound was broken in virtual time: one of the two is wrong."
-                                             : "An assumption of the bound was broken.")};
+    return {Tone::Bad,
+            fmt::format("Above the bound: {}. {}", first_of(above, 3),
+                        simulated ? "A bound was exceeded in virtual time: either the bound or the simulation is wrong."
+                                  : "An assumption of the bound does not hold.")};
   }
   const std::string within = bounded == 0 || !is_within
                                  ? ""
-                                 : fmt::format(" Every response was within its bound ({} of {} have one).", bounded,
-                                               plural(bounds.tasks.size(), "task"));
+                                 : fmt::format(" Every response time was within its bound ({} of {} have one).",
+                                               bounded, plural(bounds.tasks.size(), "task"));
   if (bounds.schedulable && metrics::has_misses(group.total(), group.dags())) {
-    return {Tone::Caution,
-            fmt::format("Analysis, {}: every deadline is met, by {}, if its assumptions hold. This run missed "
-                        "deadlines: they did not.{}",
-                        bounds.assumes, first_of(bounds.by, 2), within)};
+    return {Tone::Caution, fmt::format("Analysis ({}): every deadline is met, by {}, if its assumptions hold. This run "
+                                       "missed deadlines, so they did not hold.{}",
+                                       bounds.assumes, first_of(bounds.by, 2), within)};
   }
   if (bounds.schedulable) {
-    return {Tone::Good, fmt::format("Analysis, {}: every deadline is met, by {}.{}", bounds.assumes,
+    return {Tone::Good, fmt::format("Analysis ({}): every deadline is met, by {}.{}", bounds.assumes,
                                     first_of(bounds.by, 2), within)};
   }
-  return {Tone::Plain, fmt::format("Analysis, {}: not shown that every deadline is met; bounds are safe, not exact.{}",
-                                   bounds.assumes, within)};
+  return {Tone::Plain,
+          fmt::format("Analysis ({}): not every deadline is shown to be met; bounds are safe, not exact.{}",
+                      bounds.assumes, within)};
 }
 
 // Adds each alarm as a sentence, and one sentence for all deviations that the machine's noise may explain.
@@ -104,8 +104,8 @@ void add_assumptions(const Group &group, std::vector<Sentence> &sentences) {
     sentences.push_back({Tone::Bad, plural(alarms.size() - kMost, "other alarm") + " of this kind."});
   }
   if (!notes.empty()) {
-    sentences.push_back(
-        {Tone::Plain, fmt::format("No alarm, and within what a machine may take: {}.", first_of(notes, 3))});
+    sentences.push_back({Tone::Plain, fmt::format("No alarm; the machine's noise may explain these deviations: {}.",
+                                                  first_of(notes, 3))});
   }
 }
 
@@ -125,14 +125,14 @@ void add_remarks(const Group &group, std::vector<Sentence> &sentences) {
   }
   if (violations > 0) {
     sentences.push_back(
-        {Tone::Bad, fmt::format("The trace breaks rules of the model {}: {}", plural(violations, "time"), first)});
+        {Tone::Bad, fmt::format("The trace violates rules of the model {}: {}", plural(violations, "time"), first)});
   } else {
-    sentences.push_back({Tone::Good, fmt::format("The trace checker found every rule of the model kept, in {}.",
-                                                 plural(checks, "check"))});
+    sentences.push_back(
+        {Tone::Good, fmt::format("The trace checker found no violation of the model in {}.", plural(checks, "check"))});
   }
-  if (!enforced) sentences.push_back({Tone::Bad, "A bound on jobs in progress or a group was not kept."});
+  if (!enforced) sentences.push_back({Tone::Bad, "A bound on jobs in progress or an exclusive group was violated."});
   if (lost > 0) {
-    sentences.push_back({Tone::Caution, fmt::format("{} lost: the figures have holes.", plural(lost, "event"))});
+    sentences.push_back({Tone::Caution, fmt::format("{} lost: the figures are incomplete.", plural(lost, "event"))});
   }
 }
 

@@ -23,14 +23,14 @@ const varied = factors.filter(({name, levels}) => name !== EXECUTOR && levels.le
 const pairs = (factors.find(({name}) => name === 'max_active') || {levels: []}).levels.filter((level) => /^\d+\+\d+$/.test(level));
 
 const METRICS = {
-  miss_ratio: 'missed: late or dropped', drop_ratio: 'dropped', excess_miss_ratio: 'missed above the ideal', response_p50_ns: 'median end to end',
+  miss_ratio: 'missed: late, skipped or aborted', drop_ratio: 'skipped', excess_miss_ratio: 'missed above the ideal', response_p50_ns: 'median end to end',
   response_p95_ns: 'p95 end to end', response_p99_ns: 'p99 end to end', response_max_ns: 'longest end to end, of all runs', max_lateness_ns: 'largest lateness, of all runs',
-  deferred: 'deferred, of all jobs', preemptions: 'preemptions a job', paper_miss_ratio: 'missed as the paper counts',
-  finished_per_s: 'finished jobs a second', work: 'processors in use',
+  deferred: 'deferred, of all jobs', preemptions: 'preemptions per job', paper_miss_ratio: 'missed, counted as in the paper',
+  finished_per_s: 'finished jobs per second', work: 'processors in use',
 };
 // Returns the reason why a figure is empty.
-const nothing = (metric) => (metric.startsWith('response_') ? 'A response is that of one DAG, end to end: choose a DAG. (One that never answered has none.)'
-  : 'There is nothing of this kind: the distance to the ideal needs the executor "ideal" on the same workers and jobs.');
+const nothing = (metric) => (metric.startsWith('response_') ? 'A response time belongs to one DAG, end to end: choose a DAG. (A DAG that never finished has none.)'
+  : 'There is no data: the distance to the ideal needs runs of the executor "ideal" with the same workers and jobs.');
 const isTime = (metric) => metric.endsWith('_ns');
 const isShare = (metric) => metric.endsWith('_ratio') || metric === 'deferred';
 const show = (metric, value) => (isTime(metric) ? formatTime(value) : isShare(metric) ? formatPercent(value) : String(value));
@@ -190,7 +190,7 @@ function boundsFigure() {
   const note = element('p.soft');
   const self = figure({
     name: 'bounds', height: 380, label: 'A metric for each pair of bounds',
-    caption: 'Across: max_active of the first DAG; up: of the second. The number is the median; of a largest value, the largest of all runs.',
+    caption: 'Horizontal: max_active of the first DAG; vertical: of the second. Numbers are medians; maxima are the largest of all runs.',
     build(t, width) {
       const owner = owners[state.owner];
       const cells = pairs.map((pair) => [...pair.split('+'), spreadAt(owner, state.metric, {max_active: pair})]).filter((cell) => cell[2] !== null);
@@ -212,7 +212,7 @@ function boundsFigure() {
           return tip([`max_active ${a} and ${b}`, show(state.metric, spread[0]), `${show(state.metric, spread[1])} to ${show(state.metric, spread[2])}`]);
         }},
         xAxis: {type: 'category', data: across, name: 'max_active of the first DAG', nameLocation: 'middle', nameGap: 28},
-        yAxis: {type: 'category', data: up, name: 'of the second', nameLocation: 'middle', nameGap: 32},
+        yAxis: {type: 'category', data: up, name: 'max_active of the second DAG', nameLocation: 'middle', nameGap: 32},
         series: [{
           type: 'custom', data: cells.map(([a, b, spread], i) => [across.indexOf(a), up.indexOf(b), spread[0], i]), encode: {x: 0, y: 1},
           renderItem: (params, api) => {
@@ -239,10 +239,10 @@ function effectsFigure() {
   const terms = [...new Set(shown.flatMap(({shares}) => shares.map(name)))];
   return figure({
     name: 'effects', height: 140 + 34 * Math.max(1, shown.length), label: 'Shares of the variation that each factor explains',
-    caption: 'Of the variation of the miss ratio over all runs of an executor: the share that a factor explains alone, that pairs of factors explain '
-      + 'together (\u00d7), three and more, and chance.',
+    caption: 'Shares of the variation of the miss ratio over all runs of an executor: explained by one factor alone, by pairs of factors '
+      + 'together (\u00d7), by three or more factors, and by chance.',
     build(t) {
-      if (shown.length === 0) return report.complete ? 'The miss ratio is the same everywhere.' : 'Effects need all runs.';
+      if (shown.length === 0) return report.complete ? 'The miss ratio is the same everywhere.' : 'The effects are available once all runs are done.';
       const rows = shown.map(({workload, executor}) => (new Set(shown.map((one) => one.workload)).size > 1 ? `${label(executor)}, ${workload}` : label(executor)));
       const value = (one, term) => (one.shares.find((share) => name(share) === term) || {share: 0}).share;
       const stack = (label, data, i) => ({type: 'bar', stack: 'all', name: label, data, itemStyle: {color: colourOf(t, i), opacity: i >= 8 ? 0.55 : 1}, barMaxWidth: 22});
@@ -254,7 +254,7 @@ function effectsFigure() {
         yAxis: {type: 'category', inverse: true, data: rows, axisLabel: {color: t.ink}},
         series: [
           ...terms.map((term, i) => stack(term, shown.map((one) => value(one, term)), i)),
-          stack('three and more', shown.map((one) => one.higher_interactions), terms.length),
+          stack('three or more', shown.map((one) => one.higher_interactions), terms.length),
           stack('chance', shown.map((one) => one.noise), terms.length + 1),
         ],
       };
@@ -268,7 +268,7 @@ function verdict() {
   if (report.violations > 0) say('bad', `The trace checker found ${formatCount(report.violations)} violations of the model.`);
   else say('good', `${formatCount(report.done)} runs, ${formatCount(report.checks)} checks of their traces: no violation of the model.`);
   if (report.runs_beyond_max_active > 0) say('bad', `max_active was exceeded in ${formatCount(report.runs_beyond_max_active)} runs.`);
-  else if (pairs.length > 0 || points.some(({at}) => at.max_active)) say('good', 'Every bound max_active was kept in every run.');
+  else if (pairs.length > 0 || points.some(({at}) => at.max_active)) say('good', 'No run exceeded max_active.');
   if (!report.complete) say('caution', `${formatCount(report.done)} of ${formatCount(report.units)} runs are done.`);
   factors.find(({name}) => name === 'workload').levels.forEach((workload) => {
     const missed = (executor) => {
@@ -321,9 +321,9 @@ function howItWasRun() {
   const worldRows = worlds.length > 1 ? byWorld(executors).map(({world, names}) => [WORLDS[world], `${names.map(plainName).join(', ')} ${DRIVERS[world]}`])
     : [['World', DRIVERS[worlds[0]]]];
   return [
-    element('h2', {id: 'how'}, 'How it was run'),
+    element('h2', {id: 'how'}, 'How the runs were made'),
     element('dl', {}, ...[...worldRows, ['Length of a run', formatTime(report.duration_ns)],
-      ['Runs of a combination', String(report.repetitions)], ['Combinations', formatCount(points.length)], ['Machine', machines.join('; ') || 'not recorded'],
+      ['Runs per combination', String(report.repetitions)], ['Combinations', formatCount(points.length)], ['Machine', machines.join('; ') || 'not recorded'],
       ...provenanceRows(report.results_provenance),
     ].flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])),
     element('details', {}, element('summary', {}, 'The plan'), element('pre', {}, report.plan)),
@@ -331,12 +331,12 @@ function howItWasRun() {
   ];
 }
 
-const intervals = 'Lines across: a confidence interval for the median over the repetitions, whose level the tables of the experiment give; '
-  + 'of a largest value, which is that of all runs, from the least to the largest run.';
+const intervals = 'Bars: confidence interval of the median over the repetitions (the tables of the experiment state its level); '
+  + 'for a maximum, which is that of all runs, from the smallest to the largest run.';
 const bars = worlds.length > 1 || varied.length === 0 ? worldsFigure() : null;
 const curves = curvesFigure('curves', () => state.metric, `Medians at the chosen levels. ${intervals}`);
 const distance = curvesFigure('distance', () => 'excess_miss_ratio', 'Missed deadlines above those of the ideal (preemptive, no overhead, no bounds, in virtual '
-  + `time) on the same jobs. Below 0: better than it, which is no contradiction, since a rate-monotonic order is not optimal. ${intervals}`);
+  + `time) on the same jobs. Values below 0 are better than the ideal; this is possible, because a rate-monotonic order is not optimal. ${intervals}`);
 const map = boundsFigure();  // not drawn while hidden, with a width of 0
 // A single factor explains everything.
 const effects = varied.filter(({name}) => name !== 'workload').length > 1 ? effectsFigure() : null;
@@ -361,7 +361,7 @@ startPage([
   element('h2', {id: 'curves'}, varied.length > 0 ? 'Over one factor' : 'Executors side by side'), controls,
   ...(varied.length > 0 ? [filled(() => element('p.soft', {}, where([varied[state.x].name]))), curves.box,
     element('h3', {}, 'Distance to the ideal'), distance.box, filled(selectionTable)] : []),
-  ...(bars === null ? [] : [worlds.length > 1 ? element('h2', {id: 'worlds'}, 'World beside world') : null,
+  ...(bars === null ? [] : [worlds.length > 1 ? element('h2', {id: 'worlds'}, 'Comparison of worlds') : null,
     varied.length > 0 ? filled(() => element('div.row.controls', {}, levelChoice(varied[state.x]))) : null,
     varied.length > 0 ? filled(() => element('p.soft', {}, where([]))) : null, bars.box]),
   ...(varied.length > 0 ? [] : [filled(selectionTable)]),

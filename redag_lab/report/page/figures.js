@@ -40,8 +40,8 @@ function verticalLine(t, x, text, colour, position) {
 function responseFigure(groups, state) {
   return figure({
     name: 'responses', height: 368, label: 'Distribution of response times',
-    caption: 'Response: from the nominal release to the finish. Jobs that were lost never answer: where some were, a '
-      + `curve ends below 1. Of all tasks, the ${MOST_LINES} that came closest to their deadlines. The legend takes lines away and back.`,
+    caption: 'Response time: finish \u2212 nominal release. Lost jobs never finish: a task with lost jobs has a '
+      + `curve that ends below 1. At most ${MOST_LINES} tasks are shown, the closest to their deadlines. Click the legend to hide or show a line.`,
     build(t, width) {
       const one = state.task !== null;
       const name = one ? taskName(groups[state.executor], state.task) : null;
@@ -72,7 +72,7 @@ function responseFigure(groups, state) {
         tooltip: {
           trigger: 'item',
           formatter: (item) => tip([item.seriesName, `${one ? formatTime(item.value[0]) : `${item.value[0].toFixed(3)} of the deadline`}`,
-            state.tail ? `exceeded by ${formatPercent(item.value[1])}` : `answered: ${formatPercent(item.value[1])}`]),
+            state.tail ? `longer: ${formatPercent(item.value[1])} of the jobs` : `finished: ${formatPercent(item.value[1])} of the jobs`]),
         },
         dataZoom: [{type: 'inside', filterMode: 'none', zoomOnMouseWheel: 'ctrl', preventDefaultMouseMove: false}],
         xAxis: {
@@ -82,7 +82,7 @@ function responseFigure(groups, state) {
           axisLabel: {showMaxLabel: false, formatter: (value) => (one ? formatAxisTime(value, most / 20) : String(Number(value.toPrecision(3))))},
         },
         yAxis: state.tail
-          ? {type: 'log', max: 1, name: 'share that takes longer', nameGap: 24, nameTextStyle: {align: 'left'},
+          ? {type: 'log', max: 1, name: 'share of jobs that take longer', nameGap: 24, nameTextStyle: {align: 'left'},
             axisLabel: {formatter: (value) => String(value)}}
           : {type: 'value', min: 0, max: 1, name: 'share of jobs', nameGap: 24, nameTextStyle: {align: 'left'}},
         series: lines.map(({group, g, task, i}, k) => ({
@@ -101,8 +101,8 @@ function responseFigure(groups, state) {
 function latenessFigure(groups, state) {
   return figure({
     name: 'lateness', height: 308, label: 'Histogram of lateness',
-    caption: 'Lateness: finish minus deadline, as a share of the deadline; \u22121 is the release, right of 0 is late. The last '
-      + 'class holds everything later than one whole deadline. Lost jobs have no lateness and are not here. Logarithmic.',
+    caption: 'Lateness: finish \u2212 deadline, relative to the deadline. \u22121 is the release; jobs right of 0 are late. The last '
+      + 'class holds all jobs that are later than one whole deadline. Lost jobs have no lateness. Logarithmic.',
     build(t, width) {
       const group = groups[state.executor];
       const tasks = state.task !== null ? [group.tasks[state.task]] : group.tasks;
@@ -143,7 +143,7 @@ function latenessFigure(groups, state) {
 function timelineFigure(groups, state) {
   return figure({
     name: 'timeline', height: 268, label: 'Workers in use and missed deadlines over the whole run',
-    caption: 'Above: workers in use, by DAG. Below: share of the jobs released in each stretch that missed their deadline '
+    caption: 'Above: workers in use, by DAG. Below: share of the jobs released in each interval that missed their deadline '
       + 'or were lost.',
     build(t, width) {
       const group = groups[state.executor];
@@ -211,7 +211,7 @@ function comparisonFigure({name, title, groups, rows, value, log, format, format
           trigger: 'item',
           formatter: (item) => {
             const {at, min, max} = spread(rows[item.dataIndex], item.seriesIndex % groups.length);
-            return tip([`${rows[item.dataIndex].name}, ${groups[item.seriesIndex % groups.length].label}`, at === null ? 'no answer' : format(at),
+            return tip([`${rows[item.dataIndex].name}, ${groups[item.seriesIndex % groups.length].label}`, at === null ? 'no job finished' : format(at),
               min === max ? null : `repetitions: ${format(min)} to ${format(max)}`]);
           },
         },

@@ -47,6 +47,6 @@ const DRIVERS = {
 const WORLDS = {simulator: 'virtual time', threads: 'threads', ros: 'ROS 2', ros_nodes: 'ROS 2', ros2: 'ROS 2'};
 const OUTCOMES = ['in progress', 'finished', 'skipped', 'aborted'];
 const REASONS = [
-  '', 'not started when the next was released', 'not ready when the next was released', 'its queue was full',
-  'its DAG was full', 'its task was removed', 'exception', 'over its budget', 'nothing to do',
+  '', 'not started before the next release', 'not ready before the next release', 'its queue was full',
+  'its DAG was full', 'its task was removed', 'exception', 'budget used up', 'no data',
 ];

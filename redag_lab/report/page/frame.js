@@ -35,7 +35,7 @@ const programOf = ({version, revision}) => `redag ${version} (revision ${revisio
 
 /** Returns the origin of results as rows of a description list. `provenance` is null in results of older versions. */
 function provenanceRows(provenance) {
-  if (!provenance) return [['Recorded', 'by a version of redag that did not note when, where and how']];
+  if (!provenance) return [['Recorded', 'by an old version of redag, which did not record when, where and how']];
   const {created, host, kernel, command, calibration} = provenance;
   return [['Recorded', `${created}, by ${programOf(provenance)}`], ['Host', `${host}, ${kernel}`], ['Command line', element('code', {}, command)],
     ['Calibration', calibration]];

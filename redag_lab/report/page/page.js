@@ -33,12 +33,12 @@ function comparisonSection() {
     comparisonFigure({
       name: 'missed', title: 'missed', groups, rows, value: (row, cell) => ({...cell.miss_ratio, at: cell.missed / Math.max(1, cell.released)}), log: false, format: formatPercent,
       formatAxis: (share) => `${Number((100 * share).toPrecision(3))} %`,
-      caption: 'Share of the released jobs of all repetitions that were late, skipped or aborted; lines from the lowest to the highest repetition.',
+      caption: 'Share of released jobs that were late, skipped or aborted, over all repetitions. Lines: from the lowest to the highest repetition.',
     }),
     comparisonFigure({
       name: 'p99', title: 'p99 end to end', groups, rows, value: (row, cell) => cell.p99_ns && {...cell.p99_ns, at: cell.p99_ns.median}, log: true,
       format: (ns) => (ns > 0 ? formatTime(Number(ns.toPrecision(3))) : ''), formatAxis: (ns) => formatAxisTime(ns, ns),
-      caption: '99th percentile of the end-to-end response, logarithmic: median over repetitions, lines from the lowest to the highest.',
+      caption: '99th percentile of the end-to-end response time (logarithmic): median over the repetitions. Lines: from the lowest to the highest repetition.',
     }),
   ];
   return [...parts, element('div.side-by-side', {}, ...figures.map((fig) => fig.box)), filled(() => comparisonTable(groups, rows))];
@@ -48,7 +48,7 @@ function taskChoice(refresh) {
   return filled(() => {
     const group = groups[state.executor];
     const tasks = group.tasks.map((task, i) => i).filter((i) => hasCurve(group.tasks[i]));
-    const names = ['all tasks, as a share of their deadlines', ...tasks.map((i) => taskName(group, i))];
+    const names = ['all tasks, relative to their deadlines', ...tasks.map((i) => taskName(group, i))];
     return dropdown('task', names, 1 + tasks.indexOf(state.task), (i) => {
       state.task = i === 0 ? null : tasks[i - 1];
       refill();
@@ -64,7 +64,7 @@ function detailSections() {
   const schedule = scheduleFigure(groups, state);
   const redraw = () => { responses.draw(); lateness.draw(); };
 
-  const pick = several ? [element('div.row.executors', {}, element('span.soft', {}, 'details for'),
+  const pick = several ? [element('div.row.executors', {}, element('span.soft', {}, 'Details of'),
     choice(groups.map((group) => group.label), 0, (i) => {
       const name = state.task === null ? null : taskName(groups[state.executor], state.task);
       state.executor = i;
@@ -82,11 +82,11 @@ function detailSections() {
     ...pick,
     several ? filled(() => verdictList(groups[state.executor].verdict)) : null,
     element('h2', {id: 'dags'}, 'DAGs'), filled(() => dagTable(groups[state.executor])),
-    element('h2', {id: 'tasks'}, 'Tasks: measured and proven'),
+    element('h2', {id: 'tasks'}, 'Tasks: measured times and bounds'),
     filled(() => {
       const {bounds} = groups[state.executor];
       return element('p.soft', {}, bounds.absent ? `No bounds: ${bounds.absent}.`
-        : `Bounds for ${bounds.assumes}; the method stands in the tooltip of a bound.`);
+        : `Bounds for ${bounds.assumes}. The tooltip of a bound names its method.`);
     }),
     filled(() => taskTable(groups[state.executor], state.unfolded, () => {
       state.unfolded = true;
@@ -99,7 +99,7 @@ function detailSections() {
     responses.box,
     element('h3', {}, 'Lateness'), lateness.box,
     element('h2', {id: 'schedule'}, 'Schedule'), timeline.box,
-    element('h3', {}, 'In detail'),
+    element('h3', {}, 'Schedule in detail'),
     element('div.row.controls', {},
       filled(() => dropdown('show', viewNames(groups[state.executor]), state.view, (i) => { state.view = i; schedule.look(); })),
       choice(['tasks', 'workers'], 0, (i) => { state.rows = i === 1 ? 'workers' : 'tasks'; schedule.draw(); }),
@@ -129,8 +129,8 @@ function howItWasRun() {
       ['Executor', run.executor], ['World', DRIVERS[run.driver]],
       ['Preemption', run.preemption + (run.preemption_why ? ` (${run.preemption_why})` : '')],
       ['Workers', `${config.workers}${config.levels ? `, ${config.levels} priority levels` : ''}`], ['Policy', config.policy],
-      ['Length', `${formatTime(run.end_ns - run.start_ns)}${run.warm_up_ns ? `, of which ${formatTime(run.warm_up_ns)} warm-up are not counted` : ''}`],
-      ['Overheads', run.overheads || 'none added'],
+      ['Length', `${formatTime(run.end_ns - run.start_ns)}${run.warm_up_ns ? `, without jobs of the first ${formatTime(run.warm_up_ns)} (warm-up)` : ''}`],
+      ['Overheads', run.overheads || 'none'],
       ['Machine', [machine.model, machine.cpus ? `${machine.cpus} processors` : '', machine.kernel].filter(Boolean).join(', ') || 'not recorded'],
     ];
     rows.push(...provenanceRows(runs[0].provenance));
@@ -139,7 +139,7 @@ function howItWasRun() {
       element('details', {}, element('summary', {}, 'The workload'), element('pre', {}, run.workload))];
   };
   return [
-    element('h2', {id: 'how'}, 'How it was run'), filled(facts), runTable(groups),
+    element('h2', {id: 'how'}, 'How the runs were made'), filled(facts), runTable(groups),
     ...(report.cuts.length === 0 ? [] : [element('h3', {}, 'What is not shown'), element('ul.soft', {}, ...cuts().map((cut) => element('li', {}, cut)))]),
     pageFooter(report),
   ];

@@ -60,8 +60,8 @@ function scheduleFigure(groups, state) {
 
   const fig = figure({
     name: 'schedule', height: 300, canvas: true, label: 'Schedule',
-    caption: 'Drag to move; Ctrl and the wheel, or two fingers, to zoom. Colour: the DAG. \u2191 release, \u2193 deadline; red: a missed deadline, '
-      + `\u00d7 a job that was lost. A stretch that ends with a notch was preempted. At most ${MOST_ROWS} rows, misses first.`,
+    caption: 'Drag to move; zoom with Ctrl and the wheel, or with two fingers. Colour: DAG; \u2191 release; \u2193 deadline; red: missed deadline; '
+      + `\u00d7 lost job. A slice that ends with a notch was preempted. At most ${MOST_ROWS} rows are shown, those with misses first.`,
     build(t) {
       const c = contents();
       const inTasks = state.rows === 'tasks';
@@ -79,7 +79,7 @@ function scheduleFigure(groups, state) {
             const j = c.slices.job[i];
             const job = j === null ? [taskName(c.group, c.slices.task[i])] : describeJob(c, j);
             return tip([...job, `worker ${c.slices.worker[i]}: ${formatTime(c.slices.length[i])} from ${formatTime(item.value[1])}`,
-              ['finished here', 'aborted here', 'preempted here', 'goes on'][c.slices.how[i]]]);
+              ['finished here', 'aborted here', 'preempted here', 'continues'][c.slices.how[i]]]);
           },
         },
         dataZoom: [

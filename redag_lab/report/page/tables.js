@@ -34,20 +34,20 @@ function meter(t, response, deadline, bound, colour) {
   return element('span', {title}, svg);
 }
 
-const meterHelp = 'Solid: median; lighter: p99 and max; grey: the time until the deadline. Red tick: deadline, green tick: bound';
+const meterHelp = 'Solid: median; lighter: p99 and max; grey: time up to the deadline. Red tick: deadline; green tick: bound';
 
 function boundCell(bound, measured, method, alarm) {
   if (bound === null || bound === undefined) return '\u2013';
-  return {text: formatTime(bound), kind: alarm ? 'bad' : '', title: `by ${method}${measured > bound ? '; exceeded' : ''}`};
+  return {text: formatTime(bound), kind: alarm ? 'bad' : '', title: `by ${method}${measured > bound ? '; the bound was exceeded' : ''}`};
 }
 
 function taskTable(group, unfolded, unfold) {
   const t = theme();
   const columns = [
-    column('task'), column('period'), column('deadline'), column('jobs', 'Released'), column('missed', 'Late, skipped or aborted, of all released'),
-    column('p50', 'Response f \u2212 r, median'), column('p99'), column('max'), column('bound', 'Tightest sound bound on the response'),
-    column('measured, bound, deadline', meterHelp, true), column('L max', 'Largest lateness; negative: how close a job came'),
-    column('ran / wcet', 'Most processor time that a job used, and what it was stated to take at most'), column('preempted', 'How often jobs lost their worker'),
+    column('task'), column('period'), column('deadline'), column('jobs', 'Released jobs'), column('missed', 'Late, skipped or aborted jobs, of all released jobs'),
+    column('p50', 'Median response time: finish \u2212 release'), column('p99'), column('max'), column('bound', 'Tightest sound bound on the response time'),
+    column('measured, bound, deadline', meterHelp, true), column('max lateness', 'Largest finish \u2212 deadline; negative: the least time to spare'),
+    column('executed / wcet', 'Largest processor time of a job, and the stated worst-case execution time'), column('preempted', 'Number of preemptions'),
   ];
   // Of many tasks, only those closest to a miss are shown at first.
   const all = group.tasks.filter((task) => task.jobs !== undefined);
@@ -74,7 +74,7 @@ function taskTable(group, unfolded, unfold) {
   });
   if (shown.length === all.length) return [table(columns, rows)];
   return [table(columns, rows), element('p.row.soft', {}, `The ${shown.length} tasks closest to a miss, of ${all.length}.`,
-    element('button.controls', {type: 'button', onclick: unfold}, `all ${all.length} tasks`))];
+    element('button.controls', {type: 'button', onclick: unfold}, `show all ${all.length} tasks`))];
 }
 
 /** Returns the responses of each sink of a DAG with several sinks. */
@@ -88,9 +88,9 @@ function sinkTimes(group, dag) {
 function dagTable(group) {
   const t = theme();
   const columns = [
-    column('DAG'), column('tasks'), column('rate', 'Of its fastest task'), column('jobs'), column('missed', 'Late, skipped or aborted, of all released'),
-    column('end to end p50', 'From a source\u2019s release to a sink\u2019s finish; of several sinks, each figure is that of the worst one'), column('p99'), column('max'),
-    column('bound'), column('deadline', 'End to end'), column('late', 'Finishes of sinks beyond the end-to-end deadline'),
+    column('DAG'), column('tasks'), column('rate', 'Rate of its fastest task'), column('jobs'), column('missed', 'Late, skipped or aborted jobs, of all released jobs'),
+    column('end to end p50', 'From a source\u2019s release to a sink\u2019s finish; with several sinks, each figure is that of the worst one'), column('p99'), column('max'),
+    column('bound'), column('deadline', 'End-to-end deadline'), column('late', 'Jobs of sinks that finished after the end-to-end deadline'),
     column('active / bound', 'Most jobs in progress at any time, and max_active'),
   ];
   return table(columns, group.dags.map((dag, d) => {
@@ -108,12 +108,12 @@ function dagTable(group) {
 
 function comparisonTable(groups, rows) {
   const t = theme();
-  const help = 'End to end, from a source\u2019s release to a sink\u2019s finish; of several sinks, that of the worst one. ';
+  const help = 'End to end, from a source\u2019s release to a sink\u2019s finish; with several sinks, that of the worst one. ';
   const several = groups.some((group) => group.runs.length > 1);
-  const median = several ? 'median of the repetitions' : '';
+  const median = several ? 'Median of the repetitions' : '';
   const columns = [
-    column('DAG'), column('executor', '', true), column('jobs'), column('late', 'Finished after their deadline, or overdue'),
-    column('missed', 'Late, skipped or aborted, of all released'),
+    column('DAG'), column('executor', '', true), column('jobs'), column('late', 'Jobs that finished after their deadline, or are overdue'),
+    column('missed', 'Late, skipped or aborted jobs, of all released jobs'),
     ...['p50', 'p95', 'p99'].map((name) => column(several ? `${name}, median` : name, `${help}${median}`)),
     column(several ? 'max of all' : 'max', `${help}${several ? 'The largest of all repetitions' : ''}`),
   ];
@@ -129,7 +129,7 @@ function comparisonTable(groups, rows) {
 function runTable(groups) {
   const columns = [
     column('run'), column('recorded', 'UTC', true), column('seed'), column('jobs'), column('missed'), column('workers busy'), column('rules checked'), column('violations'),
-    column('priority inversions', 'Stretches in which a more urgent job waited while a less urgent one ran'), column('longest'),
+    column('priority inversions', 'Intervals in which a more urgent job waited while a less urgent one ran'), column('longest'),
   ];
   return table(columns, groups.flatMap((group) => group.runs.map((run) => ({cells: [
     {text: element('span', {title: run.path}, run.path.split('/').slice(-2).join('/'))},
