@@ -36,7 +36,8 @@ Disturbance::Disturbance(std::vector<std::string> words) : name_(words.at(0)) {
   for (std::string &word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   int failure[2] = {-1, -1};  // carries errno of a failed exec; a successful exec closes it
-  if (::pipe2(failure, O_CLOEXEC) != 0) throw std::runtime_error(std::string("no pipe: ") + std::strerror(errno));
+  if (::pipe2(failure, O_CLOEXEC) != 0)
+    throw std::runtime_error(std::string("cannot create a pipe: ") + std::strerror(errno));
   const pid_t parent = ::getpid();
   child_ = ::fork();
   if (child_ == 0) {
@@ -91,7 +92,7 @@ bool Disturbance::has_ended() {
 }
 
 void Disturbance::expect_running() {
-  if (has_ended()) throw std::runtime_error(name_ + " has ended, although it was to run all the time");
+  if (has_ended()) throw std::runtime_error(name_ + " has ended before the experiment was over");
 }
 
 }  // namespace closed_loop

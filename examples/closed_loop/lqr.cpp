@@ -87,7 +87,7 @@ Matrix lqr(const Matrix &a, const Matrix &b, const std::vector<double> &q, const
     p = std::move(next);
     if (change < kSettled * size) return gain;
   }
-  throw std::runtime_error("the Riccati equation does not settle: this plant cannot be stabilised");
+  throw std::runtime_error("the Riccati equation does not converge, so this plant cannot be stabilised");
 }
 
 }  // namespace closed_loop

@@ -175,7 +175,8 @@ int run(const Arguments &arguments) {
   }
   std::optional<Disturbance> disturbance;
   if (!arguments.stress.empty()) {
-    if (!arguments.threads) throw std::runtime_error("--stress: virtual time cannot be disturbed (--threads)");
+    if (!arguments.threads)
+      throw std::runtime_error("--stress needs --threads: runs in virtual time cannot be disturbed");
     disturbance.emplace(stress_ng(arguments.stress));
   }
   RunSetup setup;
@@ -222,26 +223,26 @@ int run(const Arguments &arguments) {
 
 int main(int argc, char **argv) {
   Arguments arguments;
-  CLI::App app("Unstable plants under feedback that shares its workers: what an executor's misses do to a robot");
-  app.add_option("workload", arguments.workload, "YAML; DAGs named after the plants, with tasks sense and control")
+  CLI::App app("Unstable plants under feedback that shares its workers: effects of an executor's misses on a robot");
+  app.add_option("workload", arguments.workload,
+                 "Workload (YAML), with DAGs named after the plants and tasks sense and control")
       ->capture_default_str();
-  app.add_option(
-         "--executors", arguments.executors,
-         "alone, redag, redag-cooperative, redag-none, mte, ste, static, events, cbg; mte-fifo, ...: on SCHED_FIFO "
-         "threads")
+  app.add_option("--executors", arguments.executors,
+                 "Executors: alone, redag, redag-cooperative, redag-none, mte, ste, static, events, cbg; with -fifo "
+                 "(mte-fifo, ...) on SCHED_FIFO threads")
       ->delimiter(',')
       ->capture_default_str();
-  app.add_flag("--threads", arguments.threads, "On threads of this machine, in real time; default: virtual time");
+  app.add_flag("--threads", arguments.threads, "Run on threads of this machine in real time, instead of virtual time");
   app.add_option("--stress", arguments.stress,
-                 "With --threads: run stress-ng with these arguments meanwhile, such as '--cpu 2 --cache 1'");
-  app.add_option("--seeds", arguments.seeds, "How many: SEED, SEED+1, ...")
+                 "With --threads, run stress-ng with these arguments meanwhile, such as '--cpu 2 --cache 1'");
+  app.add_option("--seeds", arguments.seeds, "Number of runs, with seeds SEED, SEED+1, ...")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  app.add_option("--seed", arguments.seed, "Of pushes and execution times")->capture_default_str();
+  app.add_option("--seed", arguments.seed, "Seed of pushes and execution times")->capture_default_str();
   app.add_option("--seconds", arguments.seconds, "Length of a run")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
-  app.add_option("--out", arguments.out, "Folder for results.csv, states.csv, trajectories.svg, frames.png");
+  app.add_option("--out", arguments.out, "Folder for results.csv, states.csv, trajectories.svg and frames.png");
   CLI11_PARSE(app, argc, argv);
   watch_signals();
   try {

@@ -112,7 +112,7 @@ Model compile(const std::string &text) {
   const auto files = std::make_unique<mjVFS>();
   mj_defaultVFS(files.get());
   if (mj_makeEmptyFileVFS(files.get(), name.c_str(), static_cast<int>(text.size())) != 0) {
-    throw std::runtime_error("MuJoCo: no room for the model");
+    throw std::runtime_error("MuJoCo: the model does not fit into memory");
   }
   std::memcpy(files->filedata[mj_findFileVFS(files.get(), name.c_str())], text.data(), text.size());
   std::string error(1024, '\0');

@@ -141,7 +141,7 @@ Result<std::string> Acceptance::replay(std::uint64_t unit, std::string_view resu
   if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
   const std::uint64_t seed = workload_seed(plan_, point, repetition);
   const std::optional<SeenMiss> miss = find_miss(*workload, *task_set, plan_.simulation, seed);
-  if (!miss) return make_error(fmt::format("unit {}: the miss is not seen again", unit));
+  if (!miss) return make_error(fmt::format("unit {}: the miss did not occur again", unit));
   return fmt::format(
       "# unit {} of '{}': {}, repetition {}; workload seed {}\n"
       "# accepted by: {}\n"

@@ -49,8 +49,9 @@ class Checker {
     if (plan_.simulation.periods == 0) say("simulation", "simulation: periods must be at least 1");
     for (const PreemptionMode mode : plan_.preemption) {
       if (mode == PreemptionMode::None || mode == PreemptionMode::Os) continue;
-      say("preemption", fmt::format("preemption '{}' says nothing here", to_string(mode)),
-          mode == PreemptionMode::Auto ? "choose none or os" : "generated tasks have no preemption points: say none");
+      say("preemption", fmt::format("preemption '{}' has no meaning here", to_string(mode)),
+          mode == PreemptionMode::Auto ? "choose none or os"
+                                       : "generated tasks have no preemption points: choose none or os");
     }
     if (mistakes_.empty()) check_points();
     return std::move(mistakes_);
@@ -62,13 +63,13 @@ class Checker {
   }
 
   void check_name() {
-    if (!is_plan_name(plan_.name)) say("name", "a name has letters, digits, - and _, and at least one of them");
+    if (!is_plan_name(plan_.name)) say("name", "a name consists of one or more letters, digits, - and _");
   }
 
   template <class Value>
   void check_list(const char *key, const std::vector<Value> &values) {
     if (values.empty()) say(key, fmt::format("{} has no values", key));
-    if (has_twice(values)) say(key, fmt::format("{} names a value twice", key));
+    if (has_twice(values)) say(key, fmt::format("{} lists a value twice", key));
   }
 
   void check_methods() {
@@ -77,7 +78,7 @@ class Checker {
       if (std::find(known.begin(), known.end(), name) != known.end()) continue;
       const std::string_view near = nearest(name, known);
       say("methods", fmt::format("unknown method '{}'", name),
-          near.empty() ? "'redag analyze --methods' lists them; any and simulation are others"
+          near.empty() ? "'redag analyze --methods' lists methods; 'any' and 'simulation' are also known"
                        : fmt::format("did you mean '{}'?", near));
     }
   }
@@ -99,11 +100,11 @@ class Checker {
     const std::uint64_t count = count_points();
     if (count > kMostPoints) {
       say("experiment", fmt::format("the plan has more than {} points", kMostPoints),
-          "every combination of its lists is one: shorten them, or make several plans of it");
+          "every combination of the plan's lists is a point: shorten the lists, or split the plan");
       return;
     }
     if (count > kMostUnits / plan_.sets) {
-      say("sets", fmt::format("{} points of {} sets are more than {}", count, plan_.sets, kMostUnits));
+      say("sets", fmt::format("{} points with {} sets each are more than {} workloads", count, plan_.sets, kMostUnits));
       return;
     }
     std::uint64_t to_draw = 100'000;  // tasks, about a third of a second of drawing
@@ -112,7 +113,8 @@ class Checker {
       Diagnostics mistakes = lab::find_mistakes(options);
       const std::uint64_t tasks = std::uint64_t{options.dags} * options.max_tasks;
       if (mistakes.empty() && tasks > kMostTasks) {
-        say("dags", fmt::format("{}: up to {} tasks a workload, more than {}", describe(point), tasks, kMostTasks));
+        say("dags", fmt::format("{}: workloads have up to {} tasks; at most {} are allowed", describe(point), tasks,
+                                kMostTasks));
         return;
       }
       if (mistakes.empty() && tasks <= to_draw) {

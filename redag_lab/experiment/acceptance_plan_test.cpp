@@ -75,7 +75,7 @@ TEST(AcceptancePlan, EveryMistakeHasItsPlace) {
   EXPECT_THAT(errors, HasSubstr("plan.yaml:3:11: error: workers must be a whole number"));
   EXPECT_THAT(errors, HasSubstr("plan.yaml:4:20: error: "));
   EXPECT_THAT(errors, HasSubstr("did you mean 'os'?"));
-  EXPECT_THAT(errors, HasSubstr("plan.yaml:5:14: error: utilization: '0.1:x' are no such values"));
+  EXPECT_THAT(errors, HasSubstr("plan.yaml:5:14: error: utilization: '0.1:x' is neither a range nor a list of values"));
   EXPECT_THAT(errors, HasSubstr("plan.yaml:6:"));
   EXPECT_THAT(errors, HasSubstr("did you mean 'layered'?"));
 }
@@ -83,17 +83,17 @@ TEST(AcceptancePlan, EveryMistakeHasItsPlace) {
 TEST(AcceptancePlan, WhatMakesNoSense) {
   const std::string head = "experiment: acceptance\n";
   EXPECT_THAT(errors_of(head + "methods: [guan, gaun]\n"), HasSubstr("plan.yaml:2:10: error: unknown method 'gaun' "));
-  EXPECT_THAT(errors_of(head + "methods: [any, any]\n"), HasSubstr("names a value twice"));
+  EXPECT_THAT(errors_of(head + "methods: [any, any]\n"), HasSubstr("lists a value twice"));
   EXPECT_THAT(errors_of(head + "preemption: cooperative\n"), HasSubstr("no preemption points"));
   EXPECT_THAT(errors_of(head + "dags: []\n"), HasSubstr("dags has no values"));
-  EXPECT_THAT(errors_of(head + "name: a/b\n"), HasSubstr("a name has letters"));
+  EXPECT_THAT(errors_of(head + "name: a/b\n"), HasSubstr("a name consists of one or more letters"));
   // Two tasks cannot use four workers. The generator reports the mistake, and the plan reader its place.
   EXPECT_THAT(errors_of(head + "dags: 2\nworkload: {tasks: 1}\n"), HasSubstr("plan.yaml:3:11: error: 2 DAGs"));
-  EXPECT_THAT(errors_of("name: x\n"), HasSubstr("experiment is missing"));
+  EXPECT_THAT(errors_of("name: x\n"), HasSubstr("the key 'experiment' is missing"));
   EXPECT_THAT(errors_of("experiment: figure\n"), HasSubstr("unknown experiment 'figure'"));
-  EXPECT_THAT(errors_of("experiment: factorial\n"), HasSubstr("it is a plan of 'redag experiment factorial'"));
-  EXPECT_THAT(errors_of("sets: 1\n"), HasSubstr("say 'experiment: acceptance'"));
-  EXPECT_THAT(errors_of(""), HasSubstr("there is no plan in it"));
+  EXPECT_THAT(errors_of("experiment: factorial\n"), HasSubstr("this is a plan for 'redag experiment factorial'"));
+  EXPECT_THAT(errors_of("sets: 1\n"), HasSubstr("write 'experiment: acceptance'"));
+  EXPECT_THAT(errors_of(""), HasSubstr("the file has no plan"));
 }
 
 // Points are counted before they are created, and workloads are drawn only where this takes little time.

@@ -80,7 +80,7 @@ AcceptanceCounter::AcceptanceCounter(const Acceptance &acceptance) : acceptance_
 Result<void> AcceptanceCounter::add(std::uint64_t unit, const std::string &result) {
   if (unit >= results_.units || !acceptance_.is_result(result)) {
     return make_error(fmt::format("the plan has no unit {} with result '{}'", unit, result),
-                      "units.csv is damaged: delete the line, and the unit is made again");
+                      "units.csv is damaged: delete this line, and the unit is run again");
   }
   AcceptanceRow &row = results_.rows[unit % results_.rows.size()];
   ++row.sets;
@@ -143,10 +143,10 @@ std::string to_svg(const Acceptance &acceptance, const AcceptanceResults &result
   const AcceptancePlan &plan = acceptance.plan();
   LinePlot plot;
   plot.title = fmt::format("{}: schedulable workloads", plan.name);
-  plot.subtitle = fmt::format("{} random workloads a point, bands: 95 % confidence", plan.sets);
+  plot.subtitle = fmt::format("{} random workloads per point; bands: 95 % confidence", plan.sets);
   if (!results.complete()) plot.subtitle = fmt::format("{} of {} workloads done", results.done, results.units);
   plot.x_label = "utilization per worker";
-  plot.y_label = "share accepted";
+  plot.y_label = "share of workloads accepted";
   for (const std::string &method : plan.methods) plot.lines.push_back(method);
   for (std::size_t r = 0; r < results.rows.size(); ++r) {
     const AcceptanceRow &row = results.rows[r];

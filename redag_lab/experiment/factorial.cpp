@@ -109,7 +109,7 @@ Result<Workload> Factorial::workload_of(const FactorialPoint &point, std::uint64
   for (Dag &dag : workload.dags) inherit_periods(dag);
   if (wanted > 0) {
     const double is = mean_utilization(workload);
-    if (!(is > 0)) return make_error("the workload has no execution times that could be scaled to a utilization");
+    if (!(is > 0)) return make_error("the workload has no execution times to scale to a utilization");
     scale_demand(workload, wanted / is);
   }
   if (const std::uint32_t level = point.of(FactorKind::DemandScale); level != kNoLevel) {

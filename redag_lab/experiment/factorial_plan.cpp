@@ -67,25 +67,26 @@ class Checker {
   Checker(const FactorialPlan &plan, const ExecutorNames &executors) : plan_(plan), executors_(executors) {}
 
   std::vector<PlanMistake> run() {
-    if (!is_plan_name(plan_.name)) say("name", "a name has letters, digits, - and _, and at least one of them");
+    if (!is_plan_name(plan_.name)) say("name", "a name consists of one or more letters, digits, - and _");
     if (plan_.repetitions == 0) say("repetitions", "repetitions must be at least 1");
-    if (plan_.warm_up >= plan_.duration) say("warm_up", "warm_up takes the whole duration");
-    if (plan_.workloads.empty()) say("workloads", "there is no workload", "name files: workloads: [cart.yaml]");
-    if (plan_.executors.empty()) say("executors", "there is no executor", "such as executors: [ideal, redag, mte]");
+    if (plan_.warm_up >= plan_.duration) say("warm_up", "the warm-up takes the whole duration");
+    if (plan_.workloads.empty()) say("workloads", "no workload is given", "name files, as in workloads: [cart.yaml]");
+    if (plan_.executors.empty())
+      say("executors", "no executor is given", "name executors, as in executors: [ideal, redag, mte]");
     check_executors();
     for (const Factor &factor : factors_of(plan_)) {
       const std::set<std::string> distinct(factor.levels.begin(), factor.levels.end());
       if (distinct.size() == factor.levels.size()) continue;
-      say(key_of(factor.kind), fmt::format("{} names a value twice", key_of(factor.kind)));
+      say(key_of(factor.kind), fmt::format("{} lists a value twice", key_of(factor.kind)));
     }
     check_workloads();
     if (mistakes_.empty() && has_too_many_combinations()) {
       say("executors", fmt::format("the plan has more than {} combinations", kMostCombinations),
-          "shorten its lists, or make several plans of it");
+          "shorten the plan's lists, or split the plan");
     }
     if (mistakes_.empty() && points_of(plan_).size() > kMostUnits / plan_.repetitions) {
-      say("repetitions", fmt::format("{} combinations {} times are more than {} runs", points_of(plan_).size(),
-                                     plan_.repetitions, kMostUnits));
+      say("repetitions", fmt::format("{} combinations with {} repetitions are more than {} runs",
+                                     points_of(plan_).size(), plan_.repetitions, kMostUnits));
     }
     return std::move(mistakes_);
   }
@@ -121,7 +122,7 @@ class Checker {
                                          [](const std::string &name) { return is_redag(name); });
     for (const auto &[key, given] : {std::pair<const char *, bool>{"policies", !plan_.policies.empty()},
                                      {"max_active", !plan_.max_active.empty()}}) {
-      if (given && !any_bounded) say(key, fmt::format("{} mean nothing to the executors of this plan", key));
+      if (given && !any_bounded) say(key, fmt::format("{} have no meaning for the executors of this plan", key));
     }
   }
 
@@ -135,23 +136,23 @@ class Checker {
       say("executors", fmt::format("there is no executor '{}'", written),
           near.empty() ? fmt::format("known: {}", fmt::join(known, ", ")) : fmt::format("did you mean '{}'?", near));
     } else if (world == World::Simulator && name.ends_with("-fifo")) {
-      say("executors",
-          fmt::format("the simulator has no threads: '{}' is '{}' there", name, name.substr(0, name.find('-'))));
+      say("executors", fmt::format("the simulator has no threads to make real-time: '{}' is the same as '{}' there",
+                                   name, name.substr(0, name.find('-'))));
     }
   }
 
   void check_workloads() {
     for (const WorkloadSource &source : plan_.workloads) {
       if (!is_plan_name(source.name)) {
-        say("workloads", fmt::format("'{}': the name of a workload has letters, digits, - and _", source.name));
+        say("workloads", fmt::format("'{}': the name of a workload consists of letters, digits, - and _", source.name));
       }
       if (source.random && plan_.utilization.empty()) {
-        say("workloads", fmt::format("'{}': random workloads need utilization", source.name));
+        say("workloads", fmt::format("'{}': random workloads need a utilization", source.name));
       }
       const std::size_t dags = source.random ? source.random->dags : source.workload.dags.size();
       for (const std::vector<std::uint32_t> &bounds : plan_.max_active) {
         if (bounds.size() <= 1 || bounds.size() == dags) continue;
-        say("max_active", fmt::format("{} bounds, but '{}' has {} DAGs", bounds.size(), source.name, dags));
+        say("max_active", fmt::format("{} bounds are given, but '{}' has {} DAGs", bounds.size(), source.name, dags));
         break;
       }
     }

@@ -133,8 +133,8 @@ TEST(FactorialPlan, MistakesHaveTheirPlaceAndAHint) {
       "max_active: [{from: 3, to: 2}]\nworkloads:\n  - {name: x}\n  - no/such.yaml\nworker: 1\n");
   for (const char *words :
        {"plan.yaml:2:8: error: ", "plan.yaml:3:11: error: workers must be a whole number",
-        "plan.yaml:4:17: error: deadline_scale: '-1' are no such values",
-        "plan.yaml:6:14: error: max_active: from and to", "plan.yaml:8:5: error: a workload is a file",
+        "plan.yaml:4:17: error: deadline_scale: '-1' is neither a range nor a list of values",
+        "plan.yaml:6:14: error: max_active: 'from' and 'to'", "plan.yaml:8:5: error: a workload is a file",
         "plan.yaml:9:5: error: the workload 'no/such.yaml' cannot be used",
         "plan.yaml:10:1: error: unknown key 'worker'", "did you mean 'workers'?"}) {
     EXPECT_THAT(errors, HasSubstr(words));
@@ -144,15 +144,15 @@ TEST(FactorialPlan, MistakesHaveTheirPlaceAndAHint) {
   EXPECT_THAT(errors_of(std::string("experiment: factorial\nexecutors: [mte-fifo]") + kCart),
               HasSubstr("the simulator has no threads"));
   EXPECT_THAT(errors_of(std::string("experiment: factorial\nexecutors: [mte]\nmax_active: [2]") + kCart),
-              HasSubstr("max_active mean nothing to the executors of this plan"));
+              HasSubstr("max_active have no meaning for the executors of this plan"));
   EXPECT_THAT(errors_of(std::string("experiment: factorial\nexecutors: [redag]\nmax_active: [[1, 2, 3]]") + kCart),
-              HasSubstr("plan.yaml:3:13: error: 3 bounds, but 'cart' has 2 DAGs"));
+              HasSubstr("plan.yaml:3:13: error: 3 bounds are given, but 'cart' has 2 DAGs"));
   EXPECT_THAT(errors_of(std::string("experiment: factorial\nexecutors: [redag]\nworkers: [1, 1]") + kCart),
-              HasSubstr("workers names a value twice"));
+              HasSubstr("workers lists a value twice"));
   EXPECT_THAT(errors_of("experiment: factorial\nexecutors: [redag]\nworkloads:\n  - {name: r, random: {dags: 2}}\n"),
-              HasSubstr("random workloads need utilization"));
-  EXPECT_THAT(errors_of("experiment: acceptance\n"), HasSubstr("it is a plan of 'redag experiment acceptance'"));
-  EXPECT_THAT(errors_of(""), HasSubstr("there is no plan in it"));
+              HasSubstr("random workloads need a utilization"));
+  EXPECT_THAT(errors_of("experiment: acceptance\n"), HasSubstr("this is a plan for 'redag experiment acceptance'"));
+  EXPECT_THAT(errors_of(""), HasSubstr("the file has no plan"));
 }
 
 }  // namespace

@@ -85,7 +85,8 @@ class Reader : private PlanReader {
                 if (const Node *file = find(node, "file")) return load(*file, std::move(name));
                 if (const Node *text = find(node, "text")) return parse(*text, std::move(name));
                 if (const Node *random = find(node, "random")) return read_random(*random, std::move(name));
-                error(node, "a workload is a file, a text, or random", "such as {name: cart, file: cart.yaml}");
+                error(node, "a workload is a file, a text, or random",
+                      "write, for example, {name: cart, file: cart.yaml}");
                 return std::nullopt;
               });
   }
@@ -96,7 +97,7 @@ class Reader : private PlanReader {
     const std::filesystem::path path = std::filesystem::path(file_).parent_path() / *given;
     Result<LoadedWorkload> loaded = load_workload(path);
     if (!loaded) {
-      error(node, fmt::format("the workload '{}' cannot be used", *given), "its own mistakes are below");
+      error(node, fmt::format("the workload '{}' cannot be used", *given), "its mistakes are listed below");
       // Their places are in the workload's file. The reader's own error() would place them in the plan.
       std::copy(loaded.error().begin(), loaded.error().end(), std::back_inserter(diagnostics_));
       return std::nullopt;
@@ -138,7 +139,7 @@ class Reader : private PlanReader {
     const Node *node = find(root_, "max_active");
     if (node == nullptr) return;
     if (node->kind != Node::Kind::Sequence) {
-      wrong_type(*node, "max_active", "a list: of unbounded, 3, [2, 3], or {from: 2, to: 5}");
+      wrong_type(*node, "max_active", "a list of bounds, such as unbounded, 3, [2, 3] or {from: 2, to: 5}");
       return;
     }
     for (const Node &item : node->children) {
@@ -165,7 +166,8 @@ class Reader : private PlanReader {
     take_count(item, "from", from, 1);
     take_count(item, "to", to, 1);
     if (from == 0 || to < from || to - from > 100) {
-      error(item, "max_active: from and to are a range of at most 100 bounds", "such as {from: 2, to: 5}");
+      error(item, "max_active: 'from' and 'to' must be a range of at most 100 bounds",
+            "write, for example, {from: 2, to: 5}");
       return;
     }
     for (std::uint32_t a = from; a <= to; ++a) {

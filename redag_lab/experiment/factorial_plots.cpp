@@ -114,12 +114,12 @@ std::vector<LinePlot::Value> answered(const FactorialRow &row, std::size_t dag) 
 std::string to_svg(const Factorial &factorial, const FactorialResults &results) {
   const FactorialPlan &plan = factorial.plan();
   LinePlot plot;
-  plot.title = fmt::format("{}: deadlines missed", plan.name);
-  plot.subtitle = fmt::format("{}; {} run{} of {} a combination; each value is a mean over all other factors",
+  plot.title = fmt::format("{}: missed deadlines", plan.name);
+  plot.subtitle = fmt::format("{}; {} run{} of {} per combination; each value is a mean over all other factors",
                               to_string(plan.world), plan.repetitions, plan.repetitions == 1 ? "" : "s",
                               format_duration(plan.duration));
-  if (!results.complete()) plot.subtitle = fmt::format("{} of {} runs done", results.done, results.units);
-  plot.y_label = "late or dropped, of all releases";
+  if (!results.complete()) plot.subtitle = fmt::format("{} of {} runs are done", results.done, results.units);
+  plot.y_label = "late, skipped or aborted, of all releases";
   plot.lines = plan.executors;
   for (const Factor &factor : factorial.factors()) {
     if (factor.kind == FactorKind::Executor || factor.levels.size() < 2) continue;
@@ -146,11 +146,12 @@ std::optional<std::string> distance_svg(const Factorial &factorial, const Factor
   LinePlot plot;
   plot.title = fmt::format("{}: distance to the ideal", plan.name);
   plot.subtitle = fmt::format(
-      "medians of {} runs of {}, each against the ideal on the same jobs; fewer misses than its are drawn as 0",
+      "medians of {} runs of {}, each compared with the ideal on the same jobs; fewer misses than the ideal are drawn "
+      "as 0",
       plan.repetitions, format_duration(plan.duration));
-  if (!results.complete()) plot.subtitle = fmt::format("{} of {} runs done", results.done, results.units);
+  if (!results.complete()) plot.subtitle = fmt::format("{} of {} runs are done", results.done, results.units);
   plot.x_label = "utilization per worker";
-  plot.y_label = "missed above the ideal, of all releases";
+  plot.y_label = "misses above the ideal, of all releases";
   // The ideal and the unlimited executor are references and have no line.
   std::copy_if(plan.executors.begin(), plan.executors.end(), std::back_inserter(plot.lines),
                [](const std::string &executor) { return executor != kIdeal && executor != kUnlimited; });
@@ -185,9 +186,9 @@ std::string responses_svg(const Factorial &factorial, const FactorialResults &re
   const FactorialPlan &plan = factorial.plan();
   LinePlot plot;
   plot.title = fmt::format("{}: response times", plan.name);
-  plot.subtitle = "medians of the runs; the slowest percent is not shown; what was dropped never answers";
+  plot.subtitle = "medians of the runs; the slowest percent is not shown; lost jobs never finish";
   plot.x_label = "end-to-end response in ms";
-  plot.y_label = "answered, of what was due";
+  plot.y_label = "share of due jobs that finished";
   plot.lines = plan.executors;
   for (const FactorialRow &row : results.rows) {
     const FactorialPoint &point = factorial.points()[row.point];

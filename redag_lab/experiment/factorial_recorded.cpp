@@ -18,7 +18,9 @@
 namespace redag::experiment {
 namespace {
 
-Result<FinishedRun> no_driver(const PlannedRun & /*run*/) { return make_error("nothing is run here"); }
+Result<FinishedRun> no_driver(const PlannedRun & /*run*/) {
+  return make_error("recorded runs can only be added to an experiment, not run");
+}
 
 // Returns the text that identifies a workload's jobs. It ignores names, platform and policy.
 std::string jobs_of(Workload workload) {
@@ -34,13 +36,13 @@ std::string executor_of(const RecordedRun &run) { return std::string("ros2/") + 
 
 Result<void> fits(const FactorialPlan &plan, const RecordedRun &run) {
   if (run.info.driver != trace::Driver::RosNodes) {
-    return make_error(fmt::format("{}: not a run of ROS 2 nodes", run.file),
-                      "run_workload of redag_rclcpp_lab records such");
+    return make_error(fmt::format("{}: this is not a run of ROS 2 nodes", run.file),
+                      "run_workload of redag_rclcpp_lab records such runs");
   }
   const auto differ = [&](const char *what, Duration is, Duration planned) {
-    return make_error(fmt::format("{}: its {} is {}, that of the plan {}", run.file, what, format_duration(is),
+    return make_error(fmt::format("{}: its {} is {}, but {} in the plan", run.file, what, format_duration(is),
                                   format_duration(planned)),
-                      "only runs of the same length can stand beside each other");
+                      "only runs of the same length can be compared");
   };
   const Duration length = run.info.end - run.info.start;
   if (length != plan.duration) return differ("duration", length, plan.duration);
@@ -106,10 +108,10 @@ Result<FactorialUnits> with_recorded(FactorialUnits units, const std::vector<Rec
       placed = true;
     }
     if (!placed && known) {
-      return make_error(fmt::format("{}: one run of '{}' too many: the plan has {} repetitions", run.file,
+      return make_error(fmt::format("{}: there are more runs of '{}' than the {} repetitions of the plan", run.file,
                                     executor_of(run), all.plan.repetitions));
     }
-    if (!placed) return make_error(fmt::format("{}: no combination of the plan has its jobs", run.file));
+    if (!placed) return make_error(fmt::format("{}: no combination of the plan has the jobs of this run", run.file));
   }
   std::sort(all.units.begin(), all.units.end(),
             [](const FinishedUnit &a, const FinishedUnit &b) { return a.unit < b.unit; });

@@ -120,9 +120,11 @@ TEST(Recorded, RunsWithOtherJobsHaveNoDistanceToTheIdeal) {
 }
 
 TEST(Recorded, MistakesAreNamed) {
-  EXPECT_THAT(error_of({recorded(1), recorded(2), recorded(3)}), HasSubstr("one run of 'ros2/mte' too many"));
-  EXPECT_THAT(error_of({recorded(1, 2 * kSecond)}), HasSubstr("its duration is 2s, that of the plan 1s"));
-  EXPECT_THAT(error_of({recorded(1, kSecond, 5 * kMillisecond)}), HasSubstr("no combination of the plan has its jobs"));
+  EXPECT_THAT(error_of({recorded(1), recorded(2), recorded(3)}),
+              HasSubstr("there are more runs of 'ros2/mte' than the 2 repetitions"));
+  EXPECT_THAT(error_of({recorded(1, 2 * kSecond)}), HasSubstr("its duration is 2s, but 1s in the plan"));
+  EXPECT_THAT(error_of({recorded(1, kSecond, 5 * kMillisecond)}),
+              HasSubstr("no combination of the plan has the jobs of this run"));
   RecordedRun other = recorded(1);
   other.info.driver = trace::Driver::Threads;
   EXPECT_THAT(error_of({other}), HasSubstr("not a run of ROS 2 nodes"));

@@ -103,7 +103,7 @@ Result<void> FactorialCounter::add(std::uint64_t unit, const std::string &result
       unit < results_.units ? parse_observation(result) : Result<Observation>(make_error("the plan has no such unit"));
   if (!seen) {
     return make_error(fmt::format("unit {}: {}", unit, seen.error().front().message),
-                      "units.csv is damaged: delete the line, and the unit is made again");
+                      "units.csv is damaged: delete this line, and the unit is run again");
   }
   FactorialRow &row = results_.rows[factorial_.point_of(unit)];
   const std::uint64_t repetition = factorial_.repetition_of(unit);

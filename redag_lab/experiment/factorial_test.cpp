@@ -208,7 +208,7 @@ TEST(Factorial, UnfinishedResultsSayWhatTheyCan) {
   EXPECT_EQ(over_runs(factorial, results, results.rows[1], 0, Metric::ExcessMissRatio), std::nullopt);
   EXPECT_EQ(over_runs(factorial, results, results.rows[0], 0, Metric::MissRatio), std::nullopt);
   EXPECT_TRUE(effects_of(factorial, results).empty());
-  EXPECT_THAT(to_svg(factorial, results), HasSubstr("1 of 4 runs done"));
+  EXPECT_THAT(to_svg(factorial, results), HasSubstr("1 of 4 runs are done"));
   EXPECT_FALSE(counter.add(4, *factorial.evaluate(1)));
   EXPECT_FALSE(counter.add(2, "[1,2]"));
   EXPECT_FALSE(counter.add(2, "x"));

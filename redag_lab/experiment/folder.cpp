@@ -58,7 +58,7 @@ Result<void> expect_plan(const std::string &file, const std::string &there, cons
   return file_error(file, line,
                     fmt::format("the folder holds results of another plan: '{}' there, '{}' now", line_of(there, line),
                                 line_of(plan, line)),
-                    "choose another folder, or go on with the plan that lies in this one");
+                    "choose another folder, or resume with the plan in this one");
 }
 
 // Syncs the folder: the names of new files reach the disk with their folder.
@@ -99,7 +99,7 @@ Result<Journal> open_folder(const std::string &folder, const std::string &plan) 
 
 Result<std::string> read_plan(const std::string &folder) {
   Result<std::string> plan = trace::read_file(plan_file(folder));
-  if (!plan) plan.error().front().hint = "is it the folder of an experiment (--out)?";
+  if (!plan) plan.error().front().hint = "is this the folder of an experiment (--out)?";
   return plan;
 }
 

@@ -33,7 +33,7 @@ std::string_view whole_lines(std::string_view text) { return text.substr(0, text
 
 Result<std::vector<FinishedUnit>> parse(std::string_view text, const std::string &path, const std::string &head) {
   if (!text.starts_with(head)) {
-    return file_error(path, 1, "holds results of something else than this plan with this version of redag",
+    return file_error(path, 1, "holds results of another plan or of another version of redag",
                       "expected '" + head.substr(0, head.find('\n')) + "'; choose another folder");
   }
   std::vector<FinishedUnit> units;
@@ -46,7 +46,8 @@ Result<std::vector<FinishedUnit>> parse(std::string_view text, const std::string
     const char *end = row.data() + row.size();
     const auto [stop, error] = std::from_chars(row.data(), end, unit.unit);
     if (error != std::errc() || stop == end || *stop != ',') {
-      return file_error(path, line, "not a finished unit", "'unit,result' was expected; delete the line if damaged");
+      return file_error(path, line, "this line is not a finished unit",
+                        "expected 'unit,result'; delete this line if it is damaged");
     }
     unit.result.assign(stop + 1, end);
     units.push_back(std::move(unit));
@@ -75,7 +76,7 @@ Result<void> sort_and_unite(std::vector<FinishedUnit> &units, const std::string 
     return file_error(
         file, 0,
         fmt::format("unit {} has two results, '{}' and '{}'", clash->unit, clash->result, std::next(clash)->result),
-        "a unit depends on the plan alone: were they made by different builds of redag?");
+        "a unit depends on the plan alone: were they run by different builds of redag?");
   }
   units.erase(std::unique(units.begin(), units.end()), units.end());
   return {};
@@ -107,8 +108,8 @@ Result<Journal> Journal::open(std::string path, std::string_view subject) {
   if (descriptor < 0) return journal.failure("cannot open");
   if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK) return journal.failure("cannot lock");
-    return file_error(journal.path_, 0, "another process is writing to it",
-                      "wait for it, or give this one a folder of its own");
+    return file_error(journal.path_, 0, "another process is writing to this folder",
+                      "wait for that process, or choose another folder");
   }
   if (Result<void> begun = journal.begin(subject); !begun) {
     return tl::unexpected<Diagnostics>(std::move(begun.error()));
@@ -123,14 +124,14 @@ Result<void> Journal::begin(std::string_view subject) {
   const std::size_t whole = whole_lines(*text).size();
   const std::string head = header(subject);
   if (head.starts_with(whole_lines(*text))) {  // new, or killed while writing the header
-    if (::ftruncate(descriptor_, 0) != 0) return failure("cannot cut off");
+    if (::ftruncate(descriptor_, 0) != 0) return failure("cannot truncate");
     buffer_ = head;
     return sync();
   }
   Result<std::vector<FinishedUnit>> units = parse(whole_lines(*text), path_, head);
   if (!units) return tl::unexpected<Diagnostics>(std::move(units.error()));
   if (whole < text->size() && ::ftruncate(descriptor_, static_cast<off_t>(whole)) != 0) {
-    return failure("cannot cut off");
+    return failure("cannot truncate");
   }
   found_ = std::move(*units);
   return {};
@@ -164,7 +165,7 @@ Result<void> Journal::write() {
 Result<void> Journal::sync() {
   if (Result<void> written = write(); !written) return written;
   last_sync_ = Clock::now();
-  if (!broken_ && ::fdatasync(descriptor_) != 0 && errno != EINVAL) return failure("cannot sync");
+  if (!broken_ && ::fdatasync(descriptor_) != 0 && errno != EINVAL) return failure("cannot write to disk");
   return {};
 }
 

@@ -87,14 +87,14 @@ TEST_F(JournalTest, RefusesAnotherSubject) {
   const Result<Journal> other = Journal::open(file_, "plan b");
   ASSERT_FALSE(other);
   EXPECT_EQ(other.error().front().line, 1);
-  EXPECT_THAT(other.error().front().message, HasSubstr("something else"));
+  EXPECT_THAT(other.error().front().message, HasSubstr("another plan"));
   EXPECT_FALSE(read_journal(file_, "plan b"));
 }
 
 TEST_F(JournalTest, SaysWhichLineIsNone) {
   fill({{0, "01"}});
   add("one,01\n");
-  EXPECT_THAT(error(), HasSubstr(":4:1: error: not a finished unit"));
+  EXPECT_THAT(error(), HasSubstr(":4:1: error: this line is not a finished unit"));
 }
 
 TEST_F(JournalTest, CountsAUnitOnce) {
@@ -108,7 +108,7 @@ TEST_F(JournalTest, CountsAUnitOnce) {
 TEST_F(JournalTest, IsOfOneProcess) {
   const Result<Journal> first = Journal::open(file_, "plan a");
   ASSERT_TRUE(first);
-  EXPECT_THAT(error(), HasSubstr("another process is writing to it"));
+  EXPECT_THAT(error(), HasSubstr("another process is writing to this folder"));
 }
 
 // A limit on file size acts as a full disk.

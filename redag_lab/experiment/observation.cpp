@@ -184,18 +184,18 @@ Result<Observation> parse_observation(std::string_view line) {
     for (const Json &dag : json.at(7)) {
       DagObservation row;
       row.dag = dag.at(0).get<std::string>();
-      if (dag.at(1).size() != kMeasureCount) return make_error("an observation has other measures");
+      if (dag.at(1).size() != kMeasureCount) return make_error("an observation has other measures than expected");
       row.values = dag.at(1).get<std::array<std::int64_t, kMeasureCount>>();
       row.quantiles = dag.at(2).get<std::vector<Duration>>();
       if (!row.quantiles.empty() && row.quantiles.size() != kQuantiles.size()) {
-        return make_error("an observation has other quantiles");
+        return make_error("an observation has other quantiles than expected");
       }
       seen.dags.push_back(std::move(row));
     }
     if (seen.dags.empty()) return make_error("an observation has no DAGs");
     return seen;
   } catch (const nlohmann::json::exception &problem) {
-    return make_error(fmt::format("not an observation: {}", problem.what()));
+    return make_error(fmt::format("this is not an observation: {}", problem.what()));
   }
 }
 

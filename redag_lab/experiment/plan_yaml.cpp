@@ -48,18 +48,18 @@ std::optional<std::vector<std::uint32_t>> split(std::string_view text, char sepa
 
 bool PlanReader::is_plan(const Node &root, std::string_view kind, const std::vector<std::string_view> &keys) {
   if (root.kind == Node::Kind::Null) {
-    error(Node{}, "there is no plan in it", fmt::format("begin with 'experiment: {}': see docs/experiments.md", kind));
+    error(Node{}, "the file has no plan", fmt::format("begin with 'experiment: {}', see docs/experiments.md", kind));
     return false;
   }
   if (!check_map(root, "a plan", keys)) return false;
   const Node *named = find(root, "experiment");
   if (named == nullptr) {
-    error(root, "experiment is missing", fmt::format("say 'experiment: {}'", kind));
+    error(root, "the key 'experiment' is missing", fmt::format("write 'experiment: {}'", kind));
   } else if (named->text != kind) {
     const bool is_other = std::find(kExperiments.begin(), kExperiments.end(), named->text) != kExperiments.end();
-    error(
-        *named, fmt::format("unknown experiment {}", describe(*named)),
-        is_other ? fmt::format("it is a plan of 'redag experiment {}'", named->text) : fmt::format("known: {}", kind));
+    error(*named, fmt::format("unknown experiment {}", describe(*named)),
+          is_other ? fmt::format("this is a plan for 'redag experiment {}'", named->text)
+                   : fmt::format("known: {}", kind));
   }
   return true;
 }
@@ -162,16 +162,16 @@ void PlanReader::take_tasks(const Node &map, lab::GenerateOptions &out) {
 }
 
 Result<std::vector<std::uint32_t>> parse_range(std::string_view text) {
-  constexpr const char *kHint = "from:to:step or a list, each above 0: 0.05:1:0.05 or 0.2,0.5,0.8";
+  constexpr const char *kHint = "write from:to:step or a list, each value above 0, as in 0.05:1:0.05 or 0.2,0.5,0.8";
   const bool is_range = text.find(':') != std::string_view::npos;
   const std::optional<std::vector<std::uint32_t>> values = split(text, is_range ? ':' : ',');
   if (!values || (is_range && values->size() != 3)) {
-    return make_error(fmt::format("'{}' are no such values", text), kHint);
+    return make_error(fmt::format("'{}' is neither a range nor a list of values", text), kHint);
   }
   if (!is_range) return *values;
   const auto [from, to, step] = std::tuple((*values)[0], (*values)[1], (*values)[2]);
   if (from > to || (to - from) / step > 10'000) {
-    return make_error(fmt::format("'{}' is no range of at most 10000 values", text), kHint);
+    return make_error(fmt::format("'{}' is not a range of at most 10000 values", text), kHint);
   }
   std::vector<std::uint32_t> range;
   for (std::uint64_t u = from; u <= to; u += step) range.push_back(static_cast<std::uint32_t>(u));

@@ -17,7 +17,7 @@ Result<Shard> parse_shard(std::string_view text) {
     const auto [stop, bad_count] = std::from_chars(slash + 1, end, shard.count);
     if (bad_count == std::errc() && stop == end && shard.index >= 1 && shard.index <= shard.count) return shard;
   }
-  return make_error(fmt::format("'{}' is not a shard", text), "i/n with 1 <= i <= n, such as 1/4");
+  return make_error(fmt::format("'{}' is not a shard", text), "write i/n with 1 <= i <= n, such as 1/4");
 }
 
 std::string to_string(const Shard &shard) { return fmt::format("{}/{}", shard.index, shard.count); }

@@ -29,10 +29,10 @@ std::string words_of(const metrics::JudgedJob &job, const Workload &workload, co
     case metrics::Miss::None: break;
     case metrics::Miss::Lost: return fmt::format("{} was {}", name, to_string(record.outcome));
     case metrics::Miss::Deadline:
-      return fmt::format("{} answered after at least {}, its deadline is {}", name, format_duration(*job.response),
-                         format_duration(task.deadline));
+      return fmt::format("{} had a response time of at least {}; its deadline is {}", name,
+                         format_duration(*job.response), format_duration(task.deadline));
     case metrics::Miss::EndToEnd:
-      return fmt::format("{} answered after at least {}, its DAG's end-to-end deadline is {}", name,
+      return fmt::format("{} had an end-to-end response time of at least {}; its DAG's end-to-end deadline is {}", name,
                          format_duration(*job.end_to_end), format_duration(task_set.dags[task.dag.value].deadline));
   }
   return {};

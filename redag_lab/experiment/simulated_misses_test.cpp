@@ -36,7 +36,7 @@ TEST(SimulatedMisses, LateJob) {
       miss_of(workload("  - {name: a, tasks: [{name: t, wcet: 5ms, period: 10ms}]}\n"
                        "  - {name: b, tasks: [{name: t, wcet: 6ms, period: 20ms, deadline: 15ms}]}\n"));
   ASSERT_TRUE(miss);
-  EXPECT_EQ(miss->what, "b.t: job 0 answered after at least 16ms, its deadline is 15ms");
+  EXPECT_EQ(miss->what, "b.t: job 0 had a response time of at least 16ms; its deadline is 15ms");
   EXPECT_EQ(miss->duration, 100 * kMillisecond);
 }
 
@@ -78,7 +78,9 @@ TEST(SimulatedMisses, EndToEndDeadline) {
   EXPECT_FALSE(with("10ms"));
   const auto miss = with("9ms");
   ASSERT_TRUE(miss);
-  EXPECT_THAT(miss->what, HasSubstr("a.d: job 0 answered after at least 10ms, its DAG's end-to-end deadline is 9ms"));
+  EXPECT_THAT(
+      miss->what,
+      HasSubstr("a.d: job 0 had an end-to-end response time of at least 10ms; its DAG's end-to-end deadline is 9ms"));
 }
 
 TEST(SimulatedMisses, UnfinishedAtTheEnd) {

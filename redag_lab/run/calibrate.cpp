@@ -364,8 +364,8 @@ class Calibrating {
       (realtime ? result_.realtime : result_.normal) = charged;
     }
     if (!result_.realtime && !result_.normal) {
-      return make_error("ended before everything had been measured once: there is nothing to write",
-                        "a second is enough on most machines");
+      return make_error("the calibration ended before everything was measured once: there is nothing to write",
+                        "on most machines, a second is long enough");
     }
     result_.processors = static_cast<std::uint32_t>(cpus);
     result_.processor = trace::this_machine().model;

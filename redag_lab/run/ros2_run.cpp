@@ -96,7 +96,7 @@ const std::vector<std::string> &ros2_executors() {
 Result<experiment::FinishedRun> run_in_ros2(const experiment::PlannedRun &planned, const std::string &program,
                                             const std::atomic<bool> &stop) {
   const Scratch scratch;
-  if (!scratch.made()) return make_error(fmt::format("cannot make a folder for a run: {}", std::strerror(errno)));
+  if (!scratch.made()) return make_error(fmt::format("cannot create a folder for a run: {}", std::strerror(errno)));
   if (Result<void> saved = save_workload(planned.workload, scratch.file("workload.yaml")); !saved) {
     return tl::unexpected<Diagnostics>(std::move(saved.error()));
   }
@@ -119,7 +119,7 @@ Result<experiment::FinishedRun> run_in_ros2(const experiment::PlannedRun &planne
   if (stop.load()) return make_error("interrupted");
   // Status 1 means that the trace breaks a rule, which is checked below.
   if (!WIFEXITED(status) || WEXITSTATUS(status) > 1) {
-    return make_error(fmt::format("'{}' failed; it said: {}", name, last_words(log)));
+    return make_error(fmt::format("'{}' failed with this message: {}", name, last_words(log)));
   }
   Result<trace::Trace> trace = trace::read_trace(out + "/events.jsonl");
   if (!trace) return tl::unexpected<Diagnostics>(std::move(trace.error()));

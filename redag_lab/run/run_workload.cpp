@@ -73,15 +73,16 @@ class Run {
       result_.mode.reason = "executor " + options_.executor + " has no other";
     }
     if (options_.realtime_threads && setup->band.top_job == 0) {
-      return make_error("the workers cannot be SCHED_FIFO threads: this process may not", runtime::realtime_hint());
+      return make_error("the workers cannot be SCHED_FIFO threads, because this process may not use SCHED_FIFO",
+                        runtime::realtime_hint());
     }
     const std::uint32_t spins = spins_before_sleep(*setup, options_.spin);
     result_.warnings = std::move(setup->warnings);
     const std::uint64_t most = most_started(workload_);
     if (preemptive && result_.mode.mode == PreemptionMode::Os && setup->config.max_started < most) {
       result_.warnings.push_back(
-          fmt::format("{} threads for up to {} jobs in progress at once: a job can wait for a thread that a less "
-                      "urgent one holds, which counts as a priority inversion",
+          fmt::format("{} threads serve up to {} jobs in progress: a job can wait for a thread that a less urgent job "
+                      "holds, which counts as a priority inversion",
                       setup->config.max_started, most));
     }
     if (options_.lock_memory) {
@@ -181,7 +182,7 @@ class Run {
     engine_->drain(events, finally);
     if (!flight_) return;
     const Result<void> kept = flight_->append(std::span(events).subspan(before), engine_->lost_events());
-    if (!kept) result_.warnings.push_back(fmt::format("no flight record from here on: {}", to_string(kept.error())));
+    if (!kept) result_.warnings.push_back(fmt::format("the flight record ends here: {}", to_string(kept.error())));
   }
 
   // Passes the collected events to the sink, if there is one.
@@ -275,19 +276,19 @@ class Run {
   void warn() {
     if (const Duration gave_way = engine_->gave_way(); gave_way > 0) {
       result_.warnings.push_back(
-          fmt::format("jobs of lower criticality were ordinary threads for {}, so that the kernel did not stop those "
-                      "of high criticality (real-time throttling)",
+          fmt::format("jobs of lower criticality ran on ordinary threads for {}, so that the kernel's real-time "
+                      "throttling did not stop those of high criticality",
                       humanize_duration(gave_way)));
     }
     if (const std::uint64_t waits = engine_->thread_waits(); waits > 0) {
-      result_.warnings.push_back(fmt::format("{} time{} a job waited for a thread: all {} had jobs in progress", waits,
-                                             waits == 1 ? "" : "s", engine_->thread_count()));
+      result_.warnings.push_back(fmt::format("{} time{} a job waited for a thread, because all {} had jobs in progress",
+                                             waits, waits == 1 ? "" : "s", engine_->thread_count()));
     }
     if (engine_->refused_priorities() > 0) {
-      result_.warnings.push_back(fmt::format("{} priority changes were refused", engine_->refused_priorities()));
+      result_.warnings.push_back(fmt::format("the kernel refused {} priority changes", engine_->refused_priorities()));
     }
     if (!result_.unfinished.empty()) {
-      result_.warnings.push_back(fmt::format("not finished {} after the end: {}",
+      result_.warnings.push_back(fmt::format("jobs not finished {} after the end: {}",
                                              format_duration(options_.drain_timeout),
                                              fmt::join(result_.unfinished, ", ")));
     }

@@ -175,7 +175,7 @@ TEST(RunWorkload, ThereIsAThreadForEveryJobThatCanBeInProgress) {
   options.duration = 150 * kMillisecond;
   const auto too_few = [](const RunResult &result) {
     return std::count_if(result.warnings.begin(), result.warnings.end(), [](const std::string &warning) {
-      return warning.find("2 threads for up to 3 jobs in progress at once") != std::string::npos;
+      return warning.find("2 threads serve up to 3 jobs in progress") != std::string::npos;
     });
   };
   const RunResult enough = run(workload, options);

@@ -39,7 +39,7 @@ trace::RunInfo describe_simulation(const Workload &workload, const Variant &vari
   info.preemption = mode_name(info.config.preemption);
   const PreemptionMode wanted = workload.platform.preemption;
   if (wanted == PreemptionMode::Os || wanted == PreemptionMode::Auto) {
-    info.preemption_why = fmt::format("{}at any instant, at no cost but --overhead-preempt",
+    info.preemption_why = fmt::format("{}at any instant, with no cost except --overhead-preempt",
                                       wanted == PreemptionMode::Auto ? "auto, simulated as os: " : "simulated: ");
   }
   info.driver = trace::Driver::Simulator;
@@ -205,7 +205,7 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
     if (machine) {
       result->trace.info.overheads = to_string(*machine);
     } else {
-      result->warnings.push_back(machine.error().front().message + ": none were charged");
+      result->warnings.push_back(machine.error().front().message + ": no overheads are charged");
     }
   }
   evaluation->finish(std::move(result->trace.info));
@@ -251,7 +251,8 @@ std::optional<std::string> busy_machine_warning() {
   const std::size_t cpus = runtime::usable_cpus().size();
   // Half a processor each; an idle desktop stays below this load.
   if (getloadavg(&load, 1) != 1 || load < 0.5 * static_cast<double>(cpus)) return std::nullopt;
-  return fmt::format("load average {:.1f} on {} processor(s): other programs disturb the figures", load, cpus);
+  return fmt::format("the load average is {:.1f} on {} processor(s): other programs disturb the measurements", load,
+                     cpus);
 }
 
 Duration sensible_duration(const Workload &workload) {

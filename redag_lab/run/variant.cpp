@@ -51,7 +51,7 @@ Result<std::vector<Variant>> parse_variants(std::string_view list) {
     if (!variant) return tl::unexpected<Diagnostics>(std::move(variant.error()));
     const auto same = [&](const Variant &other) { return other.name == variant->name; };
     if (std::any_of(variants.begin(), variants.end(), same)) {
-      return make_error("executor '" + variant->name + "' is named twice");
+      return make_error("executor '" + variant->name + "' is listed twice");
     }
     variants.push_back(*std::move(variant));
     if (comma == std::string_view::npos) return variants;

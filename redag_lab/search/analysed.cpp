@@ -69,7 +69,7 @@ void judge(const Analysed &analysed, Row &row, std::size_t index, bool is_dag) {
     // A yes-or-no test can accept where the bounds are too coarse. A bound above the deadline is then dropped.
     row.tightest = {};
     row.slack.reset();
-    row.reason = fmt::format("{} accepts the workload as a whole, and tells no response times", test->name);
+    row.reason = fmt::format("{} accepts the workload as a whole and gives no response times", test->name);
     row.says = test;
     row.standing = Standing::Ok;
   } else if (!row.tightest.response) {
@@ -103,7 +103,7 @@ Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatf
                          const analysis::ExplorationOptions *explore, const std::string &executor,
                          const analysis::AnalyzeOptions &limits, const std::vector<std::string> &only) {
   const executors::ExecutorKind *kind = executors::find_executor(executor);
-  if (kind == nullptr) return make_error("there is no analysis of the executor '" + executor + "'");
+  if (kind == nullptr) return make_error("there is no analysis for the executor '" + executor + "'");
   Result<analysis::TaskSet> task_set = analysis::compile_for(*kind, workload, platform);
   if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
   std::vector<analysis::Method> methods = analysis::methods_of(*kind);

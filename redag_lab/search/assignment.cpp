@@ -51,7 +51,7 @@ class Search {
       if (platform_.workers > 1) add_order("dkc", with_order(workload_, *task_set, dkc_order(*task_set)));
       add_audsley(*task_set);
     } else {
-      result.audsley_reason = "priorities are to stay as they are";
+      result.audsley_reason = "--keep priorities leaves priorities as they are";
     }
     return std::move(result_);
   }

@@ -73,7 +73,7 @@ class Search {
       if (workload_.dags[d].max_active == 0) continue;
       Workload changed = workload_;
       changed.dags[d].max_active = 0;
-      if (suffices(changed, platform_)) return fmt::format("DAG {} without max_active", workload_.dags[d].name);
+      if (suffices(changed, platform_)) return fmt::format("DAG {}: no max_active", workload_.dags[d].name);
     }
     return std::nullopt;
   }
@@ -94,7 +94,7 @@ class Search {
         Workload changed = workload_;
         changed.dags[d].tasks[t].group.clear();
         if (!suffices(changed, platform_)) continue;
-        return fmt::format("{}.{} outside of group '{}'", workload_.dags[d].name, task.name, task.group);
+        return fmt::format("task {}.{}: remove it from group '{}'", workload_.dags[d].name, task.name, task.group);
       }
     }
     return std::nullopt;

@@ -61,11 +61,11 @@ std::string obstacle_of(const Workload &workload, const analysis::AnalysisPlatfo
     worst = t;
     missing = late;
   }
-  if (worst) return "bound of " + label(*task_set, *worst) + " above its deadline";
+  if (worst) return "the bound of " + label(*task_set, *worst) + " exceeds its deadline";
   for (std::size_t d = 0; d < task_set->dags.size(); ++d) {
     const analysis::CompiledDag &dag = task_set->dags[d];
     if (dag.deadline > 0 && report.dags[d].response.value_or(kNever) > dag.deadline) {
-      return "end-to-end deadline of " + dag.name;
+      return "the end-to-end deadline of " + dag.name;
     }
   }
   return "not accepted";
@@ -109,7 +109,7 @@ class Search {
     if (margin_.position) {
       margin_.factor = load_factor(workload_, margin_.knob, *margin_.position);
       const bool at_end = margin_.knob.kind == Knob::Kind::Period && *margin_.position == -1;
-      margin_.obstacle = at_end ? "the clock's resolution"
+      margin_.obstacle = at_end ? "the resolution of the clock"
                                 : obstacle_of(turned(workload_, margin_.knob, *margin_.position + 1), platform_);
     }
     return margin_;
@@ -270,9 +270,9 @@ std::optional<std::string> why_impossible(const analysis::TaskSet &task_set) {
     const analysis::CompiledTask &task = task_set.tasks[t];
     // Jobs of a task that can overlap (concurrency) may take longer than the limit; such workloads are not analysed.
     const Duration due = task_set.not_analysable.empty() ? std::min(task.deadline, task.limit) : task.deadline;
-    if (task.wcet > due) return label(task_set, t) + " alone takes longer than it has";
+    if (task.wcet > due) return label(task_set, t) + " alone takes longer than its deadline allows";
   }
-  if (is_overloaded(task_set)) return fmt::format("utilization above {}", task_set.platform.workers);
+  if (is_overloaded(task_set)) return fmt::format("the utilization exceeds {}", task_set.platform.workers);
   return std::nullopt;
 }
 

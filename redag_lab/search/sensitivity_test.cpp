@@ -40,7 +40,7 @@ TEST(Sensitivity, HarmonicPeriodsUseTheWholeWorker) {
   EXPECT_EQ(found.position, 2 * kFactorUnit);
   EXPECT_DOUBLE_EQ(found.factor, 2.0);
   EXPECT_FALSE(found.again);
-  EXPECT_EQ(found.obstacle, "utilization above 1");
+  EXPECT_EQ(found.obstacle, "the utilization exceeds 1");
   EXPECT_EQ(margin(half, {Kind::Rates, all_tasks(half)}).position, 2 * kFactorUnit);
   // One task takes all the remaining time: 1 ms + 1/2 of 8 ms.
   EXPECT_EQ(margin(half, {Kind::Wcet, {1}}).position, 5 * kMillisecond);
@@ -80,7 +80,7 @@ TEST(Sensitivity, WhereNoneAloneSufficesItSaysSo) {
   const Workload hopeless = independent({{9, 8}, {17, 16}});
   EXPECT_FALSE(margin(hopeless, {Kind::Wcet, {0}}).position);
   EXPECT_FALSE(margin(hopeless, {Kind::Wcet, {1}}).position);
-  EXPECT_EQ(margin(hopeless, {Kind::Wcet, {0}}).obstacle, "b.t alone takes longer than it has");
+  EXPECT_EQ(margin(hopeless, {Kind::Wcet, {0}}).obstacle, "b.t alone takes longer than its deadline allows");
   EXPECT_TRUE(all_wcets(hopeless).position);
 }
 
@@ -90,7 +90,7 @@ TEST(Sensitivity, AChangeOfOrderEndsTheRoom) {
   // With b at 40, a is first (5 <= 6), then b (8 <= 10). At 20 either can be first, and a responds after 8 > 6.
   const Margin found = margin(workload, {Kind::Period, {1}});
   EXPECT_EQ(found.position, -21);
-  EXPECT_EQ(found.obstacle, "bound of a.t above its deadline");
+  EXPECT_EQ(found.obstacle, "the bound of a.t exceeds its deadline");
   EXPECT_FALSE(found.again);
 }
 

@@ -83,8 +83,8 @@ class Generator {
     }
     const auto utilizations = draw_utilizations();
     if (!utilizations) {
-      return make_error("no vector of utilizations keeps the bound in the attempts allowed",
-                        "more tasks, less utilization, or the method drs");
+      return make_error("no utilizations within the bound were drawn in the allowed attempts",
+                        "use more tasks, less utilization, or the method drs");
     }
     std::size_t next = 0;
     for (std::uint32_t d = 0; d < o_.dags; ++d) {
@@ -277,7 +277,8 @@ Diagnostics find_mistakes(const GenerateOptions &o) {
     require(value >= 0 && value <= 1, fmt::format("{} must be from 0 to 1, not {}", name, value));
   };
   require(o.dags >= 1, "dags must be at least 1");
-  require(o.min_tasks >= 1 && o.min_tasks <= o.max_tasks, "min_tasks to max_tasks must be a range from at least 1");
+  require(o.min_tasks >= 1 && o.min_tasks <= o.max_tasks,
+          "min_tasks to max_tasks must be a range that starts at 1 or more");
   require(std::uint64_t{o.dags} * o.max_tasks <= kMaxTasks,
           fmt::format("dags * max_tasks must be at most {}", kMaxTasks));
   require(o.workers >= 1 && o.workers <= kMaxWorkers, fmt::format("workers must be from 1 to {}", kMaxWorkers));
@@ -286,16 +287,16 @@ Diagnostics find_mistakes(const GenerateOptions &o) {
   require(o.utilization > 0 && std::isfinite(o.utilization), "utilization must be greater than zero");
   require(o.max_task_utilization > 0 && o.max_task_utilization <= 1, "max_task_utilization must be in (0, 1]");
   require(o.utilization <= o.max_task_utilization * o.dags * o.min_tasks,
-          fmt::format("{} DAGs of {} tasks of at most {} do not reach utilization {}", o.dags, o.min_tasks,
-                      o.max_task_utilization, o.utilization));
-  require(o.period_granularity >= 1 && o.period_min >= o.period_granularity, "period_min is below the granularity");
-  require(o.period_min <= o.period_max && o.period_max <= kMaxDuration / 4, "period_min to period_max is not a range");
+          fmt::format("{} DAGs of {} tasks with a utilization of at most {} each do not reach utilization {}", o.dags,
+                      o.min_tasks, o.max_task_utilization, o.utilization));
+  require(o.period_granularity >= 1 && o.period_min >= o.period_granularity, "period_min is below period_granularity");
+  require(o.period_min <= o.period_max && o.period_max <= kMaxDuration / 4, "period_min to period_max must be a range");
   require(o.deadline_min > 0 && o.deadline_min <= o.deadline_max && o.deadline_max <= 4,
           "deadline_min to deadline_max must be a range in (0, 4]");
   require(o.bcet_min >= 0 && o.bcet_min <= o.bcet_max && o.bcet_max <= 1,
           "bcet_min to bcet_max must be a range in [0, 1]");
-  require(o.max_active_min <= o.max_active_max, "max_active_min to max_active_max is not a range");
-  require(o.group_share == 0 || o.groups > 0, "group_share needs groups");
+  require(o.max_active_min <= o.max_active_max, "max_active_min to max_active_max must be a range");
+  require(o.group_share == 0 || o.groups > 0, "group_share needs at least one group");
   require(o.queue_depth >= 1 && o.queue_depth <= kMaxQueueDepth, "queue_depth is out of range");
   require_share("edge_probability", o.edge_probability);
   require_share("data_share", o.data_share);
@@ -304,7 +305,7 @@ Diagnostics find_mistakes(const GenerateOptions &o) {
   require_share("queue_share", o.queue_share);
   require_share("high_share", o.high_share);
   require_share("low_share", o.low_share);
-  require(o.high_share + o.low_share <= 1 + 1e-9, "high_share and low_share exceed 1 together");
+  require(o.high_share + o.low_share <= 1 + 1e-9, "high_share and low_share together must be at most 1");
   return mistakes;
 }
 

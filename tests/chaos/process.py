@@ -195,7 +195,7 @@ def throttled(rng, folder):
     file.write_text(SPARED)
     child = run("1500ms", "--out", folder / "spared")
     expect(child.status == 0, child.err)
-    expect("jobs of lower criticality were ordinary threads for " in child.err, child.err)
+    expect("jobs of lower criticality ran on ordinary threads for " in child.err, child.err)
     check_results(folder)
 
 

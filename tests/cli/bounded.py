@@ -86,12 +86,12 @@ class Limits(Case):
     def test_a_time_limit(self):
         many = self.write("many.yaml", independent(3000, 2))
         text = self.expect(redag("analyze", many, "--time-limit", "1ns"), 0).stdout
-        self.assertIn("gave up on bertogna_cirinei: the time limit of 1ns is over\n", text)
+        self.assertIn("gave up on bertogna_cirinei: the time limit of 1ns has passed\n", text)
         result = self.expect(redag("sensitivity", many, "--time-limit", "1ns", "--json"), 0,
-                             "the time limit of 1ns is over: these are 0 of")
+                             "the time limit of 1ns has passed: these are 0 of")
         self.assertTrue(json.loads(result.stdout)["stopped"])
         result = self.expect(redag("assign", self.cart, "--time-limit", "1ns", "--json"), 0,
-                             "the time limit of 1ns is over: this is the best so far")
+                             "the time limit of 1ns has passed: this is the best assignment found so far")
         self.assertTrue(json.loads(result.stdout)["stopped"])
 
     def test_terms_of_a_large_workload_come_on_demand(self):

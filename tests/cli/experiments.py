@@ -78,14 +78,14 @@ class Acceptance(Case):
     def test_merging_what_is_not_all_there(self):
         self.acceptance("first", "--sets", "4", "--shard", "1/2")
         result = redag("experiment", "merge", self.folder / "first", self.folder / "first", "-o", self.folder / "merged")
-        self.expect(result, 0, "16 of 32 workloads are in none of the folders")
+        self.expect(result, 0, "16 of 32 workloads are missing from the folders")
         self.assertIn("16 of 32 workloads are done", result.stdout)
         plan = self.folder / "merged" / "plan.yaml"
         self.expect(redag("experiment", "acceptance", plan, "--out", self.folder / "merged"), 0)
         self.acceptance("whole", "--sets", "4")
         self.assertEqual(self.results("whole")[0], self.results("merged")[0])
         again = redag("experiment", "merge", self.folder / "first", "-o", self.folder / "merged")
-        self.expect(again, 2, "holds results already")
+        self.expect(again, 2, "already holds results")
 
         self.acceptance("other", "--sets", "5")
         result = redag("experiment", "merge", self.folder / "first", self.folder / "other", "-o", self.folder / "x")
@@ -111,7 +111,7 @@ class Acceptance(Case):
         size = ["--sets", "2000", "--simulation-periods", "40"]
         process = self.start("stopped", *size)
         second = redag("experiment", "acceptance", *self.PLAN, *size, "--out", self.folder / "stopped")
-        self.expect(second, 2, "another process is writing to it")
+        self.expect(second, 2, "another process is writing to this folder")
         process.send_signal(signal.SIGINT)
         out, error = process.communicate(timeout=60)
         self.assertEqual(process.returncode, 0, error)
@@ -156,7 +156,7 @@ class Acceptance(Case):
         number = lines[forged].split(",")[0]
         result = self.acceptance("forged", "--sets", "2", status=1)
         self.assertIn(f"error: unit {number} (6 DAGs, 2 workers, ", result.stderr)
-        self.assertIn("misses a deadline in the simulation, but is accepted by any", result.stderr)
+        self.assertIn("misses a deadline in simulation, although it is accepted by any", result.stderr)
         replay = self.folder / "forged" / f"violation-{number}.yaml"
         options = re.search(r"^# redag simulate THIS_FILE (.*)$", replay.read_text(), re.M)[1].split()
         self.expect(redag("simulate", replay, *options, "--check"), 1)
@@ -177,7 +177,7 @@ class Acceptance(Case):
         self.acceptance("damaged", "--sets", "1")
         with open(damaged / "units.csv", "a") as units:
             units.write("x,110\n")
-        self.assertIn("units.csv:11:1: error: not a finished unit", self.acceptance("damaged", "--sets", "1",
+        self.assertIn("units.csv:11:1: error: this line is not a finished unit", self.acceptance("damaged", "--sets", "1",
                                                                                    status=2).stderr)
 
     def test_progress_on_a_terminal(self):
@@ -208,7 +208,7 @@ class Factorial(Case):
     def test_same_results_for_any_number_of_jobs_and_shards(self):
         plan = self.plan()
         result = self.run_plan(plan, "one", "-j1")
-        self.assertIn("no violation of the model; every bound max_active was kept", result.stdout)
+        self.assertIn("no violation of the model; every max_active bound was kept", result.stdout)
         self.assertIn("workers x deadline_scale", result.stdout)
         self.run_plan(plan, "two", "-j2")
         self.assertEqual(self.results("one"), self.results("two"))
@@ -242,9 +242,9 @@ class Factorial(Case):
         self.assertIn("<title>small - ReDAG-RT report</title>", (self.folder / "done" / "report.html").read_text())
         document = json.loads(self.expect(redag("report", self.folder / "done", "--json"), 0).stdout)
         self.assertEqual((document["kind"], len(document["points"])), ("factorial", 26))
-        self.expect(redag("report", self.folder / "done", self.folder / "done"), 2, "name one folder")
+        self.expect(redag("report", self.folder / "done", self.folder / "done"), 2, "name this folder alone")
         (self.folder / "done" / "factorial.json").write_text("{}")
-        self.expect(redag("report", self.folder / "done"), 2, "factorial.json: error: is no redag.experiment.factorial/2")
+        self.expect(redag("report", self.folder / "done"), 2, "factorial.json: error: is not a redag.experiment.factorial/2")
         self.run_plan(self.folder / "done" / "plan.yaml", "done")  # an earlier page is accepted
 
     def test_plan_in_the_folder_is_whole(self):
@@ -274,7 +274,7 @@ class Factorial(Case):
         process.send_signal(signal.SIGINT)
         out, error = process.communicate(timeout=60)
         self.assertEqual(process.returncode, 0, error)
-        self.assertIn("interrupted: the results so far are kept; the same command goes on", error)
+        self.assertIn("interrupted: the results so far are kept; run the same command to resume", error)
         self.assertIn("of 5 200 runs are done", out)
         document = json.loads((self.folder / "stopped" / "factorial.json").read_text())
         self.assertFalse(document["complete"])
@@ -305,7 +305,7 @@ class Factorial(Case):
         self.expect(redag("experiment", "factorial", "/no/such.yaml"), 2, "/no/such.yaml")
         threads = self.write("threads.yaml", "experiment: factorial\nworld: threads\nexecutors: [redag]\n"
                              "workloads: [{name: a, text: \"" + CART.replace("\n", "\\n") + "\"}]\n")
-        self.expect(redag("experiment", "factorial", threads, "--shard", "1/2"), 2, "belong to one machine")
+        self.expect(redag("experiment", "factorial", threads, "--shard", "1/2"), 2, "depend on one machine")
 
     def test_threads(self):
         """Real runs take turns. The ideal runs beside them in virtual time."""
@@ -336,7 +336,7 @@ exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --w
         self.assertEqual(len(rows), (2 + 2 + 2 + 1) * 2)
         self.assertTrue(all(int(row["released"]) > 100 for row in rows))
         program.write_text("#!/bin/sh\necho error: no such thing >&2\nexit 2\n")
-        self.assertIn("failed; it said: error: no such thing", self.run_plan(plan, "bad", "--run-workload", program,
+        self.assertIn("failed with this message: error: no such thing", self.run_plan(plan, "bad", "--run-workload", program,
                                                                            status=2).stderr)
         self.assertIn("source the workspace", self.run_plan(plan, "worse", "--run-workload", "/no/such", status=2).stderr)
 
@@ -355,8 +355,8 @@ exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --w
         rows = {(row["executor"], row["world"]) for row in csv.DictReader(self.results("both")[1].splitlines())}
         self.assertEqual(rows, {("ideal", "simulator"), ("mte", "simulator"), ("ros2/mte", "ros_nodes")})
         self.assertIn("6 of 6", self.expect(redag("report", self.folder / "both", "-o", self.folder / "both.html"), 0).stdout)
-        self.assertIn("too many", self.expect(redag(*both, self.folder / "recorded", "--out", self.folder / "twice"), 2).stderr)
-        self.assertIn("name the folder of the one", self.expect(
+        self.assertIn("there are more runs of", self.expect(redag(*both, self.folder / "recorded", "--out", self.folder / "twice"), 2).stderr)
+        self.assertIn("name the folder of the experiment", self.expect(
             redag("experiment", "merge", self.folder / "recorded", "--out", self.folder / "alone"), 2).stderr)
 
     def test_plans_of_this_repository(self):

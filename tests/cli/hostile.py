@@ -114,10 +114,10 @@ class Combinations(Case):
     def test_an_executor_with_a_mode_of_its_own(self):
         for command in ("simulate", "run"):
             self.refuse(command, self.cart, "--executor", "redag-none", "--preemption", "os", "--out", self.folder / "out",
-                        says="--preemption os: 'redag-none' always runs with preemption none")
+                        says="--preemption os: executor 'redag-none' always runs with preemption none")
             self.refuse(command, self.cart, "--executor", "mte", "--preemption", "os", says="--preemption os: 'mte'")
             self.refuse(command, self.cart, "--executor", "mte", "--policy", "edf", says="--policy edf: 'mte'")
-            self.refuse(command, self.cart, "--executor", "ste", "--workers", "2", says="--workers 2: 'ste' has one worker")
+            self.refuse(command, self.cart, "--executor", "ste", "--workers", "2", says="--workers 2: executor 'ste' has only one worker")
             self.refuse(command, self.cart, "--executor", "redag-os", "--policy", "edf", "--out", self.folder / "out",
                         says="redag-os: preemption 'os' needs a static policy")
         self.refuse("analyze", self.cart, "--executor", "mte", "--policy", "edf", says="--policy edf: 'mte'")
@@ -135,7 +135,7 @@ class Combinations(Case):
                     self.assertIn("".join(mode), ("none", "cooperative", "os"), text)
 
     def test_options_that_would_be_ignored(self):
-        self.refuse("compare", self.cart, "--executors", "redag", says="nothing to compare 'redag' with")
+        self.refuse("compare", self.cart, "--executors", "redag", says="no other executor to compare 'redag' with")
         self.refuse("compare", self.cart, "--simulate", "--affinity", "0", says="excludes")
         self.refuse("compare", self.cart, "--overhead-release", "5us", says="--overhead-release requires --simulate")
         self.refuse("sensitivity", self.cart, "--duration", "1s", says="--duration requires --simulate")
@@ -144,7 +144,7 @@ class Combinations(Case):
         self.refuse("analyze", "--methods", "--explain", "a.x", says="FILE is required")
         self.refuse("top", "--list", "5", says="excludes")
         self.refuse("simulate", self.cart, "--duration", "1s", "--duration", "2s", says="--duration is given more than once")
-        self.refuse("run", self.cart, "--affinity", "1023", says="--affinity: this process may not use processor 1023")
+        self.refuse("run", self.cart, "--affinity", "1023", says="--affinity: this process is not allowed to use processor 1023")
 
     def test_chain_leaves_the_file_alone(self):
         before = self.expect(redag("analyze", "--chain", "fast.sense,fast.act", self.cart), 0).stdout
@@ -220,7 +220,7 @@ class Files(Case):
             closed.mkdir(mode=0o555)
             self.expect(redag("simulate", self.cart, "--out", closed / "x"), 2, str(closed))
         for place in ("/proc/x", "/dev/null", str(self.cart)):
-            self.expect(redag("simulate", self.cart, "--out", place), 2, f"{place}: error: cannot make the folder")
+            self.expect(redag("simulate", self.cart, "--out", place), 2, f"{place}: error: cannot create the folder")
 
 
 if __name__ == "__main__":

@@ -76,7 +76,7 @@ class Top(Case):
         self.assertIn("cart  redag", text)
         for column in ["rate/s", "p99", "deadline", "bound", "missed", "active"]:
             self.assertIn(column, text)
-        piped = self.expect(redag("top", process.pid), 0, "not on a terminal")
+        piped = self.expect(redag("top", process.pid), 0, "not a terminal")
         self.assertIn("plan", piped.stdout)
         self.assertNotIn("\033", piped.stdout)
 
@@ -103,15 +103,15 @@ class Top(Case):
         process = self.start()
         self.frame_of(process)
         self.page(process).chmod(0o644)
-        self.expect(redag("top", process.pid, "--once"), 2, "others than its owner")
+        self.expect(redag("top", process.pid, "--once"), 2, "other users than its owner")
         self.page(process).chmod(0o600)
         self.expect(redag("top", process.pid, "--once"), 0)
 
     def test_bad_targets(self):
-        self.expect(redag("top", "cart"), 2, "'cart' is no process")
-        self.expect(redag("top", "12."), 2, "'12.' is no process")
-        self.expect(redag("top", "--folder", self.folder), 1, "no executor runs")
-        self.expect(redag("top", "--folder", self.folder, "--list"), 1, "no executor runs")
+        self.expect(redag("top", "cart"), 2, "'cart' is not a process")
+        self.expect(redag("top", "12."), 2, "'12.' is not a process")
+        self.expect(redag("top", "--folder", self.folder), 1, "no running executor")
+        self.expect(redag("top", "--folder", self.folder, "--list"), 1, "no running executor")
 
     def test_of_several_one_has_to_be_named(self):
         with tempfile.TemporaryDirectory(dir="/dev/shm") as name:
@@ -120,12 +120,12 @@ class Top(Case):
             for process in first, second:
                 self.linked(folder, process)
             lower = min(first.pid, second.pid)
-            result = self.expect(redag("top", "--folder", folder, "--once"), 2, "several executors run", f"redag top {lower}")
+            result = self.expect(redag("top", "--folder", folder, "--once"), 2, "several executors are running", f"redag top {lower}")
             self.assertIn(str(first.pid), result.stderr)
             self.assertIn(str(second.pid), result.stderr)
             one = self.document(redag("top", f"{second.pid}.0", "--folder", folder, "--json"), "redag.live/1")
             self.assertEqual(one["pid"], second.pid)
-            self.expect(redag("top", f"{second.pid}.1", "--folder", folder, "--once"), 1, "has no live page")
+            self.expect(redag("top", f"{second.pid}.1", "--folder", folder, "--once"), 1, "publishes no live page")
 
     def test_damaged_pages(self):
         page = self.folder / f"redag.{os.getpid()}.0"
@@ -159,7 +159,7 @@ class Top(Case):
         self.assertRegex(screen.read_until("q quit"), r"\033\[J(\033\[\d+m)?\Z")
         first.kill()
         first.wait(timeout=100)
-        screen.read_until("it has ended")
+        screen.read_until("the executor has ended")
         second = self.start()
         screen.read_until(f"redag {second.pid}")
         screen.press("q")
@@ -175,7 +175,7 @@ class Top(Case):
             screen.read_until(f"redag {first.pid}")  # the only executor
             self.linked(folder, second)
             screen.press("l")
-            screen.read_until("which executor?")
+            screen.read_until("Which executor?")
             screen.read_until(f"> 1 {first.pid}")
             screen.read_until(f"2 {second.pid}")
             screen.press(DOWN)
@@ -192,11 +192,11 @@ class Top(Case):
             screen.press("\r")
             screen.read_until(f"redag {second.pid}")
             screen.press("l")
-            screen.read_until("which executor?")
+            screen.read_until("Which executor?")
             screen.press("1")
             screen.read_until(f"redag {first.pid}")
             screen.press("l")
-            screen.read_until("which executor?")
+            screen.read_until("Which executor?")
             screen.press(ESCAPE)
             screen.read_until(f"redag {first.pid}")
             screen.press(ESCAPE)
@@ -210,9 +210,9 @@ class Top(Case):
             screen.press(key)
             screen.read_until(f"by {order}")
         screen.press("i")
-        screen.read_until("inverted")
+        screen.read_until("reversed")
         screen.press("g")
-        screen.read_until("inverted")
+        screen.read_until("reversed")
         self.assertNotIn("sense", screen.read_until("q quit"))
         screen.press("g")
         screen.read_until("sense")
@@ -221,7 +221,7 @@ class Top(Case):
         screen.press(" ")
         # Leaves room for two of five rows: two DAGs and three tasks.
         screen.press("i")
-        screen.resize(8, 120)
+        screen.resize(9, 120)
         screen.press(END)
         screen.read_until("plan")
         screen.press(HOME)

@@ -26,7 +26,7 @@ class Diff(Case):
         self.assertIn("differs preemption: none -> os", result.stdout)
         self.assertIn("better fast.sense: missed 200 (10.0 %) -> 0", result.stdout)
         self.assertIn("worse slow.plan: p50 27ms -> 33ms", result.stdout)
-        self.assertNotIn("lasts longer than the blocks", result.stdout)
+        self.assertNotIn("correlated beyond the blocks", result.stdout)
         self.expect(redag("diff", none, full, "--check"), 1)
         self.expect(redag("diff", none, none, "--check"), 0)
         self.assertIn("no figure differs", redag("diff", none, none).stdout)
@@ -56,18 +56,18 @@ class Diff(Case):
         other = self.results("other", file=self.write("other.yaml", CART.replace("25ms", "20ms")))
         self.expect(redag("diff", one, other), 2, "different workloads: wcet of slow.plan: 25ms -> 20ms", "--different")
         result = self.expect(redag("diff", one, other, "--different"), 0)
-        self.assertIn("caution: the two ran different workloads", result.stdout)
+        self.assertIn("caution: the two sides ran different workloads", result.stdout)
 
     def test_what_else_differs(self):
         simulated = self.results("simulated")
         slowed = self.results("slowed", "--overhead-dispatch", "100us")
-        self.assertIn("caution: overheads differ: none, and release 0s, dispatch 0.1ms, preempt 0s",
+        self.assertIn("caution: the sides were charged different overheads: none, and release 0s, dispatch 0.1ms, preempt 0s",
                       self.expect(redag("diff", simulated, slowed), 0).stdout)
         on_threads = self.folder / "threads"
         self.expect(redag("run", self.cart, "--duration", "500ms", "--out", on_threads), 0)
         text = self.expect(redag("diff", simulated, on_threads), 0).stdout
         self.assertIn("caution: one side comes from 'simulator', the other from 'threads'", text)
-        self.assertIn("caution: a side has a single run", text)
+        self.assertIn("caution: one side has a single run", text)
         info, *events = (on_threads / "events.jsonl").read_text().splitlines(keepends=True)
         (self.folder / "elsewhere").mkdir()
         changed = json.loads(info)
@@ -186,16 +186,16 @@ class Report(Case):
         out = self.results("out")
         self.expect(redag("report", out, "-o", "/nowhere/report.html"), 2, "/nowhere/report.html")
         (out / "comparison.json").write_text("{}")
-        self.expect(redag("report", out), 2, "comparison.json:1", "not a comparison")
+        self.expect(redag("report", out), 2, "comparison.json:1", "was not written by 'redag compare'")
         (out / "comparison.json").unlink()
         events = (out / "events.jsonl").read_text().splitlines(keepends=True)
         (out / "events.jsonl").write_text("".join(events[:-1]))
-        self.expect(redag("report", out), 2, f"events.jsonl:{len(events) - 1}", "ends too early")
+        self.expect(redag("report", out), 2, f"events.jsonl:{len(events) - 1}", "file is incomplete")
 
     def test_repetitions_of_different_things(self):
         self.results("out/repetition-1")
         self.results("out/repetition-2", "--executor", "mte")
-        self.expect(redag("report", self.folder / "out"), 2, "repetition-2/events.jsonl: is no repetition")
+        self.expect(redag("report", self.folder / "out"), 2, "repetition-2/events.jsonl: is not a repetition")
 
 
 class Tune(Case):
@@ -214,7 +214,7 @@ dags:
         tuned = self.folder / "tuned.yaml"
         result = self.expect(redag("tune", file, "--simulator-only", "-o", tuned), 0, "wrote")
         self.assertIn("change max_active of wide: none -> 1", result.stdout)
-        self.assertRegex(result.stdout, r"misses, on seeds that the search has not seen: [\d ]+ \([\d.]+ %\) -> none")
+        self.assertRegex(result.stdout, r"misses, on unseen seeds: [\d ]+ \([\d.]+ %\) -> none")
         self.assertIn("seed by seed: 10 better, 0 equal, 0 worse", result.stdout)
         self.expect(redag("validate", "--strict", tuned), 0)
         self.assertIn("bcet: 20ms", tuned.read_text())
@@ -238,8 +238,8 @@ dags:
         self.assertRegex(text, r"criticality high: \d+ lost, [\d.]+us -> 0 lost, -9ms")
         self.assertRegex(text, r"criticality normal: 0 lost, ")
         text = self.expect(redag("tune", file, "--objective", "slack", "--exhaustive", "1", *options), 0).stdout
-        self.assertRegex(text, r"slack, on seeds that the search has not seen: \d+ lost, -[\d.]+ % -> 0 lost, [\d.]+ %")
-        self.assertIn("local search (seed 1), not every combination", text)
+        self.assertRegex(text, r"slack, on unseen seeds: \d+ lost, -[\d.]+ % -> 0 lost, [\d.]+ %")
+        self.assertIn("local search (seed 1), not all combinations were tried", text)
 
     def test_json_is_the_same_for_every_number_of_processors(self):
         file = self.write("wide.yaml", self.WIDE)

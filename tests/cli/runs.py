@@ -55,12 +55,12 @@ class Calibrate(Case):
         self.assertTrue(document["bounds"]["calibrated"])
         self.assertGreater(document["bounds"]["tasks"][0]["bound_ns"], plain["bounds"]["tasks"][0]["bound_ns"])
         report = json.loads(redag("report", out, "--json").stdout)
-        self.assertIn("with the overheads of the machine", report["groups"][0]["bounds"]["assumes"])
+        self.assertIn("charged with the machine's overheads", report["groups"][0]["bounds"]["assumes"])
         self.assertEqual(report["groups"][0]["tasks"][0]["bound_ns"], document["bounds"]["tasks"][0]["bound_ns"])
 
     def test_without_one_the_run_says_so(self):
         result = self.expect(redag("run", self.cart, "--duration", "200ms", "--preemption", "none"), 0)
-        self.assertIn("platform overheads not charged; run 'redag calibrate'", result.stdout)
+        self.assertIn("overheads of the platform are not charged; measure them with 'redag calibrate'", result.stdout)
 
     def test_bad_files(self):
         self.expect(redag("run", self.cart, "--overheads", self.folder / "none.yaml"), 2, "cannot open")
@@ -73,7 +73,7 @@ class Calibrate(Case):
 
     def test_bad_arguments(self):
         self.expect(redag("calibrate", "--duration", "0"), 2, "--duration")
-        self.expect(redag("calibrate", "--duration", "200h"), 2, "more than a day")
+        self.expect(redag("calibrate", "--duration", "200h"), 2, "longer than a day")
         self.expect(redag("calibrate", "--duration", "1s", "--out", self.folder / "no" / "folder.yaml"), 2, "folder.yaml")
 
     def test_interrupted_it_writes_what_it_has(self):
@@ -83,8 +83,8 @@ class Calibrate(Case):
             interrupt(process, after=5)
             out, error = process.communicate(timeout=60)
         self.assertEqual(process.returncode, 0, error)
-        self.assertIn("the calibration is partial", error)
-        self.assertIn("partial: ended early", out)
+        self.assertIn("the calibration is incomplete", error)
+        self.assertIn("incomplete: the calibration ended early", out)
         self.assertIn("complete: false", path.read_text())
         self.expect(redag("analyze", self.cart, "--overheads", path), 0)
 
@@ -375,7 +375,7 @@ class Compare(Case):
     def test_bad_values(self):
         self.expect(redag("compare", self.cart, "--repeat", "20000"), 2, "--repeat: '20000' is not a whole number from 1 to 10000")
         self.expect(redag("compare", self.cart, "--simulate", "--executors", "redag,mte-fifo"), 2,
-                    "the simulator has no threads: 'mte-fifo' is 'mte' there")
+                    "the simulator has no threads to make real-time: 'mte-fifo' is the same as 'mte' there")
 
     def test_preemption_is_what_makes_the_difference(self):
         result = redag("compare", self.cart, "--simulate", "--executors", "redag-none,redag-os", "--duration", "1s")

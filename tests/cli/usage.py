@@ -23,7 +23,10 @@ class Usage(Case):
         self.assertRegex(self.expect(redag("--version"), 0).stdout, r"^redag \d+\.\d+\.\d+ \(revision \S+\)\n$")
 
     def test_no_arguments(self):
-        self.expect(redag(), 2, "Subcommands:", "check-trace")
+        self.expect(redag(), 2, "Commands:", "check-trace")
+
+    def test_missing_command(self):
+        self.expect(redag("experiment"), 2, "a command is missing after 'redag experiment'")
 
     def test_help_of_every_command(self):
         listed = redag("--help").stdout
@@ -32,6 +35,7 @@ class Usage(Case):
             text = self.expect(redag(*command, "--help"), 0).stdout
             self.assertIn(f"Usage: redag {' '.join(command)}", text)
             self.assertIn("Examples:", text)
+            self.assertEqual([line for line in text.splitlines() if len(line) > 80], [], command)
 
     def test_examples_parse(self):
         """Every option in the examples of --help exists."""
@@ -45,7 +49,7 @@ class Usage(Case):
         """docs/cli.md has a row for every command, and a command's section names only options of that command."""
         page = (SOURCE / "docs" / "cli.md").read_text(encoding="utf-8")
         helps = {" ".join(command): redag(*command, "--help").stdout for command in [*COMMANDS, ["recover"]]}
-        commands = re.findall(r"^  ([a-z][a-z-]+) {2,}", redag("--help").stdout.split("Subcommands:")[1], re.M)
+        commands = re.findall(r"^  ([a-z][a-z-]+) {2,}", redag("--help").stdout.split("Commands:")[1], re.M)
         for command in commands:
             self.assertRegex(page, rf"(?m)^\|.*`{command}[ `].*\|")
         for section in re.split(r"(?m)^## ", page):
@@ -63,8 +67,8 @@ class Usage(Case):
         self.expect(redag("compare", self.cart, "--executors", "redag,stee"), 2, "did you mean 'ste'?")
 
     def test_bad_values(self):
-        for arguments, words in [(["--duration", "5"], "no unit"), (["--duration", "0s"], "not longer than 0"),
-                                 (["--duration", "-1s"], "not longer than 0"), (["--seed", "-1"], "whole number"),
+        for arguments, words in [(["--duration", "5"], "no unit"), (["--duration", "0s"], "not greater than 0"),
+                                 (["--duration", "-1s"], "not greater than 0"), (["--seed", "-1"], "whole number"),
                                  (["--seed", "99999999999999999999"], "whole number"),
                                  (["--workers", "100000"], "workers"), (["--warm-up", "20s"], "leaves nothing"), (["--warmup", "20s"], "leaves nothing")]:
             self.expect(redag("simulate", self.cart, "--duration=10s" if "--duration" not in arguments else "--seed=1",

@@ -17,14 +17,14 @@ constexpr std::uint32_t kMaxLevels = 1'000'000;  // larger than the number of ta
 
 void add_analysis_arguments(CLI::App &app, AnalysisArguments &arguments, const std::string &check_help) {
   RunArguments &run = arguments.run;
-  app.add_flag("--all-tasks", run.all_tasks, "A row for every task, however many");
-  app.add_flag("--json", run.json, "Write one JSON document to standard output, and nothing else");
+  app.add_flag("--all-tasks", run.all_tasks, "Show every task, however many there are");
+  app.add_flag("--json", run.json, "Write one JSON document, and nothing else, to standard output");
   app.add_flag("--check", run.check, check_help);
-  add_duration(app, "--time-limit", arguments.time_limit, "Time after which no further work is begun; default: none")
+  add_duration(app, "--time-limit", arguments.time_limit, "Begin no further work after this time (default: no limit)")
       ->group("Limits");
   add_platform_arguments(app, run);
   add_count(app, "--levels", arguments.levels, {0, kMaxLevels},
-            "Priority levels; tasks that share one do not preempt; 0: one for each priority")
+            "Number of priority levels; tasks of one level do not preempt each other; 0: one level for each priority")
       ->group("Platform");
   add_overhead_arguments(app, run, "Platform");
 }
@@ -48,7 +48,7 @@ analysis::AnalyzeOptions AnalysisWatch::options() {
 std::string AnalysisWatch::why_stop() const {
   if (InterruptGuard::interrupted()) return "interrupted";
   if (arguments_.time_limit && watch_.elapsed() > *arguments_.time_limit) {
-    return fmt::format("the time limit of {} is over", humanize_duration(*arguments_.time_limit));
+    return fmt::format("the time limit of {} has passed", humanize_duration(*arguments_.time_limit));
   }
   return {};
 }

@@ -23,7 +23,7 @@ Result<TaskId> find_task(const lab::Analysed &analysed, const std::string &name)
   for (std::size_t t = 0; t < analysed.task_set.tasks.size(); ++t) {
     if (task_name(analysed, TaskId(t)) == row->name) return TaskId(t);
   }
-  return make_error("'" + name + "' is a DAG", "a chain is of tasks: dag.task,dag.task");
+  return make_error("'" + name + "' is a DAG", "a chain consists of tasks: write dag.task,dag.task");
 }
 
 std::optional<Duration> let_reaction_of(const lab::Analysed &analysed, const std::vector<TaskId> &tasks) {
@@ -83,9 +83,9 @@ std::string describe(const lab::Analysed &analysed, const std::vector<ChainRow> 
     }
   }
   return table.render(terminal.width, terminal.colour) + parts +
-         "reaction: until an input shows in an output; age: of the input behind an output when the next one comes; "
-         "for\n"
-         "strictly periodic timers. LET: both, exact, if tasks read at their release and write at their deadline\n";
+         "reaction: largest time from an input to an output that depends on it\n"
+         "age: largest age of the input behind an output, until the next output\nBoth assume strictly periodic timers. "
+         "LET: both, exactly, if tasks read at their\nrelease and write at their deadline\n";
 }
 
 Json to_json(const lab::Analysed &analysed, const std::vector<ChainRow> &chains) {

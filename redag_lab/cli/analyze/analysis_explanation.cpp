@@ -23,7 +23,7 @@ std::string owner(const lab::Analysed &analysed, const Term &term) {
   if (term.dag.valid()) return analysed.task_set.dags[term.dag.value].name;
   switch (term.kind) {
     case Term::Kind::Blocking: return "less urgent work";
-    case Term::Kind::Interference: return "more urgent work, together";
+    case Term::Kind::Interference: return "more urgent work";
     default: return "-";
   }
 }
@@ -31,14 +31,14 @@ std::string owner(const lab::Analysed &analysed, const Term &term) {
 std::string what(const Term &term) {
   switch (term.kind) {
     // Of a DAG on several workers: its longest path (one job), and the delay of this path by the DAG's other tasks.
-    case Term::Kind::Own: return term.jobs == 0 ? "own tasks beside the path" : "own execution";
-    case Term::Kind::Earlier: return term.amount < 0 ? "since earlier jobs were released" : "earlier jobs of its own";
+    case Term::Kind::Own: return term.jobs == 0 ? "its other tasks, off the longest path" : "own execution";
+    case Term::Kind::Earlier: return term.amount < 0 ? "time since earlier jobs were released" : "its own earlier jobs";
     case Term::Kind::Blocking: return "blocking by";
-    case Term::Kind::Interference: return "interference of";
+    case Term::Kind::Interference: return "interference by";
     case Term::Kind::Jitter: return "release jitter";
-    case Term::Kind::Wait: return "data of other rates, waited for";
+    case Term::Kind::Wait: return "waiting for data of other rates";
     case Term::Kind::Overhead: return "overhead";
-    case Term::Kind::Waiting: return "waiting, for all that comes before";
+    case Term::Kind::Waiting: return "all waiting together";
   }
   return "?";
 }
@@ -47,8 +47,8 @@ std::string advice_on_blocking(const lab::Analysed &analysed, const std::string 
   switch (analysed.task_set.mode) {
     case sched::Preemption::None:
       return fmt::format(
-          "{} keeps its worker until it ends: shorten it, or let it be preempted (`region` with --preemption "
-          "cooperative, or os)",
+          "{} keeps its worker until it ends: shorten it, or let it be preempted (--preemption os, or `region` with "
+          "--preemption cooperative)",
           who);
     case sched::Preemption::Cooperative:
       return fmt::format("{} keeps its worker until its next preemption point: give it a shorter `region`", who);
@@ -61,21 +61,22 @@ std::string advice(const lab::Analysed &analysed, const Term &term) {
   const std::string who = owner(analysed, term);
   switch (term.kind) {
     case Term::Kind::Own:
-      return term.jobs == 0 ? "its own tasks wait for each other: smaller wcets, or a larger max_active, count most"
-                            : "a smaller wcet of its own counts most";
-    case Term::Kind::Earlier: return "its earlier jobs are not done when it comes: a smaller wcet or a longer period";
+      return term.jobs == 0 ? "its own tasks wait for each other: smaller wcets or a larger max_active help most"
+                            : "a smaller wcet of its own helps most";
+    case Term::Kind::Earlier:
+      return "its earlier jobs have not ended when it is released: a smaller wcet or a longer period helps most";
     case Term::Kind::Blocking: return advice_on_blocking(analysed, who);
     case Term::Kind::Interference: {
-      const std::string times = term.jobs > 1 ? fmt::format(" comes {} times before it ends",
+      const std::string times = term.jobs > 1 ? fmt::format(" is released {} times before it ends",
                                                             format_count(static_cast<std::uint64_t>(term.jobs)))
-                                              : std::string(" goes first");
+                                              : std::string(" runs first");
       return fmt::format("{}{}: shorten it, release it less often, or add a worker", who, times);
     }
-    case Term::Kind::Jitter: return "a release that is seen sooner counts most";
-    case Term::Kind::Wait: return "a shorter period or response of its predecessors counts most";
-    case Term::Kind::Overhead: return "fewer and longer jobs, or cheaper scheduling, count most";
+    case Term::Kind::Jitter: return "less release jitter helps most";
+    case Term::Kind::Wait: return "a shorter period or response time of its predecessors helps most";
+    case Term::Kind::Overhead: return "fewer and longer jobs, or smaller scheduling overheads, help most";
     case Term::Kind::Waiting:
-      return "the schedule that is worst for it was found by trying all; without --explore the bounds name the causes";
+      return "the exploration found its worst case among all schedules; without --explore, the bounds name the causes";
   }
   return {};
 }
@@ -98,23 +99,24 @@ std::string explain_bound(const lab::Analysed &analysed, const lab::Row &row, co
                {is_negative ? "-" + humanize_duration(-term.amount) : humanize_duration(term.amount)},
                {is_negative ? "-" : format_percent(share(term.amount, response))}});
   }
-  std::string text = fmt::format("where it comes from, by {}:\n", row.tightest.method->name) +
+  std::string text = fmt::format("contributions to the bound by {}:\n", row.tightest.method->name) +
                      table.render(terminal.width, terminal.colour);
   if (terms.empty()) return text;
-  text += fmt::format("what to change: the largest term is {} of {}, {}: {}\n", humanize_duration(terms.front().amount),
-                      humanize_duration(response), format_percent(share(terms.front().amount, response)),
-                      advice(analysed, terms.front()));
-  if (row.slack.value_or(0) < 0) text += fmt::format("{} are missing\n", humanize_duration(-*row.slack));
+  text += fmt::format("what to change: the largest contribution is {} of {} ({}): {}\n",
+                      humanize_duration(terms.front().amount), humanize_duration(response),
+                      format_percent(share(terms.front().amount, response)), advice(analysed, terms.front()));
+  if (row.slack.value_or(0) < 0)
+    text += fmt::format("the bound exceeds the deadline by {}\n", humanize_duration(-*row.slack));
   return text;
 }
 
 // Returns the reason why there is no bound, the methods that gave up or do not apply, and the load.
 std::string explain_absence(const lab::Analysed &analysed, const lab::Row &row) {
-  std::string text = fmt::format("why there is no bound: {}\n", row.reason);
+  std::string text = fmt::format("reason for the missing bound: {}\n", row.reason);
   if (!analysed.task_set.not_analysable.empty() && !analysed.task_set.has_modes) return text;
   text += describe_gave_up(analysed.report);
   const std::string reasons = methods_that_do_not_apply(analysed.report, false);
-  if (!reasons.empty()) text += "what does not apply:\n" + reasons;
+  if (!reasons.empty()) text += "methods that do not apply:\n" + reasons;
   std::vector<std::pair<double, std::string>> loads;
   for (const analysis::Unit &unit : analysed.task_set.units) {
     loads.emplace_back(share(unit.volume, unit.period), unit.tasks.size() > 1
@@ -123,7 +125,7 @@ std::string explain_absence(const lab::Analysed &analysed, const lab::Row &row) 
   }
   std::stable_sort(loads.begin(), loads.end(), [](const auto &a, const auto &b) { return a.first > b.first; });
   constexpr std::size_t kMost = 3;
-  text += "who uses most of the workers:";
+  text += "largest shares of the utilization:";
   for (std::size_t i = 0; i < loads.size() && i < kMost; ++i) {
     text += fmt::format("{} {} {}", i == 0 ? "" : ",", loads[i].second, format_percent(loads[i].first));
   }
@@ -155,22 +157,22 @@ Result<lab::Row> find_row(const lab::Analysed &analysed, const std::string &name
 std::string explain(const lab::Analysed &analysed, const lab::Row &row, const StreamTraits &terminal) {
   std::string text = tinted(row.name, Tint::Strong, terminal.colour) + ": ";
   if (row.tightest.response) {
-    text += fmt::format("answers within {} of its release, ", humanize_up(*row.tightest.response));
+    text += fmt::format("response time at most {}, ", humanize_up(*row.tightest.response));
   } else {
     text += "no bound on its response time, ";
   }
   text += row.deadline > 0 ? fmt::format("deadline {}: ", humanize_duration(row.deadline)) : "no end-to-end deadline: ";
-  text += row.standing == lab::Standing::NoDeadline ? "nothing to miss" : to_string(row.standing);
+  text += row.standing == lab::Standing::NoDeadline ? "no deadline to miss" : to_string(row.standing);
   if (row.standing == lab::Standing::Ok && row.says != nullptr) text += fmt::format(", shown by {}", row.says->name);
   text += "\n";
   if (row.due && row.deadline > *row.due) {
-    text += fmt::format("held to {}: beyond, the next release would skip a job that has not started\n",
+    text += fmt::format("judged at {}: after that, the next release would skip a job that has not started\n",
                         humanize_duration(*row.due));
   }
   text += row.tightest.response ? explain_bound(analysed, row, terminal) : explain_absence(analysed, row);
   const bool is_open = row.standing == lab::Standing::MayMiss || (row.standing == lab::Standing::NoBound && row.due);
   if (is_open && analysed.report.verdict != analysis::Verdict::Schedulable) {
-    text += "what to change in the file: " +
+    text += "suggested change: " +
             suggested_change(analysed, row).value_or("no single change was found that lets every deadline be shown") +
             "\n";
   }

@@ -80,8 +80,8 @@ TEST(Explanation, OfADagOnSeveralWorkersTellsThePathFromTheRest) {
   EXPECT_EQ(row.tightest.response, 9 * kMillisecond);
   EXPECT_EQ(row.tightest.response, row_of(analysed, "fork").tightest.response);
   const std::string text = explain(analysed, row, StreamTraits{});
-  EXPECT_THAT(text, HasSubstr("own execution              fork     1   5ms  55.6 %"));
-  EXPECT_THAT(text, HasSubstr("own tasks beside the path  fork     -   4ms  44.4 %"));
+  EXPECT_THAT(text, HasSubstr("own execution                          fork     1   5ms  55.6 %"));
+  EXPECT_THAT(text, HasSubstr("its other tasks, off the longest path  fork     -   4ms  44.4 %"));
 }
 
 TEST(Explanation, OfEachKindOfTermSaysWhatItIsAndWhatHelps) {
@@ -92,23 +92,23 @@ TEST(Explanation, OfEachKindOfTermSaysWhatItIsAndWhatHelps) {
   };
   const TaskId a(0);
   const Case cases[] = {
-      {term(Kind::Own, 6, TaskId(1), 1), "own execution", "a smaller wcet of its own counts most"},
-      {term(Kind::Own, 6, TaskId(1)), "own tasks beside the path", "a larger max_active, count most"},
-      {term(Kind::Earlier, 6, TaskId(1), 1), "earlier jobs of its own", "a smaller wcet or a longer period"},
+      {term(Kind::Own, 6, TaskId(1), 1), "own execution", "a smaller wcet of its own helps most"},
+      {term(Kind::Own, 6, TaskId(1)), "its other tasks, off the longest path", "a larger max_active help most"},
+      {term(Kind::Earlier, 6, TaskId(1), 1), "its own earlier jobs", "a smaller wcet or a longer period helps most"},
       {term(Kind::Blocking, 6, a, 1), "blocking by", "fast.a holds a group or shares a priority level"},
       {term(Kind::Blocking, 6), "less urgent work", "less urgent work holds a group"},
-      {term(Kind::Interference, 6, a, 2), "interference of", "fast.a comes 2 times before it ends"},
-      {term(Kind::Interference, 6, a, 1), "interference of", "fast.a goes first: shorten it"},
-      {term(Kind::Interference, 6), "more urgent work, together", "more urgent work, together goes first"},
-      {term(Kind::Jitter, 6), "release jitter", "a release that is seen sooner counts most"},
-      {term(Kind::Wait, 6), "data of other rates, waited for", "response of its predecessors counts most"},
-      {term(Kind::Overhead, 6), "overhead", "fewer and longer jobs"},
-      {term(Kind::Waiting, 6), "waiting, for all that comes before", "without --explore the bounds name the causes"},
+      {term(Kind::Interference, 6, a, 2), "interference by", "fast.a is released 2 times before it ends"},
+      {term(Kind::Interference, 6, a, 1), "interference by", "fast.a runs first: shorten it"},
+      {term(Kind::Interference, 6), "more urgent work", "more urgent work runs first"},
+      {term(Kind::Jitter, 6), "release jitter", "less release jitter helps most"},
+      {term(Kind::Wait, 6), "waiting for data of other rates", "response time of its predecessors helps most"},
+      {term(Kind::Overhead, 6), "overhead", "fewer and longer jobs, or smaller scheduling overheads, help most"},
+      {term(Kind::Waiting, 6), "all waiting together", "without --explore, the bounds name the causes"},
   };
   for (const Case &c : cases) {
     const std::string text = explained(c.largest);
     EXPECT_THAT(text, HasSubstr(c.what));
-    EXPECT_THAT(text, HasSubstr("the largest term is 6ms of 10ms, 60.0 %: "));
+    EXPECT_THAT(text, HasSubstr("the largest contribution is 6ms of 10ms (60.0 %): "));
     EXPECT_THAT(text, HasSubstr(c.advice));
   }
 }
@@ -122,14 +122,14 @@ TEST(Explanation, OfBlockingDependsOnHowTheBlockerCanBePreempted) {
 TEST(Explanation, OfAUnitOfSeveralTasksNamesItsDag) {
   Term of_dag = term(Kind::Interference, 6, {}, 1);
   of_dag.dag = DagId(0);
-  EXPECT_THAT(explained(of_dag), HasSubstr("fast goes first"));
+  EXPECT_THAT(explained(of_dag), HasSubstr("fast runs first"));
 }
 
 TEST(Explanation, WhatIsTakenOffHasNoShareAndWhatIsNothingNoRow) {
   const std::string text = explained(term(Kind::Earlier, -1, TaskId(1), 1));
-  EXPECT_THAT(text, HasSubstr("since earlier jobs were released"));
+  EXPECT_THAT(text, HasSubstr("time since earlier jobs were released"));
   EXPECT_THAT(text, HasSubstr("-1ms"));
-  EXPECT_THAT(text, HasSubstr("the largest term is 4ms of 10ms"));
+  EXPECT_THAT(text, HasSubstr("the largest contribution is 4ms of 10ms"));
   EXPECT_THAT(explained(term(Kind::Jitter, 0)), Not(HasSubstr("release jitter")));
 }
 
@@ -139,7 +139,8 @@ TEST(Explanation, SaysWhenADeadlineBeyondThePeriodCannotBeUsed) {
   ASSERT_TRUE(row);
   row->deadline = 30 * kMillisecond;
   row->due = 20 * kMillisecond;
-  EXPECT_THAT(explain(analysed, *row, StreamTraits{}), HasSubstr("held to 20ms: beyond, the next release would skip"));
+  EXPECT_THAT(explain(analysed, *row, StreamTraits{}),
+              HasSubstr("judged at 20ms: after that, the next release would skip"));
 }
 
 }  // namespace

@@ -109,7 +109,7 @@ std::string method_table(const lab::Analysed &analysed, const StreamTraits &term
   }
   const std::string others = methods_that_do_not_apply(analysed.report, true);
   return (order.empty() ? "" : table.render(terminal.width, terminal.colour)) +
-         (others.empty() ? "" : "does not apply:\n" + others);
+         (others.empty() ? "" : "methods that do not apply:\n" + others);
 }
 
 // Returns the best and worst responses over all schedules. Bounds give no best case.
@@ -123,9 +123,11 @@ std::string exploration_table(const lab::Analysed &analysed, const StreamTraits 
   }
   return table.render(terminal.width, terminal.colour) +
          fmt::format(
-             "best and worst response to the source's release over all schedules that are possible with the "
-             "stated\noffsets, jitter and execution times from bcet to wcet, and strictly periodic timers{}\n",
-             exploration.exact ? "" : "; with several\nworkers the range can be too wide, never too narrow");
+             "best and worst response to the source's release, over all possible schedules with\nthe stated offsets "
+             "and jitter, execution times from bcet to wcet, and strictly\nperiodic timers{}\n",
+             exploration.exact ? ""
+                               : ";\n"
+                                 "with several workers the range can be too wide, but never too narrow");
 }
 
 std::string plural(std::size_t count, const char *noun) {
@@ -148,7 +150,8 @@ std::string headline(const lab::Analysed &analysed) {
   }
   if (platform.lateness > 0 || platform.timer_overhead > 0 || platform.stall != Loss{}) {
     text += fmt::format(
-        "machine: releases up to {} late, {} of processor time each; a processor stalls for up to {} + {} a second\n",
+        "machine: releases are up to {} late and cost {} of processor time each; a processor stalls for up to {} + {} "
+        "a second\n",
         humanize_duration(platform.lateness), humanize_duration(platform.timer_overhead),
         humanize_duration(platform.stall.longest), humanize_duration(platform.stall.per_second));
   }
@@ -184,13 +187,13 @@ const char *mode_name(const lab::Analysed &analysed) { return lab::mode_name(ana
 std::string mode_reason(const lab::Analysed &analysed) {
   const analysis::TaskSet &task_set = analysed.task_set;
   if (task_set.platform.preemption == sched::Preemption::Cooperative && task_set.mode == sched::Preemption::None) {
-    return "no task has a region: the same as none";
+    return "no task has a region, so this equals none";
   }
   if (!analysed.executor->ours) return "rclcpp's executors do not preempt";
   if (analysed.workload.platform.preemption != PreemptionMode::Auto) return {};
   return is_static(task_set.policy)
-             ? "auto is analysed as os; a process without SCHED_FIFO runs it as cooperative: see --preemption"
-             : fmt::format("auto is analysed as os, as simulated; threads run {} as cooperative: see --preemption",
+             ? "auto is analysed as os; a process without SCHED_FIFO runs it as cooperative, see --preemption"
+             : fmt::format("auto is analysed and simulated as os; threads run {} as cooperative, see --preemption",
                            to_string(task_set.policy));
 }
 
@@ -202,11 +205,11 @@ std::string verdict_in_words(const lab::Analysed &analysed) {
   const double needed = analysed.workload.utilization();
   const std::uint32_t workers = analysed.task_set.platform.workers;
   if (needed > workers * (1 + 1e-9)) {
-    return fmt::format("not schedulable: the utilization, {:.3f}, is above what {} can do", needed,
+    return fmt::format("not schedulable: the utilization, {:.3f}, exceeds the capacity of {}", needed,
                        plural(workers, "worker"));
   }
   if (!analysed.task_set.not_analysable.empty() && !analysed.task_set.has_modes) {
-    return "not shown schedulable: no method takes this workload: " + analysed.task_set.not_analysable;
+    return "not shown schedulable: no method applies to this workload: " + analysed.task_set.not_analysable;
   }
   std::size_t late = 0;
   std::size_t unbounded = 0;
@@ -228,7 +231,7 @@ std::string verdict_in_words(const lab::Analysed &analysed) {
   say(unbounded_tasks, "task", "without a bound");
   say(late - late_tasks, "DAG", "with a bound above the end-to-end deadline");
   say(unbounded - unbounded_tasks, "DAG", "with an end-to-end deadline and without a bound");
-  return fmt::format("not shown schedulable: {}; bounds are safe, not exact; --explain says where one comes from",
+  return fmt::format("not shown schedulable: {}; bounds are safe, not exact; --explain shows what a bound consists of",
                      missing);
 }
 
@@ -236,16 +239,18 @@ std::string describe(const lab::Analysed &analysed, const StreamTraits &terminal
   const std::vector<lab::Row> tasks = lab::task_rows(analysed);
   std::string text = headline(analysed) + "\n" + table_of("task", shown_rows(tasks, all), terminal);
   if (!all && tasks.size() > kMostTasks) {
-    text += fmt::format("(the {} of {} tasks with the least slack; --all-tasks shows every one)\n", kMostTasks,
+    text += fmt::format("(the {} of {} tasks with the least slack; --all-tasks shows all)\n", kMostTasks,
                         format_count(tasks.size()));
   }
   text += "\n" + table_of("DAG", lab::dag_rows(analysed), terminal) + "\n";
   text +=
-      "bound: response time from the nominal release that no job exceeds; of a DAG, and of its tasks where edges\n"
-      "join them, from the source's release to the finish of the last task; verdicts hold for every execution\n";
+      "bound: response time from the nominal release that no job exceeds; for a DAG, and\nfor its tasks where edges "
+      "join them, from the source's release to the finish of\nthe last task; verdicts hold for every execution\n";
   for (const lab::Row &row : tasks) {
     if (*row.due == row.deadline) continue;
-    text += "slack: to the deadline, or to where the next release would skip a job that has not started, if sooner\n";
+    text +=
+        "slack: time to the deadline, or to the instant at which the next release would\nskip a job that has not "
+        "started, whichever is sooner\n";
     break;
   }
   const bool yes = analysed.report.verdict == Verdict::Schedulable;
@@ -264,7 +269,7 @@ std::optional<std::string> suggested_change(const lab::Analysed &analysed, const
   if (analysed.task_set.tasks.size() > lab::kMostTasksForRemedy) return std::nullopt;
   auto remedy = lab::find_remedy(analysed.workload, analysed.task_set.platform, lab::suspects_of(analysed, row));
   if (!remedy) return std::nullopt;
-  return *remedy + ": then every deadline is shown to be met";
+  return *remedy + "; then every deadline is shown to be met";
 }
 
 std::string summarise(const lab::Analysed &analysed, const StreamTraits &terminal) {
@@ -288,14 +293,14 @@ std::string summarise(const lab::Analysed &analysed, const StreamTraits &termina
     if (!yes) {
       text += "suggested change: " +
               suggested_change(analysed, *weakest)
-                  .value_or(fmt::format("no single one was found; see --explain {}", weakest->name)) +
+                  .value_or(fmt::format("no single change was found; see --explain {}", weakest->name)) +
               "\n";
     }
   }
   text += describe_gave_up(analysed.report);
   text += fmt::format("preemption: {}{}; --all shows every task and method{}\n", mode_name(analysed),
                       reason.empty() ? "" : " (" + reason + ")",
-                      weakest ? ", --explain " + weakest->name + " where its time goes" : "");
+                      weakest ? ", --explain " + weakest->name + " explains its bound" : "");
   if (analysed.exploration != nullptr && analysed.exploration->end == analysis::Exploration::End::Complete) {
     text += "\n" + exploration_table(analysed, terminal, false);
   }
@@ -327,7 +332,7 @@ std::string describe_gave_up(const analysis::Report &report) {
     if (!method.gave_up()) continue;
     text += fmt::format("gave up on {}: {}\n", method.method->name, std::get<NotApplicable>(method.outcome).reason);
   }
-  if (!text.empty()) text += "  --effort and --time-limit set these limits; what the other methods say holds\n";
+  if (!text.empty()) text += "  --effort and --time-limit set these limits; the results of other methods hold\n";
   return text;
 }
 
@@ -340,7 +345,9 @@ std::string describe_methods() {
   };
   for (const Method &method : analysis::methods()) describe(method, method.is_paper() ? ", paper" : "");
   describe(analysis::exploration(), "; with --explore");
-  text += "\nFor rclcpp's own executors, with --executor ste or mte:\n";
+  text +=
+      "\n"
+      "Methods for rclcpp's own executors, with --executor ste or mte:\n";
   for (const Method &method : analysis::executor_methods()) describe(method, "");
   return text;
 }

@@ -130,7 +130,7 @@ Result<lab::Analysed> analyse_configured(const Workload &workload, const Options
   Result<lab::Analysed> analysed =
       lab::analyse(workload, platform, &explore, options.executor, watch.options(), options.only);
   progress.clear();
-  if (InterruptGuard::interrupted()) console.warn("interrupted: the exploration is not complete");
+  if (InterruptGuard::interrupted()) console.warn("interrupted: the exploration is incomplete");
   return analysed;
 }
 
@@ -142,15 +142,17 @@ int analyze_file(const Options &options, Console &console) {
       console.print(describe_methods());
       return kExitOk;
     }
-    console.error("FILE is required", "only --methods alone does without");
+    console.error("FILE is required", "only --methods works without it");
     return kExitBad;
   }
   if (options.explore > 0 && options.executor != "redag") {
-    console.error("--explore follows our executor alone, not '" + options.executor + "'", "leave one of the two out");
+    console.error("--explore is available for ReDAG-RT only, not for executor '" + options.executor + "'",
+                  "leave out --explore or --executor");
     return kExitBad;
   }
   if (!options.chains.empty() && options.executor != "redag") {
-    console.error("--chain is for our executor alone, not '" + options.executor + "'", "leave one of the two out");
+    console.error("--chain is available for ReDAG-RT only, not for executor '" + options.executor + "'",
+                  "leave out --chain or --executor");
     return kExitBad;
   }
   const std::optional<Workload> workload = load_configured(options.analysis.run, console);
@@ -170,40 +172,40 @@ int analyze_file(const Options &options, Console &console) {
 
 Action add_analyze(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option("FILE", options->analysis.run.file, "Workload (YAML); - is standard input");
+  app.add_option("FILE", options->analysis.run.file, "Workload file (YAML); - reads standard input");
   add_choice(app, "--executor", options->executor, executor_choices(),
-             "Under our executor, or the model of another one: what is known of its order")
+             "Executor to analyze: ReDAG-RT, or a model of one of rclcpp's executors")
       ->default_str(options->executor);
-  app.add_option("--explain", options->explain, "Where the bound of one task (dag.task) or DAG comes from")
-      ->type_name("TASK");
+  app.add_option("--explain", options->explain, "Explain the bound of one task (dag.task) or DAG")->type_name("TASK");
   app.add_option(
          "--chain", options->chains,
-         "Reaction time and data age of a cause-effect chain, also over several DAGs: dag.task,dag.task; can be "
-         "given several times")
+         "Reaction time and data age of a cause-effect chain, which may span several DAGs; can be given several times")
       ->type_name("TASK,TASK...")
       ->expected(1)
       ->take_all()
       ->allow_extra_args(false);
   app.add_flag("--methods", options->methods,
-               "Every method's assumptions, citation and complexity; FILE may be missing. With --json every method's "
-               "bound of every task");
-  app.add_option("--method", options->only, "Only this method; can be given several times")
+               "Describe every method: its assumptions, citation and complexity. FILE is optional; with --json, every "
+               "method's bound of every task is included");
+  app.add_option("--method", options->only, "Use only this method; can be given several times")
       ->type_name("NAME")
       ->expected(1)
       ->take_all()
       ->allow_extra_args(false);
-  app.add_flag("--all", options->all, "A table of the tasks and DAGs, each method's answer, and what does not apply");
+  app.add_flag("--all", options->all,
+               "Show all tasks and DAGs, the result of each method, and the methods that do not apply");
   app.add_flag(
          "--explore{" + std::to_string(kUsualStates) + "}", options->explore,
-         "Try all schedules of strictly periodic jobs that run to completion, in at most STATES states (default " +
-             format_count(kUsualStates) + "): best and worst responses, exact on one worker")
+         "Explore all schedules of strictly periodic jobs that run to completion, in at most STATES states (default " +
+             format_count(kUsualStates) + "); gives best and worst responses, exact on one worker")
       ->type_name("[=STATES]")
       ->disable_flag_override(false)
       ->check(is_states);
   add_count(app, "--effort", options->analysis.effort, {0, kMostEffort},
-            "Steps of one method at which it gives up, in millions; 0: no limit. The same on every machine")
+            "Steps after which one method gives up, in millions; 0: no limit. The result is the same on every machine")
       ->group("Limits");
-  add_analysis_arguments(app, options->analysis, "Exit with 1 if no sound method shows that every deadline is met");
+  add_analysis_arguments(app, options->analysis,
+                         "Exit with status 1 unless a sound method shows that every deadline is met");
   return [options](Console &console) { return analyze_file(*options, console); };
 }
 

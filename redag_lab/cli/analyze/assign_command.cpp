@@ -68,7 +68,8 @@ int assign_file(const Options &options, Console &console) {
     return kExitBad;
   }
   assigned.assignment = *std::move(found);
-  if (assigned.assignment.stopped) console.warn(watch.why_stop() + ": this is the best so far");
+  if (assigned.assignment.stopped)
+    console.warn(watch.why_stop() + "interrupted: this is the best assignment found so far");
   if (options.analysis.run.json) {
     console.print(to_text(to_json(assigned)));
   } else {
@@ -82,7 +83,7 @@ int assign_file(const Options &options, Console &console) {
       return kExitBad;
     }
     console.note(fmt::format("wrote {}{}\n", options.output,
-                             changes(assigned.assignment).empty() ? ": the workload as it was" : ""));
+                             changes(assigned.assignment).empty() ? ": the unchanged workload" : ""));
   }
   return options.analysis.run.check && !assigned.assignment.best.score.schedulable ? kExitNo : kExitOk;
 }
@@ -92,24 +93,26 @@ int assign_file(const Options &options, Console &console) {
 Action add_assign(CLI::App &app) {
   auto options = std::make_shared<Options>();
   lab::AssignmentOptions &assignment = options->assignment;
-  app.add_option("FILE", options->analysis.run.file, "Workload (YAML); - is standard input")->required();
-  app.add_option("-o,--output", options->output, "File for the workload with the best assignment; without comments")
+  app.add_option("FILE", options->analysis.run.file, "Workload file (YAML); - reads standard input")->required();
+  app.add_option("-o,--output", options->output, "File for the workload with the best assignment; comments are lost")
       ->type_name("FILE");
-  add_choice(app, "--objective", assignment.objective,
-             choices_of(std::array{lab::Objective::Lateness, lab::Objective::Slack}),
-             "The smallest worst bound - deadline, or the largest least share of a deadline that is left")
+  add_choice(
+      app, "--objective", assignment.objective, choices_of(std::array{lab::Objective::Lateness, lab::Objective::Slack}),
+      "Minimise the largest bound - deadline (lateness), or maximise the smallest share of a deadline that is left "
+      "(slack)")
       ->default_str(to_string(assignment.objective));
   add_choice(
       app, "--keep", options->keep,
       Choices<Keep>{{"nothing", Keep::Nothing}, {"priorities", Keep::Priorities}, {"max_active", Keep::MaxActive}},
-      "What must stay as it is")
+      "What to keep as it is")
       ->default_str("nothing");
   add_count(app, "--exhaustive", assignment.exhaustive, {0, kMaxCombinations},
-            "Combinations of max_active up to which all are tried");
+            "Try all combinations of max_active up to this number; above, search locally");
   add_count(app, "--restarts", assignment.restarts, {0, kMaxRestarts},
-            "Random places from which the local search starts besides");
-  add_seed(app, assignment.seed, "Of these places: the same seed gives the same answer");
-  add_analysis_arguments(app, options->analysis, "Exit with 1 if no assignment that was tried is shown schedulable");
+            "Number of random starting points of the local search");
+  add_seed(app, assignment.seed, "Seed of these starting points; the same seed gives the same result");
+  add_analysis_arguments(app, options->analysis,
+                         "Exit with status 1 if no assignment that was tried is shown schedulable");
   return [options](Console &console) { return assign_file(*options, console); };
 }
 

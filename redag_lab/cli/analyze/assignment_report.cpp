@@ -92,9 +92,8 @@ std::string trials_table(const Assigned &assigned, const StreamTraits &terminal,
   if (shown < trials.size()) add(trials.back());
   std::string text = table.render(terminal.width, terminal.colour);
   if (shown < trials.size()) {
-    text +=
-        fmt::format("(the {} best of {} combinations under this order, and the worst; --all-tasks shows every one)\n",
-                    shown, format_count(trials.size()));
+    text += fmt::format("(the best {} of {} combinations under this order, and the worst;\n--all-tasks shows all)\n",
+                        shown, format_count(trials.size()));
   }
   return text;
 }
@@ -107,8 +106,8 @@ std::string audsley_words(const Assignment &assignment) {
   }
   std::string text = "Audsley's assignment, by " + assignment.audsley_test + ": ";
   text += assignment.audsley_found ? "finds an order that passes" : "finds no order that passes";
-  if (!assignment.audsley_optimal) return text + "; a heuristic here, another order may\n";
-  return text + (assignment.audsley_found ? "\n" : "; by this test there is none\n");
+  if (!assignment.audsley_optimal) return text + "; the search is a heuristic here, and another order may pass\n";
+  return text + (assignment.audsley_found ? "\n" : "; no order passes this test\n");
 }
 
 Json score_json(const BoundScore &score) {
@@ -154,27 +153,28 @@ std::string in_words(const Assigned &assigned) {
   std::string text;
   const bool is_unchanged = assignment.best.workload == assignment.present.workload;
   if (is_unchanged && !after.schedulable && !after.extremes.any) {
-    text += "nothing to compare: no method bounds any response time, whatever was tried; see redag analyze\n";
+    text += "nothing to compare: no method bounds any response time, whatever was tried;\nsee 'redag analyze'\n";
   } else if (is_unchanged) {
     text += fmt::format(
         "nothing to change: no other assignment that was tried has {}\n",
         assigned.options.objective == Objective::Lateness ? "a smaller worst lateness" : "a larger least slack");
   } else {
     if (!before.schedulable && after.schedulable) {
-      text += "gain: the workload is shown schedulable, which it is not as it stands\n";
+      text += "gain: the workload becomes schedulable by the bounds\n";
     }
     if (before.unbounded != after.unbounded) {
       text += fmt::format("gain: deadlines without a bound: {} -> {}\n", before.unbounded, after.unbounded);
     }
     text += fmt::format("worst lateness (bound - deadline): {} -> {}\n", lateness_text(before.extremes),
                         lateness_text(after.extremes));
-    text +=
-        fmt::format("least slack (of a deadline): {} -> {}\n", slack_text(before.extremes), slack_text(after.extremes));
+    text += fmt::format("least slack (share of a deadline): {} -> {}\n", slack_text(before.extremes),
+                        slack_text(after.extremes));
   }
   if (!after.schedulable) text += "no assignment that was tried is shown schedulable\n";
   text += audsley_words(assignment);
   if (!assignment.exhaustive) {
-    text += fmt::format("max_active: local search (seed {}), not every combination\n", assigned.options.seed);
+    text += fmt::format("max_active: found by local search (seed {}), not all combinations were tried\n",
+                        assigned.options.seed);
   }
   if (assignment.stopped) text += fmt::format("stopped after {} analyses\n", format_count(assignment.analyses));
   return text;
@@ -190,12 +190,13 @@ std::string describe(const Assigned &assigned, const StreamTraits &terminal, boo
   const BoundScore &best = assignment.best.score;
   if (assignment.trials.size() > 1 && (best.schedulable || best.extremes.any)) {
     text += fmt::format("\nmax_active under {}, {}\n", assignment.best.order,
-                        assignment.exhaustive ? "every combination" : "those met by the local search");
+                        assignment.exhaustive ? "every combination" : "combinations that the local search tried");
     text += trials_table(assigned, terminal, all);
   }
-  text +=
-      fmt::format("\nworst lateness and least slack: of the bounds, which hold for every execution; {} analyses\n\n",
-                  format_count(assignment.analyses));
+  text += fmt::format(
+      "\nworst lateness and least slack are those of the bounds, which hold for every\nexecution; {} analyses\n"
+      "\n",
+      format_count(assignment.analyses));
   for (const std::string &change : changes(assignment)) {
     text += tinted("change ", Tint::Strong, terminal.colour) + change + "\n";
   }

@@ -29,7 +29,7 @@ TEST(AssignmentReport, TellsChangesAndGains) {
   EXPECT_EQ(changes(result.assignment), std::vector<std::string>{"policy: rate_monotonic -> deadline_monotonic"});
   const std::string words = in_words(result);
   EXPECT_NE(words.find("worst lateness (bound - deadline): 1ms -> -2ms\n"), std::string::npos) << words;
-  EXPECT_NE(words.find("least slack (of a deadline): -25.0 % -> 50.0 %\n"), std::string::npos) << words;
+  EXPECT_NE(words.find("least slack (share of a deadline): -25.0 % -> 50.0 %\n"), std::string::npos) << words;
   const Json document = to_json(result);
   EXPECT_EQ(document["best"]["worst_lateness_ns"], -2 * kMillisecond);
   EXPECT_EQ(document["present"]["schedulable"], false);

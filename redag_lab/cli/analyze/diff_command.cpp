@@ -90,11 +90,11 @@ class Diffing {
       if (const std::string other = add(*trace, side); !other.empty()) {
         progress_.clear();
         if (labels.size() > 1) {
-          console_.error(fmt::format("{}: holds runs of several kinds: {}", place, some_of(labels)),
+          console_.error(fmt::format("{} holds runs of several kinds: {}", place, some_of(labels)),
                          fmt::format("name one of them, such as {}/{}", place, labels.front()));
         } else {
-          console_.error(fmt::format("{}: is no repetition of the run beside it: {}", traces[i], other),
-                         "keep runs of one kind in a folder");
+          console_.error(fmt::format("{} is not a repetition of the runs beside it: {}", traces[i], other),
+                         "keep only runs of one kind in a folder");
         }
         return false;
       }
@@ -110,7 +110,7 @@ class Diffing {
       const bool same_way = first.executor == trace.info.executor && first.preemption == trace.info.preemption &&
                             first.driver == trace.info.driver &&
                             trace::worker_count(first) == trace::worker_count(trace.info);
-      if (!same_way) return "its executor, mode, workers or driver differ";
+      if (!same_way) return "the executor, preemption mode, number of workers or driver differs";
       const std::vector<lab::Change> changes = lab::changes_between(first.workload, trace.info.workload);
       if (!changes.empty()) return changes.front().text();
     }
@@ -127,9 +127,9 @@ class Diffing {
       if (change.kind == lab::Change::Kind::Demand) demand.push_back(change.text());
     }
     if (demand.empty()) return true;
-    const std::string what = fmt::format("the two ran different workloads: {}", some_of(demand));
+    const std::string what = fmt::format("the two sides ran different workloads: {}", some_of(demand));
     if (!options_.different) {
-      console_.error(what, "--different compares the tasks that both have all the same");
+      console_.error(what, "--different compares the tasks that both sides have");
       return false;
     }
     diffed_.warnings.push_back(what);
@@ -146,19 +146,20 @@ class Diffing {
 
 Action add_diff(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option("A", options->a, "Folder of a run, or of its repetitions (run, simulate, compare, ROS 2 run_workload)")
+  app.add_option(
+         "A", options->a,
+         "Folder of a run or of its repetitions, as written by run, simulate, compare, or by run_workload of ROS 2")
       ->required();
-  app.add_option("B", options->b, "The same for what it is compared with")->required();
+  app.add_option("B", options->b, "Folder to compare it with")->required();
   add_number(app, "--tolerance", options->bootstrap.tolerance, {0, kMostTolerance},
-             "Share by which response percentiles may differ and count as equal");
-  app.add_flag("--different", options->different,
-               "Compare runs of different workloads too, as far as tasks are in both");
+             "Share by which response percentiles may differ and still count as equal");
+  app.add_flag("--different", options->different, "Compare runs of different workloads, for the tasks that both have");
   add_count(app, "--replicates", options->bootstrap.replicates, {kFewestReplicates, kMostReplicates},
-            "Of the bootstrap");
-  add_seed(app, options->bootstrap.seed, "Of the bootstrap: the same seed gives the same answer");
-  app.add_flag("--all-tasks", options->all_tasks, "A row for every task, however many");
-  app.add_flag("--json", options->json, "Write one JSON document to standard output, and nothing else");
-  app.add_flag("--check", options->check, "Exit with 1 if B is worse in any figure by more than chance");
+            "Number of bootstrap replicates");
+  add_seed(app, options->bootstrap.seed, "Seed of the bootstrap; the same seed gives the same result");
+  app.add_flag("--all-tasks", options->all_tasks, "Show every task, however many there are");
+  app.add_flag("--json", options->json, "Write one JSON document, and nothing else, to standard output");
+  app.add_flag("--check", options->check, "Exit with status 1 if any figure of B is significantly worse");
   return [options](Console &console) { return Diffing(*options, console).run(); };
 }
 

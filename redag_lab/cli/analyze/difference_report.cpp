@@ -93,7 +93,7 @@ std::string differences_table(const Diffed &diffed, const StreamTraits &terminal
   Table table({{"", false, 9},
                {"jobs", true, 2},
                {"missed", true, 8},
-               {"dropped", true, 1},
+               {"lost", true, 1},
                {"p50", true, 3},
                {"p95", true, 4},
                {"p99", true, 6},
@@ -155,14 +155,14 @@ std::vector<std::string> cautions(const Diffed &diffed) {
     if (row.is_correlated()) correlated.push_back(row_name(row));
   }
   if (untested > 0) {
-    list.push_back(
-        fmt::format("{} of {} rows have figures that were not tested: too few jobs or too short runs; run for longer",
-                    untested, diffed.difference.rows.size()));
+    list.push_back(fmt::format(
+        "{} of {} rows have figures that were not tested, because jobs are few or runs are short; run for longer",
+        untested, diffed.difference.rows.size()));
   }
   if (!correlated.empty()) {
     list.push_back(fmt::format(
-        "{}{}: what happens lasts longer than the blocks of time that are compared, so the intervals are too narrow; "
-        "run for longer",
+        "{}{}: jobs are correlated beyond the blocks of time that are compared, so the intervals are too narrow; run "
+        "for longer",
         correlated.front(), correlated.size() > 1 ? fmt::format(" and {} more", correlated.size() - 1) : ""));
   }
   return list;
@@ -218,22 +218,22 @@ std::vector<std::string> caveats(const DiffSide &a, const DiffSide &b) {
         fmt::format("one side comes from '{}', the other from '{}': what the machine adds is part of the difference",
                     trace::to_string(x.driver), trace::to_string(y.driver)));
   } else if (x.driver != trace::Driver::Simulator && !(x.machine == y.machine)) {
-    list.emplace_back("the sides ran on different machines or kernels: that is part of the difference");
+    list.emplace_back("the sides ran on different machines or kernels, which is part of the difference");
   }
   if (x.overheads != y.overheads) {
     const auto said = [](const trace::RunInfo &run) { return run.overheads.empty() ? "none" : run.overheads.c_str(); };
-    list.push_back(fmt::format("overheads differ: {}, and {}", said(x), said(y)));
+    list.push_back(fmt::format("the sides were charged different overheads: {}, and {}", said(x), said(y)));
   }
   const std::size_t fewest = std::min(a.jobs.runs().size(), b.jobs.runs().size());
   if (fewest == 1 && (x.driver != trace::Driver::Simulator || y.driver != trace::Driver::Simulator)) {
     list.emplace_back(
-        "a side has a single run: how runs differ from each other on this machine is not in the intervals; repeat them "
-        "('redag compare --repeat')");
+        "one side has a single run: its intervals do not include the variation between runs on this machine; use "
+        "several runs ('redag compare --repeat')");
   }
   for (const DiffSide *side : {&a, &b}) {
     const auto &runs = side->jobs.runs();
     if (std::any_of(runs.begin(), runs.end(), [](const trace::RunInfo &run) { return run.lost_events > 0; })) {
-      list.push_back(side->name + " lost events: its jobs are not all there");
+      list.push_back(side->name + " lost events: some of its jobs are missing");
     }
   }
   return list;
@@ -245,17 +245,18 @@ std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool al
     text += tinted("differs ", Tint::Strong, terminal.colour) + change.text() + "\n";
   text += "\n" + differences_table(diffed, terminal, all) + "\n";
   const std::string found = findings(diffed, terminal);
-  text += found.empty() ? "no figure differs by more than chance" +
+  text += found.empty() ? "no figure differs significantly" +
                               (diffed.options.tolerance > 0 ? fmt::format(" and {:g} %", 100 * diffed.options.tolerance)
                                                             : std::string()) +
                               "\n"
                         : found;
   text += fmt::format(
-      "* more than chance{}; {} tests, false discovery rate 5 %; intervals 95 %, from blocks of time; max is not "
-      "tested\ntimes of a task: finish - release; of a DAG with one sink: end to end; shares: of the jobs of that "
-      "side\n",
-      diffed.options.tolerance > 0 ? fmt::format(", response times by more than {:g} %", 100 * diffed.options.tolerance)
-                                   : "",
+      "* significant{}\n{} tests; false discovery rate 5 %; 95 % intervals from blocks of time;\nmax is not tested\n"
+      "times: of a task, finish - release; of a DAG with one sink, end to end\n"
+      "shares: of the jobs of that side\n",
+      diffed.options.tolerance > 0
+          ? fmt::format(", and for response times by more than {:g} %", 100 * diffed.options.tolerance)
+          : "",
       diffed.difference.tests);
   for (const std::string &caution : cautions(diffed)) {
     text += tinted("caution: ", Tint::Caution, terminal.colour) + caution + "\n";

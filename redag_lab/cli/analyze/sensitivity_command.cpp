@@ -129,7 +129,7 @@ int sensitivity_of_file(const Options &options, Console &console) {
     watch.progress().clear();
     console.warn(fmt::format("{}: these are {} of {} results", why, format_count(sensitivity.results.size()),
                              format_count(knobs->size())),
-                 "--task asks of one task or DAG alone; --time-limit sets the limit");
+                 "limit the analysis to one task or DAG with --task, or raise --time-limit");
   }
   watch.progress().clear();
   if (options.analysis.run.json) {
@@ -146,14 +146,16 @@ int sensitivity_of_file(const Options &options, Console &console) {
 Action add_sensitivity(CLI::App &app) {
   auto options = std::make_shared<Options>();
   RunArguments &run = options->analysis.run;
-  app.add_option("FILE", run.file, "Workload (YAML); - is standard input")->required();
-  app.add_option("--task", options->task, "Only what concerns one task (dag.task) or DAG")->type_name("TASK");
+  app.add_option("FILE", run.file, "Workload file (YAML); - reads standard input")->required();
+  app.add_option("--task", options->task, "Analyze one task (dag.task) or DAG only")->type_name("TASK");
   add_count(app, "--probes", options->probes, {0, kMostProbes},
-            "Positions tested besides, to see whether acceptance is monotone");
+            "Number of extra positions tested, to see whether acceptance is monotone");
   CLI::Option *simulate =
-      app.add_flag("--simulate", options->simulate, "How far the simulator would go, beside the bounds: no proof");
-  add_duration(app, "--duration", run.duration, "Of each simulation; default: 20 longest periods")->needs(simulate);
-  add_analysis_arguments(app, options->analysis, "Exit with 1 if the workload is not shown schedulable as it is");
+      app.add_flag("--simulate", options->simulate, "Also search the limit by simulation, which proves nothing");
+  add_duration(app, "--duration", run.duration, "Length of each simulation (default: 20 longest periods)")
+      ->needs(simulate);
+  add_analysis_arguments(app, options->analysis,
+                         "Exit with status 1 if the workload is not shown schedulable as it is");
   return [options](Console &console) { return sensitivity_of_file(*options, console); };
 }
 

@@ -79,7 +79,7 @@ std::string table_of(const Sensitivity &sensitivity, const std::vector<const Kno
   const bool simulated = sensitivity.simulated_for > 0;
   std::vector<Column> columns = {{"what", false, 9, true}, {"now", true, 5}, {"limit", true, 7}, {"factor", true, 8}};
   if (simulated) columns.push_back({"simulated", true, 6});
-  columns.push_back({"what ends it", false, 1});
+  columns.push_back({"limited by", false, 1});
   Table table(columns);
   for (const KnobResult *row : rows) {
     const Margin &margin = row->margin;
@@ -124,7 +124,7 @@ const Margin *nearest(const Sensitivity &sensitivity, bool rates) {
 std::string change_of(const lab::Analysed &analysed, const Margin &margin) {
   const std::string name = knob_name(analysed, margin.knob);
   const std::optional<Duration> now = value_at(margin.knob, margin.nominal);
-  if (!now) return fmt::format("{}, to {} of what it is", name, format_factor(margin.factor));
+  if (!now) return fmt::format("{}, to {} of its value", name, format_factor(margin.factor));
   return fmt::format("{}, from {} to {}", name, format_duration(*now),
                      humanize_safely(margin.knob, *value_at(margin.knob, *margin.position)));
 }
@@ -134,14 +134,14 @@ std::string words_of_room(const Sensitivity &sensitivity) {
   for (const KnobResult &result : sensitivity.results) {
     const Margin &margin = result.margin;
     if (!is_of_all(sensitivity, margin.knob)) continue;
-    text += fmt::format("all {} together can grow to {} times what they are\n",
+    text += fmt::format("all {} together can grow to {} times their values\n",
                         is_of_rates(margin.knob) ? "rates" : "execution times", format_factor(margin.factor));
   }
   if (const Margin *least = nearest(sensitivity, false)) {
-    text += "the execution time with the least room: " + change_of(sensitivity.analysed, *least) + "\n";
+    text += "the execution time that can grow least: " + change_of(sensitivity.analysed, *least) + "\n";
   }
   if (const Margin *least = nearest(sensitivity, true)) {
-    text += "the rate with the least room: " + change_of(sensitivity.analysed, *least) + "\n";
+    text += "the rate that can grow least: " + change_of(sensitivity.analysed, *least) + "\n";
   }
   return text;
 }
@@ -157,18 +157,19 @@ std::string words_of_lack(const Sensitivity &sensitivity) {
     if (!is_of_all(sensitivity, margin.knob)) {
       (rates ? tried_rate : tried_wcet) = true;
     } else if (margin.position) {
-      text += fmt::format("to be shown schedulable, all {} together have to shrink to {} of what they are\n", what,
+      text += fmt::format("to be shown schedulable, all {} together must shrink to {} of their values\n", what,
                           format_factor(margin.factor));
     } else {
-      text += fmt::format("shrinking all {} together, however far, does not suffice: {}\n", what, margin.obstacle);
+      text += fmt::format("shrinking all {} together never suffices: {}\n", what, margin.obstacle);
     }
   }
   const auto say = [&](bool tried, bool rates) {
     if (!tried) return;
     const Margin *least = nearest(sensitivity, rates);
-    text += least == nullptr
-                ? fmt::format("none of the {} looked at suffices alone\n", rates ? "rates" : "execution times")
-                : fmt::format("alone suffices, with the least change: {}\n", change_of(sensitivity.analysed, *least));
+    text += least == nullptr ? fmt::format("changing a single one of the {} examined does not suffice\n",
+                                           rates ? "rates" : "execution times")
+                             : fmt::format("changing one alone suffices; the smallest change: {}\n",
+                                           change_of(sensitivity.analysed, *least));
   };
   say(tried_wcet, false);
   say(tried_rate, true);
@@ -214,13 +215,13 @@ std::string in_words(const Sensitivity &sensitivity) {
   std::string text = is_schedulable(sensitivity) ? words_of_room(sensitivity) : words_of_lack(sensitivity);
   for (const KnobResult &result : sensitivity.results) {
     if (!result.simulated || !result.simulated->position || !is_of_all(sensitivity, result.margin.knob)) continue;
-    text += fmt::format("in simulation, which proves nothing, all {} together go to {} times what they are\n",
+    text += fmt::format("in simulation (no proof), all {} together can grow to {} times their values\n",
                         is_of_rates(result.margin.knob) ? "rates" : "execution times",
                         format_factor(result.simulated->factor));
   }
   for (const KnobResult &result : sensitivity.results) {
     if (!result.margin.again) continue;
-    text += fmt::format("not monotone: {} is accepted again at {}; the limit is that below which all tests accept\n",
+    text += fmt::format("not monotone: {} is accepted again at {}; every test below the stated limit accepts\n",
                         knob_name(sensitivity.analysed, result.margin.knob),
                         again_text(sensitivity.analysed, result.margin));
   }
@@ -244,15 +245,17 @@ std::string describe(const Sensitivity &sensitivity, const StreamTraits &termina
   const std::vector<const KnobResult *> rows = shown_rows(sensitivity, all);
   text += table_of(sensitivity, rows, terminal);
   if (rows.size() < sensitivity.results.size()) {
-    text += fmt::format("(the {} of {} with the least room; --all-tasks shows every one)\n", rows.size(),
+    text += fmt::format("(the {} of {} that can grow least; --all-tasks shows all)\n", rows.size(),
                         format_count(sensitivity.results.size()));
   }
   std::uint64_t tests = 0;
   for (const KnobResult &result : sensitivity.results) tests += result.margin.tested;
   text += fmt::format(
-      "\nlimit: shown schedulable there and in every test below; the next step (1ns, or a factor of 0.000001) is not;\n"
-      "four digits, rounded towards less load: --json has every nanosecond\n"
-      "factor: load at the limit over the load now, rounded down; {} analyses\n",
+      "\nlimit: the value with the largest load at which all deadlines are shown to be met,\n"
+      "as in every test with less load; rounded to four digits towards less load\n"
+      "(--json has every nanosecond)\n"
+      "factor: load at the limit / present load, rounded down\n"
+      "{} analyses\n",
       format_count(tests));
   if (sensitivity.simulated_for > 0) {
     text += fmt::format("simulated: no miss in {} with these offsets and full execution times: no proof\n",

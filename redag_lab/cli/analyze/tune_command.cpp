@@ -48,7 +48,7 @@ bool parse_vary(const std::string &list, lab::Freedom &freedom, Console &console
     } else if (name == "order") {
       freedom.ties = true;
     } else {
-      console.error(fmt::format("--vary: {} is not a choice", in_quotes(name)),
+      console.error(fmt::format("--vary: {} is not a valid choice", in_quotes(name)),
                     suggestion(name, {"workers", "max_active", "order"}));
       return false;
     }
@@ -100,7 +100,7 @@ int write(const std::string &path, const lab::Tuned &tuned, Console &console) {
     console.note(written.error());
     return kExitBad;
   }
-  console.note(fmt::format("wrote {}{}\n", path, tuned.changed() ? "" : ": the workload as it was"));
+  console.note(fmt::format("wrote {}{}\n", path, tuned.changed() ? "" : ": the unchanged workload"));
   return kExitOk;
 }
 
@@ -111,7 +111,7 @@ int tune_file(const Options &options, Console &console) {
   tuning.options.effort.seed = options.run.seed;
   tuning.options.seed = options.run.seed;
   if (options.run.seed + options.tune.seeds + options.tune.held_out < options.run.seed) {
-    console.error("--seed, --seeds and --held-out: the last seed is not below 2^64", "begin with a smaller seed");
+    console.error("--seed, --seeds and --held-out: the last seed is not below 2^64", "choose a smaller first seed");
     return kExitBad;
   }
   tuning.options.simulation.overheads = options.run.overheads;
@@ -141,11 +141,11 @@ int tune_file(const Options &options, Console &console) {
   const InterruptGuard guard;  // covers writing the results too
   std::optional<lab::Tuned> tuned = search(*workload, tuning.options, console);
   if (!tuned) {
-    console.error("interrupted before the workload as it is was judged: there is nothing to say");
+    console.error("interrupted before the present workload was judged: there is no result");
     return kExitBad;
   }
   tuning.tuned = *std::move(tuned);
-  if (tuning.tuned.stopped) console.warn("interrupted: this is the best so far");
+  if (tuning.tuned.stopped) console.warn("interrupted: this is the best setting found so far");
   console.print(options.run.json ? to_text(to_json(tuning))
                                  : describe(tuning, console.out_traits(), options.all_trials));
   if (const int status = write(options.output, tuning.tuned, console); status != kExitOk) return status;
@@ -159,36 +159,38 @@ int tune_file(const Options &options, Console &console) {
 Action add_tune(CLI::App &app) {
   auto options = std::make_shared<Options>();
   lab::TuneOptions &tune = options->tune;
-  app.add_option("FILE", options->run.file, "Workload (YAML); - is standard input")->required();
-  app.add_option("-o,--output", options->output, "File for the tuned workload; without comments")->type_name("FILE");
+  app.add_option("FILE", options->run.file, "Workload file (YAML); - reads standard input")->required();
+  app.add_option("-o,--output", options->output, "File for the tuned workload; comments are lost")->type_name("FILE");
   const auto objective = [](lab::Objective value) { return std::pair(std::string(objective_name(value)), value); };
   add_choice(app, "--objective", tune.goal.objective,
              Choices<lab::Objective>{objective(lab::Objective::Misses), objective(lab::Objective::Lateness),
                                      objective(lab::Objective::Slack)},
-             "Fewest jobs late or lost, smallest largest lateness, or largest least share of a deadline that is left")
+             "Minimise late and lost jobs (misses) or the largest lateness (max_lateness), or maximise the smallest "
+             "share of a deadline that is left (slack)")
       ->default_str(objective_name(tune.goal.objective));
-  app.add_flag("--per-criticality", tune.goal.per_criticality,
-               "What DAGs of higher criticality gain counts before all that others lose");
-  app.add_option("--vary", options->vary, "What may change: workers, max_active, order (of DAGs that share a priority)")
+  app.add_flag("--per-criticality", tune.goal.per_criticality, "Compare settings by their most critical DAGs first");
+  app.add_option("--vary", options->vary, "What may change: workers, max_active, order (of DAGs with equal priority)")
       ->type_name("LIST")
       ->capture_default_str();
   app.add_option("--caps", options->caps,
-                 "Values of max_active to try for every DAG; default: none, 1, 2, ... as far as they can matter")
+                 "Values of max_active to try for every DAG (default: none, and all values that can matter)")
       ->type_name("LOW-HIGH");
   add_count(app, "--most-workers", tune.freedom.most_workers, {0, kMaxWorkers},
-            "Try up to so many workers; 0: as many as there are");
-  add_duration(app, "--duration", options->run.duration, "Length of a simulation; default: some hyperperiods");
-  add_count(app, "--seeds", tune.seeds, {1, kMostSeeds}, "Simulations of each setting: seeds SEED, SEED+1, ...");
-  add_count(app, "--held-out", tune.held_out, {0, kMostSeeds}, "Seeds after these, on which the answer is judged");
-  add_seed(app, options->run.seed, "The first of them, and of the local search");
-  app.add_flag("--simulator-only", options->simulator_only, "Do not ask the bounds what is proven");
-  add_count(app, "--exhaustive", tune.effort.exhaustive, {0, kMaxCombinations}, "Settings up to which all are tried");
+            "Try at most this many workers; 0: as many as there are");
+  add_duration(app, "--duration", options->run.duration, "Length of a simulation (default: some hyperperiods)");
+  add_count(app, "--seeds", tune.seeds, {1, kMostSeeds}, "Simulations of each setting, with seeds SEED, SEED+1, ...");
+  add_count(app, "--held-out", tune.held_out, {0, kMostSeeds},
+            "Number of unseen seeds for the validation of the result");
+  add_seed(app, options->run.seed, "First seed, also of the local search");
+  app.add_flag("--simulator-only", options->simulator_only, "Do not analyze what the bounds prove");
+  add_count(app, "--exhaustive", tune.effort.exhaustive, {0, kMaxCombinations},
+            "Try all settings up to this number; above, search locally");
   add_count(app, "--restarts", tune.effort.restarts, {0, kMaxRestarts},
-            "Random places from which the local search starts besides");
-  add_count(app, "--jobs", tune.jobs, {0, kMaxJobs}, "Processors to use; 0: all. The answer is the same");
+            "Number of random starting points of the local search");
+  add_count(app, "--jobs", tune.jobs, {0, kMaxJobs}, "Processors to use; 0: all. The result does not depend on it");
   app.add_flag("--all-trials", options->all_trials, "Show every setting that was tried");
-  app.add_flag("--json", options->run.json, "Write one JSON document to standard output, and nothing else");
-  app.add_flag("--check", options->run.check, "Exit with 1 if the best setting misses a deadline in the simulator");
+  app.add_flag("--json", options->run.json, "Write one JSON document, and nothing else, to standard output");
+  app.add_flag("--check", options->run.check, "Exit with status 1 if the best setting misses a deadline in simulation");
   add_platform_arguments(app, options->run);
   add_overhead_arguments(app, options->run, "Platform");
   return [options](Console &console) { return tune_file(*options, console); };

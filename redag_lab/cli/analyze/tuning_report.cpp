@@ -90,8 +90,8 @@ std::string scores_table(const Tuning &tuning, const StreamTraits &terminal) {
   add("present", "searched", tuned.present.score);
   if (tuned.found.point != tuned.present.point) add("found", "searched", tuned.found.score);
   if (tuning.options.held_out > 0) {
-    add("present", "held out", tuned.present.held_out);
-    if (tuned.found.point != tuned.present.point) add("found", "held out", tuned.found.held_out);
+    add("present", "unseen", tuned.present.held_out);
+    if (tuned.found.point != tuned.present.point) add("found", "unseen", tuned.found.held_out);
   }
   return table.render(terminal.width, terminal.colour);
 }
@@ -134,12 +134,18 @@ std::string tried_tables(const Tuning &tuning, const StreamTraits &terminal, boo
   if (by_workers.size() > 1) {
     Ranked best;
     for (const auto &[workers, trial] : by_workers) best.push_back(trial);
-    text += "\nthe best for each number of workers\n" + trials_table(tuning, best, terminal);
+    text +=
+        "\n"
+        "best setting for each number of workers\n" +
+        trials_table(tuning, best, terminal);
   }
   const std::size_t shown = all ? trials.size() : std::min(trials.size(), kMostTrials);
-  text += fmt::format("\ntried: {} of {} settings, best first\n", format_count(shown), format_count(trials.size()));
+  text += fmt::format(
+      "\n"
+      "settings tried: {} of {}, best first\n",
+      format_count(shown), format_count(trials.size()));
   text += trials_table(tuning, {trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(shown)}, terminal);
-  if (shown < trials.size()) text += "(--all-trials shows every one)\n";
+  if (shown < trials.size()) text += "(--all-trials shows all)\n";
   return text;
 }
 
@@ -173,11 +179,10 @@ std::string gains(const Tuning &tuning) {
   const RunScore &before = held ? tuned.present.held_out : tuned.present.score;
   const RunScore &after = held ? tuned.found.held_out : tuned.found.score;
   std::string text;
-  if (!before.proven && after.proven) text += "gain: every deadline is proven to hold, which it is not as it stands\n";
-  text +=
-      fmt::format("{}, {}: {} -> {}\n", objective_name(objective),
-                  held ? "on seeds that the search has not seen" : "on the seeds of the search (none were held out)",
-                  objective_text(before.all(), objective), objective_text(after.all(), objective));
+  if (!before.proven && after.proven) text += "gain: the bounds now prove that every deadline is met\n";
+  text += fmt::format("{}, {}: {} -> {}\n", objective_name(objective),
+                      held ? "on unseen seeds" : "on the seeds of the search (no validation)",
+                      objective_text(before.all(), objective), objective_text(after.all(), objective));
   if (has_classes(before)) {
     for (const Criticality c : kByUrgency) {
       const ClassScore &x = before.of[static_cast<std::size_t>(c)];
@@ -249,19 +254,19 @@ std::string in_words(const Tuning &tuning) {
   if (tuned.changed()) {
     text += gains(tuning);
   } else if (tuned.rejected()) {
-    text +=
-        "nothing to change: what was better on the seeds of the search was worse on those held out\n" + gains(tuning);
+    text += "nothing to change: the best setting of the search is worse on the unseen seeds\n" + gains(tuning);
   } else {
     text += fmt::format("nothing to change: no other setting that was tried is better by {}\n",
                         objective_name(tuning.options.goal.objective));
   }
   if (!tuned.varies) {
     text +=
-        "runs of different seeds are the same: execution times and jitter do not vary, so there is nothing to hold "
-        "out\n";
+        "runs with different seeds are equal, because execution times and jitter do not vary:\nno validation is "
+        "needed\n";
   }
   if (!tuned.exhaustive) {
-    text += fmt::format("local search (seed {}), not every combination\n", tuning.options.effort.seed);
+    text +=
+        fmt::format("found by local search (seed {}), not all combinations were tried\n", tuning.options.effort.seed);
   }
   if (tuned.stopped) text += fmt::format("stopped after {} settings\n", format_count(tuned.trials.size()));
   return text;
@@ -274,9 +279,12 @@ std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool al
                                  workload.platform.workers, workload.platform.workers == 1 ? "" : "s",
                                  objective_name(options.goal.objective),
                                  options.goal.per_criticality ? ", the most critical DAGs first" : "");
-  text += fmt::format("simulated {} with each of {} seeds; {} seeds held out; {}\n\n",
-                      humanize_duration(options.simulation.duration), options.seeds, options.held_out,
-                      options.bounds ? "a workload that the bounds prove comes first" : "without bounds");
+  text += fmt::format(
+      "simulated {} with each of {} seeds; validated on {} unseen seeds;\n"
+      "{}\n"
+      "\n",
+      humanize_duration(options.simulation.duration), options.seeds, options.held_out,
+      options.bounds ? "settings that the bounds prove come first" : "bounds are not used");
   text += scores_table(tuning, terminal);
   text += tried_tables(tuning, terminal, all) + "\n";
   for (const std::string &change : changes(tuning.tuned)) {

@@ -43,17 +43,18 @@ class AcceptanceStudy final : public Study {
   [[nodiscard]] std::string files(const std::string &folder) const override {
     return fmt::format(
         "  {0}/acceptance.svg   the plot\n"
-        "  {0}/acceptance.csv, acceptance.json   the figures, with their confidence intervals\n",
+        "  {0}/acceptance.csv, acceptance.json\n"
+        "      the figures, with confidence intervals\n",
         folder);
   }
 
   [[nodiscard]] int judge(const std::string &folder, Console &console) const override {
     const std::vector<experiment::Violation> &violations = counter_.results().violations;
     for (const experiment::Violation &violation : violations) {
-      const std::string place = folder.empty() ? std::string("run it again with --out DIR for a file to replay")
+      const std::string place = folder.empty() ? std::string("run it again with --out DIR to get a file to replay")
                                                : fmt::format("replay: {}/violation-{}.yaml", folder, violation.unit);
       console.error(
-          fmt::format("unit {} ({}) misses a deadline in the simulation, but is accepted by {}", violation.unit,
+          fmt::format("unit {} ({}) misses a deadline in simulation, although it is accepted by {}", violation.unit,
                       experiment::describe(acceptance_.point_of(violation.unit)), fmt::join(violation.methods, ", ")),
           place);
     }
@@ -73,10 +74,9 @@ Action add_acceptance(CLI::App &app) {
   add_study_settings(app, *settings);
   app.footer(
       "Examples:\n"
-      "  redag experiment acceptance --dags 10 --workers 4 --methods guan,any,simulation --out results/guan\n"
-      "  redag experiment acceptance experiments/acceptance_tasks.yaml --sets 1000 --out results/tasks\n"
-      "  redag experiment acceptance experiments/acceptance_dags.yaml --shard 1/3 --out results/dags-1\n"
-      "  redag experiment acceptance --dags 3 --min-tasks 3 --max-tasks 8 --utilization 0.1:1:0.1 --json\n");
+      "  redag experiment acceptance --dags 10 --workers 4 --methods guan,any\n"
+      "  redag experiment acceptance experiments/acceptance_tasks.yaml --out results\n"
+      "  redag experiment acceptance experiments/acceptance_dags.yaml --shard 1/3\n");
   return [plan, settings](Console &console) {
     std::optional<AcceptancePlan> read = plan->plan(console);
     if (!read) return kExitBad;

@@ -73,7 +73,8 @@ int merge(const MergeSettings &settings, Console &console) {
     (has_runs ? recorded : experiments).push_back(folder);
   }
   if (experiments.empty()) {
-    console.error("recorded runs alone are no experiment", "name the folder of the one that they belong to, too");
+    console.error("recorded runs alone are not an experiment",
+                  "also name the folder of the experiment that they belong to");
     return kExitBad;
   }
   Result<MergedUnits> merged = read_merged(experiments);
@@ -88,14 +89,14 @@ int merge(const MergeSettings &settings, Console &console) {
 Action add_merge(CLI::App &app) {
   const auto settings = std::make_shared<MergeSettings>();
   app.add_option("DIR", settings->folders,
-                 "Folders of the shards (--out), the same plan in all; folders of run_workload, whose runs are added")
+                 "Folders of the shards (--out) of one plan; and of run_workload, whose runs are added")
       ->type_name("DIR")
       ->required();
-  add_study_output(app, settings->output, "-o,--out", "Folder for the whole")->required();
+  add_study_output(app, settings->output, "-o,--out", "Folder for the merged results")->required();
   app.footer(
       "Examples:\n"
-      "  redag experiment merge results/dags-1 results/dags-2 results/dags-3 --out results/dags\n"
-      "  redag experiment merge results/simulated results/recorded_with_ros --out results/both\n");
+      "  redag experiment merge results/dags-1 results/dags-2 --out results/dags\n"
+      "  redag experiment merge results/simulated results/ros --out results/both\n");
   return [settings](Console &console) { return merge(*settings, console); };
 }
 
@@ -104,10 +105,9 @@ Action add_merge(CLI::App &app) {
 Action add_experiment(CLI::App &app) {
   app.require_subcommand(1);
   CLI::App *acceptance =
-      app.add_subcommand("acceptance", "Which share of random workloads do the bounds accept, over utilization?");
-  CLI::App *factorial =
-      app.add_subcommand("factorial", "Every executor on every combination of workers, deadlines, bounds, load, ...");
-  CLI::App *together = app.add_subcommand("merge", "Put the shards of several machines together");
+      app.add_subcommand("acceptance", "Measure the share of random workloads that the bounds accept");
+  CLI::App *factorial = app.add_subcommand("factorial", "Run every executor on every combination of factors");
+  CLI::App *together = app.add_subcommand("merge", "Merge the shards of several machines");
   return [acceptance, factorial, judge = add_acceptance(*acceptance), cross = add_factorial(*factorial),
           join = add_merge(*together)](Console &console) {
     if (acceptance->parsed()) return judge(console);

@@ -64,9 +64,12 @@ std::string describe(const experiment::Acceptance &acceptance, const experiment:
     }
     text += table.render(traits.width, traits.colour);
   }
-  if (unsound) text += "\n!: accepted by an equation whose hypotheses do not hold here: not a proof\n";
+  if (unsound) text += "\n!: accepted by an equation whose assumptions do not hold here: no proof\n";
   if (!results.complete()) {
-    text += fmt::format("\n{} of {} workloads are done\n", format_count(results.done), format_count(results.units));
+    text += fmt::format(
+        "\n"
+        "{} of {} workloads are done\n",
+        format_count(results.done), format_count(results.units));
   }
   return text;
 }

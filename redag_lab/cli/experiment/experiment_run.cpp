@@ -138,10 +138,10 @@ class StudyRun {
 
   [[nodiscard]] std::string how_to_go_on() const {
     if (!journal_) {
-      return fmt::format("the results are those of the {} so far; with --out DIR a run can go on later",
+      return fmt::format("the results cover only the {} so far; with --out DIR, a run can be resumed later",
                          study_.units_are());
     }
-    return "the results so far are kept; the same command goes on";
+    return "the results so far are kept; run the same command to resume";
   }
 
   Study &study_;
@@ -156,21 +156,22 @@ class StudyRun {
 CLI::Option *add_study_output(CLI::App &app, StudyOutput &output, const std::string &names, const std::string &help) {
   CLI::Option *folder = app.add_option(names, output.folder, help)->type_name("DIR");
   app.add_flag("--force", output.force, "Write into a folder that holds other files")->needs(folder);
-  app.add_flag("--json", output.json, "Write one JSON document to standard output, and nothing else");
+  app.add_flag("--json", output.json, "Write one JSON document, and nothing else, to standard output");
   return folder;
 }
 
 void add_study_settings(CLI::App &app, StudySettings &settings) {
-  add_count(app, "-j,--jobs", settings.jobs, {1, kMaxJobs}, "Done at the same time; default: one a processor")
+  add_count(app, "-j,--jobs", settings.jobs, {1, kMaxJobs}, "Number of parallel runs (default: one for each processor)")
       ->default_str("");
   const auto set_shard = [&settings](const std::string &text) {
     const Result<experiment::Shard> shard = experiment::parse_shard(text);
     if (!shard) reject("--shard", shard.error().front().message, shard.error().front().hint);
     settings.shard = *shard;
   };
-  app.add_option_function<std::string>("--shard", set_shard, "Do only the i-th of n shares: one for each machine")
+  app.add_option_function<std::string>("--shard", set_shard, "Run only share i of n, such as 1/4, one for each machine")
       ->type_name("i/n");
-  add_study_output(app, settings.output, "--out", "Folder for the results; a run that was killed goes on there");
+  add_study_output(app, settings.output, "--out",
+                   "Folder for the results; an experiment that was killed resumes there");
 }
 
 int run_study(Study &study, const StudySettings &settings, Console &console) {
@@ -197,8 +198,8 @@ int merge_studies(const MergedUnits &merged, const StudyOutput &output, const St
   Result<Journal> journal = experiment::open_folder(folder, merged.plan);
   if (!ok(journal, console)) return kExitBad;
   if (!journal->found().empty()) {
-    console.error(fmt::format("{} holds results already", folder),
-                  "merge into a new folder, or name it as a source too");
+    console.error(fmt::format("{} already holds results", folder),
+                  "merge into a new folder, or name this folder as a source, too");
     return kExitBad;
   }
   for (const FinishedUnit &unit : merged.units) {
@@ -207,9 +208,9 @@ int merge_studies(const MergedUnits &merged, const StudyOutput &output, const St
   if (!ok(journal->sync(), console)) return kExitBad;
   if (!ok(experiment::add_runs(folder, merged.runs), console)) return kExitBad;
   if (study->done() < study->unit_count()) {
-    console.warn(fmt::format("{} of {} {} are in none of the folders", study->unit_count() - study->done(),
+    console.warn(fmt::format("{} of {} {} are missing from the folders", study->unit_count() - study->done(),
                              study->unit_count(), study->units_are()),
-                 fmt::format("'redag experiment {1} {0}/plan.yaml --out {0}' makes them", folder, study->command()));
+                 fmt::format("'redag experiment {1} {0}/plan.yaml --out {0}' runs them", folder, study->command()));
   }
   return show(*study, output, console);
 }

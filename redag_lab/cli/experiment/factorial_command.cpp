@@ -87,8 +87,9 @@ class FactorialStudy final : public Study {
   }
   [[nodiscard]] std::string files(const std::string &folder) const override {
     return fmt::format(
-        "  {0}/factorial.svg   the plot: what each factor does\n"
-        "  {0}/factorial.csv, factorial.json   medians with confidence intervals, by combination and DAG\n"
+        "  {0}/factorial.svg   the plot: effects of each factor\n"
+        "  {0}/factorial.csv, factorial.json\n"
+        "      medians with confidence intervals, by combination and DAG\n"
         "  {0}/observations.csv   every run\n",
         folder);
   }
@@ -97,7 +98,7 @@ class FactorialStudy final : public Study {
     const experiment::FactorialResults &results = counter_.results();
     if (results.violations > 0) {
       console.error(fmt::format("the trace checker found {} violations of the model", results.violations),
-                    "observations.csv says in which runs");
+                    "observations.csv shows in which runs");
     }
     return results.violations > 0 || results.unenforced > 0 ? kExitNo : kExitOk;
   }
@@ -112,17 +113,17 @@ class FactorialStudy final : public Study {
 Action add_factorial(CLI::App &app) {
   const auto file = std::make_shared<std::string>();
   const auto settings = std::make_shared<StudySettings>();
-  app.add_option("PLAN", *file, "Plan (YAML, docs/experiments.md)")->type_name("FILE")->required();
+  app.add_option("PLAN", *file, "Plan (YAML, see docs/experiments.md)")->type_name("FILE")->required();
   const auto program = std::make_shared<std::string>();
-  app.add_option(
-         "--run-workload", *program,
-         "world: ros2: the program run_workload of redag_rclcpp_lab; default: 'ros2 run redag_rclcpp_lab run_workload'")
+  app.add_option("--run-workload", *program,
+                 "Program run_workload of redag_rclcpp_lab, for 'world: ros2' (default: 'ros2 run redag_rclcpp_lab "
+                 "run_workload')")
       ->type_name("PROGRAM");
   add_study_settings(app, *settings);
   app.footer(
       "Examples:\n"
-      "  redag experiment factorial experiments/paper/factorial.yaml --out results/factorial\n"
-      "  redag experiment factorial experiments/paper/utilization.yaml --shard 1/2 --out results/utilization-1\n");
+      "  redag experiment factorial experiments/paper/factorial.yaml --out results\n"
+      "  redag experiment factorial experiments/paper/utilization.yaml --shard 1/2\n");
   return [file, program, settings](Console &console) {
     Result<FactorialPlan> plan = experiment::load_factorial_plan(*file, executors_of);
     if (!plan) {
@@ -131,7 +132,8 @@ Action add_factorial(CLI::App &app) {
     }
     if (needs_machine(*plan)) {
       if (settings->shard.count > 1) {
-        console.error("--shard: real runs belong to one machine", "give each machine a plan and a folder");
+        console.error("--shard: runs on threads or under ROS 2 depend on one machine",
+                      "give each machine a plan and a folder of its own");
         return kExitBad;
       }
       if (const auto busy = lab::busy_machine_warning()) console.warn(*busy);

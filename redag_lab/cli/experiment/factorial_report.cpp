@@ -59,7 +59,7 @@ std::string combination_table(const Factorial &factorial, const FactorialResults
     shown.push_back(factor.kind);
     columns.push_back({to_string(factor.kind), factor.numeric, 1000});
   }
-  for (const char *title : {"missed", "dropped", "paper counts"}) columns.push_back({title, true, 900});
+  for (const char *title : {"missed", "skipped", "paper counts"}) columns.push_back({title, true, 900});
   columns.push_back({"max lateness", true, 200});
   Table table(std::move(columns));
   for (const FactorialRow &row : results.rows) {
@@ -150,7 +150,7 @@ std::string effects_table(const Factorial &factorial, const std::vector<Factoria
         what += (what.empty() ? "" : " x ") + std::string(to_string(one.factors[f]));
       add(what, term.share);
     }
-    if (one.factors.size() > 2) add("three and more together", one.effects.higher);
+    if (one.factors.size() > 2) add("three or more factors together", one.effects.higher);
     add("chance (between runs of one combination)", one.effects.noise);
   }
   return any ? table.render(traits.width, traits.colour) : std::string();
@@ -166,27 +166,30 @@ std::string describe(const Factorial &factorial, const FactorialResults &results
   if (results.done > 0) {
     if (results.rows.size() <= kMostRows) {
       heading(
-          "Deadlines missed: late or dropped, of all releases (medians, confidence interval); max lateness: of all "
-          "runs");
+          "Missed deadlines: late, skipped or aborted jobs, of all releases (medians with\nconfidence intervals)\n"
+          "max lateness: of all runs");
       text += combination_table(factorial, results, traits);
     } else {
-      heading("Deadlines missed: late or dropped, of all releases");
+      heading("Missed deadlines: late, skipped or aborted jobs, of all releases");
       text += range_table(factorial, results, traits);
     }
   }
   const std::vector<FactorialEffects> effects = effects_of(factorial, results);
   if (const std::string table = effects_table(factorial, effects, traits); !table.empty()) {
-    heading("What explains how much of the variation of the miss ratio");
+    heading("Variation of the miss ratio that each factor explains");
     text += table;
   }
   text += fmt::format(
       "\n{} runs, {} checks of their traces: {}; {}\n", format_count(results.done), format_count(results.checks),
       results.violations == 0 ? std::string("no violation of the model")
                               : fmt::format("{} VIOLATIONS", format_count(results.violations)),
-      results.unenforced == 0 ? std::string("every bound max_active was kept")
+      results.unenforced == 0 ? std::string("every max_active bound was kept")
                               : fmt::format("max_active was EXCEEDED in {} runs", format_count(results.unenforced)));
   if (!results.complete()) {
-    text += fmt::format("\n{} of {} runs are done\n", format_count(results.done), format_count(results.units));
+    text += fmt::format(
+        "\n"
+        "{} of {} runs are done\n",
+        format_count(results.done), format_count(results.units));
   }
   return text;
 }

@@ -78,8 +78,9 @@ class Reporting {
         if (!group.fits(trace->info)) {
           progress_.clear();
           console_.error(
-              fmt::format("{}: is no repetition of the runs beside it: its executor, mode or tasks differ", file),
-              "name folders with one kind of run each");
+              fmt::format("{} is not a repetition of the runs beside it: its executor, preemption mode or tasks differ",
+                          file),
+              "name folders that hold one kind of run each");
           return false;
         }
         group.add(fs::path(file).parent_path().string(), *trace);
@@ -91,7 +92,7 @@ class Reporting {
     // A single group is labelled by its executor instead of its path.
     if (groups_.size() == 1) groups_.front().set_label(groups_.front().info().executor);
     if (done < count) {
-      notes_.push_back(fmt::format("interrupted: {} of {} runs were read", done, count));
+      notes_.push_back(fmt::format("interrupted: only {} of {} runs were read", done, count));
       console_.warn(notes_.back());
     }
     return true;
@@ -117,7 +118,7 @@ class Reporting {
     for (const report::Group &group : groups_) {
       text += (groups_.size() > 1 ? group.label() + ": " : "") + report::verdict_of(group).front().text + "\n";
     }
-    text += fmt::format("{}: {:.1f} MB, opens in any browser, without a network\n", path,
+    text += fmt::format("{}: {:.1f} MB, opens in any browser without a network\n", path,
                         static_cast<double>(html.size()) / 1e6);
     if (options_.json) {
       console_.note(text);
@@ -144,7 +145,7 @@ class Reporting {
 // Reports the folder of a factorial experiment, which becomes one page.
 int report_experiment(const Options &options, const fs::path &file, Console &console) {
   if (options.places.size() > 1) {
-    console.error(fmt::format("{}: an experiment has a page of its own", file.string()), "name one folder");
+    console.error(fmt::format("{}: an experiment has a page of its own", file.string()), "name this folder alone");
     return kExitBad;
   }
   const Result<std::string> text = trace::read_file(file.string());
@@ -168,8 +169,10 @@ int report_experiment(const Options &options, const fs::path &file, Console &con
     console.note(written.error());
     return kExitBad;
   }
-  const std::string words = fmt::format("{}\n{}: {:.1f} MB, opens in any browser, without a network\n",
-                                        document->summary, path, static_cast<double>(html.size()) / 1e6);
+  const std::string words = fmt::format(
+      "{}\n"
+      "{}: {:.1f} MB, opens in any browser without a network\n",
+      document->summary, path, static_cast<double>(html.size()) / 1e6);
   if (options.json) {
     console.note(words);
   } else {
@@ -191,12 +194,13 @@ int make_report(const Options &options, Console &console) {
 
 Action add_report(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option(
-         "DIR", options->places,
-         "Folders that run, simulate or compare wrote with --out, also with such below; or one of experiment factorial")
+  app.add_option("DIR", options->places,
+                 "Folders of recorded runs (--out of run, simulate, compare), at any depth; or one folder of 'redag "
+                 "experiment factorial'")
       ->required();
-  app.add_option("-o,--output", options->output, "The page; default: report.html in the first DIR")->type_name("FILE");
-  app.add_flag("--json", options->json, "Write the report's data to standard output; a page only with -o");
+  app.add_option("-o,--output", options->output, "File for the page (default: report.html in the first DIR)")
+      ->type_name("FILE");
+  app.add_flag("--json", options->json, "Write the data of the report to standard output; write a page only with -o");
   return [options](Console &console) { return make_report(*options, console); };
 }
 

@@ -30,10 +30,10 @@ const char *name_of(Broken broken) {
 std::string describe(const lab::BoundCheck &check, std::size_t tasks, const StreamTraits &terminal) {
   std::string text = fmt::format("bounds: {} of {} tasks have one", check.bounded, tasks);
   text += check.absent.empty() ? "" : fmt::format(" ({})", check.absent);
-  text += check.assumptions.is_calibrated ? ", with the overheads of the machine" : "";
+  text += check.assumptions.is_calibrated ? ", with the machine's overheads charged" : "";
   if (check.remarks.empty()) {
-    text += fmt::format("{}, {}", check.bounded > 0 ? "; no response was above its bound" : "",
-                        tinted("no execution above its wcet", Tint::Good, terminal.colour));
+    text += fmt::format("{}, {}", check.bounded > 0 ? "; no response time was above its bound" : "",
+                        tinted("no execution time was above its wcet", Tint::Good, terminal.colour));
   } else if (!check.assumptions.has_alarms()) {
     text += "; " + tinted("no alarm", Tint::Good, terminal.colour);
   }

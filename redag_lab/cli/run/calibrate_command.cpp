@@ -83,12 +83,12 @@ std::string describe(const Calibration &calibration, const StreamTraits &termina
   }
   std::string text = table.render(terminal.width, terminal.colour) + "\n";
   const auto charged = [&](const char *threads, const std::optional<Overheads> &overheads) {
-    if (overheads) text += fmt::format("charged on {} threads: {}\n", threads, to_string(*overheads));
+    if (overheads) text += fmt::format("overheads charged on {} threads: {}\n", threads, to_string(*overheads));
   };
   charged("SCHED_FIFO", calibration.realtime);
   charged("ordinary", calibration.normal);
-  if (!calibration.complete) text += "partial: ended early, these are the figures until then\n";
-  return text + "a measured maximum is evidence and no proof: a longer calibration can find a larger one\n";
+  if (!calibration.complete) text += "incomplete: the calibration ended early\n";
+  return text + "note: a measured maximum is no proof; a longer calibration can find a larger one\n";
 }
 
 Result<Calibration> measure(const Options &options, Console &console) {
@@ -108,7 +108,7 @@ Result<Calibration> measure(const Options &options, Console &console) {
 
 int calibrate(const Options &options, Console &console) {
   if (options.duration > kLongest) {
-    console.error(fmt::format("--duration: {} is more than a day", format_duration(options.duration)));
+    console.error(fmt::format("--duration: {} is longer than a day", format_duration(options.duration)));
     return kExitBad;
   }
   if (const auto busy = lab::busy_machine_warning()) console.warn(*busy);
@@ -124,17 +124,19 @@ int calibrate(const Options &options, Console &console) {
   calibration.host = now.host;
   calibration.kernel = now.kernel;
   calibration.version = now.version;
-  if (!calibration.complete) console.warn("interrupted: the calibration is partial");
+  if (!calibration.complete) console.warn("interrupted: the calibration is incomplete");
   if (!calibration.realtime) {
     console.warn(
-        "this process may not use SCHED_FIFO: only ordinary threads were measured, as for cooperative and none");
+        "this process may not use SCHED_FIFO: only ordinary threads were measured, as preemption 'cooperative' and "
+        "'none' use them");
   }
   console.print(options.json ? to_text(to_json(calibration)) : describe(calibration, console.out_traits()));
   if (const Result<void> written = write_text(options.out, to_yaml(calibration)); !written) {
     console.note(written.error());
     return kExitBad;
   }
-  const std::string message = fmt::format("wrote {}: charge it with --overheads {}\n", options.out, options.out);
+  const std::string message =
+      fmt::format("wrote {}: charge these overheads with --overheads {}\n", options.out, options.out);
   if (options.json) {
     console.note(message);
   } else {
@@ -147,10 +149,10 @@ int calibrate(const Options &options, Console &console) {
 
 Action add_calibrate(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  add_duration(app, "--duration", options->duration, "How long to measure, in all")->default_str("30s");
-  app.add_flag("--loaded", options->loaded, "Half of the time with own threads that keep the machine busy");
-  app.add_option("--out", options->out, "The overheads file")->type_name("FILE")->capture_default_str();
-  app.add_flag("--json", options->json, "Write one JSON document to standard output, and nothing else");
+  add_duration(app, "--duration", options->duration, "Total time to measure")->default_str("30s");
+  app.add_flag("--loaded", options->loaded, "Keep the machine busy with other threads for half of the time");
+  app.add_option("--out", options->out, "File for the measured overheads")->type_name("FILE")->capture_default_str();
+  app.add_flag("--json", options->json, "Write one JSON document, and nothing else, to standard output");
   return [options](Console &console) { return calibrate(*options, console); };
 }
 

@@ -88,7 +88,7 @@ class Checking {
 
 Action add_check_trace(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option("PLACE", options->places, "Traces (events.jsonl), or folders with traces in them or below")
+  app.add_option("PLACE", options->places, "Traces (events.jsonl), or folders that hold traces at any depth")
       ->required();
   app.add_flag("--json", options->json, "Write the verdicts as one JSON document");
   return [options](Console &console) { return Checking(*options, console).run(); };

@@ -57,7 +57,8 @@ class Comparing {
     }
     // Keeps whole rounds only: every executor has the same number of repetitions.
     for (lab::ExecutorResults &results : results_) results.repetitions.resize(done);
-    if (done < repetitions_) console_.warn(fmt::format("interrupted: {} of {} repetitions", done, repetitions_));
+    if (done < repetitions_)
+      console_.warn(fmt::format("interrupted: {} of {} repetitions are complete", done, repetitions_));
     return report();
   }
 
@@ -159,10 +160,14 @@ class Comparing {
   void say_what_was_written(const std::string &folder) {
     const std::string first = fmt::format("{}/{}/repetition-1", folder, results_.front().variant.name);
     const std::string text = fmt::format(
-        "\nOpen these files:\n"
-        "  {0}/comparison.json, {0}/comparison.csv   this comparison, every repetition\n"
-        "  {1}/trace.json   the schedule: drop it on https://ui.perfetto.dev\n"
-        "  {1}/jobs.csv, summary.json, events.jsonl   every job; the other executors lie beside it\n",
+        "\n"
+        "Open these files:\n"
+        "  {0}/comparison.json, comparison.csv\n"
+        "      this comparison, with every repetition\n"
+        "  {1}/trace.json\n"
+        "      the schedule, for https://ui.perfetto.dev\n"
+        "  {1}/jobs.csv, summary.json, events.jsonl\n"
+        "      every job; the folders beside it hold the other executors\n",
         folder, first);
     if (options_.run.json) {
       console_.note(text);
@@ -189,13 +194,14 @@ int compare(const Options &options, Console &console) {
     return kExitBad;
   }
   if (variants->size() < 2) {
-    console.error(fmt::format("--executors: there is nothing to compare '{}' with", variants->front().name),
-                  "name two or more, such as redag,mte; 'redag run' runs one");
+    console.error(fmt::format("--executors: there is no other executor to compare '{}' with", variants->front().name),
+                  "name two or more, such as redag,mte; 'redag run' runs a single one");
     return kExitBad;
   }
   for (const lab::Variant &variant : *variants) {
     if (!options.simulate || !variant.realtime_threads) continue;
-    console.error(fmt::format("the simulator has no threads: '{}' is '{}' there", variant.name, variant.executor));
+    console.error(fmt::format("the simulator has no threads to make real-time: '{}' is the same as '{}' there",
+                              variant.name, variant.executor));
     return kExitBad;
   }
   const std::uint32_t repetitions = options.repeat > 0 ? options.repeat : (options.simulate ? 1 : kThreadsRepetitions);
@@ -203,7 +209,7 @@ int compare(const Options &options, Console &console) {
   if (!workload) return kExitBad;
   if (!takes_arguments(*variants, options.run, console)) return kExitBad;
   if (options.simulate && options.run.seed + (repetitions - 1) < options.run.seed) {
-    console.error("--seed and --repeat: the last seed is not below 2^64", "begin with a smaller seed");
+    console.error("--seed and --repeat: the last seed is not below 2^64", "choose a smaller first seed");
     return kExitBad;
   }
   for (const lab::Variant &variant : *variants) {
@@ -224,17 +230,16 @@ int compare(const Options &options, Console &console) {
 Action add_compare(CLI::App &app) {
   auto options = std::make_shared<Options>();
   add_workload_arguments(app, options->run);
-  app.add_option(
-         "--executors", options->executors,
-         "What to compare: redag, redag-none, redag-cooperative, redag-os, mte, ste, static, events, cbg; mte-fifo, "
-         "ste-fifo, ...: on real-time threads")
+  app.add_option("--executors", options->executors,
+                 "Executors to compare: redag, redag-none, redag-cooperative, redag-os, mte, ste, static, events, cbg; "
+                 "with -fifo (mte-fifo, ...) on real-time threads")
       ->type_name("LIST")
       ->capture_default_str();
-  add_count(
-      app, "--repeat", options->repeat, {1, kMostRepetitions},
-      "Repetitions, the executors taking turns; default 3, simulated 1. Simulated ones take seeds SEED, SEED+1, ...")
+  add_count(app, "--repeat", options->repeat, {1, kMostRepetitions},
+            "Repetitions, in which the executors take turns; by default 3, or 1 with --simulate, where they take seeds "
+            "SEED, SEED+1, ...")
       ->default_str("");
-  CLI::Option *simulate = app.add_flag("--simulate", options->simulate, "Virtual time instead of threads");
+  CLI::Option *simulate = app.add_flag("--simulate", options->simulate, "Use virtual time instead of threads");
   add_result_arguments(app, options->run);
   add_simulator_arguments(app, options->run);
   add_thread_arguments(app, options->run);

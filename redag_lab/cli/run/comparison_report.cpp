@@ -107,14 +107,19 @@ std::string comparison_table(const lab::Comparison &comparison, const StreamTrai
 
 // Explains the columns of the table in words.
 std::string legend(const lab::Comparison &comparison, std::size_t repetitions) {
-  std::string text = "missed: late, skipped or aborted, of all jobs";
+  std::string text = "missed: jobs that were late, skipped or aborted, of all jobs";
   if (repetitions > 1) text += " of all repetitions";
-  text += "\np50 to max: end to end, from the release of a source to the finish of a sink";
+  text +=
+      "\n"
+      "p50 to max: end to end, from the release of a source to the finish of a sink";
   const bool several = std::any_of(comparison.executors.front().repetitions.front().begin(),
                                    comparison.executors.front().repetitions.front().end(),
                                    [](const metrics::DagSummary &seen) { return seen.end_to_end.sinks.size() > 1; });
-  if (several) text += ";\nof several sinks, each figure is that of the worst one";
-  if (repetitions > 1) text += ";\nmax is of all repetitions, p50 to p99 are medians over the repetitions";
+  if (several)
+    text +=
+        ";\n"
+        "with several sinks, each figure is that of the worst one";
+  if (repetitions > 1) text += ";\nmax is the largest of all repetitions; p50 to p99 are medians over repetitions";
   return text + "\n\n";
 }
 
@@ -144,8 +149,8 @@ std::string caveat(const lab::Comparison &comparison) {
   }
   if (with.empty() || without.empty()) return {};
   return fmt::format(
-      "{} had real-time (SCHED_FIFO) threads, {} had not: on a busy machine part of the difference is that alone; "
-      "mte-fifo and ste-fifo, or --realtime, give them to all",
+      "{} had real-time (SCHED_FIFO) threads, {} had not: on a busy machine, this alone explains part of the "
+      "difference; mte-fifo and ste-fifo, or --realtime, give real-time threads to all executors",
       report::join(with), report::join(without));
 }
 

@@ -105,7 +105,7 @@ TEST(Comparison, MaximaAreOfAllRepetitions) {
   const lab::Comparison comparison = comparison_of({three});
   EXPECT_NE(table_row(comparison, "redag").find("9ms"), std::string::npos) << table_row(comparison, "redag");
   EXPECT_EQ(to_json(comparison)["executors"][0]["dags"][0]["end_to_end_max_ns"], 9 * kMillisecond);
-  EXPECT_NE(describe(comparison, StreamTraits{}).find("max is of all repetitions, p50 to p99 are medians"),
+  EXPECT_NE(describe(comparison, StreamTraits{}).find("max is the largest of all repetitions; p50 to p99 are medians"),
             std::string::npos);
 }
 

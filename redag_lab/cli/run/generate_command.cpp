@@ -31,43 +31,55 @@ constexpr double kLeastShare = 1e-9;  // minimum of options that must be above 0
 
 void add_structure(CLI::App &app, lab::GenerateOptions &g) {
   const std::string group = "DAGs";
-  add_count(app, "--dags", g.dags, {1, lab::kMaxTasks}, "DAGs")->group(group);
+  add_count(app, "--dags", g.dags, {1, lab::kMaxTasks}, "Number of DAGs")->group(group);
   add_count(app, "--min-tasks", g.min_tasks, {1, lab::kMaxTasks}, "Fewest tasks of a DAG")->group(group);
   add_count(app, "--max-tasks", g.max_tasks, {1, lab::kMaxTasks}, "Most tasks of a DAG")->group(group);
-  add_choice(app, "--shape", g.shape, choices_of(lab::kDagShapes), "Edges")
+  add_choice(app, "--shape", g.shape,
+             choices_of({lab::DagShape::Layered, lab::DagShape::ErdosRenyi, lab::DagShape::ForkJoin,
+                         lab::DagShape::Chain, lab::DagShape::Independent}),
+             "Structure of the edges")
       ->default_str(to_string(g.shape))
       ->group(group);
-  add_number(app, "--edge-probability", g.edge_probability, kShare, "Of each further edge (layered, erdos_renyi)")
+  add_number(app, "--edge-probability", g.edge_probability, kShare,
+             "Probability of each further edge (layered, erdos_renyi)")
       ->group(group);
-  add_number(app, "--data-share", g.data_share, kShare, "Of the tasks with predecessors: released by data")
+  add_number(app, "--data-share", g.data_share, kShare,
+             "Share of the tasks with predecessors that are released by data")
       ->group(group);
-  add_count(app, "--max-active-min", g.max_active_min, {0, kMaxBound}, "Least max_active of a DAG; 0: no bound")
+  add_count(app, "--max-active-min", g.max_active_min, {0, kMaxBound}, "Smallest max_active of a DAG; 0: no bound")
       ->group(group);
   add_count(app, "--max-active-max", g.max_active_max, {0, kMaxBound}, "Largest max_active of a DAG; 0: no bound")
       ->group(group);
-  add_count(app, "--groups", g.groups, {0, lab::kMaxTasks}, "Exclusive groups in the workload")->group(group);
-  add_number(app, "--group-share", g.group_share, kShare, "Of the tasks: in a group")->group(group);
-  add_number(app, "--queue-share", g.queue_share, kShare, "Of the tasks: overrun queue")->group(group);
-  add_count(app, "--queue-depth", g.queue_depth, {1, kMaxQueueDepth}, "Largest queue_depth of those")->group(group);
-  add_number(app, "--high-share", g.high_share, kShare, "Of the DAGs: criticality high")->group(group);
-  add_number(app, "--low-share", g.low_share, kShare, "Of the DAGs: criticality low")->group(group);
+  add_count(app, "--groups", g.groups, {0, lab::kMaxTasks}, "Number of exclusive groups in the workload")->group(group);
+  add_number(app, "--group-share", g.group_share, kShare, "Share of the tasks that are in a group")->group(group);
+  add_number(app, "--queue-share", g.queue_share, kShare, "Share of the tasks with 'overrun: queue'")->group(group);
+  add_count(app, "--queue-depth", g.queue_depth, {1, kMaxQueueDepth}, "Largest queue_depth of these tasks")
+      ->group(group);
+  add_number(app, "--high-share", g.high_share, kShare, "Share of the DAGs with 'criticality: high'")->group(group);
+  add_number(app, "--low-share", g.low_share, kShare, "Share of the DAGs with 'criticality: low'")->group(group);
 }
 
 void add_timing(CLI::App &app, lab::GenerateOptions &g) {
   const std::string group = "Time";
-  add_number(app, "--utilization", g.utilization, {kLeastShare, lab::kMaxTasks}, "Of all tasks together")->group(group);
-  add_number(app, "--max-task-utilization", g.max_task_utilization, {kLeastShare, 1}, "Of one task")->group(group);
-  add_choice(app, "--method", g.method, choices_of(lab::kUtilizationMethods), "How the utilization is shared")
+  add_number(app, "--utilization", g.utilization, {kLeastShare, lab::kMaxTasks}, "Total utilization of all tasks")
+      ->group(group);
+  add_number(app, "--max-task-utilization", g.max_task_utilization, {kLeastShare, 1}, "Largest utilization of one task")
+      ->group(group);
+  add_choice(app, "--method", g.method, choices_of(lab::kUtilizationMethods),
+             "How the utilization is divided among tasks")
       ->default_str(to_string(g.method))
       ->group(group);
-  add_choice(app, "--periods", g.periods, choices_of(lab::kPeriodModels), "Periods")
+  add_choice(app, "--periods", g.periods,
+             choices_of({lab::PeriodModel::LogUniform, lab::PeriodModel::Harmonic, lab::PeriodModel::Automotive,
+                         lab::PeriodModel::Robot}),
+             "Distribution of periods")
       ->default_str(to_string(g.periods))
       ->group(group);
   add_duration(app, "--period-min", g.period_min, "Shortest period (log_uniform, harmonic)")->group(group);
   add_duration(app, "--period-max", g.period_max, "Longest period (log_uniform, harmonic)")->group(group);
-  add_duration(app, "--period-granularity", g.period_granularity, "Periods are multiples of it (log_uniform)")
+  add_duration(app, "--period-granularity", g.period_granularity, "Unit of which periods are multiples (log_uniform)")
       ->group(group);
-  add_choice(app, "--rates", g.rates, choices_of(lab::kRateScopes), "Who draws a period")
+  add_choice(app, "--rates", g.rates, choices_of(lab::kRateScopes), "Whether each DAG or each task draws a period")
       ->default_str(to_string(g.rates))
       ->group(group);
   add_number(app, "--deadline-min", g.deadline_min, {kLeastShare, 4}, "Smallest deadline / period")->group(group);
@@ -75,16 +87,18 @@ void add_timing(CLI::App &app, lab::GenerateOptions &g) {
   add_number(app, "--bcet-min", g.bcet_min, kShare, "Smallest bcet / wcet")->group(group);
   add_number(app, "--bcet-max", g.bcet_max, kShare, "Largest bcet / wcet")->group(group);
   add_number(app, "--jitter", g.jitter, kShare, "Release jitter / period of timer tasks")->group(group);
-  app.add_flag("--offsets", g.offsets, "Timer tasks start anywhere in their first period")->group(group);
+  app.add_flag("--offsets", g.offsets, "Give timer tasks random offsets below their periods")->group(group);
 }
 
 void add_platform(CLI::App &app, lab::GenerateOptions &g) {
   const std::string group = "Platform";
-  add_count(app, "--workers", g.workers, {1, kMaxWorkers}, "Workers")->group(group);
-  add_choice(app, "--preemption", g.preemption, preemption_choices(), "Preemption")
+  add_count(app, "--workers", g.workers, {1, kMaxWorkers}, "Number of workers")->group(group);
+  add_choice(app, "--preemption", g.preemption, preemption_choices(), "Preemption mode")
       ->default_str(to_string(g.preemption))
       ->group(group);
-  add_choice(app, "--policy", g.policy, policy_choices(), "Policy")->default_str(to_string(g.policy))->group(group);
+  add_choice(app, "--policy", g.policy, policy_choices(), "Scheduling policy")
+      ->default_str(to_string(g.policy))
+      ->group(group);
 }
 
 // Returns the command that generates this workload again, as a comment for its first line.
@@ -118,15 +132,15 @@ std::string in_options(const CLI::App &app, const std::string &message) {
 
 int generate_workloads(const CLI::App &app, const Options &options, Console &console) {
   if (options.count > 1 && options.folder.empty()) {
-    console.error("--count needs --out DIR: one file holds one workload");
+    console.error("--count needs --out DIR, because one file holds one workload");
     return kExitBad;
   }
   if (options.seed + (options.count - 1) < options.seed) {
-    console.error("--seed and --count: the last seed is not below 2^64", "begin with a smaller seed");
+    console.error("--seed and --count: the last seed is not below 2^64", "choose a smaller first seed");
     return kExitBad;
   }
   if (!options.folder.empty() && !options.file.empty()) {
-    console.error("-o and --out exclude each other");
+    console.error("-o and --out exclude each other: use -o for one file, --out for a folder");
     return kExitBad;
   }
   if (!options.file.empty()) {
@@ -172,12 +186,12 @@ int generate_workloads(const CLI::App &app, const Options &options, Console &con
 
 Action add_generate(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  add_seed(app, options->seed, "The same options and seed give the same workload everywhere");
-  app.add_option("-o,--output", options->file, "File to write; default: standard output")->type_name("FILE");
+  add_seed(app, options->seed, "Seed; the same options and seed give the same workload everywhere");
+  app.add_option("-o,--output", options->file, "File to write (default: standard output)")->type_name("FILE");
   add_count(app, "--count", options->count, {1, kMaxCount},
-            "Workloads to make, with seeds SEED, SEED+1, ...; needs --out");
+            "Number of workloads to generate, with seeds SEED, SEED+1, ...; needs --out");
   CLI::Option *folder =
-      app.add_option("--out", options->folder, "Folder for workload-SEED.yaml files")->type_name("DIR");
+      app.add_option("--out", options->folder, "Folder for the files workload-SEED.yaml")->type_name("DIR");
   app.add_flag("--force", options->force, "Write into a folder that holds other files")->needs(folder);
   add_structure(app, options->generate);
   add_timing(app, options->generate);

@@ -188,7 +188,7 @@ std::vector<std::string> head_of(const live::Listed &listed, const Frame &frame,
       Tint::Strong, terminal.colour));
   const double rate = rate_of(total, frame, false);
   lines.push_back(
-      fitting(fmt::format("up {}  jobs {} ({}/s)  workers busy {}  page {} of a processor",
+      fitting(fmt::format("up {}  jobs {} ({}/s)  workers busy {}  live page {} of a processor",
                           humanize_duration(frame.published - frame.began), format_count(total.finished),
                           rate_text(rate), format_percent(busy_of(frame)), format_percent(page_cost(frame)))));
   const std::string misses = fmt::format("misses {}, {} in the last {}", format_count(total.misses),
@@ -199,12 +199,12 @@ std::vector<std::string> head_of(const live::Listed &listed, const Frame &frame,
                                                  : Tint::Good,
                          terminal.colour));
   if (const auto late = overdue(frame, now)) {
-    lines.push_back(tinted(fitting(fmt::format("no news for {}: the process is stopped, or all processors are taken",
+    lines.push_back(tinted(fitting(fmt::format("no update for {}: the process is stopped, or gets no processor",
                                                humanize_duration(*late))),
                            Tint::Bad, terminal.colour));
   }
   if (frame.left_out > 0) {
-    lines.push_back(tinted(fitting(fmt::format("{} more tasks found no room", format_count(frame.left_out))),
+    lines.push_back(tinted(fitting(fmt::format("{} more tasks do not fit the live page", format_count(frame.left_out))),
                            Tint::Caution, terminal.colour));
   }
   return lines;
@@ -365,7 +365,7 @@ std::string describe(const std::vector<live::Listed> &pages, const StreamTraits 
                {format_count(total.finished)},
                count_cell(total.misses, Tint::Bad),
                {humanize_duration(frame.published - frame.began)},
-               late ? Cell{"no news for " + humanize_duration(*late), Tint::Bad} : Cell{"running", Tint::Good}});
+               late ? Cell{"no update for " + humanize_duration(*late), Tint::Bad} : Cell{"running", Tint::Good}});
   }
   return table.render(terminal.width, terminal.colour);
 }

@@ -135,7 +135,7 @@ TEST(LiveText, SaysThatNobodyWrites) {
   strange.interval = kMaxDuration;  // must not overflow
   EXPECT_EQ(overdue(strange, 25 * kSecond), std::nullopt);
   const LiveText text = describe(listed, *listed.page, {}, kPlain, 25 * kSecond);
-  EXPECT_THAT(text.head.back(), HasSubstr("no news for 5s"));
+  EXPECT_THAT(text.head.back(), HasSubstr("no update for 5s"));
 }
 
 TEST(LiveText, FitsNarrowTerminals) {

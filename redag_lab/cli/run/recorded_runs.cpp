@@ -60,7 +60,7 @@ Result<void> read_comparison(const fs::path &file, std::vector<std::string> &ord
   if (!fs::exists(file, error)) return {};
   const Result<std::string> text = trace::read_file(file.string());
   if (!text) return tl::unexpected<Diagnostics>(text.error());
-  const auto bad = [&] { return trace::file_error(file.string(), 1, "not a comparison of 'redag compare'"); };
+  const auto bad = [&] { return trace::file_error(file.string(), 1, "the file was not written by 'redag compare'"); };
   if (json_nests_deeper(*text)) return bad();
   const Json json = Json::parse(*text, nullptr, false);
   if (!json.is_object() || !is_comparison(json.value("format", Json()))) return bad();

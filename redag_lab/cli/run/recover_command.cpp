@@ -40,8 +40,9 @@ Diagnostics warnings_of(const trace::Recovered &recovered) {
     warn(fmt::format("the record was full: its first {} events were replaced by newer ones", recovered.overwritten));
   }
   if (recovered.damaged > 0) {
-    warn(fmt::format("the record has a hole: {} of its blocks were not written whole, and what follows is left out",
-                     recovered.damaged));
+    warn(fmt::format(
+        "the record is damaged: {} of its blocks were not written completely, and the events after them are left out",
+        recovered.damaged));
   }
   return warnings;
 }
@@ -54,7 +55,8 @@ int recover(const Options &options, Console &console) {
     return kExitBad;
   }
   if (options.folder.empty() && record == options.place) {
-    console.error(fmt::format("'{}' is a record and not a folder of results", record), "say with --out where they go");
+    console.error(fmt::format("'{}' is a record of events, not a folder of results", record),
+                  "name a folder for the results with --out");
     return kExitBad;
   }
   const std::string &folder = options.folder.empty() ? options.place : options.folder;
@@ -86,12 +88,13 @@ int recover(const Options &options, Console &console) {
 
 Action add_recover(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option("DIR", options->place, "The --out folder of a run that was killed, or a flight folder (with --out)")
+  app.add_option("DIR", options->place, "The --out folder of a killed run, or its record (then with --out)")
       ->required();
-  app.add_option("--out", options->folder, "Folder for the results, instead of DIR; made if missing")->type_name("DIR");
+  app.add_option("--out", options->folder, "Folder for the results, instead of DIR; created if missing")
+      ->type_name("DIR");
   app.add_flag("--force", options->force, "Write into a folder that holds other files");
-  app.add_flag("--keep", options->keep, "Keep the record once its results are written");
-  app.add_flag("--json", options->json, "Write one JSON document to standard output, and nothing else");
+  app.add_flag("--keep", options->keep, "Keep the record after its results are written");
+  app.add_flag("--json", options->json, "Write one JSON document, and nothing else, to standard output");
   return [options](Console &console) { return recover(*options, console); };
 }
 

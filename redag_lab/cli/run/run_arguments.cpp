@@ -20,16 +20,20 @@
 namespace redag::cli {
 namespace {
 
-constexpr const char *kWorkloadGroup = "Instead of what the workload says";
+constexpr const char *kWorkloadGroup = "Override the workload";
 constexpr const char *kResultGroup = "Results";
 
 }  // namespace
 
 void add_platform_arguments(CLI::App &app, RunArguments &arguments) {
   add_choice(app, "--policy", arguments.policy, policy_choices(), "Priority order")->group(kWorkloadGroup);
-  add_choice(app, "--ties", arguments.ties, ties_choices(), "Order of equal priorities")->group(kWorkloadGroup);
-  add_choice(app, "--preemption", arguments.preemption, preemption_choices(), "Of redag")->group(kWorkloadGroup);
-  add_count(app, "--workers", arguments.workers, {1, kMaxWorkers}, "Workers")->default_str("")->group(kWorkloadGroup);
+  add_choice(app, "--ties", arguments.ties, ties_choices(), "Order of tasks with equal priority")
+      ->group(kWorkloadGroup);
+  add_choice(app, "--preemption", arguments.preemption, preemption_choices(), "Preemption mode of ReDAG-RT")
+      ->group(kWorkloadGroup);
+  add_count(app, "--workers", arguments.workers, {1, kMaxWorkers}, "Number of workers")
+      ->default_str("")
+      ->group(kWorkloadGroup);
 }
 
 CLI::Option *add_calibration_argument(CLI::App &app, RunArguments &arguments, const std::string &group) {
@@ -41,7 +45,7 @@ CLI::Option *add_calibration_argument(CLI::App &app, RunArguments &arguments, co
   };
   return app
       .add_option_function<std::string>("--overheads", read,
-                                        "What the machine costs, measured by redag calibrate: charged to bounds")
+                                        "Charge the overheads of the machine that 'redag calibrate' measured")
       ->type_name("FILE")
       ->group(group);
 }
@@ -53,30 +57,30 @@ void add_overhead_arguments(CLI::App &app, RunArguments &arguments, const std::s
   };
   add("--overhead-release", arguments.overheads.release, "Processor time to handle a release");
   add("--overhead-dispatch", arguments.overheads.dispatch, "Processor time to start a job");
-  add("--overhead-preempt", arguments.overheads.preempt, "Processor time to resume a job");
+  add("--overhead-preempt", arguments.overheads.preempt, "Processor time to resume a preempted job");
 }
 
 void add_workload_arguments(CLI::App &app, RunArguments &arguments) {
-  app.add_option("FILE", arguments.file, "Workload (YAML); - is standard input")->required();
-  add_duration(app, "--duration", arguments.duration, "Releases happen in this time; jobs may still be running then");
-  add_duration(app, "--warm-up", arguments.warm_up, "Jobs released in this time at the start are not counted", true);
-  add_duration(app, "--warmup", arguments.warm_up, "As it was called", true)->group("");  // not in --help
-  add_seed(app, arguments.seed, "Of execution times and jitter: every executor gets the same jobs");
+  app.add_option("FILE", arguments.file, "Workload file (YAML); - reads standard input")->required();
+  add_duration(app, "--duration", arguments.duration, "Length of the run: the time in which jobs are released");
+  add_duration(app, "--warm-up", arguments.warm_up, "Do not count jobs released in this time at the start", true);
+  add_duration(app, "--warmup", arguments.warm_up, "Former name of --warm-up", true)->group("");  // not in --help
+  add_seed(app, arguments.seed, "Seed of execution times and jitter; every executor gets the same jobs");
   add_platform_arguments(app, arguments);
 }
 
 void add_result_arguments(CLI::App &app, RunArguments &arguments) {
-  app.add_flag("--json", arguments.json, "Write one JSON document to standard output, and nothing else")
+  app.add_flag("--json", arguments.json, "Write one JSON document, and nothing else, to standard output")
       ->group(kResultGroup);
-  CLI::Option *folder = app.add_option("--out", arguments.folder, "Folder for result files; made if missing")
+  CLI::Option *folder = app.add_option("--out", arguments.folder, "Folder for the result files; created if missing")
                             ->type_name("DIR")
                             ->group(kResultGroup);
   app.add_flag("--force", arguments.force, "Write into a folder that holds other files")
       ->needs(folder)
       ->group(kResultGroup);
-  app.add_flag("--check", arguments.check, "Exit with 1 if a deadline was missed")->group(kResultGroup);
+  app.add_flag("--check", arguments.check, "Exit with status 1 if a deadline was missed")->group(kResultGroup);
   add_count(app, "--max-events", arguments.max_events, {1, kMaxEvents},
-            "Events that are checked and written, 32 bytes of memory each; later ones are summarized")
+            "Number of events to check and write, at 32 bytes of memory each; later events count in the summary only")
       ->group(kResultGroup);
 }
 
@@ -87,16 +91,19 @@ void add_simulator_arguments(CLI::App &app, RunArguments &arguments) {
 
 void add_thread_arguments(CLI::App &app, RunArguments &arguments) {
   const std::string group = "Threads";
-  app.add_option("--affinity", arguments.cpus, "Processors of the workers: 2,3 or 0-3")
+  app.add_option("--affinity", arguments.cpus, "Processors of the workers, such as 2,3 or 0-3")
       ->type_name("CPUS")
       ->group(group);
-  app.add_flag("--mlockall", arguments.lock_memory, "Lock the memory: no page faults during the run")->group(group);
-  app.add_flag("--realtime", arguments.realtime_threads, "SCHED_FIFO threads, also for executors that do not preempt")
+  app.add_flag("--mlockall", arguments.lock_memory, "Lock all memory, to avoid page faults during the run")
       ->group(group);
-  add_duration(app, "--spin", arguments.spin, "How long an idle worker looks for a job before it sleeps; not with os",
-               true)
+  app.add_flag("--realtime", arguments.realtime_threads,
+               "Use SCHED_FIFO threads for every executor, also for those that do not preempt")
       ->group(group);
-  add_duration(app, "--watchdog", arguments.watchdog, "Say which jobs are in progress for longer, while they are")
+  add_duration(app, "--spin", arguments.spin,
+               "Time for which an idle worker looks for a job before it sleeps; not with preemption os", true)
+      ->group(group);
+  add_duration(app, "--watchdog", arguments.watchdog,
+               "Report jobs that are in progress for longer than this, while they still run")
       ->group(group);
 }
 
@@ -129,26 +136,28 @@ bool takes_arguments(const std::vector<lab::Variant> &variants, const RunArgumen
   if (arguments.preemption && none([&](const lab::Variant &variant) {
         return !variant.preemption || variant.preemption == arguments.preemption;
       })) {
-    console.error(fmt::format("--preemption {}: '{}' always runs with preemption {}", to_string(*arguments.preemption),
-                              first.name, to_string(*first.preemption)),
+    console.error(fmt::format("--preemption {}: executor '{}' always runs with preemption {}",
+                              to_string(*arguments.preemption), first.name, to_string(*first.preemption)),
                   "leave --preemption out, or choose the executor 'redag'");
     return false;
   }
   if (arguments.policy && none([](const lab::Variant &variant) { return variant.is_redag(); })) {
-    console.error(fmt::format("--policy {}: '{}' has an order of its own", to_string(*arguments.policy), first.name),
+    console.error(fmt::format("--policy {}: executor '{}' has a fixed order of its own", to_string(*arguments.policy),
+                              first.name),
                   "leave --policy out, or choose the executor 'redag'");
     return false;
   }
   if (arguments.ties && none([](const lab::Variant &variant) { return variant.is_redag(); })) {
-    console.error(fmt::format("--ties {}: '{}' has an order of its own", to_string(*arguments.ties), first.name),
-                  "leave --ties out, or choose the executor 'redag'");
+    console.error(
+        fmt::format("--ties {}: executor '{}' has a fixed order of its own", to_string(*arguments.ties), first.name),
+        "leave --ties out, or choose the executor 'redag'");
     return false;
   }
   const auto has_workers = [](const lab::Variant &variant) {
     return !executors::find_executor(variant.executor)->single_worker;
   };
   if (arguments.workers > 1 && none(has_workers)) {
-    console.error(fmt::format("--workers {}: '{}' has one worker", arguments.workers, first.name),
+    console.error(fmt::format("--workers {}: executor '{}' has only one worker", arguments.workers, first.name),
                   "leave --workers out, or choose the executor 'mte'");
     return false;
   }
@@ -171,12 +180,12 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
   options.live = arguments.live;
   options.watchdog = arguments.watchdog.value_or(0);
   if (options.duration > trace::kMaxTraceTime) {
-    console.error(fmt::format("a run of {} is longer than a trace can be", format_duration(options.duration)),
-                  "the longest is " + format_duration(trace::kMaxTraceTime));
+    console.error(fmt::format("a run of {} is longer than a trace can record", format_duration(options.duration)),
+                  "choose at most " + format_duration(trace::kMaxTraceTime));
     return std::nullopt;
   }
   if (options.warm_up >= options.duration) {
-    console.error(fmt::format("the warm-up of {} leaves nothing of a run of {}", format_duration(options.warm_up),
+    console.error(fmt::format("a warm-up of {} leaves nothing of a run of {}", format_duration(options.warm_up),
                               format_duration(options.duration)));
     return std::nullopt;
   }
@@ -184,15 +193,15 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
     const std::optional<std::vector<int>> cpus = parse_cpu_list(arguments.cpus);
     if (!cpus) {
       console.error(fmt::format("--affinity: {} is not a list of processors", in_quotes(arguments.cpus)),
-                    "numbers and ranges, as in 0,2-3");
+                    "write numbers and ranges, such as 0,2-3");
       return std::nullopt;
     }
     options.cpus = *cpus;
     const std::vector<int> usable = runtime::usable_cpus();
     const auto is_usable = [&](int cpu) { return std::binary_search(usable.begin(), usable.end(), cpu); };
     if (const auto bad = std::find_if_not(cpus->begin(), cpus->end(), is_usable); bad != cpus->end()) {
-      console.error(fmt::format("--affinity: this process may not use processor {}", *bad),
-                    fmt::format("it may use {}", fmt::join(usable, ", ")));
+      console.error(fmt::format("--affinity: this process is not allowed to use processor {}", *bad),
+                    fmt::format("allowed: {}", fmt::join(usable, ", ")));
       return std::nullopt;
     }
   }

@@ -19,22 +19,24 @@ Action add_run(CLI::App &app) {
   auto arguments = std::make_shared<RunArguments>();
   auto executor = std::make_shared<std::string>("redag");
   add_workload_arguments(app, *arguments);
-  app.add_option("--executor", *executor, "As in simulate, also mte-fifo, ste-fifo, ...: those on real-time threads")
+  app.add_option("--executor", *executor,
+                 "Executor: as for 'redag simulate', and also mte-fifo, ste-fifo, ..., which use real-time threads")
       ->type_name("NAME")
       ->capture_default_str();
   add_result_arguments(app, *arguments);
-  app.add_flag("--all-tasks", arguments->all_tasks, "A row for every task, however many");
+  app.add_flag("--all-tasks", arguments->all_tasks, "Show every task, however many there are");
   add_thread_arguments(app, *arguments);
   add_calibration_argument(app, *arguments, "Threads");
   arguments->live = true;
-  app.add_flag("--live,!--no-live", arguments->live, "Let redag top see the run (a page of memory, 2 updates a second)")
+  app.add_flag("--live,!--no-live", arguments->live,
+               "Let 'redag top' show the run; costs a page of memory and two updates a second")
       ->group("Threads");
   arguments->flight = true;
   app.add_flag("--flight,!--no-flight", arguments->flight,
-               "With --out, record events while the run goes on: 'redag recover' makes results of a killed run")
+               "With --out, record events during the run, so that 'redag recover' can restore a killed run")
       ->group("Results");
   add_count(app, "--flight-size", arguments->flight_mib, {1, kMaxFlightMib},
-            "MiB of that record; then new events replace the oldest")
+            "Size of that record in MiB; when it is full, new events replace the oldest")
       ->needs(&option_named(app, "--out"))
       ->group("Results");
   return [arguments, executor](Console &console) {

@@ -84,7 +84,7 @@ std::string task_table(const lab::Session &session, const StreamTraits &terminal
   }
   std::string text = table.render(terminal.width, terminal.colour);
   if (!all && session.summary.tasks.size() > kMostTasks) {
-    text += fmt::format("(the worst {} of {} tasks; --all-tasks shows every one)\n", kMostTasks,
+    text += fmt::format("(the worst {} of {} tasks; --all-tasks shows all)\n", kMostTasks,
                         format_count(session.summary.tasks.size()));
   }
   return text;
@@ -117,12 +117,15 @@ std::string dag_table(const lab::Session &session, const StreamTraits &terminal)
 
 std::string legend(const lab::Session &session) {
   std::string text =
-      "missed: late, skipped or aborted; times of a task: finish - release; of a DAG, end to end:\nfinish of a sink - "
-      "release of its source";
+      "missed: late, skipped or aborted\n"
+      "times of tasks: finish - release\n"
+      "times of DAGs: end to end, from the release of a source to the finish of a sink";
   const auto &dags = session.summary.dags;
   const bool several =
       std::any_of(dags.begin(), dags.end(), [](const auto &dag) { return dag.end_to_end.sinks.size() > 1; });
-  return text + (several ? ", each figure that of the worst sink\n" : "\n");
+  return text + (several ? ";\n"
+                           "with several sinks, each figure is that of the worst one\n"
+                         : "\n");
 }
 
 std::string verdict_line(const lab::Session &session, const StreamTraits &terminal) {
@@ -145,7 +148,7 @@ std::string headline(const lab::Session &session) {
                       info.preemption_why.empty() ? "" : " (" + info.preemption_why + ")");
   if (!info.overheads.empty()) text += fmt::format("overheads: {}\n", info.overheads);
   if (info.warm_up > 0) text += fmt::format("warm-up: the first {} are not counted\n", humanize_duration(info.warm_up));
-  if (session.stopped) text += "stopped early: the results are those of the shorter run\n";
+  if (session.stopped) text += "stopped early: the results cover only the time until then\n";
   return text;
 }
 
@@ -174,7 +177,7 @@ std::string describe(const lab::Session &session, const StreamTraits &terminal, 
     error = std::max(error, task.jobs.response.percentile_error);
   }
   if (error > 0) {
-    text += fmt::format("percentiles of tasks with many jobs: within {:.1f} %\n", 100 * error);
+    text += fmt::format("percentiles of tasks with many jobs are accurate to {:.1f} %\n", 100 * error);
   }
   if (!session.summary.worker_busy.empty()) {
     text += "workers busy:";
@@ -184,21 +187,22 @@ std::string describe(const lab::Session &session, const StreamTraits &terminal, 
   const metrics::Inversions &inversions = session.summary.inversions;
   text +=
       fmt::format("priority inversions: {}{}\n", format_count(inversions.count),
-                  inversions.count > 0 ? fmt::format(", longest {}, in all {}", humanize_duration(inversions.longest),
+                  inversions.count > 0 ? fmt::format(", longest {}, in total {}", humanize_duration(inversions.longest),
                                                      humanize_duration(inversions.total))
                                        : "");
   if (has_bounds(session)) text += describe(lab::check_bounds(session), session.summary.tasks.size(), terminal);
   if (session.summary.total.exceeded > 0) {
-    text += fmt::format("jobs that used their budget and went on: {}\n", format_count(session.summary.total.exceeded));
+    text +=
+        fmt::format("jobs that used up their budget and continued: {}\n", format_count(session.summary.total.exceeded));
   }
   const metrics::HighModeTime &high = session.summary.high_mode;
   if (high.count > 0) {
-    text += fmt::format("HI mode: {} time{}, in all {}\n", format_count(high.count), high.count == 1 ? "" : "s",
+    text += fmt::format("HI mode: {} time{}, in total {}\n", format_count(high.count), high.count == 1 ? "" : "s",
                         humanize_duration(high.total));
   }
   text += describe_check(session.check, terminal);
   if (session.cut_at) {
-    text += fmt::format("the first {} events were checked and kept: {} of {}; --max-events raises that\n",
+    text += fmt::format("events checked and kept: the first {}, {} of {}; --max-events raises this limit\n",
                         format_count(session.trace.events.size()), humanize_duration(*session.cut_at),
                         humanize_duration(session.info.end));
   }

@@ -14,11 +14,11 @@ Action add_simulate(CLI::App &app) {
   auto executor = std::make_shared<std::string>("redag");
   add_workload_arguments(app, *arguments);
   app.add_option("--executor", *executor,
-                 "redag, redag-none, redag-cooperative, redag-os, mte, ste, static, events or cbg")
+                 "Executor: redag, redag-none, redag-cooperative, redag-os, mte, ste, static, events or cbg")
       ->type_name("NAME")
       ->capture_default_str();
   add_result_arguments(app, *arguments);
-  app.add_flag("--all-tasks", arguments->all_tasks, "A row for every task, however many");
+  app.add_flag("--all-tasks", arguments->all_tasks, "Show every task, however many there are");
   add_simulator_arguments(app, *arguments);
   return [arguments, executor](Console &console) {
     return run_once(*arguments, *executor, trace::Driver::Simulator, console);

@@ -37,7 +37,7 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   }
   const bool simulated = driver == trace::Driver::Simulator;
   if (simulated && variant->realtime_threads) {
-    console.error(fmt::format("the simulator has no threads: use '{}'", variant->executor));
+    console.error(fmt::format("the simulator has no threads to make real-time: use '{}'", variant->executor));
     return kExitBad;
   }
   const std::optional<Workload> workload = load_configured(arguments, console);
@@ -75,7 +75,8 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
     console.note(problems);
     written = problems.empty();
     const std::string message = fmt::format(
-        "wrote {}/: summary.json, jobs.csv, events.jsonl, trace.json (open it in https://ui.perfetto.dev)\n",
+        "wrote {}/: summary.json, jobs.csv, events.jsonl, trace.json\n"
+        "(open trace.json in https://ui.perfetto.dev)\n",
         arguments.folder);
     if (written && arguments.json) console.note(message);
     if (written && !arguments.json) console.print(message);

@@ -55,7 +55,7 @@ std::string describe(const Facts &facts) {
   return fmt::format("{}, {}{}, {}, utilization {:.3f} on {} ({:.1f} %), hyperperiod {}", plural(facts.dags, "DAG"),
                      plural(facts.tasks, "task"), unknown, plural(facts.edges, "edge"), facts.utilization,
                      plural(facts.workers, "worker"), 100 * facts.utilization / facts.workers,
-                     facts.hyperperiod ? format_duration(*facts.hyperperiod) : "beyond 146 years");
+                     facts.hyperperiod ? format_duration(*facts.hyperperiod) : "longer than 146 years");
 }
 
 Json facts_json(const std::string &name, const Facts &facts) {
@@ -98,8 +98,8 @@ int validate_files(const Options &options, Console &console) {
 
 Action add_validate(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option("FILE", options->files, "Workload files (YAML); - is standard input")->required();
-  app.add_flag("--strict", options->strict, "Take warnings for errors");
+  app.add_option("FILE", options->files, "Workload files (YAML); - reads standard input")->required();
+  app.add_flag("--strict", options->strict, "Treat warnings as errors");
   app.add_flag("--json", options->json, "Write the findings as one JSON document");
   return [options](Console &console) { return validate_files(*options, console); };
 }

@@ -35,7 +35,7 @@ Result<std::string> read_standard_input() {
       return trace::file_error("<stdin>", 0, fmt::format("cannot read: {}", std::strerror(errno)));
     }
   }
-  return trace::file_error("<stdin>", 0, fmt::format("longer than {} bytes", kMaxWorkloadBytes));
+  return trace::file_error("<stdin>", 0, fmt::format("the file is longer than {} bytes", kMaxWorkloadBytes));
 }
 
 // Writes to devices and pipes, which a rename cannot replace.
@@ -78,7 +78,7 @@ Result<void> write_text(const std::string &path, std::string_view text) {
 
 Result<void> check_output(const std::string &path) {
   std::error_code ignored;
-  if (fs::is_directory(path, ignored)) return trace::file_error(path, 0, "cannot write: this is a folder");
+  if (fs::is_directory(path, ignored)) return trace::file_error(path, 0, "cannot write: the path is a folder");
   const fs::file_status status = fs::symlink_status(path, ignored);
   const bool in_place = fs::exists(status) && !fs::is_regular_file(status);
   const std::string folder = fs::path(path).parent_path().string();
@@ -100,12 +100,12 @@ Result<std::vector<std::string>> find_traces(const std::string &place) {
   }
   if (error) return trace::file_error(place, 0, fmt::format("cannot list the folder: {}", error.message()));
   if (files.empty() && fs::exists(flight_folder(place), error)) {
-    return trace::file_error(place, 0, "no events.jsonl in this folder, but the record of a run that did not end",
-                             fmt::format("'redag recover {}' makes results of it", place));
+    return trace::file_error(place, 0, "this folder holds no events.jsonl, only the record of a run that did not end",
+                             fmt::format("'redag recover {}' restores its results", place));
   }
   if (files.empty()) {
-    return trace::file_error(place, 0, "no events.jsonl in this folder or below",
-                             "'redag run', 'simulate' and 'compare' write one with --out");
+    return trace::file_error(place, 0, "no events.jsonl in this folder or below it",
+                             "'redag run', 'simulate' and 'compare' write one with '--out DIR'");
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -142,7 +142,7 @@ bool is_result_name(std::string_view name) {
 Result<void> prepare_folder(const std::string &path, bool force) {
   std::error_code error;
   fs::create_directories(path, error);
-  if (error) return trace::file_error(path, 0, fmt::format("cannot make the folder: {}", error.message()));
+  if (error) return trace::file_error(path, 0, fmt::format("cannot create the folder: {}", error.message()));
   if (::access(path.c_str(), W_OK | X_OK) != 0) {
     return trace::file_error(path, 0, fmt::format("cannot write into the folder: {}", std::strerror(errno)));
   }
@@ -151,7 +151,7 @@ Result<void> prepare_folder(const std::string &path, bool force) {
     const std::string name = entry->path().filename().string();
     if (is_result_name(name)) continue;
     return trace::file_error(path, 0, fmt::format("the folder holds '{}', which is not a result of redag", name),
-                             "choose another folder, or say --force to write beside it");
+                             "choose another folder, or write beside it with --force");
   }
   if (error) return trace::file_error(path, 0, fmt::format("cannot list the folder: {}", error.message()));
   return {};

@@ -57,7 +57,7 @@ CLI::Option *add_duration_to(CLI::App &app, const std::string &name, Target &tar
     const Result<Duration> parsed = parse_duration(text);
     if (!parsed) reject(name, parsed.error().front().message, parsed.error().front().hint);
     if (*parsed < 0 || (*parsed == 0 && !zero_allowed)) {
-      reject(name, in_quotes(text) + " is not " + (zero_allowed ? "a duration from 0s on" : "longer than 0"));
+      reject(name, in_quotes(text) + " is not " + (zero_allowed ? "a duration of at least 0s" : "greater than 0"));
     }
     target = *parsed;
   };
@@ -87,7 +87,7 @@ CLI::Option &option_named(CLI::App &app, std::string_view name) {
       if (name.substr(2) == own) return *option;
     }
   }
-  throw std::logic_error(fmt::format("no option {}", name));
+  throw std::logic_error(fmt::format("there is no option {}", name));
 }
 
 CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint32_t &target, Range<std::uint32_t> range,

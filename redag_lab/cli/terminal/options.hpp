@@ -93,7 +93,7 @@ CLI::Option *add_choice(CLI::App &app, const std::string &name, Target &target, 
         return;
       }
     }
-    reject(name, in_quotes(given) + " is not a choice", suggestion(given, names));
+    reject(name, in_quotes(given) + " is not a valid choice", suggestion(given, names));
   };
   return app.add_option_function<std::string>(name, set, help + ": " + listed)->type_name("NAME");
 }

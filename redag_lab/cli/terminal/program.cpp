@@ -15,6 +15,7 @@
 #include "redag/base/text.hpp"
 #include "redag/version.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/help.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
 
 namespace redag::cli {
@@ -28,34 +29,35 @@ struct Entry {
 };
 
 constexpr std::array kCommands = {
-    Entry{"validate", "Check workload files and say what is wrong, line by line", add_validate,
+    Entry{"validate", "Check workload files and report every mistake with its line", add_validate,
           "  redag validate cart.yaml\n"
           "  redag validate --strict workloads/*.yaml\n"},
-    Entry{"generate", "Make random workloads from a seed", add_generate,
+    Entry{"generate", "Generate random workloads from a seed", add_generate,
           "  redag generate --dags 4 --utilization 1.6 --seed 7 -o random.yaml\n"
           "  redag generate --periods robot --shape chain | redag validate -\n"
           "  redag generate --count 100 --out sets/\n"},
-    Entry{"simulate", "Run a workload in virtual time: exact, and the same for the same seed", add_simulate,
+    Entry{"simulate", "Simulate a workload in virtual time; results depend on the seed alone", add_simulate,
           "  redag simulate cart.yaml\n"
           "  redag simulate cart.yaml --executor mte --duration 60s --json\n"
           "  redag simulate cart.yaml --preemption none --workers 4 --out results/none\n"},
-    Entry{"run", "Run a workload on threads, with synthetic callbacks that take their time", add_run,
+    Entry{"run", "Run a workload on threads with synthetic callbacks", add_run,
           "  redag run cart.yaml --duration 10s\n"
-          "  sudo redag run cart.yaml --preemption os --affinity 2,3 --mlockall --out results/os\n"
-          "  redag run cart.yaml --executor ste --check || echo 'deadlines were missed'\n"},
-    Entry{"calibrate", "Measure what this machine adds to jobs: for bounds that hold on it", add_calibrate,
+          "  sudo redag run cart.yaml --preemption os --mlockall --out results/os\n"
+          "  redag run cart.yaml --workers 2 --affinity 2,3\n"
+          "  redag run cart.yaml --executor ste --check || echo 'missed a deadline'\n"},
+    Entry{"calibrate", "Measure the overheads of this machine, for bounds that hold on it", add_calibrate,
           "  redag calibrate\n"
           "  sudo redag calibrate --duration 5min --loaded --out overheads.yaml\n"
           "  redag calibrate --duration 5s --json | jq .overheads\n"},
-    Entry{"compare", "Run several executors on the same jobs and say how they differ", add_compare,
+    Entry{"compare", "Run several executors on the same jobs and compare their results", add_compare,
           "  redag compare cart.yaml\n"
-          "  redag compare cart.yaml --executors redag-none,redag-os,mte,mte-fifo --repeat 5 --out results/cmp\n"
+          "  redag compare cart.yaml --executors redag,mte --repeat 5 --out results/cmp\n"
           "  redag compare cart.yaml --simulate --duration 60s --json\n"},
-    Entry{"diff", "Two recorded results beside each other: what differs by more than chance", add_diff,
+    Entry{"diff", "Compare two recorded results and report significant differences", add_diff,
           "  redag diff results/before results/after\n"
           "  redag diff results/cmp/mte results/cmp/redag --tolerance 0.1\n"
-          "  redag diff results/main results/branch --check || echo 'the branch is worse'\n"},
-    Entry{"analyze", "Bound every response time: which deadlines hold whatever happens, and why", add_analyze,
+          "  redag diff results/main results/branch --check || echo 'worse'\n"},
+    Entry{"analyze", "Bound every response time and show which deadlines are guaranteed", add_analyze,
           "  redag analyze cart.yaml\n"
           "  redag analyze cart.yaml --preemption none --workers 2 --check\n"
           "  redag analyze cart.yaml --explain control.pid\n"
@@ -63,34 +65,33 @@ constexpr std::array kCommands = {
           "  redag analyze cart.yaml --executor ste\n"
           "  redag analyze cart.yaml --preemption none --explore\n"
           "  redag analyze --methods\n"},
-    Entry{"sensitivity", "How far execution times and rates can grow, or have to shrink, by the bounds",
-          add_sensitivity,
+    Entry{"sensitivity", "Find how far execution times and rates can grow, or must shrink", add_sensitivity,
           "  redag sensitivity cart.yaml\n"
           "  redag sensitivity cart.yaml --preemption none --task control.pid\n"
           "  redag sensitivity cart.yaml --simulate --json\n"},
-    Entry{"assign", "Find better priorities and max_active, judged by the bounds", add_assign,
+    Entry{"assign", "Find better priorities and max_active by response-time analysis", add_assign,
           "  redag assign cart.yaml\n"
           "  redag assign cart.yaml --objective slack -o tuned.yaml\n"
           "  redag assign cart.yaml --keep priorities --workers 4 --json\n"},
-    Entry{"tune", "Find better max_active, workers and tie order by simulation, validated on unseen seeds", add_tune,
+    Entry{"tune", "Find better max_active, workers and tie order by simulation", add_tune,
           "  redag tune cart.yaml\n"
           "  redag tune cart.yaml --objective max_lateness --per-criticality -o tuned.yaml\n"
-          "  redag tune cart.yaml --vary max_active --caps 2-5 --simulator-only --all-trials\n"},
-    Entry{"experiment", "Measure over many random workloads: seeded, parallel, resumable", add_experiment,
+          "  redag tune cart.yaml --vary max_active --caps 2-5 --all-trials\n"},
+    Entry{"experiment", "Run experiments over many workloads: seeded, parallel, resumable", add_experiment,
           "  redag experiment acceptance experiments/acceptance_tasks.yaml\n"
           "  redag experiment acceptance --help\n"
           "  redag experiment merge --help\n"},
-    Entry{"check-trace", "Hold recorded traces to the rules of the model", add_check_trace,
+    Entry{"check-trace", "Check recorded traces against the rules of the model", add_check_trace,
           "  redag check-trace results/demo\n"
           "  redag check-trace --json results/os/events.jsonl\n"},
-    Entry{"recover", "Make results of what a killed run had recorded", add_recover,
+    Entry{"recover", "Recover the results of a run that was killed", add_recover,
           "  redag recover results/os\n"
           "  redag recover results/os --out results/rescued --keep\n"},
-    Entry{"report", "Make one HTML page of recorded runs: verdict, tables, figures, schedule", add_report,
+    Entry{"report", "Write one HTML page about recorded runs", add_report,
           "  redag report results/demo\n"
           "  redag report results/none results/os -o report.html\n"
           "  redag report results/demo --json | jq .groups[].total\n"},
-    Entry{"top", "Watch an executor that runs: rates, response times, misses, queues", add_top,
+    Entry{"top", "Watch a running executor: rates, response times, misses, queues", add_top,
           "  redag top\n"
           "  redag top --list\n"
           "  redag top 1234 --interval 500ms\n"
@@ -107,7 +108,7 @@ std::vector<std::string> command_names() {
 // Returns the message for an unknown argument, with the nearest known option.
 std::string unknown_argument(const CLI::App &command) {
   const std::vector<std::string> rest = command.remaining();
-  if (rest.empty()) return "too many arguments";
+  if (rest.empty()) return "too many arguments are given";
   const std::string given = rest.front().substr(0, rest.front().find('='));
   if (given.empty() || given.front() != '-') return fmt::format("unexpected argument {}", in_quotes(rest.front()));
   std::vector<std::string> names;
@@ -144,7 +145,7 @@ std::string find_empty(const CLI::App &command) {
 
 int usage_error(Console &console, const std::string &message, const std::string &command) {
   console.error(message);
-  console.note(fmt::format("'redag {}--help' explains the usage\n", command.empty() ? "" : command + " "));
+  console.note(fmt::format("run 'redag {}--help' for the usage\n", command.empty() ? "" : command + " "));
   return kExitBad;
 }
 
@@ -170,14 +171,20 @@ std::string help_prefix(const CLI::App &command) {
 }
 
 int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
-  CLI::App app("Priority scheduling for many callback DAGs in one process: validate, simulate, run, compare, analyze.",
-               "redag");
+  CLI::App app(
+      "ReDAG-RT schedules many DAGs of callbacks by priority in one process. This program validates, simulates, runs, "
+      "compares and analyzes workloads.",
+      "redag");
   app.set_version_flag("--version", fmt::format("redag {} (revision {})", kVersion, build_revision()));
   app.require_subcommand(0, 1);
   app.option_defaults()->disable_flag_override();
-  app.get_formatter()->column_width(34);
+  auto formatter = std::make_shared<HelpFormatter>();
+  formatter->label("SUBCOMMAND", "COMMAND");
+  app.formatter(formatter);
   app.footer(
-      "'redag COMMAND --help' explains a command. Exit status: 0 fine, 1 the answer is no, 2 bad input or usage.");
+      "Run 'redag COMMAND --help' for the options of a command, with examples.\n\n"
+      "Exit status: 0 success; 1 negative result, such as a missed deadline with\n"
+      "--check; 2 bad input or usage.");
   std::vector<std::pair<CLI::App *, Action>> actions;
   for (const Entry &entry : kCommands) {
     CLI::App *command = app.add_subcommand(entry.name, entry.summary);
@@ -215,7 +222,10 @@ int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
     return usage_error(console, mismatch(error), name_of(chosen(app)));
   } catch (const CLI::ParseError &error) {
     CLI::App *command = chosen(app);
-    return usage_error(console, error.what(), name_of(command));
+    const std::string said = error.what();
+    const bool lacks_command = said == "A subcommand is required";
+    return usage_error(console, lacks_command ? "a command is missing after 'redag " + name_of(command) + "'" : said,
+                       name_of(command));
   }
   if (const CLI::App *command = chosen(app); command != nullptr) {
     if (const std::string option = find_empty(*command); !option.empty()) {
@@ -225,7 +235,7 @@ int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
   for (const auto &[command, action] : actions) {
     if (command->parsed()) return action(console);
   }
-  return usage_error(console, "no command given", "");
+  return usage_error(console, "no command is given", "");
 }
 
 }  // namespace

@@ -41,8 +41,8 @@ InterruptGuard::InterruptGuard() {
   action.sa_handler = on_signal;
   action.sa_flags = SA_RESTART;
   sigemptyset(&action.sa_mask);
-  REDAG_CHECK(sigaction(SIGINT, &action, &old_interrupt_) == 0, "no handler for SIGINT");
-  REDAG_CHECK(sigaction(SIGTERM, &action, &old_terminate_) == 0, "no handler for SIGTERM");
+  REDAG_CHECK(sigaction(SIGINT, &action, &old_interrupt_) == 0, "cannot install the handler of SIGINT");
+  REDAG_CHECK(sigaction(SIGTERM, &action, &old_terminate_) == 0, "cannot install the handler of SIGTERM");
 }
 
 // After an interrupt the handlers stay. The program is about to end, and a duplicate signal must not kill it before.

@@ -32,7 +32,7 @@ struct Options {
 };
 
 constexpr const char *kHowTo =
-    "redag run makes one; programs set ExecutorOptions::live, ROS 2 nodes the parameter live";
+    "'redag run' publishes one by default; programs set ExecutorOptions::live, and ROS 2 nodes the parameter 'live'";
 
 std::optional<LiveTarget> parse_target(const std::string &text) {
   LiveTarget target;
@@ -56,7 +56,7 @@ int list(const Options &options, Console &console) {
     console.print(describe(pages, console.out_traits(), now));
   }
   if (!pages.empty()) return kExitOk;
-  console.note("no executor runs that has a live page\n");
+  console.note("no running executor publishes a live page\n");
   return kExitNo;
 }
 
@@ -66,9 +66,9 @@ int show_once(const Options &options, const std::optional<LiveTarget> &target, C
   const Time now = runtime::monotonic_now();
   if (pages.empty()) {
     if (target) {
-      console.error(fmt::format("process {} has no live page", options.target), kHowTo);
+      console.error(fmt::format("process {} publishes no live page", options.target), kHowTo);
     } else {
-      console.error("no executor runs that has a live page", kHowTo);
+      console.error("no running executor publishes a live page", kHowTo);
     }
     return kExitNo;
   }
@@ -79,7 +79,7 @@ int show_once(const Options &options, const std::optional<LiveTarget> &target, C
   }
   if (pages.size() > 1) {
     console.note(describe(pages, console.err_traits(), now));
-    console.error("several executors run: say which", fmt::format("redag top {}", pages.front().pid));
+    console.error("several executors are running: name one", fmt::format("redag top {}", pages.front().pid));
     return kExitBad;
   }
   const live::Listed &listed = pages.front();
@@ -106,15 +106,15 @@ int top(const Options &options, Console &console) {
   if (!options.target.empty()) {
     target = parse_target(options.target);
     if (!target) {
-      console.error(fmt::format("{} is no process", in_quotes(options.target)),
-                    "a process id, or PID.N as in redag top --list");
+      console.error(fmt::format("{} is not a process", in_quotes(options.target)),
+                    "give a process ID, or PID.N as 'redag top --list' shows it");
       return kExitBad;
     }
   }
   if (options.list) return list(options, console);
   if (options.once || options.json) return show_once(options, target, console);
   if (!Screen::is_possible()) {
-    console.note("not on a terminal: one frame, as with --once\n");
+    console.note("the output is not a terminal: one frame is printed, as with --once\n");
     return show_once(options, target, console);
   }
   TopOptions screen;
@@ -132,14 +132,14 @@ int top(const Options &options, Console &console) {
 Action add_top(CLI::App &app) {
   auto options = std::make_shared<Options>();
   CLI::Option *target = app.add_option("PID", options->target,
-                                       "Process to watch; without it, the one that there is, or a list to choose from");
-  CLI::Option *list = app.add_flag("--list", options->list, "List the executors that run")->excludes(target);
-  app.add_flag("--once", options->once, "Print one frame as text")->excludes(list);
-  app.add_flag("--json", options->json, "Print one frame, or the list, as a JSON document");
-  add_duration(app, "--interval", options->interval, "Time from one look to the next");
-  app.add_flag("--dags", options->dags_only, "DAGs without their tasks");
-  app.add_flag("--since-start", options->since_start, "Rates, response times and processor time of the whole run");
-  app.add_option("--folder", options->folder, "Where the pages are")
+                                       "Process ID; by default the only running executor, or a list to choose from");
+  CLI::Option *list = app.add_flag("--list", options->list, "List the running executors")->excludes(target);
+  app.add_flag("--once", options->once, "Print one frame as text and exit")->excludes(list);
+  app.add_flag("--json", options->json, "Print one frame (or the list) as a JSON document and exit");
+  add_duration(app, "--interval", options->interval, "Time between two updates");
+  app.add_flag("--dags", options->dags_only, "Show only DAGs, not their tasks");
+  app.add_flag("--since-start", options->since_start, "Show figures since the start instead of over the last seconds");
+  app.add_option("--folder", options->folder, "Folder of the live pages")
       ->type_name("DIR")
       ->capture_default_str()
       ->check([](const std::string &folder) {

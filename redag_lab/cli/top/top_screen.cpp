@@ -17,9 +17,10 @@
 namespace redag::cli {
 namespace {
 
-constexpr const char *kKeys =
-    "q quit  sort: d dag n name r rate p p99 x max m misses c cpu  i invert  g dags only  t since start  l list  "
-    "space pause";
+// Each line fits into 80 columns.
+constexpr const char *kSortKeys = "sort by: d DAG  n name  r rate  p p99  x max  m misses  c CPU  i reverse";
+constexpr const char *kKeys = "q quit  space pause  g DAGs only  t since start  l list";
+constexpr std::size_t kKeyLines = 2;
 
 class Top {
  public:
@@ -57,21 +58,22 @@ class Top {
     size_ = screen.size();
     StreamTraits terminal{true, options_.colour, size_.columns};
     std::vector<std::string> lines = choosing_ ? list(terminal) : shown_ ? frame(terminal) : waiting();
-    const std::size_t room = size_.lines > 1 ? size_.lines - 1 : 1;
-    lines.resize(room);
-    lines.push_back(tinted(cut(choosing_ ? "q quit  up, down, enter, or 1 to 9: choose" : kKeys, size_.columns),
-                           Tint::Faint, options_.colour));
+    lines.resize(size_.lines > kKeyLines ? size_.lines - kKeyLines : 1);
+    const char *const choice = "choose: up, down, Enter, or 1 to 9";
+    for (const char *keys : {choosing_ ? choice : kSortKeys, kKeys}) {
+      lines.push_back(tinted(cut(keys, size_.columns), Tint::Faint, options_.colour));
+    }
     return screen.draw(lines);
   }
 
   std::vector<std::string> waiting() {
     page_ = 0;
-    return {cut("no executor runs that has a live page; waiting for one", size_.columns)};
+    return {cut("no running executor publishes a live page; waiting for one", size_.columns)};
   }
 
   std::vector<std::string> list(const StreamTraits &terminal) {
     if (pages_.empty()) return waiting();
-    std::vector<std::string> lines{cut("which executor?", size_.columns)};
+    std::vector<std::string> lines{cut("Which executor?", size_.columns)};
     StreamTraits narrower = terminal;
     narrower.width = terminal.width > 4 ? terminal.width - 4 : 1;
     const std::string text = describe(pages_, narrower, now_);
@@ -89,17 +91,17 @@ class Top {
     LiveText text = describe(*shown_, *shown_->page, view_, terminal, gone_ ? shown_->page->frame.published : now_);
     std::vector<std::string> lines = std::move(text.head);
     if (gone_) {
-      lines.push_back(
-          tinted(cut(fmt::format("it has ended; waiting for the next '{}'", attachment_.name()), size_.columns),
-                 Tint::Bad, options_.colour));
+      lines.push_back(tinted(
+          cut(fmt::format("the executor has ended; waiting for the next '{}'", attachment_.name()), size_.columns),
+          Tint::Bad, options_.colour));
     }
     if (paused_) lines.push_back(tinted("paused", Tint::Caution, options_.colour));
     const std::string what =
-        fmt::format("by {}{}, {}", to_string(view_.order), view_.reversed ? ", inverted" : "",
+        fmt::format("sorted by {}{}, {}", to_string(view_.order), view_.reversed ? ", reversed" : "",
                     view_.since_start ? "since the start" : "last " + humanize_duration(shown_->page->frame.window));
     lines.push_back(tinted(cut(what, size_.columns), Tint::Faint, options_.colour));
     lines.push_back(tinted(text.titles, Tint::Strong, options_.colour));
-    page_ = size_.lines > lines.size() + 1 ? size_.lines - lines.size() - 1 : 1;
+    page_ = size_.lines > lines.size() + kKeyLines ? size_.lines - lines.size() - kKeyLines : 1;
     rows_ = text.rows.size();
     first_ = std::min(first_, rows_ > page_ ? rows_ - page_ : 0);
     const std::size_t last = std::min(rows_, first_ + page_);

@@ -1,0 +1,112 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/cli/terminal/help.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <string_view>
+#include <vector>
+
+namespace redag::cli {
+namespace {
+
+constexpr std::size_t kWidth = 80;
+constexpr std::size_t kTextColumn = 28;  // where descriptions of options begin
+
+// Breaks `text` at spaces. Lines after the first are indented; the first one begins at that column, too.
+std::string wrapped(std::string_view text, std::size_t indent) {
+  std::string lines;
+  std::size_t column = indent;
+  while (!text.empty()) {
+    const std::string_view word = text.substr(0, text.find(' '));
+    text.remove_prefix(std::min(word.size() + 1, text.size()));
+    if (column > indent && column + 1 + word.size() > kWidth) {
+      lines += "\n" + std::string(indent, ' ');
+      column = indent;
+    }
+    if (column > indent) {
+      lines += " ";
+      ++column;
+    }
+    lines += word;
+    column += word.size();
+  }
+  return lines + "\n";
+}
+
+// Returns a row: a name, and its description beside or below it.
+std::string row(const std::string &name, const std::string &description) {
+  std::string text = "  " + name;
+  if (text.size() + 2 > kTextColumn) text += "\n";
+  const std::size_t begin = text.back() == '\n' ? 0 : text.size();
+  return text + std::string(kTextColumn - begin, ' ') + wrapped(description, kTextColumn);
+}
+
+std::string names_of(const CLI::Option &option) {
+  if (option.get_positional()) return option.get_name(true, false);
+  std::string names;
+  for (const std::string &name : option.get_snames()) names += (names.empty() ? "-" : ", -") + name;
+  for (const std::string &name : option.get_lnames()) names += (names.empty() ? "--" : ", --") + name;
+  return names;
+}
+
+std::string names_of(const std::set<CLI::Option *> &options) {
+  std::vector<std::string> names;
+  for (const CLI::Option *option : options) names.push_back(option->get_name());
+  std::sort(names.begin(), names.end());
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+// Returns " (default: 3; needs --out)" or an empty text.
+std::string remarks_on(const CLI::Option &option) {
+  std::vector<std::string> remarks;
+  if (!option.get_positional() && option.get_required()) remarks.emplace_back("required");
+  if (option.get_type_size() != 0 && !option.get_default_str().empty()) {
+    remarks.push_back("default: " + option.get_default_str());
+  }
+  if (!option.get_needs().empty()) remarks.push_back("needs " + names_of(option.get_needs()));
+  if (!option.get_excludes().empty()) remarks.push_back("not with " + names_of(option.get_excludes()));
+  return remarks.empty() ? std::string() : fmt::format(" ({})", fmt::join(remarks, "; "));
+}
+
+std::string row(const CLI::Option &option) {
+  std::string name = names_of(option);
+  const std::string type = option.get_type_name();
+  const bool is_optional_value = type.rfind("[=", 0) == 0;
+  if (is_optional_value) {
+    name += type;
+  } else if (!option.get_positional() && option.get_type_size() != 0 && !type.empty()) {
+    name += " " + type;
+  }
+  return row(name, option.get_description() + remarks_on(option));
+}
+
+std::string section(const std::string &title, const std::vector<const CLI::Option *> &options) {
+  std::string text;
+  for (const CLI::Option *option : options) text += row(*option);
+  return text.empty() ? text : "\n" + title + ":\n" + text;
+}
+
+}  // namespace
+
+std::string HelpFormatter::make_help(const CLI::App *app, std::string name, CLI::AppFormatMode /*mode*/) const {
+  std::string text = wrapped(app->get_description(), 0) + "\n" + make_usage(app, name);
+  text += section("Arguments", app->get_options([](const CLI::Option *option) { return option->get_positional(); }));
+  for (const std::string &group : app->get_groups()) {
+    if (group.empty()) continue;  // hidden options
+    text += section(group, app->get_options([&](const CLI::Option *option) {
+      return option->get_group() == group && option->nonpositional();
+    }));
+  }
+  std::string commands;
+  for (const CLI::App *command : app->get_subcommands({}))
+    commands += row(command->get_name(), command->get_description());
+  if (!commands.empty()) text += "\nCommands:\n" + commands;
+  const std::string footer = app->get_footer();
+  return text + "\n" + footer + (footer.empty() || footer.back() == '\n' ? "" : "\n");
+}
+
+}  // namespace redag::cli
