@@ -121,10 +121,7 @@ void PlanOptions::add_workloads(CLI::App &app) {
      [&w](AcceptancePlan &plan) { plan.workload.min_tasks = w.min_tasks; });
   on(add_count(app, "--max-tasks", w.max_tasks, {1, lab::kMaxTasks}, "Most tasks of a DAG"), group,
      [&w](AcceptancePlan &plan) { plan.workload.max_tasks = w.max_tasks; });
-  on(add_choice(app, "--shape", w.shape,
-                choices_of({lab::DagShape::Layered, lab::DagShape::ErdosRenyi, lab::DagShape::ForkJoin,
-                            lab::DagShape::Chain, lab::DagShape::Independent}),
-                "Structure of the edges")
+  on(add_choice(app, "--shape", w.shape, choices_of(lab::kDagShapes), "Structure of the edges")
          ->default_str(to_string(w.shape)),
      group, [&w](AcceptancePlan &plan) { plan.workload.shape = w.shape; });
   on(add_number(app, "--edge-probability", w.edge_probability, {0, 1},
@@ -137,10 +134,7 @@ void PlanOptions::add_workloads(CLI::App &app) {
        plan.workload.max_active_min = w.max_active_max;
        plan.workload.max_active_max = w.max_active_max;
      });
-  on(add_choice(app, "--periods", w.periods,
-                choices_of({lab::PeriodModel::LogUniform, lab::PeriodModel::Harmonic, lab::PeriodModel::Automotive,
-                            lab::PeriodModel::Robot}),
-                "Distribution of periods")
+  on(add_choice(app, "--periods", w.periods, choices_of(lab::kPeriodModels), "Distribution of periods")
          ->default_str(to_string(w.periods)),
      group, [&w](AcceptancePlan &plan) { plan.workload.periods = w.periods; });
   on(add_duration(app, "--period-min", w.period_min, "Shortest period (log_uniform, harmonic)"), group,

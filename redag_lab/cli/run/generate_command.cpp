@@ -34,10 +34,7 @@ void add_structure(CLI::App &app, lab::GenerateOptions &g) {
   add_count(app, "--dags", g.dags, {1, lab::kMaxTasks}, "Number of DAGs")->group(group);
   add_count(app, "--min-tasks", g.min_tasks, {1, lab::kMaxTasks}, "Fewest tasks of a DAG")->group(group);
   add_count(app, "--max-tasks", g.max_tasks, {1, lab::kMaxTasks}, "Most tasks of a DAG")->group(group);
-  add_choice(app, "--shape", g.shape,
-             choices_of({lab::DagShape::Layered, lab::DagShape::ErdosRenyi, lab::DagShape::ForkJoin,
-                         lab::DagShape::Chain, lab::DagShape::Independent}),
-             "Structure of the edges")
+  add_choice(app, "--shape", g.shape, choices_of(lab::kDagShapes), "Structure of the edges")
       ->default_str(to_string(g.shape))
       ->group(group);
   add_number(app, "--edge-probability", g.edge_probability, kShare,
@@ -69,10 +66,7 @@ void add_timing(CLI::App &app, lab::GenerateOptions &g) {
              "How the utilization is divided among tasks")
       ->default_str(to_string(g.method))
       ->group(group);
-  add_choice(app, "--periods", g.periods,
-             choices_of({lab::PeriodModel::LogUniform, lab::PeriodModel::Harmonic, lab::PeriodModel::Automotive,
-                         lab::PeriodModel::Robot}),
-             "Distribution of periods")
+  add_choice(app, "--periods", g.periods, choices_of(lab::kPeriodModels), "Distribution of periods")
       ->default_str(to_string(g.periods))
       ->group(group);
   add_duration(app, "--period-min", g.period_min, "Shortest period (log_uniform, harmonic)")->group(group);
