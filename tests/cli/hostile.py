@@ -115,12 +115,12 @@ class Combinations(Case):
         for command in ("simulate", "run"):
             self.refuse(command, self.cart, "--executor", "redag-none", "--preemption", "os", "--out", self.folder / "out",
                         says="--preemption os: executor 'redag-none' always runs with preemption none")
-            self.refuse(command, self.cart, "--executor", "mte", "--preemption", "os", says="--preemption os: 'mte'")
-            self.refuse(command, self.cart, "--executor", "mte", "--policy", "edf", says="--policy edf: 'mte'")
+            self.refuse(command, self.cart, "--executor", "mte", "--preemption", "os", says="--preemption os: executor 'mte'")
+            self.refuse(command, self.cart, "--executor", "mte", "--policy", "edf", says="--policy edf: executor 'mte'")
             self.refuse(command, self.cart, "--executor", "ste", "--workers", "2", says="--workers 2: executor 'ste' has only one worker")
             self.refuse(command, self.cart, "--executor", "redag-os", "--policy", "edf", "--out", self.folder / "out",
                         says="redag-os: preemption 'os' needs a static policy")
-        self.refuse("analyze", self.cart, "--executor", "mte", "--policy", "edf", says="--policy edf: 'mte'")
+        self.refuse("analyze", self.cart, "--executor", "mte", "--policy", "edf", says="--policy edf: executor 'mte'")
         self.refuse("compare", self.cart, "--executors", "mte,redag-none", "--preemption", "os", says="--preemption os")
         # A value that at least one executor accepts is accepted.
         self.expect(redag("compare", self.cart, "--simulate", "--executors", "mte,redag", "--preemption", "os", "--duration", "1s"), 0)

@@ -195,7 +195,7 @@ class Report(Case):
     def test_repetitions_of_different_things(self):
         self.results("out/repetition-1")
         self.results("out/repetition-2", "--executor", "mte")
-        self.expect(redag("report", self.folder / "out"), 2, "repetition-2/events.jsonl: is not a repetition")
+        self.expect(redag("report", self.folder / "out"), 2, "repetition-2/events.jsonl is not a repetition")
 
 
 class Tune(Case):

@@ -68,8 +68,7 @@ int assign_file(const Options &options, Console &console) {
     return kExitBad;
   }
   assigned.assignment = *std::move(found);
-  if (assigned.assignment.stopped)
-    console.warn(watch.why_stop() + "interrupted: this is the best assignment found so far");
+  if (assigned.assignment.stopped) console.warn(watch.why_stop() + ": this is the best assignment found so far");
   if (options.analysis.run.json) {
     console.print(to_text(to_json(assigned)));
   } else {
