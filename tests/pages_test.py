@@ -42,7 +42,7 @@ class Pages(unittest.TestCase):
     def test_ros2_lists_the_parameters(self):
         sources = [f for f in SOURCE.glob("redag_rclcpp*/**/*.cpp") if f.name == "options.cpp"]
         self.assertEqual(len(sources), 1, sources)
-        declared = re.findall(r'\{"([a-z_]+)",\s*"', sources[0].read_text(encoding="utf-8"))
+        declared = re.findall(r'\{\s*"([a-z_]+)",\s*"', sources[0].read_text(encoding="utf-8"))
         self.assertGreater(len(declared), 15)
         self.assertEqual(sorted(first_cells("docs/ros2.md", "Parameters")), sorted(declared))
 
