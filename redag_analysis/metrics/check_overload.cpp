@@ -39,6 +39,7 @@ void OverloadRules::exceeded(const JobEvent &event, const LiveJob &job) {
 }
 
 void OverloadRules::high_mode(const JobEvent &event, const LiveJob *job) {
+  cause_ = {event.task, event.job};
   const Task &task = context_.replay.task(event.task);
   const bool can_begin = job != nullptr && job->started() && task.wcet_low > 0;
   context_.expect(Rule::Budget, can_begin && !context_.replay.is_degradable(event.task), event.task, event.job,
@@ -57,6 +58,8 @@ void OverloadRules::check_used(const JobEvent &event, const LiveJob &job, Durati
 }
 
 void OverloadRules::low_mode(const JobEvent &event) {
+  context_.expect(Rule::Budget, cause_ == std::pair(event.task, event.job), event.task, event.job,
+                  [] { return std::string("HI mode ended in its name, but another job began it"); });
   context_.expect(Rule::Budget, is_idle(), event.task, event.job,
                   [] { return std::string("HI mode ended although a job was ready or started"); });
   context_.expect(Rule::Budget, event.value == context_.replay.high_since(), event.task, event.job,

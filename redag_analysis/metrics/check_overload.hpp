@@ -6,6 +6,9 @@
 // applies it. Internal to metrics/.
 #pragma once
 
+#include <cstdint>
+#include <utility>
+
 #include "redag_analysis/metrics/check_context.hpp"
 
 namespace redag::metrics {
@@ -30,6 +33,7 @@ class OverloadRules {
   }
 
   CheckContext &context_;
+  std::pair<TaskId, std::uint32_t> cause_;  // the job that began HI mode last
 };
 
 }  // namespace redag::metrics

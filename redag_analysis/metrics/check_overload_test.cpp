@@ -147,6 +147,11 @@ TEST(CheckHighMode, SaysWhenItBegan) {
   expect_broken(high_mode_run_to_the_idle_instant().low_mode("h", 0, 4).until(15), Rule::Budget);
 }
 
+TEST(CheckHighMode, EndsInTheNameOfTheJobThatBeganIt) {
+  expect_broken(high_mode_run_to_the_idle_instant().low_mode("h", 1, 5).until(15), Rule::Budget);
+  expect_broken(high_mode_run_to_the_idle_instant().low_mode("l", 0, 5).until(15), Rule::Budget);
+}
+
 TEST(CheckHighMode, BeginsAndEndsInTurn) {
   expect_broken(high_mode_run().high_mode("h", 0).until(6), Rule::Life);
   expect_broken(mode_run().at(5).low_mode("h", 0, 5).until(6), Rule::Life);
