@@ -109,9 +109,9 @@ std::string name_of(const trace::Trace &trace, std::size_t i) {
          std::to_string(event.job) + ", event " + std::to_string(i);
 }
 
-// Without overload: each event in turn is dropped, doubled, moved by a nanosecond, or given to the next job.
+// Each event in turn is dropped, doubled, moved by a nanosecond, or given to the next job.
 TEST_P(DamagedTraces, AreNoticed) {
-  const trace::Trace good = simulated(drawn(static_cast<std::uint64_t>(GetParam()), false), 60 * kMillisecond);
+  const trace::Trace good = simulated(drawn(static_cast<std::uint64_t>(GetParam())), 60 * kMillisecond);
   ASSERT_FALSE(notices(good));
   for (std::size_t i = 0; i < good.events.size(); ++i) {
     const auto at = static_cast<std::ptrdiff_t>(i);
