@@ -1,13 +1,12 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/sched/lifecycle.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cstdint>
 #include <vector>
 
+#include "redag/sched/lifecycle_rules.hpp"
 #include "redag_testing/builders.hpp"
 
 namespace redag::sched {
@@ -16,33 +15,28 @@ namespace {
 using testing::make_dag;
 using testing::make_workload;
 
-// A lifecycle with one task, whose next job has `number`. It takes no decisions.
-class Counter final : public Lifecycle {
- public:
-  explicit Counter(std::uint32_t number) : Lifecycle(Config{}) {
-    load(make_workload({make_dag("d", {{"t", 10, 5}})}, 1, PreemptionMode::None));
-    tasks_[0].next_number = number;
-  }
-  Step dispatch(Time now, std::uint32_t /*most*/) override {
-    begin(now);
-    return step();
-  }
-  void preemption_point(JobSlot /*job*/, Time /*now*/) override {}
-  [[nodiscard]] bool outranked(JobSlot /*job*/) const override { return false; }
+// Takes no decisions.
+struct Idle {
+  static constexpr bool kEnforcesLimits = true;
 
- private:
-  void on_ready(std::uint32_t /*slot*/) override {}
-  void on_withdrawn(std::uint32_t /*slot*/) override {}
-  void on_end(std::uint32_t /*slot*/) override {}
-  void on_lowered(std::uint32_t /*slot*/) override {}
-  void on_reconfigured() override {}
+  explicit Idle(JobTable & /*table*/) {}
+  void on_ready(std::uint32_t /*slot*/) {}
+  void on_withdrawn(std::uint32_t /*slot*/) {}
+  void on_end(std::uint32_t /*slot*/) {}
+  void on_lowered(std::uint32_t /*slot*/) {}
+  void on_reconfigured() {}
+  void on_preemption_point(std::uint32_t /*slot*/) {}
+  void decide(std::uint32_t /*most*/) {}
+  [[nodiscard]] bool outranked(const Job & /*job*/) const { return false; }
+  [[nodiscard]] bool is_idle() const { return true; }
 };
 
 // At 1 kHz, job numbers wrap around after 49 days and 17 hours.
 TEST(Lifecycle, AfterTheLastNumberComesTheFirst) {
   constexpr std::uint64_t kNumbers = std::uint64_t{1} << 32U;
   constexpr std::uint64_t kBefore = 2;
-  Counter counter(static_cast<std::uint32_t>(kNumbers - kBefore));
+  Lifecycle<Idle> counter(make_workload({make_dag("d", {{"t", 10, 5}})}, 1, PreemptionMode::None), Config{});
+  counter.table().tasks[0].next_number = static_cast<std::uint32_t>(kNumbers - kBefore);
   std::vector<std::uint32_t> numbers;
   for (Time now = 1; now <= 4; ++now) {
     counter.miss(TaskId(0), now, now, Reason::Overrun);

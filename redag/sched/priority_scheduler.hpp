@@ -17,16 +17,22 @@
 
 namespace redag::sched {
 
-class PriorityScheduler final : public Lifecycle {
+class PriorityDispatcher {
  public:
-  /// Requires config.workers > 0 and valid DAGs with periods and deadlines set (inherit_periods). Limited levels also
-  /// require a static policy.
-  PriorityScheduler(const Workload &workload, const Config &config);
+  static constexpr bool kEnforcesLimits = true;
 
-  void preemption_point(JobSlot job, Time now) override;
-  Step dispatch(Time now, std::uint32_t most = kNoLimit) override;
-  [[nodiscard]] bool outranked(JobSlot job) const override;
-  [[nodiscard]] std::uint64_t thread_waits() const override { return thread_waits_; }
+  /// Limited levels require a static policy.
+  explicit PriorityDispatcher(JobTable &table);
+
+  void on_ready(std::uint32_t slot) { push(slot); }
+  void on_withdrawn(std::uint32_t slot);
+  void on_end(std::uint32_t slot);
+  void on_lowered(std::uint32_t slot);
+  void on_reconfigured();
+  void on_preemption_point(std::uint32_t slot) { open(table_.jobs[slot].worker.value); }
+  void decide(std::uint32_t most);
+  [[nodiscard]] bool outranked(const Job &job) const { return top() != kNil && outranks(table_.jobs[top()], job); }
+  [[nodiscard]] bool is_idle() const;
 
  private:
   // A job must pass its gates to start and holds them until it ends: its task, its DAG, its group, and the platform's
@@ -57,12 +63,6 @@ class PriorityScheduler final : public Lifecycle {
     std::uint32_t victim = kNil;  // the job that loses the worker
   };
 
-  void on_ready(std::uint32_t slot) override;
-  void on_withdrawn(std::uint32_t slot) override;
-  void on_end(std::uint32_t slot) override;
-  void on_lowered(std::uint32_t slot) override;
-  void on_reconfigured() override;
-
   [[nodiscard]] bool find_place(const Job &job, Place &place) const;
   [[nodiscard]] std::uint32_t least_urgent_running() const;
   [[nodiscard]] bool outranks(const Job &a, const Job &b) const;
@@ -73,8 +73,6 @@ class PriorityScheduler final : public Lifecycle {
   bool park_if_not_eligible(std::uint32_t slot);
   void inherit(std::uint32_t holder, const Job &waiter);
   void close_open_workers();
-  void do_post_dispatch_work();
-  void restore_if_idle();
   bool set_aside(std::uint32_t slot);
   void put_back();
 
@@ -97,13 +95,14 @@ class PriorityScheduler final : public Lifecycle {
   }
   /// A started job holds its gates until it ends.
   void hold_gates(std::uint32_t slot) {
-    for_gates_of(jobs_[slot], [slot](Gate &gate) {
+    for_gates_of(table_.jobs[slot], [slot](Gate &gate) {
       ++gate.used;
       gate.holder = slot;
     });
   }
   void open(std::uint32_t worker);
 
+  JobTable &table_;
   bool static_;
   LevelQueue levels_;  // the ready queue of static policies; otherwise heap_
   HeapQueue heap_;
@@ -116,8 +115,11 @@ class PriorityScheduler final : public Lifecycle {
   std::vector<Worker> workers_;
   LevelBitmap free_workers_;
   std::vector<std::uint32_t> open_workers_;
-  std::uint64_t thread_waits_ = 0;
-  std::uint32_t held_back_ = kNil;  // during dispatch(): held-back jobs, linked by Job::next; they may not start
+  std::uint32_t held_back_ = kNil;  // during decide(): held-back jobs, linked by Job::next; they may not start
 };
+
+/// Limited levels require a static policy.
+using PriorityScheduler = Lifecycle<PriorityDispatcher>;
+extern template class Lifecycle<PriorityDispatcher>;
 
 }  // namespace redag::sched

@@ -487,8 +487,8 @@ TEST(PriorityScheduler, ReusedIdsKeepMemoryFlat) {
   EXPECT_GT(group_number, 2'000U);
   EXPECT_LE(scheduler.task_slots(), 8U + 4 * 3 + 16);
   EXPECT_LE(scheduler.dag_slots(), 1U + 4 + 16);
-  EXPECT_LE(scheduler.job_slots(), 3 * scheduler.task_slots());
-  EXPECT_LE(scheduler.group_slots(), 8U + 16);
+  EXPECT_LE(scheduler.table().jobs.size(), 3 * scheduler.task_slots());
+  EXPECT_LE(scheduler.table().group_slots(), 8U + 16);
 }
 
 TEST(PriorityScheduler, WithoutReuseAnIdNamesOneTaskForEver) {

@@ -5,37 +5,41 @@
 // priorities or budgets. The model decides which callback is next. Not thread-safe.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
-#include "redag/sched/lifecycle.hpp"
+#include "redag/base/check.hpp"
+#include "redag/sched/job_table.hpp"
 
 namespace redag::executors {
 
-/// Runs callbacks to completion; Lifecycle keeps the state of the jobs.
-class CallbackThreads : public sched::Lifecycle {
+class CallbackThreads {
  public:
-  /// Does nothing: these executors know neither budgets nor criticality.
-  void exceed(JobSlot /*job*/, sched::Limit /*limit*/, Time /*now*/) final {}
-  void preemption_point(JobSlot job, Time now) final;
-  sched::Step dispatch(Time now, std::uint32_t most = sched::kNoLimit) final;
-  [[nodiscard]] bool outranked(JobSlot /*job*/) const final { return false; }
-
- protected:
   /// Requires config.workers > 0 and Preemption::None.
-  explicit CallbackThreads(const sched::Config &config, TimerReleases timer_releases = TimerReleases::AsTheTaskSays);
+  explicit CallbackThreads(sched::JobTable &table) : table_(table), working_(table.config.workers, false) {
+    REDAG_CHECK(!working_.empty(), "an executor has at least one thread");
+    REDAG_CHECK(table.config.preemption == sched::Preemption::None, "rclcpp's executors do not preempt");
+  }
 
-  /// Removes and returns the ready job that a free thread runs next; kNil if there is none for it.
-  virtual std::uint32_t take() = 0;
-  /// Called before the free threads take their jobs.
-  virtual void before_taking() {}
-  /// Called when a started job has ended and its thread is free.
-  virtual void on_over(std::uint32_t slot) = 0;
+  /// Gives each free thread the job that `take()` returns, until that is kNil. Starts at most `most` jobs.
+  template <class Take>
+  void run(std::uint32_t most, Take take) {
+    for (; most > 0; --most) {
+      const auto free = std::find(working_.begin(), working_.end(), false);
+      if (free == working_.end()) return;
+      const std::uint32_t slot = take();
+      if (slot == sched::kNil) return;
+      *free = true;
+      table_.start(slot, WorkerId(static_cast<std::uint32_t>(free - working_.begin())), sched::kNil, 0);
+    }
+  }
+
+  /// The thread of a job that ended is free.
+  void on_end(std::uint32_t slot) { working_[table_.jobs[slot].worker.value] = false; }
 
  private:
-  void on_end(std::uint32_t slot) final;
-  void on_lowered(std::uint32_t /*slot*/) final {}
-
+  sched::JobTable &table_;
   std::vector<bool> working_;  // by thread
 };
 

@@ -10,6 +10,7 @@
 #include <deque>
 #include <vector>
 
+#include "redag/sched/lifecycle.hpp"
 #include "redag_analysis/executors/callback_threads.hpp"
 #include "redag_analysis/executors/ready_jobs.hpp"
 
@@ -38,12 +39,24 @@ namespace redag::executors {
 ///
 /// A timer task is a timer, a data task a subscription; `group` is as in redag_analysis/executors/wait_set.hpp. These
 /// executors do not know max_active, priorities and preemption.
-class EventsScheduler final : public CallbackThreads {
+class EventsDispatcher {
  public:
+  static constexpr bool kEnforcesLimits = false;
+
   enum class Kind : std::uint8_t { Events, CallbackGroups };
 
   /// Requires Preemption::None and config.workers > 0; Kind::Events requires 1 worker.
-  EventsScheduler(const Workload &workload, const sched::Config &config, Kind kind);
+  EventsDispatcher(sched::JobTable &table, Kind kind);
+
+  void on_ready(std::uint32_t slot);
+  void on_withdrawn(std::uint32_t slot);
+  void on_end(std::uint32_t slot);
+  void on_lowered(std::uint32_t /*slot*/) {}
+  void on_reconfigured();
+  void on_preemption_point(std::uint32_t /*slot*/) {}
+  void decide(std::uint32_t most);
+  [[nodiscard]] bool outranked(const sched::Job & /*job*/) const { return false; }
+  [[nodiscard]] bool is_idle() const { return true; }
 
  private:
   struct Entity {
@@ -56,24 +69,24 @@ class EventsScheduler final : public CallbackThreads {
     bool idle = true;  // not in the queue of groups, and none of its jobs runs
   };
 
-  void on_ready(std::uint32_t slot) override;
-  void on_withdrawn(std::uint32_t slot) override;
-  void on_over(std::uint32_t slot) override;
-  void on_reconfigured() override;
-
-  [[nodiscard]] bool rearms(TaskId task) const { return kind_ == Kind::CallbackGroups && tasks_[task.value].timer; }
-  std::uint32_t take() override;
-  void before_taking() override { give_back_groups(); }
+  [[nodiscard]] bool rearms(TaskId task) const {
+    return kind_ == Kind::CallbackGroups && table_.tasks[task.value].timer;
+  }
+  std::uint32_t take();
   std::uint32_t take_from(Group &group);
   void enqueue(TaskId task);
   void give_back_groups();
   void give_back(std::uint32_t group);
 
+  sched::JobTable &table_;
+  CallbackThreads threads_;
   Kind kind_;
   std::vector<Entity> entities_;            // by TaskId
   std::vector<Group> groups_;               // Events: one; otherwise by the positions that on_reconfigured() sets
   std::deque<std::uint32_t> ready_groups_;  // groups with events and without a running job, in turn
   std::vector<TaskId> ended_;               // jobs whose group is still to go back
 };
+
+using EventsScheduler = sched::Lifecycle<EventsDispatcher>;
 
 }  // namespace redag::executors

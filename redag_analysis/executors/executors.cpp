@@ -50,12 +50,12 @@ std::unique_ptr<sched::Scheduler> make_scheduler(std::string_view name, const Wo
   const sched::Config effective = effective_config(*kind, config);
   if (name == "redag") return std::make_unique<sched::PriorityScheduler>(workload, effective);
   if (name == "events") {
-    return std::make_unique<EventsScheduler>(workload, effective, EventsScheduler::Kind::Events);
+    return std::make_unique<EventsScheduler>(workload, effective, EventsDispatcher::Kind::Events);
   }
   if (name == "cbg") {
-    return std::make_unique<EventsScheduler>(workload, effective, EventsScheduler::Kind::CallbackGroups);
+    return std::make_unique<EventsScheduler>(workload, effective, EventsDispatcher::Kind::CallbackGroups);
   }
-  using Order = WaitSetScheduler::Order;
+  using Order = WaitSetDispatcher::Order;
   return std::make_unique<WaitSetScheduler>(workload, effective,
                                             name == "static" ? Order::SubscriptionsFirst : Order::TimersFirst);
 }

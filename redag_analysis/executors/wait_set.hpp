@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "redag/sched/lifecycle.hpp"
 #include "redag_analysis/executors/callback_threads.hpp"
 #include "redag_analysis/executors/ready_jobs.hpp"
 
@@ -34,13 +35,25 @@ namespace redag::executors {
 /// A timer task is a timer, a data task a subscription. `group` is the callback group. A task without one is alone in a
 /// group of its own, whereas in ROS 2 all callbacks of a node share its default group unless the node says
 /// otherwise. These executors do not know max_active, priorities and preemption.
-class WaitSetScheduler final : public CallbackThreads {
+class WaitSetDispatcher {
  public:
+  static constexpr bool kEnforcesLimits = false;
+
   enum class Order : std::uint8_t { TimersFirst, SubscriptionsFirst };
 
   /// Requires config.workers > 0 and Preemption::None. With 1 worker it is the SingleThreadedExecutor or, with
   /// subscriptions first, the static one.
-  WaitSetScheduler(const Workload &workload, const sched::Config &config, Order order);
+  WaitSetDispatcher(sched::JobTable &table, Order order);
+
+  void on_ready(std::uint32_t slot);
+  void on_withdrawn(std::uint32_t slot);
+  void on_end(std::uint32_t slot);
+  void on_lowered(std::uint32_t /*slot*/) {}
+  void on_reconfigured();
+  void on_preemption_point(std::uint32_t /*slot*/) {}
+  void decide(std::uint32_t most);
+  [[nodiscard]] bool outranked(const sched::Job & /*job*/) const { return false; }
+  [[nodiscard]] bool is_idle() const { return true; }
 
  private:
   /// A task as rclcpp sees it: a timer or a subscription.
@@ -50,20 +63,19 @@ class WaitSetScheduler final : public CallbackThreads {
     bool in_window = false;
   };
 
-  void on_ready(std::uint32_t slot) override;
-  void on_withdrawn(std::uint32_t slot) override;
-  void on_over(std::uint32_t slot) override;
-  void on_reconfigured() override;
-
-  std::uint32_t take() override;
+  std::uint32_t take();
   std::uint32_t take_from_window();
   bool wait();
 
+  sched::JobTable &table_;
+  CallbackThreads threads_;
   Order order_;
   std::vector<Entity> entities_;             // by TaskId
   std::vector<std::uint32_t> registration_;  // tasks in the order in which a window is searched
   std::vector<std::uint32_t> room_;          // number of jobs that a group can start: one group for each task, then the
                                              // named ones
 };
+
+using WaitSetScheduler = sched::Lifecycle<WaitSetDispatcher>;
 
 }  // namespace redag::executors

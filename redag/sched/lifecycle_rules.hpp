@@ -1,0 +1,302 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// The definitions of Lifecycle: jobs from release to end, and reconfiguration.
+#pragma once
+
+#include <algorithm>
+
+#include "redag/base/check.hpp"
+#include "redag/sched/lifecycle.hpp"
+#include "redag/sched/lifecycle_overload.hpp"
+
+namespace redag::sched {
+
+[[nodiscard]] constexpr Reason reason_of(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::Threw: return Reason::Exception;
+    case Outcome::BudgetExceeded: return Reason::Budget;
+    case Outcome::NoData: return Reason::NoData;
+    case Outcome::Finished: break;
+  }
+  return Reason::None;
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::release(TaskId task, Time nominal, Time now) {
+  REDAG_CHECK(task.value < table_.tasks.size(), "release of a task that does not exist");
+  REDAG_CHECK(table_.tasks[task.value].timer, "data tasks are released by their predecessors");
+  table_.step.begin(now);
+  if (table_.tasks[task.value].life != TaskLife::Live) return;
+  restricted_ ? admit_or_refuse(task, nominal, nominal) : admit(task, nominal, nominal);
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::admit_or_refuse(TaskId id, Time nominal, Time origin) {
+  if (closed_) return;
+  const Reason reason = refusal(table_.tasks[id.value], nominal);
+  reason == Reason::None ? admit(id, nominal, origin) : refuse(id, nominal, reason);
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::miss(TaskId id, Time nominal, Time now, Reason reason) {
+  REDAG_CHECK(id.value < table_.tasks.size(), "release of a task that does not exist");
+  TaskState &task = table_.tasks[id.value];
+  REDAG_CHECK(task.timer, "data tasks are released by their predecessors");
+  table_.step.begin(now);
+  if (!takes_releases(task)) return;
+  const Reason refused = restricted_ ? refusal(task, nominal) : Reason::None;
+  refuse(id, nominal, refused == Reason::None ? reason : refused);
+}
+
+// Counts a release and returns the number of its job.
+template <Dispatcher D>
+std::uint32_t Lifecycle<D>::count_release(TaskState &task) {
+  const std::uint32_t number = task.next_number++;
+  if (task.next_number == 0) task.released_earlier += std::uint64_t{1} << 32U;
+  return number;
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::refuse(TaskId id, Time nominal, Reason reason) {
+  TaskState &task = table_.tasks[id.value];
+  Job fresh;
+  fresh.task = id;
+  fresh.number = count_release(task);
+  table_.step.emit(fresh, JobEventKind::Released, nominal);
+  ++task.skipped;
+  table_.step.emit(fresh, JobEventKind::Skipped, 0, reason);
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::complete(JobSlot job_slot, Time now, Outcome outcome) {
+  REDAG_CHECK(job_slot.value < table_.jobs.size() && table_.jobs[job_slot.value].started(),
+              "completion of a job that does not run");
+  table_.step.begin(now);
+  const std::uint32_t slot = job_slot.value;
+  const Job job = table_.jobs[slot];
+  TaskState &task = table_.tasks[job.task.value];
+  if (outcome == Outcome::Finished) {
+    ++task.finished;
+    table_.step.emit(job, JobEventKind::Finished, now);
+  } else {
+    ++task.aborted;
+    table_.step.emit(job, JobEventKind::Aborted, now, reason_of(outcome));
+  }
+  // The job used its budget and ended at one instant: drop its pending level change.
+  table_.step.drop(job_slot);
+  dispatcher_.on_end(slot);
+  table_.free_slot(slot);
+  if (outcome != Outcome::Finished || !task.joined || !takes_releases(task)) return;
+
+  table_.precedence.on_complete(job.task, job.release, job.origin, now, [&](TaskId successor) {
+    const TaskState &next = table_.tasks[successor.value];
+    if (next.life != TaskLife::Live) return;
+    if (!next.timer) {
+      const Precedence::Data data = table_.precedence.consume(successor);
+      restricted_ ? admit_or_refuse(successor, data.complete, data.origin)
+                  : admit(successor, data.complete, data.origin);
+    } else if (next.waiting != kNil) {
+      make_ready(next.waiting, table_.precedence.consume(successor).origin);
+    }
+  });
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::preemption_point(JobSlot job, Time now) {
+  REDAG_CHECK(table_.config.preemption == Preemption::Cooperative, "preemption points are for cooperative preemption");
+  table_.step.begin(now);
+  REDAG_CHECK(table_.jobs[job.value].state == JobState::Running, "a preemption point of a job that does not run");
+  dispatcher_.on_preemption_point(job.value);
+}
+
+template <Dispatcher D>
+Step Lifecycle<D>::dispatch(Time now, std::uint32_t most) {
+  table_.step.begin(now);
+  dispatcher_.decide(most);
+  if (table_.high_mode && dispatcher_.is_idle()) leave_high_mode();
+  return table_.step.read();
+}
+
+template <Dispatcher D>
+bool Lifecycle<D>::outranked(JobSlot job) const {
+  return table_.config.preemption == Preemption::Cooperative && dispatcher_.outranked(table_.jobs[job.value]);
+}
+
+// `origin` is used for tasks without predecessors and for data tasks, whose data is already consumed.
+template <Dispatcher D>
+void Lifecycle<D>::admit(TaskId id, Time nominal, Time origin) {
+  TaskState &task = table_.tasks[id.value];
+  DagState &dag = table_.dags[task.dag.value];
+  Job fresh;
+  fresh.task = id;
+  fresh.number = count_release(task);
+  fresh.release = nominal;
+  fresh.deadline = nominal + task.deadline;
+  table_.step.emit(fresh, JobEventKind::Released, nominal);
+
+  if (takes_turns_) fresh.turn = turn_of(task, nominal);
+  if (task.waiting != kNil) skip(task.waiting, Reason::Precedence);
+  if (task.queue_depth == 0 && task.ready_count > 0) {
+    skip(task.latest_ready, Reason::Overrun);
+    if (task.timer && task.joined) table_.precedence.give_back(id);
+  }
+  const bool has_data = task.timer && task.joined && table_.precedence.has_predecessors(id);
+  const bool complete_set = !has_data || table_.precedence.on_release(id, nominal);
+  const bool queue_is_full = task.queue_depth > 0 && task.ready_count >= task.queue_depth;
+  const bool dag_is_full = dag.max_pending > 0 && dag.pending >= dag.max_pending;
+  if (queue_is_full || dag_is_full) {
+    ++task.skipped;
+    table_.step.emit(fresh, JobEventKind::Skipped, 0, queue_is_full ? Reason::QueueFull : Reason::DagFull);
+    return;
+  }
+
+  const std::uint32_t slot = table_.take_slot(task);
+  table_.jobs[slot] = fresh;
+  ++dag.pending;
+  if (complete_set) {
+    make_ready(slot, has_data ? table_.precedence.consume(id).origin : origin);
+  } else {
+    table_.jobs[slot].state = JobState::Waiting;
+    task.waiting = slot;
+  }
+}
+
+// Returns the turn of the task's next job (Ties::Share). A job that replaces another takes its turn: with its own,
+// later release, each replacement would put the task behind its equals for ever. A queued job never comes before an
+// earlier job of its task.
+template <Dispatcher D>
+Time Lifecycle<D>::turn_of(const TaskState &task, Time release) const {
+  if (task.waiting != kNil) return table_.jobs[task.waiting].turn;
+  if (task.ready_count == 0) return release;
+  const Time earlier = table_.jobs[task.latest_ready].turn;
+  return task.queue_depth == 0 ? earlier : std::max(release, earlier);
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::make_ready(std::uint32_t slot, Time origin) {
+  Job &job = table_.jobs[slot];
+  TaskState &task = table_.tasks[job.task.value];
+  if (task.waiting == slot) task.waiting = kNil;
+  ++task.ready_count;
+  task.latest_ready = slot;
+  job.state = JobState::Ready;
+  job.origin = origin;
+  job.sequence = next_sequence_++;
+  job.priority_of = job.task;
+  job.rank = task.rank;
+  switch (table_.config.policy) {
+    case PolicyKind::Edf: job.key = task.degraded ? table_.demoted_key(task) : job.deadline; break;
+    case PolicyKind::Fifo:
+      job.key = task.degraded ? table_.demoted_key(task) : static_cast<std::int64_t>(job.sequence);
+      break;
+    default: job.key = task.key; break;
+  }
+  table_.step.emit(job, JobEventKind::Ready, origin);
+  dispatcher_.on_ready(slot);
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::skip(std::uint32_t slot, Reason reason) {
+  Job &job = table_.jobs[slot];
+  TaskState &task = table_.tasks[job.task.value];
+  if (job.state == JobState::Ready) {
+    dispatcher_.on_withdrawn(slot);
+    --task.ready_count;
+  } else {
+    task.waiting = kNil;
+  }
+  --table_.dags[task.dag.value].pending;
+  ++task.skipped;
+  table_.step.emit(job, JobEventKind::Skipped, 0, reason);
+  table_.free_slot(slot);
+}
+
+template <Dispatcher D>
+template <class Predicate>
+void Lifecycle<D>::skip_all(Reason reason, Predicate which) {
+  for (std::uint32_t slot = 0; slot < table_.jobs.size(); ++slot) {
+    const JobState state = table_.jobs[slot].state;
+    if ((state == JobState::Waiting || state == JobState::Ready) && which(table_.jobs[slot])) skip(slot, reason);
+  }
+}
+
+// ---- reconfiguration ----
+
+template <Dispatcher D>
+void Lifecycle<D>::load(const Workload &workload) {
+  for (const Dag &dag : workload.dags) table_.append_dag(dag);
+  reprioritise();
+}
+
+template <Dispatcher D>
+DagId Lifecycle<D>::add_dag(const Dag &dag, Time now) {
+  table_.step.begin(now);
+  table_.collect();
+  const DagId id = table_.append_dag(dag);
+  reprioritise();
+  return id;
+}
+
+template <Dispatcher D>
+TaskId Lifecycle<D>::add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) {
+  REDAG_CHECK(dag.value < table_.dags.size() && !table_.dags[dag.value].removed,
+              "a task for a DAG that does not exist");
+  REDAG_CHECK(task.activation == Activation::Timer && task.predecessors.empty(),
+              "a task that is added alone has no predecessors");
+  table_.step.begin(now);
+  table_.collect();
+  const TaskId id = table_.append_task(dag, rank, task);
+  reprioritise();
+  return id;
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::remove_dag(DagId dag, Time now) {
+  REDAG_CHECK(dag.value < table_.dags.size(), "removal of a DAG that does not exist");
+  table_.step.begin(now);
+  table_.dags[dag.value].removed = true;
+  for (const TaskId task : table_.dags[dag.value].tasks) {
+    table_.tasks[task.value].life = TaskLife::Removed;
+    forget_skip(table_.tasks[task.value]);
+  }
+  skip_all(Reason::Removed, [&](const Job &job) { return table_.tasks[job.task.value].dag == dag; });
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::remove_task(TaskId task, Time now) {
+  REDAG_CHECK(task.value < table_.tasks.size(), "removal of a task that does not exist");
+  table_.step.begin(now);
+  if (table_.tasks[task.value].life != TaskLife::Live) return;
+  table_.tasks[task.value].life = TaskLife::Removed;
+  forget_skip(table_.tasks[task.value]);
+  skip_all(Reason::Removed, [&](const Job &job) { return job.task == task; });
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::set_timing(TaskId task, Duration period, Duration deadline, Time now) {
+  REDAG_CHECK(task.value < table_.tasks.size(), "a new period for a task that does not exist");
+  REDAG_CHECK(period > 0 && deadline > 0, "a task needs a period and a deadline");
+  table_.step.begin(now);
+  if (table_.tasks[task.value].life == TaskLife::Gone) return;
+  table_.tasks[task.value].period = period;
+  table_.tasks[task.value].deadline = deadline;
+  table_.precedence.set_period(task, period);
+  reprioritise();
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::reprioritise() {
+  table_.prioritise();
+  dispatcher_.on_reconfigured();
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::close(Time now) {
+  table_.step.begin(now);
+  closed_ = true;
+  refresh_restricted();
+  skip_all(Reason::Removed, [](const Job &) { return true; });
+}
+
+}  // namespace redag::sched
