@@ -51,6 +51,8 @@ class RecordingScheduler final : public sched::Scheduler {
   void complete(JobSlot job, Time now, sched::Outcome outcome) override;
   void preemption_point(JobSlot job, Time now) override;
   void exceed(JobSlot job, sched::Limit limit, Time now) override;
+  /// Does nothing: the recorded scheduler's steps keep all events.
+  void record_only(sched::EventKinds /*kinds*/) override {}
   [[nodiscard]] bool high_mode() const override { return scheduler_->high_mode(); }
   sched::Step dispatch(Time now, std::uint32_t most) override;
   [[nodiscard]] bool outranked(JobSlot job) const override { return scheduler_->outranked(job); }

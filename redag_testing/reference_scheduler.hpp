@@ -24,6 +24,8 @@ class ReferenceScheduler final : public sched::Scheduler {
   void miss(TaskId task, Time nominal, Time now, Reason reason) override;
   void complete(JobSlot job, Time now, sched::Outcome outcome) override;
   void exceed(JobSlot job, sched::Limit limit, Time now) override;
+  /// Does nothing: the reference always reports all events, for comparison.
+  void record_only(sched::EventKinds /*kinds*/) override {}
   [[nodiscard]] bool high_mode() const override { return high_mode_; }
   void preemption_point(JobSlot job, Time now) override;
   sched::Step dispatch(Time now, std::uint32_t most = sched::kNoLimit) override;

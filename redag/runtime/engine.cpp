@@ -31,6 +31,10 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
   const sched::Config &config = options_.config;
   REDAG_CHECK(!os() || config.max_started >= config.workers, "mode os needs at least one thread for every processor");
   REDAG_CHECK(!os() || options_.spins == 0, "spinning threads would keep others off their processors in mode os");
+  if (options_.trace_capacity == 0) {
+    const JobEventKind counted = options_.measure ? JobEventKind::Preempted : JobEventKind::Skipped;
+    scheduler_->record_only({JobEventKind::Skipped, counted});
+  }
   if (os() && options_.throttling) {
     guard_.emplace(*options_.throttling, pool_, placement_);
     guard_thread_ = std::make_unique<GuardThread>();

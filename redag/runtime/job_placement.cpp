@@ -50,14 +50,16 @@ Next JobPlacement::place(const sched::Step &step, WorkerThread *self, JobSlot be
     // In `os` mode a thread steals only if it would be idle: two threads that exchange jobs must exchange priorities.
     const std::uint32_t above = own == nullptr ? sched::kNoLimit : (os_ ? 0 : own->level);
     if (WorkerThread *other = steal(above)) {
-      next = Next{Next::Kind::Start, move_job(*other, *self)};
+      next.kind = Next::Kind::Start;
+      next.assignment = move_job(*other, *self);
       own = nullptr;
     } else if (own == nullptr) {
       idle_.push_back(self);
     }
   }
   if (own != nullptr) {
-    next = Next{Next::Kind::Start, assign(*self, *own, tasks[own->task])};
+    next.kind = Next::Kind::Start;
+    assign(*self, *own, tasks[own->task], next.assignment);
     if (!is_caller) set_priority_for_job(*self, next.assignment);
   }
   for (const Dispatch &dispatch : step.dispatches) {
@@ -70,9 +72,10 @@ Next JobPlacement::place(const sched::Step &step, WorkerThread *self, JobSlot be
     REDAG_CHECK(!idle_.empty(), "more jobs started than there are threads");
     WorkerThread &thread = *idle_.back();
     idle_.pop_back();
-    const Assignment assignment = assign(thread, dispatch, tasks[dispatch.task]);
-    set_priority_for_job(thread, assignment);
-    post(thread, assignment, wake_ups);
+    REDAG_CHECK(!thread.has_mail.load(std::memory_order_relaxed), "a worker was given two jobs");
+    assign(thread, dispatch, tasks[dispatch.task], thread.mail);
+    set_priority_for_job(thread, thread.mail);
+    post(thread, wake_ups);
   }
   return next;
 }
@@ -116,20 +119,19 @@ Assignment JobPlacement::move_job(WorkerThread &from, WorkerThread &to) {
   return assignment;
 }
 
-Assignment JobPlacement::assign(WorkerThread &thread, const Dispatch &dispatch, TaskEntry &entry) {
+void JobPlacement::assign(WorkerThread &thread, const Dispatch &dispatch, TaskEntry &entry, Assignment &assignment) {
   REDAG_CHECK(entry.busy < entry.concurrency, "more jobs of one task at a time than it allows");
   ++entry.busy;
   ++unfinished_;
-  const Job job{dispatch.task, dispatch.number, dispatch.release, dispatch.job, dispatch.worker};
-  thread.stack.push_back(job);
+  assignment.job = Job{dispatch.task, dispatch.number, dispatch.release, dispatch.job, dispatch.worker};
+  assignment.entry = &entry;
+  assignment.expected_short = entry.expected_short();
+  thread.stack.push_back(assignment.job);
   thread.level = dispatch.level;
   thread.is_spared = dispatch.inherits || entry.is_high;
-  return Assignment{job, &entry, entry.expected_short()};
 }
 
-void JobPlacement::post(WorkerThread &thread, const Assignment &assignment, WakeUps &wake_ups) {
-  REDAG_CHECK(!thread.has_mail.load(std::memory_order_relaxed), "a worker was given two jobs");
-  thread.mail = assignment;
+void JobPlacement::post(WorkerThread &thread, WakeUps &wake_ups) {
   thread.has_mail.store(true, std::memory_order_release);
   if (!thread.is_handed) handed_.push_back(&thread);
   thread.is_handed = true;

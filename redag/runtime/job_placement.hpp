@@ -82,8 +82,10 @@ class JobPlacement {
  private:
   WorkerThread *steal(std::uint32_t level);
   Assignment move_job(WorkerThread &from, WorkerThread &to);
-  Assignment assign(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry);
-  void post(WorkerThread &thread, const Assignment &assignment, WakeUps &wake_ups);
+  /// Fills `assignment`, which is the thread's mail or its next action.
+  void assign(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment);
+  /// The thread has mail.
+  void post(WorkerThread &thread, WakeUps &wake_ups);
   void change_level(const sched::Dispatch &dispatch, const TaskTable &tasks);
   void set_priority_for_job(WorkerThread &thread, const Assignment &assignment);
   void apply(std::span<const ThreadPriorities::Change> changes);

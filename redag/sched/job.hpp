@@ -38,7 +38,7 @@ struct alignas(32) Job {
   Time turn = 0;               // Ties::Share: its release, or the turn of the job that it replaced
   std::uint64_t sequence = 0;  // order in which jobs became ready
   std::uint32_t rank = 0;
-  TaskId priority_of;  // the task whose priority it has: its own, or the task of a job from which it inherited
+  TaskId priority_of{};  // the task whose priority it has: its own, or the task of a job from which it inherited
 
   // Links of the container that holds the job: the ready queue or a gate's heap.
   std::uint32_t next = kNil;
@@ -48,7 +48,7 @@ struct alignas(32) Job {
 
   std::uint32_t task_next = kNil;  // next unstarted job of the same task
   std::uint32_t under = kNil;      // Cooperative: the job suspended below this one
-  WorkerId worker;                 // where it runs, or ran last
+  WorkerId worker{};               // where it runs, or ran last
   JobState state = JobState::Free;
   bool deferred = false;
   bool demoted = false;  // comes after all other jobs, unless it inherits

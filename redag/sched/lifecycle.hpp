@@ -53,6 +53,7 @@ class Lifecycle final : public Scheduler {
   void preemption_point(JobSlot job, Time now) override;
   void exceed(JobSlot job, Limit limit, Time now) override;
   Step dispatch(Time now, std::uint32_t most = kNoLimit) override;
+  void record_only(EventKinds kinds) override { table_.step.record_only(kinds); }
   [[nodiscard]] bool outranked(JobSlot job) const override;
   [[nodiscard]] bool high_mode() const override { return table_.high_mode; }
   DagId add_dag(const Dag &dag, Time now) override;
@@ -84,12 +85,12 @@ class Lifecycle final : public Scheduler {
   void reprioritise();
 
   // From release to readiness.
-  void admit(TaskId id, Time nominal, Time origin);
+  inline void admit(TaskId id, Time nominal, Time origin);
   void admit_or_refuse(TaskId id, Time nominal, Time origin);
   void refuse(TaskId id, Time nominal, Reason reason);
   static std::uint32_t count_release(TaskState &task);
   [[nodiscard]] Time turn_of(const TaskState &task, Time release) const;
-  void make_ready(std::uint32_t slot, Time origin);
+  inline void make_ready(std::uint32_t slot, Time origin);
   void skip(std::uint32_t slot, Reason reason);
   template <class Predicate>
   void skip_all(Reason reason, Predicate which);

@@ -60,12 +60,10 @@ std::uint32_t Lifecycle<D>::count_release(TaskState &task) {
 template <Dispatcher D>
 void Lifecycle<D>::refuse(TaskId id, Time nominal, Reason reason) {
   TaskState &task = table_.tasks[id.value];
-  Job fresh;
-  fresh.task = id;
-  fresh.number = count_release(task);
-  table_.step.emit(fresh, JobEventKind::Released, nominal);
+  const std::uint32_t number = count_release(task);
+  table_.step.emit(id, number, WorkerId(), JobEventKind::Released, nominal);
   ++task.skipped;
-  table_.step.emit(fresh, JobEventKind::Skipped, 0, reason);
+  table_.step.emit(id, number, WorkerId(), JobEventKind::Skipped, 0, reason);
 }
 
 template <Dispatcher D>
@@ -128,14 +126,10 @@ template <Dispatcher D>
 void Lifecycle<D>::admit(TaskId id, Time nominal, Time origin) {
   TaskState &task = table_.tasks[id.value];
   DagState &dag = table_.dags[task.dag.value];
-  Job fresh;
-  fresh.task = id;
-  fresh.number = count_release(task);
-  fresh.release = nominal;
-  fresh.deadline = nominal + task.deadline;
-  table_.step.emit(fresh, JobEventKind::Released, nominal);
+  const std::uint32_t number = count_release(task);
+  table_.step.emit(id, number, WorkerId(), JobEventKind::Released, nominal);
 
-  if (takes_turns_) fresh.turn = turn_of(task, nominal);
+  const Time turn = takes_turns_ ? turn_of(task, nominal) : 0;
   if (task.waiting != kNil) skip(task.waiting, Reason::Precedence);
   if (task.queue_depth == 0 && task.ready_count > 0) {
     skip(task.latest_ready, Reason::Overrun);
@@ -147,12 +141,14 @@ void Lifecycle<D>::admit(TaskId id, Time nominal, Time origin) {
   const bool dag_is_full = dag.max_pending > 0 && dag.pending >= dag.max_pending;
   if (queue_is_full || dag_is_full) {
     ++task.skipped;
-    table_.step.emit(fresh, JobEventKind::Skipped, 0, queue_is_full ? Reason::QueueFull : Reason::DagFull);
+    table_.step.emit(id, number, WorkerId(), JobEventKind::Skipped, 0,
+                     queue_is_full ? Reason::QueueFull : Reason::DagFull);
     return;
   }
 
   const std::uint32_t slot = table_.take_slot(task);
-  table_.jobs[slot] = fresh;
+  table_.jobs[slot] =
+      Job{.task = id, .number = number, .release = nominal, .deadline = nominal + task.deadline, .turn = turn};
   ++dag.pending;
   if (complete_set) {
     make_ready(slot, has_data ? table_.precedence.consume(id).origin : origin);

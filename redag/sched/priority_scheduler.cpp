@@ -10,6 +10,7 @@
 
 namespace redag::sched {
 
+// Members that are declared inline here are inlined into the rules; nothing else calls them.
 template class Lifecycle<PriorityDispatcher>;
 
 PriorityDispatcher::PriorityDispatcher(JobTable &table)
@@ -25,7 +26,7 @@ PriorityDispatcher::PriorityDispatcher(JobTable &table)
 
 // ---- decisions ----
 
-void PriorityDispatcher::decide(std::uint32_t most) {
+inline void PriorityDispatcher::decide(std::uint32_t most) {
   for (std::uint32_t best = top(); best != kNil; best = top()) {
     const bool starts = !table_.jobs[best].started();
     if (starts && most == 0) {
@@ -38,8 +39,8 @@ void PriorityDispatcher::decide(std::uint32_t most) {
     if (starts) --most;
     run(best, place);
   }
-  close_open_workers();
-  put_back();
+  if (!open_workers_.empty()) close_open_workers();
+  if (held_back_ != kNil) put_back();
 }
 
 // No more jobs may start. Holds this job back and lets dispatch() look past it for started jobs, as long as there are
@@ -62,7 +63,7 @@ void PriorityDispatcher::put_back() {
 }
 
 // Finds where `job`, the first in the ready queue, could run now. Returns false if there is no place.
-bool PriorityDispatcher::find_place(const Job &job, Place &place) const {
+inline bool PriorityDispatcher::find_place(const Job &job, Place &place) const {
   if (!free_workers_.empty()) {
     const bool last_is_free = job.worker.valid() && workers_[job.worker.value].stack == kNil;
     place = Place{last_is_free ? job.worker : WorkerId(free_workers_.first()), kNil};
@@ -92,20 +93,20 @@ std::uint32_t PriorityDispatcher::least_urgent_running() const {
   return least;
 }
 
-bool PriorityDispatcher::outranks(const Job &a, const Job &b) const {
+inline bool PriorityDispatcher::outranks(const Job &a, const Job &b) const {
   if (static_) return level_of(a) < level_of(b);
   if (table_.config.policy == PolicyKind::Fifo) return false;
   // Neither equals nor demoted jobs preempt each other.
   return table_.config.ties == Ties::Share ? a.key < b.key : before(a, b) && !table_.is_demoted_key(a.key);
 }
 
-std::uint32_t PriorityDispatcher::level_of(const Job &job) const {
+inline std::uint32_t PriorityDispatcher::level_of(const Job &job) const {
   if (!static_) return 0;
   const auto key = static_cast<std::uint32_t>(job.key);
   return level_of_key_.empty() ? std::min(key, table_.tier_count()) : level_of_key_[key];
 }
 
-void PriorityDispatcher::run(std::uint32_t slot, const Place &place) {
+inline void PriorityDispatcher::run(std::uint32_t slot, const Place &place) {
   const bool resumes = table_.jobs[slot].started();
   remove(slot);
   if (!resumes) hold_gates(slot);
@@ -120,7 +121,7 @@ void PriorityDispatcher::run(std::uint32_t slot, const Place &place) {
   worker.open = false;
 }
 
-void PriorityDispatcher::make_way(const Place &place) {
+inline void PriorityDispatcher::make_way(const Place &place) {
   if (place.victim == kNil) {
     free_workers_.clear(place.worker.value);
     return;
@@ -153,7 +154,7 @@ bool PriorityDispatcher::is_idle() const {
 
 // A worker is available to the job. Parks the job if one of its gates is full. Tries the gates in the order task, DAG,
 // group, threads.
-bool PriorityDispatcher::park_if_not_eligible(std::uint32_t slot) {
+inline bool PriorityDispatcher::park_if_not_eligible(std::uint32_t slot) {
   Job &job = table_.jobs[slot];
   if (job.started()) return false;
   TaskGates &to_pass = task_gates_[job.task.value];
@@ -237,7 +238,7 @@ void PriorityDispatcher::on_withdrawn(std::uint32_t slot) {
   for_gates_of(job, [this](Gate &gate) { promote_one(gate); });
 }
 
-void PriorityDispatcher::on_end(std::uint32_t slot) {
+inline void PriorityDispatcher::on_end(std::uint32_t slot) {
   const Job &job = table_.jobs[slot];
   Worker &worker = workers_[job.worker.value];
   if (job.state == JobState::Suspended) {
@@ -268,7 +269,7 @@ void PriorityDispatcher::open(std::uint32_t worker) {
 
 // If the gate has room, its most urgent parked job goes back to the ready queue. Called once for each place that
 // becomes free, and for each queued job that is gone and could have used one.
-void PriorityDispatcher::promote_one(Gate &gate) {
+inline void PriorityDispatcher::promote_one(Gate &gate) {
   const std::uint32_t slot = gate.parked.top();
   if (slot == kNil || gate.used == gate.capacity) return;
   gate.parked.remove(table_.jobs, slot);
@@ -280,7 +281,7 @@ void PriorityDispatcher::promote_one(Gate &gate) {
 
 // Each level has a list for its started jobs, then one for each of its tiers. SCHED_FIFO continues a preempted thread
 // before it runs a new one of the same level, and the scheduler does the same.
-std::uint32_t PriorityDispatcher::list_of(const Job &job) const {
+inline std::uint32_t PriorityDispatcher::list_of(const Job &job) const {
   const auto key = static_cast<std::uint32_t>(job.key);
   const std::uint32_t level = level_of(job);
   if (!job.started()) return key + level + 1;
@@ -288,13 +289,31 @@ std::uint32_t PriorityDispatcher::list_of(const Job &job) const {
   return first + level;
 }
 
-void PriorityDispatcher::push(std::uint32_t slot) {
-  if (table_.jobs[slot].started()) ++queued_started_;
-  static_ ? levels_.push(table_.jobs, slot, list_of(table_.jobs[slot])) : heap_.push(table_.jobs, slot);
+inline void PriorityDispatcher::push(std::uint32_t slot) {
+  Job &job = table_.jobs[slot];
+  if (job.started()) ++queued_started_;
+  job.child = static_ ? list_of(job) : kNil;
+  const std::uint32_t top_slot = top();
+  if (top_slot != kNil && !is_ahead(job, table_.jobs[top_slot])) return enqueue(slot);
+  if (first_ != kNil) enqueue(first_);
+  first_ = slot;
 }
 
-void PriorityDispatcher::remove(std::uint32_t slot) {
+inline void PriorityDispatcher::enqueue(std::uint32_t slot) {
+  static_ ? levels_.push(table_.jobs, slot, table_.jobs[slot].child) : heap_.push(table_.jobs, slot);
+}
+
+// Returns true if `a` goes before `b` in the ready queue. Under static policies, Job::child is the number of the list.
+inline bool PriorityDispatcher::is_ahead(const Job &a, const Job &b) const {
+  return static_ && a.child != b.child ? a.child < b.child : before(a, b);
+}
+
+inline void PriorityDispatcher::remove(std::uint32_t slot) {
   if (table_.jobs[slot].started()) --queued_started_;
+  if (slot == first_) {
+    first_ = kNil;
+    return;
+  }
   static_ ? levels_.remove(table_.jobs, slot) : heap_.remove(table_.jobs, slot);
 }
 
@@ -318,6 +337,7 @@ void PriorityDispatcher::on_reconfigured() {
   const std::size_t lowest = table_.config.levels > 0 ? table_.config.levels : table_.tier_count();
   levels_ = LevelQueue(static_ ? 2 * std::size_t{table_.tier_count()} + lowest + 1 : 0);
   heap_ = HeapQueue();
+  first_ = kNil;
   queued_started_ = 0;
 
   static_assert(sizeof(TaskGates) == 32, "two tasks' gates in a cache line");

@@ -80,7 +80,10 @@ class PriorityDispatcher {
   [[nodiscard]] std::uint32_t list_of(const Job &job) const;
   void push(std::uint32_t slot);
   void remove(std::uint32_t slot);
-  [[nodiscard]] std::uint32_t top() const { return static_ ? levels_.top() : heap_.top(); }
+  void enqueue(std::uint32_t slot);
+  [[nodiscard]] bool is_ahead(const Job &a, const Job &b) const;
+  [[nodiscard]] std::uint32_t queue_top() const { return static_ ? levels_.top() : heap_.top(); }
+  [[nodiscard]] std::uint32_t top() const { return first_ != kNil ? first_ : queue_top(); }
   void promote_one(Gate &gate);
   /// Returns the gate of Job::parked_at. Positions below the number of tasks are the tasks' own gates; the shared ones
   /// follow.
@@ -104,8 +107,11 @@ class PriorityDispatcher {
 
   JobTable &table_;
   bool static_;
-  LevelQueue levels_;  // the ready queue of static policies; otherwise heap_
+  // The ready queue: levels_ for static policies, otherwise heap_. A job that is ahead of all in it when it is added is
+  // kept in first_ instead. It often starts at once, and never enters the queue.
+  LevelQueue levels_;
   HeapQueue heap_;
+  std::uint32_t first_ = kNil;
   std::uint32_t queued_started_ = 0;  // started jobs in the ready queue; only full preemption puts them there
   // Where levels are limited: the level of each key, and the first key of that level. Empty: each tier is a level.
   std::vector<std::uint32_t> level_of_key_;

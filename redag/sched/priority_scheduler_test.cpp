@@ -556,5 +556,20 @@ TEST(PriorityScheduler, ALimitLooksPastReadyJobsForSuspendedOnes) {
   EXPECT_EQ(rest.dispatches[0].over, low);
 }
 
+TEST(PriorityScheduler, RecordsOnlyTheKindsAskedFor) {
+  const Workload workload = make_workload({make_dag("a", {{"t", 10}})}, 1);
+  PriorityScheduler scheduler(workload, {});
+  scheduler.record_only({JobEventKind::Ready, JobEventKind::Skipped});
+  scheduler.release(TaskId(0), 0, 0);
+  scheduler.release(TaskId(0), 10, 10);
+  const Step step = scheduler.dispatch(10);
+  std::vector<JobEventKind> kinds;
+  for (const JobEvent &event : step.events) kinds.push_back(event.kind);
+  EXPECT_EQ(kinds, (std::vector{JobEventKind::Ready, JobEventKind::Skipped, JobEventKind::Ready}));
+  ASSERT_EQ(step.dispatches.size(), 1U);
+  EXPECT_EQ(step.dispatches[0].number, 1U);
+  EXPECT_EQ(scheduler.accounting(TaskId(0)).released, 2U);
+}
+
 }  // namespace
 }  // namespace redag::sched

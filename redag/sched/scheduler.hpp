@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <span>
 
 #include "redag/model/job_event.hpp"
@@ -28,6 +29,22 @@ enum class Outcome : std::uint8_t {
   Threw,
   BudgetExceeded,
   NoData,  // the job found nothing to do: its message was overwritten or its timer cancelled
+};
+
+/// A set of kinds of events.
+class EventKinds {
+ public:
+  constexpr EventKinds(std::initializer_list<JobEventKind> kinds) {
+    for (const JobEventKind kind : kinds) bits_ |= bit(kind);
+  }
+  [[nodiscard]] static constexpr EventKinds all() { return EventKinds(~0U); }
+  [[nodiscard]] constexpr bool contains(JobEventKind kind) const { return (bits_ & bit(kind)) != 0; }
+
+ private:
+  constexpr explicit EventKinds(std::uint32_t bits) : bits_(bits) {}
+  [[nodiscard]] static constexpr std::uint32_t bit(JobEventKind kind) { return 1U << static_cast<unsigned>(kind); }
+
+  std::uint32_t bits_ = 0;
 };
 
 /// Up to this many releases between two calls of dispatch() never allocate, for any tasks.
@@ -90,6 +107,9 @@ class Scheduler {
   /// Takes the decisions. A second call without a new event yields nothing. At most `most` jobs are started. Once that
   /// many are, dispatch() ignores the other unstarted jobs, and started ones continue as if those did not exist.
   virtual Step dispatch(Time now, std::uint32_t most = kNoLimit) = 0;
+
+  /// From now on, steps have only events of these kinds. By default they have all. Decisions do not depend on it.
+  virtual void record_only(EventKinds kinds) = 0;
 
   /// Cooperative: returns true if dispatch() could put a job over `job` at a preemption point now. May return true
   /// although a bound or a group keeps the more urgent job waiting; never false wrongly. Other modes: returns false.

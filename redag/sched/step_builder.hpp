@@ -40,8 +40,17 @@ class StepBuilder {
     events_.reserve(events);
   }
 
+  /// From now on, only events of these kinds are kept.
+  void record_only(EventKinds kinds) { recorded_ = kinds; }
+
   void emit(const Job &job, JobEventKind kind, std::int64_t value, Reason reason = Reason::None) {
-    events_.push_back(JobEvent{now_, value, job.task, job.number, job.worker.value, kind, reason, 0});
+    emit(job.task, job.number, job.worker, kind, value, reason);
+  }
+  void emit(TaskId task, std::uint32_t number, WorkerId worker, JobEventKind kind, std::int64_t value,
+            Reason reason = Reason::None) {
+    if (recorded_.contains(kind)) {
+      events_.push_back(JobEvent{now_, value, task, number, worker.value, kind, reason, 0});
+    }
   }
 
   void tell(const Job &job, JobSlot slot, DispatchKind kind, JobSlot over, std::uint32_t level) {
@@ -63,12 +72,14 @@ class StepBuilder {
 
   /// Drops all decisions that the step has for this job.
   void drop(JobSlot slot) {
+    if (dispatches_.empty()) return;
     std::erase_if(dispatches_, [slot](const Dispatch &d) { return d.job == slot; });
   }
 
  private:
   std::vector<JobEvent> events_;
   std::vector<Dispatch> dispatches_;
+  EventKinds recorded_ = EventKinds::all();
   Time now_ = 0;
   bool was_read_ = false;
 };
