@@ -42,10 +42,10 @@ bench: ## build the benchmarks, run them BENCH_ROUNDS (7) times, print ratios; J
 	cmake --build --preset bench
 	tools/bench --rounds $(BENCH_ROUNDS)
 
-instructions: ## what the scheduler executes for a job, counted by valgrind: the same at any load
+instructions: ## instructions of a job in scheduler and engine, counted by valgrind; fails 3 % above tests/budgets
 	@tools/bootstrap instructions
 	cmake --preset bench
-	cmake --build --preset bench --target redag_scheduler_steps
+	cmake --build --preset bench --target redag_counted
 	tools/count_instructions
 
 lint: ## layers, references, commits, module diagram, formatting, locks, and clang-tidy on files that differ from the main branch

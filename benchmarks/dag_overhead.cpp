@@ -14,53 +14,22 @@
 #define REDAG_HAS_TASKFLOW 1
 #endif
 
-#include <array>
 #include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "redag/base/rng.hpp"
+#include "benchmarks/graphs.hpp"
 #include "redag/runtime/clock.hpp"
-#include "redag/runtime/engine.hpp"
 #include "redag/runtime/spins.hpp"
-#include "redag/runtime/threads.hpp"
-#include "redag/sched/priority_scheduler.hpp"
 
 namespace {
 
 using namespace redag;
 using namespace redag::runtime;
+using namespace redag::benchmarks;
 
-constexpr std::uint32_t kNodes = 64;
 constexpr std::uint32_t kRounds = 1000;
-
-enum class Shape : std::uint8_t { Chain, FanOut, Random };
-constexpr std::array kShapes = {"chain", "fan_out", "random"};
-
-// Returns the predecessors of each node. Node 0 is the only source, and the last node is the only sink.
-std::vector<std::vector<std::uint32_t>> predecessors_of(Shape shape) {
-  std::vector<std::vector<std::uint32_t>> predecessors(kNodes);
-  Rng rng(7);
-  std::vector<bool> has_successor(kNodes, false);
-  for (std::uint32_t v = 1; v + 1 < kNodes; ++v) {
-    switch (shape) {
-      case Shape::Chain: predecessors[v] = {v - 1}; break;
-      case Shape::FanOut: predecessors[v] = {0}; break;
-      case Shape::Random:
-        for (std::uint32_t u = v < 8 ? 0 : v - 8; u < v; ++u) {
-          if (rng.uniform(0, 3) == 0) predecessors[v].push_back(u);
-        }
-        if (predecessors[v].empty()) predecessors[v] = {v - 1};
-        break;
-    }
-    for (const std::uint32_t u : predecessors[v]) has_successor[u] = true;
-  }
-  for (std::uint32_t u = 0; u + 1 < kNodes; ++u) {
-    if (!has_successor[u]) predecessors[kNodes - 1].push_back(u);
-  }
-  return predecessors;
-}
 
 class Cost {
  public:
@@ -100,49 +69,11 @@ void redag_engine(benchmark::State &state, Shape shape, PreemptionMode mode, Dur
   const auto workers = static_cast<std::uint32_t>(state.range(0));
   Result<Setup> setup = set_up({.preemption = mode, .policy = PolicyKind::Fixed, .workers = workers});
   if (!setup) return state.SkipWithError("this mode cannot be had here");
-  Workload workload;
-  workload.dags.emplace_back();
-  for (const auto &predecessors : predecessors_of(shape)) {
-    Task task;
-    task.priority = static_cast<int>(workload.dags[0].tasks.size());  // the sink does not preempt itself
-    task.period = task.deadline = kSecond;
-    task.wcet = kMillisecond;
-    task.activation = predecessors.empty() ? Activation::Timer : Activation::Data;
-    task.predecessors = predecessors;
-    workload.dags[0].tasks.push_back(task);
-  }
-  EngineOptions options;
-  options.config = setup->config;
-  options.band = setup->band;
-  options.spins = spins_in(spin);
-  Engine engine(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
-  FutexWord done{0};
-  std::uint32_t left = 0;
-  std::vector<std::atomic<std::uint32_t>> runs(kNodes);
-  std::vector<Body> bodies(kNodes, [&](const runtime::Job &job) {
-    runs[job.task.value].fetch_add(1, std::memory_order_relaxed);
-    return sched::Outcome::Finished;
-  });
-  bodies.back() = [&](const runtime::Job &) {
-    if (--left > 0) {
-      engine.release(TaskId(0), 0);
-    } else {
-      done.store(1);
-      futex_wake(done, 1);
-    }
-    return sched::Outcome::Finished;
-  };
-  engine.bind(workload, std::move(bodies));
-  engine.set_origin(monotonic_now());
-  if (!engine.start()) return state.SkipWithError("threads cannot be started");
+  EngineGraph graph(shape, *setup, spins_in(spin));
+  if (!graph.start()) return state.SkipWithError("threads cannot be started");
   Cost cost(state);
   for (auto _ : state) {
-    left = kRounds;
-    done.store(0);
-    cost.of([&] {
-      engine.release(TaskId(0), 0);
-      while (done.load() == 0) futex_wait(done, 0);
-    });
+    cost.of([&] { graph.run(kRounds); });
   }
 }
 
@@ -203,7 +134,7 @@ void taskflow(benchmark::State &state, Shape shape) {
         ->Unit(benchmark::kMillisecond);
   };
   for (const Shape shape : {Shape::Chain, Shape::FanOut, Shape::Random}) {
-    const std::string name = kShapes[static_cast<std::size_t>(shape)];
+    const std::string name(kShapes[static_cast<std::size_t>(shape)]);
     add(name + "/redag_none", [=](benchmark::State &state) { redag_engine(state, shape, PreemptionMode::None); });
     add(name + "/redag_none_spin_50us",
         [=](benchmark::State &state) { redag_engine(state, shape, PreemptionMode::None, 50 * kMicrosecond); });

@@ -26,6 +26,7 @@
 
 #include "contenders.hpp"
 #include "rclcpp/rclcpp.hpp"
+#include "ring.hpp"
 #include "std_msgs/msg/u_int64.hpp"
 
 namespace {
@@ -158,29 +159,19 @@ Figures publish_latency(rclcpp::Executor &executor, double seconds, bool intra_p
   return {{"p50_us", latency.at(0.5)}, {"p99_us", latency.at(0.99)}};
 }
 
-// A ring of `count` subscriptions whose callbacks each publish to the next one: the executor is never idle.
-Figures saturation(rclcpp::Executor &executor, double seconds, int count) {
-  auto node = std::make_shared<rclcpp::Node>("bench", rclcpp::NodeOptions().use_intra_process_comms(true));
-  std::vector<rclcpp::Subscription<Message>::SharedPtr> subscriptions;
-  std::vector<rclcpp::Publisher<Message>::SharedPtr> publishers;
+// Callbacks in a second while a ring of `count` subscriptions keeps the executor busy.
+Figures saturation(rclcpp::Executor &executor, double seconds, std::size_t count) {
   std::atomic<std::uint64_t> calls{0};
   std::atomic<bool> stop{false};
-  for (int i = 0; i < count; ++i) {
-    publishers.push_back(node->create_publisher<Message>("ring" + std::to_string(i), rclcpp::QoS(10)));
-  }
-  for (int i = 0; i < count; ++i) {
-    auto &next = publishers[static_cast<std::size_t>((i + 1) % count)];
-    subscriptions.push_back(node->create_subscription<Message>("ring" + std::to_string(i), rclcpp::QoS(10),
-                                                               [&, next](Message::UniquePtr message) {
-                                                                 calls.fetch_add(1, std::memory_order_relaxed);
-                                                                 if (!stop) next->publish(std::move(message));
-                                                               }));
-  }
-  executor.add_node(node);
+  redag_rclcpp::lab::Ring ring(count, [&] {
+    calls.fetch_add(1, std::memory_order_relaxed);
+    return !stop;
+  });
+  executor.add_node(ring.node());
   Figures figures;
   {
     Spinning spinning(executor);
-    publishers[0]->publish(std::make_unique<Message>());
+    ring.publish();
     std::this_thread::sleep_for(20ms);
     const std::uint64_t calls_before = calls;
     const double cpu_before = cpu_seconds();
@@ -193,7 +184,7 @@ Figures saturation(rclcpp::Executor &executor, double seconds, int count) {
     stop = true;
     std::this_thread::sleep_for(20ms);
   }
-  executor.remove_node(node);
+  executor.remove_node(ring.node());
   return figures;
 }
 

@@ -1,0 +1,89 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Jobs through the scheduler alone and through the engine, for tools/count_instructions to count the instructions. The
+// engine has one worker. While a graph runs, no other thread has anything to do.
+#include <cstdint>
+#include <cstdio>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "benchmarks/graphs.hpp"
+#include "benchmarks/scheduler_loop.hpp"
+#include "counted.hpp"
+#include "redag/base/check.hpp"
+#include "redag/runtime/setup.hpp"
+#include "virtual_time.hpp"
+
+namespace {
+
+using namespace redag;
+using namespace redag::benchmarks;
+
+constexpr std::uint32_t kMaxActive = 2;
+
+std::uint64_t scheduler_tasks(std::uint64_t jobs, std::size_t tasks, sched::Preemption preemption,
+                              std::uint32_t max_active) {
+  SchedulerLoop loop(tasks, preemption, max_active);
+  for (std::uint64_t i = 0; i < jobs; ++i) loop.step();
+  return jobs;
+}
+
+std::uint64_t rounds_of(std::uint64_t least, Shape shape) { return (least + nodes_of(shape) - 1) / nodes_of(shape); }
+
+std::uint64_t scheduler_graph(std::uint64_t least, Shape shape, sched::Preemption preemption) {
+  SchedulerGraph graph(shape, preemption);
+  const std::uint64_t rounds = rounds_of(least, shape);
+  std::uint64_t jobs = 0;
+  for (std::uint64_t i = 0; i < rounds; ++i) jobs += graph.round();
+  REDAG_CHECK(jobs == rounds * nodes_of(shape), "not every node ran once a round");
+  return jobs;
+}
+
+std::uint64_t engine_graph(std::uint64_t least, Shape shape, PreemptionMode mode) {
+  const Result<runtime::Setup> setup = runtime::set_up({.preemption = mode, .policy = PolicyKind::Fixed, .workers = 1});
+  if (!setup) {
+    std::fprintf(stderr, "%s\n", to_string(setup.error()).c_str());
+    return 0;
+  }
+  begin_virtual_time();
+  EngineGraph graph(shape, *setup, 0);
+  if (const Result<void> started = graph.start(); !started) {
+    std::fprintf(stderr, "%s\n", to_string(started.error()).c_str());
+    return 0;
+  }
+  const std::uint64_t rounds = rounds_of(least, shape);
+  graph.run(static_cast<std::uint32_t>(rounds));
+  return rounds * nodes_of(shape);
+}
+
+std::vector<Case> all_cases() {
+  std::vector<Case> cases;
+  const auto add = [&](const std::string &name, auto run) { cases.push_back({name, run}); };
+  for (const auto &[mode, preemption] :
+       {std::pair{"none", sched::Preemption::None}, {"full", sched::Preemption::Full}}) {
+    const std::string place = std::string("scheduler/") + mode + "/";
+    for (const Shape shape : {Shape::Single, Shape::Chain, Shape::FanOut, Shape::Random}) {
+      add(place + std::string(kShapes[static_cast<std::size_t>(shape)]),
+          [=](std::uint64_t least) { return scheduler_graph(least, shape, preemption); });
+    }
+    for (const std::size_t tasks : {20U, 1'000U, 10'000U}) {
+      const std::string name = place + std::to_string(tasks) + "_tasks";
+      add(name, [=](std::uint64_t least) { return scheduler_tasks(least, tasks, preemption, 0); });
+      add(name + "_bounded",
+          [=](std::uint64_t least) { return scheduler_tasks(least, tasks, preemption, kMaxActive); });
+    }
+  }
+  for (const PreemptionMode mode : {PreemptionMode::None, PreemptionMode::Os}) {
+    for (const Shape shape : {Shape::Single, Shape::Chain, Shape::FanOut, Shape::Random}) {
+      add("engine/" + std::string(to_string(mode)) + "/" + std::string(kShapes[static_cast<std::size_t>(shape)]),
+          [=](std::uint64_t least) { return engine_graph(least, shape, mode); });
+    }
+  }
+  return cases;
+}
+
+}  // namespace
+
+int main(int argc, char **argv) { return run_counted(argc, argv, all_cases()); }
