@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "benchmarks/graphs.hpp"
@@ -61,9 +60,8 @@ std::uint64_t engine_graph(std::uint64_t least, Shape shape, PreemptionMode mode
 std::vector<Case> all_cases() {
   std::vector<Case> cases;
   const auto add = [&](const std::string &name, auto run) { cases.push_back({name, run}); };
-  for (const auto &[mode, preemption] :
-       {std::pair{"none", sched::Preemption::None}, {"full", sched::Preemption::Full}}) {
-    const std::string place = std::string("scheduler/") + mode + "/";
+  for (const sched::Preemption preemption : {sched::Preemption::None, sched::Preemption::Full}) {
+    const std::string place = preemption == sched::Preemption::None ? "scheduler/none/" : "scheduler/full/";
     for (const Shape shape : {Shape::Single, Shape::Chain, Shape::FanOut, Shape::Random}) {
       add(place + std::string(kShapes[static_cast<std::size_t>(shape)]),
           [=](std::uint64_t least) { return scheduler_graph(least, shape, preemption); });
