@@ -33,8 +33,8 @@ TEST(Admission, WhatDoesNotIsNamed) {
       make_workload({make_dag("a", {{"t", 10, 4}}), make_dag("b", {{"u", 20, 13}})}, 1, PreemptionMode::Os);
   const Result<void> admitted = admit_by_bounds(workload, preemptive(1));
   ASSERT_FALSE(admitted);
-  EXPECT_THAT(to_string(admitted.error()), HasSubstr("b/u"));
-  EXPECT_THAT(to_string(admitted.error()), Not(HasSubstr("a/t"))) << "the more urgent one is not in doubt";
+  EXPECT_THAT(to_string(admitted.error()), HasSubstr("b.u"));
+  EXPECT_THAT(to_string(admitted.error()), Not(HasSubstr("a.t"))) << "the more urgent one is not in doubt";
   EXPECT_TRUE(admit_by_bounds(workload, preemptive(2)));
 }
 

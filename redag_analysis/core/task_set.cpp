@@ -146,7 +146,7 @@ class Compiler {
   CompiledTask compile_task(const Dag &dag, const Task &task, std::uint32_t first) {
     const AnalysisPlatform &platform = task_set_.platform;
     CompiledTask compiled;
-    compiled.name = dag.name + "/" + task.name;
+    compiled.name = dag.name + "." + task.name;
     compiled.dag = DagId(task_set_.dags.size());
     // The job that preempts pays for the resumption; a job preempts at most once, when it starts.
     const Duration lead = add(platform.release_overhead, platform.dispatch_overhead);

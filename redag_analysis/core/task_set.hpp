@@ -63,7 +63,7 @@ inline constexpr std::uint32_t kNoGroup = 0xffffffff;
 
 /// One per TaskId.
 struct CompiledTask {
-  std::string name;  // "dag/task"
+  std::string name;  // "dag.task"
   DagId dag;
   std::uint32_t unit = 0;
   Duration wcet = 0;      // C with overheads

@@ -54,7 +54,7 @@ TEST(TaskSet, AGraphOfOneRateIsOneUnit) {
   EXPECT_TRUE(task_set.units[0].has_edges);
   EXPECT_THAT(task_set.tasks[0].successors, ElementsAre(1, 2));
   EXPECT_THAT(task_set.by_rank, ElementsAre(3, 0, 1, 2));
-  EXPECT_EQ(task_set.tasks[1].name, "graph/b");
+  EXPECT_EQ(task_set.tasks[1].name, "graph.b");
   EXPECT_TRUE(task_set.not_analysable.empty());
 }
 
@@ -135,7 +135,7 @@ TEST(TaskSet, OverlappingJobsOfOneTaskAreNotAnalysed) {
   Workload workload = two_dags();
   workload.dags[0].tasks[1].concurrency = 2;
   const TaskSet task_set = compiled(workload, mode(sched::Preemption::Full, 2));
-  EXPECT_EQ(task_set.not_analysable, "task 'graph/b': jobs of a task with concurrency above 1 can overlap");
+  EXPECT_EQ(task_set.not_analysable, "task 'graph.b': jobs of a task with concurrency above 1 can overlap");
   EXPECT_TRUE(std::holds_alternative<NotApplicable>(analyze(task_set).methods.at(0).outcome));
 }
 

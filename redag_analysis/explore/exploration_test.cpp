@@ -109,7 +109,7 @@ TEST(Exploration, SaysWhenItEndsEarly) {
   const Exploration overrun = explore(late);
   EXPECT_EQ(overrun.end, Exploration::End::Overrun);
   EXPECT_EQ(to_bound(late, overrun).figures,
-            fmt::format("{} states; d/a can end after its next release", overrun.states));
+            fmt::format("{} states; d.a can end after its next release", overrun.states));
 }
 
 TEST(Exploration, SaysWhereThereIsNothingToExplore) {

@@ -130,11 +130,7 @@ std::vector<analysis::Term> terms_of(const Analysed &analysed, const Row &row) {
   return itemised(analysed.task_set, row.tightest, row.dag).terms;
 }
 
-std::string task_name(const Analysed &analysed, TaskId task) {
-  const analysis::CompiledTask &found = analysed.task_set.tasks[task.value];
-  const std::string &dag = analysed.task_set.dags[found.dag.value].name;
-  return dag + "." + found.name.substr(dag.size() + 1);
-}
+std::string task_name(const Analysed &analysed, TaskId task) { return analysed.task_set.tasks[task.value].name; }
 
 std::vector<Row> task_rows(const Analysed &analysed) {
   std::vector<Row> rows;

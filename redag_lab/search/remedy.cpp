@@ -63,7 +63,7 @@ class Search {
       const std::optional<Margin> margin = margin_of(workload_, platform_, knob, accepted_by_analysis, options);
       if (!margin || !margin->position || (best && best->factor >= margin->factor)) continue;
       best = Shorter{margin->factor, fmt::format("wcet of {}: {} instead of {}", name_of(suspects[i]),
-                                                 humanize_down(*margin->position), format_duration(margin->nominal))};
+                                                 humanize_down(*margin->position), humanize_duration(margin->nominal))};
     }
     return best;
   }

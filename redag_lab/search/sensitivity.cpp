@@ -28,12 +28,6 @@ bool is_overloaded(const analysis::TaskSet &task_set) {
   return sum > Int128{task_set.platform.workers} << kBits;
 }
 
-// Returns "dag.task", the form that the commands use.
-std::string label(const analysis::TaskSet &task_set, std::uint32_t task) {
-  const std::string &dag = task_set.dags[task_set.tasks[task].dag.value].name;
-  return dag + "." + task_set.tasks[task].name.substr(dag.size() + 1);
-}
-
 std::string why_no_bound(const analysis::Report &report, std::uint32_t task) {
   for (const analysis::MethodReport &method : report.methods) {
     const analysis::Bound *bound = method.bound();
@@ -55,13 +49,13 @@ std::string obstacle_of(const Workload &workload, const analysis::AnalysisPlatfo
   for (std::uint32_t t = 0; t < task_set->tasks.size(); ++t) {
     const analysis::CompiledTask &task = task_set->tasks[t];
     if (meets_deadline(task, report.tasks[t].bound)) continue;
-    if (!report.tasks[t].response) return label(*task_set, t) + ": " + why_no_bound(report, t);
+    if (!report.tasks[t].response) return task_set->tasks[t].name + ": " + why_no_bound(report, t);
     const Duration late = *report.tasks[t].response - std::min(task.deadline, task.limit);
     if (worst && late <= missing) continue;
     worst = t;
     missing = late;
   }
-  if (worst) return "the bound of " + label(*task_set, *worst) + " exceeds its deadline";
+  if (worst) return "the bound of " + task_set->tasks[*worst].name + " exceeds its deadline";
   for (std::size_t d = 0; d < task_set->dags.size(); ++d) {
     const analysis::CompiledDag &dag = task_set->dags[d];
     if (dag.deadline > 0 && report.dags[d].response.value_or(kNever) > dag.deadline) {
@@ -270,7 +264,7 @@ std::optional<std::string> why_impossible(const analysis::TaskSet &task_set) {
     const analysis::CompiledTask &task = task_set.tasks[t];
     // Jobs of a task that can overlap (concurrency) may take longer than the limit; such workloads are not analysed.
     const Duration due = task_set.not_analysable.empty() ? std::min(task.deadline, task.limit) : task.deadline;
-    if (task.wcet > due) return label(task_set, t) + " alone takes longer than its deadline allows";
+    if (task.wcet > due) return task.name + " alone takes longer than its deadline allows";
   }
   if (is_overloaded(task_set)) return fmt::format("the utilization exceeds {}", task_set.platform.workers);
   return std::nullopt;

@@ -312,7 +312,7 @@ class Factorial(Case):
         plan = self.write("plan.yaml", "experiment: factorial\nworld: threads\nduration: 300ms\nrepetitions: 2\n"
                           "workloads: cart.yaml\nexecutors: [ideal, redag-none, mte]\n")
         result = self.run_plan(plan, "threads", "-j4")
-        self.assertIn("on 1 core", result.stderr)
+        self.assertIn("a second on 1 processor", result.stderr)
         rows = list(csv.DictReader(self.results("threads")[1].splitlines()))
         self.assertEqual({(row["executor"], row["world"]) for row in rows},
                          {("ideal", "simulator"), ("redag-none", "threads"), ("mte", "threads")})

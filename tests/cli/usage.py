@@ -45,6 +45,26 @@ class Usage(Case):
             for option in re.findall(r"--[a-z-]+", examples):
                 self.assertIn(option, options, command)
 
+    def test_examples_run(self):
+        """The examples in --help run as they are printed, but those that need earlier results or minutes."""
+        for name in "workloads", "experiments":
+            (self.folder / name).symlink_to(SOURCE / name)
+        path = f"{os.path.dirname(os.path.abspath(PROGRAM))}:{os.environ['PATH']}"
+        ran = 0
+        for command in COMMANDS:
+            for example in redag(*command, "--help").stdout.split("Examples:")[1].strip().splitlines():
+                for file in re.findall(r"\b(?:workloads|experiments)/\w\S*\.yaml", example):
+                    self.assertTrue((SOURCE / file).exists(), example)
+                if command[0] in ("run", "compare", "calibrate", "diff", "check-trace", "top", "report", "experiment"):
+                    continue
+                if "sensitivity" in example and "--simulate" in example:
+                    continue
+                result = subprocess.run(["bash", "-c", f"set -o pipefail; {example}"], cwd=self.folder, text=True,
+                                        env={**os.environ, "PATH": path}, capture_output=True, timeout=250, check=False)
+                self.assertEqual(result.returncode, 1 if "--check" in example else 0, example + result.stderr)
+                ran += 1
+        self.assertGreater(ran, 20)
+
     def test_the_page_has_the_commands_and_their_options(self):
         """docs/cli.md has a row for every command, and a command's section names only options of that command."""
         page = (SOURCE / "docs" / "cli.md").read_text(encoding="utf-8")

@@ -130,6 +130,19 @@ std::string exploration_table(const lab::Analysed &analysed, const StreamTraits 
                                  "with several workers the range can be too wide, but never too narrow");
 }
 
+// Returns what --explore found: a table, or one line that gives the reason for having none. Empty: not requested.
+std::string exploration_text(const lab::Analysed &analysed, const StreamTraits &terminal) {
+  if (analysed.exploration != nullptr && analysed.exploration->end == analysis::Exploration::End::Complete) {
+    return "\n" + exploration_table(analysed, terminal, false);
+  }
+  for (const MethodReport &report : analysed.report.methods) {
+    if (report.method->name != analysis::exploration().name) continue;
+    const auto *reason = std::get_if<NotApplicable>(&report.outcome);
+    return fmt::format("no exploration: {}\n", reason != nullptr ? reason->reason : report.bound()->figures);
+  }
+  return {};
+}
+
 std::string plural(std::size_t count, const char *noun) {
   return fmt::format("{} {}{}", format_count(count), noun, count == 1 ? "" : "s");
 }
@@ -298,13 +311,10 @@ std::string summarise(const lab::Analysed &analysed, const StreamTraits &termina
     }
   }
   text += describe_gave_up(analysed.report);
-  text += fmt::format("preemption: {}{}; --all shows every task and method{}\n", mode_name(analysed),
-                      reason.empty() ? "" : " (" + reason + ")",
-                      weakest ? ", --explain " + weakest->name + " explains its bound" : "");
-  if (analysed.exploration != nullptr && analysed.exploration->end == analysis::Exploration::End::Complete) {
-    text += "\n" + exploration_table(analysed, terminal, false);
-  }
-  return text;
+  text += fmt::format("preemption: {}{}\n", mode_name(analysed), reason.empty() ? "" : " (" + reason + ")");
+  text += fmt::format("--all shows every task and method{}\n",
+                      weakest ? "; --explain " + weakest->name + " explains its bound" : "");
+  return text + exploration_text(analysed, terminal);
 }
 
 std::string methods_that_do_not_apply(const analysis::Report &report, bool tests) {

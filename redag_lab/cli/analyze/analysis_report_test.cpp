@@ -80,6 +80,9 @@ TEST(AnalysisReport, AnExplorationIsAMethodAmongOthers) {
   const Result<lab::Analysed> preempted = lab::analyse(workload, analysis::platform_of(workload), &options);
   ASSERT_TRUE(preempted);
   EXPECT_EQ(preempted->exploration, nullptr);
+  const std::string summary = summarise(*preempted, StreamTraits{});
+  EXPECT_NE(summary.find("\nno exploration: requires jobs that run to completion"), std::string::npos) << summary;
+  EXPECT_EQ(summarise(look_at(workload), StreamTraits{}).find("exploration"), std::string::npos);
   EXPECT_EQ(preempted->report.methods.back().method->name, "exploration");
   EXPECT_EQ(preempted->report.methods.back().bound(), nullptr);
 }

@@ -174,7 +174,7 @@ Action add_analyze(CLI::App &app) {
   auto options = std::make_shared<Options>();
   app.add_option("FILE", options->analysis.run.file, "Workload file (YAML); - reads standard input");
   add_choice(app, "--executor", options->executor, executor_choices(),
-             "Executor to analyze: ReDAG-RT, or a model of one of rclcpp's executors")
+             "Executor to analyse: ReDAG-RT, or a model of one of rclcpp's executors")
       ->default_str(options->executor);
   app.add_option("--explain", options->explain, "Explain the bound of one task (dag.task) or DAG")->type_name("TASK");
   app.add_option(

@@ -25,16 +25,6 @@ using lab::OrderCandidate;
 
 constexpr std::size_t kMostTrials = 10;
 
-// Lists the bounds of the DAGs with a choice: those with several tasks.
-std::string caps_text(const Workload &workload, const Caps &caps) {
-  std::string text;
-  for (std::size_t d = 0; d < caps.size(); ++d) {
-    if (workload.dags[d].tasks.size() < 2 && caps[d] == 0) continue;
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", workload.dags[d].name, lab::bound_text(caps[d]));
-  }
-  return text.empty() ? "-" : text;
-}
-
 std::vector<Cell> score_cells(const BoundScore &score) {
   return {{score.schedulable ? "yes" : "not shown", score.schedulable ? Tint::Good : Tint::Caution},
           {score.unbounded == 0 ? "-" : fmt::format("{}", score.unbounded)},

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "redag/base/text.hpp"
+#include "redag_lab/workload/changes.hpp"
 
 namespace redag::cli {
 
@@ -19,6 +20,15 @@ std::string lateness_text(const lab::Extremes &extremes) {
 
 std::string slack_text(const lab::Extremes &extremes) {
   return extremes.any ? fmt::format("{:.1f} %", std::floor(extremes.least_slack * 1000 + 1e-9) / 10) : "-";
+}
+
+std::string caps_text(const Workload &workload, std::span<const std::uint32_t> caps) {
+  std::string text;
+  for (std::size_t d = 0; d < caps.size(); ++d) {
+    if (workload.dags[d].tasks.size() < 2 && caps[d] == 0) continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", workload.dags[d].name, lab::bound_text(caps[d]));
+  }
+  return text.empty() ? "-" : text;
 }
 
 }  // namespace redag::cli

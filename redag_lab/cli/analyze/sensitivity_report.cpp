@@ -56,10 +56,9 @@ std::string limit_text(const Knob &knob, std::optional<std::int64_t> position) {
   return value ? humanize_safely(knob, *value) : "-";
 }
 
-// Formats the nominal value as workload files write it.
 std::string nominal_text(const Knob &knob, std::int64_t position) {
   const std::optional<Duration> value = value_at(knob, position);
-  return value ? format_duration(*value) : "-";
+  return value ? humanize_duration(*value) : "-";
 }
 
 std::string factor_text(const std::optional<Margin> &margin) {
@@ -125,7 +124,7 @@ std::string change_of(const lab::Analysed &analysed, const Margin &margin) {
   const std::string name = knob_name(analysed, margin.knob);
   const std::optional<Duration> now = value_at(margin.knob, margin.nominal);
   if (!now) return fmt::format("{}, to {} of its value", name, format_factor(margin.factor));
-  return fmt::format("{}, from {} to {}", name, format_duration(*now),
+  return fmt::format("{}, from {} to {}", name, humanize_duration(*now),
                      humanize_safely(margin.knob, *value_at(margin.knob, *margin.position)));
 }
 

@@ -182,7 +182,7 @@ Action add_tune(CLI::App &app) {
   add_count(app, "--held-out", tune.held_out, {0, kMostSeeds},
             "Number of unseen seeds for the validation of the result");
   add_seed(app, options->run.seed, "First seed, also of the local search");
-  app.add_flag("--simulator-only", options->simulator_only, "Do not analyze what the bounds prove");
+  app.add_flag("--simulator-only", options->simulator_only, "Do not analyse what the bounds prove");
   add_count(app, "--exhaustive", tune.effort.exhaustive, {0, kMaxCombinations},
             "Try all settings up to this number; above, search locally");
   add_count(app, "--restarts", tune.effort.restarts, {0, kMaxRestarts},

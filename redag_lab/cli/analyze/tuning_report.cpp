@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <map>
+#include <span>
 
 #include "redag/base/text.hpp"
 #include "redag_analysis/text/table.hpp"
@@ -56,14 +57,6 @@ std::vector<Cell> score_cells(const RunScore &score, bool bounds) {
           {format_count(all.lost)},
           {lateness_text(all.extremes)},
           {slack_text(all.extremes)}};
-}
-
-std::string point_text(const Workload &workload, const Point &point) {
-  std::string text;
-  for (std::size_t d = 0; d < workload.dags.size(); ++d) {
-    text += fmt::format("{}{} {}", d == 0 ? "" : ", ", workload.dags[d].name, lab::bound_text(point[1 + d]));
-  }
-  return text;
 }
 
 // Formats the tie order of the point, a Lehmer code. Zeros stand for the order of the file.
@@ -117,8 +110,9 @@ std::string trials_table(const Tuning &tuning, const Ranked &trials, const Strea
                {"max lateness", true, 7},
                {"least slack", true, 6}});
   for (const auto &[point, score] : trials) {
-    std::vector<Cell> cells = {
-        {fmt::format("{}", point.front())}, {point_text(workload, point)}, {ties_text(workload, point)}};
+    std::vector<Cell> cells = {{fmt::format("{}", point.front())},
+                               {caps_text(workload, std::span(point).subspan(1, workload.dags.size()))},
+                               {ties_text(workload, point)}};
     for (Cell &cell : score_cells(score, tuning.options.bounds)) cells.push_back(std::move(cell));
     table.add(std::move(cells));
   }
@@ -280,10 +274,12 @@ std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool al
                                  objective_name(options.goal.objective),
                                  options.goal.per_criticality ? ", the most critical DAGs first" : "");
   text += fmt::format(
-      "simulated {} with each of {} seeds; validated on {} unseen seeds;\n"
+      "simulated {} with {}; validated on {} unseen seed{};\n"
       "{}\n"
       "\n",
-      humanize_duration(options.simulation.duration), options.seeds, options.held_out,
+      humanize_duration(options.simulation.duration),
+      options.seeds == 1 ? std::string("one seed") : fmt::format("each of {} seeds", options.seeds), options.held_out,
+      options.held_out == 1 ? "" : "s",
       options.bounds ? "settings that the bounds prove come first" : "bounds are not used");
   text += scores_table(tuning, terminal);
   text += tried_tables(tuning, terminal, all) + "\n";

@@ -129,7 +129,7 @@ class StudyRun {
       good =
           ok(log_run(folder, experiment::RunEnd{finished, elapsed, InterruptGuard::interrupted()}), console_) && good;
     }
-    console_.note(fmt::format("{} {} in {}, {:.{}f}/s on {} core{}\n", finished, study_.units_are(),
+    console_.note(fmt::format("{} {} in {}, {:.{}f} a second on {} processor{}\n", finished, study_.units_are(),
                               humanize_duration(elapsed),
                               1e9 * static_cast<double>(finished) / static_cast<double>(std::max<Duration>(elapsed, 1)),
                               study_.takes_turns() ? 2 : 0, options.jobs, options.jobs == 1 ? "" : "s"));

@@ -28,7 +28,7 @@ const char *name_of(Broken broken) {
 }  // namespace
 
 std::string describe(const lab::BoundCheck &check, std::size_t tasks, const StreamTraits &terminal) {
-  std::string text = fmt::format("bounds: {} of {} tasks have one", check.bounded, tasks);
+  std::string text = fmt::format("bounds: {} of {} tasks have a bound", check.bounded, tasks);
   text += check.absent.empty() ? "" : fmt::format(" ({})", check.absent);
   text += check.assumptions.is_calibrated ? ", with the machine's overheads charged" : "";
   if (check.remarks.empty()) {

@@ -45,7 +45,8 @@ TEST(BoundCheck, ARunWithinItsBounds) {
   const std::string text = describe(check, 2, StreamTraits{});
   EXPECT_THAT(
       text,
-      HasSubstr("2 of 2 tasks have one; no response time was above its bound, no execution time was above its wcet"));
+      HasSubstr(
+          "2 of 2 tasks have a bound; no response time was above its bound, no execution time was above its wcet"));
   EXPECT_THAT(text, HasSubstr("overheads of the platform are not charged"));
 }
 
@@ -104,7 +105,7 @@ TEST(BoundCheck, SaysWhyThereIsNone) {
   session.info.workload.dags[1].tasks[0].wcet = 60 * kMillisecond;
   const lab::BoundCheck check = lab::check_bounds(session);
   EXPECT_EQ(check.bounded, 1U);
-  EXPECT_THAT(describe(check, 2, StreamTraits{}), HasSubstr("1 of 2 tasks have one (slow.plan: "));
+  EXPECT_THAT(describe(check, 2, StreamTraits{}), HasSubstr("1 of 2 tasks have a bound (slow.plan: "));
 }
 
 }  // namespace

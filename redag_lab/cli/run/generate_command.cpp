@@ -168,6 +168,7 @@ int generate_workloads(const CLI::App &app, const Options &options, Console &con
       return kExitBad;
     }
   }
+  if (!options.file.empty()) console.note(fmt::format("wrote {}\n", options.file));
   if (!options.folder.empty()) {
     console.note(fmt::format("wrote {} workload{} to {}: seeds {} to {}\n", options.count,
                              options.count == 1 ? "" : "s", options.folder, options.seed,

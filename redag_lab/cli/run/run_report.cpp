@@ -140,10 +140,11 @@ bool has_bounds(const lab::Session &session) { return session.info.driver == tra
 std::string headline(const lab::Session &session) {
   const trace::RunInfo &info = session.info;
   const bool simulated = info.driver == trace::Driver::Simulator;
+  const std::string length = humanize_duration(info.end - info.start);
   std::string text =
-      fmt::format("{}: {}, {}, {} worker{}, {} of {}, seed {}\n", info.workload.name, info.executor,
+      fmt::format("{}: {}, {}, {} worker{}, {}, seed {}\n", info.workload.name, info.executor,
                   to_string(info.config.policy), info.config.workers, info.config.workers == 1 ? "" : "s",
-                  simulated ? "simulation" : "run on threads", humanize_duration(info.end - info.start), info.seed);
+                  simulated ? "simulation of " + length : "run of " + length + " on threads", info.seed);
   text += fmt::format("preemption: {}{}\n", info.preemption,
                       info.preemption_why.empty() ? "" : " (" + info.preemption_why + ")");
   if (!info.overheads.empty()) text += fmt::format("overheads: {}\n", info.overheads);

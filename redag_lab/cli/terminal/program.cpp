@@ -30,53 +30,53 @@ struct Entry {
 
 constexpr std::array kCommands = {
     Entry{"validate", "Check workload files and report every mistake with its line", add_validate,
-          "  redag validate cart.yaml\n"
+          "  redag validate workloads/robot.yaml\n"
           "  redag validate --strict workloads/*.yaml\n"},
     Entry{"generate", "Generate random workloads from a seed", add_generate,
           "  redag generate --dags 4 --utilization 1.6 --seed 7 -o random.yaml\n"
           "  redag generate --periods robot --shape chain | redag validate -\n"
           "  redag generate --count 100 --out sets/\n"},
     Entry{"simulate", "Simulate a workload in virtual time; results depend on the seed alone", add_simulate,
-          "  redag simulate cart.yaml\n"
-          "  redag simulate cart.yaml --executor mte --duration 60s --json\n"
-          "  redag simulate cart.yaml --preemption none --workers 4 --out results/none\n"},
+          "  redag simulate workloads/robot.yaml\n"
+          "  redag simulate workloads/robot.yaml --executor mte --duration 60s --json\n"
+          "  redag simulate workloads/robot.yaml --preemption none --out results/none\n"},
     Entry{"run", "Run a workload on threads with synthetic callbacks", add_run,
-          "  redag run cart.yaml --duration 10s\n"
-          "  sudo redag run cart.yaml --preemption os --mlockall --out results/os\n"
-          "  redag run cart.yaml --workers 2 --affinity 2,3\n"
-          "  redag run cart.yaml --executor ste --check || echo 'missed a deadline'\n"},
+          "  redag run workloads/robot.yaml --duration 10s\n"
+          "  sudo redag run workloads/robot.yaml --preemption os --out results/os\n"
+          "  redag run workloads/robot.yaml --workers 2 --affinity 2,3\n"
+          "  redag run workloads/robot.yaml --executor ste --check || echo 'missed'\n"},
     Entry{"calibrate", "Measure the overheads of this machine, for bounds that hold on it", add_calibrate,
           "  redag calibrate\n"
           "  sudo redag calibrate --duration 5min --loaded --out overheads.yaml\n"
           "  redag calibrate --duration 5s --json | jq .overheads\n"},
     Entry{"compare", "Run several executors on the same jobs and compare their results", add_compare,
-          "  redag compare cart.yaml\n"
-          "  redag compare cart.yaml --executors redag,mte --repeat 5 --out results/cmp\n"
-          "  redag compare cart.yaml --simulate --duration 60s --json\n"},
+          "  redag compare workloads/robot.yaml\n"
+          "  redag compare workloads/robot.yaml --executors redag,mte --out results/cmp\n"
+          "  redag compare workloads/robot.yaml --simulate --duration 60s --json\n"},
     Entry{"diff", "Compare two recorded results and report significant differences", add_diff,
           "  redag diff results/before results/after\n"
           "  redag diff results/cmp/mte results/cmp/redag --tolerance 0.1\n"
           "  redag diff results/main results/branch --check || echo 'worse'\n"},
     Entry{"analyze", "Bound every response time and show which deadlines are guaranteed", add_analyze,
-          "  redag analyze cart.yaml\n"
-          "  redag analyze cart.yaml --preemption none --workers 2 --check\n"
-          "  redag analyze cart.yaml --explain control.pid\n"
-          "  redag analyze cart.yaml --chain sensors.camera,control.pid\n"
-          "  redag analyze cart.yaml --executor ste\n"
-          "  redag analyze cart.yaml --preemption none --explore\n"
+          "  redag analyze workloads/robot.yaml\n"
+          "  redag analyze workloads/robot.yaml --preemption none --workers 2 --check\n"
+          "  redag analyze workloads/robot.yaml --explain control.controller\n"
+          "  redag analyze workloads/robot.yaml --chain lidar.scan,lidar.planner\n"
+          "  redag analyze workloads/robot.yaml --executor ste\n"
+          "  redag analyze workloads/robot.yaml --preemption none --explore\n"
           "  redag analyze --methods\n"},
     Entry{"sensitivity", "Find how far execution times and rates can grow, or must shrink", add_sensitivity,
-          "  redag sensitivity cart.yaml\n"
-          "  redag sensitivity cart.yaml --preemption none --task control.pid\n"
-          "  redag sensitivity cart.yaml --simulate --json\n"},
+          "  redag sensitivity workloads/robot.yaml\n"
+          "  redag sensitivity workloads/robot.yaml --preemption none --task lidar\n"
+          "  redag sensitivity workloads/robot.yaml --simulate --json\n"},
     Entry{"assign", "Find better priorities and max_active by response-time analysis", add_assign,
-          "  redag assign cart.yaml\n"
-          "  redag assign cart.yaml --objective slack -o tuned.yaml\n"
-          "  redag assign cart.yaml --keep priorities --workers 4 --json\n"},
+          "  redag assign workloads/robot.yaml\n"
+          "  redag assign workloads/robot.yaml --objective slack -o tuned.yaml\n"
+          "  redag assign workloads/robot.yaml --keep priorities --workers 4 --json\n"},
     Entry{"tune", "Find better max_active, workers and tie order by simulation", add_tune,
-          "  redag tune cart.yaml\n"
-          "  redag tune cart.yaml --objective max_lateness --per-criticality -o tuned.yaml\n"
-          "  redag tune cart.yaml --vary max_active --caps 2-5 --all-trials\n"},
+          "  redag tune workloads/robot.yaml\n"
+          "  redag tune workloads/robot.yaml --objective max_lateness -o tuned.yaml\n"
+          "  redag tune workloads/robot.yaml --vary max_active --caps 2-5 --all-trials\n"},
     Entry{"experiment", "Run experiments over many workloads: seeded, parallel, resumable", add_experiment,
           "  redag experiment acceptance experiments/acceptance_tasks.yaml\n"
           "  redag experiment acceptance --help\n"
@@ -173,7 +173,7 @@ std::string help_prefix(const CLI::App &command) {
 int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
   CLI::App app(
       "ReDAG-RT schedules many DAGs of callbacks by priority in one process. This program validates, simulates, runs, "
-      "compares and analyzes workloads.",
+      "compares and analyses workloads.",
       "redag");
   app.set_version_flag("--version", fmt::format("redag {} (revision {})", kVersion, build_revision()));
   app.require_subcommand(0, 1);
