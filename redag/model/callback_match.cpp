@@ -194,12 +194,4 @@ std::vector<std::string> CallbackMatcher::unmatched() const {
   return lines;
 }
 
-std::vector<std::string> CallbackMatcher::unconfigured() const {
-  std::vector<std::string> lines;
-  for (const Seen &seen : seen_) {
-    if (!seen.entry && !is_ros_internal(seen.id)) lines.push_back(to_string(seen.id));
-  }
-  return lines;
-}
-
 }  // namespace redag

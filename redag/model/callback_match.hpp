@@ -61,10 +61,6 @@ class CallbackMatcher {
   /// names, and which of the callbacks seen is nearest to it.
   [[nodiscard]] std::vector<std::string> unmatched() const;
 
-  /// Returns the callbacks seen that no task names, each once, in the order in which they were first seen. Leaves out
-  /// those of ROS itself.
-  [[nodiscard]] std::vector<std::string> unconfigured() const;
-
  private:
   struct Seen {
     CallbackId id;

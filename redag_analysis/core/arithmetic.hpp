@@ -24,11 +24,6 @@ inline constexpr Duration kUnbounded = kMaxDuration;
   return numerator / denominator + (numerator % denominator != 0 ? 1 : 0);
 }
 
-/// Rounds down, for negative numerators too. Requires denominator > 0.
-[[nodiscard]] constexpr Duration floor_div(Duration numerator, Duration denominator) {
-  return numerator / denominator - (numerator % denominator < 0 ? 1 : 0);
-}
-
 /// multiply() and add() saturate at kUnbounded and require non-negative arguments.
 [[nodiscard]] constexpr Duration multiply(Duration a, Duration b) { return saturate(Int128{a} * b); }
 [[nodiscard]] constexpr Duration add(Duration a, Duration b) { return saturate(Int128{a} + b); }

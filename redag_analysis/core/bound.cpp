@@ -39,10 +39,6 @@ const char *to_string(Term::Kind kind) {
   return "?";
 }
 
-const char *to_string(Verdict verdict) {
-  return verdict == Verdict::Schedulable ? "schedulable" : "not shown schedulable";
-}
-
 bool meets_deadline(const CompiledTask &task, const ResponseBound &bound) {
   return bound.response && *bound.response <= std::min(task.deadline, task.limit);
 }

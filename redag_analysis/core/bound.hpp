@@ -99,8 +99,6 @@ struct Method {
 
 enum class Verdict : std::uint8_t { Schedulable, NotShown };
 
-[[nodiscard]] const char *to_string(Verdict verdict);
-
 /// True if every job of the task meets its deadline and none is skipped.
 [[nodiscard]] bool meets_deadline(const CompiledTask &task, const ResponseBound &bound);
 /// Schedulable if the test accepts, or if the bound covers every task and every DAG with a deadline and each deadline

@@ -36,7 +36,6 @@ void load(std::string_view input, LoadOptions options) {
     (void)matcher.find(CallbackId{callback.kind, callback.node + "x", "/other", callback.period, 1});
   }
   (void)matcher.unmatched();
-  (void)matcher.unconfigured();
 }
 
 }  // namespace
