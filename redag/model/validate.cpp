@@ -13,6 +13,7 @@
 
 #include "redag/base/text.hpp"
 #include "redag/model/callback_match.hpp"
+#include "redag/model/validate_edges.hpp"
 
 namespace redag {
 namespace {
@@ -37,7 +38,7 @@ constexpr std::array kDurationRules = {
     DurationRule{Field::WcetLow, &Task::wcet_low, 0},
 };
 
-/// Collects findings about one workload. Sets their place while it walks through the workload.
+/// Walks through one workload and applies every rule, with the place of its findings.
 class Checker {
  public:
   Checker(const Workload &workload, ValidateOptions options) : workload_(workload), options_(options) {}
@@ -45,37 +46,29 @@ class Checker {
   std::vector<Finding> run() {
     if (!workload_.name.empty()) check_name(workload_.name, "workload");
     check_platform();
-    if (workload_.dags.empty()) error(Field::Dags, Field::Dags, "the workload has no DAGs", "add one under 'dags:'");
+    if (workload_.dags.empty()) {
+      findings_.error(Field::Dags, Field::Dags, "the workload has no DAGs", "add one under 'dags:'");
+    }
     check_dag_names();
     for (std::size_t d = 0; d < workload_.dags.size(); ++d) check_dag(DagId(d));
-    dag_ = DagId::none();
+    findings_.at(DagId::none());
     check_load();
-    return std::move(findings_);
+    return findings_.take();
   }
 
  private:
-  Finding &add(Severity severity, Field at, FieldSet involves, std::string message, std::string hint) {
-    involves |= at;
-    return findings_.emplace_back(
-        Finding{severity, dag_, task_, at, Finding::kNone, involves, std::move(message), std::move(hint)});
-  }
-  Finding &error(Field at, FieldSet involves, std::string message, std::string hint = {}) {
-    return add(Severity::Error, at, involves, std::move(message), std::move(hint));
-  }
-  Finding &warning(Field at, FieldSet involves, std::string message, std::string hint = {}) {
-    return add(Severity::Warning, at, involves, std::move(message), std::move(hint));
-  }
-
   void check_platform() {
     const Platform &platform = workload_.platform;
     if (platform.workers < 1 || platform.workers > kMaxWorkers) {
-      error(Field::Workers, {}, fmt::format("workers must be from 1 to {}, not {}", kMaxWorkers, platform.workers));
+      findings_.error(Field::Workers, {},
+                      fmt::format("workers must be from 1 to {}, not {}", kMaxWorkers, platform.workers));
     }
     const bool dynamic = !is_static(workload_.policy);
     if (platform.preemption == PreemptionMode::Os && dynamic) {
-      error(Field::Preemption, Field::Policy,
-            fmt::format("preemption 'os' needs a static policy, and '{}' is not one", to_string(workload_.policy)),
-            "use cooperative or none, or another policy");
+      findings_.error(
+          Field::Preemption, Field::Policy,
+          fmt::format("preemption 'os' needs a static policy, and '{}' is not one", to_string(workload_.policy)),
+          "use cooperative or none, or another policy");
     }
     const auto has_priority = [](const Dag &dag) {
       return std::any_of(dag.tasks.begin(), dag.tasks.end(),
@@ -83,62 +76,64 @@ class Checker {
     };
     if (workload_.policy == PolicyKind::Fixed &&
         std::none_of(workload_.dags.begin(), workload_.dags.end(), has_priority)) {
-      warning(Field::Policy, Field::Priority, "policy is 'fixed', but no task has a priority",
-              "give tasks a 'priority', or choose another policy");
+      findings_.warning(Field::Policy, Field::Priority, "policy is 'fixed', but no task has a priority",
+                        "give tasks a 'priority', or choose another policy");
     }
   }
 
   void check_name(const std::string &name, std::string_view what) {
     if (name.empty()) {
-      error(Field::Name, {}, fmt::format("a {} has no name", what), "add 'name:'");
+      findings_.error(Field::Name, {}, fmt::format("a {} has no name", what), "add 'name:'");
     } else if (const std::string why = name_mistake(name); !why.empty()) {
-      error(Field::Name, {}, fmt::format("the name {} of a {} {}", in_quotes(name), what, why));
+      findings_.error(Field::Name, {}, fmt::format("the name {} of a {} {}", in_quotes(name), what, why));
     }
   }
 
   void check_bound(const Dag &dag, Field field, std::uint32_t value) {
     if (value <= kMaxBound) return;
-    error(field, {},
-          fmt::format("{} of DAG '{}' must be from 1 to {}, not {}", to_string(field), dag.name, kMaxBound, value),
-          "leave it out if there is no bound");
+    findings_.error(
+        field, {},
+        fmt::format("{} of DAG '{}' must be from 1 to {}, not {}", to_string(field), dag.name, kMaxBound, value),
+        "leave it out if there is no bound");
   }
 
   void check_dag_names() {
     std::unordered_map<std::string_view, std::size_t> seen;
     for (std::size_t d = 0; d < workload_.dags.size(); ++d) {
-      dag_ = DagId(d);
+      findings_.at(DagId(d));
       const std::string &name = workload_.dags[d].name;
       check_name(name, "DAG");
       if (!name.empty() && !seen.emplace(name, d).second) {
-        error(Field::Name, {}, fmt::format("the name '{}' is used by another DAG", name),
-              "choose a unique name for each DAG");
+        findings_.error(Field::Name, {}, fmt::format("the name '{}' is used by another DAG", name),
+                        "choose a unique name for each DAG");
       }
     }
-    dag_ = DagId::none();
+    findings_.at(DagId::none());
   }
 
   void check_dag(DagId id) {
-    dag_ = id;
+    findings_.at(id);
     const Dag &dag = workload_.dags[id.value];
     if (dag.deadline < 0 || dag.deadline > kMaxDuration) {
-      error(Field::Deadline, {},
-            fmt::format("deadline of DAG '{}' must be from 0 to {}, not {}", dag.name, kMaxDurationText,
-                        format_duration(dag.deadline)));
+      findings_.error(Field::Deadline, {},
+                      fmt::format("deadline of DAG '{}' must be from 0 to {}, not {}", dag.name, kMaxDurationText,
+                                  format_duration(dag.deadline)));
     }
     check_bound(dag, Field::MaxActive, dag.max_active);
     check_bound(dag, Field::MaxPending, dag.max_pending);
     check_degrade(dag);
-    if (dag.tasks.empty()) error(Field::Tasks, {}, fmt::format("DAG '{}' has no tasks", dag.name));
+    if (dag.tasks.empty()) findings_.error(Field::Tasks, {}, fmt::format("DAG '{}' has no tasks", dag.name));
     std::unordered_map<std::string_view, std::size_t> seen;
     seen.reserve(dag.tasks.size());
     bool sound_edges = true;
     for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {
-      task_ = i;
+      findings_.at(id, i);
       const Task &task = dag.tasks[i];
       check_name(task.name, "task");
       if (!task.name.empty() && !seen.emplace(task.name, i).second) {
-        error(Field::Name, {}, fmt::format("the name '{}' is used by another task of DAG '{}'", task.name, dag.name),
-              "choose a unique name for each task of a DAG");
+        findings_.error(Field::Name, {},
+                        fmt::format("the name '{}' is used by another task of DAG '{}'", task.name, dag.name),
+                        "choose a unique name for each task of a DAG");
       }
       check_durations(task);
       check_wcet_low(dag, task);
@@ -146,11 +141,9 @@ class Checker {
       check_activation(task);
       check_options(task);
       check_callback(task);
-      sound_edges = check_edges(dag, task, i) && sound_edges;
+      sound_edges = check_edges(dag, i, findings_) && sound_edges;
     }
-    task_ = Finding::kNone;
-    const bool acyclic = check_cycles(dag);
-    if (sound_edges && acyclic) check_inherited_periods(dag);
+    check_graph(dag, id, sound_edges, findings_);
   }
 
   void check_durations(const Task &task) {
@@ -163,51 +156,56 @@ class Checker {
       // A deadline that was copied from a bad period is not a second mistake.
       if (rule.field == Field::Deadline && task.period <= 0 && value == task.period) continue;
       if (rule.field == Field::Period && value == 0) {
-        error(rule.field, {}, fmt::format("timer task '{}' has no period", task.name),
-              "add 'period:' to it or to its DAG, or use 'activation: data'");
+        findings_.error(rule.field, {}, fmt::format("timer task '{}' has no period", task.name),
+                        "add 'period:' to it or to its DAG, or use 'activation: data'");
       } else if (value < rule.smallest) {
-        error(rule.field, rule.field == Field::Deadline ? FieldSet(Field::Period) : FieldSet(),
-              fmt::format("{} of task '{}' must {}, not {}", name, task.name,
-                          rule.smallest == 0 ? "not be negative" : "be greater than zero", format_duration(value)));
+        findings_.error(
+            rule.field, rule.field == Field::Deadline ? FieldSet(Field::Period) : FieldSet(),
+            fmt::format("{} of task '{}' must {}, not {}", name, task.name,
+                        rule.smallest == 0 ? "not be negative" : "be greater than zero", format_duration(value)));
       } else if (value > kMaxDuration) {
-        error(rule.field, {},
-              fmt::format("{} of task '{}' is too large; at most {} is allowed", name, task.name, kMaxDurationText));
+        findings_.error(
+            rule.field, {},
+            fmt::format("{} of task '{}' is too large; at most {} is allowed", name, task.name, kMaxDurationText));
       }
     }
     check_against_wcet(task);
     if (task.activation == Activation::Timer && task.period > 0 && task.jitter > task.period) {
-      error(Field::Jitter, Field::Period,
-            fmt::format("jitter {} of task '{}' exceeds its period {}", format_duration(task.jitter), task.name,
-                        format_duration(task.period)),
-            "a release would overtake the previous one");
+      findings_.error(Field::Jitter, Field::Period,
+                      fmt::format("jitter {} of task '{}' exceeds its period {}", format_duration(task.jitter),
+                                  task.name, format_duration(task.period)),
+                      "a release would overtake the previous one");
     }
   }
 
   void check_against_wcet(const Task &task) {
     const std::string wcet = format_duration(task.wcet);
     if (task.wcet > 0 && task.bcet > task.wcet) {
-      error(Field::Bcet, Field::Wcet,
-            fmt::format("bcet {} of task '{}' exceeds its wcet {}", format_duration(task.bcet), task.name, wcet));
+      findings_.error(
+          Field::Bcet, Field::Wcet,
+          fmt::format("bcet {} of task '{}' exceeds its wcet {}", format_duration(task.bcet), task.name, wcet));
     }
     if (task.deadline > 0 && task.wcet > task.deadline) {
-      warning(
+      findings_.warning(
           Field::Wcet, Field::Deadline | Field::Period,
           fmt::format("wcet {} of task '{}' exceeds its deadline {}", wcet, task.name, format_duration(task.deadline)),
           "a job that runs for its wcet misses its deadline");
     } else if (task.period > 0 && task.wcet > task.period) {
-      warning(Field::Wcet, Field::Period,
-              fmt::format("wcet {} of task '{}' exceeds its period {}", wcet, task.name, format_duration(task.period)));
+      findings_.warning(
+          Field::Wcet, Field::Period,
+          fmt::format("wcet {} of task '{}' exceeds its period {}", wcet, task.name, format_duration(task.period)));
     }
     if (task.budget > 0 && task.budget < task.wcet && task.on_budget != OnBudget::Log) {
-      warning(Field::Budget, Field::Wcet | Field::OnBudget,
-              fmt::format("budget {} of task '{}' is below its wcet {}", format_duration(task.budget), task.name, wcet),
-              task.on_budget == OnBudget::Abort ? "jobs that keep within their wcet are cut off"
-                                                : "the action of 'on_budget' affects jobs that keep within their wcet");
+      findings_.warning(
+          Field::Budget, Field::Wcet | Field::OnBudget,
+          fmt::format("budget {} of task '{}' is below its wcet {}", format_duration(task.budget), task.name, wcet),
+          task.on_budget == OnBudget::Abort ? "jobs that keep within their wcet are cut off"
+                                            : "the action of 'on_budget' affects jobs that keep within their wcet");
     }
     if (task.on_budget != OnBudget::Abort && task.budget == 0) {
-      error(Field::OnBudget, Field::Budget,
-            fmt::format("task '{}' has 'on_budget: {}', but no budget", task.name, to_string(task.on_budget)),
-            "add 'budget:', the processor time after which that action happens");
+      findings_.error(Field::OnBudget, Field::Budget,
+                      fmt::format("task '{}' has 'on_budget: {}', but no budget", task.name, to_string(task.on_budget)),
+                      "add 'budget:', the processor time after which that action happens");
     }
   }
 
@@ -215,32 +213,35 @@ class Checker {
   void check_wcet_low(const Dag &dag, const Task &task) {
     if (task.wcet_low <= 0) return;
     if (dag.criticality != Criticality::High) {
-      error(Field::WcetLow, Field::Criticality,
-            fmt::format("task '{}' has a wcet_low, but DAG '{}' is not of high criticality", task.name, dag.name),
-            "add 'criticality: high' to the DAG, or remove 'wcet_low:'");
+      findings_.error(
+          Field::WcetLow, Field::Criticality,
+          fmt::format("task '{}' has a wcet_low, but DAG '{}' is not of high criticality", task.name, dag.name),
+          "add 'criticality: high' to the DAG, or remove 'wcet_low:'");
     }
     if (task.wcet > 0 && task.wcet_low > task.wcet) {
-      error(Field::WcetLow, Field::Wcet,
-            fmt::format("wcet_low {} of task '{}' exceeds its wcet {}", format_duration(task.wcet_low), task.name,
-                        format_duration(task.wcet)),
-            "wcet is C(HI), an upper bound on every execution; wcet_low is C(LO), which holds in LO mode");
+      findings_.error(Field::WcetLow, Field::Wcet,
+                      fmt::format("wcet_low {} of task '{}' exceeds its wcet {}", format_duration(task.wcet_low),
+                                  task.name, format_duration(task.wcet)),
+                      "wcet is C(HI), an upper bound on every execution; wcet_low is C(LO), which holds in LO mode");
     }
   }
 
   void check_degrade(const Dag &dag) {
     const Degrade &degrade = dag.degrade;
     if (dag.criticality == Criticality::High && degrade != Degrade{}) {
-      error(Field::Degrade, Field::Criticality, fmt::format("DAG '{}' of high criticality is never degraded", dag.name),
-            "remove 'degrade:'");
+      findings_.error(Field::Degrade, Field::Criticality,
+                      fmt::format("DAG '{}' of high criticality is never degraded", dag.name), "remove 'degrade:'");
     }
     if (degrade.kind == Degrade::Kind::Skip && (degrade.skip < 1 || degrade.skip > kMaxDegrade)) {
-      error(Field::Degrade, {},
-            fmt::format("skip of DAG '{}' must be from 1 to {}, not {}", dag.name, kMaxDegrade, degrade.skip));
+      findings_.error(
+          Field::Degrade, {},
+          fmt::format("skip of DAG '{}' must be from 1 to {}, not {}", dag.name, kMaxDegrade, degrade.skip));
     }
     if (degrade.kind == Degrade::Kind::Stretch && !(degrade.stretch >= 1 && degrade.stretch <= kMaxDegrade)) {
-      error(Field::Degrade, {},
-            fmt::format("stretch of DAG '{}' must be from 1 to {}, not {}", dag.name, kMaxDegrade, degrade.stretch),
-            "stretch is the factor by which periods grow in HI mode");
+      findings_.error(
+          Field::Degrade, {},
+          fmt::format("stretch of DAG '{}' must be from 1 to {}, not {}", dag.name, kMaxDegrade, degrade.stretch),
+          "stretch is the factor by which periods grow in HI mode");
     }
   }
 
@@ -250,26 +251,27 @@ class Checker {
     const FieldSet bounds = Field::Wcet | Field::Bcet;
     if (model.kind == Kind::Normal) {
       if (model.mean < task.bcet || model.mean > task.wcet || model.mean <= 0) {
-        error(Field::Execution, bounds,
-              fmt::format("mean {} of task '{}' is not between its bcet and its wcet", format_duration(model.mean),
-                          task.name));
+        findings_.error(Field::Execution, bounds,
+                        fmt::format("mean {} of task '{}' is not between its bcet and its wcet",
+                                    format_duration(model.mean), task.name));
       }
       if (model.stddev < 0 || model.stddev > kMaxDuration) {
-        error(Field::Execution, {},
-              fmt::format("stddev of task '{}' must be from 0 to {}, not {}", task.name, kMaxDurationText,
-                          format_duration(model.stddev)));
+        findings_.error(Field::Execution, {},
+                        fmt::format("stddev of task '{}' must be from 0 to {}, not {}", task.name, kMaxDurationText,
+                                    format_duration(model.stddev)));
       }
     }
     if (model.kind != Kind::Empirical) return;
     if (model.samples.empty()) {
-      error(Field::Execution, {}, fmt::format("task '{}' has no execution-time samples", task.name));
+      findings_.error(Field::Execution, {}, fmt::format("task '{}' has no execution-time samples", task.name));
     }
     for (std::size_t i = 0; i < model.samples.size(); ++i) {
       const Duration sample = model.samples[i];
       if (sample > 0 && sample >= task.bcet && sample <= task.wcet) continue;
-      error(Field::Execution, bounds,
-            fmt::format("sample {} of task '{}' is not between its bcet and its wcet", format_duration(sample),
-                        task.name))
+      findings_
+          .error(Field::Execution, bounds,
+                 fmt::format("sample {} of task '{}' is not between its bcet and its wcet", format_duration(sample),
+                             task.name))
           .item = static_cast<std::uint32_t>(i);
     }
   }
@@ -277,38 +279,40 @@ class Checker {
   void check_activation(const Task &task) {
     if (task.activation == Activation::Timer) return;
     if (task.predecessors.empty()) {
-      error(Field::Activation, Field::After, fmt::format("data task '{}' has no predecessor", task.name),
-            "name predecessors with 'after:', or use 'activation: timer'");
+      findings_.error(Field::Activation, Field::After, fmt::format("data task '{}' has no predecessor", task.name),
+                      "name predecessors with 'after:', or use 'activation: timer'");
     }
     for (const auto &[field, value] : {std::pair{Field::Offset, task.offset}, std::pair{Field::Jitter, task.jitter}}) {
       if (value == 0) continue;
-      error(field, Field::Activation, fmt::format("data task '{}' has '{}'", task.name, to_string(field)),
-            "only timer tasks can have it, because predecessors release a data task");
+      findings_.error(field, Field::Activation, fmt::format("data task '{}' has '{}'", task.name, to_string(field)),
+                      "only timer tasks can have it, because predecessors release a data task");
     }
   }
 
   void check_options(const Task &task) {
     if (const std::string why = name_mistake(task.group); !task.group.empty() && !why.empty()) {
-      error(Field::Group, {}, fmt::format("group {} of task '{}' {}", in_quotes(task.group), task.name, why));
+      findings_.error(Field::Group, {}, fmt::format("group {} of task '{}' {}", in_quotes(task.group), task.name, why));
     }
     if (task.overrun == Overrun::Queue && (task.queue_depth < 1 || task.queue_depth > kMaxQueueDepth)) {
-      error(Field::Overrun, {},
-            fmt::format("queue depth of task '{}' must be from 1 to {}, not {}", task.name, kMaxQueueDepth,
-                        task.queue_depth));
+      findings_.error(Field::Overrun, {},
+                      fmt::format("queue depth of task '{}' must be from 1 to {}, not {}", task.name, kMaxQueueDepth,
+                                  task.queue_depth));
     }
     if (task.concurrency < 1 || task.concurrency > kMaxConcurrency) {
-      error(Field::Concurrency, {},
-            fmt::format("concurrency of task '{}' must be from 1 to {}, not {}", task.name, kMaxConcurrency,
-                        task.concurrency));
+      findings_.error(Field::Concurrency, {},
+                      fmt::format("concurrency of task '{}' must be from 1 to {}, not {}", task.name, kMaxConcurrency,
+                                  task.concurrency));
     } else if (task.concurrency > 1 && !task.group.empty()) {
-      error(Field::Concurrency, Field::Group,
-            fmt::format("task '{}' has concurrency {}, but is in group '{}'", task.name, task.concurrency, task.group),
-            "jobs of one group never overlap: remove 'concurrency' or 'group'");
+      findings_.error(
+          Field::Concurrency, Field::Group,
+          fmt::format("task '{}' has concurrency {}, but is in group '{}'", task.name, task.concurrency, task.group),
+          "jobs of one group never overlap: remove 'concurrency' or 'group'");
     }
     if (task.priority && workload_.policy != PolicyKind::Fixed) {
-      warning(Field::Priority, Field::Policy,
-              fmt::format("policy '{}' ignores the priority of task '{}'", to_string(workload_.policy), task.name),
-              "use 'policy: fixed', or remove the priority");
+      findings_.warning(
+          Field::Priority, Field::Policy,
+          fmt::format("policy '{}' ignores the priority of task '{}'", to_string(workload_.policy), task.name),
+          "use 'policy: fixed', or remove the priority");
     }
   }
 
@@ -319,7 +323,7 @@ class Checker {
     const bool is_timer = callback.kind == Callback::Kind::Timer;
     const bool is_counted = is_timer || callback.kind == Callback::Kind::Waitable;
     const auto refuse = [&](std::uint32_t item, std::string message, std::string hint = {}) {
-      error(Field::Callback, {}, std::move(message), std::move(hint)).item = item;
+      findings_.error(Field::Callback, {}, std::move(message), std::move(hint)).item = item;
     };
     check_callback_name(task, callback.node, "node", kCallbackNode);
     if (!is_counted) {
@@ -331,138 +335,36 @@ class Checker {
       refuse(kCallbackKind, fmt::format("the {} of task '{}' cannot have period {}", kind, task.name,
                                         format_duration(callback.period)));
     } else if (callback.period != 0 && task.activation == Activation::Timer && callback.period != task.period) {
-      warning(Field::Period, Field::Callback,
-              fmt::format("period {} of task '{}' differs from the period of its timer, {}",
-                          format_duration(task.period), task.name, format_duration(callback.period)),
-              "use the timer's period, because the priority follows from it");
+      findings_.warning(Field::Period, Field::Callback,
+                        fmt::format("period {} of task '{}' differs from the period of its timer, {}",
+                                    format_duration(task.period), task.name, format_duration(callback.period)),
+                        "use the timer's period, because the priority follows from it");
     }
     if (!is_counted && callback.index) {
       refuse(kCallbackKind, fmt::format("the {} of task '{}' cannot have an index", kind, task.name));
     }
     if (is_timer && task.activation == Activation::Data) {
-      error(Field::Callback, Field::Activation, fmt::format("data task '{}' has a timer as its callback", task.name),
-            "predecessors release it: name the callback that takes their data, or use 'activation: timer'")
+      findings_
+          .error(Field::Callback, Field::Activation,
+                 fmt::format("data task '{}' has a timer as its callback", task.name),
+                 "predecessors release it: name the callback that takes their data, or use 'activation: timer'")
           .item = kCallbackKind;
     }
     const auto [other, is_first] = callbacks_.emplace(to_string(callback), task.name);
     if (!is_first) {
-      warning(Field::Callback, {},
-              fmt::format("task '{}' names the same callback as task '{}'", task.name, other->second),
-              "only the first of them in the file is used");
+      findings_.warning(Field::Callback, {},
+                        fmt::format("task '{}' names the same callback as task '{}'", task.name, other->second),
+                        "only the first of them in the file is used");
     }
   }
 
   void check_callback_name(const Task &task, const std::string &name, const char *what, std::uint32_t item) {
     const std::string why = ros_name_mistake(name);
     if (why.empty()) return;
-    error(Field::Callback, {}, fmt::format("{} '{}' of the callback of task '{}' {}", what, name, task.name, why),
-          "write full names as 'ros2 node info' prints them; * and ? match any characters")
+    findings_
+        .error(Field::Callback, {}, fmt::format("{} '{}' of the callback of task '{}' {}", what, name, task.name, why),
+               "write full names as 'ros2 node info' prints them; * and ? match any characters")
         .item = item;
-  }
-
-  bool check_edges(const Dag &dag, const Task &task, std::uint32_t index) {
-    bool sound = task.activation == Activation::Timer || !task.predecessors.empty();
-    std::vector<std::uint32_t> seen;
-    for (std::uint32_t k = 0; k < task.predecessors.size(); ++k) {
-      const std::uint32_t p = task.predecessors[k];
-      std::string message;
-      if (p >= dag.tasks.size()) {
-        message = fmt::format("predecessor {} of task '{}' does not exist", p, task.name);
-      } else if (p == index) {
-        message = fmt::format("task '{}' is its own predecessor", task.name);
-      }
-      if (message.empty()) {
-        seen.push_back(p);
-        continue;
-      }
-      sound = false;
-      error(Field::After, {}, std::move(message)).item = k;
-    }
-    std::sort(seen.begin(), seen.end());
-    if (std::adjacent_find(seen.begin(), seen.end()) == seen.end()) return sound;
-    report_duplicate_edges(dag, task);
-    return false;
-  }
-
-  void report_duplicate_edges(const Dag &dag, const Task &task) {
-    std::unordered_map<std::uint32_t, std::uint32_t> first;
-    for (std::uint32_t k = 0; k < task.predecessors.size(); ++k) {
-      const std::uint32_t p = task.predecessors[k];
-      if (p >= dag.tasks.size() || first.emplace(p, k).second) continue;
-      error(Field::After, {}, fmt::format("task '{}' names predecessor '{}' twice", task.name, dag.tasks[p].name))
-          .item = k;
-    }
-  }
-
-  // Depth-first search along predecessors, without recursion. An edge back to the current path closes a cycle. Reports
-  // each such edge, up to a bound that keeps the report readable.
-  bool check_cycles(const Dag &dag) {
-    enum class Mark : std::uint8_t { New, OnPath, Done };
-    struct Step {
-      std::uint32_t task;
-      std::uint32_t next = 0;  // index in its predecessors
-    };
-    constexpr std::size_t kMostReported = 10;
-    std::vector<Mark> marks(dag.tasks.size(), Mark::New);
-    std::vector<Step> path;
-    std::size_t cycles = 0;
-    for (std::uint32_t root = 0; root < dag.tasks.size(); ++root) {
-      if (marks[root] != Mark::New) continue;
-      path.push_back({root});
-      marks[root] = Mark::OnPath;
-      while (!path.empty()) {
-        Step &top = path.back();
-        const auto &predecessors = dag.tasks[top.task].predecessors;
-        if (top.next == predecessors.size()) {
-          marks[top.task] = Mark::Done;
-          path.pop_back();
-          continue;
-        }
-        const std::uint32_t p = predecessors[top.next++];
-        if (p >= dag.tasks.size() || p == top.task) continue;  // reported as edges
-        if (marks[p] == Mark::OnPath && cycles++ < kMostReported) {
-          auto start = std::find_if(path.begin(), path.end(), [p](const Step &step) { return step.task == p; });
-          std::vector<std::uint32_t> cycle;
-          for (; start != path.end(); ++start) cycle.push_back(start->task);
-          report_cycle(dag, std::move(cycle));
-        } else if (marks[p] == Mark::New) {
-          marks[p] = Mark::OnPath;
-          path.push_back({p});
-        }
-      }
-    }
-    return cycles == 0;
-  }
-
-  // `cycle` runs against the edges: each task is a successor of the next one.
-  void report_cycle(const Dag &dag, std::vector<std::uint32_t> cycle) {
-    constexpr std::size_t kMostNamed = 12;
-    std::reverse(cycle.begin(), cycle.end());
-    std::rotate(cycle.begin(), std::min_element(cycle.begin(), cycle.end()), cycle.end());
-    std::string names;
-    for (std::size_t i = 0; i < cycle.size() && i < kMostNamed; ++i) names += dag.tasks[cycle[i]].name + " -> ";
-    if (cycle.size() > kMostNamed) names += fmt::format("({} more) -> ", cycle.size() - kMostNamed);
-    task_ = cycle.front();
-    error(Field::After, {}, fmt::format("cycle in DAG '{}': {}{}", dag.name, names, dag.tasks[cycle.front()].name),
-          "remove one of these edges: a task cannot wait for itself");
-    task_ = Finding::kNone;
-  }
-
-  // Requires an acyclic DAG without unsound edges; other DAGs have no periods to inherit.
-  void check_inherited_periods(const Dag &dag) {
-    for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {
-      const Task &task = dag.tasks[i];
-      if (task.activation != Activation::Data) continue;
-      Duration largest = 0;
-      for (const std::uint32_t p : task.predecessors) largest = std::max(largest, dag.tasks[p].period);
-      if (task.period == largest) continue;
-      task_ = i;
-      error(Field::Period, Field::After,
-            fmt::format("period {} of data task '{}' is not {}, the largest period of its predecessors",
-                        format_duration(task.period), task.name, format_duration(largest)),
-            "call inherit_periods() after changes of periods");
-    }
-    task_ = Finding::kNone;
   }
 
   void check_load() {
@@ -474,17 +376,15 @@ class Checker {
     }
     constexpr double kRounding = 1e-9;
     if (utilization <= static_cast<double>(workload_.platform.workers) * (1 + kRounding)) return;
-    warning(Field::Workers, Field::Wcet | Field::Period,
-            fmt::format("utilization {:.4g} exceeds the capacity of {} worker{}", utilization,
-                        workload_.platform.workers, workload_.platform.workers == 1 ? "" : "s"),
-            "no schedule meets every deadline if jobs execute for their wcet");
+    findings_.warning(Field::Workers, Field::Wcet | Field::Period,
+                      fmt::format("utilization {:.4g} exceeds the capacity of {} worker{}", utilization,
+                                  workload_.platform.workers, workload_.platform.workers == 1 ? "" : "s"),
+                      "no schedule meets every deadline if jobs execute for their wcet");
   }
 
   const Workload &workload_;
   ValidateOptions options_;
-  DagId dag_;
-  std::uint32_t task_ = Finding::kNone;
-  std::vector<Finding> findings_;
+  FindingList findings_;
   std::unordered_map<std::string, std::string_view> callbacks_;  // text of a callback -> task that names it first
 };
 
