@@ -177,7 +177,8 @@ TEST_P(Degradation, EveryHighModeCountsAnew) {
   EXPECT_EQ(ended, " a10 a20");
 }
 
-// A random DAG of 2 to 5 tasks on one grid, all joined by edges.
+// A random DAG of 2 to 5 tasks on one grid, all joined by edges. Apart from random_dag(), which draws tasks of
+// different periods: the property is about tasks that are let through together.
 Dag random_joined_dag(Rng &rng) {
   std::vector<TestTask> tasks;
   const auto count = static_cast<std::uint32_t>(rng.uniform(2, 5));

@@ -282,8 +282,7 @@ Diagnostics find_mistakes(const GenerateOptions &o) {
   require(std::uint64_t{o.dags} * o.max_tasks <= kMaxTasks,
           fmt::format("dags * max_tasks must be at most {}", kMaxTasks));
   require(o.workers >= 1 && o.workers <= kMaxWorkers, fmt::format("workers must be from 1 to {}", kMaxWorkers));
-  require(o.preemption != PreemptionMode::Os || (o.policy != PolicyKind::Edf && o.policy != PolicyKind::Fifo),
-          "preemption 'os' needs a static policy");
+  require(o.preemption != PreemptionMode::Os || is_static(o.policy), "preemption 'os' needs a static policy");
   require(o.utilization > 0 && std::isfinite(o.utilization), "utilization must be greater than zero");
   require(o.max_task_utilization > 0 && o.max_task_utilization <= 1, "max_task_utilization must be in (0, 1]");
   require(o.utilization <= o.max_task_utilization * o.dags * o.min_tasks,

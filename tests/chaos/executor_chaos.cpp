@@ -162,7 +162,8 @@ class Run {
   }
 
  private:
-  // Adds a DAG to the executor and to `dags_`, where its position is its DagId.
+  // Adds a DAG to the executor and to `dags_`, where its position is its DagId. Drawn apart from random_dag(): the
+  // periods are long enough for real threads, and DagBuilder takes bodies instead of execution times.
   void add() {
     const LockGuard guard(lock_);
     if (dags_.size() >= kMostDags) return;
