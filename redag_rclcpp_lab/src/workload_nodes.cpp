@@ -4,8 +4,6 @@
 #include "workload_nodes.hpp"
 
 #include <fmt/format.h>
-#include <rcl/timer.h>
-#include <rcutils/time.h>
 
 #include <cctype>
 #include <chrono>
@@ -15,7 +13,6 @@
 #include <thread>
 #include <utility>
 
-#include "rclcpp/version.h"
 #include "redag/model/demand.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/preemption_point.hpp"
@@ -32,17 +29,8 @@ using redag::Task;
 using redag::TaskId;
 using redag::Time;
 
-redag::Time timer_clock_now() noexcept {
-  rcutils_time_point_value_t now = 0;
-  // The call fails only for a null pointer and without a steady clock; neither happens here.
-  [[maybe_unused]] const rcutils_ret_t status = rcutils_steady_time_now(&now);
-  return now;
-}
-
 namespace {
 
-constexpr Duration kPhaseTolerance = redag::kMicrosecond;  // largest error of a timer's first expiry
-constexpr int kPhaseAttempts = 1000;
 constexpr Duration kConnectLook = 5 * redag::kMillisecond;
 constexpr Duration kForgotten = 3 * redag::kSecond;  // the middleware has forgotten an earlier run by then
 // The shortest absence from the processor that is recorded. Interrupts and the like are shorter.
@@ -140,12 +128,11 @@ struct WorkloadNodes::TaskNode {
   std::string task_name;  // name in ROS
   rclcpp::Node::SharedPtr node;
   rclcpp::CallbackGroup::SharedPtr group;
-  rclcpp::TimerBase::SharedPtr timer;
+  std::unique_ptr<PhasedTimer> timer;
   std::uint32_t timer_index = 0;  // index among the timers of its node
-  Time first_expiry = 0;
-  std::int64_t last_job = -1;  // timer task: number of the last expired job
-  std::int64_t waiting = -1;   // timer task with predecessors: job that waits for data; -1: none
-  Time consumed = -1;          // data task: end of the last predecessor of the last job
+  std::int64_t last_job = -1;     // timer task: number of the last expired job
+  std::int64_t waiting = -1;      // timer task with predecessors: job that waits for data; -1: none
+  Time consumed = -1;             // data task: end of the last predecessor of the last job
   std::int64_t completed = 0;
   std::deque<Input> inputs;
   std::uint32_t slowest = 0;  // input with the largest period; it numbers the jobs of a data task
@@ -275,59 +262,15 @@ redag::Result<void> WorkloadNodes::connect(Duration timeout) {
 
 // ---- timers ----
 
-// Starts each timer's grid at the wanted time. A grid begins when the timer is reset. The timer is reset with the
-// distance to its first expiry as period, and the true period is set right after. The error is the time between two
-// clock readings.
 void WorkloadNodes::arm(Time origin) {
   origin_ = origin;
   std::map<const rclcpp::Node *, std::uint32_t> timers;
   for (TaskNode &task : tasks_) {
     if (task.task->activation != Activation::Timer) continue;
     task.timer_index = timers[task.node.get()]++;
-    create_timer(task);
-  }
-}
-
-void WorkloadNodes::create_timer(TaskNode &task) {
-#if RCLCPP_VERSION_MAJOR >= 28
-  const auto callback = [this, &task](const rclcpp::TimerInfo &info) {
-    on_timer(task, (info.actual_call_time.nanoseconds() - task.first_expiry) / task.task->period);
-  };
-#else
-  const auto callback = [this, &task] { on_timer(task, expired_job(task)); };
-#endif
-  task.timer = task.node->create_wall_timer(std::chrono::nanoseconds(task.task->period), callback, task.group);
-  const std::shared_ptr<const rcl_timer_t> handle = task.timer->get_timer_handle();
-  const Time wanted = origin_ + task.task->offset;
-  Duration unsure = 0;
-  for (int attempt = 0; attempt < kPhaseAttempts; ++attempt) {
-    std::int64_t old = 0;
-    if (rcl_timer_exchange_period(handle.get(), wanted - timer_clock_now(), &old) != RCL_RET_OK) {
-      rclcpp::exceptions::throw_from_rcl_error(RCL_RET_ERROR, "cannot set a timer's period");
-    }
-    task.timer->reset();
-    if (rcl_timer_exchange_period(handle.get(), task.task->period, &old) != RCL_RET_OK) {
-      rclcpp::exceptions::throw_from_rcl_error(RCL_RET_ERROR, "cannot set a timer's period");
-    }
-    const Time before = timer_clock_now();
-    const Duration until = task.timer->time_until_trigger().count();
-    const Time after = timer_clock_now();
-    unsure = (after - before + 1) / 2;
-    task.first_expiry = before + until + unsure;
-    if (after + until - wanted <= kPhaseTolerance) break;
-  }
-  phase_error_ = std::max(phase_error_, std::abs(task.first_expiry - wanted) + unsure);
-}
-
-// Number of the grid point whose call this is: the one before the timer's next point.
-std::int64_t WorkloadNodes::expired_job(TaskNode &task) const {
-  for (;;) {
-    const Time before = timer_clock_now();
-    const Duration until = task.timer->time_until_trigger().count();
-    const Time after = timer_clock_now();
-    // Repeats the reading if the thread was preempted for so long that another point could be meant.
-    if (after - before > task.task->period / 4) continue;
-    return (before + until + task.task->period / 2 - task.first_expiry) / task.task->period - 1;
+    task.timer = std::make_unique<PhasedTimer>(*task.node, task.group, origin_ + task.task->offset, task.task->period,
+                                               [this, &task](std::int64_t job) { on_timer(task, job); });
+    phase_error_ = std::max(phase_error_, task.timer->phase_error());
   }
 }
 
@@ -495,14 +438,14 @@ bool WorkloadNodes::wait_idle(Time deadline) const {
 Duration WorkloadNodes::measurement_cost() {
   constexpr int kRounds = 2000;
   redag::trace::Ring scratch(2 * kRounds);
-  TaskNode *timed = nullptr;
-  for (TaskNode &task : tasks_) {
-    if (task.timer != nullptr) timed = &task;
+  const PhasedTimer *timer = nullptr;
+  for (const TaskNode &task : tasks_) {
+    if (task.timer != nullptr) timer = task.timer.get();
   }
   const Time begin = timer_clock_now();
   for (int i = 0; i < kRounds; ++i) {
     running_.fetch_add(1);
-    if (timed != nullptr && RCLCPP_VERSION_MAJOR < 28) (void)expired_job(*timed);
+    if (timer != nullptr) timer->repeat_numbering();
     for (const JobEventKind kind : {JobEventKind::Started, JobEventKind::Finished}) {
       record({now(), 0, TaskId(0), static_cast<std::uint32_t>(i), 0, kind}, &scratch);
     }

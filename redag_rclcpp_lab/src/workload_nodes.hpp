@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "phased_timer.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/result.hpp"
 #include "redag/model/job_event.hpp"
@@ -25,9 +26,6 @@
 #include "std_msgs/msg/int64_multi_array.hpp"
 
 namespace redag_rclcpp::lab {
-
-/// Reads rclcpp's steady clock, on which timers expire. In some distributions it differs from std::chrono's.
-[[nodiscard]] redag::Time timer_clock_now() noexcept;
 
 struct NodesOptions {
   std::uint64_t seed = 1;
@@ -97,14 +95,12 @@ class WorkloadNodes {
 
   void create_node(TaskNode &task);
   void create_topics();
-  void create_timer(TaskNode &task);
   void on_timer(TaskNode &task, std::int64_t job);
   void on_message(TaskNode &task, Input &input, const Message &message);
   void run_if_complete(TaskNode &task);
   void execute(TaskNode &task, const Job &job);
   void publish(TaskNode &task, const Job &job, redag::Time finish);
   void use_processor(redag::Duration demand, redag::Duration region, redag::JobEvent job, redag::trace::Ring *events);
-  [[nodiscard]] std::int64_t expired_job(TaskNode &task) const;
   redag::trace::Ring *ring(std::uint32_t &thread) noexcept;
   void record(const redag::JobEvent &event, redag::trace::Ring *ring) noexcept;
 
