@@ -72,8 +72,8 @@ the timer's grid, or the end of the last predecessor. A release that never ran
 is a miss. Ctrl-C ends the run early and shows the results so far.
 
 Examples:
-  ros2 run redag_rclcpp_lab run_workload cart.yaml --executor redag-os
-  ros2 run redag_rclcpp_lab run_workload cart.yaml --executor redag,mte,ste
+  ros2 run redag_rclcpp_lab run_workload workloads/hello.yaml --executor mte,ste
+  ros2 run redag_rclcpp_lab run_workload workloads/hello.yaml --out results
   redag check-trace results/scheduler_events.jsonl
 
 Exit status: 0 success; 1 a trace breaks rules of the model; 2 bad input, or
