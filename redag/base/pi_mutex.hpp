@@ -39,12 +39,11 @@ class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
   PiMutex(const PiMutex &) = delete;
   PiMutex &operator=(const PiMutex &) = delete;
 
-  void lock() noexcept REDAG_ACQUIRE() {
-    if (spin()) return;
-    if (!inherits_) return acquire(mutex_);
-    acquire(queue_);
-    if (!spin()) acquire(mutex_);
-    queued_ = true;
+  /// Returns true if the mutex was free.
+  bool lock() noexcept REDAG_ACQUIRE() {
+    if (try_lock()) return true;
+    wait();
+    return false;
   }
   [[nodiscard]] bool try_lock() noexcept REDAG_TRY_ACQUIRE(true) { return pthread_mutex_trylock(&mutex_) == 0; }
   void unlock() noexcept REDAG_RELEASE() {
@@ -55,6 +54,14 @@ class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
   }
 
  private:
+  void wait() noexcept {
+    if (spin()) return;
+    if (!inherits_) return acquire(mutex_);
+    acquire(queue_);
+    if (!spin()) acquire(mutex_);
+    queued_ = true;
+  }
+
   // The longest pause between two tries, in calls of relax(). All pauses together take less than 2 us.
   static constexpr int kPauses = 32;
 

@@ -24,11 +24,12 @@ class CpuMeter {
     bool exact = true;
   };
 
-  /// Begins a job. `exact`: its start must be exact.
-  Start begin(Time now, bool exact) noexcept {
-    if (!fresh_ && (exact || now - read_at_ > kStale)) set(thread_cpu_now(), now);
-    return Start{read_, fresh_};
+  /// Returns true if a job that begins at `now` needs a new reading. `exact`: its start must be exact.
+  [[nodiscard]] bool needs_reading(Time now, bool exact) const noexcept {
+    return !fresh_ && (exact || now - read_at_ > kStale);
   }
+  /// The start of a job that begins now.
+  [[nodiscard]] Start start() const noexcept { return Start{read_, fresh_}; }
   /// Notes the thread's processor time at `now`, where the next job begins.
   void set(Duration cpu, Time now) noexcept {
     read_ = cpu;

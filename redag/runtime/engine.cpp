@@ -184,8 +184,16 @@ void Engine::refresh_outranked() {
 
 // ---- events from outside ----
 
-void Engine::release(std::span<const Release> releases) {
-  const Time at = now();
+void Engine::release(std::span<const Release> releases) { release_at(releases, now()); }
+
+void Engine::release(TaskId task, Time nominal) { release(task, nominal, now()); }
+
+void Engine::release(TaskId task, Time nominal, Time at) {
+  const Release one{task, nominal};
+  release_at(std::span(&one, 1), at);
+}
+
+void Engine::release_at(std::span<const Release> releases, Time at) {
   Locked locked(*this, releases.size());
   withdraw_if_halting();
   if (halted_at_ != kNever) return;
@@ -195,11 +203,6 @@ void Engine::release(std::span<const Release> releases) {
     decide(locked, at);
     releases = releases.subspan(lot.size());
   } while (!releases.empty());
-}
-
-void Engine::release(TaskId task, Time nominal) {
-  const Release one{task, nominal};
-  release(std::span(&one, 1));
 }
 
 void Engine::miss(TaskId task, Time nominal, Reason reason) {

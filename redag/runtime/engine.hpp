@@ -108,6 +108,8 @@ class Engine {
   /// after the other. Decisions are carried out before it returns. Nothing allocates under the lock.
   void release(std::span<const Release> releases);
   void release(TaskId task, Time nominal);
+  /// As above, for a caller that has just read now(): the job arrives at `at`.
+  void release(TaskId task, Time nominal, Time at);
   /// Reports a release that is skipped at once for `reason` (sched::Scheduler::miss).
   void miss(TaskId task, Time nominal, Reason reason);
 
@@ -178,13 +180,13 @@ class Engine {
   class Locked;
 
   Result<void> start_threads(const std::vector<int> &cpus);
+  void release_at(std::span<const Release> releases, Time at);
   void main(WorkerThread &self) noexcept;
   void guard_throttling() noexcept;
   Next run(WorkerThread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;
   sched::Outcome call(const Assignment &assignment);
-  Duration charge(WorkerThread &self, const TaskEntry &entry, const RunningJob &running, Time at) noexcept;
-  Next finish(WorkerThread &self, const Assignment &assignment, RunningJob &running, sched::Outcome outcome, Time at,
-              Duration used, JobSlot below);
+  Next finish(WorkerThread &self, const Assignment &assignment, RunningJob &running, sched::Outcome outcome,
+              JobSlot below, Time &next_begins);
   void preemption_point(RunningJob &job);
   void reach_limit(RunningJob &job, Duration used);
 

@@ -23,9 +23,10 @@ std::optional<TaskId> Engine::current_task() const noexcept {
   return std::nullopt;
 }
 
-// Runs a job to its end, on top of `below` if that is valid. `at` is when it begins, and is set to when it ends. A job
-// that follows another on its thread is charged for the decision between the two, which saves reading clocks. Returns
-// the thread's next action.
+// Runs a job to its end, on top of `below` if that is valid. `at` is when it begins, and is set to when the thread's
+// next job does. A job that follows another on its thread is charged for the decision between the two, which saves
+// reading clocks. On the clock, it does not take the time for which that decision was delayed, nor the time to ask for
+// the thread's processor time. Returns the thread's next action.
 Next Engine::run(WorkerThread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept {
   const Job &job = assignment.job;
   if (options_.trace_capacity > 0) {
@@ -41,37 +42,29 @@ Next Engine::run(WorkerThread &self, const Assignment &assignment, JobSlot below
   running.slot = job.slot;
   running.top = &self.top;
   running.limit = assignment.entry->next_limit(running);
+  running.measured = assignment.entry->always_measured();
+  if (self.meter.needs_reading(at, !assignment.expected_short)) {
+    self.meter.set(thread_cpu_now(), at);
+    at = now();
+  }
   running.begun = at;
-  running.start = self.meter.begin(at, !assignment.expected_short);
+  running.start = self.meter.start();
   running.below = RunningJob::current();
   RunningJob::set_current(&running);
   running.enter();
   const Outcome outcome = call(assignment);
-  running.leave();
+  running.close();
   RunningJob::set_current(running.below);
-  at = now();
-  const Duration used = charge(self, *assignment.entry, running, at);
-  if (options_.trace_capacity > 0) {
-    self.events.push(
-        JobEvent{at, used, job.task, job.number, job.worker.value, JobEventKind::Executed, Reason::None, 0});
-  }
-  return finish(self, assignment, running, outcome, at, used, below);
-}
-
-// Returns the processor time that a job used which ended at `at`.
-Duration Engine::charge(WorkerThread &self, const TaskEntry &entry, const RunningJob &running, Time at) noexcept {
-  const Duration took = at - running.begun;
-  if (running.total < 0 && took <= CpuMeter::kShort && !entry.always_measured()) {
-    self.meter.pass();
-    return took;
-  }
-  const Duration used = running.total >= 0 ? running.total : running.cpu_time();
-  if (running.start.exact) {
-    self.meter.set(running.start.cpu + used, at);
+  if (running.start.exact && !running.on_trust) {
+    self.meter.set(running.start.cpu + running.charged, running.ended);
   } else {
     self.meter.pass();
   }
-  return used;
+  if (options_.trace_capacity > 0) {
+    self.events.push(JobEvent{running.ended, running.charged, job.task, job.number, job.worker.value,
+                              JobEventKind::Executed, Reason::None, 0});
+  }
+  return finish(self, assignment, running, outcome, below, at);
 }
 
 Outcome Engine::call(const Assignment &assignment) {
@@ -85,29 +78,46 @@ Outcome Engine::call(const Assignment &assignment) {
   }
 }
 
-Next Engine::finish(WorkerThread &self, const Assignment &assignment, RunningJob &running, Outcome outcome, Time at,
-                    Duration used, JobSlot below) {
+// Sets `next_begins` to when the thread's next job begins.
+Next Engine::finish(WorkerThread &self, const Assignment &assignment, RunningJob &running, Outcome outcome,
+                    JobSlot below, Time &next_begins) {
   Body doomed;  // of a removed task; destroyed without the lock
   TaskEntry &entry = *assignment.entry;
+  const Time at = running.ended;
   const bool measured = entry.response && outcome == Outcome::Finished;
   const Duration response = at - assignment.job.release;
   if (measured) entry.response->add(response);
-  Locked locked(*this);
-  withdraw_if_halting();
-  entry.count(used, at - running.begun);
-  if (measured && response > entry.deadline) ++entry.late;
-  --entry.busy;
-  if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
-  placement_.end(self);
-  if (used > running.limit) {
-    running.used_budget = running.used_budget || outcome == Outcome::BudgetExceeded;
-    report_limits(running, used, at);
+  Next next;
+  bool delayed = false;
+  {
+    Locked locked(*this);
+    withdraw_if_halting();
+    entry.count(running.charged, at - running.begun);
+    if (measured && response > entry.deadline) ++entry.late;
+    --entry.busy;
+    if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
+    placement_.end(self);
+    if (running.charged > running.limit) {
+      running.used_budget = running.used_budget || outcome == Outcome::BudgetExceeded;
+      report_limits(running, running.charged, at);
+    }
+    scheduler_->complete(assignment.job.slot, at, outcome);
+    next = decide(locked, at, &self == &pool_.caller() ? nullptr : &self, below);
+    if (placement_.unfinished() == 0 && halted_at_ != kNever) idle_event_.set();
+    if (placement_.unfinished() == 0 && pause_waiters_ > 0) wake_pause_waiters();
+    delayed = locked.delayed();
   }
-  scheduler_->complete(assignment.job.slot, at, outcome);
-  const Next next = decide(locked, at, &self == &pool_.caller() ? nullptr : &self, below);
-  if (placement_.unfinished() == 0 && halted_at_ != kNever) idle_event_.set();
-  if (placement_.unfinished() == 0 && pause_waiters_ > 0) wake_pause_waiters();
+  next_begins = delayed || !running.on_trust ? now() : at;
   return next;
+}
+
+void RunningJob::close() noexcept {
+  if (ended != kNever) return;
+  leave();
+  ended = engine->now();
+  const Duration took = ended - begun;
+  on_trust = took <= CpuMeter::kShort && !measured;
+  charged = on_trust ? took : cpu_time();
 }
 
 Duration RunningJob::cpu_time() const noexcept {

@@ -16,7 +16,7 @@ namespace redag::runtime {
 class REDAG_SCOPED_CAPABILITY Engine::Locked {
  public:
   explicit Locked(Engine &engine) REDAG_ACQUIRE(engine.lock_) : engine_(engine), wake_ups_(engine.realtime()) {
-    engine_.lock_.lock();
+    at_once_ = engine_.lock_.lock();
   }
   /// For `releases` releases. Each can skip a ready job and one that waits for its predecessors. Allocates room for
   /// these skips before it takes the lock.
@@ -25,7 +25,7 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
     if (2 * releases > kFewSkips && engine_.has_listeners_.load(std::memory_order_relaxed)) {
       more_skips_.reserve(2 * releases - kFewSkips);
     }
-    engine_.lock_.lock();
+    at_once_ = engine_.lock_.lock();
   }
   ~Locked() REDAG_RELEASE() {
     engine_.lock_.unlock();
@@ -56,9 +56,13 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
 
   [[nodiscard]] WakeUps &wake_ups() { return wake_ups_; }
 
+  /// Returns true if the thread waited for the lock, or wakes others. Both can take longer than a short job.
+  [[nodiscard]] bool delayed() const { return !at_once_ || wake_ups_.any(); }
+
  private:
   Engine &engine_;
   WakeUps wake_ups_;
+  bool at_once_ = true;  // the lock was free
   struct Skip {
     std::shared_ptr<SkipListener> listener;
     Reason reason = Reason::None;

@@ -35,6 +35,7 @@ class WakeUps {
  public:
   explicit WakeUps(bool at_once) : at_once_(at_once) {}
   void wake(WorkerThread &thread) {
+    any_ = true;
     if (at_once_ || count_ == late_.size()) {
       thread.parker.unpark();
     } else {
@@ -45,9 +46,11 @@ class WakeUps {
   void wake_late() {
     for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
   }
+  [[nodiscard]] bool any() const { return any_; }
 
  private:
   bool at_once_;
+  bool any_ = false;
   std::array<WorkerThread *, 32> late_;
   std::size_t count_ = 0;
 };

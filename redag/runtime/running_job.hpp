@@ -25,22 +25,25 @@ struct RunningJob {
   Duration limit = kNever;  // processor time of its next limit to check; kNever: none
   Time begun = 0;           // on the engine's clock
   CpuMeter::Start start;    // excludes jobs that ran on top
+  bool measured = false;    // its processor time is asked for, however short it was
   RunningJob *below = nullptr;
   Atomic<RunningJob *> *top = nullptr;  // WorkerThread::top of its thread: points here while the body runs
-  Duration total = -1;                  // processor time of the whole job; below 0: not known yet
   bool used_wcet_low = false;           // reported to the scheduler; written under the engine's lock
   bool used_budget = false;
   bool reported = false;  // was reported overdue; written under the engine's lock
+  // Set by close():
+  Time ended = kNever;    // on the engine's clock; kNever: close() has not been called
+  Duration charged = 0;   // processor time of the whole job
+  bool on_trust = false;  // `charged` is the time that the job took on the clock
 
   void reach_preemption_point();
   void reach_limit(Duration used);
   /// Processor time until now, never too little. If its start is not exact, at most what the job took on the clock.
   [[nodiscard]] Duration cpu_time() const noexcept;
-  /// For a body that is about to return and needs its processor time: the engine then need not read the clock again.
-  Duration close() noexcept {
-    leave();
-    return total = cpu_time();
-  }
+  /// Ends the job: sets `ended` and `charged`. A body that is about to return and needs them may call it. Otherwise the
+  /// engine does. Later calls have no effect. A job that is over within CpuMeter::kShort is charged this time on trust:
+  /// asking for its processor time would be a system call.
+  void close() noexcept;
 
   /// watch() may read what the job has used between enter() and leave() only.
   void enter() noexcept { top->store(this, std::memory_order_release); }

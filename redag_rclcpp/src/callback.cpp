@@ -13,10 +13,12 @@ using redag::sched::Outcome;
 
 Outcome Callback::execute(const redag::runtime::Job &job) {
   if (!run()) return Outcome::NoData;
-  const Duration response = engine_.now() - job.release;
+  redag::runtime::RunningJob &running = *redag::runtime::RunningJob::current();
+  running.close();
+  const Duration response = running.ended - job.release;
   response_.add(response);
   if (response > deadline_.load(std::memory_order_relaxed)) count_late();
-  execution_.add(redag::runtime::RunningJob::current()->close());
+  execution_.add(running.charged);
   return Outcome::Finished;
 }
 
