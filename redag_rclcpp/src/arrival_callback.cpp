@@ -34,11 +34,11 @@ bool ArrivalCallback::connect() {
 void ArrivalCallback::detach() {
   std::shared_ptr<ExecutorContext> left;
   {
-    const redag::LockGuard release_guard(release_lock_);
     const redag::LockGuard guard(lock_);
     left = leave();
     tokens_.clear();
   }
+  releases_.wait();
   unhook();
 }
 
@@ -46,48 +46,49 @@ void ArrivalCallback::detach() {
 
 void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool seen_only) {
   std::shared_ptr<ExecutorContext> to_wake;
+  Time now = 0;
+  Time arrival = 0;
+  bool begins = false;
+  std::size_t overwritten = 0;
   {
-    const redag::LockGuard release_guard(release_lock_);
-    Time now = 0;
-    bool begins = false;
-    Time arrival = 0;
-    std::size_t overwritten = 0;
-    {
-      const redag::LockGuard guard(lock_);
-      if (!context()) return;  // detached: the engine may no longer exist
-      now = engine().now();
-      if (context()->learning()) learn_from_arrival(now, count, source);
-      const bool direct = context()->direct();
-      if (depth_ > 0) count = std::min(count, depth_);
-      bool replaces = false;
-      for (std::size_t i = 0; i < count; ++i) {
-        if (depth_ > 0 && kept_[index_of(source)] >= depth_) {
-          const Overwritten whose = drop_oldest(source);
-          if (whose == Overwritten::Released && direct && !replaces) {
-            // The released job's message is gone. Its release is replaced by one for the next message.
-            replaces = true;
-          } else if (whose != Overwritten::Skipped) {
-            ++overwritten;
-          }
-          if (whose == Overwritten::Started) continue;
+    const redag::LockGuard guard(lock_);
+    if (!context()) return;  // detached: the engine may no longer exist
+    now = engine().now();
+    if (context()->learning()) learn_from_arrival(now, count, source);
+    const bool direct = context()->direct();
+    if (depth_ > 0) count = std::min(count, depth_);
+    bool replaces = false;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (depth_ > 0 && kept_[index_of(source)] >= depth_) {
+        const Overwritten whose = drop_oldest(source);
+        if (whose == Overwritten::Released && direct && !replaces && releases_.none()) {
+          // The released job's message is gone. Its release is replaced by one for the next message. A release that is
+          // still in progress could come after the one that replaces it, and stands for the next message instead.
+          replaces = true;
+        } else if (whose != Overwritten::Skipped) {
+          ++overwritten;
         }
-        tokens_.push(Token{.arrival = now, .source = source, .part = part, .seen_only = seen_only});
-        ++kept_[index_of(source)];
+        if (whose == Overwritten::Started) continue;
       }
-      if (replaces) {
-        arrival = tokens_.front().arrival;
-        ++released_;
-        ++releasers_;
-        begins = true;
-      } else {
-        const bool noted = noted_;
-        begins = begin_release(arrival);
-        if (noted_ && !noted) to_wake = context();
-      }
+      tokens_.push(Token{.arrival = now, .source = source, .part = part, .seen_only = seen_only});
+      ++kept_[index_of(source)];
     }
-    for (; overwritten > 0; --overwritten) engine().miss(task(), now, redag::Reason::QueueFull);
-    if (begins) release(arrival);
+    if (replaces) {
+      begins = true;
+      arrival = tokens_.front().arrival;
+      ++released_;
+      releases_.begin();
+    } else {
+      const bool noted = noted_;
+      begins = begin_release(arrival);
+      if (noted_ && !noted) to_wake = context();
+      if (overwritten > 0 && !begins) releases_.begin();
+    }
   }
+  const bool uses_engine = begins || overwritten > 0;
+  for (; overwritten > 0; --overwritten) engine().miss(task(), now, redag::Reason::QueueFull);
+  if (begins) engine().release(task(), arrival, now);
+  if (uses_engine) end_release();
   if (to_wake) to_wake->wake();
 }
 
@@ -109,7 +110,9 @@ ArrivalCallback::Overwritten ArrivalCallback::drop_oldest(Source source) {
   return Overwritten::Started;
 }
 
-// Prepares the release of the first token. True: the caller must call release() after it has left lock_.
+// Prepares the release of the first token. True: the caller must call Engine::release() and end_release() after it has
+// left lock_. Without a job of the task that is in progress, only releases_ keeps the engine, and the task's id its
+// own.
 bool ArrivalCallback::begin_release(Time &arrival) {
   if (released_ > 0 || !context() || tokens_.empty()) return false;
   if (!context()->direct()) {
@@ -120,34 +123,35 @@ bool ArrivalCallback::begin_release(Time &arrival) {
     return false;
   }
   ++released_;
-  ++releasers_;
+  releases_.begin();
   arrival = tokens_.front().arrival;
   return true;
 }
 
-// The caller holds release_lock_ or runs in a job of the task: the task's id is not reused while one of its jobs runs.
-// If the scheduler skips the job at once, the loop releases the next token.
-void ArrivalCallback::release(Time arrival) {
-  for (bool again = true; again;) {
+// If the scheduler has skipped a job meanwhile, for example the released one at once, this releases the next token.
+void ArrivalCallback::end_release() {
+  while (releases_.end()) {
+    Time arrival = kNever;
+    {
+      const redag::LockGuard guard(lock_);
+      if (!begin_release(arrival)) return;
+    }
     engine().release(task(), arrival);
-    const redag::LockGuard guard(lock_);
-    --releasers_;
-    again = begin_release(arrival);
   }
 }
 
 void ArrivalCallback::admit() {
-  const redag::LockGuard release_guard(release_lock_);
   Time arrival = kNever;
   {
     const redag::LockGuard guard(lock_);
     noted_ = false;
     if (!context() || released_ > 0 || tokens_.empty()) return;
     ++released_;
-    ++releasers_;
+    releases_.begin();
     arrival = tokens_.front().arrival;
   }
-  release(arrival);
+  engine().release(task(), arrival);
+  end_release();
 }
 
 Time ArrivalCallback::expire(Time now, std::vector<redag::runtime::Release> &releases,
@@ -157,6 +161,7 @@ Time ArrivalCallback::expire(Time now, std::vector<redag::runtime::Release> &rel
 }
 
 void ArrivalCallback::skipped(redag::Reason reason) noexcept {
+  Time arrival = kNever;
   {
     const redag::LockGuard guard(lock_);
     if (!context()) return;
@@ -172,16 +177,12 @@ void ArrivalCallback::skipped(redag::Reason reason) noexcept {
       tokens_.pop();
     }
     --released_;
-    if (releasers_ > 0) return;  // the thread in release() looks for the next token
+    // A thread in end_release(), perhaps this one further up its stack, releases the next token. The depth of calls is
+    // thus limited.
+    if (releases_.tell() || !begin_release(arrival)) return;
   }
-  const redag::LockGuard release_guard(release_lock_);
-  Time arrival = kNever;
-  bool begins = false;
-  {
-    const redag::LockGuard guard(lock_);
-    begins = begin_release(arrival);
-  }
-  if (begins) release(arrival);
+  engine().release(task(), arrival);
+  end_release();
 }
 
 bool ArrivalCallback::take_token(Token &token) {
@@ -197,7 +198,10 @@ bool ArrivalCallback::take_token(Token &token) {
     token.after_skipped = dropping_[at] > 0;
     begins = begin_release(next);
   }
-  if (begins) release(next);
+  if (begins) {
+    engine().release(task(), next);
+    end_release();
+  }
   return true;
 }
 
@@ -222,7 +226,9 @@ Duration ArrivalCallback::mean_interval() const {
   // If another process subscribes as well, the middleware brings each message of this process a second time, and rclcpp
   // does not take it. The measured share of taken messages is assumed to hold for overwritten messages, too.
   auto arrivals = static_cast<double>(arrivals_[index_of(Source::Middleware)]);
-  if (takes_ > 0) arrivals *= static_cast<double>(taken_) / static_cast<double>(takes_);
+  const auto taken = static_cast<double>(taken_.load(std::memory_order_relaxed));
+  const auto takes = static_cast<double>(takes_.load(std::memory_order_relaxed));
+  if (takes > 0) arrivals *= std::min(taken / takes, 1.0);
   arrivals += static_cast<double>(arrivals_[index_of(Source::IntraProcess)]);
   const auto handled = static_cast<Duration>(std::llround(arrivals));
   if (handled < 3) return 0;
@@ -267,20 +273,17 @@ void ArrivalCallback::release_leftovers(Source source) {
 ArrivalCallback::Taking::~Taking() {
   if (begun_) return;
   begin();
-  const redag::LockGuard guard(callback_.lock_);
   callback_.leftovers_[index_of(source_)] = true;  // the message may still be there
 }
 
 void ArrivalCallback::Taking::begin() {
   begun_ = true;
-  const redag::LockGuard guard(callback_.lock_);
   --callback_.kept_[index_of(source_)];
 }
 
 void ArrivalCallback::Taking::count(bool taken) {
-  const redag::LockGuard guard(callback_.lock_);
-  ++callback_.takes_;
-  if (taken) ++callback_.taken_;
+  callback_.takes_.fetch_add(1, std::memory_order_relaxed);
+  if (taken) callback_.taken_.fetch_add(1, std::memory_order_relaxed);
 }
 
 bool ArrivalCallback::run() {
@@ -309,9 +312,11 @@ bool ArrivalCallback::execute_token(const Token &token) {
   if (token.after_skipped) drop_skipped(token.source);
   const bool taken = handle(token, taking);
   bool more = false;
-  {
+  // This job has lowered kept_ and now reads leftovers_. release_leftovers() sets leftovers_ and then reads kept_. At
+  // least one of them sees what the other wrote.
+  if (leftovers_[index_of(token.source)]) {
     const redag::LockGuard guard(lock_);
-    bool &leftovers = leftovers_[index_of(token.source)];
+    std::atomic<bool> &leftovers = leftovers_[index_of(token.source)];
     leftovers = leftovers && taken;
     more = leftovers && kept_[index_of(token.source)] == 0;
   }

@@ -5,8 +5,9 @@
 // token at a time is a released job that waits in the scheduler; the others wait here, and cost the scheduler nothing.
 // When the job starts, the next token is released. If the scheduler skips a job, its message is dropped unread. Inputs
 // that later ones do not replace (requests, responses) keep their tokens, which are released again until they are
-// taken. Threads: the middleware's threads and publishing threads call the hooks, with their own locks held. Lock
-// order: the callers' locks, release_lock_, lock_, the timer queue's, the engine's.
+// taken. Threads: the middleware's threads and publishing threads call the hooks, with their own locks held. An arrival
+// and a job each take lock_ once, and the engine's lock once. Lock order: the callers' locks, lock_, the timer queue's,
+// the engine's.
 #pragma once
 
 #include <atomic>
@@ -17,6 +18,7 @@
 
 #include "callback.hpp"
 #include "hook.hpp"
+#include "redag/runtime/in_progress.hpp"
 #include "token_queue.hpp"
 
 namespace redag_rclcpp {
@@ -122,33 +124,33 @@ class ArrivalCallback : public Callback, public Hooked {
   void learn_from_arrival(Time now, std::size_t count, Source source) REDAG_REQUIRES(lock_);
   [[nodiscard]] bool take_token(Token &token);
   [[nodiscard]] bool begin_release(Time &arrival) REDAG_REQUIRES(lock_);
-  void release(Time arrival);
+  void end_release() REDAG_EXCLUDES(lock_);
   [[nodiscard]] bool begin_drop(Source source) REDAG_EXCLUDES(lock_);
   void forget_dropped(Source source) REDAG_EXCLUDES(lock_);
 
   const std::size_t depth_;
   std::atomic<bool> by_wait_set_;  // a wait set watches the entity
 
-  // Held while a hook releases a job, which lets detach() wait for the hook. Not held while a worker takes its token: a
-  // worker may wake before the hook is done with the engine, and must not wait for it.
-  redag::PiMutex release_lock_;
+  // Uses of the engine that were begun under lock_ and go on without it. detach() waits for them. No worker does: it
+  // may wake before the hook that released its job is done with the engine.
+  redag::runtime::InProgress releases_;
 
   TokenQueue<Token> tokens_ REDAG_GUARDED_BY(lock_);  // if a job is released, the first token is its
   // Indexed by source. The source keeps a message until the moment before it is taken. Earlier arrivals may overwrite
-  // it.
-  std::size_t kept_[2] REDAG_GUARDED_BY(lock_) = {0, 0};        // messages that the source keeps
-  std::size_t dropped_[2] REDAG_GUARDED_BY(lock_) = {0, 0};     // part of kept_: their jobs were skipped; without token
-  std::size_t dropping_[2] REDAG_GUARDED_BY(lock_) = {0, 0};    // part of kept_: to be dropped by the next job
-  bool leftovers_[2] REDAG_GUARDED_BY(lock_) = {false, false};  // there may be more messages than tokens
-  std::uint32_t released_ REDAG_GUARDED_BY(lock_) = 0;   // jobs in the scheduler, or whose skip it has yet to report
-  std::uint32_t releasers_ REDAG_GUARDED_BY(lock_) = 0;  // number of threads in release()
-  bool noted_ REDAG_GUARDED_BY(lock_) = false;           // noted by note(), not yet admitted
-  bool seen_ REDAG_GUARDED_BY(lock_) = false;            // seen by the wait set, not yet handled
+  // it. Taking::begin() lowers kept_ without a lock, all else changes it under lock_: a thread that finds the source
+  // full there comes before a job that begins to take meanwhile.
+  std::atomic<std::size_t> kept_[2] = {0, 0};                 // messages that the source keeps
+  std::size_t dropped_[2] REDAG_GUARDED_BY(lock_) = {0, 0};   // part of kept_: their jobs were skipped; without token
+  std::size_t dropping_[2] REDAG_GUARDED_BY(lock_) = {0, 0};  // part of kept_: to be dropped by the next job
+  std::atomic<bool> leftovers_[2] = {false, false};           // there may be more messages than tokens
+  std::uint32_t released_ REDAG_GUARDED_BY(lock_) = 0;  // jobs in the scheduler, or whose skip it has yet to report
+  bool noted_ REDAG_GUARDED_BY(lock_) = false;          // noted by note(), not yet admitted
+  bool seen_ REDAG_GUARDED_BY(lock_) = false;           // seen by the wait set, not yet handled
   std::vector<TaskId> publishers_ REDAG_GUARDED_BY(lock_);
   std::uint64_t arrivals_[2] REDAG_GUARDED_BY(lock_) = {0, 0};
   // Messages from the middleware, counted if intra-process communication delivers messages as well.
-  std::uint64_t takes_ REDAG_GUARDED_BY(lock_) = 0;  // attempts to take one
-  std::uint64_t taken_ REDAG_GUARDED_BY(lock_) = 0;  // attempts that found a message for the callback
+  std::atomic<std::uint64_t> takes_{0};  // attempts to take one
+  std::atomic<std::uint64_t> taken_{0};  // attempts that found a message for the callback
   Time first_arrival_ REDAG_GUARDED_BY(lock_) = 0;
   Time last_arrival_ REDAG_GUARDED_BY(lock_) = 0;
 };
