@@ -1,0 +1,131 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// What a short callback costs in system calls, locks of this project, and clock readings. The callback publishes to
+// itself, so that the executor is never idle. From some callback on, its thread has a stepped clock: all callbacks are
+// short, whatever the machine does.
+#include <gtest/gtest.h>
+#include <pthread.h>
+
+#include <atomic>
+#include <memory>
+#include <thread>
+
+#include "mode_test.hpp"
+#include "redag/base/pi_mutex.hpp"
+#include "spinning.hpp"
+#include "stepped_clock.hpp"
+#include "system_calls.hpp"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define REDAG_SANITIZED 1
+#else
+#define REDAG_SANITIZED 0
+#endif
+
+namespace {
+std::atomic<std::uint64_t> locks_taken{0};
+}  // namespace
+
+#if !REDAG_SANITIZED
+// PiMutex alone takes mutexes by this function; it falls back to others where the mutex is not free.
+extern "C" int pthread_mutex_trylock(pthread_mutex_t *mutex) noexcept {
+  static auto *const real = [] {
+    void *const found = dlsym(RTLD_NEXT, "pthread_mutex_trylock");
+    int (*function)(pthread_mutex_t *) = nullptr;
+    std::memcpy(&function, &found, sizeof function);
+    return function;
+  }();
+  const int result = real(mutex);
+  if (result == 0 && redag::testing::detail::steps.step != 0) locks_taken.fetch_add(1);
+  return result;
+}
+#endif
+
+namespace redag_rclcpp {
+namespace {
+
+using redag::testing::clock_readings;
+
+struct Cost {
+  std::uint64_t calls = 0;
+  std::uint64_t asked = 0;  // for the thread's processor time
+  std::uint64_t clocks = 0;
+  std::uint64_t locks = 0;
+};
+
+class CostTest : public ModeTest {
+ protected:
+  static constexpr int kWarm = 100;
+  static constexpr int kCount = 1000;
+
+  static Cost now(const redag::testing::SystemCalls &calls) {
+    return {calls.count(), clock_readings.processor, clock_readings.monotonic, locks_taken};
+  }
+
+  /// Runs the callback, and returns what kCount calls of it cost. `count_calls`: system calls, too.
+  Cost measure(redag::testing::SystemCalls &calls, bool count_calls) {
+    Cost before;
+    Cost after;
+    std::atomic<int> called{0};
+    std::atomic<bool> done{false};
+    const auto out = publisher("ring");
+    const auto in = subscribe("ring", [&] {
+      redag::testing::step_clock(10);
+      const int call = called++;
+      if (call == kWarm && count_calls && !calls.count_this_thread()) {
+        done = true;
+        return;
+      }
+      if (call == 2 * kWarm) before = now(calls);
+      if (call == 2 * kWarm + kCount) {
+        after = now(calls);
+        done = true;
+        return;
+      }
+      out->publish(std::make_unique<Empty>());
+    });
+    ReDAGExecutor executor(options);
+    executor.add_node(node);
+    {
+      const Spinner spinner(executor);
+      out->publish(std::make_unique<Empty>());
+      EXPECT_TRUE(eventually([&] { return done.load(); }));
+    }
+    return {after.calls - before.calls, after.asked - before.asked, after.clocks - before.clocks,
+            after.locks - before.locks};
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Modes, CostTest,
+                         ::testing::Values(redag::PreemptionMode::None, redag::PreemptionMode::Cooperative,
+                                           redag::PreemptionMode::Os),
+                         [](const auto &instance) { return std::string(to_string(instance.param)); });
+
+// Another thread may hold a lock now and then, for example the one that looks for new entities.
+TEST_P(CostTest, AShortCallbackMakesNoSystemCall) {
+  if (REDAG_SANITIZED) GTEST_SKIP() << "sanitizers make system calls of their own";
+  redag::testing::SystemCalls calls;
+  const Cost cost = measure(calls, true);
+  if (!calls.why().empty()) GTEST_SKIP() << "system calls CANNOT BE COUNTED here: " << calls.why();
+  EXPECT_LE(cost.calls, kCount / 100) << calls.list();
+}
+
+TEST_P(CostTest, AShortCallbackAsksForNoProcessorTime) {
+  redag::testing::SystemCalls calls;
+  const Cost cost = measure(calls, false);
+  EXPECT_EQ(cost.asked, 0u);
+}
+
+// The callback's own lock and the engine's, once when the message arrives and once when it is handled. One reading of
+// the clock when it arrives, and one when the callback ends.
+TEST_P(CostTest, AShortCallbackTakesFourLocksAndReadsTheClockTwice) {
+  if (REDAG_SANITIZED) GTEST_SKIP() << "sanitizers count locks themselves";
+  redag::testing::SystemCalls calls;
+  const Cost cost = measure(calls, false);
+  EXPECT_GE(cost.locks, 4u * kCount - kCount / 100);
+  EXPECT_LE(cost.locks, 4u * kCount + kCount / 100);
+  EXPECT_LE(cost.clocks, 2u * kCount + kCount / 100);
+}
+
+}  // namespace
+}  // namespace redag_rclcpp
