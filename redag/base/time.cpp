@@ -80,8 +80,8 @@ Result<Duration> parse_duration(std::string_view text) {
   if (unit == nullptr) return fail(fmt::format("unknown unit {} (ns, us, ms, s, min, h)", in_quotes(unit_name)));
 
   const Int128 scaled = digits * unit->nanoseconds;
-  if (scaled % scale != 0) return fail("it is not a whole number of nanoseconds");
-  const Int128 value = scaled / scale;
+  if (scale != 1 && scaled % scale != 0) return fail("it is not a whole number of nanoseconds");
+  const Int128 value = scale == 1 ? scaled : scaled / scale;
   if (value > Int128{kMaxDuration})
     return fail(fmt::format("it is too large; at most {} is allowed", kMaxDurationText));
   return static_cast<Duration>(negative ? -value : value);

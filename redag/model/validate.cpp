@@ -179,26 +179,26 @@ class Checker {
   }
 
   void check_against_wcet(const Task &task) {
-    const std::string wcet = format_duration(task.wcet);
+    const auto wcet = [&task] { return format_duration(task.wcet); };
     if (task.wcet > 0 && task.bcet > task.wcet) {
       findings_.error(
           Field::Bcet, Field::Wcet,
-          fmt::format("bcet {} of task '{}' exceeds its wcet {}", format_duration(task.bcet), task.name, wcet));
+          fmt::format("bcet {} of task '{}' exceeds its wcet {}", format_duration(task.bcet), task.name, wcet()));
     }
     if (task.deadline > 0 && task.wcet > task.deadline) {
-      findings_.warning(
-          Field::Wcet, Field::Deadline | Field::Period,
-          fmt::format("wcet {} of task '{}' exceeds its deadline {}", wcet, task.name, format_duration(task.deadline)),
-          "a job that runs for its wcet misses its deadline");
+      findings_.warning(Field::Wcet, Field::Deadline | Field::Period,
+                        fmt::format("wcet {} of task '{}' exceeds its deadline {}", wcet(), task.name,
+                                    format_duration(task.deadline)),
+                        "a job that runs for its wcet misses its deadline");
     } else if (task.period > 0 && task.wcet > task.period) {
       findings_.warning(
           Field::Wcet, Field::Period,
-          fmt::format("wcet {} of task '{}' exceeds its period {}", wcet, task.name, format_duration(task.period)));
+          fmt::format("wcet {} of task '{}' exceeds its period {}", wcet(), task.name, format_duration(task.period)));
     }
     if (task.budget > 0 && task.budget < task.wcet && task.on_budget != OnBudget::Log) {
       findings_.warning(
           Field::Budget, Field::Wcet | Field::OnBudget,
-          fmt::format("budget {} of task '{}' is below its wcet {}", format_duration(task.budget), task.name, wcet),
+          fmt::format("budget {} of task '{}' is below its wcet {}", format_duration(task.budget), task.name, wcet()),
           task.on_budget == OnBudget::Abort ? "jobs that keep within their wcet are cut off"
                                             : "the action of 'on_budget' affects jobs that keep within their wcet");
     }

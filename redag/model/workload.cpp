@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <numeric>
 #include <queue>
 
 #include "redag/base/check.hpp"
@@ -40,12 +41,18 @@ std::vector<TaskRef> flatten(const Workload &workload) {
 std::vector<std::uint32_t> topological_ranks(const Dag &dag) {
   const std::size_t count = dag.tasks.size();
   std::vector<std::uint32_t> missing(count);
-  std::vector<std::vector<std::uint32_t>> successors(count);
+  std::vector<std::uint32_t> first(count + 1);  // successors of i: [first[i], first[i + 1])
   std::priority_queue<std::uint32_t, std::vector<std::uint32_t>, std::greater<>> open;
   for (std::uint32_t i = 0; i < count; ++i) {
     missing[i] = static_cast<std::uint32_t>(dag.tasks[i].predecessors.size());
-    for (const std::uint32_t p : dag.tasks[i].predecessors) successors[p].push_back(i);
+    for (const std::uint32_t p : dag.tasks[i].predecessors) ++first[p + 1];
     if (missing[i] == 0) open.push(i);
+  }
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  std::vector<std::uint32_t> successors(first.back());
+  std::vector<std::uint32_t> last(first.begin(), first.end() - 1);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    for (const std::uint32_t p : dag.tasks[i].predecessors) successors[last[p]++] = i;
   }
   std::vector<std::uint32_t> ranks(count);
   std::uint32_t next = 0;
@@ -53,8 +60,8 @@ std::vector<std::uint32_t> topological_ranks(const Dag &dag) {
     const std::uint32_t i = open.top();
     open.pop();
     ranks[i] = next++;
-    for (const std::uint32_t s : successors[i]) {
-      if (--missing[s] == 0) open.push(s);
+    for (std::uint32_t s = first[i]; s < first[i + 1]; ++s) {
+      if (--missing[successors[s]] == 0) open.push(successors[s]);
     }
   }
   REDAG_CHECK(next == count, "a DAG must be acyclic");

@@ -62,7 +62,8 @@ struct DagPart : Part {
 
 const Node *find(const Part &part, Field field) { return yaml::find(*part.node, to_string(field)); }
 
-std::vector<std::string_view> names_of(std::span<const Field> fields) {
+template <std::size_t N>
+std::vector<std::string_view> names_of(const std::array<Field, N> &fields) {
   std::vector<std::string_view> names;
   for (const Field field : fields) names.emplace_back(to_string(field));
   return names;
@@ -166,7 +167,8 @@ class Reader : private yaml::ValueReader {
 
   void read_dag(const Node &node, Dag &dag, DagPart &part) {
     part.node = &node;
-    if (!check_map(node, "a DAG", names_of(kDagFields))) {
+    static const std::vector<std::string_view> kNames = names_of(kDagFields);
+    if (!check_map(node, "a DAG", kNames)) {
       for (const Field field : kDagFields) part.broken |= field;
       return;
     }
@@ -192,7 +194,8 @@ class Reader : private yaml::ValueReader {
 
   void read_task(const Node &node, Task &task, TaskPart &part) {
     part.node = &node;
-    if (!check_map(node, "a task", names_of(kTaskFields))) {
+    static const std::vector<std::string_view> kNames = names_of(kTaskFields);
+    if (!check_map(node, "a task", kNames)) {
       for (const Field field : kTaskFields) part.broken |= field;
       return;
     }

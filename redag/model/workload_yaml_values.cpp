@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/base/check.hpp"
 #include "redag/base/nearest.hpp"
 #include "redag/model/validate.hpp"
 
@@ -44,19 +45,23 @@ bool ValueReader::check_map(const Node &node, std::string_view what, const std::
     wrong_type(node, what, fmt::format("a map of {}", fmt::join(keys, ", ")));
     return false;
   }
-  std::vector<std::string_view> seen;
+  REDAG_CHECK(keys.size() <= 64, "one bit for each key");
+  std::uint64_t seen = 0;
   for (std::size_t i = 0; i + 1 < node.children.size(); i += 2) {
     const Node &key = node.children[i];
     if (key.kind != Node::Kind::Scalar) {
       error(key, fmt::format("a key must be a name, not {}", describe(key)));
-    } else if (std::find(keys.begin(), keys.end(), key.text) == keys.end()) {
+      continue;
+    }
+    const auto known = std::find(keys.begin(), keys.end(), key.text);
+    const std::uint64_t bit = known == keys.end() ? 0 : std::uint64_t{1} << (known - keys.begin());
+    if (bit == 0) {
       error(key, fmt::format("unknown key {} in {}", describe(key), what),
             did_you_mean(key.text, keys, fmt::format("known: {}", fmt::join(keys, ", "))));
-    } else if (std::find(seen.begin(), seen.end(), key.text) != seen.end()) {
+    } else if ((seen & bit) != 0) {
       error(key, fmt::format("key '{}' is given twice", key.text));
-    } else {
-      seen.push_back(key.text);
     }
+    seen |= bit;
   }
   return true;
 }
