@@ -78,7 +78,11 @@ Bound from_units(const TaskSet &task_set, std::vector<ResponseBound> units) {
     });
     bound.dags[d] = units[last];
   }
-  for (std::size_t t = 0; t < task_set.tasks.size(); ++t) bound.tasks[t] = units[task_set.tasks[t].unit];
+  for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
+    const std::uint32_t unit = task_set.tasks[t].unit;
+    const bool only = task_set.units[unit].tasks.size() == 1;
+    bound.tasks[t] = only ? std::move(units[unit]) : units[unit];
+  }
   return bound;
 }
 

@@ -199,6 +199,13 @@ void SharedTerms::add(const Term &term) {
 
 void SharedTerms::add_share(Term::Kind kind, const GlobalUnit &whose, Duration numerator, Duration denominator,
                             std::int64_t jobs) {
+  if (denominator_ == 1) denominator_ = denominator;  // no remainder so far
+  if (denominator == denominator_) {
+    const Duration sum = remainder_ + numerator;
+    remainder_ = sum % denominator;
+    if (numerator != 0) push(kind, whose, sum / denominator, jobs);
+    return;
+  }
   const Int128 common = Int128{denominator_} * denominator;
   const Int128 sum = Int128{remainder_} * denominator + Int128{numerator} * denominator_;
   const auto whole = static_cast<Duration>(sum / common);

@@ -19,14 +19,17 @@ namespace redag::analysis::global {
 /// A unit as the bounds see it. Times within a window count from the release as seen, and responses from the nominal
 /// release.
 struct GlobalUnit {
+  // What the fixed points read of the more urgent units comes first, in one cache line.
   Duration volume = 0;
-  Duration length = 0;
   Duration period = 0;
   Duration jitter = 0;
-  Duration limit = 0;     // a response above it counts as none; never above the period
   Duration response = 0;  // of the current bound, once known
-  Duration work = 0;      // in the current window, and (`carried`) with an earlier job; scratch of the fixed points
+  Duration work = 0;      // in the current window, of which `carried` is an earlier job's; scratch of the fixed points
   Duration carried = 0;
+  Duration next_job = 0;    // the window in which its next job begins; scratch of the fixed points, as is begun_work
+  Duration begun_work = 0;  // of the jobs before it, each executed in full
+  Duration length = 0;
+  Duration limit = 0;            // a response above it counts as none; never above the period
   Duration turn = 0;             // width * period, see divide()
   double rate = 0;               // 1 / turn
   std::uint32_t width = 1;       // its jobs that can execute at once, never above the workers
@@ -99,6 +102,10 @@ class SharedTerms {
  public:
   SharedTerms(const TaskSet &task_set, const GlobalUnit &unit);
 
+  /// Makes room for this many terms.
+  void reserve(std::size_t count) {
+    if (wanted_) terms_.reserve(count);
+  }
   /// Adds the unit's own time: `length` of the longest path, of which the platform's overhead is a term of its own.
   void add_path();
   void add_jitter();

@@ -5,8 +5,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <tuple>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "redag_testing/bound_property.hpp"
 #include "redag_testing/builders.hpp"
@@ -198,6 +203,68 @@ TEST(GlobalSequential, WhereTheWindowsBeginDoesNotShow) {
   }
   EXPECT_GT(compared, 5000U);
   EXPECT_GT(later, 1000U);
+}
+
+// The least d with sum_i min(W_i, d) < m d, tried one after the other; W_i by the equations of the paper.
+std::optional<Duration> guan_by_definition(const std::vector<global::GlobalUnit> &units, std::size_t k,
+                                           std::uint32_t workers) {
+  const global::GlobalUnit &own = units[k];
+  for (Duration d = 1; d - 1 + own.volume + own.jitter <= own.limit; ++d) {
+    const Duration x = d + own.volume - 1;
+    Duration sum = 0;
+    std::vector<Duration> carried;
+    for (std::size_t i = 0; i < k; ++i) {
+      const auto &[wcet, period, jitter] = std::tie(units[i].volume, units[i].period, units[i].jitter);
+      const Duration fresh = (x + jitter) / period * wcet + std::min(wcet, (x + jitter) % period);
+      const Duration whole = x < wcet ? -1 : (x - wcet) / period;
+      const Duration rest = x - wcet - whole * period - (period - units[i].response);
+      const Duration with = (whole + 1) * wcet + std::clamp<Duration>(rest, 0, jitter > 0 ? wcet : wcet - 1);
+      sum += std::min(fresh, d);
+      carried.push_back(std::min(std::max({with, fresh, wcet}), d) - std::min(fresh, d));
+    }
+    std::sort(carried.begin(), carried.end(), std::greater<>());
+    for (std::size_t i = 0; i < carried.size() && i + 1 < workers; ++i) sum += carried[i];
+    if (sum < Duration{workers} * d) return d - 1 + own.volume + own.jitter;
+  }
+  return std::nullopt;
+}
+
+// The steps skip windows, remember jobs from the last one, and look only at tasks that can carry in enough.
+TEST(GlobalSequential, GuanFindsTheLeastWindow) {
+  BoundCaseLimits limits = several_workers(sched::Preemption::Full);
+  limits.min_period = 3;
+  limits.max_period = 200;
+  limits.max_dags = 12;
+  std::uint64_t bounded = 0;
+  std::uint64_t waiting = 0;
+  testing::for_cases(cases(limits), 4000, [&](const testing::BoundCase &, const TaskSet &task_set, Rng &) {
+    global::Units view = global::units_of(task_set, {.mode = sched::Preemption::Full, .edges = false});
+    if (view.reason) return;
+    for (std::size_t k = 0; k < view.units.size(); ++k) {
+      const bool found = global::guan_response(view.units, k, view.workers, global::start_after(view.units, k));
+      const std::optional<Duration> response = guan_by_definition(view.units, k, view.workers);
+      ASSERT_EQ(found, response.has_value());
+      if (!found) return;
+      ASSERT_EQ(view.units[k].response, *response);
+      ++bounded;
+      if (*response > view.units[k].volume + view.units[k].jitter) ++waiting;
+    }
+  });
+  EXPECT_GT(bounded, 5000U);
+  EXPECT_GT(waiting, 1000U);
+}
+
+// What a search remembers of the jobs in its windows is gone when the next one begins.
+TEST(GlobalSequential, GuanSeesThatATaskHasChanged) {
+  const TaskSet shorter = compiled(independent(2, {{2, 20}, {2, 20}, {30, 100}}), sched::Preemption::Full);
+  const TaskSet longer = compiled(independent(2, {{6, 20}, {6, 20}, {30, 100}}), sched::Preemption::Full);
+  std::vector<global::GlobalUnit> units = global::units_of(shorter, {}).units;
+  for (std::size_t k = 0; k < 3; ++k) ASSERT_TRUE(global::guan_response(units, k, 2));
+  const Duration before = units[2].response;
+  units[0].volume = units[1].volume = units[0].response = units[1].response = 6;
+  ASSERT_TRUE(global::guan_response(units, 2, 2));
+  EXPECT_EQ(units[2].response, responses(guan(), longer)[2]);
+  EXPECT_GT(units[2].response, before);
 }
 
 TEST(GlobalSequential, TermsAddUp) {

@@ -20,8 +20,11 @@ class Largest {
  public:
   explicit Largest(std::size_t kept) : kept_(std::min(kept, kMost)) { std::fill_n(entries_.begin(), kept_, Entry{}); }
 
+  /// True if offer() would keep this value.
+  [[nodiscard]] bool accepts(Duration value) const { return kept_ != 0 && value > entries_[kept_ - 1].value; }
+
   void offer(Duration value, std::size_t whose = 0) {
-    if (kept_ == 0 || value <= entries_[kept_ - 1].value) return;
+    if (!accepts(value)) return;
     std::size_t i = kept_ - 1;
     for (; i > 0 && entries_[i - 1].value < value; --i) entries_[i] = entries_[i - 1];
     entries_[i] = {value, whose};
