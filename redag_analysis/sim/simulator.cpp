@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <numeric>
+#include <span>
 #include <vector>
 
 #include "redag/base/check.hpp"
 #include "redag/base/int128.hpp"
 #include "redag/model/demand.hpp"
 #include "redag/model/release_queue.hpp"
+#include "redag_analysis/sim/release_tree.hpp"
 
 namespace redag::sim {
 namespace {
@@ -22,27 +24,31 @@ class Simulation {
       : scheduler_(scheduler),
         options_(options),
         sink_(sink),
-        tasks_(flatten(workload)),
-        places_(places_of(workload)),
-        processors_(workers) {
-    at_once_.reserve(workers);
-    for (std::size_t i = 0; i < tasks_.size(); ++i) {
-      const Task &task = *tasks_[i].task;
+        processors_(workers),
+        at_once_(workers),
+        releases_(workload.task_count()) {
+    const std::vector<std::uint32_t> places = places_of(workload);
+    for (const TaskRef &ref : flatten(workload)) {
+      const Task &task = *ref.task;
+      tasks_.push_back(task_state(task, places[ref.id.value]));
       has_regions_ = has_regions_ || task.region > 0;
       has_limits_ = has_limits_ || task.wcet_low > 0 || (task.budget > 0 && task.on_budget != OnBudget::Abort);
       if (task.activation != Activation::Timer || task.offset >= options.horizon) continue;
-      const TaskId id(i);
-      releases_.push({.seen = task.offset + jitter(task, id, 0), .nominal = task.offset, .task = id});
+      TimerRelease &release = tasks_.back().release;
+      release = {.seen = task.offset + jitter(task, ref.id, 0), .nominal = task.offset, .task = ref.id};
+      releases_.set(ref.id, release.seen);
     }
   }
 
   Result run() {
+    if (!sink_) scheduler_.record_only({});
     bool goes_on = true;
     while (goes_on) {
-      const Time next = std::min(releases_.next(), next_processor_event());
-      if (next > options_.horizon || (next == options_.horizon && next_processor_event() > next)) break;
+      const Time of_processors = next_processor_event();
+      const Time next = std::min(releases_.next(), of_processors);
+      if (next > options_.horizon || (next == options_.horizon && of_processors > next)) break;
       now_ = next;
-      complete_jobs();
+      if (of_processors == now_) complete_jobs();
       if (has_limits_) reach_limits();
       release_jobs();
       if (has_regions_) reach_preemption_points();
@@ -66,6 +72,15 @@ class Simulation {
     Duration budget = kNever;
     Duration wcet_low = kNever;
   };
+  // What the simulation needs of a task, together in memory.
+  struct TaskState {
+    const Task *task = nullptr;
+    Duration period = 0;
+    TimerRelease release;  // its next one
+    bool has_jitter = false;
+    bool demand_varies = true;  // if not, each of its jobs begins as `fresh`
+    Progress fresh;
+  };
   struct Processor {
     JobSlot job;
     Time since = 0;        // when the job last got the processor
@@ -75,7 +90,10 @@ class Simulation {
 
   [[nodiscard]] Time next_processor_event() const {
     Time next = kNever;
-    for (const Processor &processor : processors_) next = std::min({next, processor.finish, processor.point});
+    for (const Processor &processor : processors_) next = std::min(next, processor.finish);
+    if (has_regions_ || has_limits_) {
+      for (const Processor &processor : processors_) next = std::min(next, processor.point);
+    }
     return next;
   }
 
@@ -93,18 +111,20 @@ class Simulation {
   // tasks and must not matter.
   template <class Predicate, class Tell>
   void tell_in_order(Predicate which, Tell tell) {
-    at_once_.clear();
+    std::size_t count = 0;
     for (Processor &processor : processors_) {
-      if (which(processor)) at_once_.push_back(&processor);
+      at_once_[count] = &processor;  // without a branch: which processor it is cannot be predicted
+      count += which(processor) ? 1U : 0U;
     }
-    if (at_once_.size() > 1) {
-      std::sort(at_once_.begin(), at_once_.end(), [this](const Processor *a, const Processor *b) {
+    const std::span<Processor *> found = std::span(at_once_).first(count);
+    if (found.size() > 1) {
+      std::sort(found.begin(), found.end(), [this](const Processor *a, const Processor *b) {
         const Progress &x = progress_[a->job.value];
         const Progress &y = progress_[b->job.value];
         return x.place != y.place ? x.place < y.place : x.number < y.number;
       });
     }
-    for (Processor *processor : at_once_) tell(*processor);
+    for (Processor *processor : found) tell(*processor);
   }
 
   void complete_jobs() {
@@ -120,15 +140,14 @@ class Simulation {
 
   void release_jobs() {
     while (releases_.next() <= now_ && now_ < options_.horizon) {
-      TimerRelease release = releases_.top();
-      const Task &task = *tasks_[release.task.value].task;
+      TaskState &state = tasks_[releases_.task().value];
+      TimerRelease &release = state.release;
       ++result_.released;
       scheduler_.release(release.task, release.nominal, now_);
       const std::uint32_t next = release.number + 1;
-      const Duration gap = options_.gap ? options_.gap(task, release.task, next) : 0;
-      release.advance(task.period + gap, jitter(task, release.task, next));
-      if (release.nominal >= options_.horizon) release.seen = kNever;
-      releases_.replace_top(release);
+      const Duration gap = options_.gap ? options_.gap(*state.task, release.task, next) : 0;
+      release.advance(state.period + gap, state.has_jitter ? jitter(*state.task, release.task, next) : 0);
+      releases_.set(release.task, release.seen);
     }
   }
 
@@ -177,7 +196,7 @@ class Simulation {
       give_processor(dispatch);
     }
     if (has_regions_ || has_limits_) plan_points();
-    return sink_(step.events);
+    return !sink_ || sink_(step.events);
   }
 
   void take_processor(JobSlot job) {
@@ -205,22 +224,36 @@ class Simulation {
     processor = Processor{dispatch.job, now_, now_ + progress.left, kNever};
   }
 
-  Progress begin_job(const sched::Dispatch &dispatch) const {
-    const Task &task = *tasks_[dispatch.task.value].task;
-    Duration demand = options_.demand ? options_.demand(task, dispatch.task, dispatch.number)
-                                      : execution_time(task, dispatch.task, dispatch.number, options_.seed);
-    REDAG_CHECK(demand > 0, "a job executes for a positive time");
-    Progress progress;
-    progress.place = places_[dispatch.task.value];
+  [[nodiscard]] TaskState task_state(const Task &task, std::uint32_t place) const {
+    TaskState state;
+    state.task = &task;
+    state.period = task.period;
+    state.has_jitter = task.jitter > 0 || options_.jitter;
+    state.demand_varies = task.execution.kind != ExecutionTime::Kind::Constant || options_.demand || task.wcet <= 0;
+    state.fresh.place = place;
+    if (task.on_budget != OnBudget::Abort && task.budget > 0) state.fresh.budget = task.budget;
+    if (task.wcet_low > 0) state.fresh.wcet_low = task.wcet_low;
+    state.fresh.lead = options_.overheads.release + options_.overheads.dispatch;
+    state.fresh.region = task.region;
+    set_demand(state.fresh, task, task.wcet);
+    return state;
+  }
+
+  static void set_demand(Progress &progress, const Task &task, Duration demand) {
+    progress.cut_off = task.on_budget == OnBudget::Abort && task.budget > 0 && demand > task.budget;
+    progress.left = (progress.cut_off ? task.budget : demand) + progress.lead;
+  }
+
+  [[nodiscard]] Progress begin_job(const sched::Dispatch &dispatch) const {
+    const TaskState &state = tasks_[dispatch.task.value];
+    Progress progress = state.fresh;
     progress.number = dispatch.number;
-    const bool cuts_off = task.on_budget == OnBudget::Abort;
-    progress.cut_off = cuts_off && task.budget > 0 && demand > task.budget;
-    if (progress.cut_off) demand = task.budget;
-    if (task.budget > 0 && !cuts_off) progress.budget = task.budget;
-    if (task.wcet_low > 0) progress.wcet_low = task.wcet_low;
-    progress.lead = options_.overheads.release + options_.overheads.dispatch;
-    progress.left = demand + progress.lead;
-    progress.region = task.region;
+    if (!state.demand_varies) return progress;
+    const Task &task = *state.task;
+    const Duration demand = options_.demand ? options_.demand(task, dispatch.task, dispatch.number)
+                                            : execution_time(task, dispatch.task, dispatch.number, options_.seed);
+    REDAG_CHECK(demand > 0, "a job executes for a positive time");
+    set_demand(progress, task, demand);
     return progress;
   }
 
@@ -248,12 +281,11 @@ class Simulation {
   sched::Scheduler &scheduler_;
   const Options &options_;
   const EventSink &sink_;
-  std::vector<TaskRef> tasks_;
-  std::vector<std::uint32_t> places_;  // by TaskId
+  std::vector<TaskState> tasks_;  // by TaskId
   std::vector<Processor> processors_;
   std::vector<Processor *> at_once_;
   std::vector<Progress> progress_;
-  ReleaseQueue<TimerRelease> releases_;
+  ReleaseTree releases_;
   Result result_;
   Time now_ = 0;
   bool has_regions_ = false;

@@ -39,7 +39,8 @@ struct Options {
   std::function<Duration(const Task &, TaskId, std::uint32_t number)> gap;
 };
 
-/// Receives the events in decision order, one batch per instant. Returns false to end the simulation.
+/// Receives the events in decision order, one batch per instant. Returns false to end the simulation. If it is empty,
+/// the scheduler records no events.
 using EventSink = std::function<bool(std::span<const JobEvent>)>;
 
 struct Result {

@@ -4,6 +4,7 @@
 #include "redag_analysis/sim/simulator.hpp"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -62,6 +63,23 @@ TEST(GoldenSchedule, DhallEffect) {
             "heavy#0 w0 1-10 w0 11-\n"
             "l1#1 w1 10-11\n"
             "l2#1 w0 10-11\n");
+}
+
+TEST(Simulator, RecordsNoEventsWithoutASink) {
+  const Workload workload = make_workload({make_dag("a", {{"t1", 4, 1}, {"t2", 6, 2}}), make_dag("b", {{"t3", 12, 5}})},
+                                          2, PreemptionMode::Os);
+  sched::PriorityScheduler heard(workload, sched::config_of(workload));
+  sched::PriorityScheduler silent(workload, sched::config_of(workload));
+  Options options;
+  options.horizon = 100 * kMs;
+  const Result with = simulate(workload, heard, 2, options, [](std::span<const JobEvent>) { return true; });
+  const Result without = simulate(workload, silent, 2, options, {});
+  EXPECT_EQ(with.released, without.released);
+  EXPECT_EQ(with.finished, without.finished);
+  EXPECT_EQ(with.end, without.end);
+  for (std::uint32_t t = 0; t < 3; ++t) EXPECT_EQ(heard.accounting(TaskId(t)), silent.accounting(TaskId(t)));
+  silent.release(TaskId(0), options.horizon, options.horizon);
+  EXPECT_TRUE(silent.dispatch(options.horizon).events.empty());
 }
 
 // Graham, SIAM J. Appl. Math. 17(2), 1969: with list scheduling, shorter jobs can make the schedule longer. Nine tasks
