@@ -15,7 +15,6 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
-#include "redag/model/workload_yaml_plain.hpp"
 
 namespace redag::yaml {
 namespace {
@@ -171,11 +170,6 @@ class ViewBuffer : public std::streambuf {
 }  // namespace
 
 Result<Node> parse(std::string_view text, const std::string &file) {
-  if (std::optional<Node> root = parse_plain(text)) return *std::move(root);
-  return parse_any(text, file);
-}
-
-Result<Node> parse_any(std::string_view text, const std::string &file) {
   if (const auto bad = find_bad_character(text)) {
     return error_at(file, bad->line, bad->column, bad->message, bad->hint);
   }

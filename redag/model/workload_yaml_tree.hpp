@@ -32,10 +32,6 @@ inline constexpr std::size_t kMaxDepth = 32;
 /// YAML syntax, aliases, anchors and tags, more than one document, nesting beyond kMaxDepth.
 [[nodiscard]] Result<Node> parse(std::string_view text, const std::string &file);
 
-/// The same by yaml-cpp alone. parse() comes here with what is not plain (workload_yaml_plain.hpp); tests compare the
-/// two.
-[[nodiscard]] Result<Node> parse_any(std::string_view text, const std::string &file);
-
 /// Describes a node for messages: "a map", "a list", "'5ms'".
 [[nodiscard]] std::string describe(const Node &node);
 
