@@ -240,6 +240,7 @@ void ReferenceScheduler::complete(JobSlot slot, Time now, Outcome outcome) {
     deliver(job, now);
   } else {
     ++tasks_[j.task].count.aborted;
+    if (outcome == Outcome::NoData) ++tasks_[j.task].count.no_data;
     const Reason reason = outcome == Outcome::Threw            ? Reason::Exception
                           : outcome == Outcome::BudgetExceeded ? Reason::Budget
                                                                : Reason::NoData;

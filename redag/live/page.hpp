@@ -46,7 +46,7 @@ struct Figures {
   std::uint64_t finished;
   std::uint64_t skipped;
   std::uint64_t aborted;
-  std::uint64_t misses;  // finished late, skipped, or aborted; in ROS 2 aborted ones (most had no data) are no misses
+  std::uint64_t misses;  // finished late, skipped, or aborted although they had data
   std::uint64_t deferred;
   std::uint64_t preemptions;
   std::int64_t cpu;  // processor time of ended jobs

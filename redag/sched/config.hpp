@@ -61,7 +61,10 @@ struct Accounting {
   std::uint64_t skipped = 0;
   std::uint64_t aborted = 0;
   std::uint64_t deferred = 0;
+  std::uint64_t no_data = 0;  // of the aborted ones: jobs that found nothing to do, which are no misses
 
+  /// Jobs that never answer: skipped, or aborted although they had data.
+  [[nodiscard]] std::uint64_t lost() const { return skipped + aborted - no_data; }
   [[nodiscard]] std::uint64_t in_flight() const { return released - finished - skipped - aborted; }
   friend bool operator==(const Accounting &, const Accounting &) = default;
 };

@@ -50,6 +50,7 @@ struct alignas(64) TaskState {
   std::uint64_t released_earlier = 0;  // releases before next_number last wrapped around to 0
   std::uint64_t skipped = 0;
   std::uint64_t aborted = 0;
+  std::uint64_t no_data = 0;  // of the aborted ones
   std::uint64_t deferred = 0;
   Duration period = 0;
   Duration offset = 0;

@@ -68,8 +68,12 @@ class Lifecycle final : public Scheduler {
   [[nodiscard]] std::size_t dag_slots() const override { return table_.dags.size(); }
   [[nodiscard]] Accounting accounting(TaskId task) const override {
     const TaskState &state = table_.tasks[task.value];
-    return Accounting{state.released_earlier + state.next_number, state.finished, state.skipped, state.aborted,
-                      state.deferred};
+    return Accounting{.released = state.released_earlier + state.next_number,
+                      .finished = state.finished,
+                      .skipped = state.skipped,
+                      .aborted = state.aborted,
+                      .deferred = state.deferred,
+                      .no_data = state.no_data};
   }
   [[nodiscard]] std::uint32_t ready(TaskId task) const override { return table_.tasks[task.value].ready_count; }
   [[nodiscard]] std::uint64_t thread_waits() const override { return table_.thread_waits; }

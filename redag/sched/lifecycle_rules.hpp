@@ -79,6 +79,7 @@ void Lifecycle<D>::complete(JobSlot job_slot, Time now, Outcome outcome) {
     table_.step.emit(job, JobEventKind::Finished, now);
   } else {
     ++task.aborted;
+    if (outcome == Outcome::NoData) ++task.no_data;
     table_.step.emit(job, JobEventKind::Aborted, now, reason_of(outcome));
   }
   // The job used its budget and ended at one instant: drop its pending level change.

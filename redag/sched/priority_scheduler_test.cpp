@@ -295,6 +295,19 @@ TEST(PriorityScheduler, AnAbortedJobReleasesNoSuccessor) {
   EXPECT_EQ(workers.accounting("source").aborted, 1U);
 }
 
+TEST(PriorityScheduler, AJobWithoutDataIsAbortedAndNotLost) {
+  const Workload workload = make_workload({make_dag("a", {{"t", 40}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("t").decide();
+  workers.at(1).finish("t", Outcome::NoData).decide();
+  EXPECT_EQ(workers.accounting("t").aborted, 1U);
+  EXPECT_EQ(workers.accounting("t").no_data, 1U);
+  EXPECT_EQ(workers.accounting("t").lost(), 0U);
+  workers.at(40).release("t").decide();
+  workers.at(41).finish("t", Outcome::Threw).decide();
+  EXPECT_EQ(workers.accounting("t").lost(), 1U);
+}
+
 TEST(PriorityScheduler, PendingBoundRefusesReleases) {
   Workload workload = make_workload({make_dag("a", {{"x", 10}, {"y", 20}, {"z", 30}})}, 1);
   workload.dags[0].max_pending = 1;

@@ -110,7 +110,7 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
     CallbackStats &stats = row.stats;
     const Callback &callback = *row.callback;
     stats.jobs = engine.accounting(row.task);
-    stats.misses = callback.late() + stats.jobs.skipped;
+    stats.misses = callback.late() + stats.jobs.lost();
     stats.response_p50 = callback.response().percentile(0.5);
     stats.response_p99 = callback.response().percentile(0.99);
     stats.response_max = callback.response().longest();
@@ -158,7 +158,7 @@ void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std:
   for (Row &row : rows) {
     const redag::runtime::TaskFigures figures = engine.figures(TaskId(row.task.key));
     redag::runtime::fill(row.task, figures);
-    row.task.misses = row.callback->late() + figures.jobs.skipped;  // as in stats(): aborted jobs are no misses
+    row.task.misses = row.callback->late() + figures.jobs.lost();  // as in stats()
   }
   // As in stats(): skips callbacks that have gone meanwhile.
   const redag::LockGuard guard(lock_);
