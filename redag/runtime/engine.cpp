@@ -25,7 +25,8 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
       scheduler_(std::move(scheduler)),
       pool_(os() ? options_.config.max_started : options_.config.workers, options_.trace_capacity),
       tasks_(options_.measure),
-      placement_(pool_, os(), options_.band),
+      lookout_(posts_silently() ? std::make_unique<HelperThread>() : nullptr),
+      placement_(pool_, os(), options_.band, lookout_ ? &lookout_->parker : nullptr),
       paused_(options_.start_paused),
       decisions_(options_.trace_capacity) {
   const sched::Config &config = options_.config;
@@ -37,7 +38,7 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
   }
   if (os() && options_.throttling) {
     guard_.emplace(*options_.throttling, pool_, placement_);
-    guard_thread_ = std::make_unique<GuardThread>();
+    guard_thread_ = std::make_unique<HelperThread>();
   }
 }
 
@@ -64,7 +65,7 @@ Result<void> Engine::start() {
   }
   if (Result<void> started = start_threads(cpus); !started) {
     // No thread has a job: none starts before running_ is set.
-    pool_.end();
+    end_threads();
     pool_.reset();
     return started;
   }
@@ -82,12 +83,29 @@ Result<void> Engine::start() {
 Result<void> Engine::start_threads(const std::vector<int> &cpus) {
   const ThreadSetup setup{options_.name, realtime() ? options_.band.top_job : 0, cpus, options_.touched_stack};
   Result<void> started = pool_.start(setup, [this](WorkerThread &self) { main(self); });
-  if (!started || !guard_thread_) return started;
-  Result<ThreadHandle> guard =
-      start_thread({options_.name + "-guard", options_.band.timer, {}}, [this] { guard_throttling(); });
-  if (!guard) return tl::unexpected(guard.error());
-  guard_thread_->handle = *std::move(guard);
+  if (started && guard_thread_) {
+    started = start_helper(*guard_thread_, "guard", options_.band.timer, [this] { guard_throttling(); });
+  }
+  if (started && lookout_) {
+    started = start_helper(*lookout_, "lookout", 0, [this] { look_out(); });
+  }
+  return started;
+}
+
+Result<void> Engine::start_helper(HelperThread &helper, const char *name, int priority, std::function<void()> main) {
+  Result<ThreadHandle> started = start_thread({options_.name + "-" + name, priority, {}}, std::move(main));
+  if (!started) return tl::unexpected(started.error());
+  helper.handle = *std::move(started);
   return {};
+}
+
+void Engine::end_threads() {
+  pool_.end();
+  for (HelperThread *helper : {guard_thread_.get(), lookout_.get()}) {
+    if (helper == nullptr) continue;
+    helper->parker.unpark();
+    if (helper->handle.joinable()) helper->handle.join();
+  }
 }
 
 void Engine::main(WorkerThread &self) noexcept {
@@ -101,10 +119,11 @@ void Engine::main(WorkerThread &self) noexcept {
       self.meter.pass();
       Time at = now();
       while (next.kind == Next::Kind::Start) next = run(self, next.assignment, JobSlot(), at);
-      continue;
+    } else if (ending) {
+      return;
     }
-    if (ending) return;
-    self.parker.park(options_.spins);
+    // Mail that came meanwhile is not taken without a token: if it is silent, it is left to others.
+    if (!pool_.ending()) self.parker.park(options_.spins);
   }
 }
 
@@ -116,10 +135,7 @@ void Engine::join() {
     withdraw_if_halting();
     pool_.forget_processors();
   }
-  pool_.end();
-  if (!guard_thread_) return;
-  guard_thread_->parker.unpark();
-  if (guard_thread_->handle.joinable()) guard_thread_->handle.join();
+  end_threads();
 }
 
 // The throttling guard: sleeps until a job is in progress, then checks several times a second while there are jobs.
@@ -140,6 +156,20 @@ Duration Engine::look_at_throttling() {
   const Time at = now();
   Locked locked(*this);
   return guard_->look(at, tasks_.can_give_way());
+}
+
+// The lookout: sleeps until it is woken because mail is silent, then looks at intervals while that goes on.
+void Engine::look_out() noexcept {
+  for (bool again = false;;) {
+    if (again) {
+      lookout_->parker.park_until(monotonic_now() + Mailboxes::kLookInterval);
+    } else {
+      lookout_->parker.park();
+    }
+    if (pool_.ending()) return;
+    Locked locked(*this);
+    again = placement_.look(locked.wake_ups());
+  }
 }
 
 // ---- decisions ----
@@ -168,7 +198,7 @@ Next Engine::decide(Locked &locked, Time now, WorkerThread *self, JobSlot below)
   // guard is above all jobs and waits for the lock. Its owner is raised meanwhile, and no job preempts it.
   const bool has_jobs = placement_.unfinished() > 0 || !step.dispatches.empty();
   if (guards && has_jobs && guard_->must_wake()) guard_thread_->parker.unpark();
-  const Next next = placement_.place(step, self, below, tasks_, locked.wake_ups());
+  const Next next = placement_.place(step, now, Taker{self, below, locked.waited()}, tasks_, locked.wake_ups());
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
   if (guards) guard_->note(now);
   return next;

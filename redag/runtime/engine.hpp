@@ -11,6 +11,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -179,10 +180,18 @@ class Engine {
   friend struct RunningJob;
   class Locked;
 
+  struct HelperThread {
+    Parker parker;
+    ThreadHandle handle;
+  };
+
   Result<void> start_threads(const std::vector<int> &cpus);
+  Result<void> start_helper(HelperThread &helper, const char *name, int priority, std::function<void()> main);
+  void end_threads();
   void release_at(std::span<const Release> releases, Time at);
   void main(WorkerThread &self) noexcept;
   void guard_throttling() noexcept;
+  void look_out() noexcept;
   Next run(WorkerThread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;
   sched::Outcome call(const Assignment &assignment);
   Next finish(WorkerThread &self, const Assignment &assignment, RunningJob &running, sched::Outcome outcome,
@@ -203,17 +212,14 @@ class Engine {
 
   [[nodiscard]] bool os() const { return options_.config.preemption == sched::Preemption::Full; }
   [[nodiscard]] bool realtime() const { return os() || options_.realtime_threads; }
-
-  struct GuardThread {
-    Parker parker;
-    ThreadHandle handle;
-  };
+  [[nodiscard]] bool posts_silently() const { return !realtime() && options_.config.workers > 1; }
 
   EngineOptions options_;
   mutable PiMutex lock_;
   std::unique_ptr<sched::Scheduler> scheduler_ REDAG_PT_GUARDED_BY(lock_);
   WorkerPool pool_;
   TaskTable tasks_ REDAG_GUARDED_BY(lock_);
+  const std::unique_ptr<HelperThread> lookout_;  // several ordinary threads
   JobPlacement placement_ REDAG_GUARDED_BY(lock_);
   std::optional<ThrottlingGuard> guard_ REDAG_GUARDED_BY(lock_);  // os, throttled
   bool running_ REDAG_GUARDED_BY(lock_) = false;                  // the threads have been started
@@ -224,7 +230,7 @@ class Engine {
   trace::Ring decisions_;  // written under the lock
   EventMerge merge_;       // drain() only
   Event idle_event_;
-  std::unique_ptr<GuardThread> guard_thread_;  // os, throttled
+  std::unique_ptr<HelperThread> guard_thread_;  // os, throttled
   Atomic<Time> origin_{kNever};
   Atomic<bool> halting_{false};
   std::atomic<bool> has_listeners_{false};  // a task has or had a listener; written under the lock

@@ -56,8 +56,9 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
 
   [[nodiscard]] WakeUps &wake_ups() { return wake_ups_; }
 
+  [[nodiscard]] bool waited() const { return !at_once_; }
   /// Returns true if the thread waited for the lock, or wakes others. Both can take longer than a short job.
-  [[nodiscard]] bool delayed() const { return !at_once_ || wake_ups_.any(); }
+  [[nodiscard]] bool delayed() const { return waited() || wake_ups_.any(); }
 
  private:
   Engine &engine_;

@@ -26,85 +26,72 @@ const Dispatch *choose_own(const sched::Step &step, JobSlot below) {
 
 }  // namespace
 
-JobPlacement::JobPlacement(WorkerPool &pool, bool os, const PriorityBand &band)
-    : pool_(pool), os_(os), band_(band), priorities_(os ? pool.size() : 0, band.top_job) {
-  idle_.reserve(pool.size());
-  handed_.reserve(pool.size());
-}
+JobPlacement::JobPlacement(WorkerPool &pool, bool os, const PriorityBand &band, Parker *lookout)
+    : pool_(pool),
+      os_(os),
+      band_(band),
+      priorities_(os ? pool.size() : 0, band.top_job),
+      mailboxes_(pool.size(), lookout) {}
 
 void JobPlacement::start(std::size_t processors) {
   priorities_.set_processors(processors);
+  mailboxes_.set_processors(processors);
   const auto &threads = pool_.threads();
-  for (auto thread = threads.rbegin(); thread != threads.rend(); ++thread) idle_.push_back(thread->get());
+  for (auto thread = threads.rbegin(); thread != threads.rend(); ++thread) mailboxes_.add_idle(**thread);
 }
 
 // Threads are alike: any idle thread gets the job. A job that is suspended under others stays on its thread. In `os`
-// mode the kernel decides by priority which job really runs, and a preempted job needs no action. The calling thread
-// takes the most urgent job to start. Therefore none of the threads that it wakes preempts it under the lock.
-Next JobPlacement::place(const sched::Step &step, WorkerThread *self, JobSlot below, TaskTable &tasks,
-                         WakeUps &wake_ups) {
+// mode the kernel decides by priority which job really runs, and a preempted job needs no action. The taker takes the
+// most urgent job to start. Therefore none of the threads that it wakes preempts it under the lock.
+Next JobPlacement::place(const sched::Step &step, Time now, const Taker &taker, TaskTable &tasks, WakeUps &wake_ups) {
+  WorkerThread *self = taker.thread;
   const bool is_caller = self == &pool_.caller();
-  const Dispatch *own = self == nullptr ? nullptr : choose_own(step, below);
+  const Dispatch *own = self == nullptr ? nullptr : choose_own(step, taker.below);
   Next next;
-  if (self != nullptr && !below.valid() && !is_caller) {
+  if (self != nullptr && !taker.below.valid() && !is_caller) {
     // In `os` mode a thread steals only if it would be idle: two threads that exchange jobs must exchange priorities.
     const std::uint32_t above = own == nullptr ? sched::kNoLimit : (os_ ? 0 : own->level);
-    if (WorkerThread *other = steal(above)) {
+    if (own != nullptr && mailboxes_.should_leave(tasks[own->task], taker.waited)) {
+      own = nullptr;
+      mailboxes_.add_idle(*self);
+    } else if (WorkerThread *other = mailboxes_.steal(above)) {
       next.kind = Next::Kind::Start;
       next.assignment = move_job(*other, *self);
+      mailboxes_.begin(*self, *next.assignment.entry);
       own = nullptr;
     } else if (own == nullptr) {
-      idle_.push_back(self);
+      mailboxes_.add_idle(*self);
     }
   }
   if (own != nullptr) {
+    TaskEntry &entry = tasks[own->task];
     next.kind = Next::Kind::Start;
-    assign(*self, *own, tasks[own->task], next.assignment);
+    assign(*self, *own, entry, next.assignment);
     if (!is_caller) set_priority_for_job(*self, next.assignment);
+    if (!is_caller && !taker.below.valid()) mailboxes_.begin(*self, entry);
   }
   for (const Dispatch &dispatch : step.dispatches) {
     if (&dispatch == own) continue;
     if (dispatch.kind != DispatchKind::Start) {
-      if (dispatch.kind == DispatchKind::Resume && dispatch.job == below) next.kind = Next::Kind::Resume;
+      if (dispatch.kind == DispatchKind::Resume && dispatch.job == taker.below) next.kind = Next::Kind::Resume;
       if (os_) change_level(dispatch, tasks);
       continue;
     }
-    REDAG_CHECK(!idle_.empty(), "more jobs started than there are threads");
-    WorkerThread &thread = *idle_.back();
-    idle_.pop_back();
-    REDAG_CHECK(!thread.has_mail.load(std::memory_order_relaxed), "a worker was given two jobs");
-    assign(thread, dispatch, tasks[dispatch.task], thread.mail);
-    set_priority_for_job(thread, thread.mail);
-    post(thread, wake_ups);
+    TaskEntry &entry = tasks[dispatch.task];
+    mailboxes_.post(entry, now, wake_ups, [&](WorkerThread &thread) {
+      assign(thread, dispatch, entry, thread.mail);
+      set_priority_for_job(thread, thread.mail);
+    });
   }
+  mailboxes_.settle(wake_ups);
   return next;
 }
 
 void JobPlacement::end(WorkerThread &thread) {
   thread.stack.pop_back();
+  mailboxes_.end(thread);
   if (os_ && &thread != &pool_.caller()) priorities_.end(thread.index);
   --unfinished_;
-}
-
-// Steals the job of a thread that is not awake yet, if that job is above `level`; waking it takes longer than most
-// jobs. Returns that thread, or null. The thread then finds no mail.
-WorkerThread *JobPlacement::steal(std::uint32_t level) {
-  WorkerThread *victim = nullptr;
-  for (std::size_t i = 0; i < handed_.size();) {
-    WorkerThread &thread = *handed_[i];
-    if (!thread.has_mail.load(std::memory_order_relaxed)) {
-      thread.is_handed = false;
-      handed_[i] = handed_.back();
-      handed_.pop_back();
-      continue;
-    }
-    if (thread.level < level) {
-      victim = &thread;
-      level = thread.level;
-    }
-    ++i;
-  }
-  return victim != nullptr && victim->take_mail() ? victim : nullptr;
 }
 
 Assignment JobPlacement::move_job(WorkerThread &from, WorkerThread &to) {
@@ -115,7 +102,7 @@ Assignment JobPlacement::move_job(WorkerThread &from, WorkerThread &to) {
   to.is_spared = from.is_spared;
   if (os_) priorities_.end(from.index);
   set_priority_for_job(to, assignment);
-  idle_.push_back(&from);
+  mailboxes_.add_idle(from);
   return assignment;
 }
 
@@ -129,13 +116,6 @@ void JobPlacement::assign(WorkerThread &thread, const Dispatch &dispatch, TaskEn
   thread.stack.push_back(assignment.job);
   thread.level = dispatch.level;
   thread.is_spared = dispatch.inherits || entry.is_high;
-}
-
-void JobPlacement::post(WorkerThread &thread, WakeUps &wake_ups) {
-  thread.has_mail.store(true, std::memory_order_release);
-  if (!thread.is_handed) handed_.push_back(&thread);
-  thread.is_handed = true;
-  wake_ups.wake(thread);
 }
 
 void JobPlacement::change_level(const Dispatch &dispatch, const TaskTable &tasks) {

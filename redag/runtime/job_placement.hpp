@@ -5,11 +5,11 @@
 // allocates or looks up names. Not thread-safe: the engine's lock guards it.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "redag/runtime/mailboxes.hpp"
 #include "redag/runtime/setup.hpp"
 #include "redag/runtime/task_table.hpp"
 #include "redag/runtime/thread_priorities.hpp"
@@ -29,45 +29,28 @@ struct Next {
   Assignment assignment;
 };
 
-/// Threads to wake. Real-time threads are woken at once, under the lock: a waker preempted between decision and wake-up
-/// would leave an urgent job asleep. As the lock's owner, the waker is raised as soon as the next decision is due.
-class WakeUps {
- public:
-  explicit WakeUps(bool at_once) : at_once_(at_once) {}
-  void wake(WorkerThread &thread) {
-    any_ = true;
-    if (at_once_ || count_ == late_.size()) {
-      thread.parker.unpark();
-    } else {
-      late_[count_++] = &thread;
-    }
-  }
-  /// Wakes those that could wait for the end of the lock. Call it once.
-  void wake_late() {
-    for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
-  }
-  [[nodiscard]] bool any() const { return any_; }
-
- private:
-  bool at_once_;
-  bool any_ = false;
-  std::array<WorkerThread *, 32> late_;
-  std::size_t count_ = 0;
+/// The calling thread, if it has just lost its job and can take another.
+struct Taker {
+  WorkerThread *thread = nullptr;
+  JobSlot below;        // the job suspended on it, if any
+  bool waited = false;  // for the engine's lock
 };
 
 class JobPlacement {
  public:
-  /// os: the kernel schedules the threads by their priorities in `band`.
-  JobPlacement(WorkerPool &pool, bool os, const PriorityBand &band);
+  /// os: the kernel schedules the threads by their priorities in `band`. For `lookout` see Mailboxes.
+  JobPlacement(WorkerPool &pool, bool os, const PriorityBand &band, Parker *lookout);
 
   /// All threads wait for jobs, on that many processors.
   void start(std::size_t processors);
 
-  /// Carries out a step. `self` is the calling thread if it has just lost its job and can take another. `below` is the
-  /// job suspended on it.
-  Next place(const sched::Step &step, WorkerThread *self, JobSlot below, TaskTable &tasks, WakeUps &wake_ups);
+  /// Carries out a step that was decided at `now`. Returns the taker's next action.
+  Next place(const sched::Step &step, Time now, const Taker &taker, TaskTable &tasks, WakeUps &wake_ups);
   /// The thread's topmost job has ended.
   void end(WorkerThread &thread);
+
+  /// For the lookout: returns true if it should look again.
+  bool look(WakeUps &wake_ups) { return mailboxes_.look(wake_ups); }
 
   /// Jobs placed and not ended.
   [[nodiscard]] std::uint32_t unfinished() const { return unfinished_; }
@@ -83,12 +66,9 @@ class JobPlacement {
   }
 
  private:
-  WorkerThread *steal(std::uint32_t level);
   Assignment move_job(WorkerThread &from, WorkerThread &to);
   /// Fills `assignment`, which is the thread's mail or its next action.
   void assign(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment);
-  /// The thread has mail.
-  void post(WorkerThread &thread, WakeUps &wake_ups);
   void change_level(const sched::Dispatch &dispatch, const TaskTable &tasks);
   void set_priority_for_job(WorkerThread &thread, const Assignment &assignment);
   void apply(std::span<const ThreadPriorities::Change> changes);
@@ -101,9 +81,8 @@ class JobPlacement {
   WorkerPool &pool_;
   bool os_;
   PriorityBand band_;
-  ThreadPriorities priorities_;         // os
-  std::vector<WorkerThread *> idle_;    // threads without a job; the last one is used first
-  std::vector<WorkerThread *> handed_;  // threads that may have mail; each once
+  ThreadPriorities priorities_;  // os
+  Mailboxes mailboxes_;
   std::uint32_t unfinished_ = 0;
   std::uint64_t refused_priorities_ = 0;
   bool giving_way_ = false;

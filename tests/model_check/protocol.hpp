@@ -5,7 +5,6 @@
 //
 // Watching a job is an operation of the explorer only where the engine itself must keep two things apart. As long as
 // the engine does so, watching adds no executions. If it does not, every order is explored.
-// no execution as long as the engine does so, and shows every order in which it does not.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -174,6 +173,16 @@ class Machine {
     explored::settle();
     explored::calm(true);
     finish();
+  }
+  /// Runs enough jobs of the first `tasks` tasks, one after the other, for them to be expected to be tiny; not
+  /// explored.
+  void run_tiny_jobs(std::size_t tasks) {
+    explored::calm(true);
+    for (std::size_t i = 0; i < tasks * runtime::TaskEntry::kStreak; ++i) {
+      release(i % tasks);
+      explored::settle();
+    }
+    explored::calm(false);
   }
   void release(std::size_t task) { engine->release(TaskId(task), 0); }
 

@@ -1,0 +1,125 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Hands jobs to threads that have none. Such a job is the thread's mail. Waking the thread takes longer than many jobs:
+// a thread that is awake and needs a job therefore steals mail. Mail of a tiny job need not even wake its thread while
+// another thread is in a tiny job, because that one soon looks for mail. Such mail is silent. A thread of its own, the
+// lookout, looks every kLookInterval for mail that has waited for a whole interval, and has its thread woken.
+//
+// Invariant: while mail is silent, the lookout is awake. Nothing here allocates. Not thread-safe: the engine's lock
+// guards it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "redag/base/check.hpp"
+#include "redag/base/time.hpp"
+#include "redag/runtime/worker_pool.hpp"
+
+namespace redag::runtime {
+
+/// Threads to wake. Real-time threads are woken at once, under the lock: a waker preempted between decision and wake-up
+/// would leave an urgent job asleep. As the lock's owner, the waker is raised as soon as the next decision is due.
+class WakeUps {
+ public:
+  explicit WakeUps(bool at_once) : at_once_(at_once) {}
+  void wake(WorkerThread &thread) {
+    any_ = true;
+    if (at_once_ || count_ == late_.size()) {
+      thread.parker.unpark();
+    } else {
+      late_[count_++] = &thread;
+    }
+  }
+  /// Wakes those that could wait for the end of the lock. Call it once.
+  void wake_late() {
+    for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
+  }
+  [[nodiscard]] bool any() const { return any_; }
+
+ private:
+  bool at_once_;
+  bool any_ = false;
+  std::array<WorkerThread *, 32> late_;
+  std::size_t count_ = 0;
+};
+
+class Mailboxes {
+ public:
+  /// How long the lookout sleeps between two looks.
+  static constexpr Duration kLookInterval = 50 * kMicrosecond;
+
+  /// For up to `threads` threads. `lookout` is null if no mail may be silent. Otherwise its thread, when it was
+  /// woken, calls look() after every interval.
+  Mailboxes(std::size_t threads, Parker *lookout);
+
+  /// A look wakes not more threads than there are other processors.
+  void set_processors(std::size_t processors) { other_processors_ = std::max<std::size_t>(processors, 2) - 1; }
+
+  /// The thread has no job.
+  void add_idle(WorkerThread &thread) { idle_.push_back(&thread); }
+  /// Posts a job. `write` is called with the thread that gets it, and writes the thread's mail. Requires an idle
+  /// thread.
+  template <typename Write>
+  void post(const TaskEntry &entry, Time now, WakeUps &wake_ups, Write &&write) {
+    REDAG_CHECK(!idle_.empty(), "more jobs started than there are threads");
+    const bool silent = may_be_silent(entry, now);
+    WorkerThread &thread = *idle_.back();
+    idle_.pop_back();
+    REDAG_CHECK(!thread.has_mail.load(std::memory_order_relaxed), "a worker was given two jobs");
+    std::forward<Write>(write)(thread);
+    deliver(thread, silent, wake_ups);
+  }
+  /// Takes the mail of a thread that is not awake yet, if that job is above `level`, or is at this level and did not
+  /// wake its thread. Returns that thread, which then finds no mail and is not idle yet, or null.
+  WorkerThread *steal(std::uint32_t level);
+
+  /// The thread begins a job, and looks for mail when that has ended.
+  void begin(WorkerThread &thread, const TaskEntry &entry) {
+    thread.in_tiny_job = lookout_ != nullptr && entry.expected_tiny();
+    if (thread.in_tiny_job) ++in_tiny_jobs_;
+  }
+  void end(WorkerThread &thread) {
+    if (std::exchange(thread.in_tiny_job, false)) --in_tiny_jobs_;
+  }
+
+  /// Returns true if a thread should post its next job and sleep, because others are in tiny jobs, too: a single thread
+  /// ends them sooner than several that compete for the lock. `waited`: the thread waited for the lock.
+  [[nodiscard]] bool should_leave(const TaskEntry &next, bool waited) const {
+    return in_tiny_jobs_ > 0 && (waited || looks_) && next.expected_tiny();
+  }
+  /// To be called after posting: no mail stays silent if no thread is left that soon looks for it.
+  void settle(WakeUps &wake_ups) {
+    if (looks_ && in_tiny_jobs_ == 0) wake_silent(silent_posts_, handed_.size(), wake_ups);
+  }
+  /// Has threads woken whose mail has been silent since before the last look: the most urgent, as many as there are
+  /// other processors. Returns true if the lookout should look again, and false if it should sleep.
+  bool look(WakeUps &wake_ups);
+
+ private:
+  /// Two wake-ups within this time that mail could have done without wake the lookout.
+  static constexpr Duration kBusy = 200 * kMicrosecond;
+
+  bool may_be_silent(const TaskEntry &entry, Time now);
+  void deliver(WorkerThread &thread, bool silent, WakeUps &wake_ups);
+  /// Wakes up to `most` threads with mail of the first `silent_posts` silent posts. Returns true if silent mail is
+  /// left.
+  bool wake_silent(std::uint64_t silent_posts, std::size_t most, WakeUps &wake_ups);
+
+  Parker *lookout_;
+  std::size_t other_processors_ = 1;
+  std::vector<WorkerThread *> idle_;    // the last one is used first
+  std::vector<WorkerThread *> handed_;  // threads that may have mail; each once
+  bool looks_ = false;                  // the lookout is awake
+  std::uint32_t in_tiny_jobs_ = 0;      // threads
+  std::uint64_t silent_posts_ = 0;      // since the start
+  std::uint64_t seen_ = 0;              // silent posts at the last look
+  Time last_wake_up_ = -kBusy;          // the last one that mail could have done without
+};
+
+}  // namespace redag::runtime

@@ -1,0 +1,93 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Explores mail that does not wake its thread: it is stolen, or looked after, whatever the other threads do.
+#include "protocol.hpp"
+
+namespace redag::model_check {
+namespace {
+
+std::uint32_t thread(std::function<void()> body) { return explored::spawn(std::move(body)); }
+
+// Two workers and two tasks whose jobs are expected to be tiny.
+class MailProtocol : public ::testing::TestWithParam<Preemption> {
+ protected:
+  struct Scenario {
+    Scenario() : machine(ladder(2), Platform{GetParam(), 2}, {nullptr, nullptr}) {
+      machine.start_calmly();
+      machine.run_tiny_jobs(2);
+    }
+    /// The first task's job releases one of the second. This wakes a thread; the next time its mail is silent.
+    void release_from_body_calmly() {
+      machine.work(0) = [this](const Job &) {
+        machine.release(1);
+        return Outcome::Finished;
+      };
+      explored::calm(true);
+      machine.release(0);
+      explored::settle();
+      explored::calm(false);
+    }
+    Machine machine;
+  };
+};
+INSTANTIATE_TEST_SUITE_P(Modes, MailProtocol, ::testing::Values(Preemption::None, Preemption::Cooperative),
+                         [](const auto &instance) {
+                           return std::string(instance.param == Preemption::None ? "none" : "cooperative");
+                         });
+
+// The job that was expected to be tiny goes on until the other one has run.
+TEST_P(MailProtocol, SilentMailIsLookedAfter) {
+  expect_holds([] {
+    Scenario scenario;
+    scenario.release_from_body_calmly();
+    Machine &machine = scenario.machine;
+    Countdown other(1);
+    machine.work(0) = [&](const Job &) {
+      machine.release(1);
+      other.wait();
+      return Outcome::Finished;
+    };
+    machine.work(1) = [&](const Job &) {
+      other.count();
+      return Outcome::Finished;
+    };
+    machine.release(0);
+    other.wait();
+    machine.finish_calmly();
+  });
+}
+
+// The halt and the end of the threads while mail is silent, stolen, or looked after.
+TEST_P(MailProtocol, AHaltFindsSilentMail) {
+  expect_holds([] {
+    Scenario scenario;
+    scenario.release_from_body_calmly();
+    scenario.machine.release(0);
+    scenario.machine.finish();
+  });
+}
+
+// Two threads compete for the lock, and one leaves its next job to the other.
+TEST_P(MailProtocol, TinyJobsThatCompeteAllRun) {
+  expect_holds([] {
+    Scenario scenario;
+    Machine &machine = scenario.machine;
+    Countdown all(4);
+    for (std::size_t t = 0; t < 2; ++t) {
+      machine.work(t) = [&, t, again = true](const Job &) mutable {
+        if (std::exchange(again, false)) machine.release(t);
+        all.count();
+        return Outcome::Finished;
+      };
+    }
+    const std::uint32_t source = thread([&] { machine.release(1); });
+    machine.release(0);
+    all.wait();
+    explored::join(source);
+    machine.finish_calmly();
+  });
+}
+
+}  // namespace
+}  // namespace redag::model_check
