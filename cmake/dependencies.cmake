@@ -3,8 +3,9 @@
 
 # Finds all packages. The top CMakeLists.txt includes this file, because imported targets are visible only in its folder
 # and below. tools/bootstrap installs the packages.
+list(APPEND CMAKE_MODULE_PATH ${CMAKE_CURRENT_LIST_DIR})
 find_package(fmt REQUIRED)
-find_package(yaml-cpp REQUIRED)
+find_package(LibYAML REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(tl-expected REQUIRED)
 find_package(Threads REQUIRED)
@@ -12,12 +13,6 @@ find_package(ZLIB REQUIRED)
 if(NOT redag_parts STREQUAL "executor")  # the workbench as well
   find_package(CLI11 REQUIRED)
   find_package(TBB REQUIRED)
-endif()
-# yaml-cpp 0.8 renamed its target.
-if(TARGET yaml-cpp::yaml-cpp)
-  set(redag_yaml_cpp yaml-cpp::yaml-cpp)
-else()
-  set(redag_yaml_cpp yaml-cpp)
 endif()
 
 if(REDAG_BUILD_TESTS)

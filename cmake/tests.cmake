@@ -26,7 +26,7 @@ redag_sources(testing_sources redag_testing)
 add_library(redag_testing STATIC ${testing_sources})
 # Everything that tests may use: a test program names no further libraries.
 target_link_libraries(redag_testing
-  PUBLIC redag_lab fmt::fmt ${redag_yaml_cpp} nlohmann_json::nlohmann_json GTest::gtest GTest::gmock rapidcheck
+  PUBLIC redag_lab fmt::fmt LibYAML::LibYAML nlohmann_json::nlohmann_json GTest::gtest GTest::gmock rapidcheck
   PRIVATE redag_warnings)
 target_compile_definitions(redag_testing PUBLIC
   REDAG_SOURCE_DIR="${PROJECT_SOURCE_DIR}" REDAG_BINARY_DIR="${CMAKE_BINARY_DIR}")

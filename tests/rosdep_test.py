@@ -21,16 +21,16 @@ SYSTEM_KEYS = {
     "libexpected-dev": "libexpected-dev",
     "libgmock-dev": "libgmock-dev",
     "libgtest-dev": "libgtest-dev",
+    "libyaml-dev": "libyaml-dev",
     "nlohmann-json-dev": "nlohmann-json3-dev",
     "tbb": "libtbb-dev",
-    "yaml-cpp": "libyaml-cpp-dev",
     "zlib": "zlib1g-dev",
 }
 # Packages of the distributions themselves: ros-<distribution>-<name>.
 ROS_KEYS = {"ament_cmake", "diagnostic_msgs", "launch_ros", "rclcpp", "rclcpp_action", "rclcpp_components",
             "rclcpp_lifecycle", "std_msgs", "std_srvs", "test_msgs"}
 # Names that find_package() looks for, with the rosdep key that installs them.
-CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "yaml-cpp": "yaml-cpp", "tl-expected": "libexpected-dev",
+CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "tl-expected": "libexpected-dev",
                   "CLI11": "cli11", "TBB": "tbb", "GTest": "libgtest-dev"}
 ROS_PACKAGES = ("redag_rclcpp", "redag_rclcpp_lab")
 PACKAGES = ("redag", "redag_analysis", "redag_lab", *ROS_PACKAGES)

@@ -10,14 +10,6 @@
 namespace redag {
 namespace {
 
-char32_t decode(std::string_view sequence) {
-  const auto lead = static_cast<unsigned char>(sequence.front());
-  if (sequence.size() == 1) return lead;
-  char32_t code = lead & (0x7FU >> sequence.size());
-  for (const char c : sequence.substr(1)) code = code << 6U | (static_cast<unsigned char>(c) & 0x3FU);
-  return code;
-}
-
 bool can_be_shown(char32_t code) {
   const bool control = code < 0x20 || (code >= 0x7F && code < 0xA0);
   const bool separator = code == 0x2028 || code == 0x2029 || code == 0xFEFF;
@@ -27,6 +19,14 @@ bool can_be_shown(char32_t code) {
 }
 
 }  // namespace
+
+char32_t code_point(std::string_view sequence) {
+  const auto lead = static_cast<unsigned char>(sequence.front());
+  if (sequence.size() == 1) return lead;
+  char32_t code = lead & (0x7FU >> sequence.size());
+  for (const char c : sequence.substr(1)) code = code << 6U | (static_cast<unsigned char>(c) & 0x3FU);
+  return code;
+}
 
 std::size_t utf8_length(std::string_view text, std::size_t at) {
   const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
@@ -49,7 +49,7 @@ std::string find_unprintable(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const std::size_t length = utf8_length(text, i);
     if (length == 0) return fmt::format("byte 0x{:02X}", static_cast<unsigned char>(text[i]));
-    const char32_t code = decode(text.substr(i, length));
+    const char32_t code = code_point(text.substr(i, length));
     if (!can_be_shown(code)) return fmt::format("U+{:04X}", static_cast<std::uint32_t>(code));
     i += length;
   }
@@ -67,7 +67,7 @@ std::string written_out(std::string_view text, std::string_view kept) {
       shown += fmt::format("\\x{:02X}", static_cast<unsigned char>(text[i++]));
       continue;
     }
-    const char32_t code = decode(text.substr(i, length));
+    const char32_t code = code_point(text.substr(i, length));
     if (can_be_shown(code) || (length == 1 && kept.find(text[i]) != std::string_view::npos)) {
       shown += text.substr(i, length);
     } else {

@@ -31,6 +31,9 @@ inline constexpr const char *kMaxDurationText = "1281023h (146 years)";  // kMax
 /// Length of the UTF-8 sequence at `at`; 0: invalid (also overlong forms, surrogates, and beyond U+10FFFF).
 [[nodiscard]] std::size_t utf8_length(std::string_view text, std::size_t at);
 
+/// The code of the one character that `sequence` is. Requires valid UTF-8.
+[[nodiscard]] char32_t code_point(std::string_view sequence);
+
 /// Returns the first character that a terminal would obey instead of show, as "U+001B": controls (C0, DEL, C1), line
 /// separators, marks that reverse the direction of text. Returns "byte 0xFF" for a byte that is not UTF-8. Empty: all
 /// can be shown.

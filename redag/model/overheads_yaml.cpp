@@ -3,18 +3,18 @@
 
 // The text form of a calibration: docs/calibration.md.
 #include <fmt/format.h>
-#include <yaml-cpp/emitter.h>
-#include <yaml-cpp/emittermanip.h>
 
 #include "redag/model/overheads.hpp"
 #include "redag/model/text_file.hpp"
 #include "redag/model/workload_yaml_values.hpp"
+#include "redag/model/yaml_writer.hpp"
 
 namespace redag {
 namespace {
 
 using yaml::find;
 using yaml::Node;
+using yaml::Writer;
 
 constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
 
@@ -109,59 +109,67 @@ class Reader : private yaml::ValueReader {
   Calibration calibration_;
 };
 
-void write(YAML::Emitter &out, const char *key, const std::string &value) {
-  out << YAML::Key << key << YAML::Value << YAML::DoubleQuoted << value;
+void write_quoted(Writer &out, std::string_view key, std::string_view value) {
+  out.text(key);
+  out.quoted(value);
 }
 
-void write(YAML::Emitter &out, const char *key, const std::optional<Overheads> &overheads) {
+void write(Writer &out, std::string_view key, const std::optional<Overheads> &overheads) {
   if (!overheads) return;
   Overheads copy = *overheads;
-  out << YAML::Key << key << YAML::Value << YAML::BeginMap;
+  out.text(key);
+  out.begin_map();
   for (const std::string_view name : overhead_names()) {
-    out << YAML::Key << std::string(name) << YAML::Value << format_duration(*overhead_named(copy, name));
+    out.write(name, format_duration(*overhead_named(copy, name)));
   }
-  out << YAML::EndMap;
+  out.end_map();
+}
+
+void write(Writer &out, const Measured &row) {
+  out.begin_map(Writer::Layout::OneLine);
+  out.write("what", row.what);
+  out.write("threads", row.threads);
+  out.write("load", row.load);
+  out.write("samples", row.samples);
+  out.write("p50", format_duration(row.p50));
+  out.write("p99", format_duration(row.p99));
+  out.write("p999", format_duration(row.p999));
+  out.write("max", format_duration(row.max));
+  out.end_map();
 }
 
 }  // namespace
 
 std::string to_yaml(const Calibration &calibration) {
-  YAML::Emitter out;
-  out << YAML::BeginMap;
-  out << YAML::Key << "overheads" << YAML::Value << YAML::BeginMap;
+  Writer out;
+  out.begin_map();
+  out.text("overheads");
+  out.begin_map();
   write(out, "realtime", calibration.realtime);
   write(out, "normal", calibration.normal);
-  out << YAML::EndMap;
-  out << YAML::Key << "provenance" << YAML::Value << YAML::BeginMap;
-  write(out, "date", calibration.date);
-  write(out, "host", calibration.host);
-  write(out, "kernel", calibration.kernel);
-  write(out, "processor", calibration.processor);
-  out << YAML::Key << "processors" << YAML::Value << calibration.processors;
-  write(out, "rights", calibration.rights);
-  write(out, "load", calibration.load);
-  out << YAML::Key << "duration" << YAML::Value << format_duration(calibration.duration);
-  out << YAML::Key << "complete" << YAML::Value << (calibration.complete ? "true" : "false");
-  write(out, "version", calibration.version);
-  out << YAML::EndMap;
+  out.end_map();
+  out.text("provenance");
+  out.begin_map();
+  write_quoted(out, "date", calibration.date);
+  write_quoted(out, "host", calibration.host);
+  write_quoted(out, "kernel", calibration.kernel);
+  write_quoted(out, "processor", calibration.processor);
+  out.write("processors", calibration.processors);
+  write_quoted(out, "rights", calibration.rights);
+  write_quoted(out, "load", calibration.load);
+  out.write("duration", format_duration(calibration.duration));
+  out.write("complete", calibration.complete ? "true" : "false");
+  write_quoted(out, "version", calibration.version);
+  out.end_map();
   if (!calibration.measured.empty()) {
-    out << YAML::Key << "measured" << YAML::Value << YAML::BeginSeq;
-    for (const Measured &row : calibration.measured) {
-      out << YAML::Flow << YAML::BeginMap << YAML::Key << "what" << YAML::Value << row.what;
-      out << YAML::Key << "threads" << YAML::Value << row.threads << YAML::Key << "load" << YAML::Value << row.load;
-      out << YAML::Key << "samples" << YAML::Value << row.samples;
-      out << YAML::Key << "p50" << YAML::Value << format_duration(row.p50);
-      out << YAML::Key << "p99" << YAML::Value << format_duration(row.p99);
-      out << YAML::Key << "p999" << YAML::Value << format_duration(row.p999);
-      out << YAML::Key << "max" << YAML::Value << format_duration(row.max) << YAML::EndMap;
-    }
-    out << YAML::EndSeq;
+    out.text("measured");
+    out.begin_list();
+    for (const Measured &row : calibration.measured) write(out, row);
+    out.end_list();
   }
-  out << YAML::EndMap;
-  return std::string(
-             "# What this machine adds to the jobs of a workload: docs/calibration.md. Charged with --overheads "
-             "FILE.\n") +
-         out.c_str() + "\n";
+  out.end_map();
+  return "# What this machine adds to the jobs of a workload: docs/calibration.md. Charged with --overheads FILE.\n" +
+         out.take();
 }
 
 Result<Calibration> parse_calibration(std::string_view text, std::string file_name) {

@@ -84,7 +84,8 @@ class Reader : private yaml::ValueReader {
     }
     Diagnostics found = take_diagnostics();
     if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
-    return LoadedWorkload{std::move(workload_), std::move(found)};
+    const bool states_workers = platform_.node != nullptr && find(platform_, Field::Workers) != nullptr;
+    return LoadedWorkload{std::move(workload_), std::move(found), states_workers};
   }
 
  private:

@@ -18,12 +18,13 @@ namespace redag {
 struct LoadedWorkload {
   Workload workload;
   Diagnostics warnings;
+  bool states_workers = false;  // if not, `workload` has the format's default
 };
 
 /// What a file must state. LoadOptions{.wcet_optional = true} is for programs that run callbacks and measure them.
 using LoadOptions = ValidateOptions;
 
-/// The longest text that is read, in bytes. yaml-cpp can take 400 times as much memory.
+/// The longest text that is read, in bytes. Its tree can take 260 times as much memory.
 inline constexpr std::size_t kMaxWorkloadBytes = std::size_t{16} << 20U;
 
 /// Reads and validates a file. Errors: all mistakes by line (with the warnings among them), or why the file cannot be

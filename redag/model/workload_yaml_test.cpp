@@ -208,6 +208,16 @@ TEST(ParseWorkload, MayLeaveTheWcetOfACallbackOpen) {
             "w.yaml:1:42: error: wcet must be greater than zero, not '0'");
 }
 
+TEST(ParseWorkload, KnowsWhetherTheFileStatesTheWorkers) {
+  const auto states = [](const std::string &platform) {
+    const std::string dag = "dags: [{name: d, period: 1s, tasks: [{name: t, wcet: 1ms}]}]\n";
+    return parse_workload(platform + dag, "w.yaml").value().states_workers;
+  };
+  EXPECT_TRUE(states("platform: {workers: 1}\n"));
+  EXPECT_FALSE(states("platform: {preemption: none}\n"));
+  EXPECT_FALSE(states(""));
+}
+
 TEST(ParseWorkload, AcceptsAByteOrderMarkAndWindowsLineEnds) {
   EXPECT_EQ(read("\xEF\xBB\xBF"
                  "dags:\r\n  - name: d\r\n    tasks:\r\n      - {name: t, wcet: 1ms, period: 1s}\r\n")

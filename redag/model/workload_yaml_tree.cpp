@@ -3,15 +3,11 @@
 
 #include "redag/model/workload_yaml_tree.hpp"
 
-#include <istream>
-#include <optional>
-#include <streambuf>
+#include <new>
 #include <utility>
 
 #include <fmt/format.h>
-#include <yaml-cpp/eventhandler.h>
-#include <yaml-cpp/exceptions.h>
-#include <yaml-cpp/parser.h>
+#include <yaml.h>
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
@@ -19,183 +15,246 @@
 namespace redag::yaml {
 namespace {
 
-/// Thrown through yaml-cpp to stop it at the first forbidden construct.
+struct Place {
+  int line = 1;
+  int column = 1;
+};
+
+Place place_of(const yaml_mark_t &mark) { return {static_cast<int>(mark.line) + 1, static_cast<int>(mark.column) + 1}; }
+
+/// Leaves parse() at the first mistake.
 struct Rejected {
-  YAML::Mark mark;
+  Place place;
   std::string message;
   std::string hint;
 };
 
-tl::unexpected<Diagnostics> error_at(const std::string &file, int line, int column, std::string message,
-                                     std::string hint) {
-  return tl::unexpected<Diagnostics>(
-      Diagnostics{Diagnostic{Severity::Error, file, line, column, std::move(message), std::move(hint)}});
-}
+const char *as_text(const yaml_char_t *bytes) { return reinterpret_cast<const char *>(bytes); }
 
-class TreeBuilder : public YAML::EventHandler {
+/// What libyaml found next. Owns the texts in it.
+class Event {
  public:
-  void OnDocumentStart(const YAML::Mark & /*mark*/) override {}
-  void OnDocumentEnd() override {}
+  Event() = default;
+  ~Event() { yaml_event_delete(&raw_); }
+  Event(const Event &) = delete;
+  Event &operator=(const Event &) = delete;
 
-  void OnNull(const YAML::Mark &mark, YAML::anchor_t anchor) override {
-    refuse_extras(mark, anchor, "");
-    add(Node::Kind::Null, mark);
-  }
-
-  void OnAlias(const YAML::Mark &mark, YAML::anchor_t /*anchor*/) override { refuse_alias(mark); }
-
-  void OnScalar(const YAML::Mark &mark, const std::string &tag, YAML::anchor_t anchor,
-                const std::string &value) override {
-    refuse_extras(mark, anchor, tag);
-    Node &node = add(Node::Kind::Scalar, mark);
-    node.text = value;
-    node.quoted = tag == "!";
-    last_scalar_ = mark;
-  }
-
-  void OnSequenceStart(const YAML::Mark &mark, const std::string &tag, YAML::anchor_t anchor,
-                       YAML::EmitterStyle::value /*style*/) override {
-    refuse_extras(mark, anchor, tag);
-    open(Node::Kind::Sequence, mark);
-  }
-  void OnSequenceEnd() override { close(); }
-
-  void OnMapStart(const YAML::Mark &mark, const std::string &tag, YAML::anchor_t anchor,
-                  YAML::EmitterStyle::value /*style*/) override {
-    refuse_extras(mark, anchor, tag);
-    open(Node::Kind::Map, mark);
-  }
-  void OnMapEnd() override { close(); }
-
-  [[nodiscard]] Node take_root() { return std::move(root_); }
-  [[nodiscard]] const YAML::Mark &last_scalar() const { return last_scalar_; }
+  [[nodiscard]] yaml_event_t &raw() { return raw_; }
 
  private:
-  [[noreturn]] static void refuse_alias(const YAML::Mark &mark) {
-    throw Rejected{mark, "aliases and anchors (* and &) are not supported", "write out the values"};
+  yaml_event_t raw_{};
+};
+
+/// Returns the place of byte `end`. Requires that the text before it is valid UTF-8.
+Place place_at(std::string_view text, std::size_t end) {
+  Place place;
+  for (std::size_t i = 0; i < end; i += utf8_length(text, i)) {
+    if (text[i] == '\n') {
+      ++place.line;
+      place.column = 1;
+    } else {
+      ++place.column;
+    }
+  }
+  return place;
+}
+
+/// libyaml's events of one text, which must outlive it.
+class EventReader {
+ public:
+  explicit EventReader(std::string_view text) : text_(text) {
+    if (yaml_parser_initialize(&parser_) == 0) throw std::bad_alloc();
+    yaml_parser_set_encoding(&parser_, YAML_UTF8_ENCODING);
+    const char *bytes = text.empty() ? "" : text.data();
+    yaml_parser_set_input_string(&parser_, reinterpret_cast<const unsigned char *>(bytes), text.size());
+  }
+  ~EventReader() { yaml_parser_delete(&parser_); }
+  EventReader(const EventReader &) = delete;
+  EventReader &operator=(const EventReader &) = delete;
+
+  /// Replaces `event` by the next one. Throws Rejected where the text is not YAML.
+  void next(Event &event) {
+    yaml_event_delete(&event.raw());
+    if (yaml_parser_parse(&parser_, &event.raw()) == 0) throw mistake();
   }
 
-  static void refuse_extras(const YAML::Mark &mark, YAML::anchor_t anchor, const std::string &tag) {
-    if (anchor != YAML::NullAnchor) refuse_alias(mark);
-    // yaml-cpp gives "?" to plain and "!" to quoted scalars that have no tag.
-    if (!tag.empty() && tag != "?" && tag != "!") {
-      throw Rejected{mark, fmt::format("tags (here '{}') are not supported", tag), "remove the tag"};
+ private:
+  [[nodiscard]] Rejected mistake() const {
+    if (parser_.error == YAML_MEMORY_ERROR) throw std::bad_alloc();
+    const std::string_view problem = parser_.problem;
+    if (parser_.error == YAML_READER_ERROR) {
+      return {place_at(text_, parser_.problem_offset), fmt::format("invalid YAML: {}", problem), ""};
     }
+    const Place place = place_of(parser_.problem_mark);
+    if (parser_.context == nullptr) return {place, fmt::format("invalid YAML: {}", problem), ""};
+    const std::string_view context = parser_.context;
+    const Place begin = place_of(parser_.context_mark);
+    // It swallows the rest of the file, whose end is not the place to look at.
+    if (context == "while scanning a quoted scalar" && problem == "found unexpected end of stream") {
+      return {begin, "invalid YAML: a quote is not closed", ""};
+    }
+    std::string message = fmt::format("invalid YAML: {} {}", problem, context);
+    if (begin.line != place.line) message += fmt::format(" that begins in line {}", begin.line);
+    return {place, std::move(message), ""};
+  }
+
+  std::string_view text_;
+  yaml_parser_t parser_{};
+};
+
+class TreeBuilder {
+ public:
+  /// Takes the events of one document, from its begin to its end.
+  Node read(EventReader &reader) {
+    Event event;
+    do {
+      reader.next(event);
+    } while (take(event.raw()));
+    REDAG_CHECK(open_.empty(), "libyaml closes what it opened");
+    return std::move(root_);
+  }
+
+ private:
+  bool take(const yaml_event_t &event) {
+    switch (event.type) {
+      case YAML_SCALAR_EVENT: add_scalar(event); break;
+      case YAML_SEQUENCE_START_EVENT:
+        refuse_extras(event.start_mark, event.data.sequence_start.anchor, event.data.sequence_start.tag);
+        open(Node::Kind::Sequence, event.start_mark);
+        break;
+      case YAML_MAPPING_START_EVENT:
+        refuse_extras(event.start_mark, event.data.mapping_start.anchor, event.data.mapping_start.tag);
+        open(Node::Kind::Map, event.start_mark);
+        break;
+      case YAML_SEQUENCE_END_EVENT:
+      case YAML_MAPPING_END_EVENT: close(); break;
+      case YAML_ALIAS_EVENT: refuse_alias(event.start_mark);
+      default: return false;
+    }
+    return true;
+  }
+
+  [[noreturn]] static void refuse_alias(const yaml_mark_t &mark) {
+    throw Rejected{place_of(mark), "aliases and anchors (* and &) are not supported", "write out the values"};
+  }
+
+  static void refuse_extras(const yaml_mark_t &mark, const yaml_char_t *anchor, const yaml_char_t *tag) {
+    if (anchor != nullptr) refuse_alias(mark);
+    if (tag == nullptr) return;
+    throw Rejected{place_of(mark), fmt::format("tags (here {}) are not supported", in_quotes(as_text(tag))),
+                   "remove the tag"};
+  }
+
+  void add_scalar(const yaml_event_t &event) {
+    const auto &scalar = event.data.scalar;
+    refuse_extras(event.start_mark, scalar.anchor, scalar.tag);
+    const std::string_view text(as_text(scalar.value), scalar.length);
+    const bool quoted = scalar.style != YAML_PLAIN_SCALAR_STYLE;
+    if (!quoted && is_null(text)) {
+      add(Node::Kind::Null, event.start_mark);
+      return;
+    }
+    Node &node = add(Node::Kind::Scalar, event.start_mark);
+    node.text = text;
+    node.quoted = quoted;
   }
 
   // Pointers in open_ stay valid, because only the innermost open node's children grow.
-  Node &add(Node::Kind kind, const YAML::Mark &mark) {
+  Node &add(Node::Kind kind, const yaml_mark_t &mark) {
     Node *node = &root_;
-    if (!open_.empty()) node = &open_.back()->children.emplace_back();
+    if (!open_.empty()) {
+      std::vector<Node> &children = open_.back()->children;
+      if (children.empty()) children.reserve(4);  // most parts have at least two keys
+      node = &children.emplace_back();
+    }
     node->kind = kind;
-    node->line = mark.line + 1;
-    node->column = mark.column + 1;
+    const Place place = place_of(mark);
+    node->line = place.line;
+    node->column = place.column;
     return *node;
   }
 
-  void open(Node::Kind kind, const YAML::Mark &mark) {
+  void open(Node::Kind kind, const yaml_mark_t &mark) {
     if (open_.size() >= kMaxDepth) {
-      throw Rejected{mark, fmt::format("the file is nested more than {} levels deep", kMaxDepth),
+      throw Rejected{place_of(mark), fmt::format("the file is nested more than {} levels deep", kMaxDepth),
                      "a workload needs seven levels"};
     }
     open_.push_back(&add(kind, mark));
   }
 
   void close() {
-    REDAG_CHECK(!open_.empty(), "yaml-cpp closes only what it opened");
+    REDAG_CHECK(!open_.empty(), "libyaml closes only what it opened");
     open_.pop_back();
   }
 
   Node root_;
   std::vector<Node *> open_;
-  YAML::Mark last_scalar_ = YAML::Mark::null_mark();
 };
 
-struct BadCharacter {
-  int line;
-  int column;
-  std::string message;
-  std::string hint;
-};
-
-// Checked before yaml-cpp, which guesses other encodings and takes the character 4 for the end of the file.
-std::optional<BadCharacter> find_bad_character(std::string_view text) {
-  int line = 1;
-  std::size_t line_start = 0;
+// libyaml would say less about them, and takes a second byte order mark for an invalid character.
+void refuse_bad_characters(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const auto c = static_cast<unsigned char>(text[i]);
-    const auto column = static_cast<int>(i - line_start) + 1;
-    const std::size_t length = utf8_length(text, i);
-    if (length == 0)
-      return BadCharacter{line, column, fmt::format("byte 0x{:02x} is not valid UTF-8", c), "save the file as UTF-8"};
-    if (c == '\n') {
-      ++line;
-      line_start = i + 1;
-    } else if ((c < 0x20 && c != '\t' && c != '\r') || c == 0x7F) {
-      return BadCharacter{line, column, fmt::format("the file contains control character 0x{:02x}", c),
-                          "is it a text file?"};
+    const std::size_t length = c < 0x80 ? 1 : utf8_length(text, i);
+    if (length == 0) {
+      throw Rejected{place_at(text, i), fmt::format("byte 0x{:02x} is not valid UTF-8", c), "save the file as UTF-8"};
+    }
+    if ((c < 0x20 && c != '\t' && c != '\n' && c != '\r') || c == 0x7F) {
+      throw Rejected{place_at(text, i), fmt::format("the file contains control character 0x{:02x}", c),
+                     "is it a text file?"};
     }
     i += length;
   }
-  return std::nullopt;
 }
 
-/// yaml-cpp lets an unclosed quoted text run to the end of the file. It is then the last scalar.
-bool is_unclosed(std::string_view text, int position) {
-  if (position < 0 || static_cast<std::size_t>(position) >= text.size()) return false;
-  auto i = static_cast<std::size_t>(position);
-  const char quote = text[i];
-  if (quote != '"' && quote != '\'') return false;
-  for (++i; i < text.size(); ++i) {
-    if (quote == '"' && text[i] == '\\') {
-      ++i;
-    } else if (text[i] == quote) {
-      const bool doubled = quote == '\'' && i + 1 < text.size() && text[i + 1] == quote;
-      if (!doubled) return false;
-      ++i;
-    }
-  }
-  return true;
+bool is_break_before(std::string_view text, std::size_t at) {
+  const std::string_view before = text.substr(0, at);
+  // What libyaml takes for the end of a line: besides these two U+0085, U+2028 and U+2029.
+  if (before.empty() || before.ends_with('\n') || before.ends_with('\r')) return true;
+  return before.ends_with("\xC2\x85") || before.ends_with("\xE2\x80\xA8") || before.ends_with("\xE2\x80\xA9");
 }
 
-/// A stream over text in memory.
-class ViewBuffer : public std::streambuf {
- public:
-  explicit ViewBuffer(std::string_view text) {
-    char *begin = const_cast<char *>(text.data());  // a get area is never written to
-    setg(begin, begin, begin + text.size());
+// Only tags need the directive. libyaml compares each with all before it: a file of them would take hours.
+void refuse_tag_directives(std::string_view text) {
+  constexpr std::string_view kDirective = "%TAG";
+  for (std::size_t at = text.find(kDirective); at != text.npos; at = text.find(kDirective, at + 1)) {
+    if (!is_break_before(text, at)) continue;
+    throw Rejected{place_at(text, at), "tags (here the directive %TAG) are not supported", "remove the directive"};
   }
-};
+}
+
+Node read_only_document(std::string_view text) {
+  EventReader reader(text);
+  Event event;
+  reader.next(event);  // the begin of the text
+  reader.next(event);
+  if (event.raw().type == YAML_STREAM_END_EVENT) return {};
+  Node root = TreeBuilder().read(reader);
+  reader.next(event);
+  if (event.raw().type == YAML_STREAM_END_EVENT) return root;
+  reader.next(event);
+  throw Rejected{place_of(event.raw().start_mark), "the file has a second document",
+                 "put each document in a file of its own"};
+}
 
 }  // namespace
 
 Result<Node> parse(std::string_view text, const std::string &file) {
-  if (const auto bad = find_bad_character(text)) {
-    return error_at(file, bad->line, bad->column, bad->message, bad->hint);
-  }
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   try {
-    ViewBuffer buffer(text);
-    std::istream stream(&buffer);
-    YAML::Parser parser(stream);
-    TreeBuilder builder;
-    if (!parser.HandleNextDocument(builder)) return Node{};
-    if (const YAML::Mark &mark = builder.last_scalar(); is_unclosed(text, mark.pos)) {
-      return error_at(file, mark.line + 1, mark.column + 1, "invalid YAML: a quote is not closed", "");
-    }
-    TreeBuilder rest;
-    if (parser.HandleNextDocument(rest)) {
-      const Node second = rest.take_root();
-      return error_at(file, second.line, second.column, "the file has a second document",
-                      "put each document in a file of its own");
-    }
-    return builder.take_root();
-  } catch (const Rejected &rejected) {
-    return error_at(file, rejected.mark.line + 1, rejected.mark.column + 1, rejected.message, rejected.hint);
-  } catch (const YAML::Exception &exception) {
-    return error_at(file, exception.mark.line + 1, exception.mark.column + 1, "invalid YAML: " + exception.msg, "");
+    refuse_bad_characters(text);
+    refuse_tag_directives(text);
+    return read_only_document(text);
+  } catch (Rejected &rejected) {
+    return tl::unexpected<Diagnostics>(
+        Diagnostics{Diagnostic{Severity::Error, file, rejected.place.line, rejected.place.column,
+                               std::move(rejected.message), std::move(rejected.hint)}});
   }
+}
+
+bool is_null(std::string_view plain) {
+  return plain.empty() || plain == "~" || plain == "null" || plain == "Null" || plain == "NULL";
 }
 
 std::string describe(const Node &node) {

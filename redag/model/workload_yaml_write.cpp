@@ -7,27 +7,24 @@
 #include <fstream>
 
 #include <fmt/format.h>
-#include <yaml-cpp/emitter.h>
-#include <yaml-cpp/emittermanip.h>
 
 #include "redag/base/check.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag/model/yaml_writer.hpp"
 
 namespace redag {
 namespace {
 
+using yaml::Writer;
 using Kind = ExecutionTime::Kind;
+using Layout = Writer::Layout;
 
-void write(YAML::Emitter &out, Field field, const std::string &value) {
-  out << YAML::Key << to_string(field) << YAML::Value << value;
-}
+void write(Writer &out, Field field, std::string_view value) { out.write(to_string(field), value); }
 
-void write_count(YAML::Emitter &out, Field field, std::uint32_t value) {
-  out << YAML::Key << to_string(field) << YAML::Value << value;
-}
+void write(Writer &out, Field field, std::uint32_t value) { out.write(to_string(field), std::uint64_t{value}); }
 
-void write_duration(YAML::Emitter &out, Field field, Duration value) {
+void write_duration(Writer &out, Field field, Duration value) {
   if (value != 0) write(out, field, format_duration(value));
 }
 
@@ -42,76 +39,88 @@ Duration common_period(const Dag &dag) {
   return common;
 }
 
-void write_execution(YAML::Emitter &out, const Task &task) {
+void write_execution(Writer &out, const Task &task) {
   const ExecutionTime &model = task.execution;
   const Kind implied = task.bcet == 0 ? Kind::Constant : Kind::Uniform;
   if (model.kind == implied) return;
-  out << YAML::Key << to_string(Field::Execution) << YAML::Value;
+  out.text(to_string(Field::Execution));
   switch (model.kind) {
-    case Kind::Constant: out << "constant"; return;
-    case Kind::Uniform: out << "uniform"; return;
+    case Kind::Constant: out.text("constant"); return;
+    case Kind::Uniform: out.text("uniform"); return;
     case Kind::Normal:
-      out << YAML::BeginMap << YAML::Key << "normal" << YAML::Value << YAML::BeginMap;
-      out << YAML::Key << "mean" << YAML::Value << format_duration(model.mean);
-      out << YAML::Key << "stddev" << YAML::Value << format_duration(model.stddev);
-      out << YAML::EndMap << YAML::EndMap;
+      out.begin_map();
+      out.text("normal");
+      out.begin_map();
+      out.write("mean", format_duration(model.mean));
+      out.write("stddev", format_duration(model.stddev));
+      out.end_map();
+      out.end_map();
       return;
     case Kind::Empirical:
-      out << YAML::BeginMap << YAML::Key << "empirical" << YAML::Value << YAML::BeginSeq;
-      for (const Duration sample : model.samples) out << format_duration(sample);
-      out << YAML::EndSeq << YAML::EndMap;
+      out.begin_map();
+      out.text("empirical");
+      out.begin_list();
+      for (const Duration sample : model.samples) out.text(format_duration(sample));
+      out.end_list();
+      out.end_map();
       return;
   }
 }
 
-void write_edges(YAML::Emitter &out, const Dag &dag, const Task &task) {
+void write_edges(Writer &out, const Dag &dag, const Task &task) {
   if (task.predecessors.empty()) return;
-  out << YAML::Key << to_string(Field::After) << YAML::Value << YAML::BeginSeq;
+  out.text(to_string(Field::After));
+  out.begin_list();
   for (const std::uint32_t p : task.predecessors) {
     REDAG_CHECK(p < dag.tasks.size(), "to_yaml() needs a valid workload");
-    out << dag.tasks[p].name;
+    out.text(dag.tasks[p].name);
   }
-  out << YAML::EndSeq;
+  out.end_list();
 }
 
-void write_overrun(YAML::Emitter &out, const Task &task) {
+void write_overrun(Writer &out, const Task &task) {
   if (task.overrun == Overrun::Skip) return;
-  out << YAML::Key << to_string(Field::Overrun) << YAML::Value << YAML::BeginMap;
-  out << YAML::Key << "queue" << YAML::Value << task.queue_depth << YAML::EndMap;
+  out.text(to_string(Field::Overrun));
+  out.begin_map();
+  out.write("queue", task.queue_depth);
+  out.end_map();
 }
 
 // Writes a factor as the shortest text that reads back the same.
-void write_degrade(YAML::Emitter &out, const Degrade &degrade) {
+void write_degrade(Writer &out, const Degrade &degrade) {
   if (degrade == Degrade{}) return;
-  out << YAML::Key << to_string(Field::Degrade) << YAML::Value << YAML::Flow << YAML::BeginMap;
+  out.text(to_string(Field::Degrade));
+  out.begin_map(Layout::OneLine);
   if (degrade.kind == Degrade::Kind::Skip) {
-    out << YAML::Key << "skip" << YAML::Value << degrade.skip;
+    out.write("skip", degrade.skip);
   } else {
-    out << YAML::Key << "stretch" << YAML::Value << fmt::format("{}", degrade.stretch);
+    out.write("stretch", fmt::format("{}", degrade.stretch));
   }
-  out << YAML::EndMap;
+  out.end_map();
 }
 
-void write_callback(YAML::Emitter &out, const Callback &callback) {
-  out << YAML::Key << to_string(Field::Callback) << YAML::Value << YAML::BeginMap;
-  out << YAML::Key << "node" << YAML::Value << callback.node;
-  out << YAML::Key << to_string(callback.kind) << YAML::Value;
+void write_callback(Writer &out, const Callback &callback) {
+  out.text(to_string(Field::Callback));
+  out.begin_map();
+  out.write("node", callback.node);
+  out.text(to_string(callback.kind));
   if (!callback.name.empty()) {
-    out << callback.name;
+    out.text(callback.name);
   } else if (callback.index) {
-    out << YAML::BeginMap;
+    out.begin_map();
     write_duration(out, Field::Period, callback.period);
-    out << YAML::Key << "index" << YAML::Value << *callback.index << YAML::EndMap;
+    out.write("index", *callback.index);
+    out.end_map();
   } else {
-    out << (callback.period == 0 ? "any" : format_duration(callback.period));
+    out.text(callback.period == 0 ? "any" : format_duration(callback.period));
   }
-  out << YAML::EndMap;
+  out.end_map();
 }
 
-void write_task(YAML::Emitter &out, const Dag &dag, const Task &task, Duration dag_period) {
+void write_task(Writer &out, const Dag &dag, const Task &task, Duration dag_period) {
   const bool has_timer = task.callback && task.callback->period != 0;
   const Duration implied_period = has_timer ? task.callback->period : dag_period;
-  out << YAML::Flow << YAML::BeginMap;
+  out.begin_map(Layout::OneLine);
   write(out, Field::Name, task.name);
   write_duration(out, Field::Wcet, task.wcet);
   write_duration(out, Field::WcetLow, task.wcet_low);
@@ -130,46 +139,50 @@ void write_task(YAML::Emitter &out, const Dag &dag, const Task &task, Duration d
   if (task.on_budget != OnBudget::Abort) write(out, Field::OnBudget, to_string(task.on_budget));
   if (task.criticality != dag.criticality) write(out, Field::Criticality, to_string(task.criticality));
   write_edges(out, dag, task);
-  if (task.concurrency != 1) write_count(out, Field::Concurrency, task.concurrency);
+  if (task.concurrency != 1) write(out, Field::Concurrency, task.concurrency);
   if (!task.group.empty()) write(out, Field::Group, task.group);
   write_overrun(out, task);
-  if (task.priority) out << YAML::Key << to_string(Field::Priority) << YAML::Value << *task.priority;
+  if (task.priority) write(out, Field::Priority, std::to_string(*task.priority));
   if (task.callback) write_callback(out, *task.callback);
-  out << YAML::EndMap;
+  out.end_map();
 }
 
-void write_dag(YAML::Emitter &out, const Dag &dag) {
+void write_dag(Writer &out, const Dag &dag) {
   const Duration period = common_period(dag);
-  out << YAML::BeginMap;
+  out.begin_map();
   write(out, Field::Name, dag.name);
   write_duration(out, Field::Period, period);
   write_duration(out, Field::Deadline, dag.deadline);
-  if (dag.max_active != 0) write_count(out, Field::MaxActive, dag.max_active);
-  if (dag.max_pending != 0) write_count(out, Field::MaxPending, dag.max_pending);
+  if (dag.max_active != 0) write(out, Field::MaxActive, dag.max_active);
+  if (dag.max_pending != 0) write(out, Field::MaxPending, dag.max_pending);
   if (dag.criticality != Criticality::Normal) write(out, Field::Criticality, to_string(dag.criticality));
   write_degrade(out, dag.degrade);
-  out << YAML::Key << to_string(Field::Tasks) << YAML::Value << YAML::BeginSeq;
+  out.text(to_string(Field::Tasks));
+  out.begin_list();
   for (const Task &task : dag.tasks) write_task(out, dag, task, period);
-  out << YAML::EndSeq << YAML::EndMap;
+  out.end_list();
+  out.end_map();
 }
 
 }  // namespace
 
 std::string to_yaml(const Workload &workload) {
-  YAML::Emitter out;
-  out << YAML::BeginMap;
+  Writer out;
+  out.begin_map();
   if (!workload.name.empty()) write(out, Field::Name, workload.name);
-  out << YAML::Key << to_string(Field::Platform) << YAML::Value << YAML::Flow << YAML::BeginMap;
-  out << YAML::Key << to_string(Field::Workers) << YAML::Value << workload.platform.workers;
+  out.text(to_string(Field::Platform));
+  out.begin_map(Layout::OneLine);
+  write(out, Field::Workers, workload.platform.workers);
   write(out, Field::Preemption, to_string(workload.platform.preemption));
-  out << YAML::EndMap;
+  out.end_map();
   write(out, Field::Policy, to_string(workload.policy));
   if (workload.ties != Ties::Share) write(out, Field::Ties, to_string(workload.ties));
-  out << YAML::Key << to_string(Field::Dags) << YAML::Value << YAML::BeginSeq;
+  out.text(to_string(Field::Dags));
+  out.begin_list();
   for (const Dag &dag : workload.dags) write_dag(out, dag);
-  out << YAML::EndSeq << YAML::EndMap;
-  REDAG_CHECK(out.good(), "the emitter is driven by this file alone");
-  return std::string(out.c_str(), out.size()) + "\n";
+  out.end_list();
+  out.end_map();
+  return out.take();
 }
 
 Result<void> save_workload(const Workload &workload, const std::filesystem::path &path, ValidateOptions options) {

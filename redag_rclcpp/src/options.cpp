@@ -4,7 +4,6 @@
 #include "redag_rclcpp/options.hpp"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <array>
@@ -142,12 +141,6 @@ std::vector<int> read_cpus(Reader &reader) {
   return cpus;
 }
 
-// True if the file states the number of workers. If it does not, the parameter counts, and not the format's default.
-bool states_workers(const std::string &path) {
-  const YAML::Node file = YAML::LoadFile(path);
-  return file["platform"] && file["platform"]["workers"];
-}
-
 void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
   const Spec spec{"config", "Workload file that maps callbacks to the tasks of DAGs; empty: none",
                   "the path of a workload file (docs/workload_format.md)"};
@@ -162,7 +155,8 @@ void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
     RCLCPP_WARN(node.get_logger(), "%s", warning.to_string().c_str());
   }
   const redag::Workload &workload = loaded->workload;
-  if (options.workers == 0 && states_workers(path)) options.workers = workload.platform.workers;
+  // If the file does not state the number, the parameter counts, and not the format's default.
+  if (options.workers == 0 && loaded->states_workers) options.workers = workload.platform.workers;
   if (options.preemption == redag::PreemptionMode::Auto) options.preemption = workload.platform.preemption;
   if (options.policy == redag::PolicyKind::RateMonotonic) options.policy = workload.policy;
   if (options.ties == redag::Ties::Share) options.ties = workload.ties;
