@@ -36,6 +36,7 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
     const JobEventKind counted = options_.measure ? JobEventKind::Preempted : JobEventKind::Skipped;
     scheduler_->record_only({JobEventKind::Skipped, counted});
   }
+  if (realtime() || config.workers == 1) options_.while_idle = nullptr;
   if (os() && options_.throttling) {
     guard_.emplace(*options_.throttling, pool_, placement_);
     guard_thread_ = std::make_unique<HelperThread>();
@@ -123,8 +124,25 @@ void Engine::main(WorkerThread &self) noexcept {
       return;
     }
     // Mail that came meanwhile is not taken without a token: if it is silent, it is left to others.
-    if (!pool_.ending()) self.parker.park(options_.spins);
+    if (!pool_.ending()) idle(self);
   }
+}
+
+// Sleeps until there is a token. The threads that became idle last, which get the next jobs, also wait for the next
+// release and report it themselves. The release timer may not run then: the kernel can let a thread that it woke
+// preempt it, and the job of that thread may be long. There are two such threads: two jobs may be released at once.
+void Engine::idle(WorkerThread &self) noexcept {
+  constexpr std::uint32_t kWaitForReleases = 2;
+  if (options_.while_idle) {
+    const std::uint32_t turn = idle_turns_.fetch_add(1, std::memory_order_relaxed) + 1;
+    while (idle_turns_.load(std::memory_order_relaxed) - turn < kWaitForReleases) {
+      const Time next = options_.while_idle();
+      if (next == kNever) break;
+      static_cast<void>(self.parker.spin(options_.spins));
+      if (self.parker.park_until(next)) return;
+    }
+  }
+  self.parker.park(options_.spins);
 }
 
 void Engine::join() {

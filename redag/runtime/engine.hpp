@@ -59,6 +59,9 @@ struct EngineOptions {
   // none, cooperative: how many spins a thread without a job makes before it sleeps; see spins_in().
   std::uint32_t spins = 0;
   std::size_t touched_stack = 0;  // bytes of each worker thread's stack; see ThreadSetup
+  // none, cooperative, several workers, not real-time: the threads that became idle last call this before they sleep,
+  // at the same time. It may release jobs. Returns when to call it again (CLOCK_MONOTONIC; kNever: no need).
+  std::function<Time()> while_idle;
 };
 
 /// A job that is overdue and has not ended.
@@ -190,6 +193,7 @@ class Engine {
   void end_threads();
   void release_at(std::span<const Release> releases, Time at);
   void main(WorkerThread &self) noexcept;
+  void idle(WorkerThread &self) noexcept;
   void guard_throttling() noexcept;
   void look_out() noexcept;
   Next run(WorkerThread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;
@@ -233,7 +237,8 @@ class Engine {
   std::unique_ptr<HelperThread> guard_thread_;  // os, throttled
   Atomic<Time> origin_{kNever};
   Atomic<bool> halting_{false};
-  std::atomic<bool> has_listeners_{false};  // a task has or had a listener; written under the lock
+  std::atomic<bool> has_listeners_{false};    // a task has or had a listener; written under the lock
+  std::atomic<std::uint32_t> idle_turns_{0};  // how often a thread became idle, with while_idle
 };
 
 }  // namespace redag::runtime

@@ -66,25 +66,28 @@ void ReleaseTimer::join() {
   if (thread_.joinable()) thread_.join();
 }
 
+Time ReleaseTimer::release_due() {
+  for (;;) {
+    // The lock is held during the report. When remove() gets it, no release of a removed task is under way.
+    const LockGuard guard(lock_);
+    if (origin_ == kNever) return kNever;
+    due_.clear();
+    heap_.pop_due(std::min(monotonic_now() - origin_, horizon_ - 1), due_);
+    if (due_.empty()) return heap_.next() < horizon_ ? origin_ + heap_.next() : kNever;
+    sink_(due_);
+  }
+}
+
 void ReleaseTimer::main() noexcept {
   for (;;) {
     // Read before the clock: a stop seen here happened before the clock is read. Releases due by then are all reported.
     const bool stopping = stopping_.load(std::memory_order_acquire);
-    Time wake_up = kNever;
-    {
-      // The lock is held during the report. When remove() gets it, no release of a removed task is under way.
+    const Time wake_up = release_due();
+    if (stopping) {
       const LockGuard guard(lock_);
-      if (origin_ != kNever) {
-        due_.clear();
-        heap_.pop_due(std::min(monotonic_now() - origin_, horizon_ - 1), due_);
-        if (!due_.empty()) {
-          sink_(due_);
-          continue;
-        }
-        if (heap_.next() < horizon_) wake_up = origin_ + heap_.next();
-      }
+      origin_ = kNever;  // other threads release nothing after the timer's end
+      return;
     }
-    if (stopping) return;
     if (wake_up == kNever) {
       parker_.park();
     } else {

@@ -3,7 +3,7 @@
 
 // One thread that releases timer tasks on their grids. It sleeps until the next release (absolute, CLOCK_MONOTONIC) and
 // reports all due releases as one instant. It does not wake up while there is nothing to release. Owns its thread and a
-// ReleaseHeap. add(), remove(): any thread. stop(): async-signal-safe.
+// ReleaseHeap. add(), remove(), release_due(): any thread. stop(): async-signal-safe.
 #pragma once
 
 #include <functional>
@@ -23,7 +23,7 @@ namespace redag::runtime {
 
 class ReleaseTimer {
  public:
-  /// Called on the timer's thread, under the timer's lock. It must not call the timer.
+  /// Called on the timer's thread or by release_due(), under the timer's lock. It must not call the timer.
   using Sink = std::function<void(std::span<const Release>)>;
 
   ReleaseTimer(Sink sink, std::uint64_t seed);
@@ -43,6 +43,10 @@ class ReleaseTimer {
   [[nodiscard]] Result<void> start(const ThreadSetup &setup);
   void begin(Time origin, Time horizon);
 
+  /// Reports what is due, as the timer's thread does. For threads that have nothing else to do. Returns when the next
+  /// release is due (CLOCK_MONOTONIC); kNever: none is known, or the timer has not begun or has ended.
+  Time release_due();
+
   /// Ends the releases at this moment. Releases that were due before are still reported.
   void stop() noexcept;
   /// Waits for the thread, after stop().
@@ -57,7 +61,7 @@ class ReleaseTimer {
   std::vector<Release> due_ REDAG_GUARDED_BY(lock_);
   Parker parker_;
   Atomic<bool> stopping_{false};
-  Time origin_ REDAG_GUARDED_BY(lock_) = kNever;  // kNever: before begin()
+  Time origin_ REDAG_GUARDED_BY(lock_) = kNever;  // kNever: before begin(), and after the thread's end
   Time horizon_ REDAG_GUARDED_BY(lock_) = kNever;
   ThreadHandle thread_;
 };

@@ -84,6 +84,39 @@ TEST(ReleaseTimer, ReleasesNothingBeforeItBegins) {
   EXPECT_EQ(collector.releases[0].nominal, 0);
 }
 
+TEST(ReleaseTimer, OtherThreadsReleaseWhatIsDue) {
+  Collector collector;
+  ReleaseTimer timer(collector.sink(), 1);
+  timer.add(one_timer(3600 * kSecond), std::array{TaskId(0)}, 0);
+  EXPECT_EQ(timer.release_due(), kNever) << "it has not begun";
+  EXPECT_TRUE(collector.releases.empty());
+  const Time origin = monotonic_now();
+  timer.begin(origin, kNever);
+  EXPECT_EQ(timer.release_due(), origin + 3600 * kSecond);
+  EXPECT_EQ(timer.release_due(), origin + 3600 * kSecond);
+  EXPECT_EQ(collector.releases.size(), 1U) << "each release comes once";
+}
+
+TEST(ReleaseTimer, OtherThreadsKnowTheHorizon) {
+  Collector collector;
+  ReleaseTimer timer(collector.sink(), 1);
+  timer.add(one_timer(kMillisecond), std::array{TaskId(0)}, 0);
+  timer.begin(monotonic_now() - kSecond, 5 * kMillisecond);
+  EXPECT_EQ(timer.release_due(), kNever);
+  EXPECT_EQ(collector.releases.size(), 5U);
+}
+
+TEST(ReleaseTimer, OtherThreadsReleaseNothingAfterItsEnd) {
+  Collector collector;
+  ReleaseTimer timer(collector.sink(), 1);
+  ASSERT_TRUE(timer.start(monotonic_now(), kNever, {}));
+  timer.stop();
+  timer.join();
+  timer.add(one_timer(3600 * kSecond), std::array{TaskId(0)}, 0);
+  EXPECT_EQ(timer.release_due(), kNever);
+  EXPECT_TRUE(collector.releases.empty());
+}
+
 TEST(ReleaseTimer, AThreadThatCannotBeSetUpIsAnError) {
   ReleaseTimer timer([](auto) {}, 1);
   EXPECT_FALSE(timer.start(0, kNever, ThreadSetup{"t", 0, {1023}}));

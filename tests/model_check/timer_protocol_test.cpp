@@ -145,6 +145,40 @@ TEST(TimerProtocol, ReleasesAreOnTheGridUntilTheStop) {
       kTimed);
 }
 
+// The same while another thread releases what is due, too.
+TEST(TimerProtocol, AnIdleThreadReleasesOnTheSameGrid) {
+  expect_holds(
+      [] {
+        std::vector<Time> released;
+        bool joined = false;
+        runtime::ReleaseTimer timer(
+            [&](std::span<const runtime::Release> releases) {
+              for (const runtime::Release &release : releases) {
+                explored::check(release.nominal <= explored::now(), "released early");
+                released.push_back(release.nominal);
+              }
+              explored::check(!joined, "a release after the timer's end");
+            },
+            0);
+        timer.add(one_timer_task(10), std::array{TaskId(0)}, 0);
+        explored::check(timer.start(0, 15, {}).has_value(), "the timer does not start");
+        const std::uint32_t idle = thread([&] {
+          const Time next = timer.release_due();
+          explored::check(next == kNever || next == 10, "the next release is off the grid");
+        });
+        explored::tick(5);
+        timer.stop();
+        timer.join();
+        joined = true;
+        explored::join(idle);
+        explored::check(!released.empty() && released.size() <= 2, "a release is missing, or came twice");
+        for (std::size_t i = 0; i < released.size(); ++i) {
+          explored::check(released[i] == static_cast<Time>(i) * 10, "a release is off the grid");
+        }
+      },
+      kTimed);
+}
+
 // Adding a task wakes the timer from a longer sleep.
 TEST(TimerProtocol, AnAdditionIsNotSleptThrough) {
   expect_holds([] {
