@@ -67,6 +67,13 @@ TEST(YamlWriter, QuotesWhatWouldBeReadAsSomethingElse) {
   for (const char *null : {"", "~", "null", "Null", "NULL"}) {
     EXPECT_EQ(written(null), "[\"" + std::string(null) + "\", \"" + null + "\"]\n");
   }
+  for (const char *special : {"a #b", "a: b", "a:", "- a", "-",  ": a", " a", "a ",  "#a",  "&a", "a&b", "*a",
+                              "!a",   "|",    ">",  "%a",  "@a", "`a",  "'a", "---", "...", "a?", "a]",  "a}"}) {
+    EXPECT_EQ(written(special), "[\"" + std::string(special) + "\", \"" + special + "\"]\n");
+  }
+  for (const char *plain : {"a#b", "a:b", "-a", "a - b", "a'b", "a\"b", "a*", "a!", "a|b", "5ms", "-1"}) {
+    EXPECT_EQ(written(plain).substr(0, 2 + std::string_view(plain).size()), "[" + std::string(plain) + ",");
+  }
   EXPECT_EQ(written("a, b"), "[\"a, b\", \"a, b\"]\n");
 }
 
