@@ -59,22 +59,20 @@ WorkerThread *Mailboxes::steal(std::uint32_t level) {
 
 bool Mailboxes::look(WakeUps &wake_ups) {
   const std::uint64_t until = std::exchange(seen_, silent_posts_);
-  const bool any_left = wake_silent(until, other_processors_, wake_ups);
-  looks_ = any_left || silent_posts_ != until;
+  wake_silent(until, other_processors_, wake_ups);
+  // Threads that are woken now may leave their next jobs. If silent mail is left, there are some, or it is new.
+  looks_ = wake_ups.any() || silent_posts_ != until;
   return looks_;
 }
 
-bool Mailboxes::wake_silent(std::uint64_t silent_posts, std::size_t most, WakeUps &wake_ups) {
-  for (;;) {
+void Mailboxes::wake_silent(std::uint64_t silent_posts, std::size_t most, WakeUps &wake_ups) {
+  for (; most > 0; --most) {
     WorkerThread *next = nullptr;
-    bool any = false;
     for (WorkerThread *thread : handed_) {
-      if (!has_mail(*thread) || thread->silent == 0) continue;
-      any = true;
-      if (thread->silent <= silent_posts && (next == nullptr || is_before(*thread, *next))) next = thread;
+      if (!has_mail(*thread) || thread->silent == 0 || thread->silent > silent_posts) continue;
+      if (next == nullptr || is_before(*thread, *next)) next = thread;
     }
-    if (next == nullptr || most == 0) return any;
-    --most;
+    if (next == nullptr) return;
     next->silent = 0;
     wake_ups.wake(*next);
   }

@@ -107,9 +107,8 @@ class Mailboxes {
 
   bool may_be_silent(const TaskEntry &entry, Time now);
   void deliver(WorkerThread &thread, bool silent, WakeUps &wake_ups);
-  /// Wakes up to `most` threads with mail of the first `silent_posts` silent posts. Returns true if silent mail is
-  /// left.
-  bool wake_silent(std::uint64_t silent_posts, std::size_t most, WakeUps &wake_ups);
+  /// Wakes up to `most` threads with mail of the first `silent_posts` silent posts.
+  void wake_silent(std::uint64_t silent_posts, std::size_t most, WakeUps &wake_ups);
 
   Parker *lookout_;
   std::size_t other_processors_ = 1;

@@ -23,11 +23,12 @@ struct TaskEntry {
   static constexpr std::uint32_t kStreak = 8;
   /// The longest tiny job: another thread needs longer to wake up and take it.
   static constexpr Duration kTiny = kMicrosecond;
+  static constexpr std::uint32_t kMostTinyScore = 12;
 
   /// Counts a job that ended, used `used` of processor time and took `took` on the clock.
   void count(Duration used, Duration took) {
     short_jobs = took <= CpuMeter::kShort ? std::min(short_jobs + 1, kStreak) : 0;
-    tiny_jobs = took <= kTiny ? std::min(tiny_jobs + 1, kStreak) : tiny_jobs - (tiny_jobs > 0 ? 1 : 0);
+    tiny_score = took <= kTiny ? std::min(tiny_score + 3, kMostTinyScore) : tiny_score - (tiny_score > 0 ? 1 : 0);
     ++usage.jobs;
     usage.total += used;
     usage.longest = std::max(usage.longest, used);
@@ -50,7 +51,9 @@ struct TaskEntry {
   }
   /// Returns true if its last jobs were short: the next one is expected to be short, too.
   [[nodiscard]] bool expected_short() const { return short_jobs == kStreak && !always_measured(); }
-  [[nodiscard]] bool expected_tiny() const { return tiny_jobs > kStreak / 2; }
+  /// Returns true if more than a quarter of its last jobs were tiny: where threads compete for the engine's lock, tiny
+  /// jobs that release others often take longer.
+  [[nodiscard]] bool expected_tiny() const { return tiny_score > kMostTinyScore / 3; }
 
   /// Returns true if a job that has been in progress for `elapsed` is overdue.
   [[nodiscard]] bool is_overdue(Duration elapsed, const WatchLimits &limits) const {
@@ -75,7 +78,7 @@ struct TaskEntry {
   std::uint32_t concurrency = 0;  // jobs that can be in progress at once
   std::uint32_t busy = 0;         // jobs that have started and not ended
   std::uint32_t short_jobs = 0;   // consecutive short jobs up to now; at most kStreak
-  std::uint32_t tiny_jobs = 0;    // as above, of tiny ones
+  std::uint32_t tiny_score = 0;   // a tiny job adds 3, another one takes 1
   bool removed = false;
 };
 
