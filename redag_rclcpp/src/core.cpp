@@ -98,6 +98,7 @@ std::unique_ptr<redag::runtime::Engine> ReDAGExecutor::Core::make_engine() {
   options.trace_capacity = options_.trace_capacity;
   options.measure = options_.live;
   options.start_paused = true;
+  options.while_idle = [this] { return timer_.release_due(); };  // called after start()
   options.on_exception = [this](const redag::runtime::Job &job, std::exception_ptr e) { on_exception(job, e); };
   auto scheduler = std::make_unique<redag::sched::PriorityScheduler>(Workload{}, options.config);
   auto engine = std::make_unique<redag::runtime::Engine>(std::move(scheduler), std::move(options));

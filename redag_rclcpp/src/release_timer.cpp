@@ -42,6 +42,13 @@ Time ReleaseTimer::expire() {
   return next;
 }
 
+Time ReleaseTimer::release_due() {
+  if (!running_) return kNever;
+  Time next = queue_.next();
+  if (next != kNever && next <= engine_.now()) next = expire();
+  return next == kNever ? kNever : origin_ + next;
+}
+
 void ReleaseTimer::run() noexcept {
   while (!exit_) {
     const Time next = running_ ? expire() : kNever;

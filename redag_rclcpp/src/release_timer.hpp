@@ -40,6 +40,8 @@ class ReleaseTimer {
 
   /// Releases what is due. Returns when to call it again; kNever: after a change of the queue.
   Time expire();
+  /// The same for an idle thread, while the timer runs. The time returned is on CLOCK_MONOTONIC.
+  Time release_due();
   /// Waits until releases that left the queue earlier have been passed on.
   void settle() { const redag::LockGuard guard(expire_lock_); }
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Tests the executor's parts that need no nodes: timer queue, token queue, hooks.
+// Tests the executor's parts that need no nodes: timer queue, release timer, token queue, hooks.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +10,9 @@
 #include <random>
 
 #include "hook.hpp"
+#include "redag/runtime/clock.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+#include "release_timer.hpp"
 #include "timer_queue.hpp"
 #include "token_queue.hpp"
 
@@ -101,6 +104,36 @@ TEST(TimerQueue, AgreesWithASortedMap) {
     for (const auto &[id, at] : due) next = std::min(next, at);
     ASSERT_EQ(queue.next(), next) << "step " << step;
   }
+}
+
+// An idle thread of the engine releases in the place of the timer's thread, which is not started here.
+TEST(ReleaseTimer, AnIdleThreadReleasesOnlyWhileItRuns) {
+  constexpr Time kOrigin = 1000;
+  redag::Workload workload;
+  redag::Task &task = workload.dags.emplace_back().tasks.emplace_back();
+  task.period = task.deadline = redag::kSecond;
+  redag::runtime::EngineOptions options;
+  options.config.workers = 1;
+  options.start_paused = true;
+  redag::runtime::Engine engine(std::make_unique<redag::sched::PriorityScheduler>(workload, options.config), options);
+  std::vector<redag::runtime::Body> bodies(1,
+                                           [](const redag::runtime::Job &) { return redag::sched::Outcome::Finished; });
+  engine.bind(workload, std::move(bodies));
+  engine.set_origin(redag::runtime::monotonic_now() - redag::kSecond);
+  ReleaseTimer timer(engine, kOrigin);
+  FakeTimer fake;
+  fake.again = 3600 * redag::kSecond;
+  timer.queue().schedule(fake, 1);
+  EXPECT_EQ(timer.release_due(), kNever);
+  EXPECT_EQ(engine.accounting(TaskId(0)).released, 0u);
+  timer.resume();
+  EXPECT_EQ(timer.release_due(), kOrigin + fake.again);
+  EXPECT_EQ(engine.accounting(TaskId(0)).released, 1u);
+  EXPECT_EQ(timer.release_due(), kOrigin + fake.again);
+  EXPECT_EQ(engine.accounting(TaskId(0)).released, 1u);
+  fake.again = kNever;
+  timer.queue().schedule(fake, kNever);
+  EXPECT_EQ(timer.release_due(), kNever);
 }
 
 TEST(TokenQueue, IsAFifoThatGrowsAndDropsFromTheMiddle) {

@@ -6,6 +6,7 @@
 // rounds.
 //
 //   ros2 run redag_rclcpp_lab bench_executors [--rounds 5] [--seconds 1] [--only timer_idle,...]
+//       [--executors mte,redag-none,...]
 #include <sched.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -20,11 +21,13 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "contenders.hpp"
+#include "phased_timer.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "ring.hpp"
 #include "std_msgs/msg/u_int64.hpp"
@@ -87,52 +90,33 @@ void burn(nanoseconds time) {
   }
 }
 
-// Lateness of a 100 Hz timer against a grid that is fitted to its earliest calls. With `load`, a callback of another
-// group computes 60 ms of every 100 ms.
-Figures timer_lateness(rclcpp::Executor &executor, double seconds, bool load) {
+// Lateness of a timer against its grid. With `load`, a callback of another group computes for that long, which is 60 %
+// of its period.
+Figures timer_lateness(rclcpp::Executor &executor, double seconds, nanoseconds period, nanoseconds load) {
   auto node = std::make_shared<rclcpp::Node>("bench");
   auto fast = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
   auto slow = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
-  // The timers' clock. On Humble it differs from steady_clock and drifts from it by 0.1 ms per second.
-  rclcpp::Clock clock(RCL_STEADY_TIME);
-  std::vector<std::int64_t> calls;
-  calls.reserve(100000);
-  auto timer = node->create_wall_timer(
-      10ms, [&] { calls.push_back(clock.now().nanoseconds()); }, fast);
-  rclcpp::TimerBase::SharedPtr background;
-  if (load)
-    background = node->create_wall_timer(
-        100ms, [] { burn(60ms); }, slow);
+  const redag::Time first = redag_rclcpp::lab::timer_clock_now() + nanoseconds(200ms).count();
+  Sample lateness;
+  std::int64_t last_point = -1;
+  redag_rclcpp::lab::PhasedTimer timer(*node, fast, first, period.count(), [&](std::int64_t point) {
+    lateness.add(static_cast<double>(redag_rclcpp::lab::timer_clock_now() - first - point * period.count()) / 1e3);
+    last_point = point;
+  });
+  std::optional<redag_rclcpp::lab::PhasedTimer> background;
+  if (load > 0ns) {
+    background.emplace(*node, slow, first, load.count() / 6 * 10, [load](std::int64_t) { burn(load); });
+  }
   executor.add_node(node);
   {
     Spinning spinning(executor);
     std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
   }
   executor.remove_node(node);
-  // Fits the grid: its phase is that of the earliest call.
-  constexpr std::int64_t kPeriod = 10'000'000;
-  std::int64_t phase = kPeriod;
-  if (calls.empty()) return {};
-  const std::int64_t first = calls.front();
-  for (const std::int64_t call : calls) {
-    std::int64_t offset = (call - first) % kPeriod;
-    if (offset > kPeriod / 2) offset -= kPeriod;
-    phase = std::min(phase, offset);
-  }
-  Sample lateness;
-  std::int64_t last_point = -1;
-  std::size_t points = 0;
-  for (const std::int64_t call : calls) {
-    const std::int64_t since = call - first - phase;
-    const std::int64_t point = since / kPeriod;
-    if (point != last_point) ++points;
-    last_point = point;
-    lateness.add(static_cast<double>(since - point * kPeriod) / 1e3);
-  }
-  const auto expected = static_cast<double>((calls.back() - first) / kPeriod + 1);
+  const auto called = static_cast<double>(lateness.values.size());
   return {{"p50_us", lateness.at(0.5)},
           {"p99_us", lateness.at(0.99)},
-          {"lost_%", 100.0 * (1.0 - static_cast<double>(points) / expected)}};
+          {"lost_%", 100.0 * (1.0 - called / static_cast<double>(last_point + 1))}};
 }
 
 // Latency from publish() to the start of the callback, at 500 Hz.
@@ -252,14 +236,20 @@ struct Measurement {
 
 std::vector<Measurement> measurements() {
   return {
-      {"timer_idle", [](auto &e, double s) { return timer_lateness(e, s, false); }},
-      {"timer_loaded", [](auto &e, double s) { return timer_lateness(e, s, true); }},
+      {"timer_idle", [](auto &e, double s) { return timer_lateness(e, s, 10ms, 0ms); }},
+      {"timer_loaded", [](auto &e, double s) { return timer_lateness(e, s, 10ms, 60ms); }},
+      {"timer_1khz_loaded", [](auto &e, double s) { return timer_lateness(e, s, 1ms, 6ms); }},
       {"intra_process", [](auto &e, double s) { return publish_latency(e, s, true); }},
       {"dds", [](auto &e, double s) { return publish_latency(e, s, false); }},
       {"arrivals_loaded", [](auto &e, double s) { return arrivals_loaded(e, s); }},
       {"saturation_1", [](auto &e, double s) { return saturation(e, s, 1); }},
       {"saturation_50", [](auto &e, double s) { return saturation(e, s, 50); }},
   };
+}
+
+/// Returns true if the names, separated by commas, contain `name`; true for no names.
+bool is_listed(const std::string &name, const std::string &names) {
+  return names.empty() || ("," + names + ",").find("," + name + ",") != std::string::npos;
 }
 
 }  // namespace
@@ -269,11 +259,13 @@ int main(int argc, char **argv) {
   int rounds = 5;
   double seconds = 1;
   std::string only;
+  std::string executors;
   for (int i = 1; i + 1 < argc; i += 2) {
     const std::string option = argv[i];
     if (option == "--rounds") rounds = std::atoi(argv[i + 1]);
     if (option == "--seconds") seconds = std::atof(argv[i + 1]);
     if (option == "--only") only = argv[i + 1];
+    if (option == "--executors") executors = argv[i + 1];
   }
   rclcpp::init(0, nullptr);
   rclcpp::get_logger("redag_rclcpp").set_level(rclcpp::Logger::Level::Error);
@@ -283,7 +275,8 @@ int main(int argc, char **argv) {
       all.push_back(
           {"redag-os-not-raised", [] { return redag_rclcpp::lab::make_redag(redag::PreemptionMode::Os, false); }});
     }
-    if (!only.empty() && ("," + only + ",").find("," + measurement.name + ",") == std::string::npos) continue;
+    if (!is_listed(measurement.name, only)) continue;
+    std::erase_if(all, [&](const Contender &kind) { return !is_listed(kind.name, executors); });
     std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, then by executor
     for (int round = 0; round < rounds; ++round) {
       for (const Contender &kind : all) {
