@@ -40,7 +40,7 @@ void Mailboxes::deliver(WorkerThread &thread, bool silent, WakeUps &wake_ups) {
   if (!silent) wake_ups.wake(thread);
 }
 
-WorkerThread *Mailboxes::steal(std::uint32_t level) {
+WorkerThread *Mailboxes::steal_mail(std::uint32_t level) {
   WorkerThread *victim = nullptr;
   for (std::size_t i = 0; i < handed_.size();) {
     WorkerThread &thread = *handed_[i];

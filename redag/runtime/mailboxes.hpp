@@ -77,15 +77,18 @@ class Mailboxes {
   }
   /// Takes the mail of a thread that is not awake yet, if that job is above `level`, or is at this level and did not
   /// wake its thread. Returns that thread, which then finds no mail and is not idle yet, or null.
-  WorkerThread *steal(std::uint32_t level);
+  WorkerThread *steal(std::uint32_t level) { return handed_.empty() ? nullptr : steal_mail(level); }
 
   /// The thread begins a job, and looks for mail when that has ended.
   void begin(WorkerThread &thread, const TaskEntry &entry) {
-    thread.in_tiny_job = lookout_ != nullptr && entry.expected_tiny();
-    if (thread.in_tiny_job) ++in_tiny_jobs_;
+    if (lookout_ == nullptr || !entry.expected_tiny()) return;
+    thread.in_tiny_job = true;
+    ++in_tiny_jobs_;
   }
   void end(WorkerThread &thread) {
-    if (std::exchange(thread.in_tiny_job, false)) --in_tiny_jobs_;
+    if (!thread.in_tiny_job) return;
+    thread.in_tiny_job = false;
+    --in_tiny_jobs_;
   }
 
   /// Returns true if a thread should post its next job and sleep, because others are in tiny jobs, too: a single thread
@@ -105,6 +108,7 @@ class Mailboxes {
   /// Two wake-ups within this time that mail could have done without wake the lookout.
   static constexpr Duration kBusy = 200 * kMicrosecond;
 
+  WorkerThread *steal_mail(std::uint32_t level);
   bool may_be_silent(const TaskEntry &entry, Time now);
   void deliver(WorkerThread &thread, bool silent, WakeUps &wake_ups);
   /// Wakes up to `most` threads with mail of the first `silent_posts` silent posts.
