@@ -24,11 +24,11 @@ using sched::Outcome;
 
 constexpr Duration kLongEnough = 60 * kSecond;  // for what happens within milliseconds
 
-// An engine for one task, whose body sets an event.
+// An engine for some tasks. Their body counts, sets an event, and waits for a number of jobs in progress.
 class IdleThreads : public ::testing::TestWithParam<PreemptionMode> {
  protected:
   void start(PreemptionMode mode, std::uint32_t workers, std::function<Time()> while_idle, bool realtime = false) {
-    const Workload workload = testing::ladder(1);
+    const Workload workload = testing::ladder(tasks);
     const PriorityBand band = probe_priority_band();
     EngineOptions options;
     options.config = make_config(Mode{mode, {}}, workers, workload.policy, band, workers);
@@ -36,9 +36,10 @@ class IdleThreads : public ::testing::TestWithParam<PreemptionMode> {
     options.realtime_threads = realtime;
     options.while_idle = std::move(while_idle);
     engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
-    std::vector<Body> bodies;
-    bodies.emplace_back([this](const Job &) {
+    std::vector<Body> bodies(tasks, [this](const Job &) {
+      ++begun;
       ran.set();
+      while (begun < tasks) std::this_thread::yield();
       return Outcome::Finished;
     });
     engine->bind(workload, std::move(bodies));
@@ -51,6 +52,8 @@ class IdleThreads : public ::testing::TestWithParam<PreemptionMode> {
     return ran.wait_until(monotonic_now() + kLongEnough);
   }
 
+  std::size_t tasks = 1;
+  std::atomic<std::size_t> begun{0};
   std::unique_ptr<Engine> engine;
   Event ran;
 };
@@ -83,19 +86,26 @@ TEST_P(IdleThreads, TakeOtherJobsMeanwhile) {
 }
 
 TEST_P(IdleThreads, TwoWaitForReleases) {
-  constexpr std::size_t kCalls = 100;
+  constexpr std::size_t kCalls = 1000;
+  tasks = 6;
+  std::atomic<bool> all_ran{false};
   std::mutex lock;
-  std::vector<std::thread::id> callers;  // of the latest calls
+  std::vector<std::thread::id> callers;  // of the latest calls since all threads had a job
   Event settled;
   start(GetParam(), 6, [&] {
     const std::lock_guard guard(lock);
-    callers.push_back(std::this_thread::get_id());
+    if (all_ran) callers.push_back(std::this_thread::get_id());
     if (callers.size() == kCalls) {
       if (std::set(callers.begin(), callers.end()).size() <= 2) settled.set();
       callers.clear();
     }
     return monotonic_now() + kMillisecond / 10;
   });
+  for (std::uint32_t task = 0; task < tasks; ++task) engine->release(TaskId(task), 0);
+  for (std::uint32_t task = 0; task < tasks; ++task) {
+    while (engine->accounting(TaskId(task)).finished == 0) std::this_thread::yield();
+  }
+  all_ran = true;
   EXPECT_TRUE(settled.wait_until(monotonic_now() + kLongEnough));
   engine->join();
 }
