@@ -87,13 +87,13 @@ TEST(ReleaseTimer, ReleasesNothingBeforeItBegins) {
 TEST(ReleaseTimer, OtherThreadsReleaseWhatIsDue) {
   Collector collector;
   ReleaseTimer timer(collector.sink(), 1);
-  timer.add(one_timer(3600 * kSecond), std::array{TaskId(0)}, 0);
+  timer.add(one_timer(3600 * kSecond), std::array{TaskId(0)}, kMillisecond);
   EXPECT_EQ(timer.release_due(), kNever) << "it has not begun";
   EXPECT_TRUE(collector.releases.empty());
-  const Time origin = monotonic_now();
+  const Time origin = monotonic_now() - kSecond;
   timer.begin(origin, kNever);
-  EXPECT_EQ(timer.release_due(), origin + 3600 * kSecond);
-  EXPECT_EQ(timer.release_due(), origin + 3600 * kSecond);
+  EXPECT_EQ(timer.release_due(), origin + kMillisecond + 3600 * kSecond);
+  EXPECT_EQ(timer.release_due(), origin + kMillisecond + 3600 * kSecond);
   EXPECT_EQ(collector.releases.size(), 1U) << "each release comes once";
 }
 
