@@ -136,6 +136,19 @@ TEST_P(EngineProtocol, JoinWaitsForWhatHasStarted) {
   });
 }
 
+// The thread looks for its first mail while the job is posted and the threads are told to end.
+TEST_P(EngineProtocol, JoinWaitsForWhatHasStartedBeforeItsThreadHas) {
+  expect_holds([] {
+    Machine machine(ladder(1), platform(1), {nullptr});
+    machine.start();
+    machine.release(0);
+    machine.engine->halt();
+    machine.engine->join();
+    machine.quiet.begin();
+    explored::check(machine.engine->started().empty(), "its threads have ended, and a job has not");
+  });
+}
+
 // A release that began before the halt decides while the threads are told to end.
 TEST_P(EngineProtocol, JoinWaitsForADecisionUnderWay) {
   expect_holds([] {

@@ -17,12 +17,21 @@ class MailProtocol : public ::testing::TestWithParam<Preemption> {
       machine.start_calmly();
       machine.run_tiny_jobs(2);
     }
-    /// The first task's job releases one of the second. This wakes a thread; the next time its mail is silent.
-    void release_from_body_calmly() {
-      machine.work(0) = [this](const Job &) {
-        machine.release(1);
+    /// Sets the first task's body: its first job from now on releases the second one, which does `last`. The thread
+    /// itself takes that second job, and therefore looks for mail afterwards.
+    void run_twice(std::function<void()> last) {
+      machine.work(0) = [this, last = std::move(last), is_first = true](const Job &) mutable {
+        if (std::exchange(is_first, false)) {
+          machine.release(0);
+        } else {
+          last();
+        }
         return Outcome::Finished;
       };
+    }
+    /// A tiny job releases one of the second task. This wakes a thread; the next time its mail is silent.
+    void release_from_body_calmly() {
+      run_twice([this] { machine.release(1); });
       explored::calm(true);
       machine.release(0);
       explored::settle();
@@ -43,11 +52,10 @@ TEST_P(MailProtocol, SilentMailIsLookedAfter) {
     scenario.release_from_body_calmly();
     Machine &machine = scenario.machine;
     Countdown other(1);
-    machine.work(0) = [&](const Job &) {
+    scenario.run_twice([&] {
       machine.release(1);
       other.wait();
-      return Outcome::Finished;
-    };
+    });
     machine.work(1) = [&](const Job &) {
       other.count();
       return Outcome::Finished;
@@ -58,13 +66,20 @@ TEST_P(MailProtocol, SilentMailIsLookedAfter) {
   });
 }
 
-// The halt and the end of the threads while mail is silent, stolen, or looked after.
+// A halt while mail is silent, stolen, or looked after: the job has started and runs, or it never does.
 TEST_P(MailProtocol, AHaltFindsSilentMail) {
   expect_holds([] {
     Scenario scenario;
     scenario.release_from_body_calmly();
+    Countdown halted(1);
+    scenario.run_twice([&] {
+      scenario.machine.release(1);
+      scenario.machine.engine->halt();
+      halted.count();
+    });
     scenario.machine.release(0);
-    scenario.machine.finish();
+    halted.wait();
+    scenario.machine.finish_calmly();
   });
 }
 
