@@ -45,7 +45,8 @@ Workload one_task() {
 
 class OneTask {
  public:
-  OneTask(const Setup &setup, const Body &body) {
+  /// `releases` can be null.
+  OneTask(const Setup &setup, const Body &body, ReleaseThread *releases = nullptr) {
     const Workload workload = one_task();
     EngineOptions options;
     options.config = setup.config;
@@ -53,6 +54,7 @@ class OneTask {
     engine_ = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
     std::vector<Body> bodies(1, body);
     engine_->bind(workload, std::move(bodies));
+    if (releases != nullptr) engine_->share_releases(*releases);
     if (!engine_->start()) std::abort();
   }
   Engine &engine() { return *engine_; }
@@ -132,16 +134,17 @@ void timer(benchmark::State &state, const Setup &setup) {
     Event done;
     std::vector<Duration> ours;
     ours.reserve(kSamples);
-    OneTask task(setup, [&](const runtime::Job &job) {
+    ReleaseTimer releases([&](std::span<const Release> due) { self->engine().release(due); }, 0);
+    const auto body = [&](const runtime::Job &job) {
       const Time begun = self->engine().now();
       if (ours.size() < kSamples) ours.push_back(begun - job.release);
       if (ours.size() == kSamples) done.set();
       return sched::Outcome::Finished;
-    });
+    };
+    OneTask task(setup, body, &releases.thread());
     self = &task;
     const Time origin = monotonic_now() + 20 * kMillisecond;
     task.engine().set_origin(origin);
-    ReleaseTimer releases([&](std::span<const Release> due) { task.engine().release(due); }, 0);
     constexpr TaskId kOnly(0);
     releases.add(one_task().dags[0], std::span(&kOnly, 1), 0);
     if (!releases.start(origin, kNever, ThreadSetup{"timer", setup.timer_priority(), {}})) std::abort();

@@ -36,7 +36,6 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
     const JobEventKind counted = options_.measure ? JobEventKind::Preempted : JobEventKind::Skipped;
     scheduler_->record_only({JobEventKind::Skipped, counted});
   }
-  if (realtime() || config.workers == 1) options_.while_idle = nullptr;
   if (os() && options_.throttling) {
     guard_.emplace(*options_.throttling, pool_, placement_);
     guard_thread_ = std::make_unique<HelperThread>();
@@ -128,21 +127,34 @@ void Engine::main(WorkerThread &self) noexcept {
   }
 }
 
-// Sleeps until there is a token. The threads that became idle last, which get the next jobs, also wait for the next
-// release and report it themselves. The release timer may not run then: the kernel can let a thread that it woke
-// preempt it, and the job of that thread may be long. There are two such threads: two jobs may be released at once.
+// Sleeps until there is a token.
 void Engine::idle(WorkerThread &self) noexcept {
-  constexpr std::uint32_t kWaitForReleases = 2;
-  if (options_.while_idle) {
-    const std::uint32_t turn = idle_turns_.fetch_add(1, std::memory_order_relaxed) + 1;
-    while (idle_turns_.load(std::memory_order_relaxed) - turn < kWaitForReleases) {
-      const Time next = options_.while_idle();
-      if (next == kNever) break;
-      static_cast<void>(self.parker.spin(options_.spins));
-      if (self.parker.park_until(next)) return;
+  if (self.leads.load(std::memory_order_relaxed)) {
+    lead(self);
+  } else {
+    self.parker.park(options_.spins);
+  }
+}
+
+// The leader releases what is due, and often gets one of these jobs itself: no thread has to wake another one. With
+// `os` it has the priority of the release thread, which needs no patience then. An ordinary thread is not sure to get a
+// processor, because the kernel can let a thread that it woke preempt it for a whole job. The release thread then comes
+// second.
+void Engine::lead(WorkerThread &self) noexcept {
+  constexpr Duration kPatience = 50 * kMicrosecond;
+  for (bool has_token = false; !has_token;) {
+    self.is_awake.store(true, std::memory_order_relaxed);
+    const Time next = releases_->lead(os() ? kNever : kPatience);
+    self.is_awake.store(false, std::memory_order_relaxed);
+    static_cast<void>(self.parker.spin(options_.spins));
+    if (next == kNever) {
+      self.parker.park();
+      has_token = true;
+    } else {
+      has_token = self.parker.park_until(next);
     }
   }
-  self.parker.park(options_.spins);
+  releases_->follow();
 }
 
 void Engine::join() {
@@ -215,8 +227,10 @@ Next Engine::decide(Locked &locked, Time now, WorkerThread *self, JobSlot below)
   // Wakes the throttling guard before any job: a job above the calling thread may delay everything that follows. The
   // guard is above all jobs and waits for the lock. Its owner is raised meanwhile, and no job preempts it.
   const bool has_jobs = placement_.unfinished() > 0 || !step.dispatches.empty();
-  if (guards && has_jobs && guard_->must_wake()) guard_thread_->parker.unpark();
-  const Next next = placement_.place(step, now, Taker{self, below, locked.waited()}, tasks_, locked.wake_ups());
+  if (guards && has_jobs && guard_->must_wake()) locked.wake_ups().wake_helper(guard_thread_->parker);
+  const bool may_lead = releases_ != nullptr && releases_->expects();
+  const Next next =
+      placement_.place(step, now, Taker{self, below, locked.waited(), may_lead}, tasks_, locked.wake_ups());
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
   if (guards) guard_->note(now);
   return next;

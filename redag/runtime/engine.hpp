@@ -29,6 +29,7 @@
 #include "redag/runtime/job_body.hpp"
 #include "redag/runtime/job_placement.hpp"
 #include "redag/runtime/parker.hpp"
+#include "redag/runtime/release_thread.hpp"
 #include "redag/runtime/setup.hpp"
 #include "redag/runtime/task_table.hpp"
 #include "redag/runtime/throttling_guard.hpp"
@@ -59,9 +60,6 @@ struct EngineOptions {
   // none, cooperative: how many spins a thread without a job makes before it sleeps; see spins_in().
   std::uint32_t spins = 0;
   std::size_t touched_stack = 0;  // bytes of each worker thread's stack; see ThreadSetup
-  // none, cooperative, several workers, not real-time: the threads that became idle last call this before they sleep,
-  // at the same time. It may release jobs. Returns when to call it again (CLOCK_MONOTONIC; kNever: no need).
-  std::function<Time()> while_idle;
 };
 
 /// A job that is overdue and has not ended.
@@ -102,6 +100,10 @@ class Engine {
   /// refused, with a hint. After an error no thread is left, and start() can be called again. After success it must not
   /// be. An engine that only uses run_one() needs no start().
   [[nodiscard]] Result<void> start();
+
+  /// Lets an idle thread wait in the place of the release thread (its leader). Call it before start(). `thread` must
+  /// live until join() has returned. With realtime_threads it has no effect: an idle thread is not above busy ones.
+  void share_releases(ReleaseThread &thread) { releases_ = options_.realtime_threads ? nullptr : &thread; }
 
   /// Sets the origin (CLOCK_MONOTONIC) of all times that the scheduler sees. Until then now() is 0. Call it before any
   /// release.
@@ -194,6 +196,7 @@ class Engine {
   void release_at(std::span<const Release> releases, Time at);
   void main(WorkerThread &self) noexcept;
   void idle(WorkerThread &self) noexcept;
+  void lead(WorkerThread &self) noexcept;
   void guard_throttling() noexcept;
   void look_out() noexcept;
   Next run(WorkerThread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;
@@ -235,10 +238,10 @@ class Engine {
   EventMerge merge_;       // drain() only
   Event idle_event_;
   std::unique_ptr<HelperThread> guard_thread_;  // os, throttled
+  ReleaseThread *releases_ = nullptr;
   Atomic<Time> origin_{kNever};
   Atomic<bool> halting_{false};
-  std::atomic<bool> has_listeners_{false};    // a task has or had a listener; written under the lock
-  std::atomic<std::uint32_t> idle_turns_{0};  // how often a thread became idle, with while_idle
+  std::atomic<bool> has_listeners_{false};  // a task has or had a listener; written under the lock
 };
 
 }  // namespace redag::runtime

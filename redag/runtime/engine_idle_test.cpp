@@ -1,19 +1,19 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Threads without a job: which of them wait for the next release themselves (EngineOptions::while_idle).
+// A thread without a job that waits for the next release: the leader (Engine::share_releases).
 #include <gtest/gtest.h>
+#include <pthread.h>
 
-#include <algorithm>
 #include <atomic>
+#include <functional>
 #include <memory>
-#include <mutex>
-#include <set>
 #include <thread>
 #include <vector>
 
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/engine.hpp"
+#include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_testing/builders.hpp"
 
@@ -22,117 +22,142 @@ namespace {
 
 using sched::Outcome;
 
-constexpr Duration kLongEnough = 60 * kSecond;  // for what happens within milliseconds
-
-// An engine for some tasks. Their body counts, sets an event, and waits for a number of jobs in progress.
-class IdleThreads : public ::testing::TestWithParam<PreemptionMode> {
+// An engine for some tasks. The release thread calls `on_expire` and is called again each millisecond.
+class Leader : public ::testing::TestWithParam<PreemptionMode> {
  protected:
-  void start(PreemptionMode mode, std::uint32_t workers, std::function<Time()> while_idle, bool realtime = false) {
-    const Workload workload = testing::ladder(tasks);
-    const PriorityBand band = probe_priority_band();
+  void SetUp() override {
+    if (mode() == PreemptionMode::Os && band.top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+  }
+  static PreemptionMode mode() { return GetParam(); }
+
+  void start(std::uint32_t workers, Body body, bool realtime = false) {
+    const Workload workload = testing::ladder(2);
     EngineOptions options;
-    options.config = make_config(Mode{mode, {}}, workers, workload.policy, band, workers);
+    options.config = make_config(Mode{mode(), {}}, workers, workload.policy, band, workers);
     options.band = band;
     options.realtime_threads = realtime;
-    options.while_idle = std::move(while_idle);
     engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
-    std::vector<Body> bodies(tasks, [this](const Job &) {
-      ++begun;
-      ran.set();
-      while (begun < tasks) std::this_thread::yield();
-      return Outcome::Finished;
-    });
-    engine->bind(workload, std::move(bodies));
+    engine->bind(workload, {2, std::move(body)});
+    engine->share_releases(releases);
+    releases.release_due();  // a release is expected from here on
     ASSERT_TRUE(engine->start());
     engine->set_origin(monotonic_now());
   }
-
-  bool runs_a_job() {
-    engine->release(TaskId(0), 0);
-    return ran.wait_until(monotonic_now() + kLongEnough);
+  void TearDown() override {
+    if (!engine) return;
+    releases.stop();
+    releases.join();
+    engine->join();
+  }
+  Time expire() {
+    if (engine) on_expire();
+    return monotonic_now() + kMillisecond;
+  }
+  void run_one_job() {
+    const std::uint64_t before = engine->accounting(TaskId(1)).finished;
+    engine->release(TaskId(1), engine->now());
+    while (engine->accounting(TaskId(1)).finished == before) std::this_thread::yield();
   }
 
-  std::size_t tasks = 1;
-  std::atomic<std::size_t> begun{0};
+  const PriorityBand band = probe_priority_band();
+  std::function<void()> on_expire = [] {};
   std::unique_ptr<Engine> engine;
-  Event ran;
+  ReleaseThread releases{[this] { return expire(); }};
 };
 
-INSTANTIATE_TEST_SUITE_P(OrdinaryThreads, IdleThreads,
-                         ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative));
+INSTANTIATE_TEST_SUITE_P(Modes, Leader,
+                         ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os),
+                         [](const auto &instance) { return std::string(to_string(instance.param)); });
 
-// No other thread releases the job.
-TEST_P(IdleThreads, ReleaseWhatIsDue) {
-  std::atomic<bool> due{false};
-  start(GetParam(), 2, [&] {
-    if (due.exchange(false)) engine->release(TaskId(0), 0);
-    return monotonic_now() + kMillisecond;
-  });
-  due = true;
-  EXPECT_TRUE(ran.wait_until(monotonic_now() + kLongEnough));
-  engine->join();
-}
-
-// Jobs that others release wake a thread that waits for a time.
-TEST_P(IdleThreads, TakeOtherJobsMeanwhile) {
-  std::atomic<int> waiting{0};
-  start(GetParam(), 2, [&] {
-    ++waiting;
-    return monotonic_now() + 2 * kLongEnough;
-  });
-  while (waiting < 2) std::this_thread::yield();
-  EXPECT_TRUE(runs_a_job());
-  engine->join();
-}
-
-TEST_P(IdleThreads, TwoWaitForReleases) {
-  constexpr std::size_t kCalls = 1000;
-  tasks = 6;
-  std::atomic<bool> all_ran{false};
-  std::mutex lock;
-  std::vector<std::thread::id> callers;  // of the latest calls since all threads had a job
-  Event settled;
-  start(GetParam(), 6, [&] {
-    const std::lock_guard guard(lock);
-    if (all_ran) callers.push_back(std::this_thread::get_id());
-    if (callers.size() == kCalls) {
-      if (std::set(callers.begin(), callers.end()).size() <= 2) settled.set();
-      callers.clear();
-    }
-    return monotonic_now() + kMillisecond / 10;
-  });
-  for (std::uint32_t task = 0; task < tasks; ++task) engine->release(TaskId(task), 0);
-  for (std::uint32_t task = 0; task < tasks; ++task) {
-    while (engine->accounting(TaskId(task)).finished == 0) std::this_thread::yield();
+// The release thread is not started: no other thread releases the job.
+TEST_P(Leader, RunsTheJobThatItReleases) {
+  for (const std::uint32_t workers : {1U, 2U}) {
+    std::atomic<bool> due{false};
+    std::atomic<std::thread::id> releaser;
+    std::atomic<std::thread::id> runner;
+    on_expire = [&] {
+      if (!due.exchange(false)) return;
+      releaser = std::this_thread::get_id();
+      engine->release(TaskId(0), engine->now());
+    };
+    start(workers, [&](const Job &job) {
+      if (job.task == TaskId(0)) runner = std::this_thread::get_id();
+      return Outcome::Finished;
+    });
+    run_one_job();
+    due = true;
+    while (engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+    EXPECT_EQ(releaser.load(), runner.load());
+    engine.reset();
   }
-  all_ran = true;
-  EXPECT_TRUE(settled.wait_until(monotonic_now() + kLongEnough));
-  engine->join();
 }
 
-TEST_P(IdleThreads, TheOnlyOneDoesNotWaitForReleases) {
-  std::atomic<bool> called{false};
-  start(GetParam(), 1, [&] {
-    called = true;
-    return kNever;
+// Jobs that others release wake a leader that waits for a time.
+TEST_P(Leader, TakesOtherJobsMeanwhile) {
+  std::atomic<bool> leads{false};
+  on_expire = [&] { leads = true; };
+  start(1, [](const Job &) { return Outcome::Finished; });
+  run_one_job();
+  while (!leads) std::this_thread::yield();
+  run_one_job();
+  run_one_job();
+}
+
+TEST_P(Leader, LeavesReleasesToTheThreadWhileItHasAJob) {
+  std::atomic<bool> due{false};
+  std::atomic<bool> released{false};
+  on_expire = [&] {
+    if (!due.exchange(false)) return;
+    EXPECT_FALSE(engine->in_body());
+    released = true;
+  };
+  start(1, [&](const Job &job) {
+    if (job.task == TaskId(0)) {
+      due = true;
+      while (!released) std::this_thread::yield();
+    }
+    return Outcome::Finished;
   });
-  EXPECT_TRUE(runs_a_job());
-  engine->join();
-  EXPECT_FALSE(called);
+  ASSERT_TRUE(releases.start({"timer", mode() == PreemptionMode::Os ? band.timer : 0, {}}));
+  run_one_job();
+  engine->release(TaskId(0), engine->now());
+  while (engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
 }
 
-TEST_P(IdleThreads, RealTimeOnesLeaveReleasesToTheTimer) {
-  if (probe_priority_band().top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+TEST_P(Leader, WaitsAboveAllJobsAndRunsItsOwnAtTheirLevel) {
+  if (mode() != PreemptionMode::Os) GTEST_SKIP() << "ordinary threads";
+  std::atomic<int> waits_at{-1};
+  std::atomic<int> runs_at{-1};
+  std::atomic<bool> due{false};
+  on_expire = [&] {
+    if (!due) return;
+    waits_at = fifo_priority(pthread_self());
+    due = false;
+    engine->release(TaskId(0), engine->now());
+  };
+  start(1, [&](const Job &job) {
+    if (job.task == TaskId(0)) runs_at = fifo_priority(pthread_self());
+    return Outcome::Finished;
+  });
+  for (int i = 0; i < 20; ++i) run_one_job();  // short jobs: their threads may keep a priority of jobs
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    due = true;
+    while (engine->accounting(TaskId(0)).finished == i) std::this_thread::yield();
+    EXPECT_EQ(waits_at, band.timer);
+    EXPECT_GT(runs_at, 0);
+    EXPECT_LE(runs_at, band.top_job);
+  }
+}
+
+TEST_P(Leader, RealTimeThreadsOfOtherModesHaveNone) {
+  if (band.top_job == 0 || mode() == PreemptionMode::Os) GTEST_SKIP() << "needs SCHED_FIFO, and a mode without it";
   std::atomic<bool> called{false};
+  on_expire = [&] { called = true; };
   start(
-      GetParam(), 2,
-      [&] {
-        called = true;
-        return kNever;
-      },
-      true);
-  EXPECT_TRUE(runs_a_job());
-  engine->join();
+      2, [](const Job &) { return Outcome::Finished; }, true);
+  called = false;
+  run_one_job();
+  run_one_job();
   EXPECT_FALSE(called);
 }
 

@@ -172,11 +172,11 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   engine.measure = options_.live;
   engine.spins = spins_before_sleep(setup_, options_.spin.count());
   if (options_.lock_memory) engine.touched_stack = kTouchedStack;
-  engine.while_idle = [this] { return timer_->release_due(); };  // called after start()
   engine.on_exception = [this](const Job &job, std::exception_ptr e) { on_exception(job, std::move(e)); };
   auto scheduler = std::make_unique<sched::PriorityScheduler>(Workload{}, engine.config);
   engine_ = std::make_unique<Engine>(std::move(scheduler), std::move(engine));
   timer_ = std::make_unique<ReleaseTimer>([this](auto releases) { engine_->release(releases); }, 0);
+  engine_->share_releases(timer_->thread());
   if (!options_.live) return;
   auto publisher = live::Publisher::start(live_options(options_.name, "threads", setup_.mode, setup_.config),
                                           [this](live::Sample &sample) { this->sample(sample); });

@@ -37,7 +37,7 @@ void JobPlacement::start(std::size_t processors) {
   priorities_.set_processors(processors);
   mailboxes_.set_processors(processors);
   const auto &threads = pool_.threads();
-  for (auto thread = threads.rbegin(); thread != threads.rend(); ++thread) mailboxes_.add_idle(**thread);
+  for (auto thread = threads.rbegin(); thread != threads.rend(); ++thread) add_idle(**thread, false);
 }
 
 // Threads are alike: any idle thread gets the job. A job that is suspended under others stays on its thread. In `os`
@@ -53,14 +53,14 @@ Next JobPlacement::place(const sched::Step &step, Time now, const Taker &taker, 
     const std::uint32_t above = own == nullptr ? sched::kNoLimit : (os_ ? 0 : own->level);
     if (own != nullptr && mailboxes_.should_leave(tasks[own->task], taker.waited)) {
       own = nullptr;
-      mailboxes_.add_idle(*self);
+      add_idle(*self, taker.may_lead);
     } else if (WorkerThread *other = mailboxes_.steal(above)) {
       next.kind = Next::Kind::Start;
-      next.assignment = move_job(*other, *self);
+      next.assignment = move_job(*other, *self, taker.may_lead);
       mailboxes_.begin(*self, *next.assignment.entry);
       own = nullptr;
     } else if (own == nullptr) {
-      mailboxes_.add_idle(*self);
+      add_idle(*self, taker.may_lead);
     }
   }
   if (own != nullptr) {
@@ -94,7 +94,13 @@ void JobPlacement::end(WorkerThread &thread) {
   --unfinished_;
 }
 
-Assignment JobPlacement::move_job(WorkerThread &from, WorkerThread &to) {
+// With `os`, the leader is above all jobs while it waits, as the release thread is.
+void JobPlacement::add_idle(WorkerThread &thread, bool may_lead) {
+  const bool leads = mailboxes_.add_idle(thread, may_lead);
+  if (os_ && leads) apply(priorities_.wait(thread.index, band_.timer));
+}
+
+Assignment JobPlacement::move_job(WorkerThread &from, WorkerThread &to, bool may_lead) {
   const Assignment assignment = from.mail;
   to.stack.push_back(from.stack.back());
   from.stack.pop_back();
@@ -102,7 +108,7 @@ Assignment JobPlacement::move_job(WorkerThread &from, WorkerThread &to) {
   to.is_spared = from.is_spared;
   if (os_) priorities_.end(from.index);
   set_priority_for_job(to, assignment);
-  mailboxes_.add_idle(from);
+  add_idle(from, may_lead);
   return assignment;
 }
 

@@ -32,8 +32,9 @@ struct Next {
 /// The calling thread, if it has just lost its job and can take another.
 struct Taker {
   WorkerThread *thread = nullptr;
-  JobSlot below;        // the job suspended on it, if any
-  bool waited = false;  // for the engine's lock
+  JobSlot below;          // the job suspended on it, if any
+  bool waited = false;    // for the engine's lock
+  bool may_lead = false;  // releases are expected: an idle thread can wait for them
 };
 
 class JobPlacement {
@@ -66,7 +67,8 @@ class JobPlacement {
   }
 
  private:
-  Assignment move_job(WorkerThread &from, WorkerThread &to);
+  void add_idle(WorkerThread &thread, bool may_lead);
+  Assignment move_job(WorkerThread &from, WorkerThread &to, bool may_lead);
   /// Fills `assignment`, which is the thread's mail or its next action.
   void assign(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment);
   void change_level(const sched::Dispatch &dispatch, const TaskTable &tasks);

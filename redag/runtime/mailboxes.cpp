@@ -22,13 +22,13 @@ Mailboxes::Mailboxes(std::size_t threads, Parker *lookout) : lookout_(lookout) {
   handed_.reserve(threads);
 }
 
-bool Mailboxes::may_be_silent(const TaskEntry &entry, Time now) {
+bool Mailboxes::may_be_silent(const TaskEntry &entry, Time now, WakeUps &wake_ups) {
   if (in_tiny_jobs_ == 0 || !entry.expected_tiny()) return false;
   if (looks_) return true;
   if (now - std::exchange(last_wake_up_, now) >= kBusy) return false;
   looks_ = true;
   seen_ = silent_posts_;
-  lookout_->unpark();
+  wake_ups.wake_helper(*lookout_);
   return true;
 }
 

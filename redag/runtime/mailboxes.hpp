@@ -36,6 +36,11 @@ class WakeUps {
       late_[count_++] = &thread;
     }
   }
+  /// Wakes a helper thread at once, under the lock.
+  void wake_helper(Parker &helper) {
+    any_ = true;
+    helper.unpark();
+  }
   /// Wakes those that could wait for the end of the lock. Call it once.
   void wake_late() {
     for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
@@ -61,16 +66,23 @@ class Mailboxes {
   /// A look wakes not more threads than there are other processors.
   void set_processors(std::size_t processors) { other_processors_ = std::max<std::size_t>(processors, 2) - 1; }
 
-  /// The thread has no job.
-  void add_idle(WorkerThread &thread) { idle_.push_back(&thread); }
+  /// The thread has no job. Returns true if it is the leader from now on, which waits for releases: if it may, and
+  /// there is no other.
+  bool add_idle(WorkerThread &thread, bool may_lead = false) {
+    if (leader_ == nullptr && may_lead) {
+      leader_ = &thread;
+      thread.leads.store(true, std::memory_order_relaxed);
+      return true;
+    }
+    idle_.push_back(&thread);
+    return false;
+  }
   /// Posts a job. `write` is called with the thread that gets it, and writes the thread's mail. Requires an idle
   /// thread.
   template <typename Write>
   void post(const TaskEntry &entry, Time now, WakeUps &wake_ups, Write &&write) {
-    REDAG_CHECK(!idle_.empty(), "more jobs started than there are threads");
-    const bool silent = may_be_silent(entry, now);
-    WorkerThread &thread = *idle_.back();
-    idle_.pop_back();
+    const bool silent = may_be_silent(entry, now, wake_ups);
+    WorkerThread &thread = take_idle();
     REDAG_CHECK(!thread.has_mail.load(std::memory_order_relaxed), "a worker was given two jobs");
     std::forward<Write>(write)(thread);
     deliver(thread, silent, wake_ups);
@@ -105,18 +117,30 @@ class Mailboxes {
   bool look(WakeUps &wake_ups);
 
  private:
+  /// Removes an idle thread: the leader if it is awake or the only one, otherwise the one that became idle last.
+  WorkerThread &take_idle() {
+    if (leader_ != nullptr && (idle_.empty() || leader_->is_awake.load(std::memory_order_relaxed))) {
+      leader_->leads.store(false, std::memory_order_relaxed);
+      return *std::exchange(leader_, nullptr);
+    }
+    REDAG_CHECK(!idle_.empty(), "more jobs started than there are threads");
+    WorkerThread &thread = *idle_.back();
+    idle_.pop_back();
+    return thread;
+  }
   /// Two wake-ups within this time that mail could have done without wake the lookout.
   static constexpr Duration kBusy = 200 * kMicrosecond;
 
   WorkerThread *steal_mail(std::uint32_t level);
-  bool may_be_silent(const TaskEntry &entry, Time now);
+  bool may_be_silent(const TaskEntry &entry, Time now, WakeUps &wake_ups);
   void deliver(WorkerThread &thread, bool silent, WakeUps &wake_ups);
   /// Wakes up to `most` threads with mail of the first `silent_posts` silent posts.
   void wake_silent(std::uint64_t silent_posts, std::size_t most, WakeUps &wake_ups);
 
   Parker *lookout_;
   std::size_t other_processors_ = 1;
-  std::vector<WorkerThread *> idle_;    // the last one is used first
+  std::vector<WorkerThread *> idle_;    // without the leader; the last one is used first
+  WorkerThread *leader_ = nullptr;      // an idle thread, or null
   std::vector<WorkerThread *> handed_;  // threads that may have mail; each once
   bool looks_ = false;                  // the lookout is awake
   std::uint32_t in_tiny_jobs_ = 0;      // threads

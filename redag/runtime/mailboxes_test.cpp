@@ -66,6 +66,19 @@ TEST_F(MailboxesTest, MailWakesItsThread) {
   EXPECT_FALSE(was_woken(lookout_));
 }
 
+// The engine asks any(): the thread's next job is not charged for what it took to wake another thread.
+TEST_F(MailboxesTest, ThatTheLookoutWasWokenIsTold) {
+  mailboxes_.begin(running_, tiny_);
+  take(post(tiny_));
+  wake_ups_ = WakeUps(true);
+  EXPECT_FALSE(was_woken(post(tiny_)));
+  EXPECT_TRUE(was_woken(lookout_));
+  EXPECT_TRUE(wake_ups_.any());
+  wake_ups_ = WakeUps(true);
+  EXPECT_FALSE(was_woken(post(tiny_)));
+  EXPECT_FALSE(wake_ups_.any());
+}
+
 TEST_F(MailboxesTest, TinyJobsArePostedSilentlyWhileOneRunsAndWakeUpsAreFrequent) {
   mailboxes_.begin(running_, tiny_);
   EXPECT_TRUE(was_woken(post(tiny_, 0, 0)));

@@ -9,7 +9,8 @@
 
 namespace redag::runtime {
 
-ThreadPriorities::ThreadPriorities(std::size_t threads, int priority) : threads_(threads, Thread{priority, 0, false}) {
+ThreadPriorities::ThreadPriorities(std::size_t threads, int priority)
+    : threads_(threads, Thread{.priority = priority}) {
   changes_.reserve(threads);
 }
 
@@ -31,6 +32,16 @@ void ThreadPriorities::end(std::size_t thread) {
   if (threads_[thread].of_job > 0) --realtime_;
 }
 
+std::span<const ThreadPriorities::Change> ThreadPriorities::wait(std::size_t thread, int priority) {
+  Thread &self = threads_[thread];
+  REDAG_CHECK(!self.started, "a thread that has a job waits for none");
+  changes_.clear();
+  self.of_job = priority;
+  set(self);
+  self.waited = true;
+  return changes_;
+}
+
 std::span<const ThreadPriorities::Change> ThreadPriorities::place(Thread &self, int priority, bool is_short) {
   changes_.clear();
   if (self.of_job > 0) --realtime_;
@@ -49,7 +60,7 @@ std::span<const ThreadPriorities::Change> ThreadPriorities::place(Thread &self, 
   const auto overlaps = [&self](const Thread &other) {
     return &other != &self && other.started && other.of_job <= self.priority && self.of_job <= other.priority;
   };
-  if (is_short && self.priority > self.of_job) {
+  if (is_short && !self.waited && self.priority > self.of_job) {
     const bool ordered = std::none_of(threads_.begin(), threads_.end(), overlaps);
     if (ordered) return changes_;
     if (all_run) {
@@ -65,6 +76,7 @@ std::span<const ThreadPriorities::Change> ThreadPriorities::place(Thread &self, 
 }
 
 void ThreadPriorities::set(Thread &thread) {
+  thread.waited = false;
   if (thread.priority == thread.of_job) return;
   thread.priority = thread.of_job;
   changes_.push_back(Change{static_cast<std::size_t>(&thread - threads_.data()), thread.priority});

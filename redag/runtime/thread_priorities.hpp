@@ -25,13 +25,15 @@ class ThreadPriorities {
   /// While at most this many jobs are started, each has a processor and their order does not matter.
   void set_processors(std::size_t processors) { processors_ = processors; }
 
-  // start() and change() return the required changes, valid until the next call. Nothing allocates.
+  // start(), change() and wait() return the required changes, valid until the next call. Nothing allocates.
 
   /// A thread without a job gets one of this priority.
   std::span<const Change> start(std::size_t thread, int priority, bool is_short);
   /// The thread's job gets another priority.
   std::span<const Change> change(std::size_t thread, int priority);
   void end(std::size_t thread);
+  /// A thread without a job waits with this priority. Its next job, if short, does not keep it.
+  std::span<const Change> wait(std::size_t thread, int priority);
 
   /// Returns true if a thread with a job has a real-time priority.
   [[nodiscard]] bool any_realtime() const { return realtime_ > 0; }
@@ -41,6 +43,7 @@ class ThreadPriorities {
     int priority = 0;
     int of_job = 0;  // <= priority while started
     bool started = false;
+    bool waited = false;  // it has its priority from wait()
   };
 
   std::span<const Change> place(Thread &self, int priority, bool is_short);

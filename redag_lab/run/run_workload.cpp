@@ -112,6 +112,7 @@ class Run {
     engine_->bind(workload_, std::move(bodies));
     timer_ =
         std::make_unique<runtime::ReleaseTimer>([this](auto releases) { engine_->release(releases); }, options_.seed);
+    engine_->share_releases(timer_->thread());
     std::size_t next = 0;
     for (const Dag &dag : workload_.dags) {
       std::vector<TaskId> tasks;

@@ -81,6 +81,7 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
              options_.workload ? &*options_.workload : nullptr),
       registry_(context, options_, setup_.config.workers,
                 {.engine = *engine_, .timer = timer_, .bridge = bridge_, .tasks = tasks_}) {
+  engine_->share_releases(timer_.thread());
   for (std::string &warning : setup_.warnings) notes_.warn(std::move(warning));
   setup_.warnings.clear();
   if (options_.live) go_live();
@@ -98,7 +99,6 @@ std::unique_ptr<redag::runtime::Engine> ReDAGExecutor::Core::make_engine() {
   options.trace_capacity = options_.trace_capacity;
   options.measure = options_.live;
   options.start_paused = true;
-  options.while_idle = [this] { return timer_.release_due(); };  // called after start()
   options.on_exception = [this](const redag::runtime::Job &job, std::exception_ptr e) { on_exception(job, e); };
   auto scheduler = std::make_unique<redag::sched::PriorityScheduler>(Workload{}, options.config);
   auto engine = std::make_unique<redag::runtime::Engine>(std::move(scheduler), std::move(options));

@@ -3,31 +3,19 @@
 
 #include "release_timer.hpp"
 
-#include <utility>
-
-#include "redag/runtime/threads.hpp"
-
 namespace redag_rclcpp {
 
 using redag::kNever;
 
-redag::Result<void> ReleaseTimer::start(int priority) {
-  if (thread_.joinable()) return {};
-  redag::Result<std::thread> started = redag::runtime::start_thread({"redag-timer", priority, {}}, [this] { run(); });
-  if (!started) return tl::unexpected(std::move(started.error()));
-  thread_ = *std::move(started);
-  return {};
-}
-
 void ReleaseTimer::stop() {
-  exit_ = true;
-  parker_.unpark();
-  if (thread_.joinable()) thread_.join();
+  pause();
+  thread_.stop();
+  thread_.join();
 }
 
 void ReleaseTimer::resume() {
   running_ = true;
-  parker_.unpark();
+  thread_.changed();
 }
 
 Time ReleaseTimer::expire() {
@@ -42,22 +30,12 @@ Time ReleaseTimer::expire() {
   return next;
 }
 
+// On the thread, or on that of a worker that waits in its place.
 Time ReleaseTimer::release_due() {
-  if (!running_) return kNever;
-  Time next = queue_.next();
-  if (next != kNever && next <= engine_.now()) next = expire();
-  return next == kNever ? kNever : origin_ + next;
-}
-
-void ReleaseTimer::run() noexcept {
-  while (!exit_) {
-    const Time next = running_ ? expire() : kNever;
-    if (next == kNever) {
-      parker_.park();
-    } else if (next > engine_.now()) {
-      parker_.park_until(origin_ + next);
-    }
+  for (Time next = queue_.next(); running_; next = expire()) {
+    if (next > engine_.now()) return next == kNever ? kNever : origin_ + next;
   }
+  return kNever;
 }
 
 }  // namespace redag_rclcpp

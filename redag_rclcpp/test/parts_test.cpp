@@ -124,16 +124,16 @@ TEST(ReleaseTimer, AnIdleThreadReleasesOnlyWhileItRuns) {
   FakeTimer fake;
   fake.again = 3600 * redag::kSecond;
   timer.queue().schedule(fake, 1);
-  EXPECT_EQ(timer.release_due(), kNever);
+  EXPECT_EQ(timer.thread().release_due(), kNever);
   EXPECT_EQ(engine.accounting(TaskId(0)).released, 0u);
   timer.resume();
-  EXPECT_EQ(timer.release_due(), kOrigin + fake.again);
+  EXPECT_EQ(timer.thread().release_due(), kOrigin + fake.again);
   EXPECT_EQ(engine.accounting(TaskId(0)).released, 1u);
-  EXPECT_EQ(timer.release_due(), kOrigin + fake.again);
+  EXPECT_EQ(timer.thread().release_due(), kOrigin + fake.again);
   EXPECT_EQ(engine.accounting(TaskId(0)).released, 1u);
   fake.again = kNever;
   timer.queue().schedule(fake, kNever);
-  EXPECT_EQ(timer.release_due(), kNever);
+  EXPECT_EQ(timer.thread().release_due(), kNever);
 }
 
 TEST(TokenQueue, IsAFifoThatGrowsAndDropsFromTheMiddle) {

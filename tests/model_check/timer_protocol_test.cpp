@@ -6,6 +6,7 @@
 
 #include "protocol.hpp"
 #include "redag/runtime/executor.hpp"
+#include "redag/runtime/release_thread.hpp"
 #include "redag/runtime/release_timer.hpp"
 #include "redag_testing/builders.hpp"
 
@@ -177,6 +178,41 @@ TEST(TimerProtocol, AnIdleThreadReleasesOnTheSameGrid) {
         }
       },
       kTimed);
+}
+
+// A leader waits in the place of the thread until it gets a job, at any moment. Each release is made once, and not
+// before its time.
+TEST(TimerProtocol, LeaderAndThreadMakeEachReleaseOnce) {
+  for (const Duration patience : {Duration{1}, kNever}) {
+    expect_holds(
+        [&] {
+          const std::vector<Time> due = patience == kNever ? std::vector<Time>{1, 4} : std::vector<Time>{1};
+          std::size_t made = 0;
+          Countdown left(static_cast<int>(due.size()));
+          runtime::ReleaseThread releases([&] {
+            while (made < due.size() && explored::now() >= due[made]) {
+              ++made;
+              left.count();
+            }
+            return made < due.size() ? due[made] : kNever;
+          });
+          explored::check(releases.start({}).has_value(), "the thread does not start");
+          runtime::Parker parker;
+          const std::uint32_t leader = thread([&] {
+            for (bool has_job = false; !has_job;) {
+              const Time next = releases.lead(patience);
+              if (next == kNever) parker.park();
+              has_job = next == kNever || parker.park_until(next);
+            }
+            releases.follow();
+          });
+          parker.unpark();
+          left.wait();
+          explored::join(leader);
+          explored::check(made == due.size(), "a release is made twice");
+        },
+        kTimed);
+  }
 }
 
 // Adding a task wakes the timer from a longer sleep.
