@@ -19,6 +19,14 @@ namespace redag::runtime {
 
 using sched::Outcome;
 
+namespace {
+
+// How long the release thread leaves a release to the leader with `os`. A leader that sleeps is in time: it has the
+// thread's priority. One in a short job comes a little later.
+constexpr Duration kPatience = 200 * kMicrosecond;
+
+}  // namespace
+
 Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options)
     : options_(std::move(options)),
       lock_(realtime()),
@@ -118,7 +126,10 @@ void Engine::main(WorkerThread &self) noexcept {
       Next next{Next::Kind::Start, first};
       self.meter.pass();
       Time at = now();
-      while (next.kind == Next::Kind::Start) next = run(self, next.assignment, JobSlot(), at);
+      while (next.kind == Next::Kind::Start) {
+        if (self.led && !next.assignment.expected_short) follow(self);
+        next = run(self, next.assignment, JobSlot(), at);
+      }
     } else if (ending) {
       return;
     }
@@ -132,28 +143,31 @@ void Engine::idle(WorkerThread &self) noexcept {
   if (self.leads.load(std::memory_order_relaxed)) {
     lead(self);
   } else {
+    if (self.led) follow(self);
     self.parker.park(options_.spins);
   }
 }
 
-// The leader releases what is due, and often gets one of these jobs itself: no thread has to wake another one. With
-// `os` it has the priority of the release thread, which needs no patience then. An ordinary thread is not sure to get a
-// processor, because the kernel can let a thread that it woke preempt it for a whole job. The release thread then comes
-// second.
+// The leader releases what is due, and often gets one of these jobs itself: no thread has to wake another one. An
+// ordinary thread is not sure to get a processor in time, because the kernel can let a thread that it woke preempt it
+// for a whole job. There the release thread wakes up as well, and whoever is first makes the release.
 void Engine::lead(WorkerThread &self) noexcept {
-  constexpr Duration kPatience = 50 * kMicrosecond;
-  for (bool has_token = false; !has_token;) {
-    self.is_awake.store(true, std::memory_order_relaxed);
-    const Time next = releases_->lead(os() ? kNever : kPatience);
-    self.is_awake.store(false, std::memory_order_relaxed);
+  self.led = true;
+  for (;;) {
+    self.wakes_at.store(0, std::memory_order_relaxed);
+    const Time next = releases_->lead(os() ? kPatience : 0);
+    self.wakes_at.store(next == kNever ? kNever : next - origin_.load(std::memory_order_relaxed),
+                        std::memory_order_relaxed);
     static_cast<void>(self.parker.spin(options_.spins));
-    if (next == kNever) {
-      self.parker.park();
-      has_token = true;
-    } else {
-      has_token = self.parker.park_until(next);
-    }
+    if (next == kNever) return self.parker.park();
+    if (self.parker.park_until(next)) return;
   }
+}
+
+// Lets the release thread make the next release. Not done for a short job: the thread is probably the leader again
+// after it, and each move of the release thread's alarm can take longer than the job.
+void Engine::follow(WorkerThread &self) noexcept {
+  self.led = false;
   releases_->follow();
 }
 

@@ -197,6 +197,7 @@ class Engine {
   void main(WorkerThread &self) noexcept;
   void idle(WorkerThread &self) noexcept;
   void lead(WorkerThread &self) noexcept;
+  void follow(WorkerThread &self) noexcept;
   void guard_throttling() noexcept;
   void look_out() noexcept;
   Next run(WorkerThread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;

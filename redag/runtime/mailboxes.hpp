@@ -82,7 +82,7 @@ class Mailboxes {
   template <typename Write>
   void post(const TaskEntry &entry, Time now, WakeUps &wake_ups, Write &&write) {
     const bool silent = may_be_silent(entry, now, wake_ups);
-    WorkerThread &thread = take_idle();
+    WorkerThread &thread = take_idle(now);
     REDAG_CHECK(!thread.has_mail.load(std::memory_order_relaxed), "a worker was given two jobs");
     std::forward<Write>(write)(thread);
     deliver(thread, silent, wake_ups);
@@ -117,9 +117,10 @@ class Mailboxes {
   bool look(WakeUps &wake_ups);
 
  private:
-  /// Removes an idle thread: the leader if it is awake or the only one, otherwise the one that became idle last.
-  WorkerThread &take_idle() {
-    if (leader_ != nullptr && (idle_.empty() || leader_->is_awake.load(std::memory_order_relaxed))) {
+  /// Removes an idle thread: the leader if it wakes up now anyway or is the only one, otherwise the one that became
+  /// idle last.
+  WorkerThread &take_idle(Time now) {
+    if (leader_ != nullptr && (idle_.empty() || leader_->wakes_at.load(std::memory_order_relaxed) <= now)) {
       leader_->leads.store(false, std::memory_order_relaxed);
       return *std::exchange(leader_, nullptr);
     }
