@@ -44,6 +44,7 @@ struct Call {
   DagId dag = {};
   JobKey job = {};
   Time nominal = 0;  // or the period
+  Time origin = 0;
   Duration deadline = 0;
   Reason reason = Reason::None;
   Outcome outcome = Outcome::Finished;
@@ -77,9 +78,9 @@ std::shared_ptr<RecordingScheduler::Log> RecordingScheduler::make_log() { return
 
 // ---- calls are recorded ----
 
-void RecordingScheduler::release(TaskId task, Time nominal, Time now) {
-  log_->calls.push_back({.kind = Call::Kind::Release, .now = now, .task = task, .nominal = nominal});
-  scheduler_->release(task, nominal, now);
+void RecordingScheduler::release(TaskId task, Time nominal, Time now, Time origin) {
+  log_->calls.push_back({.kind = Call::Kind::Release, .now = now, .task = task, .nominal = nominal, .origin = origin});
+  scheduler_->release(task, nominal, now, origin);
 }
 
 void RecordingScheduler::miss(TaskId task, Time nominal, Time now, Reason reason) {
@@ -161,7 +162,7 @@ std::vector<Decision> RecordingScheduler::replay(const Log &log, Scheduler &othe
   differences = 0;
   for (const Call &call : log.calls) {
     switch (call.kind) {
-      case Call::Kind::Release: other.release(call.task, call.nominal, call.now); break;
+      case Call::Kind::Release: other.release(call.task, call.nominal, call.now, call.origin); break;
       case Call::Kind::Miss: other.miss(call.task, call.nominal, call.now, call.reason); break;
       case Call::Kind::Complete:
         if (const auto slot = slot_of(call.job)) other.complete(*slot, call.now, call.outcome);

@@ -46,7 +46,8 @@ class RecordingScheduler final : public sched::Scheduler {
   /// having started there.
   [[nodiscard]] static std::vector<Decision> replay(const Log &log, sched::Scheduler &other, std::size_t &differences);
 
-  void release(TaskId task, Time nominal, Time now) override;
+  using Scheduler::release;
+  void release(TaskId task, Time nominal, Time now, Time origin) override;
   void miss(TaskId task, Time nominal, Time now, Reason reason) override;
   void complete(JobSlot job, Time now, sched::Outcome outcome) override;
   void preemption_point(JobSlot job, Time now) override;

@@ -127,11 +127,11 @@ bool ReferenceScheduler::same_phase(const TaskState &predecessor, const TaskStat
 
 // ---- releases and completions ---------------------------------------------------------------------------------------
 
-void ReferenceScheduler::release(TaskId task, Time nominal, Time now) {
+void ReferenceScheduler::release(TaskId task, Time nominal, Time now, Time origin) {
   TaskState &state = tasks_[task.value];
   REDAG_CHECK(state.task.activation == Activation::Timer, "data tasks are released by their predecessors");
   if (state.removed || closed_) return;
-  create_job(task.value, nominal, now, {});
+  create_job(task.value, nominal, origin, now, {});
 }
 
 void ReferenceScheduler::miss(TaskId task, Time nominal, Time now, Reason reason) {
@@ -154,7 +154,8 @@ std::size_t ReferenceScheduler::new_job(std::size_t task, Time release, Time now
 }
 
 // Applies "Overrun and admission" to timer and data tasks alike.
-void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, const std::vector<Data> &consumed) {
+void ReferenceScheduler::create_job(std::size_t task, Time release, Time origin, Time now,
+                                    const std::vector<Data> &consumed) {
   TaskState &state = tasks_[task];
   const std::size_t job = new_job(task, release, now);
   if (const Reason reason = refusal(task, release); reason != Reason::None) {
@@ -162,8 +163,10 @@ void ReferenceScheduler::create_job(std::size_t task, Time release, Time now, co
     return;
   }
   jobs_[job].consumed = consumed;
+  jobs_[job].origin = origin;
+  for (const Data &data : consumed) jobs_[job].origin = std::min(jobs_[job].origin, data.origin);
   // "Ties": the job has the turn of the job that it replaces, and none before that of an earlier job of its task.
-  jobs_[job].turn = release;
+  jobs_[job].turn = jobs_[job].origin;
   for (const std::size_t other : jobs_of(task, State::Ready)) {
     const bool takes_its_place = state.task.overrun == Overrun::Skip;
     jobs_[job].turn = takes_its_place ? jobs_[other].turn : std::max(jobs_[job].turn, jobs_[other].turn);
@@ -207,9 +210,9 @@ void ReferenceScheduler::resolve(std::size_t job, Time now) {
     }
     j.consumed = state.inputs;
     for (Data &input : state.inputs) input.fresh = false;
+    if (!j.consumed.empty()) j.origin = kNever;
+    for (const Data &data : j.consumed) j.origin = std::min(j.origin, data.origin);
   }
-  j.origin = j.consumed.empty() ? j.release : kNever;
-  for (const Data &data : j.consumed) j.origin = std::min(j.origin, data.origin);
   j.state = State::Ready;
   j.ready_order = ready_count_++;
   emit(JobEventKind::Ready, job, now, j.origin, WorkerId::kNoneValue);
@@ -268,7 +271,7 @@ void ReferenceScheduler::deliver(std::size_t job, Time now) {
     } else if (std::all_of(state.inputs.begin(), state.inputs.end(), [](const Data &d) { return d.fresh; })) {
       const std::vector<Data> consumed = state.inputs;
       for (Data &d : state.inputs) d.fresh = false;
-      create_job(s, now, now, consumed);
+      create_job(s, now, kNever, now, consumed);
     }
   }
 }
@@ -605,6 +608,7 @@ Dispatch ReferenceScheduler::decision_of(std::size_t job) const {
                   .task = TaskId(j.task),
                   .number = j.number,
                   .release = j.release,
+                  .origin = j.origin,
                   .worker = WorkerId(j.worker),
                   .over = JobSlot::none(),
                   .level = level_of(job)};

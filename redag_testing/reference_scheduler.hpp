@@ -20,7 +20,8 @@ class ReferenceScheduler final : public sched::Scheduler {
  public:
   ReferenceScheduler(const Workload &workload, const sched::Config &config);
 
-  void release(TaskId task, Time nominal, Time now) override;
+  using Scheduler::release;
+  void release(TaskId task, Time nominal, Time now, Time origin) override;
   void miss(TaskId task, Time nominal, Time now, Reason reason) override;
   void complete(JobSlot job, Time now, sched::Outcome outcome) override;
   void exceed(JobSlot job, sched::Limit limit, Time now) override;
@@ -121,7 +122,7 @@ class ReferenceScheduler final : public sched::Scheduler {
 
   std::size_t new_job(std::size_t task, Time release, Time now);
   void skip_all(std::size_t task, Time now);
-  void create_job(std::size_t task, Time release, Time now, const std::vector<Data> &consumed);
+  void create_job(std::size_t task, Time release, Time origin, Time now, const std::vector<Data> &consumed);
   void resolve(std::size_t job, Time now);
   void deliver(std::size_t job, Time now);
   void skip(std::size_t job, Time now, Reason reason);

@@ -143,6 +143,7 @@ class Run {
   void know(const KnownDag &dag, const Task &task) {
     const TaskId id(task_count_++);
     if (task.activation == Activation::Timer) timers_.push_back(id);
+    if (task.predecessors.empty()) sources_.insert(id);
     releases_.push_back(task.offset);
     periods_.push_back(task.period);
     if (dag.bounded && (!task.group.empty() || config_.max_started > 0)) uncounted_.insert(id);
@@ -160,7 +161,9 @@ class Run {
       if (missed) {
         (*side)->miss(task, releases_[task.value], now_, choice % 2 == 0 ? Reason::Overrun : Reason::QueueFull);
       } else {
-        (*side)->release(task, releases_[task.value], now_);
+        const Time nominal = releases_[task.value];
+        const bool is_older = choice % 3 == 0 && sources_.count(task) > 0;
+        (*side)->release(task, nominal, now_, is_older ? nominal - choice : nominal);
       }
     }
     releases_[task.value] += periods_[task.value];
@@ -315,6 +318,7 @@ class Run {
   std::vector<KnownDag> dags_;
   std::size_t task_count_ = 0;
   std::vector<TaskId> timers_;
+  std::set<TaskId> sources_;    // tasks without predecessors
   std::set<TaskId> uncounted_;  // tasks whose deferrals are not compared
   std::vector<Time> releases_;  // the next one of each task
   std::vector<Duration> periods_;

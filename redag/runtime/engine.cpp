@@ -262,12 +262,7 @@ void Engine::refresh_outranked() {
 
 void Engine::release(std::span<const Release> releases) { release_at(releases, now()); }
 
-void Engine::release(TaskId task, Time nominal) { release(task, nominal, now()); }
-
-void Engine::release(TaskId task, Time nominal, Time at) {
-  const Release one{task, nominal};
-  release_at(std::span(&one, 1), at);
-}
+void Engine::release(TaskId task, Time nominal) { release(Release{task, nominal}, now()); }
 
 void Engine::release_at(std::span<const Release> releases, Time at) {
   Locked locked(*this, releases.size());
@@ -275,7 +270,7 @@ void Engine::release_at(std::span<const Release> releases, Time at) {
   if (halted_at_ != kNever) return;
   do {
     const auto lot = releases.first(std::min(releases.size(), sched::kMostReleasesAtOnce));
-    for (const Release &release : lot) scheduler_->release(release.task, release.nominal, at);
+    for (const Release &release : lot) scheduler_->release(release.task, release.nominal, at, release.origin);
     decide(locked, at);
     releases = releases.subspan(lot.size());
   } while (!releases.empty());

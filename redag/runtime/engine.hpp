@@ -42,6 +42,7 @@ namespace redag::runtime {
 struct Release {
   TaskId task;
   Time nominal = 0;
+  Time origin = nominal;  // of the job's data, if that is older
 };
 
 struct EngineOptions {
@@ -115,7 +116,7 @@ class Engine {
   void release(std::span<const Release> releases);
   void release(TaskId task, Time nominal);
   /// As above, for a caller that has just read now(): the job arrives at `at`.
-  void release(TaskId task, Time nominal, Time at);
+  void release(const Release &release, Time at) { release_at(std::span(&release, 1), at); }
   /// Reports a release that is skipped at once for `reason` (sched::Scheduler::miss).
   void miss(TaskId task, Time nominal, Reason reason);
 
@@ -175,9 +176,9 @@ class Engine {
   /// Priority changes that the system refused while running, because rights were taken away.
   [[nodiscard]] std::uint64_t refused_priorities() const;
   /// Returns true if the calling thread is inside one of this engine's bodies.
-  [[nodiscard]] bool in_body() const noexcept { return current_task().has_value(); }
-  /// The task whose job the calling thread runs in this engine, the topmost one of several. Empty outside bodies.
-  [[nodiscard]] std::optional<TaskId> current_task() const noexcept;
+  [[nodiscard]] bool in_body() const noexcept { return current_job() != nullptr; }
+  /// The job that the calling thread runs in this engine, the topmost one of several. Null outside bodies.
+  [[nodiscard]] const RunningJob *current_job() const noexcept;
   [[nodiscard]] std::uint32_t thread_count() const { return pool_.size(); }
   [[nodiscard]] const EngineOptions &options() const { return options_; }
 

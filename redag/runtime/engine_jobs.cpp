@@ -16,11 +16,10 @@ namespace redag::runtime {
 
 using sched::Outcome;
 
-std::optional<TaskId> Engine::current_task() const noexcept {
-  for (const RunningJob *job = RunningJob::current(); job != nullptr; job = job->below) {
-    if (job->engine == this) return job->task;
-  }
-  return std::nullopt;
+const RunningJob *Engine::current_job() const noexcept {
+  const RunningJob *job = RunningJob::current();
+  while (job != nullptr && job->engine != this) job = job->below;
+  return job;
 }
 
 // Runs a job to its end, on top of `below` if that is valid. `at` is when it begins, and is set to when the thread's
@@ -40,6 +39,7 @@ Next Engine::run(WorkerThread &self, const Assignment &assignment, JobSlot below
   running.outranked = &self.outranked;
   running.task = job.task;
   running.slot = job.slot;
+  running.origin = job.origin;
   running.top = &self.top;
   running.limit = assignment.entry->next_limit(running);
   running.measured = assignment.entry->always_measured();

@@ -20,6 +20,7 @@ struct Job {
   TaskId task;
   std::uint32_t number = 0;  // within its task, from 0
   Time release = 0;          // nominal
+  Time origin = 0;           // the earliest release whose data it carries
   JobSlot slot;
   WorkerId worker;  // the scheduler's: threads are not tied to workers; with `os` the first one of the job
 };

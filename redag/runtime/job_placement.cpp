@@ -116,7 +116,12 @@ void JobPlacement::assign(WorkerThread &thread, const Dispatch &dispatch, TaskEn
   REDAG_CHECK(entry.busy < entry.concurrency, "more jobs of one task at a time than it allows");
   ++entry.busy;
   ++unfinished_;
-  assignment.job = Job{dispatch.task, dispatch.number, dispatch.release, dispatch.job, dispatch.worker};
+  assignment.job = {.task = dispatch.task,
+                    .number = dispatch.number,
+                    .release = dispatch.release,
+                    .origin = dispatch.origin,
+                    .slot = dispatch.job,
+                    .worker = dispatch.worker};
   assignment.entry = &entry;
   assignment.expected_short = entry.expected_short();
   thread.stack.push_back(assignment.job);

@@ -22,6 +22,7 @@ struct RunningJob {
   const Atomic<bool> *outranked = nullptr;  // set while a more urgent job could run on top
   TaskId task;
   JobSlot slot;
+  Time origin = 0;          // see Job
   Duration limit = kNever;  // processor time of its next limit to check; kNever: none
   Time begun = 0;           // on the engine's clock
   CpuMeter::Start start;    // excludes jobs that ran on top

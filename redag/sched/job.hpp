@@ -35,7 +35,7 @@ struct alignas(32) Job {
   // a demoted job it is the tier plus the number of tiers. A job that inherits has the more urgent key of another job.
   // Turn, rank and sequence are always the job's own.
   std::int64_t key = 0;
-  Time turn = 0;               // Ties::Share: its release, or the turn of the job that it replaced
+  Time turn = 0;               // Ties::Share: see Lifecycle::turn_of()
   std::uint64_t sequence = 0;  // order in which jobs became ready
   std::uint32_t rank = 0;
   TaskId priority_of{};  // the task whose priority it has: its own, or the task of a job from which it inherited

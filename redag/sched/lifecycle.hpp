@@ -47,7 +47,8 @@ class Lifecycle final : public Scheduler {
   Lifecycle(const Lifecycle &) = delete;
   Lifecycle &operator=(const Lifecycle &) = delete;
 
-  void release(TaskId task, Time nominal, Time now) override;
+  using Scheduler::release;
+  void release(TaskId task, Time nominal, Time now, Time origin) override;
   void miss(TaskId task, Time nominal, Time now, Reason reason) override;
   void complete(JobSlot job, Time now, Outcome outcome) override;
   void preemption_point(JobSlot job, Time now) override;
@@ -93,7 +94,7 @@ class Lifecycle final : public Scheduler {
   void admit_or_refuse(TaskId id, Time nominal, Time origin);
   void refuse(TaskId id, Time nominal, Reason reason);
   static std::uint32_t count_release(TaskState &task);
-  [[nodiscard]] Time turn_of(const TaskState &task, Time release) const;
+  [[nodiscard]] Time turn_of(const TaskState &task, Time origin) const;
   inline void make_ready(std::uint32_t slot, Time origin);
   void skip(std::uint32_t slot, Reason reason);
   template <class Predicate>

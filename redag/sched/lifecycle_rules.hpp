@@ -23,12 +23,12 @@ namespace redag::sched {
 }
 
 template <Dispatcher D>
-void Lifecycle<D>::release(TaskId task, Time nominal, Time now) {
+void Lifecycle<D>::release(TaskId task, Time nominal, Time now, Time origin) {
   REDAG_CHECK(task.value < table_.tasks.size(), "release of a task that does not exist");
   REDAG_CHECK(table_.tasks[task.value].timer, "data tasks are released by their predecessors");
   table_.step.begin(now);
   if (table_.tasks[task.value].life != TaskLife::Live) return;
-  restricted_ ? admit_or_refuse(task, nominal, nominal) : admit(task, nominal, nominal);
+  restricted_ ? admit_or_refuse(task, nominal, origin) : admit(task, nominal, origin);
 }
 
 template <Dispatcher D>
@@ -122,7 +122,7 @@ bool Lifecycle<D>::outranked(JobSlot job) const {
   return table_.config.preemption == Preemption::Cooperative && dispatcher_.outranked(table_.jobs[job.value]);
 }
 
-// `origin` is used for tasks without predecessors and for data tasks, whose data is already consumed.
+// A timer task with predecessors has its release as `origin` here, and gets that of its data when it is ready.
 template <Dispatcher D>
 void Lifecycle<D>::admit(TaskId id, Time nominal, Time origin) {
   TaskState &task = table_.tasks[id.value];
@@ -130,7 +130,7 @@ void Lifecycle<D>::admit(TaskId id, Time nominal, Time origin) {
   const std::uint32_t number = count_release(task);
   table_.step.emit(id, number, WorkerId(), JobEventKind::Released, nominal);
 
-  const Time turn = takes_turns_ ? turn_of(task, nominal) : 0;
+  const Time turn = takes_turns_ ? turn_of(task, origin) : 0;
   if (task.waiting != kNil) skip(task.waiting, Reason::Precedence);
   if (task.queue_depth == 0 && task.ready_count > 0) {
     skip(task.latest_ready, Reason::Overrun);
@@ -160,14 +160,14 @@ void Lifecycle<D>::admit(TaskId id, Time nominal, Time origin) {
 }
 
 // Returns the turn of the task's next job (Ties::Share). A job that replaces another takes its turn: with its own,
-// later release, each replacement would put the task behind its equals for ever. A queued job never comes before an
+// later origin, each replacement would put the task behind its equals for ever. A queued job never comes before an
 // earlier job of its task.
 template <Dispatcher D>
-Time Lifecycle<D>::turn_of(const TaskState &task, Time release) const {
+Time Lifecycle<D>::turn_of(const TaskState &task, Time origin) const {
   if (task.waiting != kNil) return table_.jobs[task.waiting].turn;
-  if (task.ready_count == 0) return release;
+  if (task.ready_count == 0) return origin;
   const Time earlier = table_.jobs[task.latest_ready].turn;
-  return task.queue_depth == 0 ? earlier : std::max(release, earlier);
+  return task.queue_depth == 0 ? earlier : std::max(origin, earlier);
 }
 
 template <Dispatcher D>

@@ -101,6 +101,33 @@ TEST(PriorityScheduler, ATurnIsTheNominalRelease) {
   EXPECT_EQ(workers.running(), "three");
 }
 
+// A chain that began before an equal also ends before it, and so does data that is older than the driver's release.
+TEST(PriorityScheduler, TheTurnOfADataTaskIsTheOriginOfItsData) {
+  const Workload workload =
+      make_workload({make_dag("a", {{"first", 10}, {"second", 0, 1, {0}}, {"third", 0, 1, {1}}, {"other", 10}})}, 1);
+  ManualWorkers workers = drive(workload, Preemption::None);
+  workers.release("first").decide();
+  workers.at(1).release("other").decide();
+  workers.at(2).finish("first").decide();
+  EXPECT_EQ(workers.running(), "second");
+  workers.at(3).finish("second").decide();
+  EXPECT_EQ(workers.running(), "third");
+  workers.at(4).finish("third").decide();
+  EXPECT_EQ(workers.running(), "other");
+
+  sched::PriorityScheduler scheduler(make_workload({make_dag("a", {{"busy", 20}, {"one", 10}, {"two", 10}})}, 1),
+                                     {.workers = 1, .preemption = Preemption::None});
+  scheduler.release(TaskId(0), 0, 0);
+  const JobSlot busy = scheduler.dispatch(0).dispatches.front().job;
+  scheduler.release(TaskId(1), 3, 3);
+  scheduler.release(TaskId(2), 4, 4, 2);
+  scheduler.complete(busy, 5, sched::Outcome::Finished);
+  const sched::Step step = scheduler.dispatch(5);
+  ASSERT_EQ(step.dispatches.size(), 1U);
+  EXPECT_EQ(step.dispatches.front().task, TaskId(2));
+  EXPECT_EQ(step.dispatches.front().origin, 2);
+}
+
 // A job that replaces another keeps its turn. Otherwise, with `overrun: skip`, a busy equal would go first for ever.
 TEST(PriorityScheduler, AJobThatTakesAPlaceHasItsTurn) {
   const Workload workload = make_workload({make_dag("a", {{"heavy", 20, 25}, {"light", 20}})}, 1);

@@ -65,6 +65,7 @@ struct Dispatch {
   TaskId task;
   std::uint32_t number = 0;  // number of the job within its task
   Time release = 0;          // nominal
+  Time origin = 0;           // the earliest release whose data the job carries
   WorkerId worker;
   JobSlot over;  // the job that loses the worker (Full) or is suspended under this one (Cooperative); invalid: none
   DispatchKind kind = DispatchKind::Start;
@@ -82,8 +83,11 @@ class Scheduler {
  public:
   virtual ~Scheduler() = default;
 
-  /// Reports that the period of timer task `task` expired at `nominal`, seen at `now`. Ignores removed tasks.
-  virtual void release(TaskId task, Time nominal, Time now) = 0;
+  /// Reports that the period of timer task `task` expired at `nominal`, seen at `now`. Ignores removed tasks. `origin`:
+  /// the time from which the job's data is, if the task has no predecessors here and the driver knows it to be older
+  /// than the release.
+  virtual void release(TaskId task, Time nominal, Time now, Time origin) = 0;
+  void release(TaskId task, Time nominal, Time now) { release(task, nominal, now, nominal); }
 
   /// Reports a release of timer task `task` that is skipped at once for `reason`: a period that the timer missed, or a
   /// message that the middleware overwrote. The task's other jobs are not affected. If the scheduler would refuse the

@@ -58,6 +58,7 @@ class StepBuilder {
                                    .task = job.task,
                                    .number = job.number,
                                    .release = job.release,
+                                   .origin = job.origin,
                                    .worker = job.worker,
                                    .over = over,
                                    .kind = kind,

@@ -114,7 +114,7 @@ Method exploration(ExplorationOptions options) {
       .assumptions =
           "any number of workers, jobs run to completion, strictly periodic with the stated offsets; the tasks that "
           "edges join have one rate and one offset; R <= T; jitter, bcet, max_active, groups; static priorities, or "
-          "edf without data tasks; exact on one worker, except for data tasks of equal priority",
+          "edf without data tasks; exact on one worker",
       .complexity = "up to max_states states, O(n) per state",
       .apply = [options = std::move(options)](const TaskSet &task_set) -> Outcome {
         if (auto reason = why_not_explore(task_set)) return NotApplicable{*std::move(reason)};

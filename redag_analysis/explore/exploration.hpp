@@ -47,7 +47,7 @@ struct Exploration {
     Stopped,   // by `proceed`
   };
   End end = End::GaveUp;
-  bool exact = false;              // each range is tight: one worker, and the order of equals is always certain
+  bool exact = false;              // each range is tight: one worker
   std::uint64_t states = 0;        // states followed, after merging
   std::uint64_t merged = 0;        // states that were merged into others
   std::uint64_t jobs = 0;          // of one hyperperiod

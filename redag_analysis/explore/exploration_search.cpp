@@ -34,10 +34,8 @@ class Explorer {
         tasks_(model_.tasks) {
     result_.hyperperiod = model_.hyperperiod;
     result_.jobs = model_.jobs;
-    result_.exact = workers_ == 1;  // until the order of two equals is uncertain
+    result_.exact = workers_ == 1;
     for (const ExploredTask &task : tasks_) result_.responses.emplace_back(task.jobs);
-    before_.assign(tasks_.size(), -1);
-    for (std::uint32_t t = 0; t < tasks_.size(); ++t) (void)find_before(t);
   }
 
   Exploration run() {
@@ -72,8 +70,6 @@ class Explorer {
     Time nominal = 0;
     Interval ready;            // considering its release alone
     bool waits = false;        // also for predecessors or gates: `ready` depends on the state
-    bool data = false;         // a data task: its turn depends on the state
-    bool is_unsure = false;    // its order among its equals depends on the state, too
     std::int64_t urgency = 0;  // tier, or absolute deadline (edf); equals take turns
     std::uint32_t rank = 0;
   };
@@ -147,66 +143,23 @@ class Explorer {
       candidate.waits = workers_ > 1 && !(task.predecessors.empty() && task.gates.empty());
       const CompiledTask &compiled = task_set_.tasks[t];
       const bool is_edf = task_set_.policy == PolicyKind::Edf;
-      candidate.data = compiled.data;
       candidate.urgency = is_edf ? candidate.nominal + task.deadline : compiled.tier;
       candidate.rank = compiled.rank;
       candidates_.push_back(candidate);
     }
+    // A job's turn is the nominal release of its unit, the origin of its data.
     const bool take_turns = task_set_.ties == Ties::Share;
     std::sort(candidates_.begin(), candidates_.end(), [take_turns](const Candidate &a, const Candidate &b) {
       if (a.urgency != b.urgency) return a.urgency < b.urgency;
       if (take_turns && a.nominal != b.nominal) return a.nominal < b.nominal;
       return a.rank < b.rank;
     });
-    for (std::size_t begin = 0, end = 0; begin < candidates_.size(); begin = end) {
-      bool data = false;
-      for (; end < candidates_.size() && candidates_[end].urgency == candidates_[begin].urgency; ++end) {
-        data = data || candidates_[end].data;
-      }
-      const bool is_unsure = take_turns && data && end - begin > 1;
-      for (std::size_t c = begin; c < end; ++c) candidates_[c].is_unsure = is_unsure;
-    }
     ready_.resize(candidates_.size());
     starved_ = 0;
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       ready_[c] = candidates_[c].ready;
       if (latest_start(candidates_[c]) < latest_start(candidates_[starved_])) starved_ = c;
     }
-  }
-
-  // The turn of a timer's job is its nominal release; that of a data task's job is the finish of its last predecessor.
-  // The state does not hold the earliest value of that finish (see raise()), but the executions before it give one.
-  [[nodiscard]] Interval turn_of(const Candidate &candidate, std::span<const Interval> state) const {
-    if (!candidate.data) return {candidate.nominal, candidate.nominal};
-    const Time earliest = candidate.nominal + before_[candidate.task];
-    if (workers_ == 1) return {earliest, std::max(earliest, state[0].latest)};
-    Interval turn{earliest, earliest};
-    for (const std::uint32_t p : tasks_[candidate.task].predecessors) {
-      turn.latest = std::max(turn.latest, state[tasks_[p].finish].latest);
-    }
-    return turn;
-  }
-
-  // The least time from the release of a task's unit to the end of its predecessors.
-  Duration find_before(std::uint32_t t) {
-    if (before_[t] >= 0) return before_[t];
-    Duration least = 0;
-    for (const std::uint32_t p : tasks_[t].predecessors) least = std::max(least, find_before(p) + tasks_[p].bcet);
-    return before_[t] = least;
-  }
-
-  // True if candidates_[x], which is not less urgent, certainly goes before candidates_[c]. If neither certainly does,
-  // both orders are followed.
-  [[nodiscard]] bool surely_first(std::size_t x, std::size_t c, std::span<const Interval> state) const {
-    const Candidate &a = candidates_[x];
-    const Candidate &b = candidates_[c];
-    if (a.urgency != b.urgency) return a.urgency < b.urgency;
-    if (!a.is_unsure) return x < c;
-    const bool same_predecessors = tasks_[a.task].predecessors == tasks_[b.task].predecessors;
-    if (a.data && b.data && a.number == b.number && same_predecessors) return a.rank < b.rank;
-    const Time latest = turn_of(a, state).latest;
-    const Time earliest = turn_of(b, state).earliest;
-    return latest < earliest || (latest == earliest && a.rank < b.rank);
   }
 
   // The latest start with which the job need not end after the next release.
@@ -258,8 +211,7 @@ class Explorer {
   [[nodiscard]] Time before_more_urgent(std::size_t c, std::span<const Interval> state) const {
     const ExploredTask &task = tasks_[candidates_[c].task];
     Time until = kNever;
-    for (std::size_t x = 0; x < candidates_.size() && candidates_[x].urgency <= candidates_[c].urgency; ++x) {
-      if (x == c || !surely_first(x, c, state)) continue;
+    for (std::size_t x = 0; x < c; ++x) {
       const Candidate &other = candidates_[x];
       until = std::min(until, other.waits ? eligible_beside(other, task, state) : other.ready.latest);
     }
@@ -284,35 +236,15 @@ class Explorer {
     if (state[0].earliest > latest_start(candidates_[starved_])) return overrun(candidates_[starved_].task);
     const Time work_conserving = std::max(state[0].latest, surely_eligible);
     Time more_urgent = kNever;  // from then on one of them is certainly eligible
-    std::size_t first_equal = 0;
     for (std::size_t c = 0; c < candidates_.size() && more_urgent > state[0].earliest; ++c) {
       const Candidate &candidate = candidates_[c];
       const Time earliest = std::max(state[0].earliest, ready_[c].earliest);
       Time latest = std::min(work_conserving, more_urgent - 1);
-      if (candidate.is_unsure) latest = std::min(latest, before_equals(c, first_equal, state));
       if (candidate.waits && earliest <= latest) latest = std::min(latest, before_more_urgent(c, state));
       if (earliest <= latest && !begin(c, {earliest, latest}, hash, state, next)) return false;
-      const bool has_equals = c + 1 < candidates_.size() && candidates_[c + 1].urgency == candidate.urgency;
-      if (candidate.is_unsure && has_equals) continue;
-      for (; first_equal <= c; ++first_equal) {
-        more_urgent = std::min(more_urgent, surely_eligible_at(first_equal, state));
-      }
+      more_urgent = std::min(more_urgent, surely_eligible_at(c, state));
     }
     return true;
-  }
-
-  // The latest start of the candidate before any equal that certainly goes first is eligible.
-  Time before_equals(std::size_t c, std::size_t first, std::span<const Interval> state) {
-    Time until = kNever;
-    for (std::size_t x = first; x < candidates_.size() && candidates_[x].urgency == candidates_[c].urgency; ++x) {
-      if (x == c) continue;
-      if (surely_first(x, c, state)) {
-        until = std::min(until, surely_eligible_at(x, state));
-      } else if (!surely_first(c, x, state)) {
-        result_.exact = false;
-      }
-    }
-    return until - 1;
   }
 
   [[nodiscard]] Time surely_eligible_at(std::size_t c, std::span<const Interval> state) const {
@@ -424,7 +356,6 @@ class Explorer {
   const std::uint32_t workers_;
   const std::vector<ExploredTask> &tasks_;
   Exploration result_;
-  std::vector<Duration> before_;  // by task: see find_before()
 
   // Data of the node that is followed, and of those that it leads to.
   std::vector<std::uint32_t> counts_;

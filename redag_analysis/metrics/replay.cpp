@@ -64,7 +64,6 @@ const char *Replay::apply(const JobEvent &event) {
     job.number = event.job;
     job.release = event.value;
     job.deadline = event.value + task(event.task).deadline;
-    job.turn = job.release;
     for (const LiveJob &other : tasks_[event.task.value].live) {
       if (other.state == State::Ready) job.turn = std::max(job.turn, other.turn);
     }
@@ -84,6 +83,7 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
     case JobEventKind::Ready:
       if (before != State::Waiting) return "it was ready before";
       job.origin = event.value;
+      if (!job.replaces) job.turn = std::max(job.turn, turn_of(job));
       job.own = urgency_of(job);
       job.raised = job.own;
       move_to(job, State::Ready);
@@ -157,11 +157,20 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
   return "the kind of the event is unknown";
 }
 
+// The turn of a job that replaces none is the origin of its data; a timer task with predecessors has its release.
+Time Replay::turn_of(const LiveJob &job) const {
+  const Task &its_task = task(job.task);
+  const bool is_timer = its_task.activation == Activation::Timer && !its_task.predecessors.empty();
+  return is_timer ? job.release : job.origin;
+}
+
 // A job that replaces one that has not started also takes its turn.
 void Replay::hand_turn_on(const LiveJob &skipped, Reason reason) {
   if (reason != Reason::Overrun && reason != Reason::Precedence) return;
   LiveJob &newest = tasks_[skipped.task.value].live.back();
-  if (newest.number != skipped.number && newest.state == State::Waiting) newest.turn = skipped.turn;
+  if (newest.number == skipped.number || newest.state != State::Waiting) return;
+  newest.turn = skipped.turn;
+  newest.replaces = true;
 }
 
 // Demotes started jobs of lower criticality; the others are to be skipped.

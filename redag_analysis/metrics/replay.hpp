@@ -23,7 +23,7 @@ namespace redag::metrics {
 /// absolute deadline (edf) or the order of readiness (fifo). Inheritance changes the key alone.
 struct Urgency {
   std::int64_t key = 0;
-  Time turn = 0;  // Ties::Share: the job's release, or the turn of the job that it replaced
+  Time turn = 0;  // Ties::Share
   std::uint32_t rank = 0;
   std::uint64_t sequence = 0;  // order of readiness
 
@@ -46,7 +46,8 @@ struct LiveJob {
   Time release = 0;
   Time deadline = 0;
   Time origin = 0;
-  Time turn = 0;
+  Time turn = std::numeric_limits<Time>::min();  // final once it is ready
+  bool replaces = false;                         // it has the turn of a job that it replaced
   Urgency own;
   Urgency raised;  // own, with the key of the most urgent job that waited for its group while it held it
   Time on_worker_since = 0;
@@ -151,6 +152,7 @@ class Replay {
   const char *change_mode(const JobEvent &event);
   void demote(LiveJob &job);
   [[nodiscard]] std::int64_t demoted_key(TaskId task) const;
+  [[nodiscard]] Time turn_of(const LiveJob &job) const;
   void hand_turn_on(const LiveJob &skipped, Reason reason);
   [[nodiscard]] std::uint32_t level_of(const Urgency &urgency) const;
   const char *take_worker(LiveJob &job, const JobEvent &event);

@@ -241,7 +241,7 @@ TEST(EqualRates, TimersOfOneGroupTakeTurns) {
   }
 }
 
-// The turn of a data task's job is the end of its predecessor: a chain and a timer of its rate take turns.
+// A chain goes on before the timer's next job, which would otherwise delay each of its tasks by a period.
 TEST(EqualRates, AChainTakesTurnsWithATimer) {
   const Workload workload =
       make_workload({make_dag("a", {{"heavy", 20, 25}}), make_dag("b", {{"source", 20}, {"sink", 0, 1, {0}}})}, 1);

@@ -10,6 +10,7 @@
 namespace redag_rclcpp {
 
 using redag::kNever;
+using redag::runtime::Release;
 
 namespace {
 
@@ -47,14 +48,17 @@ void ArrivalCallback::detach() {
 void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool seen_only) {
   std::shared_ptr<ExecutorContext> to_wake;
   Time now = 0;
-  Time arrival = 0;
+  Release release;
   bool begins = false;
   std::size_t overwritten = 0;
   {
     const redag::LockGuard guard(lock_);
     if (!context()) return;  // detached: the engine may no longer exist
     now = engine().now();
-    if (context()->learning()) learn_from_arrival(now, count, source);
+    // Messages of this process arrive on the publishing thread, within the job that is the task's predecessor.
+    const redag::runtime::RunningJob *publisher = engine().current_job();
+    if (context()->learning()) learn_from_arrival(now, count, source, publisher);
+    const Time origin = origin_of(now, publisher);
     const bool direct = context()->direct();
     if (depth_ > 0) count = std::min(count, depth_);
     bool replaces = false;
@@ -70,24 +74,22 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
         }
         if (whose == Overwritten::Started) continue;
       }
-      tokens_.push(Token{.arrival = now, .source = source, .part = part, .seen_only = seen_only});
+      tokens_.push(Token{.arrival = now, .origin = origin, .source = source, .part = part, .seen_only = seen_only});
       ++kept_[index_of(source)];
     }
     if (replaces) {
       begins = true;
-      arrival = tokens_.front().arrival;
-      ++released_;
-      releases_.begin();
+      begin_release_of_first(release);
     } else {
       const bool noted = noted_;
-      begins = begin_release(arrival);
+      begins = begin_release(release);
       if (noted_ && !noted) to_wake = context();
       if (overwritten > 0 && !begins) releases_.begin();
     }
   }
   const bool uses_engine = begins || overwritten > 0;
   for (; overwritten > 0; --overwritten) engine().miss(task(), now, redag::Reason::QueueFull);
-  if (begins) engine().release(task(), arrival, now);
+  if (begins) engine().release(release, now);
   if (uses_engine) end_release();
   if (to_wake) to_wake->wake();
 }
@@ -113,7 +115,7 @@ ArrivalCallback::Overwritten ArrivalCallback::drop_oldest(Source source) {
 // Prepares the release of the first token. True: the caller must call Engine::release() and end_release() after it has
 // left lock_. Without a job of the task that is in progress, only releases_ keeps the engine, and the task's id its
 // own.
-bool ArrivalCallback::begin_release(Time &arrival) {
+bool ArrivalCallback::begin_release(Release &release) {
   if (released_ > 0 || !context() || tokens_.empty()) return false;
   if (!context()->direct()) {
     if (!noted_) {
@@ -122,46 +124,48 @@ bool ArrivalCallback::begin_release(Time &arrival) {
     }
     return false;
   }
+  begin_release_of_first(release);
+  return true;
+}
+
+void ArrivalCallback::begin_release_of_first(Release &release) {
+  const Token &first = tokens_.front();
+  release = {task(), first.arrival, first.origin};
   ++released_;
   releases_.begin();
-  arrival = tokens_.front().arrival;
-  return true;
 }
 
 // If the scheduler has skipped a job meanwhile, for example the released one at once, this releases the next token.
 void ArrivalCallback::end_release() {
   while (releases_.end()) {
-    Time arrival = kNever;
+    Release release;
     {
       const redag::LockGuard guard(lock_);
-      if (!begin_release(arrival)) return;
+      if (!begin_release(release)) return;
     }
-    engine().release(task(), arrival);
+    engine().release(release, engine().now());
   }
 }
 
 void ArrivalCallback::admit() {
-  Time arrival = kNever;
+  Release release;
   {
     const redag::LockGuard guard(lock_);
     noted_ = false;
     if (!context() || released_ > 0 || tokens_.empty()) return;
-    ++released_;
-    releases_.begin();
-    arrival = tokens_.front().arrival;
+    begin_release_of_first(release);
   }
-  engine().release(task(), arrival);
+  engine().release(release, engine().now());
   end_release();
 }
 
-Time ArrivalCallback::expire(Time now, std::vector<redag::runtime::Release> &releases,
-                             std::vector<redag::runtime::Release> &) {
-  releases.push_back(redag::runtime::Release{task(), now});  // repeats a release after a skip
+Time ArrivalCallback::expire(Time now, std::vector<Release> &releases, std::vector<Release> &) {
+  releases.push_back(Release{task(), now});  // repeats a release after a skip
   return kNever;
 }
 
 void ArrivalCallback::skipped(redag::Reason reason) noexcept {
-  Time arrival = kNever;
+  Release release;
   {
     const redag::LockGuard guard(lock_);
     if (!context()) return;
@@ -179,14 +183,14 @@ void ArrivalCallback::skipped(redag::Reason reason) noexcept {
     --released_;
     // A thread in end_release(), perhaps this one further up its stack, releases the next token. The depth of calls is
     // thus limited.
-    if (releases_.tell() || !begin_release(arrival)) return;
+    if (releases_.tell() || !begin_release(release)) return;
   }
-  engine().release(task(), arrival);
+  engine().release(release, engine().now());
   end_release();
 }
 
 bool ArrivalCallback::take_token(Token &token) {
-  Time next = kNever;
+  Release next;
   bool begins = false;
   {
     const redag::LockGuard guard(lock_);
@@ -199,20 +203,31 @@ bool ArrivalCallback::take_token(Token &token) {
     begins = begin_release(next);
   }
   if (begins) {
-    engine().release(task(), next);
+    engine().release(next, engine().now());
     end_release();
   }
   return true;
 }
 
-void ArrivalCallback::learn_from_arrival(Time now, std::size_t count, Source source) {
+// Among equal rates the oldest data goes first: a chain of callbacks that began earlier ends earlier. Data that came to
+// this callback before, or is older than the callback's deadline, counts as new. Otherwise callbacks that publish to
+// each other in a circle would go first for ever.
+Time ArrivalCallback::origin_of(Time now, const redag::runtime::RunningJob *publisher) {
+  Time origin = now;
+  if (publisher != nullptr && publisher->origin != last_origin_ && now - publisher->origin <= deadline()) {
+    origin = publisher->origin;
+  }
+  last_origin_ = origin;
+  return origin;
+}
+
+void ArrivalCallback::learn_from_arrival(Time now, std::size_t count, Source source,
+                                         const redag::runtime::RunningJob *publisher) {
   if (arrivals_[0] + arrivals_[1] == 0) first_arrival_ = now;
   last_arrival_ = now;
   arrivals_[index_of(source)] += count;
-  // Messages of this process arrive on the publishing thread, within the job that is the task's predecessor.
-  const auto publisher = engine().current_task();
-  if (publisher && std::find(publishers_.begin(), publishers_.end(), *publisher) == publishers_.end()) {
-    publishers_.push_back(*publisher);
+  if (publisher != nullptr && std::find(publishers_.begin(), publishers_.end(), publisher->task) == publishers_.end()) {
+    publishers_.push_back(publisher->task);
   }
 }
 

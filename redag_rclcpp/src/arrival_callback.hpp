@@ -45,6 +45,7 @@ class ArrivalCallback : public Callback, public Hooked {
   enum class Source : std::uint8_t { Middleware, IntraProcess };
   struct Token {
     Time arrival = 0;
+    Time origin = 0;  // of the message's data
     Source source = Source::Middleware;
     int part = 0;                // number of the waitable's part
     bool seen_only = false;      // the wait set saw it, no hook
@@ -121,9 +122,12 @@ class ArrivalCallback : public Callback, public Hooked {
     Started,   // its job has started, and takes the newer message instead
   };
   [[nodiscard]] Overwritten drop_oldest(Source source) REDAG_REQUIRES(lock_);
-  void learn_from_arrival(Time now, std::size_t count, Source source) REDAG_REQUIRES(lock_);
+  [[nodiscard]] Time origin_of(Time now, const redag::runtime::RunningJob *publisher) REDAG_REQUIRES(lock_);
+  void learn_from_arrival(Time now, std::size_t count, Source source, const redag::runtime::RunningJob *publisher)
+      REDAG_REQUIRES(lock_);
   [[nodiscard]] bool take_token(Token &token);
-  [[nodiscard]] bool begin_release(Time &arrival) REDAG_REQUIRES(lock_);
+  [[nodiscard]] bool begin_release(redag::runtime::Release &release) REDAG_REQUIRES(lock_);
+  void begin_release_of_first(redag::runtime::Release &release) REDAG_REQUIRES(lock_);
   void end_release() REDAG_EXCLUDES(lock_);
   [[nodiscard]] bool begin_drop(Source source) REDAG_EXCLUDES(lock_);
   void forget_dropped(Source source) REDAG_EXCLUDES(lock_);
@@ -153,6 +157,7 @@ class ArrivalCallback : public Callback, public Hooked {
   std::atomic<std::uint64_t> taken_{0};  // attempts that found a message for the callback
   Time first_arrival_ REDAG_GUARDED_BY(lock_) = 0;
   Time last_arrival_ REDAG_GUARDED_BY(lock_) = 0;
+  Time last_origin_ REDAG_GUARDED_BY(lock_) = 0;
 };
 
 }  // namespace redag_rclcpp

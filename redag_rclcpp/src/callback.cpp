@@ -17,7 +17,7 @@ Outcome Callback::execute(const redag::runtime::Job &job) {
   running.close();
   const Duration response = running.ended - job.release;
   response_.add(response);
-  if (response > deadline_.load(std::memory_order_relaxed)) count_late();
+  if (response > deadline()) count_late();
   execution_.add(running.charged);
   return Outcome::Finished;
 }

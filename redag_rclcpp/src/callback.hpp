@@ -73,6 +73,7 @@ class Callback : public TimerQueue::Timer,
   [[nodiscard]] std::shared_ptr<ExecutorContext> leave() REDAG_REQUIRES(lock_);
   void count_late() { late_.fetch_add(1, std::memory_order_relaxed); }
   [[nodiscard]] redag::runtime::Engine &engine() const { return engine_; }
+  [[nodiscard]] Duration deadline() const { return deadline_.load(std::memory_order_relaxed); }
 
   mutable redag::PiMutex lock_;
   /// Null once detached: the engine may no longer exist, and only jobs may use it.
