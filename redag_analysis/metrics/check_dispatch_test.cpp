@@ -86,6 +86,31 @@ TEST(CheckTrace, AJobThatTakesAPlaceHasItsTurn) {
   expect_broken(t.dispatched("heavy", 1, 0, 40).until(26), Rule::Priority);
 }
 
+TEST(CheckTrace, TheTurnOfADataTaskIsTheOriginOfItsData) {
+  Workload w = make_workload({make_dag("a", {{"first", 10, 2}, {"second", 0, 2, {0}}, {"other", 10, 2}})}, 1,
+                             PreemptionMode::None);
+  w.dags[0].tasks[2].offset = kMillisecond;
+  TraceBuilder t(w);
+  t.at(0).arrives("first", 0).dispatched("first", 0, 0, 10).at(1).arrives("other", 0);
+  t.at(2).finished("first", 0, 0).released("second", 0).ready("second", 0, 0);
+  TraceBuilder chain = t;
+  expect_kept(chain.dispatched("second", 0, 0, 12).until(3), Rule::Priority);
+  expect_broken(t.dispatched("other", 0, 0, 11).until(3), Rule::Priority);
+}
+
+TEST(CheckTrace, ATurnIsKeptWhileAJobWaitsForData) {
+  const Workload w =
+      make_workload({make_dag("a", {{"heavy", 20, 25}, {"p", 20, 1}, {"q", 20, 2, {1}}})}, 1, PreemptionMode::None);
+  TraceBuilder t(w);
+  t.at(0).arrives("heavy", 0).arrives("p", 0).released("q", 0).dispatched("heavy", 0, 0, 20);
+  t.at(20).arrives("heavy", 1).released("p", 1).skipped("p", 0, Reason::Overrun).ready("p", 1, 20);
+  t.released("q", 1).skipped("q", 0, Reason::Precedence);
+  t.at(25).finished("heavy", 0, 0).dispatched("p", 1, 0, 40).at(26).finished("p", 1, 0).ready("q", 1, 20);
+  TraceBuilder kept = t;
+  expect_kept(kept.dispatched("q", 1, 0, 40).until(27), Rule::Priority);
+  expect_broken(t.dispatched("heavy", 1, 0, 40).until(27), Rule::Priority);
+}
+
 TEST(CheckTrace, EqualsDoNotPreemptAndGoOnFirst) {
   Workload w = make_workload({make_dag("a", {{"hi", 5, 1, {}, "", 2}, {"one", 20, 4, {}, "", 1}, {"two", 20, 9}})}, 1,
                              PreemptionMode::Os);

@@ -64,6 +64,7 @@ const char *Replay::apply(const JobEvent &event) {
     job.number = event.job;
     job.release = event.value;
     job.deadline = event.value + task(event.task).deadline;
+    if (waits_for_data(event.task)) job.turn = job.release;
     for (const LiveJob &other : tasks_[event.task.value].live) {
       if (other.state == State::Ready) job.turn = std::max(job.turn, other.turn);
     }
@@ -83,7 +84,7 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
     case JobEventKind::Ready:
       if (before != State::Waiting) return "it was ready before";
       job.origin = event.value;
-      if (!job.replaces) job.turn = std::max(job.turn, turn_of(job));
+      if (!job.replaces && !waits_for_data(job.task)) job.turn = std::max(job.turn, job.origin);
       job.own = urgency_of(job);
       job.raised = job.own;
       move_to(job, State::Ready);
@@ -157,11 +158,9 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
   return "the kind of the event is unknown";
 }
 
-// The turn of a job that replaces none is the origin of its data; a timer task with predecessors has its release.
-Time Replay::turn_of(const LiveJob &job) const {
-  const Task &its_task = task(job.task);
-  const bool is_timer = its_task.activation == Activation::Timer && !its_task.predecessors.empty();
-  return is_timer ? job.release : job.origin;
+// True for a timer task with predecessors: the turn of its jobs is their release, not the origin of their data.
+bool Replay::waits_for_data(TaskId id) const {
+  return task(id).activation == Activation::Timer && !task(id).predecessors.empty();
 }
 
 // A job that replaces one that has not started also takes its turn.

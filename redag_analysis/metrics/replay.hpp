@@ -152,7 +152,7 @@ class Replay {
   const char *change_mode(const JobEvent &event);
   void demote(LiveJob &job);
   [[nodiscard]] std::int64_t demoted_key(TaskId task) const;
-  [[nodiscard]] Time turn_of(const LiveJob &job) const;
+  [[nodiscard]] bool waits_for_data(TaskId id) const;
   void hand_turn_on(const LiveJob &skipped, Reason reason);
   [[nodiscard]] std::uint32_t level_of(const Urgency &urgency) const;
   const char *take_worker(LiveJob &job, const JobEvent &event);

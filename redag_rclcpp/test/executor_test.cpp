@@ -61,6 +61,47 @@ TEST_P(ExecutorTest, RunsTheHighestRateFirst) {
   EXPECT_THAT(order, ElementsAre("fast", "middle", "slow"));
 }
 
+// Of equal rates, a chain that began earlier goes on first.
+TEST_P(ExecutorTest, TheOldestDataGoesFirst) {
+  options.default_period = 1h;  // also the deadline: data that is older counts as new
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::vector<std::string> order;
+  auto to_end = publisher("/end");
+  auto other = subscribe("/other", [&] { order.push_back("other"); });
+  auto end = subscribe("/end", [&] { order.push_back("end"); });
+  auto begin = subscribe("/begin", [&] {
+    order.push_back("begin");
+    to_end->publish(Empty());
+  });
+  executor.add_node(node);
+  for (const char *topic : {"/begin", "/other"}) publisher(topic)->publish(Empty());
+  executor.spin_all(kLimit);
+  EXPECT_THAT(order, ElementsAre("begin", "end", "other"));
+}
+
+// Callbacks that publish to each other in a circle leave turns to others.
+TEST_P(ExecutorTest, ACircleIsNotOlderThanItsEquals) {
+  options.default_period = 1h;
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::vector<std::string> order;
+  auto to_first = publisher("/first");
+  auto to_second = publisher("/second");
+  auto other = subscribe("/other", [&] { order.push_back("other"); });
+  auto second = subscribe("/second", [&] {
+    order.push_back("second");
+    if (order.size() < 20) to_first->publish(Empty());
+  });
+  auto first = subscribe("/first", [&] {
+    order.push_back("first");
+    to_second->publish(Empty());
+  });
+  executor.add_node(node);
+  for (const char *topic : {"/first", "/other"}) publisher(topic)->publish(Empty());
+  executor.spin_all(kLimit);
+  ASSERT_GE(order.size(), 20U);
+  EXPECT_LT(std::find(order.begin(), order.end(), "other") - order.begin(), 5);
+}
+
 TEST_P(ExecutorTest, WorkersTakeTheHighestRateFirst) {
   options.workload = parse(kThreeRates);
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
