@@ -78,7 +78,11 @@ Next JobPlacement::place(const sched::Step &step, Time now, const Taker &taker, 
       continue;
     }
     TaskEntry &entry = tasks[dispatch.task];
-    mailboxes_.post(entry, now, wake_ups, [&](WorkerThread &thread) {
+    // A thread that wakes up on the caller's processor, and preempts it, is there much sooner than one elsewhere. The
+    // caller would have to wait for a longer job, although another processor may be idle.
+    const bool preempts = os_ && self == nullptr && entry.expected_short();
+    const int here = preempts ? processor_of(this_threads_processor()) : -1;
+    mailboxes_.post(entry, now, here, wake_ups, [&](WorkerThread &thread) {
       assign(thread, dispatch, entry, thread.mail);
       set_priority_for_job(thread, thread.mail);
     });

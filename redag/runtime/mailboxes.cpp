@@ -32,12 +32,12 @@ bool Mailboxes::may_be_silent(const TaskEntry &entry, Time now, WakeUps &wake_up
   return true;
 }
 
-void Mailboxes::deliver(WorkerThread &thread, bool silent, WakeUps &wake_ups) {
+void Mailboxes::deliver(WorkerThread &thread, bool silent, bool preempts, WakeUps &wake_ups) {
   thread.silent = silent ? ++silent_posts_ : 0;
   thread.has_mail.store(true, std::memory_order_release);
   if (!thread.is_handed) handed_.push_back(&thread);
   thread.is_handed = true;
-  if (!silent) wake_ups.wake(thread);
+  if (!silent) wake_ups.wake(thread, preempts);
 }
 
 WorkerThread *Mailboxes::steal_mail(std::uint32_t level) {

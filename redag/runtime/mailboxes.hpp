@@ -24,13 +24,14 @@
 namespace redag::runtime {
 
 /// Threads to wake. Real-time threads are woken at once, under the lock: a waker preempted between decision and wake-up
-/// would leave an urgent job asleep. As the lock's owner, the waker is raised as soon as the next decision is due.
+/// would leave an urgent job asleep. As the lock's owner, the waker is raised as soon as the next decision is due. The
+/// exception is a thread that will preempt the waker (Mailboxes::post): it would soon wait for the lock.
 class WakeUps {
  public:
   explicit WakeUps(bool at_once) : at_once_(at_once) {}
-  void wake(WorkerThread &thread) {
+  void wake(WorkerThread &thread, bool preempts = false) {
     any_ = true;
-    if (at_once_ || count_ == late_.size()) {
+    if ((at_once_ && !preempts) || count_ == late_.size()) {
       thread.parker.unpark();
     } else {
       late_[count_++] = &thread;
@@ -78,14 +79,15 @@ class Mailboxes {
     return false;
   }
   /// Posts a job. `write` is called with the thread that gets it, and writes the thread's mail. Requires an idle
-  /// thread.
+  /// thread. One that ran last on processor `here`, where the caller is, is preferred, because the kernel lets it
+  /// preempt the caller at once; negative: any.
   template <typename Write>
-  void post(const TaskEntry &entry, Time now, WakeUps &wake_ups, Write &&write) {
+  void post(const TaskEntry &entry, Time now, int here, WakeUps &wake_ups, Write &&write) {
     const bool silent = may_be_silent(entry, now, wake_ups);
-    WorkerThread &thread = take_idle(now);
+    WorkerThread &thread = take_idle(now, here);
     REDAG_CHECK(!thread.has_mail.load(std::memory_order_relaxed), "a worker was given two jobs");
     std::forward<Write>(write)(thread);
-    deliver(thread, silent, wake_ups);
+    deliver(thread, silent, here >= 0, wake_ups);
   }
   /// Takes the mail of a thread that is not awake yet, if that job is above `level`, or is at this level and did not
   /// wake its thread. Returns that thread, which then finds no mail and is not idle yet, or null.
@@ -118,15 +120,23 @@ class Mailboxes {
 
  private:
   /// Removes an idle thread: the leader if it wakes up now anyway or is the only one, otherwise the one that became
-  /// idle last.
-  WorkerThread &take_idle(Time now) {
+  /// idle last, of those on processor `here` if there are any.
+  WorkerThread &take_idle(Time now, int here) {
     if (leader_ != nullptr && (idle_.empty() || leader_->wakes_at.load(std::memory_order_relaxed) <= now)) {
       leader_->leads.store(false, std::memory_order_relaxed);
       return *std::exchange(leader_, nullptr);
     }
     REDAG_CHECK(!idle_.empty(), "more jobs started than there are threads");
-    WorkerThread &thread = *idle_.back();
-    idle_.pop_back();
+    std::size_t at = idle_.size() - 1;
+    if (here >= 0) {
+      for (std::size_t i = idle_.size(); i-- > 0;) {
+        if (processor_of(idle_[i]->processor) != here) continue;
+        at = i;
+        break;
+      }
+    }
+    WorkerThread &thread = *idle_[at];
+    idle_.erase(idle_.begin() + static_cast<std::ptrdiff_t>(at));
     return thread;
   }
   /// Two wake-ups within this time that mail could have done without wake the lookout.
@@ -134,7 +144,7 @@ class Mailboxes {
 
   WorkerThread *steal_mail(std::uint32_t level);
   bool may_be_silent(const TaskEntry &entry, Time now, WakeUps &wake_ups);
-  void deliver(WorkerThread &thread, bool silent, WakeUps &wake_ups);
+  void deliver(WorkerThread &thread, bool silent, bool preempts, WakeUps &wake_ups);
   /// Wakes up to `most` threads with mail of the first `silent_posts` silent posts.
   void wake_silent(std::uint64_t silent_posts, std::size_t most, WakeUps &wake_ups);
 

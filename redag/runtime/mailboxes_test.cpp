@@ -18,9 +18,9 @@ class MailboxesTest : public ::testing::Test {
   }
 
   /// Returns the thread that has got the job.
-  WorkerThread &post(const TaskEntry &entry, std::uint32_t level = 0, Time now = 0) {
+  WorkerThread &post(const TaskEntry &entry, std::uint32_t level = 0, Time now = 0, int here = -1) {
     WorkerThread *got = nullptr;
-    mailboxes_.post(entry, now, wake_ups_, [&](WorkerThread &thread) {
+    mailboxes_.post(entry, now, here, wake_ups_, [&](WorkerThread &thread) {
       thread.level = level;
       got = &thread;
     });
@@ -59,6 +59,19 @@ class MailboxesTest : public ::testing::Test {
   TaskEntry tiny_;
   TaskEntry other_;
 };
+
+TEST_F(MailboxesTest, PrefersAThreadOnTheProcessorOfTheCaller) {
+  constexpr std::uint32_t kHere = 5;
+  constexpr std::uint32_t kElsewhere = 6;
+  for (std::uint32_t t = 0; t < 4; ++t) pool_[t].processor = t % 2 == 1 ? &kHere : &kElsewhere;
+  EXPECT_EQ(&post(other_, 0, 0, 5), &pool_[1]);
+  EXPECT_FALSE(was_woken(pool_[1])) << "it would preempt the caller, which has the lock";
+  wake_ups_.wake_late();
+  EXPECT_TRUE(was_woken(pool_[1]));
+  EXPECT_EQ(&post(other_, 0, 0, -1), &pool_[0]) << "the one that became idle last";
+  EXPECT_EQ(&post(other_, 0, 0, 7), &pool_[2]) << "none is there";
+  EXPECT_EQ(&post(other_, 0, 0, 5), &pool_[3]);
+}
 
 TEST_F(MailboxesTest, MailWakesItsThread) {
   EXPECT_TRUE(was_woken(post(other_)));
