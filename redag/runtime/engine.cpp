@@ -150,7 +150,7 @@ void Engine::idle(WorkerThread &self) noexcept {
 
 // The leader releases what is due, and often gets one of these jobs itself: no thread has to wake another one. An
 // ordinary thread is not sure to get a processor in time, because the kernel can let a thread that it woke preempt it
-// for a whole job. There the release thread wakes up as well, and whoever is first makes the release.
+// for a whole job. There the release thread wakes up as well, and the first of the two makes the release.
 void Engine::lead(WorkerThread &self) noexcept {
   self.led = true;
   for (;;) {
