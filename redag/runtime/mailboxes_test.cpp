@@ -208,7 +208,7 @@ TEST(MailboxesAlone, WithoutALookoutAllMailWakesItsThread) {
   WakeUps wake_ups(true);
   for (int i = 0; i < 3; ++i) {
     mailboxes.add_idle(pool[0]);
-    mailboxes.post(tiny, 0, wake_ups, [](WorkerThread &) {});
+    mailboxes.post(tiny, 0, -1, wake_ups, [](WorkerThread &) {});
     ASSERT_TRUE(pool[0].parker.spin(1));
     pool[0].parker.park();
     ASSERT_TRUE(pool[0].take_mail());

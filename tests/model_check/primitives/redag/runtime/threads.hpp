@@ -64,6 +64,7 @@ inline std::optional<std::string> thread_that_fails;  // name of the thread that
 }
 [[nodiscard]] inline clockid_t cpu_clock_of(ThreadHandle &) noexcept { return 0; }
 [[nodiscard]] inline int processor_of(ProcessorWord) noexcept { return -1; }
+[[nodiscard]] inline ProcessorWord this_threads_processor() noexcept { return nullptr; }
 inline std::function<void(std::uint32_t thread, int priority)> on_set_priority;
 [[nodiscard]] inline bool set_fifo_priority(std::uint32_t thread, int priority) noexcept {
   if (on_set_priority) on_set_priority(thread, priority);
