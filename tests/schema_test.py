@@ -144,6 +144,22 @@ class SchemaTest(unittest.TestCase):
                 document["dags"][0]["degrade"] = degrade
                 self.assertEqual(errors(document) == [], is_valid)
 
+    def test_clusters(self):
+        for platform, is_valid in (
+            ({"clusters": [{"name": "left", "cpus": "0-7", "workers": 8}]}, True),
+            ({"clusters": [{"name": "left", "cpus": [0, "2-5"]}, {"name": "right", "cpus": 6}]}, True),
+            ({"clusters": []}, False),
+            ({"clusters": [{"workers": 1}]}, False),
+            ({"clusters": [{"name": "left", "cpus": "all"}]}, False),
+            ({"clusters": [{"name": "left", "workers": 0}]}, False),
+            ({"clusters": [{"name": "left"}], "workers": 1}, False),
+        ):
+            with self.subTest(platform=platform):
+                document = with_task()
+                document["platform"] = platform
+                document["dags"][0]["cluster"] = "left"
+                self.assertEqual(errors(document) == [], is_valid)
+
     def test_only_a_callback_may_be_without_wcet(self):
         document = with_task(callback={"node": "/n", "timer": "any"})
         del document["dags"][0]["tasks"][0]["wcet"]

@@ -11,18 +11,21 @@
 
 #include <fmt/format.h>
 
+#include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
 #include "redag/model/callback_match.hpp"
+#include "redag/model/clusters.hpp"
 #include "redag/model/validate_edges.hpp"
 
 namespace redag {
 namespace {
 
 constexpr std::array<const char *, kFieldCount> kFieldNames = {
-    "name",       "platform",    "workers",     "preemption", "policy",    "ties",      "dags",       "tasks",
-    "max_active", "max_pending", "criticality", "degrade",    "wcet",      "wcet_low",  "bcet",       "period",
-    "deadline",   "offset",      "jitter",      "region",     "budget",    "on_budget", "activation", "overrun",
-    "priority",   "concurrency", "group",       "after",      "execution", "callback"};
+    "name",      "platform",   "workers",     "preemption",  "policy",      "ties",   "dags",
+    "tasks",     "max_active", "max_pending", "criticality", "degrade",     "wcet",   "wcet_low",
+    "bcet",      "period",     "deadline",    "offset",      "jitter",      "region", "budget",
+    "on_budget", "activation", "overrun",     "priority",    "concurrency", "group",  "after",
+    "execution", "callback",   "clusters",    "cluster",     "cpus"};
 
 struct DurationRule {
   Field field;
@@ -46,6 +49,7 @@ class Checker {
   std::vector<Finding> run() {
     if (!workload_.name.empty()) check_name(workload_.name, "workload");
     check_platform();
+    check_clusters();
     if (workload_.dags.empty()) {
       findings_.error(Field::Dags, Field::Dags, "the workload has no DAGs", "add one under 'dags:'");
     }
@@ -59,7 +63,7 @@ class Checker {
  private:
   void check_platform() {
     const Platform &platform = workload_.platform;
-    if (platform.workers < 1 || platform.workers > kMaxWorkers) {
+    if (platform.clusters.empty() && (platform.workers < 1 || platform.workers > kMaxWorkers)) {
       findings_.error(Field::Workers, {},
                       fmt::format("workers must be from 1 to {}, not {}", kMaxWorkers, platform.workers));
     }
@@ -79,6 +83,114 @@ class Checker {
       findings_.warning(Field::Policy, Field::Priority, "policy is 'fixed', but no task has a priority",
                         "give tasks a 'priority', or choose another policy");
     }
+  }
+
+  // Places the findings about one cluster.
+  void refuse_cluster(std::size_t cluster, FieldSet involves, std::string message, std::string hint = {}) {
+    findings_.error(Field::Clusters, involves, std::move(message), std::move(hint)).item =
+        static_cast<std::uint32_t>(cluster);
+  }
+
+  void check_clusters() {
+    const std::vector<Cluster> &clusters = workload_.platform.clusters;
+    if (clusters.empty()) return;
+    if (clusters.size() > kMaxClusters) {
+      findings_.error(Field::Clusters, {},
+                      fmt::format("there are {} clusters; at most {} are allowed", clusters.size(), kMaxClusters));
+    }
+    std::unordered_map<std::string_view, std::size_t> names;
+    std::unordered_map<int, std::size_t> owners;  // of processors
+    std::uint64_t workers = 0;
+    for (std::size_t c = 0; c < clusters.size(); ++c) {
+      const Cluster &cluster = clusters[c];
+      if (cluster.name.empty()) {
+        refuse_cluster(c, Field::Name, "a cluster has no name", "add 'name:'");
+      } else if (const std::string why = name_mistake(cluster.name); !why.empty()) {
+        refuse_cluster(c, Field::Name, fmt::format("the name {} of a cluster {}", in_quotes(cluster.name), why));
+      } else if (!names.emplace(cluster.name, c).second) {
+        refuse_cluster(c, Field::Name, fmt::format("the name '{}' is used by another cluster", cluster.name),
+                       "choose a unique name for each cluster");
+      }
+      if (cluster.workers < 1 || cluster.workers > kMaxWorkers) {
+        refuse_cluster(c, Field::Workers,
+                       fmt::format("workers of cluster '{}' must be from 1 to {}, not {}", cluster.name, kMaxWorkers,
+                                   cluster.workers));
+      }
+      workers += cluster.workers;
+      check_cpus(c, owners);
+    }
+    if (workload_.platform.workers == workers && workers <= kMaxWorkers) return;
+    findings_.error(Field::Clusters, Field::Workers,
+                    workers > kMaxWorkers ? fmt::format("the clusters have {} workers; together at most {} are allowed",
+                                                        workers, kMaxWorkers)
+                                          : fmt::format("the platform has {} workers, but its clusters have {}",
+                                                        workload_.platform.workers, workers));
+  }
+
+  void check_cpus(std::size_t c, std::unordered_map<int, std::size_t> &owners) {
+    const Cluster &cluster = workload_.platform.clusters[c];
+    for (const int cpu : cluster.cpus) {
+      if (cpu < 0 || cpu > kMaxCpu) {
+        refuse_cluster(
+            c, Field::Cpus,
+            fmt::format("cluster '{}' has processor {}, which is not from 0 to {}", cluster.name, cpu, kMaxCpu));
+        return;
+      }
+      const auto [owner, is_first] = owners.emplace(cpu, c);
+      if (is_first) continue;
+      refuse_cluster(c, Field::Cpus,
+                     fmt::format("processor {} of cluster '{}' is {}", cpu, cluster.name,
+                                 owner->second == c ? "listed twice"
+                                                    : fmt::format("also one of cluster '{}'",
+                                                                  workload_.platform.clusters[owner->second].name)),
+                     "clusters share no processors");
+      return;
+    }
+  }
+
+  // Requires a place in the DAG.
+  void check_cluster_of(const Dag &dag) {
+    const std::vector<Cluster> &clusters = workload_.platform.clusters;
+    if (cluster_of(workload_.platform, dag)) return;
+    if (dag.cluster.empty()) {
+      if (clusters.empty() || options_.cluster_optional) return;
+      findings_.error(Field::Cluster, Field::Clusters, fmt::format("DAG '{}' has no cluster", dag.name),
+                      "add 'cluster:' with " + names_of_clusters());
+    } else if (clusters.empty()) {
+      findings_.error(Field::Cluster, Field::Clusters,
+                      fmt::format("DAG '{}' names a cluster, but the platform has no clusters", dag.name),
+                      "add 'clusters:' to the platform, or remove 'cluster:'");
+    } else {
+      findings_.error(Field::Cluster, Field::Clusters,
+                      fmt::format("there is no cluster {}, which DAG '{}' names", in_quotes(dag.cluster), dag.name),
+                      "choose " + names_of_clusters());
+    }
+  }
+
+  // Many DAGs can have this hint, which is therefore short.
+  [[nodiscard]] std::string names_of_clusters() const {
+    constexpr std::size_t kMostBytes = 200;
+    std::string names;
+    for (const Cluster &cluster : workload_.platform.clusters) {
+      names += (names.empty() ? "" : ", ") + cluster.name;
+      if (names.size() > kMostBytes) return "a cluster of the platform";
+    }
+    return workload_.platform.clusters.size() == 1 ? names : "one of " + names;
+  }
+
+  // Groups exclude jobs within one scheduler, and each cluster has its own.
+  void check_group_in_cluster(DagId id, const Task &task) {
+    if (task.group.empty() || workload_.platform.clusters.empty()) return;
+    const auto [first, is_first] = groups_.emplace(task.group, id);
+    const Dag &dag = workload_.dags[id.value];
+    const Dag &other = workload_.dags[first->second.value];
+    const auto cluster = cluster_of(workload_.platform, dag);
+    const auto of_other = cluster_of(workload_.platform, other);
+    if (is_first || !cluster || !of_other || *cluster == *of_other) return;
+    findings_.error(Field::Group, Field::Cluster | Field::Clusters,
+                    fmt::format("group '{}' spans two clusters: DAG '{}' is in '{}', and DAG '{}' is in '{}'",
+                                task.group, other.name, other.cluster, dag.name, dag.cluster),
+                    "put these DAGs into one cluster, or use two groups");
   }
 
   void check_name(const std::string &name, std::string_view what) {
@@ -122,6 +234,7 @@ class Checker {
     check_bound(dag, Field::MaxActive, dag.max_active);
     check_bound(dag, Field::MaxPending, dag.max_pending);
     check_degrade(dag);
+    check_cluster_of(dag);
     if (dag.tasks.empty()) findings_.error(Field::Tasks, {}, fmt::format("DAG '{}' has no tasks", dag.name));
     std::unordered_map<std::string_view, std::size_t> seen;
     seen.reserve(dag.tasks.size());
@@ -140,6 +253,7 @@ class Checker {
       check_execution(task);
       check_activation(task);
       check_options(task);
+      check_group_in_cluster(id, task);
       check_callback(task);
       sound_edges = check_edges(dag, i, findings_) && sound_edges;
     }
@@ -368,23 +482,57 @@ class Checker {
   }
 
   void check_load() {
-    double utilization = 0;
-    for (const Dag &dag : workload_.dags) {
-      for (const Task &task : dag.tasks) {
-        if (task.period > 0) utilization += static_cast<double>(task.wcet) / static_cast<double>(task.period);
-      }
+    const Platform &platform = workload_.platform;
+    if (platform.clusters.empty()) {
+      double utilization = 0;
+      for (const Dag &dag : workload_.dags) utilization += utilization_of(dag);
+      check_load(utilization, platform.workers, "", Finding::kNone);
+      return;
     }
+    std::vector<double> loads(platform.clusters.size(), 0);
+    std::vector<bool> serves(platform.clusters.size(), false);
+    for (const Dag &dag : workload_.dags) {
+      const std::optional<std::size_t> cluster = cluster_of(platform, dag);
+      if (!cluster) continue;
+      loads[*cluster] += utilization_of(dag);
+      serves[*cluster] = true;
+    }
+    for (std::uint32_t c = 0; c < platform.clusters.size(); ++c) {
+      const Cluster &cluster = platform.clusters[c];
+      check_load(loads[c], cluster.workers, fmt::format(" of cluster '{}'", cluster.name), c);
+      if (serves[c] || options_.cluster_optional) continue;
+      findings_
+          .warning(Field::Clusters, FieldSet(Field::Cluster) | Field::Dags | Field::Name,
+                   fmt::format("no DAG is in cluster '{}'", cluster.name))
+          .item = c;
+    }
+  }
+
+  void check_load(double utilization, std::uint32_t workers, const std::string &whose, std::uint32_t cluster) {
     constexpr double kRounding = 1e-9;
-    if (utilization <= static_cast<double>(workload_.platform.workers) * (1 + kRounding)) return;
-    findings_.warning(Field::Workers, Field::Wcet | Field::Period,
-                      fmt::format("utilization {:.4g} exceeds the capacity of {} worker{}", utilization,
-                                  workload_.platform.workers, workload_.platform.workers == 1 ? "" : "s"),
-                      "no schedule meets every deadline if jobs execute for their wcet");
+    if (utilization <= static_cast<double>(workers) * (1 + kRounding)) return;
+    findings_
+        .warning(cluster == Finding::kNone ? Field::Workers : Field::Clusters,
+                 Field::Workers | Field::Wcet | Field::Period | Field::Cluster,
+                 fmt::format("utilization {:.4g}{} exceeds the capacity of {} worker{}", utilization, whose, workers,
+                             workers == 1 ? "" : "s"),
+                 "no schedule meets every deadline if jobs execute for their wcet")
+        .item = cluster;
+  }
+
+  // Periods can still be wrong here.
+  static double utilization_of(const Dag &dag) {
+    double sum = 0;
+    for (const Task &task : dag.tasks) {
+      if (task.period > 0) sum += static_cast<double>(task.wcet) / static_cast<double>(task.period);
+    }
+    return sum;
   }
 
   const Workload &workload_;
   ValidateOptions options_;
   FindingList findings_;
+  std::unordered_map<std::string_view, DagId> groups_;           // group -> DAG that uses it first
   std::unordered_map<std::string, std::string_view> callbacks_;  // text of a callback -> task that names it first
 };
 

@@ -22,6 +22,7 @@ inline constexpr std::uint32_t kMaxConcurrency = 1024;
 inline constexpr std::uint32_t kMaxDegrade = 1'000'000;  // releases skipped, or periods stretched
 inline constexpr std::uint32_t kMaxBound = 1'000'000;    // max_active, max_pending
 inline constexpr std::size_t kMaxNameBytes = 1000;
+inline constexpr std::size_t kMaxClusters = 64;
 
 /// Says why `name` cannot stand in one-line messages and tables: "is empty", "contains U+001B, ...". Empty if it can.
 [[nodiscard]] std::string name_mistake(std::string_view name);
@@ -58,9 +59,12 @@ enum class Field : std::uint8_t {
   After,
   Execution,
   Callback,
+  Clusters,
+  Cluster,
+  Cpus,
 };
 
-inline constexpr std::size_t kFieldCount = 30;
+inline constexpr std::size_t kFieldCount = 33;
 
 [[nodiscard]] const char *to_string(Field field);
 
@@ -68,7 +72,7 @@ inline constexpr std::size_t kFieldCount = 30;
 class FieldSet {
  public:
   constexpr FieldSet() = default;
-  constexpr FieldSet(Field field) : bits_(1U << static_cast<unsigned>(field)) {}
+  constexpr FieldSet(Field field) : bits_(std::uint64_t{1} << static_cast<unsigned>(field)) {}
 
   [[nodiscard]] constexpr bool intersects(FieldSet other) const { return (bits_ & other.bits_) != 0; }
   constexpr FieldSet &operator|=(FieldSet other) {
@@ -78,7 +82,7 @@ class FieldSet {
   friend constexpr FieldSet operator|(FieldSet a, FieldSet b) { return a |= b; }
 
  private:
-  std::uint32_t bits_ = 0;
+  std::uint64_t bits_ = 0;
 };
 
 [[nodiscard]] constexpr FieldSet operator|(Field a, Field b) { return FieldSet(a) | FieldSet(b); }
@@ -95,7 +99,7 @@ struct Finding {
   DagId dag;                   // invalid: about the workload
   std::uint32_t task = kNone;  // index in the DAG; kNone: about the DAG
   Field field = Field::Name;   // the field to point at
-  std::uint32_t item = kNone;  // index in `predecessors` or `samples`, or part of the callback
+  std::uint32_t item = kNone;  // index in `predecessors`, `samples` or `clusters`, or part of the callback
   FieldSet involves;           // all fields that the rule examined
   std::string message;
   std::string hint;
@@ -104,6 +108,8 @@ struct Finding {
 struct ValidateOptions {
   /// Allows a task with a callback to have no wcet (0), because it is yet to be measured.
   bool wcet_optional = false;
+  /// Allows a DAG to name none of several clusters, because its cluster is yet to be found.
+  bool cluster_optional = false;
 };
 
 /// Returns every broken rule, in the order of the workload. Linear in its size. Accepts any workload without a crash.

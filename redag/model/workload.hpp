@@ -116,7 +116,8 @@ struct Dag {
   std::uint32_t max_pending = 0;  // jobs released and not started at any time; 0: no bound
   Duration deadline = 0;          // end to end, from a source's release to a sink's finish; 0: none
   Criticality criticality = Criticality::Normal;
-  Degrade degrade;  // only used if the DAG is not of high criticality
+  Degrade degrade;           // only used if the DAG is not of high criticality
+  std::string cluster = {};  // name of the cluster that serves it; empty: the only one, or the whole platform
 
   friend bool operator==(const Dag &, const Dag &) = default;
 };
@@ -137,9 +138,19 @@ enum class Ties : std::uint8_t {
 /// What can interrupt a running job. See docs/model.md.
 enum class PreemptionMode : std::uint8_t { None, Cooperative, Os, Auto };
 
+/// Processors with workers and an order of jobs of their own. A DAG's jobs never leave its cluster (clusters.hpp).
+struct Cluster {
+  std::string name;
+  std::uint32_t workers = 1;
+  std::vector<int> cpus = {};  // processors of the workers, ascending; empty: any
+
+  friend bool operator==(const Cluster &, const Cluster &) = default;
+};
+
 struct Platform {
-  std::uint32_t workers = 1;  // m: jobs that execute at the same time
+  std::uint32_t workers = 1;  // m: jobs that execute at the same time; with clusters, the sum of theirs
   PreemptionMode preemption = PreemptionMode::Auto;
+  std::vector<Cluster> clusters = {};  // empty: all workers serve all DAGs
 
   friend bool operator==(const Platform &, const Platform &) = default;
 };

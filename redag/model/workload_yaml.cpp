@@ -27,9 +27,11 @@ namespace {
 using yaml::Node;
 
 constexpr std::array kTopFields = {Field::Name, Field::Platform, Field::Policy, Field::Ties, Field::Dags};
-constexpr std::array kPlatformFields = {Field::Workers, Field::Preemption};
-constexpr std::array kDagFields = {Field::Name,       Field::Period,      Field::Deadline, Field::MaxActive,
-                                   Field::MaxPending, Field::Criticality, Field::Degrade,  Field::Tasks};
+constexpr std::array kPlatformFields = {Field::Workers, Field::Preemption, Field::Clusters};
+constexpr std::array kClusterFields = {Field::Name, Field::Workers, Field::Cpus};
+constexpr std::array kDagFields = {Field::Name,        Field::Cluster,   Field::Period,
+                                   Field::Deadline,    Field::MaxActive, Field::MaxPending,
+                                   Field::Criticality, Field::Degrade,   Field::Tasks};
 constexpr std::array kTaskFields = {Field::Name,       Field::Wcet,        Field::Bcet,     Field::Period,
                                     Field::Deadline,   Field::Offset,      Field::Jitter,   Field::Region,
                                     Field::Budget,     Field::Concurrency, Field::Group,    Field::Criticality,
@@ -158,12 +160,43 @@ class Reader : private yaml::ValueReader {
     platform_.node = find(root_, Field::Platform);
     if (platform_.node == nullptr) return;
     if (!check_map(*platform_.node, "platform", names_of(kPlatformFields))) {
-      root_.broken |= Field::Workers | Field::Preemption;
+      root_.broken |= FieldSet(Field::Workers) | Field::Preemption | Field::Clusters;
       return;
     }
     take_count(platform_, Field::Workers, workload_.platform.workers, kMaxWorkers);
+    read_clusters();
     take_enum(platform_, Field::Preemption, workload_.platform.preemption, kPreemptionModes);
     root_.broken |= platform_.broken;
+  }
+
+  void read_clusters() {
+    const std::vector<Node> *nodes = take_list(platform_, Field::Clusters);
+    if (nodes == nullptr) return;
+    if (const Node *workers = find(platform_, Field::Workers)) {
+      error(*workers, "platform has both 'workers' and 'clusters'",
+            "each cluster has workers of its own: remove 'workers:' from the platform");
+      platform_.broken |= Field::Workers;
+    }
+    if (nodes->empty()) error(*find(platform_, Field::Clusters), "clusters is an empty list", "remove 'clusters:'");
+    std::vector<Cluster> &clusters = workload_.platform.clusters;
+    std::uint64_t workers = 0;
+    for (const Node &node : *nodes) {
+      Part part{&node, {}};
+      Cluster &cluster = clusters.emplace_back();
+      if (!check_map(node, "a cluster", names_of(kClusterFields))) {
+        platform_.broken |= Field::Clusters;
+        continue;
+      }
+      take_text(part, Field::Name, cluster.name);
+      take_count(part, Field::Workers, cluster.workers, kMaxWorkers);
+      take(part, Field::Cpus, cluster.cpus,
+           [this](const Node &value, std::string_view key) { return cpus(value, key); });
+      workers += cluster.workers;
+      if (part.broken.intersects(FieldSet(Field::Name) | Field::Workers | Field::Cpus)) {
+        platform_.broken |= Field::Clusters;
+      }
+    }
+    if (!clusters.empty()) workload_.platform.workers = static_cast<std::uint32_t>(workers);
   }
 
   void read_dag(const Node &node, Dag &dag, DagPart &part) {
@@ -174,6 +207,7 @@ class Reader : private yaml::ValueReader {
       return;
     }
     take_text(part, Field::Name, dag.name);
+    take_text(part, Field::Cluster, dag.cluster);
     Duration period = 0;
     take_positive_duration(part, Field::Period, period);
     take_positive_duration(part, Field::Deadline, dag.deadline);
@@ -414,7 +448,7 @@ class Reader : private yaml::ValueReader {
         const DagPart &dag = dags_[finding.dag.value];
         part = finding.task == Finding::kNone ? static_cast<const Part *>(&dag) : &dag.tasks[finding.task];
         unknown = part->broken;
-        if (finding.field == Field::Priority) unknown |= root_.broken;
+        if (finding.field == Field::Priority || finding.involves.intersects(Field::Clusters)) unknown |= root_.broken;
       }
       if (finding.involves.intersects(unknown)) continue;
       const Node &at = place(finding, *part);
@@ -424,11 +458,13 @@ class Reader : private yaml::ValueReader {
   }
 
   const Node &place(const Finding &finding, const Part &part) const {
-    const bool of_platform = finding.field == Field::Workers || finding.field == Field::Preemption;
+    const bool of_platform =
+        finding.field == Field::Workers || finding.field == Field::Preemption || finding.field == Field::Clusters;
     const Part &holder = of_platform && platform_.node != nullptr ? platform_ : part;
     const Node *value = holder.node->kind == Node::Kind::Map ? find(holder, finding.field) : nullptr;
     if (value == nullptr) return *part.node;
     if (finding.item == Finding::kNone) return *value;
+    if (finding.field == Field::Clusters) return value->children[finding.item];
     if (finding.field == Field::After) return *dags_[finding.dag.value].tasks[finding.task].edges[finding.item];
     if (finding.field == Field::Callback) {
       const Callback &callback = *workload_.dags[finding.dag.value].tasks[finding.task].callback;

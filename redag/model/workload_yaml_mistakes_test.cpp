@@ -102,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(
                              "w.yaml:2:7: error: the workload has no DAGs"}},
                     Mistake{"name: x\n", {"w.yaml:1:1: error: the workload has no DAGs"}},
                     Mistake{"dags: 5\n", {"w.yaml:1:7: error: dags must be a list, not '5'"}},
-                    Mistake{"dags: [3]\n", {"w.yaml:1:8: error: a DAG must be a map of name, period"}},
+                    Mistake{"dags: [3]\n", {"w.yaml:1:8: error: a DAG must be a map of name, cluster, period"}},
                     Mistake{"dags: [{name: d}]\n", {"w.yaml:1:8: error: DAG 'd' has no tasks"}},
                     Mistake{"dags: [{name: d, tasks: []}]\n", {"w.yaml:1:25: error: DAG 'd' has no tasks"}},
                     Mistake{"dags: [{tasks: [{name: t, wcet: 1ms, period: 1s}]}]\n",
@@ -125,7 +125,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Mistake{"platform: {worker: 2}\n" + tasks({"{name: t, wcet: 1ms, period: 1s}"}),
                             {"w.yaml:1:12: error: unknown key 'worker' in platform (did you mean 'workers'?)"}},
                     Mistake{"platform: 4\n" + tasks({"{name: t, wcet: 1ms, period: 1s}"}),
-                            {"w.yaml:1:11: error: platform must be a map of workers, preemption, not '4'"}},
+                            {"w.yaml:1:11: error: platform must be a map of workers, preemption, clusters, not '4'"}},
                     Mistake{"dags:\n- {name: d, tasks: [{name: t, wcet: 1ms, period: 1s}]}\n"
                             "- {name: d, tasks: [{name: t, wcet: 1ms, period: 1s}]}\n",
                             {"w.yaml:3:10: error: the name 'd' is used by another DAG"}},

@@ -345,6 +345,7 @@ TEST(Schema, HasTheKeysOfTheReader) {
   };
   expect_same_keys(schema["properties"], hint_of("xyzxyzxyz: 1"));
   expect_same_keys(schema["properties"]["platform"]["properties"], hint_of("platform: {xyzxyzxyz: 1}"));
+  expect_same_keys(schema["definitions"]["cluster"]["properties"], hint_of("platform: {clusters: [{xyzxyzxyz: 1}]}"));
   expect_same_keys(schema["definitions"]["dag"]["properties"], hint_of("dags: [{xyzxyzxyz: 1}]"));
   expect_same_keys(schema["definitions"]["task"]["properties"], hint_of("dags: [{tasks: [{xyzxyzxyz: 1}]}]"));
   expect_same_keys(schema["definitions"]["callback"]["properties"],

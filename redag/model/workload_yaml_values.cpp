@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
+#include "redag/base/cpu_list.hpp"
 #include "redag/base/nearest.hpp"
 #include "redag/model/validate.hpp"
 
@@ -129,6 +130,16 @@ std::optional<double> ValueReader::real(const Node &node, std::string_view key) 
 void ValueReader::unknown_choice(const Node &node, std::string_view key, const std::vector<std::string_view> &names) {
   wrong_type(node, key, fmt::format("one of {}", fmt::join(names, ", ")));
   if (node.kind == Node::Kind::Scalar) diagnostics_.back().hint = did_you_mean(node.text, names, "");
+}
+
+std::optional<std::vector<int>> ValueReader::cpus(const Node &node, std::string_view key) {
+  std::string list = node.text;
+  if (node.kind == Node::Kind::Sequence) {
+    for (const Node &item : node.children) list += (list.empty() ? "" : ",") + item.text;
+  }
+  std::optional<std::vector<int>> cpus = parse_cpu_list(list);
+  if (!cpus) wrong_type(node, key, "a list of processors such as 0-3 or [0, 2-5]");
+  return cpus;
 }
 
 std::optional<ExecutionTime> ValueReader::execution(const Node &node) {

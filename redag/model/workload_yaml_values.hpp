@@ -50,6 +50,8 @@ class ValueReader {
   std::optional<Duration> positive_duration(const Node &node, std::string_view key);
   /// Reads a name; see name_mistake().
   std::optional<std::string> text(const Node &node, std::string_view key);
+  /// Reads processors, ascending: a text for parse_cpu_list(), or a list of such texts.
+  std::optional<std::vector<int>> cpus(const Node &node, std::string_view key);
   std::optional<ExecutionTime> execution(const Node &node);
   std::optional<Callback> callback(const Node &node);
 

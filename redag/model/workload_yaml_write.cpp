@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
+#include "redag/base/cpu_list.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/model/yaml_writer.hpp"
@@ -147,10 +148,32 @@ void write_task(Writer &out, const Dag &dag, const Task &task, Duration dag_peri
   out.end_map();
 }
 
+void write_platform(Writer &out, const Platform &platform) {
+  out.text(to_string(Field::Platform));
+  out.begin_map(platform.clusters.empty() ? Layout::OneLine : Layout::Lines);
+  if (platform.clusters.empty()) {
+    write(out, Field::Workers, platform.workers);
+  } else {
+    out.text(to_string(Field::Clusters));
+    out.begin_list();
+    for (const Cluster &cluster : platform.clusters) {
+      out.begin_map(Layout::OneLine);
+      write(out, Field::Name, cluster.name);
+      write(out, Field::Workers, cluster.workers);
+      if (!cluster.cpus.empty()) write(out, Field::Cpus, format_cpu_list(cluster.cpus));
+      out.end_map();
+    }
+    out.end_list();
+  }
+  write(out, Field::Preemption, to_string(platform.preemption));
+  out.end_map();
+}
+
 void write_dag(Writer &out, const Dag &dag) {
   const Duration period = common_period(dag);
   out.begin_map();
   write(out, Field::Name, dag.name);
+  if (!dag.cluster.empty()) write(out, Field::Cluster, dag.cluster);
   write_duration(out, Field::Period, period);
   write_duration(out, Field::Deadline, dag.deadline);
   if (dag.max_active != 0) write(out, Field::MaxActive, dag.max_active);
@@ -170,11 +193,7 @@ std::string to_yaml(const Workload &workload) {
   Writer out;
   out.begin_map();
   if (!workload.name.empty()) write(out, Field::Name, workload.name);
-  out.text(to_string(Field::Platform));
-  out.begin_map(Layout::OneLine);
-  write(out, Field::Workers, workload.platform.workers);
-  write(out, Field::Preemption, to_string(workload.platform.preemption));
-  out.end_map();
+  write_platform(out, workload.platform);
   write(out, Field::Policy, to_string(workload.policy));
   if (workload.ties != Ties::Share) write(out, Field::Ties, to_string(workload.ties));
   out.text(to_string(Field::Dags));

@@ -5,6 +5,7 @@
 #include "redag/model/workload_yaml.hpp"
 
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -28,6 +29,20 @@ Callback arbitrary_callback(Activation activation) {
     callback.name = *rc::gen::element<std::string>("/imu/data", "*", "/a?*");
   }
   return callback;
+}
+
+/// Divides the platform. Groups become those of one cluster.
+void add_clusters(Workload &workload) {
+  std::vector<Cluster> &clusters = workload.platform.clusters;
+  clusters = {Cluster{"left", *rc::gen::inRange(1U, 9U), {}}, Cluster{"- right: 2", 1, {4}}};
+  clusters[0].cpus = *rc::gen::element(std::vector<int>{}, std::vector<int>{0}, std::vector<int>{0, 1, 3, 5, 6});
+  workload.platform.workers = clusters[0].workers + 1;
+  for (Dag &dag : workload.dags) {
+    dag.cluster = *rc::gen::element(clusters[0].name, clusters[1].name);
+    for (Task &task : dag.tasks) {
+      if (!task.group.empty()) task.group += dag.cluster;
+    }
+  }
 }
 
 /// A generated workload with every optional part drawn, too.
@@ -84,6 +99,7 @@ Workload arbitrary_workload() {
       }
     }
   }
+  if (*rc::gen::arbitrary<bool>()) add_clusters(workload);
   return workload;
 }
 

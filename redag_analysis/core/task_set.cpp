@@ -409,6 +409,11 @@ AnalysisPlatform platform_of(const sched::Config &config) {
 
 AnalysisPlatform platform_of(const Workload &workload) { return platform_of(sched::config_of(workload)); }
 
+AnalysisPlatform platform_of(AnalysisPlatform whole, const ClusterPart &part) {
+  if (part.is_cluster()) whole.workers = part.workload.platform.workers;
+  return whole;
+}
+
 sched::Config config_of(const AnalysisPlatform &platform, const Workload &workload) {
   sched::Config config = sched::config_of(workload);
   config.workers = platform.workers;
@@ -434,6 +439,7 @@ Result<TaskSet> compile(const Workload &workload, const AnalysisPlatform &platfo
   }
   Diagnostics mistakes = validate(workload);
   if (has_errors(mistakes)) return tl::unexpected<Diagnostics>(std::move(mistakes));
+  if (Result<void> one = refuse_clusters(workload, "a bound"); !one) return tl::unexpected(std::move(one.error()));
   return Compiler(workload, platform).run();
 }
 

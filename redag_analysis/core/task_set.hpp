@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
+#include "redag/model/clusters.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/config.hpp"
@@ -47,6 +48,9 @@ struct AnalysisPlatform {
 
 /// The platform on which the simulator runs the workload: `os` and `auto` mean full preemption; no overheads.
 [[nodiscard]] AnalysisPlatform platform_of(const Workload &workload);
+
+/// Returns the platform of one part of the workload, from that of the whole.
+[[nodiscard]] AnalysisPlatform platform_of(AnalysisPlatform whole, const ClusterPart &part);
 
 /// A run as the bounds see it: the workload with the policy and the ties of its scheduler, and its platform.
 struct ExecutedRun {
@@ -149,7 +153,7 @@ struct TaskSet {
 };
 
 /// Compiles a workload. Fails where validate() finds an error (set the periods of data tasks first: inherit_periods()),
-/// and for a platform without workers or with negative overheads. O(n log n + edges).
+/// and for a platform with clusters, without workers or with negative overheads. O(n log n + edges).
 [[nodiscard]] Result<TaskSet> compile(const Workload &workload, const AnalysisPlatform &platform);
 
 }  // namespace redag::analysis

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/model/clusters.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
@@ -103,7 +104,7 @@ class Reader : private PlanReader {
       return std::nullopt;
     }
     if (name.empty()) name = path.stem().string();
-    return WorkloadSource{std::move(name), std::move(loaded->workload), std::nullopt};
+    return source_of(node, std::move(name), std::move(loaded->workload));
   }
 
   std::optional<WorkloadSource> parse(const Node &node, std::string name) {
@@ -117,7 +118,16 @@ class Reader : private PlanReader {
       return std::nullopt;
     }
     if (name.empty()) name = parsed->workload.name;
-    return WorkloadSource{std::move(name), std::move(parsed->workload), std::nullopt};
+    return source_of(node, std::move(name), std::move(parsed->workload));
+  }
+
+  // The workers of a workload are a factor of the experiment.
+  std::optional<WorkloadSource> source_of(const Node &node, std::string name, Workload workload) {
+    if (const Result<void> one = refuse_clusters(workload, "an experiment"); !one) {
+      error(node, one.error().front().message, one.error().front().hint);
+      return std::nullopt;
+    }
+    return WorkloadSource{std::move(name), std::move(workload), std::nullopt};
   }
 
   std::optional<WorkloadSource> read_random(const Node &node, std::string name) {

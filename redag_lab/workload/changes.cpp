@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "redag/base/cpu_list.hpp"
+
 namespace redag::lab {
 namespace {
 
@@ -35,6 +37,15 @@ std::string degrade_text(const Degrade &degrade) {
   return "?";
 }
 
+std::string clusters_text(const Platform &platform) {
+  std::vector<std::string> texts;
+  for (const Cluster &cluster : platform.clusters) {
+    texts.push_back(fmt::format("{} ({}{}{})", cluster.name, cluster.workers, cluster.cpus.empty() ? "" : " on ",
+                                format_cpu_list(cluster.cpus)));
+  }
+  return texts.empty() ? "none" : fmt::format("{}", fmt::join(texts, ", "));
+}
+
 std::string overrun_text(const Task &task) {
   return task.overrun == Overrun::Skip ? "skip" : fmt::format("queue of {}", task.queue_depth);
 }
@@ -50,6 +61,7 @@ class Comparer {
  public:
   void compare(const Workload &a, const Workload &b) {
     add(Kind::Setting, "workers", fmt::format("{}", a.platform.workers), fmt::format("{}", b.platform.workers));
+    add(Kind::Setting, "clusters", clusters_text(a.platform), clusters_text(b.platform));
     add(Kind::Setting, "preemption", to_string(a.platform.preemption), to_string(b.platform.preemption));
     add(Kind::Setting, "policy", to_string(a.policy), to_string(b.policy));
     add(Kind::Setting, "ties", to_string(a.ties), to_string(b.ties));
@@ -83,6 +95,7 @@ class Comparer {
 
   void compare(const Dag &a, const Dag &b) {
     const std::string of = " of " + a.name;
+    add(Kind::Setting, "cluster" + of, a.cluster.empty() ? "none" : a.cluster, b.cluster.empty() ? "none" : b.cluster);
     add(Kind::Setting, "max_active" + of, bound_text(a.max_active), bound_text(b.max_active));
     add(Kind::Setting, "max_pending" + of, bound_text(a.max_pending), bound_text(b.max_pending));
     add(Kind::Demand, "deadline" + of, time_text(a.deadline), time_text(b.deadline));

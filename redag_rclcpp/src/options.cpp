@@ -13,6 +13,7 @@
 
 #include "rclcpp/exceptions.hpp"
 #include "rclcpp/logging.hpp"
+#include "redag/model/clusters.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/runtime/threads.hpp"
@@ -147,6 +148,12 @@ void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
   const std::string path = reader.text(spec, "");
   if (path.empty()) return;
   redag::Result<redag::LoadedWorkload> loaded = redag::load_workload(path, {.wcet_optional = true});
+  if (loaded) {
+    // A process has one executor, whose processors are those of `cpu_affinity`.
+    if (auto one = redag::refuse_clusters(loaded->workload, "the ROS 2 executor"); !one) {
+      loaded = tl::unexpected(std::move(one.error()));
+    }
+  }
   if (!loaded) {
     throw rclcpp::exceptions::InvalidParameterValueException(
         fmt::format("parameter 'config' is {}:\n{}", path, to_string(loaded.error())));

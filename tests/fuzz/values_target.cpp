@@ -1,12 +1,14 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "redag/base/check.hpp"
+#include "redag/base/cpu_list.hpp"
 #include "redag/base/time.hpp"
 #include "redag/model/callback_match.hpp"
-#include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/experiment/acceptance_plan.hpp"
 #include "tests/fuzz/targets.hpp"
 
@@ -18,7 +20,9 @@ void values_target(std::string_view input) {
     REDAG_CHECK(again && *again == *duration, "a duration is read as it was written");
     (void)humanize_duration(*duration);
   }
-  (void)cli::parse_cpu_list(input);
+  if (const std::optional<std::vector<int>> cpus = parse_cpu_list(input)) {
+    REDAG_CHECK(parse_cpu_list(format_cpu_list(*cpus)) == cpus, "a list of processors is read as it was written");
+  }
   (void)experiment::parse_utilization(input);
   (void)ros_name_mistake(input);
   const std::size_t half = input.size() / 2;

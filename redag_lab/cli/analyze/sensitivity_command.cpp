@@ -103,7 +103,7 @@ std::string search(Sensitivity &sensitivity, const std::vector<lab::Knob> &knobs
 }
 
 int sensitivity_of_file(const Options &options, Console &console) {
-  const std::optional<Workload> workload = load_configured(options.analysis.run, console);
+  const std::optional<Workload> workload = load_without_clusters(options.analysis.run, "sensitivity", console);
   if (!workload) return kExitBad;
   const InterruptGuard guard;  // covers writing the results too
   AnalysisWatch watch(options.analysis, console);

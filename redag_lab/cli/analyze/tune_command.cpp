@@ -119,7 +119,7 @@ int tune_file(const Options &options, Console &console) {
       !parse_caps(options.caps, tuning.options.freedom, console)) {
     return kExitBad;
   }
-  const std::optional<Workload> workload = load_configured(options.run, console);
+  const std::optional<Workload> workload = load_without_clusters(options.run, "tune", console);
   if (!workload) return kExitBad;
   if (!options.output.empty()) {
     if (const Result<void> writable = check_output(options.output); !writable) {

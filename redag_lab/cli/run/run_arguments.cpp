@@ -7,8 +7,10 @@
 
 #include <algorithm>
 
+#include "redag/base/cpu_list.hpp"
 #include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
+#include "redag/model/clusters.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/runtime/threads.hpp"
@@ -107,8 +109,8 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments) {
       ->group(group);
 }
 
-std::optional<Workload> load_configured(const RunArguments &arguments, Console &console) {
-  Result<LoadedWorkload> loaded = load_input(arguments.file);
+std::optional<Workload> load_configured(const RunArguments &arguments, Console &console, LoadOptions options) {
+  Result<LoadedWorkload> loaded = load_input(arguments.file, options);
   if (!loaded) {
     console.note(loaded.error());
     return std::nullopt;
@@ -120,14 +122,29 @@ std::optional<Workload> load_configured(const RunArguments &arguments, Console &
   if (arguments.policy) workload.policy = *arguments.policy;
   if (arguments.ties) workload.ties = *arguments.ties;
   if (arguments.preemption) workload.platform.preemption = *arguments.preemption;
+  if (arguments.workers > 0 && !workload.platform.clusters.empty()) {
+    console.error("--workers: the platform has clusters, each with workers of its own",
+                  "change 'workers:' of the clusters in the file");
+    return std::nullopt;
+  }
   if (arguments.workers > 0) workload.platform.workers = arguments.workers;
   // The file was valid. Mistakes found now come from the command line and have no line number.
-  const Diagnostics mistakes = validate(workload);
+  const Diagnostics mistakes = validate(workload, options);
   if (!has_errors(mistakes)) return workload;
   for (const Diagnostic &mistake : mistakes) {
     if (mistake.severity == Severity::Error) console.note(mistake);
   }
   return std::nullopt;
+}
+
+std::optional<Workload> load_without_clusters(const RunArguments &arguments, const char *command, Console &console) {
+  std::optional<Workload> workload = load_configured(arguments, console);
+  if (!workload) return std::nullopt;
+  if (const Result<void> one = refuse_clusters(*workload, command); !one) {
+    console.note(one.error());
+    return std::nullopt;
+  }
+  return workload;
 }
 
 bool takes_arguments(const std::vector<lab::Variant> &variants, const RunArguments &arguments, Console &console) {

@@ -14,6 +14,7 @@
 #include "redag/base/time.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
+#include "redag/model/workload_yaml.hpp"
 #include "redag_lab/cli/terminal/console.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 #include "redag_lab/run/session.hpp"
@@ -61,7 +62,11 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments);
 
 /// Returns the workload of `arguments.file` with the changes of the command line, and prints warnings and errors.
 /// Returns nothing if the workload cannot be run.
-[[nodiscard]] std::optional<Workload> load_configured(const RunArguments &arguments, Console &console);
+[[nodiscard]] std::optional<Workload> load_configured(const RunArguments &arguments, Console &console,
+                                                      LoadOptions options = {});
+/// The same for a command that cannot use a workload with clusters.
+[[nodiscard]] std::optional<Workload> load_without_clusters(const RunArguments &arguments, const char *command,
+                                                            Console &console);
 
 /// Returns false, with an error, if the command line requests a mode, a policy or workers that none of the executors
 /// takes.

@@ -15,17 +15,6 @@
 namespace redag::cli {
 namespace {
 
-constexpr int kMaxCpu = 4095;  // above the limit of today's Linux
-
-// Parses a number at the start of `text` and removes it from there.
-std::optional<int> take_number(std::string_view &text) {
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || value < 0 || value > kMaxCpu) return std::nullopt;
-  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
-  return value;
-}
-
 template <class Number>
 Number parse_number(const std::string &name, const std::string &text, Range<Number> range) {
   Number value{};
@@ -111,28 +100,6 @@ CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, 
 
 std::uint32_t parse_count(const std::string &name, const std::string &text, Range<std::uint32_t> range) {
   return parse_number(name, text, range);
-}
-
-std::optional<std::vector<int>> parse_cpu_list(std::string_view text) {
-  std::vector<int> cpus;
-  while (true) {
-    const std::optional<int> first = take_number(text);
-    if (!first) return std::nullopt;
-    int last = *first;
-    if (!text.empty() && text.front() == '-') {
-      text.remove_prefix(1);
-      const std::optional<int> given = take_number(text);
-      if (!given || *given < *first) return std::nullopt;
-      last = *given;
-    }
-    for (int cpu = *first; cpu <= last; ++cpu) cpus.push_back(cpu);
-    if (text.empty()) break;
-    if (text.front() != ',') return std::nullopt;
-    text.remove_prefix(1);
-  }
-  std::sort(cpus.begin(), cpus.end());
-  cpus.erase(std::unique(cpus.begin(), cpus.end()), cpus.end());
-  return cpus;
 }
 
 const Choices<PolicyKind> &policy_choices() {

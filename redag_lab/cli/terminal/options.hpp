@@ -73,9 +73,6 @@ CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, 
 /// Parses a number such as "3" within `range`; throws as reject() does.
 [[nodiscard]] std::uint32_t parse_count(const std::string &name, const std::string &text, Range<std::uint32_t> range);
 
-/// Parses "0,2-5" into {0, 2, 3, 4, 5}.
-[[nodiscard]] std::optional<std::vector<int>> parse_cpu_list(std::string_view text);
-
 /// Adds an option with a list of choices, which the help shows. `Target` is Value or std::optional<Value>.
 template <class Value, class Target>
 CLI::Option *add_choice(CLI::App &app, const std::string &name, Target &target, const Choices<Value> &choices,

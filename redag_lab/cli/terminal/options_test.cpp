@@ -11,20 +11,6 @@
 namespace redag::cli {
 namespace {
 
-using Cpus = std::vector<int>;
-
-TEST(CpuList, ReadsNumbersAndRanges) {
-  EXPECT_EQ(parse_cpu_list("3"), Cpus({3}));
-  EXPECT_EQ(parse_cpu_list("4,0-2"), Cpus({0, 1, 2, 4}));
-  EXPECT_EQ(parse_cpu_list("1,1-1,0-1"), Cpus({0, 1}));
-}
-
-TEST(CpuList, RejectsEverythingElse) {
-  for (const char *text : {"", ",", "1,", "-1", "2-1", "a", "1 2", "1-", "99999999999", "5000", "0x1"}) {
-    EXPECT_EQ(parse_cpu_list(text), std::nullopt) << text;
-  }
-}
-
 TEST(Suggestion, NamesTheNearestOrAll) {
   EXPECT_EQ(suggestion("simualte", {"simulate", "run"}), "did you mean 'simulate'?");
   EXPECT_EQ(suggestion("xyz", {"simulate", "run"}), "one of simulate, run");

@@ -21,6 +21,7 @@
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
+#include "redag/model/clusters.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/summary.hpp"
@@ -437,6 +438,10 @@ int run(const std::vector<std::string> &words, int argc, char **argv) {
   const redag::Result<redag::LoadedWorkload> loaded = redag::load_workload(arguments->file);
   if (!loaded) {
     note(loaded.error());
+    return kExitBad;
+  }
+  if (const redag::Result<void> one = redag::refuse_clusters(loaded->workload, "run_workload"); !one) {
+    note(one.error());
     return kExitBad;
   }
   if (!arguments->folder.empty()) {
