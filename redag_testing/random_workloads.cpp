@@ -176,6 +176,23 @@ Workload contended(Rng &rng, bool overload) {
   return workload;
 }
 
+void divide(Rng &rng, Workload &workload) {
+  std::vector<Cluster> &clusters = workload.platform.clusters;
+  clusters.resize(between(rng, 1, 3));
+  workload.platform.workers = 0;
+  for (std::size_t c = 0; c < clusters.size(); ++c) {
+    clusters[c].name = fmt::format("c{}", c);
+    clusters[c].workers = between(rng, 1, 3);
+    workload.platform.workers += clusters[c].workers;
+  }
+  for (Dag &dag : workload.dags) {
+    dag.cluster = clusters[between(rng, 0, static_cast<std::uint32_t>(clusters.size() - 1))].name;
+    for (Task &task : dag.tasks) {
+      if (!task.group.empty()) task.group += dag.cluster;
+    }
+  }
+}
+
 sched::Config random_config(Rng &rng, PolicyKind policy, sched::Preemption preemption, std::size_t task_count) {
   sched::Config config;
   config.workers = between(rng, 1, 3);

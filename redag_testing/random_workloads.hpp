@@ -41,6 +41,10 @@ struct RandomWorkloadLimits {
 /// with `overload` also wcet_low, degradation, and budgets that do not abort.
 [[nodiscard]] Workload contended(Rng &rng, bool overload = true);
 
+/// Divides the platform into one to three clusters of one to three workers, and the DAGs among them. A group becomes
+/// one of its cluster.
+void divide(Rng &rng, Workload &workload);
+
 /// Draws 1 to 3 workers. Full preemption with a static policy has limited levels or threads every other time.
 [[nodiscard]] sched::Config random_config(Rng &rng, PolicyKind policy, sched::Preemption preemption,
                                           std::size_t task_count);

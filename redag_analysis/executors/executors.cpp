@@ -7,7 +7,9 @@
 #include <array>
 
 #include "redag/base/check.hpp"
+#include "redag/sched/cluster_config.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_analysis/executors/clustered.hpp"
 #include "redag_analysis/executors/events.hpp"
 #include "redag_analysis/executors/wait_set.hpp"
 
@@ -47,6 +49,11 @@ std::unique_ptr<sched::Scheduler> make_scheduler(std::string_view name, const Wo
                                                  const sched::Config &config) {
   const ExecutorKind *kind = find_executor(name);
   REDAG_CHECK(kind != nullptr, "there is no executor of this name");
+  if (!workload.platform.clusters.empty()) {
+    return std::make_unique<ClusteredScheduler>(workload, [&](const ClusterPart &part) {
+      return make_scheduler(name, part.workload, sched::config_of(config, part));
+    });
+  }
   const sched::Config effective = effective_config(*kind, config);
   if (name == "redag") return std::make_unique<sched::PriorityScheduler>(workload, effective);
   if (name == "events") {

@@ -30,7 +30,8 @@ struct ExecutorKind {
 /// bound on threads, and some have one worker.
 [[nodiscard]] sched::Config effective_config(const ExecutorKind &kind, sched::Config config);
 
-/// Creates a scheduler for effective_config(). Requires a known name and what PriorityScheduler requires.
+/// Creates a scheduler for effective_config(), with clusters one for each of them. Requires a known name and what
+/// PriorityScheduler requires.
 [[nodiscard]] std::unique_ptr<sched::Scheduler> make_scheduler(std::string_view name, const Workload &workload,
                                                                const sched::Config &config);
 

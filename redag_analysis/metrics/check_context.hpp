@@ -6,7 +6,9 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "redag/model/demand.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/check_report.hpp"
 #include "redag_analysis/metrics/replay.hpp"
@@ -15,8 +17,10 @@ namespace redag::metrics {
 
 class CheckContext {
  public:
-  CheckContext(const trace::RunInfo &run, const Replay &state, const RuleSet &rules, CheckReport &out)
-      : info(run), replay(state), rules_(rules), report_(out) {}
+  /// `run` is the run as the cluster saw it; `ids` has its tasks' ids in the whole workload.
+  CheckContext(const trace::RunInfo &run, const std::vector<TaskId> &ids, const Replay &state, const RuleSet &rules,
+               CheckReport &out)
+      : info(run), replay(state), ids_(ids), rules_(rules), report_(out) {}
 
   const trace::RunInfo &info;
   const Replay &replay;
@@ -37,6 +41,11 @@ class CheckContext {
     if (!holds) report(rule, job_name(task, number), explain());
   }
 
+  /// The simulated execution time of a job.
+  [[nodiscard]] Duration demand_of(TaskId task, std::uint32_t number) const {
+    return execution_time(replay.task(task), ids_[task.value], number, info.seed);
+  }
+
   [[nodiscard]] std::string job_name(TaskId task, std::uint32_t number) const {
     return trace::task_name(info.workload, task) + "#" + std::to_string(number);
   }
@@ -49,6 +58,7 @@ class CheckContext {
     report_.violations.push_back(Violation{rule, time_, event_, std::move(job), std::move(text)});
   }
 
+  const std::vector<TaskId> &ids_;
   RuleSet rules_;
   CheckReport &report_;
   std::size_t event_ = 0;

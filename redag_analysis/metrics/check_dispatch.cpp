@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "redag/model/demand.hpp"
-
 namespace redag::metrics {
 
 using sched::Preemption;
@@ -183,7 +181,7 @@ void DispatchRules::ended(const JobEvent &event, const LiveJob &job) {
   check_order_of_ends(event);
   if (context_.info.driver != trace::Driver::Simulator || job.state != State::Running) return;
   const Task &task = context_.replay.task(event.task);
-  const Duration demand = execution_time(task, event.task, event.job, context_.info.seed);
+  const Duration demand = context_.demand_of(event.task, event.job);
   const bool cut_off = event.kind == JobEventKind::Aborted && event.reason == Reason::Budget;
   if (event.kind == JobEventKind::Aborted && !cut_off) return;
   context_.expect(Rule::Execution,
@@ -233,7 +231,7 @@ void DispatchRules::end_of_trace() {
     const LiveJob *job = context_.replay.running(w);
     if (job == nullptr) continue;
     const Task &task = context_.replay.task(job->task);
-    Duration demand = execution_time(task, job->task, job->number, context_.info.seed);
+    Duration demand = context_.demand_of(job->task, job->number);
     if (task.budget > 0 && task.on_budget == OnBudget::Abort) demand = std::min(demand, task.budget);
     const Duration executed = job->executed + (context_.info.end - job->on_worker_since);
     context_.expect(Rule::Execution, executed < demand, job->task, job->number,

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "redag/model/clusters.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/miss.hpp"
@@ -143,8 +144,13 @@ class PerfettoWriter::Impl {
 
   void write_names() {
     write_name("process_name", kWorkersProcess, 0, "workers (" + run_.executor + ", " + run_.preemption + ")");
+    std::vector<std::string> names;
+    for (const ClusterPart &part : parts_of(run_.workload)) {
+      if (part.is_cluster()) names.resize(part.first_worker + part.workload.platform.workers, " of " + part.name);
+    }
+    names.resize(run_.config.workers);
     for (std::uint32_t w = 0; w < run_.config.workers; ++w) {
-      write_name("thread_name", kWorkersProcess, w, "worker " + std::to_string(w));
+      write_name("thread_name", kWorkersProcess, w, "worker " + std::to_string(w) + names[w]);
     }
     for (std::size_t d = 0; d < run_.workload.dags.size(); ++d) {
       const int process = kFirstDagProcess + static_cast<int>(d);

@@ -5,6 +5,8 @@
 
 #include <limits>
 
+#include "redag/model/clusters.hpp"
+#include "redag/sched/cluster_config.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/check_context.hpp"
 #include "redag_analysis/metrics/check_dispatch.hpp"
@@ -16,30 +18,46 @@
 namespace redag::metrics {
 namespace {
 
+// Checks what one cluster did. The rules know the cluster's part only, with its ids.
 class Checker {
  public:
-  Checker(const trace::Trace &trace, const RuleSet &rules)
+  /// `info` is that of the run with the part's workload and config.
+  Checker(const trace::Trace &trace, const trace::RunInfo &info, const ClusterPart &part, const RuleSet &rules,
+          CheckReport &report)
       : trace_(trace),
-        replay_(trace.info.workload, trace.info.config),
-        context_(trace.info, replay_, rules, report_),
+        part_(part),
+        replay_(info.workload, info.config),
+        context_(info, part.tasks, replay_, rules, report),
         releases_(context_),
         decisions_(context_),
         overload_(context_),
         starts_(context_),
-        counts_(trace.info.workload.task_count()) {}
+        counts_(info.workload.task_count()) {}
 
-  CheckReport run() {
-    context_.expect(Rule::Stream, trace_.info.lost_events == 0, TaskId(), 0, [&] {
-      return std::to_string(trace_.info.lost_events) + " events were lost: the trace has holes and cannot be checked";
-    });
-    if (trace_.info.lost_events > 0) return std::move(report_);
-    for (std::size_t i = 0; i < trace_.events.size(); ++i) step(i, trace_.events[i]);
+  /// `places` are those of all tasks, and `own` is the index of the part. The first part also checks the stream.
+  void run(const std::vector<TaskPlace> &places, std::uint32_t own) {
+    const bool is_first = own == 0;
+    if (is_first) {
+      context_.expect(Rule::Stream, trace_.info.lost_events == 0, TaskId(), 0, [&] {
+        return std::to_string(trace_.info.lost_events) + " events were lost: the trace has holes and cannot be checked";
+      });
+    }
+    if (trace_.info.lost_events > 0) return;
+    for (std::size_t i = 0; i < trace_.events.size(); ++i) {
+      JobEvent event = trace_.events[i];
+      const bool known = event.task.value < places.size();
+      if (known ? places[event.task.value].part == own : is_first) {
+        if (known) event.task = places[event.task.value].task;
+        step(i, event, is_first);
+      } else if (is_first) {
+        check_time(i, event);
+      }
+    }
     end_of_instant();
     releases_.end_of_trace();
     decisions_.end_of_trace();
     starts_.end_of_trace();
     check_conservation();
-    return std::move(report_);
   }
 
  private:
@@ -48,17 +66,33 @@ class Checker {
     std::uint64_t ended = 0;
   };
 
-  void step(std::size_t index, const JobEvent &event) {
+  // Checks that time does not go backwards in the whole stream.
+  void check_time(std::size_t index, const JobEvent &event) {
+    if (is_of_body(event.kind)) return;
+    context_.at(index, event.time);
+    context_.expect(Rule::Stream, event.time >= stream_time_, event.task, event.job,
+                    [&] { return "the time goes backwards from " + format_duration(stream_time_); });
+    stream_time_ = std::max(stream_time_, event.time);
+  }
+
+  // Renumbers the event's worker as the cluster does. Returns false for a worker of another cluster.
+  bool take_worker(JobEvent &event) const {
+    if (event.worker == WorkerId::kNoneValue) return true;
+    const std::uint32_t worker = event.worker - part_.first_worker;
+    const bool is_own = event.worker >= part_.first_worker && worker < replay_.worker_count();
+    event.worker = is_own ? worker : replay_.worker_count();
+    return is_own || !part_.is_cluster();
+  }
+
+  void step(std::size_t index, JobEvent event, bool checks_time) {
     const bool known = event.task.value < counts_.size();
     if (!is_of_body(event.kind)) {
       if (event.time > time_) end_of_instant();
-      context_.at(index, event.time);
-      context_.expect(Rule::Stream, event.time >= time_, event.task, event.job,
-                      [&] { return "the time goes backwards from " + format_duration(time_); });
       time_ = std::max(time_, event.time);
-    } else {
-      context_.at(index, event.time);
     }
+    context_.at(index, event.time);
+    if (checks_time) check_time(index, event);
+    const bool own_worker = take_worker(event);
     context_.expect(Rule::Stream, known, event.task, event.job, [] { return std::string("there is no such task"); });
     if (!known) return;
 
@@ -74,8 +108,10 @@ class Checker {
     }
     const char *problem = replay_.apply(event);
     const bool about_worker = event.kind == JobEventKind::Dispatched || event.kind == JobEventKind::Resumed;
-    context_.expect(about_worker ? Rule::Worker : Rule::Life, problem == nullptr, event.task, event.job,
-                    [&] { return std::string(to_string(event.kind)) + ": " + problem; });
+    context_.expect(about_worker ? Rule::Worker : Rule::Life, problem == nullptr, event.task, event.job, [&] {
+      return std::string(to_string(event.kind)) + ": " +
+             (own_worker ? problem : "the worker belongs to another cluster");
+    });
   }
 
   void end_of_instant() {
@@ -95,7 +131,7 @@ class Checker {
   }
 
   const trace::Trace &trace_;
-  CheckReport report_;
+  const ClusterPart &part_;
   Replay replay_;
   CheckContext context_;
   ReleaseRules releases_;
@@ -104,6 +140,7 @@ class Checker {
   StartRules starts_;
   std::vector<Counts> counts_;
   Time time_ = std::numeric_limits<Time>::min();
+  Time stream_time_ = std::numeric_limits<Time>::min();  // of all clusters
 };
 
 bool is_peer(const std::string &executor) {
@@ -124,6 +161,17 @@ RuleSet rules_for(const trace::RunInfo &info) {
   return RuleSet::all();
 }
 
-CheckReport check_trace(const trace::Trace &trace, const RuleSet &rules) { return Checker(trace, rules).run(); }
+CheckReport check_trace(const trace::Trace &trace, const RuleSet &rules) {
+  CheckReport report;
+  const std::vector<ClusterPart> parts = parts_of(trace.info.workload);
+  const std::vector<TaskPlace> places = places_in(parts);
+  for (std::uint32_t p = 0; p < parts.size(); ++p) {
+    trace::RunInfo info = trace.info;
+    info.workload = parts[p].workload;
+    info.config = sched::config_of(info.config, parts[p]);
+    Checker(trace, info, parts[p], rules, report).run(places, p);
+  }
+  return report;
+}
 
 }  // namespace redag::metrics

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 
+#include "redag/model/clusters.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/metrics/assumptions.hpp"
@@ -20,11 +21,14 @@ constexpr std::size_t kMostTasks = 1000;
 std::string describe(const analysis::AnalysisPlatform &platform, const trace::RunInfo &run) {
   const bool is_real = run.driver != trace::Driver::Simulator;
   const std::string none = is_real ? metrics::not_calibrated_hint() : "no overheads";
-  return fmt::format("{} worker{}, {} preemption, {}", platform.workers, platform.workers == 1 ? "" : "s",
-                     trace::preemption_name(platform.preemption),
-                     run.overheads.empty() ? none
-                     : is_real             ? "charged with the machine's overheads"
-                                           : "charged with overheads " + run.overheads);
+  const std::size_t clusters = run.workload.platform.clusters.size();
+  return fmt::format(
+      "{} worker{}{}, {} preemption, {}", platform.workers, platform.workers == 1 ? "" : "s",
+      clusters == 0 ? std::string() : fmt::format(" in {} cluster{}", clusters, clusters == 1 ? "" : "s"),
+      trace::preemption_name(platform.preemption),
+      run.overheads.empty() ? none
+      : is_real             ? "charged with the machine's overheads"
+                            : "charged with overheads " + run.overheads);
 }
 
 RunBounds none(std::string why) {
@@ -33,13 +37,13 @@ RunBounds none(std::string why) {
   return bounds;
 }
 
-std::vector<BoundOf> by_id(const std::vector<analysis::Tightest> &all) {
-  std::vector<BoundOf> bounds;
-  bounds.reserve(all.size());
-  for (const analysis::Tightest &one : all) {
-    bounds.push_back({one.response, one.response ? std::string(one.method->name) : std::string()});
+// Writes the bounds of one cluster to the places that `ids` name.
+template <class Id>
+void take(const std::vector<analysis::Tightest> &all, const std::vector<Id> &ids, std::vector<BoundOf> &bounds) {
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const analysis::Tightest &one = all[i];
+    bounds[ids[i].value] = {one.response, one.response ? std::string(one.method->name) : std::string()};
   }
-  return bounds;
 }
 
 }  // namespace
@@ -53,21 +57,32 @@ RunBounds bounds_of(const trace::RunInfo &run) {
   }
   const auto executed = analysis::as_executed(run.workload, run.config, run.overheads);
   if (!executed) return none(executed.error().front().message);
-  const auto task_set = analysis::compile_for(*executor, executed->workload, executed->platform);
-  if (!task_set) return none(task_set.error().front().message);
-
-  const analysis::Report report = analysis::analyze(*task_set, analysis::methods_of(*executor));
   RunBounds bounds;
   bounds.assumes = describe(executed->platform, run);
-  bounds.tasks = by_id(report.tasks);
-  bounds.dags = by_id(report.dags);
-  bounds.schedulable = report.verdict == analysis::Verdict::Schedulable;
-  for (const analysis::Method *method : report.by) bounds.by.emplace_back(method->name);
+  bounds.tasks.resize(run.workload.task_count());
+  bounds.dags.resize(run.workload.dags.size());
+  bounds.schedulable = true;
+  std::string not_analysable;
+  for (const ClusterPart &part : parts_of(executed->workload)) {
+    if (part.dags.empty()) continue;
+    const auto task_set =
+        analysis::compile_for(*executor, part.workload, analysis::platform_of(executed->platform, part));
+    if (!task_set) return none(task_set.error().front().message);
+    const analysis::Report report = analysis::analyze(*task_set, analysis::methods_of(*executor));
+    take(report.tasks, part.tasks, bounds.tasks);
+    take(report.dags, part.dags, bounds.dags);
+    bounds.schedulable = bounds.schedulable && report.verdict == analysis::Verdict::Schedulable;
+    for (const analysis::Method *method : report.by) {
+      if (std::find(bounds.by.begin(), bounds.by.end(), method->name) == bounds.by.end()) {
+        bounds.by.emplace_back(method->name);
+      }
+    }
+    if (not_analysable.empty()) not_analysable = task_set->not_analysable;
+  }
   const auto bounded = [](const BoundOf &bound) { return bound.response.has_value(); };
   if (!bounds.schedulable && std::none_of(bounds.tasks.begin(), bounds.tasks.end(), bounded)) {
-    bounds.absent = task_set->not_analysable.empty()
-                        ? "no sound method bounds a response time here; 'redag analyze' shows why"
-                        : task_set->not_analysable;
+    bounds.absent = not_analysable.empty() ? "no sound method bounds a response time here; 'redag analyze' shows why"
+                                           : not_analysable;
   }
   return bounds;
 }

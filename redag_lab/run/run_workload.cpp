@@ -11,6 +11,7 @@
 
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
+#include "redag/model/clusters.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
@@ -59,6 +60,7 @@ class Run {
     Diagnostics mistakes = validate(workload_);
     std::erase_if(mistakes, [](const Diagnostic &mistake) { return mistake.severity != Severity::Error; });
     if (!mistakes.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes));
+    if (Result<void> one = refuse_clusters(workload_, "a run on threads"); !one) return one;
     const bool preemptive = kind == nullptr || kind->ours;
     const auto wanted = options_.preemption.value_or(workload_.platform.preemption);
     Result<runtime::Setup> setup = runtime::set_up({.preemption = preemptive ? wanted : PreemptionMode::None,

@@ -11,7 +11,9 @@
 #include <memory>
 #include <span>
 
+#include "redag/model/clusters.hpp"
 #include "redag/runtime/threads.hpp"
+#include "redag/sched/cluster_config.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/executors/executors.hpp"
@@ -36,6 +38,7 @@ trace::RunInfo describe_simulation(const Workload &workload, const Variant &vari
   info.workload = workload;
   info.executor = variant.executor;
   info.config = executors::effective_config(*executors::find_executor(variant.executor), sched::config_of(workload));
+  info.config.workers = workload.platform.workers;  // configure() set those that the executor uses
   info.preemption = mode_name(info.config.preemption);
   const PreemptionMode wanted = workload.platform.preemption;
   if (wanted == PreemptionMode::Os || wanted == PreemptionMode::Auto) {
@@ -156,10 +159,15 @@ std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant
   Workload configured = workload;
   for (Dag &dag : configured.dags) inherit_periods(dag);
   const executors::ExecutorKind &executor = *executors::find_executor(variant.executor);
-  const Result<analysis::TaskSet> task_set = analysis::compile_for(executor, configured, analysis::platform_of(config));
-  if (!task_set || !task_set->not_analysable.empty()) return bounds;
-  const analysis::Report report = analysis::analyze(*task_set, analysis::methods_of(executor));
-  for (std::size_t t = 0; t < bounds.size(); ++t) bounds[t] = report.tasks[t].response.value_or(0);
+  for (const ClusterPart &part : parts_of(configured)) {
+    const analysis::AnalysisPlatform platform = analysis::platform_of(sched::config_of(config, part));
+    const Result<analysis::TaskSet> task_set = analysis::compile_for(executor, part.workload, platform);
+    if (!task_set || !task_set->not_analysable.empty()) continue;
+    const analysis::Report report = analysis::analyze(*task_set, analysis::methods_of(executor));
+    for (std::size_t t = 0; t < part.tasks.size(); ++t) {
+      bounds[part.tasks[t].value] = report.tasks[t].response.value_or(0);
+    }
+  }
   return bounds;
 }
 

@@ -8,7 +8,6 @@
 #include "redag/base/check.hpp"
 #include "redag/base/nearest.hpp"
 #include "redag/base/text.hpp"
-#include "redag/model/clusters.hpp"
 #include "redag/model/validate.hpp"
 #include "redag_analysis/executors/executors.hpp"
 
@@ -63,10 +62,14 @@ Result<std::vector<Variant>> parse_variants(std::string_view list) {
 Result<Workload> configure(const Workload &workload, const Variant &variant) {
   const executors::ExecutorKind *kind = executors::find_executor(variant.executor);
   REDAG_CHECK(kind != nullptr, "an executor that variant_names() lists is unknown");
-  if (Result<void> one = refuse_clusters(workload, variant.name); !one) return tl::unexpected(std::move(one.error()));
   Workload configured = workload;
   if (variant.preemption) configured.platform.preemption = *variant.preemption;
-  if (kind->single_worker) configured.platform.workers = 1;
+  if (kind->single_worker) {
+    // One instance of the executor serves each cluster.
+    std::vector<Cluster> &clusters = configured.platform.clusters;
+    for (Cluster &cluster : clusters) cluster.workers = 1;
+    configured.platform.workers = static_cast<std::uint32_t>(std::max<std::size_t>(1, clusters.size()));
+  }
   Diagnostics mistakes = validate(configured);
   std::erase_if(mistakes, [](const Diagnostic &mistake) { return mistake.severity != Severity::Error; });
   if (mistakes.empty()) return configured;

@@ -124,6 +124,27 @@ Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatf
   return Analysed{workload, kind, *std::move(task_set), std::move(report), std::move(exploration)};
 }
 
+Result<std::vector<AnalysedPart>> analyse_parts(const Workload &workload, const analysis::AnalysisPlatform &platform,
+                                                const analysis::ExplorationOptions *explore,
+                                                const std::string &executor, const analysis::AnalyzeOptions &limits,
+                                                const std::vector<std::string> &only) {
+  std::vector<AnalysedPart> all;
+  for (ClusterPart &part : parts_of(workload)) {
+    if (part.is_cluster() && part.dags.empty()) continue;
+    Result<Analysed> analysed =
+        analyse(part.workload, analysis::platform_of(platform, part), explore, executor, limits, only);
+    if (!analysed) return tl::unexpected<Diagnostics>(std::move(analysed.error()));
+    all.push_back(AnalysedPart{std::move(part), *std::move(analysed)});
+  }
+  return all;
+}
+
+bool is_schedulable(const std::vector<AnalysedPart> &parts) {
+  return std::all_of(parts.begin(), parts.end(), [](const AnalysedPart &part) {
+    return part.analysed.report.verdict == analysis::Verdict::Schedulable;
+  });
+}
+
 std::vector<analysis::Term> terms_of(const Analysed &analysed, const Row &row) {
   if (!row.tightest.bound.terms.empty()) return row.tightest.bound.terms;
   if (row.task.valid()) return itemised(analysed.task_set, row.tightest, row.task).terms;

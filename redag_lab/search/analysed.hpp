@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "redag/model/clusters.hpp"
 #include "redag/model/workload.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/analyze/executors.hpp"
@@ -37,6 +38,23 @@ inline constexpr std::size_t kMostItemised = 128;
                                        const std::string &executor = "redag",
                                        const analysis::AnalyzeOptions &limits = {},
                                        const std::vector<std::string> &only = {});
+
+struct AnalysedPart {
+  ClusterPart part;
+  Analysed analysed;  // of part.workload
+};
+
+/// Analyses each cluster that serves a DAG on its own workers, with the arguments of analyse(). A workload without
+/// clusters is one part. `platform` is that of all clusters together.
+[[nodiscard]] Result<std::vector<AnalysedPart>> analyse_parts(const Workload &workload,
+                                                              const analysis::AnalysisPlatform &platform,
+                                                              const analysis::ExplorationOptions *explore = nullptr,
+                                                              const std::string &executor = "redag",
+                                                              const analysis::AnalyzeOptions &limits = {},
+                                                              const std::vector<std::string> &only = {});
+
+/// True if every deadline of every part is shown to be met.
+[[nodiscard]] bool is_schedulable(const std::vector<AnalysedPart> &parts);
 
 enum class Standing : std::uint8_t {
   Ok,          // a sound method shows that the deadline is met

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/analyze/analysis_arguments.hpp"
@@ -47,52 +48,109 @@ const Choices<std::string> &executor_choices() {
 constexpr std::uint64_t kUsualStates = 1'000'000;
 constexpr std::uint64_t kMostEffort = 1'000'000'000;
 
-// Finds the requested chains. Returns nothing, with an error on the console, if a task is unknown.
-std::optional<std::vector<ChainRow>> find_chains(const lab::Analysed &analysed, const Options &options,
-                                                 Console &console) {
-  std::vector<ChainRow> rows;
-  for (const std::string &chain : options.chains) {
-    Result<ChainRow> row = find_chain(analysed, chain);
-    if (!row) {
-      console.error("--chain: " + row.error().front().message, row.error().front().hint);
-      return std::nullopt;
-    }
-    rows.push_back(*std::move(row));
+using Parts = std::vector<lab::AnalysedPart>;
+
+// What the command line asks of one part.
+struct Asked {
+  std::vector<ChainRow> chains;
+  std::optional<lab::Row> row;  // of --explain
+};
+
+// Calls `find` for each part until one has it. Returns nothing, with the first part's error on the console, if none
+// has.
+template <class Find>
+bool find_in(const Parts &parts, const char *option, Console &console, Find find) {
+  std::optional<Diagnostic> first;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    const Result<void> found = find(p);
+    if (found) return true;
+    if (!first) first = found.error().front();
   }
-  return rows;
+  console.error(fmt::format("{}: {}", option, first->message), first->hint);
+  return false;
+}
+
+// Finds what is asked of each part. Returns nothing, with an error on the console, if a task is unknown.
+std::optional<std::vector<Asked>> find_asked(const Parts &parts, const Options &options, Console &console) {
+  std::vector<Asked> asked(parts.size());
+  for (const std::string &chain : options.chains) {
+    const auto find = [&](std::size_t p) {
+      return find_chain(parts[p].analysed, chain).map([&](ChainRow row) { asked[p].chains.push_back(std::move(row)); });
+    };
+    if (!find_in(parts, "--chain", console, find)) return std::nullopt;
+  }
+  const auto find = [&](std::size_t p) {
+    return find_row(parts[p].analysed, options.explain).map([&](lab::Row row) { asked[p].row = std::move(row); });
+  };
+  if (!options.explain.empty() && !find_in(parts, "--explain", console, find)) return std::nullopt;
+  return asked;
+}
+
+// A line for each cluster before what is said of it; empty for a workload without clusters.
+std::string heading(const ClusterPart &part, const StreamTraits &terminal) {
+  if (!part.is_cluster()) return {};
+  const std::uint32_t last = part.first_worker + part.workload.platform.workers - 1;
+  const std::string workers = last == part.first_worker ? fmt::format("worker {}", last)
+                                                        : fmt::format("workers {}-{}", part.first_worker, last);
+  return tinted(fmt::format("cluster {}", part.name), Tint::Strong, terminal.colour) + ": " + workers +
+         (part.cpus.empty() ? "" : ", processors " + format_cpu_list(part.cpus)) + "\n";
+}
+
+std::string text_of(const lab::AnalysedPart &part, const Asked &asked, const Options &options,
+                    const StreamTraits &terminal) {
+  const bool every_task = options.analysis.run.all_tasks;
+  std::string text;
+  if (asked.row) {
+    text = explain(part.analysed, *asked.row, terminal);
+  } else if (options.explain.empty()) {
+    text = heading(part.part, terminal);
+    text +=
+        options.all || every_task ? describe(part.analysed, terminal, every_task) : summarise(part.analysed, terminal);
+  }
+  if (!asked.chains.empty()) text += "\n" + describe(part.analysed, asked.chains, terminal);
+  return text;
+}
+
+Json json_of(const lab::AnalysedPart &part, const Asked &asked, const Options &options) {
+  Json document = to_json(part.analysed, options.methods);
+  if (!asked.chains.empty()) document["chains"] = to_json(part.analysed, asked.chains);
+  if (asked.row) {
+    document["explanation"] = {{"name", asked.row->name}, {"text", explain(part.analysed, *asked.row, StreamTraits{})}};
+  }
+  return document;
+}
+
+Json json_of(const Parts &parts, const std::vector<Asked> &asked, const Options &options) {
+  if (!parts.front().part.is_cluster()) return json_of(parts.front(), asked.front(), options);
+  Json document = {{"format", "redag.cluster_analysis/1"},
+                   {"workload", parts.front().analysed.workload.name},
+                   {"schedulable", lab::is_schedulable(parts)},
+                   {"clusters", Json::array()}};
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    document["clusters"].push_back(Json{{"name", parts[p].part.name},
+                                        {"first_worker", parts[p].part.first_worker},
+                                        {"cpus", parts[p].part.cpus},
+                                        {"analysis", json_of(parts[p], asked[p], options)}});
+  }
+  return document;
 }
 
 // Reports one task or DAG in words, or the whole analysis. Returns false if that task or DAG is unknown.
-bool report(const lab::Analysed &analysed, const Options &options, Console &console) {
-  const std::optional<std::vector<ChainRow>> chains = find_chains(analysed, options, console);
-  if (!chains) return false;
-  Json document;
-  if (options.analysis.run.json) document = to_json(analysed, options.methods);
-  if (options.analysis.run.json && !chains->empty()) document["chains"] = to_json(analysed, *chains);
-  if (!options.explain.empty()) {
-    const Result<lab::Row> row = find_row(analysed, options.explain);
-    if (!row) {
-      console.error("--explain: " + row.error().front().message, row.error().front().hint);
-      return false;
-    }
-    if (options.analysis.run.json) {
-      document["explanation"] = {{"name", row->name}, {"text", explain(analysed, *row, StreamTraits{})}};
-    } else {
-      console.print(explain(analysed, *row, console.out_traits()));
-    }
-  } else if (!options.analysis.run.json) {
-    const bool every_task = options.analysis.run.all_tasks;
-    console.print(options.all || every_task ? describe(analysed, console.out_traits(), every_task)
-                                            : summarise(analysed, console.out_traits()));
-  }
-  if (!options.analysis.run.json && !chains->empty()) {
-    console.print("\n" + describe(analysed, *chains, console.out_traits()));
-  }
+bool report(const Parts &parts, const Options &options, Console &console) {
+  const std::optional<std::vector<Asked>> asked = find_asked(parts, options, console);
+  if (!asked) return false;
   if (options.analysis.run.json) {
-    console.print(to_text(document));
-  } else if (options.methods) {
-    console.print("\n" + describe_methods());
+    console.print(to_text(json_of(parts, *asked, options)));
+    return true;
   }
+  bool has_text = false;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    const std::string text = text_of(parts[p], (*asked)[p], options, console.out_traits());
+    if (has_text && !text.empty()) console.print("\n");
+    has_text = has_text || !text.empty();
+    console.print(text);
+  }
+  if (options.methods) console.print("\n" + describe_methods());
   return true;
 }
 
@@ -107,14 +165,14 @@ std::string is_states(const std::string &text) {
 }
 
 // Analyses the workload. After Ctrl-C, the answers of the other methods remain.
-Result<lab::Analysed> analyse_configured(const Workload &workload, const Options &options, Console &console) {
+Result<Parts> analyse_configured(const Workload &workload, const Options &options, Console &console) {
   const Result<analysis::AnalysisPlatform> configured = platform_for(workload, options.analysis, options.executor);
   if (!configured) return tl::unexpected(configured.error());
   const analysis::AnalysisPlatform &platform = *configured;
   const InterruptGuard guard;
   AnalysisWatch watch(options.analysis, console);
   if (options.explore == 0) {
-    return lab::analyse(workload, platform, nullptr, options.executor, watch.options(), options.only);
+    return lab::analyse_parts(workload, platform, nullptr, options.executor, watch.options(), options.only);
   }
   Progress &progress = watch.progress();
   progress.set_label("explore");
@@ -127,8 +185,8 @@ Result<lab::Analysed> analyse_configured(const Workload &workload, const Options
     }
     return watch.why_stop().empty();
   };
-  Result<lab::Analysed> analysed =
-      lab::analyse(workload, platform, &explore, options.executor, watch.options(), options.only);
+  Result<Parts> analysed =
+      lab::analyse_parts(workload, platform, &explore, options.executor, watch.options(), options.only);
   progress.clear();
   if (InterruptGuard::interrupted()) console.warn("interrupted: the exploration is incomplete");
   return analysed;
@@ -158,14 +216,13 @@ int analyze_file(const Options &options, Console &console) {
   const std::optional<Workload> workload = load_configured(options.analysis.run, console);
   if (!workload || !takes_arguments({*lab::parse_variant(options.executor)}, options.analysis.run, console))
     return kExitBad;
-  const Result<lab::Analysed> analysed = analyse_configured(*workload, options, console);
+  const Result<Parts> analysed = analyse_configured(*workload, options, console);
   if (!analysed) {
     console.note(analysed.error());
     return kExitBad;
   }
   if (!report(*analysed, options, console)) return kExitBad;
-  const bool yes = analysed->report.verdict == analysis::Verdict::Schedulable;
-  return options.analysis.run.check && !yes ? kExitNo : kExitOk;
+  return options.analysis.run.check && !lab::is_schedulable(*analysed) ? kExitNo : kExitOk;
 }
 
 }  // namespace
