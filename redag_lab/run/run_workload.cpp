@@ -27,12 +27,29 @@ namespace {
 
 constexpr Duration kStartMargin = 20 * kMillisecond;  // from the threads being ready to time 0
 constexpr Duration kCollectEvery = 100 * kMillisecond;
+constexpr Duration kKeptBack = 50 * kMillisecond;  // far longer than a decision takes
 // Each thread has a stack and a ring of events, and every decision examines all threads.
 constexpr std::uint64_t kMostThreads = 1024;
 
 std::uint32_t pool_size(const Workload &workload, const RunOptions &options) {
   const std::uint64_t wanted = options.threads > 0 ? options.threads : std::min(most_started(workload), kMostThreads);
   return std::max(workload.platform.workers, static_cast<std::uint32_t>(wanted));
+}
+
+// One scheduler with its threads: of a cluster, or of the whole platform. What is destroyed first stands last.
+struct Instance {
+  explicit Instance(const ClusterPart &served) : part(served) { due.reserve(sched::kMostReleasesAtOnce); }
+
+  const ClusterPart &part;
+  std::unique_ptr<runtime::Engine> engine;
+  std::vector<runtime::Release> due;  // the timer's, with the cluster's ids
+  std::unique_ptr<runtime::ReleaseTimer> timer;
+  std::unique_ptr<runtime::Watchdog> watchdog;
+};
+
+// The name of a DAG where DAGs of all clusters are listed.
+std::string shown_name(const Dag &dag) {
+  return dag.cluster.empty() ? dag.name : fmt::format("{} ({})", dag.name, dag.cluster);
 }
 
 class Run {
@@ -60,32 +77,28 @@ class Run {
     Diagnostics mistakes = validate(workload_);
     std::erase_if(mistakes, [](const Diagnostic &mistake) { return mistake.severity != Severity::Error; });
     if (!mistakes.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes));
-    if (Result<void> one = refuse_clusters(workload_, "a run on threads"); !one) return one;
     const bool preemptive = kind == nullptr || kind->ours;
     const auto wanted = options_.preemption.value_or(workload_.platform.preemption);
-    Result<runtime::Setup> setup = runtime::set_up({.preemption = preemptive ? wanted : PreemptionMode::None,
-                                                    .policy = workload_.policy,
-                                                    .ties = workload_.ties,
-                                                    .workers = workload_.platform.workers,
-                                                    .threads = pool_size(workload_, options_),
-                                                    .cpus = options_.cpus});
-    if (!setup) return tl::unexpected(setup.error());
-    result_.mode = setup->mode;
+    parts_ = parts_of(workload_);
+    places_ = places_in(parts_);
+    if (parts_.front().is_cluster() && !options_.cpus.empty()) {
+      return make_error("the platform has clusters, whose processors are not chosen by --affinity",
+                        "change 'cpus:' of the clusters in the file");
+    }
+    bodies_ = synthetic_bodies(workload_, options_.seed, give_up_);
+    if (options_.bodies) {
+      bodies_ = options_.bodies(std::move(bodies_), [this] { return instances_.empty() ? Time{0} : time_now(); });
+    }
+    std::uint32_t threads = 0;  // of each part: the trace states one number for all
+    for (const ClusterPart &part : parts_) threads = std::max(threads, pool_size(part.workload, options_));
+    for (const ClusterPart &part : parts_) {
+      if (part.is_cluster() && part.dags.empty()) continue;
+      if (Result<void> added = add_instance(part, kind, preemptive ? wanted : PreemptionMode::None, threads); !added) {
+        return added;
+      }
+    }
     if (!preemptive && wanted != PreemptionMode::None) {
       result_.mode.reason = "executor " + options_.executor + " has no other";
-    }
-    if (options_.realtime_threads && setup->band.top_job == 0) {
-      return make_error("the workers cannot be SCHED_FIFO threads, because this process may not use SCHED_FIFO",
-                        runtime::realtime_hint());
-    }
-    const std::uint32_t spins = spins_before_sleep(*setup, options_.spin);
-    result_.warnings = std::move(setup->warnings);
-    const std::uint64_t most = most_started(workload_);
-    if (preemptive && result_.mode.mode == PreemptionMode::Os && setup->config.max_started < most) {
-      result_.warnings.push_back(
-          fmt::format("{} threads serve up to {} jobs in progress: a job can wait for a thread that a less urgent job "
-                      "holds, which counts as a priority inversion",
-                      setup->config.max_started, most));
     }
     if (options_.lock_memory) {
       if (const Result<void> locked = redag::runtime::lock_memory(); !locked) {
@@ -93,59 +106,122 @@ class Run {
         result_.warnings.push_back(fmt::format("{} ({})", why.message, why.hint));
       }
     }
+    if (options_.live) go_live();
+    return {};
+  }
+
+  Result<void> add_instance(const ClusterPart &part, const executors::ExecutorKind *kind, PreemptionMode wanted,
+                            std::uint32_t threads) {
+    const bool preemptive = kind == nullptr || kind->ours;
+    const std::vector<int> &cpus = part.is_cluster() ? part.cpus : options_.cpus;
+    Result<runtime::Setup> setup = runtime::set_up({.preemption = wanted,
+                                                    .policy = workload_.policy,
+                                                    .ties = workload_.ties,
+                                                    .workers = part.workload.platform.workers,
+                                                    .threads = threads,
+                                                    .cpus = cpus});
+    if (!setup) return tl::unexpected(setup.error());
+    result_.mode = setup->mode;
+    if (parts_.size() > 1 && cpus.empty() && setup->mode.mode == PreemptionMode::Os) {
+      return make_error(fmt::format("cluster '{}' has no 'cpus', which alone keep real-time clusters apart", part.name),
+                        "add 'cpus:' to each cluster, or choose preemption none or cooperative");
+    }
+    if (options_.realtime_threads && setup->band.top_job == 0) {
+      return make_error("the workers cannot be SCHED_FIFO threads, because this process may not use SCHED_FIFO",
+                        runtime::realtime_hint());
+    }
+    const std::uint32_t spins = spins_before_sleep(*setup, options_.spin);
+    for (std::string &warning : setup->warnings) warn_once(std::move(warning));
+    const std::uint64_t most = most_started(part.workload);
+    if (preemptive && result_.mode.mode == PreemptionMode::Os && setup->config.max_started < most) {
+      warn_once(
+          fmt::format("{} threads serve up to {} jobs in progress: a job can wait for a thread that a less urgent job "
+                      "holds, which counts as a priority inversion",
+                      setup->config.max_started, most));
+    }
 
     runtime::EngineOptions engine;
     engine.config = setup->config;
     engine.band = setup->band;
     engine.throttling = setup->throttling;
     engine.realtime_threads = options_.realtime_threads;
-    engine.cpus = options_.cpus;
+    engine.cpus = cpus;
     engine.trace_capacity = options_.trace_capacity;
     engine.measure = options_.live;
     engine.spins = spins;
     if (options_.lock_memory) engine.touched_stack = runtime::kTouchedStack;
     if (kind != nullptr) engine.config = executors::effective_config(*kind, engine.config);
-    auto scheduler = options_.scheduler ? options_.scheduler(workload_, engine.config)
-                                        : executors::make_scheduler(options_.executor, workload_, engine.config);
-    engine_ = std::make_unique<runtime::Engine>(std::move(scheduler), std::move(engine));
-    std::vector<runtime::Body> bodies = synthetic_bodies(workload_, options_.seed, give_up_);
-    if (options_.bodies)
-      bodies = options_.bodies(std::move(bodies), [engine_ptr = engine_.get()] { return engine_ptr->now(); });
-    engine_->bind(workload_, std::move(bodies));
-    timer_ =
-        std::make_unique<runtime::ReleaseTimer>([this](auto releases) { engine_->release(releases); }, options_.seed);
-    engine_->share_releases(timer_->thread());
+    auto scheduler = options_.scheduler ? options_.scheduler(part.workload, engine.config)
+                                        : executors::make_scheduler(options_.executor, part.workload, engine.config);
+    Instance &instance = *instances_.emplace_back(std::make_unique<Instance>(part));
+    instance.engine = std::make_unique<runtime::Engine>(std::move(scheduler), std::move(engine));
+    std::vector<runtime::Body> bodies;
+    for (const TaskId task : part.tasks) bodies.push_back(std::move(bodies_[task.value]));
+    instance.engine->bind(part.workload, std::move(bodies));
+    // The timer knows a task by its id in the whole workload, of which its jitter depends.
+    instance.timer = std::make_unique<runtime::ReleaseTimer>(
+        [this, &instance](auto releases) { release(instance, releases); }, options_.seed);
+    instance.engine->share_releases(instance.timer->thread());
     std::size_t next = 0;
-    for (const Dag &dag : workload_.dags) {
-      std::vector<TaskId> tasks;
-      for (std::size_t i = 0; i < dag.tasks.size(); ++i) tasks.emplace_back(next++);
-      timer_->add(dag, tasks, 0);
+    for (const Dag &dag : part.workload.dags) {
+      instance.timer->add(dag, std::span(part.tasks).subspan(next, dag.tasks.size()), 0);
+      next += dag.tasks.size();
     }
-    if (options_.live) go_live();
     return {};
+  }
+
+  void release(Instance &instance, std::span<const runtime::Release> releases) {
+    if (!instance.part.is_cluster()) return instance.engine->release(releases);
+    instance.due.clear();
+    for (const runtime::Release &release : releases) {
+      instance.due.push_back({places_[release.task.value].task, release.nominal});
+    }
+    instance.engine->release(instance.due);
+  }
+
+  [[nodiscard]] Time time_now() const { return instances_.front()->engine->now(); }
+
+  [[nodiscard]] runtime::Engine &engine_of(TaskId task) const {
+    const auto owner = std::find_if(instances_.begin(), instances_.end(), [&](const auto &instance) {
+      return &instance->part == &parts_[places_[task.value].part];
+    });
+    return *(*owner)->engine;
+  }
+  [[nodiscard]] TaskId local(TaskId task) const { return places_[task.value].task; }
+
+  // Returns the sum of a figure over all engines.
+  template <class Figure>
+  [[nodiscard]] auto sum(Figure figure) const {
+    auto total = figure(*instances_.front()->engine);
+    for (std::size_t i = 1; i < instances_.size(); ++i) total += figure(*instances_[i]->engine);
+    return total;
+  }
+
+  void warn_once(std::string warning) {
+    const auto &known = result_.warnings;
+    if (std::find(known.begin(), known.end(), warning) == known.end()) result_.warnings.push_back(std::move(warning));
   }
 
   void go_live() {
     std::vector<Duration> bounds;
-    if (options_.bounds) bounds = options_.bounds(engine_->options().config);
+    if (options_.bounds) bounds = options_.bounds(config());
     bounds.resize(workload_.task_count(), 0);
-    auto publisher =
-        live::Publisher::start(live_options(workload_.name, "threads", result_.mode, engine_->options().config),
-                               [this, bounds = std::move(bounds)](live::Sample &sample) {
-                                 for (const Dag &dag : workload_.dags)
-                                   sample.dags.push_back({dag.name, dag.max_active});
-                                 for (const TaskRef &ref : flatten(workload_)) {
-                                   live::TaskSample task;
-                                   fill(task, engine_->figures(ref.id));
-                                   task.key = ref.id.value;
-                                   task.name = ref.task->name;
-                                   task.dag = ref.dag.value;
-                                   task.period = ref.task->period;
-                                   task.deadline = ref.task->deadline;
-                                   task.bound = bounds[ref.id.value];
-                                   sample.tasks.push_back(std::move(task));
-                                 }
-                               });
+    auto publisher = live::Publisher::start(live_options(workload_.name, "threads", result_.mode, config()),
+                                            [this, bounds = std::move(bounds)](live::Sample &sample) {
+                                              for (const Dag &dag : workload_.dags)
+                                                sample.dags.push_back({shown_name(dag), dag.max_active});
+                                              for (const TaskRef &ref : flatten(workload_)) {
+                                                live::TaskSample task;
+                                                fill(task, engine_of(ref.id).figures(local(ref.id)));
+                                                task.key = ref.id.value;
+                                                task.name = ref.task->name;
+                                                task.dag = ref.dag.value;
+                                                task.period = ref.task->period;
+                                                task.deadline = ref.task->deadline;
+                                                task.bound = bounds[ref.id.value];
+                                                sample.tasks.push_back(std::move(task));
+                                              }
+                                            });
     if (publisher) {
       live_ = *std::move(publisher);
     } else {
@@ -155,17 +231,27 @@ class Run {
   }
 
   Result<void> start() {
-    if (Result<void> started = engine_->start(); !started) return started;
-    origin_ = runtime::monotonic_now() + kStartMargin;
-    engine_->set_origin(origin_);
-    const bool realtime = options_.realtime_threads || result_.mode.mode == PreemptionMode::Os;
-    const int priority = realtime ? engine_->options().band.timer : 0;
-    if (options_.watchdog) {
-      watchdog_ = std::make_unique<runtime::Watchdog>(*engine_, *options_.watchdog,
-                                                      [this](const runtime::OverdueJob &job) { note(job); });
-      if (Result<void> started = watchdog_->start({"redag-watch", priority, {}}); !started) return started;
+    for (const auto &instance : instances_) {
+      if (Result<void> started = instance->engine->start(); !started) return started;
     }
-    return timer_->start(origin_, options_.duration, {"redag-timer", priority, {}});
+    origin_ = runtime::monotonic_now() + kStartMargin;
+    for (const auto &instance : instances_) {
+      if (Result<void> started = start(*instance); !started) return started;
+    }
+    return {};
+  }
+
+  Result<void> start(Instance &instance) {
+    instance.engine->set_origin(origin_);
+    const bool realtime = options_.realtime_threads || result_.mode.mode == PreemptionMode::Os;
+    const int priority = realtime ? instance.engine->options().band.timer : 0;
+    if (options_.watchdog) {
+      instance.watchdog = std::make_unique<runtime::Watchdog>(
+          *instance.engine, *options_.watchdog,
+          [this, &instance](const runtime::OverdueJob &job) { note(instance.part, job); });
+      if (Result<void> started = instance.watchdog->start({"redag-watch", priority, {}}); !started) return started;
+    }
+    return instance.timer->start(origin_, options_.duration, {"redag-timer", priority, {}});
   }
 
   Result<void> record() {
@@ -182,10 +268,38 @@ class Run {
   void drain(bool finally) {
     auto &events = result_.trace.events;
     const std::size_t before = events.size();
-    engine_->drain(events, finally);
+    collect(events, finally);
     if (!flight_) return;
-    const Result<void> kept = flight_->append(std::span(events).subspan(before), engine_->lost_events());
+    const Result<void> kept = flight_->append(std::span(events).subspan(before), lost_events());
     if (!kept) result_.warnings.push_back(fmt::format("the flight record ends here: {}", to_string(kept.error())));
+  }
+
+  // Appends the new events of all clusters, in order of time. Those of the last moments are kept back, because another
+  // cluster can still report earlier ones.
+  void collect(std::vector<JobEvent> &out, bool finally) {
+    if (!parts_.front().is_cluster()) return instances_.front()->engine->drain(out, finally);
+    const Time certain = finally ? kNever : time_now() - kKeptBack;
+    for (const auto &instance : instances_) {
+      const std::size_t before = kept_back_.size();
+      instance->engine->drain(kept_back_, finally);
+      for (JobEvent &event : std::span(kept_back_).subspan(before)) {
+        event.task = instance->part.tasks[event.task.value];
+        if (event.worker != WorkerId::kNoneValue) event.worker += instance->part.first_worker;
+      }
+    }
+    std::stable_sort(kept_back_.begin(), kept_back_.end(),
+                     [](const JobEvent &a, const JobEvent &b) { return a.time < b.time; });
+    const auto end = std::find_if(kept_back_.begin(), kept_back_.end(),
+                                  [certain](const JobEvent &event) { return event.time >= certain; });
+    for (auto event = kept_back_.begin(); event != end; ++event) {
+      latest_ = event->time = std::max(latest_, event->time);
+      out.push_back(*event);
+    }
+    kept_back_.erase(kept_back_.begin(), end);
+  }
+
+  [[nodiscard]] std::uint64_t lost_events() const {
+    return sum([](const runtime::Engine &engine) { return engine.lost_events(); });
   }
 
   // Passes the collected events to the sink, if there is one.
@@ -195,9 +309,9 @@ class Run {
     result_.trace.events.clear();
   }
 
-  void note(const runtime::OverdueJob &job) {
-    std::string text = fmt::format("{} #{} is overdue: {}", trace::task_name(workload_, job.job.task), job.job.number,
-                                   runtime::describe(job));
+  void note(const ClusterPart &part, const runtime::OverdueJob &job) {
+    std::string text = fmt::format("{} #{} is overdue: {}", trace::task_name(part.workload, job.job.task),
+                                   job.job.number, runtime::describe(job));
     const LockGuard guard(notes_lock_);
     notes_.push_back(std::move(text));
   }
@@ -218,10 +332,15 @@ class Run {
   bool wait_idle() {
     const Time give_up = runtime::monotonic_now() + options_.drain_timeout;
     for (Time now = runtime::monotonic_now();; now = runtime::monotonic_now()) {
-      const bool idle = engine_->wait_idle(std::min(now + kCollectEvery, give_up));
+      const bool idle = wait_idle(std::min(now + kCollectEvery, give_up));
       report_overdue();
       if (idle || now >= give_up) return idle;
     }
+  }
+
+  [[nodiscard]] bool wait_idle(Time until) {
+    return std::all_of(instances_.begin(), instances_.end(),
+                       [until](const auto &instance) { return instance->engine->wait_idle(until); });
   }
 
   void collect_until_horizon() {
@@ -236,36 +355,53 @@ class Run {
       drain(false);
       hand_over();
       report_overdue();
-      if (options_.progress) options_.progress(engine_->now(), result_.trace.events);
+      if (options_.progress) options_.progress(time_now(), result_.trace.events);
     }
   }
 
   void finish() {
-    end_ = result_.stopped ? std::clamp<Time>(engine_->now(), 0, options_.duration) : options_.duration;
-    timer_->stop();  // reports releases that were due until now
-    timer_->join();
-    engine_->halt();
+    end_ = result_.stopped ? std::clamp<Time>(time_now(), 0, options_.duration) : options_.duration;
+    // The timers report releases that were due until now.
+    for (const auto &instance : instances_) instance->timer->stop();
+    for (const auto &instance : instances_) {
+      instance->timer->join();
+      instance->engine->halt();
+    }
     if (!wait_idle()) {
-      for (const runtime::Job &job : engine_->started()) {
-        result_.unfinished.push_back(fmt::format("{} #{}", trace::task_name(workload_, job.task), job.number));
+      for (const auto &instance : instances_) {
+        for (const runtime::Job &job : instance->engine->started()) {
+          result_.unfinished.push_back(
+              fmt::format("{} #{}", trace::task_name(instance->part.workload, job.task), job.number));
+        }
       }
       give_up_.store(true);
     }
-    (void)engine_->wait_idle(kNever);
-    watchdog_.reset();
-    engine_->join();
+    (void)wait_idle(kNever);
+    for (const auto &instance : instances_) {
+      instance->watchdog.reset();
+      instance->engine->join();
+    }
     report_overdue();
     live_.reset();
     warn();
     cut();
-    for (std::size_t t = 0; t < workload_.task_count(); ++t) result_.usage.push_back(engine_->usage(TaskId(t)));
+    for (std::size_t t = 0; t < workload_.task_count(); ++t) {
+      result_.usage.push_back(engine_of(TaskId(t)).usage(local(TaskId(t))));
+    }
+  }
+
+  // The configuration of all engines together.
+  [[nodiscard]] sched::Config config() const {
+    sched::Config config = instances_.front()->engine->options().config;
+    if (parts_.front().is_cluster()) config.workers = workload_.platform.workers;
+    return config;
   }
 
   void describe() {
     trace::RunInfo &info = result_.trace.info;
     info.workload = workload_;
     info.executor = options_.executor;
-    info.config = engine_->options().config;
+    info.config = config();
     info.preemption = to_string(result_.mode.mode);
     info.preemption_why = result_.mode.reason;
     info.driver = trace::Driver::Threads;
@@ -277,18 +413,21 @@ class Run {
   }
 
   void warn() {
-    if (const Duration gave_way = engine_->gave_way(); gave_way > 0) {
+    const auto gave_up = [](const runtime::Engine &engine) { return engine.gave_way(); };
+    if (const Duration gave_way = sum(gave_up); gave_way > 0) {
       result_.warnings.push_back(
           fmt::format("jobs of lower criticality ran on ordinary threads for {}, so that the kernel's real-time "
                       "throttling did not stop those of high criticality",
                       humanize_duration(gave_way)));
     }
-    if (const std::uint64_t waits = engine_->thread_waits(); waits > 0) {
+    const auto waited = [](const runtime::Engine &engine) { return engine.thread_waits(); };
+    if (const std::uint64_t waits = sum(waited); waits > 0) {
       result_.warnings.push_back(fmt::format("{} time{} a job waited for a thread, because all {} had jobs in progress",
-                                             waits, waits == 1 ? "" : "s", engine_->thread_count()));
+                                             waits, waits == 1 ? "" : "s", instances_.front()->engine->thread_count()));
     }
-    if (engine_->refused_priorities() > 0) {
-      result_.warnings.push_back(fmt::format("the kernel refused {} priority changes", engine_->refused_priorities()));
+    const auto refused = [](const runtime::Engine &engine) { return engine.refused_priorities(); };
+    if (const std::uint64_t changes = sum(refused); changes > 0) {
+      result_.warnings.push_back(fmt::format("the kernel refused {} priority changes", changes));
     }
     if (!result_.unfinished.empty()) {
       result_.warnings.push_back(fmt::format("jobs not finished {} after the end: {}",
@@ -302,12 +441,13 @@ class Run {
   void cut() {
     auto &events = result_.trace.events;
     drain(true);
-    const Time end = engine_->halted_at();
+    Time end = kNever;
+    for (const auto &instance : instances_) end = std::min(end, instance->engine->halted_at());
     const auto after = std::find_if(events.begin(), events.end(), [&](const JobEvent &e) { return e.time >= end; });
     events.erase(after, events.end());
     hand_over();
     result_.trace.info.end = end_;
-    result_.trace.info.lost_events = engine_->lost_events();
+    result_.trace.info.lost_events = lost_events();
     if (result_.trace.info.lost_events > 0) {
       result_.warnings.push_back(
           fmt::format("{} events were lost: raise the trace capacity", result_.trace.info.lost_events));
@@ -316,15 +456,18 @@ class Run {
 
   const Workload &workload_;
   const RunOptions &options_;
+  std::vector<ClusterPart> parts_;
+  std::vector<TaskPlace> places_;  // by TaskId
   RunResult result_;
   Mutex notes_lock_;
-  std::vector<std::string> notes_ REDAG_GUARDED_BY(notes_lock_);  // from the watchdog, not yet reported
+  std::vector<std::string> notes_ REDAG_GUARDED_BY(notes_lock_);  // from the watchdogs, not yet reported
   std::atomic<bool> give_up_{false};
   std::optional<trace::FlightRecorder> flight_;
-  std::unique_ptr<runtime::Engine> engine_;
-  std::unique_ptr<runtime::ReleaseTimer> timer_;  // after the engine: it is destroyed first
-  std::unique_ptr<runtime::Watchdog> watchdog_;   // likewise
-  std::unique_ptr<live::Publisher> live_;         // after the engine, whose figures it reads until it is destroyed
+  std::vector<runtime::Body> bodies_;                 // by TaskId, until the engines have them
+  std::vector<std::unique_ptr<Instance>> instances_;  // at least one once prepared
+  std::unique_ptr<live::Publisher> live_;             // after the engines, whose figures it reads until it is destroyed
+  std::vector<JobEvent> kept_back_;                   // clusters: collected, but not yet in order
+  Time latest_ = 0;                                   // of the events that are in order
   Time origin_ = 0;
   Time end_ = 0;
 };

@@ -9,8 +9,10 @@
 #include <algorithm>
 #include <atomic>
 #include <span>
+#include <vector>
 
 #include "redag/runtime/setup.hpp"
+#include "redag/runtime/threads.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_testing/builders.hpp"
@@ -81,6 +83,31 @@ TEST_P(EveryMode, RunsAsTheModelSays) {
   if (workers() == 1) {
     EXPECT_EQ(has_preemption(result), mode() != PreemptionMode::None);
   }
+}
+
+TEST_P(EveryMode, RunsClustersSideBySide) {
+  const std::vector<int> usable = runtime::usable_cpus();
+  if (usable.size() < 2) GTEST_SKIP() << "two clusters need two processors";
+  Workload workload = two_rates(workers(), mode());
+  workload.platform.clusters = {Cluster{"left", workers(), {usable[0]}}, Cluster{"right", 1, {usable[1]}}};
+  workload.platform.workers = workers() + 1;
+  workload.dags[0].cluster = "right";
+  workload.dags[1].cluster = "left";
+  RunOptions options;
+  options.duration = 400 * kMillisecond;
+  const RunResult result = run(workload, options);
+  expect_lawful(result);
+  EXPECT_EQ(result.trace.info.config.workers, workers() + 1);
+  EXPECT_EQ(result.trace.info.lost_events, 0U);
+  EXPECT_TRUE(result.unfinished.empty());
+  EXPECT_EQ(result.usage.size(), workload.task_count());
+  std::uint64_t sensed = 0;
+  for (const JobEvent &event : result.trace.events) {
+    if (event.kind == JobEventKind::Released && event.task == TaskId(0)) ++sensed;
+    if (event.kind != JobEventKind::Dispatched) continue;
+    EXPECT_EQ(event.task.value < 2, event.worker == workers()) << "the cluster 'right' has the last worker";
+  }
+  EXPECT_EQ(sensed, 40U);
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, EveryMode,
@@ -253,6 +280,28 @@ TEST(RunWorkload, RecordsWhatHappens) {
   const Result<RunResult> second = run_workload(two_rates(1, PreemptionMode::None), options);
   EXPECT_FALSE(second) << "nobody writes over a record";
   EXPECT_TRUE(trace::remove_flight_record(folder));
+}
+
+TEST(RunClusters, RefusesProcessorsOfTheCommandLine) {
+  Workload workload = two_rates(1, PreemptionMode::None);
+  workload.platform.clusters = {Cluster{"only", 1, {}}};
+  RunOptions options;
+  options.cpus = {0};
+  const Result<RunResult> result = run_workload(workload, options);
+  ASSERT_FALSE(result);
+  EXPECT_NE(to_string(result.error()).find("whose processors are not chosen by --affinity"), std::string::npos);
+}
+
+TEST(RunClusters, OsNeedsTheProcessorsOfEach) {
+  if (runtime::probe_priority_band().top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+  Workload workload = two_rates(1, PreemptionMode::Os);
+  workload.platform.clusters = {Cluster{"left", 1, {0}}, Cluster{"right", 1, {}}};
+  workload.platform.workers = 2;
+  workload.dags[0].cluster = "left";
+  workload.dags[1].cluster = "right";
+  const Result<RunResult> result = run_workload(workload, {});
+  ASSERT_FALSE(result);
+  EXPECT_NE(to_string(result.error()).find("cluster 'right' has no 'cpus'"), std::string::npos);
 }
 
 }  // namespace

@@ -57,8 +57,9 @@ std::vector<runtime::Body> synthetic_bodies(const Workload &workload, std::uint6
   (void)reading_cost();  // measures the cost here rather than in a job
   std::vector<runtime::Body> bodies;
   for (const TaskRef &ref : flatten(workload)) {
-    bodies.emplace_back([task = ref.task, seed, &give_up](const runtime::Job &job) {
-      const Duration demand = execution_time(*task, job.task, job.number, seed);
+    // An engine of a cluster knows the task by another id than the workload does.
+    bodies.emplace_back([task = ref.task, id = ref.id, seed, &give_up](const runtime::Job &job) {
+      const Duration demand = execution_time(*task, id, job.number, seed);
       const bool cut_off = task->on_budget == OnBudget::Abort && task->budget > 0 && demand > task->budget;
       burn(cut_off ? task->budget : demand, task->region, give_up);
       return cut_off ? sched::Outcome::BudgetExceeded : sched::Outcome::Finished;
