@@ -9,6 +9,7 @@
 #include "redag/model/workload_yaml.hpp"
 #include "redag_lab/cli/analyze/analysis_arguments.hpp"
 #include "redag_lab/cli/analyze/assignment_report.hpp"
+#include "redag_lab/cli/analyze/placement_report.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
@@ -25,6 +26,7 @@ struct Options {
   std::string output;
   Keep keep = Keep::Nothing;
   lab::AssignmentOptions assignment;
+  std::vector<const CLI::Option *> of_search;  // options that have no meaning with clusters
 };
 
 Result<lab::Assignment> search(const Workload &workload, const analysis::AnalysisPlatform &platform,
@@ -41,8 +43,48 @@ Result<lab::Assignment> search(const Workload &workload, const analysis::Analysi
   return found;
 }
 
+bool write_result(const Options &options, const Workload &workload, bool is_changed, Console &console) {
+  if (options.output.empty()) return true;
+  const Result<void> written =
+      write_text(options.output, provenance_to_comment(current_provenance()) + to_yaml(workload));
+  if (!written) {
+    console.note(written.error());
+    return false;
+  }
+  console.note(fmt::format("wrote {}{}\n", options.output, is_changed ? "" : ": the unchanged workload"));
+  return true;
+}
+
+// With clusters: finds the clusters of the DAGs that name none.
+int assign_clusters(const Workload &workload, const Options &options, Console &console) {
+  for (const CLI::Option *option : options.of_search) {
+    if (option->count() == 0) continue;
+    console.error(fmt::format("{}: 'assign' only chooses clusters for a workload with clusters", option->get_name()),
+                  "leave it out");
+    return kExitBad;
+  }
+  const Result<analysis::AnalysisPlatform> platform = platform_for(workload, options.analysis);
+  if (!platform) {
+    console.note(platform.error());
+    return kExitBad;
+  }
+  const InterruptGuard guard;  // covers writing the results too
+  AnalysisWatch watch(options.analysis, console);
+  const Result<lab::Placement> placement =
+      lab::place(workload, *platform, [&watch] { return !watch.why_stop().empty(); });
+  if (!placement) {
+    console.note(placement.error());
+    return kExitBad;
+  }
+  if (placement->stopped) console.warn(watch.why_stop() + ": not every DAG has been placed");
+  console.print(options.analysis.run.json ? to_text(to_json(*placement)) : describe(*placement, console.out_traits()));
+  if (!placement->left_over.empty()) return kExitNo;
+  if (!write_result(options, placement->workload, !placement->placed.empty(), console)) return kExitBad;
+  return options.analysis.run.check && !placement->is_schedulable() ? kExitNo : kExitOk;
+}
+
 int assign_file(const Options &options, Console &console) {
-  const std::optional<Workload> workload = load_configured(options.analysis.run, console);
+  const std::optional<Workload> workload = load_configured(options.analysis.run, console, {.cluster_optional = true});
   if (!workload) return kExitBad;
   if (!options.output.empty()) {
     if (const Result<void> writable = check_output(options.output); !writable) {
@@ -50,6 +92,7 @@ int assign_file(const Options &options, Console &console) {
       return kExitBad;
     }
   }
+  if (!workload->platform.clusters.empty()) return assign_clusters(*workload, options, console);
   Assigned assigned;
   const Result<analysis::AnalysisPlatform> platform = platform_for(*workload, options.analysis);
   if (!platform) {
@@ -74,16 +117,8 @@ int assign_file(const Options &options, Console &console) {
   } else {
     console.print(describe(assigned, console.out_traits(), options.analysis.run.all_tasks));
   }
-  if (!options.output.empty()) {
-    const Result<void> written = write_text(
-        options.output, provenance_to_comment(current_provenance()) + to_yaml(assigned.assignment.best.workload));
-    if (!written) {
-      console.note(written.error());
-      return kExitBad;
-    }
-    console.note(fmt::format("wrote {}{}\n", options.output,
-                             changes(assigned.assignment).empty() ? ": the unchanged workload" : ""));
-  }
+  const bool is_changed = !changes(assigned.assignment).empty();
+  if (!write_result(options, assigned.assignment.best.workload, is_changed, console)) return kExitBad;
   return options.analysis.run.check && !assigned.assignment.best.score.schedulable ? kExitNo : kExitOk;
 }
 
@@ -110,6 +145,9 @@ Action add_assign(CLI::App &app) {
   add_count(app, "--restarts", assignment.restarts, {0, kMaxRestarts},
             "Number of random starting points of the local search");
   add_seed(app, assignment.seed, "Seed of these starting points; the same seed gives the same result");
+  for (const char *name : {"--objective", "--keep", "--exhaustive", "--restarts", "--seed"}) {
+    options->of_search.push_back(&option_named(app, name));
+  }
   add_analysis_arguments(app, options->analysis,
                          "Exit with status 1 if no assignment that was tried is shown schedulable");
   return [options](Console &console) { return assign_file(*options, console); };
