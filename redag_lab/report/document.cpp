@@ -243,6 +243,7 @@ class GroupWriter {
                {"peak_active", group_.dags()[d].peak_active},
                {"jobs", to_json(group_.dag(DagId(d)))},
                {"end_to_end", to_json(group_.end_to_end(DagId(d)))}};
+      if (!dag.cluster.empty()) row["cluster"] = dag.cluster;
       add_bound(row, group_.bounds().dags, d);
       row["bound_alarm"] = is_above_bound(group_, DagId(d));
       rows.push_back(std::move(row));

@@ -91,26 +91,28 @@ std::string task_table(const lab::Session &session, const StreamTraits &terminal
 }
 
 std::string dag_table(const lab::Session &session, const StreamTraits &terminal) {
-  Table table({{"DAG", false, 9},
-               {"jobs", true, 7},
-               {"missed", true, 8},
-               {"end-to-end p50", true, 3},
-               {"p99", true, 4},
-               {"max", true, 6},
-               {"deadline", true, 2},
-               {"active", true, 1}});
-  for (const metrics::DagSummary &dag : session.summary.dags) {
+  const Workload &workload = session.info.workload;
+  const bool has_clusters = !workload.platform.clusters.empty();
+  std::vector<Column> columns = {{"DAG", false, 9},           {"jobs", true, 7},  {"missed", true, 8},
+                                 {"end-to-end p50", true, 3}, {"p99", true, 4},   {"max", true, 6},
+                                 {"deadline", true, 2},       {"active", true, 1}};
+  if (has_clusters) columns.push_back({"cluster", false, 5});
+  Table table(std::move(columns));
+  for (std::size_t d = 0; d < session.summary.dags.size(); ++d) {
+    const metrics::DagSummary &dag = session.summary.dags[d];
     const metrics::Distribution &end_to_end = dag.end_to_end.response;
     const std::string bound = dag.max_active > 0 ? fmt::format("{}", dag.max_active) : "-";
-    table.add(
-        {{dag.name},
-         count_cell(dag.jobs.released),
-         missed_cell(dag.jobs),
-         time_cell(end_to_end, &metrics::Distribution::p50),
-         time_cell(end_to_end, &metrics::Distribution::p99),
-         {time_cell(end_to_end, &metrics::Distribution::max).text, dag.end_to_end.late > 0 ? Tint::Bad : Tint::Plain},
-         {dag.end_to_end.deadline > 0 ? humanize_duration(dag.end_to_end.deadline) : "-"},
-         {fmt::format("{}/{}", dag.peak_active, bound)}});
+    std::vector<Cell> row = {
+        {dag.name},
+        count_cell(dag.jobs.released),
+        missed_cell(dag.jobs),
+        time_cell(end_to_end, &metrics::Distribution::p50),
+        time_cell(end_to_end, &metrics::Distribution::p99),
+        {time_cell(end_to_end, &metrics::Distribution::max).text, dag.end_to_end.late > 0 ? Tint::Bad : Tint::Plain},
+        {dag.end_to_end.deadline > 0 ? humanize_duration(dag.end_to_end.deadline) : "-"},
+        {fmt::format("{}/{}", dag.peak_active, bound)}};
+    if (has_clusters) row.push_back({workload.dags[d].cluster});
+    table.add(std::move(row));
   }
   return table.render(terminal.width, terminal.colour);
 }

@@ -96,7 +96,7 @@ function dagTable(group) {
   return table(columns, group.dags.map((dag, d) => {
     const r = dag.end_to_end.response;
     return {cells: [
-      {text: element('span', {}, swatch(t, d), dag.name)}, String(dag.tasks), dag.period_ns > 0 ? `${Number((1e9 / dag.period_ns).toPrecision(3))} Hz` : '\u2013',
+      {text: element('span', {}, swatch(t, d), dag.cluster ? `${dag.name} (${dag.cluster})` : dag.name)}, String(dag.tasks), dag.period_ns > 0 ? `${Number((1e9 / dag.period_ns).toPrecision(3))} Hz` : '\u2013',
       formatCount(dag.jobs.released), missCell(dag.jobs), formatTime(r && r.p50_ns), formatTime(r && r.p99_ns), {text: formatTime(r && r.max_ns), title: sinkTimes(group, dag)},
       boundCell(dag.bound_ns, r ? r.max_ns : 0, dag.method, dag.bound_alarm),
       dag.deadline_ns > 0 ? formatTime(dag.deadline_ns) : '\u2013',
