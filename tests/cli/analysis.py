@@ -37,6 +37,56 @@ dags:
 """
 
 
+CLUSTERS = """\
+name: clusters
+platform:
+  clusters:
+    - {name: left, cpus: 0}
+    - {name: right, cpus: 1}
+dags:
+  - {name: a, cluster: left, period: 10ms, tasks: [{name: t, wcet: 6ms, region: 1ms}]}
+  - {name: b, cluster: right, period: 10ms, tasks: [{name: t, wcet: 5ms, region: 1ms}]}
+  - {name: c, cluster: left, period: 20ms, tasks: [{name: t, wcet: 3ms, region: 1ms}]}
+"""
+
+
+class Clusters(Case):
+    def setUp(self):
+        super().setUp()
+        self.clusters = self.write("clusters.yaml", CLUSTERS)
+
+    def test_are_analysed_one_by_one(self):
+        text = self.expect(redag("analyze", self.clusters, "--check"), 0).stdout
+        self.assertRegex(text, r"(?s)^cluster left: worker 0, processors 0\nclusters: schedulable: .*\n\n"
+                               r"cluster right: worker 1, processors 1\nclusters: schedulable: ")
+        document = self.document(redag("analyze", self.clusters, "--json"), "redag.cluster_analysis/1")
+        self.assertTrue(document["schedulable"])
+        self.assertEqual([cluster["name"] for cluster in document["clusters"]], ["left", "right"])
+        tasks = [task["name"] for cluster in document["clusters"] for task in cluster["analysis"]["tasks"]]
+        self.assertEqual(tasks, ["a.t", "c.t", "b.t"])
+        late = self.write("late.yaml", CLUSTERS.replace("wcet: 5ms", "wcet: 11ms"))
+        self.expect(redag("analyze", late, "--check"), 1)
+
+    def test_one_task_of_a_cluster(self):
+        text = self.expect(redag("analyze", self.clusters, "--explain", "b.t"), 0).stdout
+        self.assertTrue(text.startswith("b.t: response time at most 5ms"), text)
+        self.expect(redag("analyze", self.clusters, "--explain", "d.t"), 2, "there is no task or DAG 'd.t'")
+        self.expect(redag("analyze", self.clusters, "--chain", "a.t,b.t"), 2)
+
+    def test_run_without_a_miss(self):
+        for command in ("simulate", "--executor", "redag"), ("simulate", "--executor", "redag-none"):
+            document = self.document(redag(command[0], self.clusters, *command[1:], "--duration", "1s", "--json"),
+                                     "redag.summary/2")
+            self.assertTrue(document["check"]["ok"])
+        compared = redag("compare", self.clusters, "--simulate", "--executors", "redag,mte,ste", "--duration", "1s", "--json")
+        self.assertEqual(len(self.document(compared, "redag.comparison/2")["executors"]), 3)
+
+    def test_commands_that_refuse(self):
+        self.expect(redag("simulate", self.clusters, "--workers", "2"), 2, "--workers: the platform has clusters")
+        for command in "sensitivity", "tune":
+            self.expect(redag(command, self.clusters), 2, f"{command} cannot use a workload with clusters")
+
+
 class Analyze(Case):
     def test_table_and_verdict(self):
         result = self.expect(redag("analyze", self.cart, "--all"), 0)
@@ -393,10 +443,31 @@ dags:
         self.expect(redag("assign", self.cart, "--objective", "latenes"), 2, "did you mean 'lateness'?")
         self.expect(redag("assign", self.cart, "-o", self.folder / "no" / "where.yaml"), 2)
 
+    def test_fills_in_missing_clusters(self):
+        file = self.write("clusters.yaml", CLUSTERS.replace("cluster: left, ", "").replace("cluster: right, ", ""))
+        self.expect(redag("analyze", file), 2, "clusters.yaml:7:5: error: DAG 'a' has no cluster")
+        placed = self.folder / "placed.yaml"
+        text = self.expect(redag("assign", file, "-o", placed, "--check"), 0, "wrote").stdout
+        self.assertIn("change cluster of a: left\n", text)
+        self.assertIn("schedulable: every deadline is met in every cluster", text)
+        self.expect(redag("analyze", placed, "--check"), 0)
+        document = self.document(redag("assign", placed, "--json"), "redag.placement/1")
+        self.assertEqual([cluster["dags"] for cluster in document["clusters"]], [["a", "c"], ["b"]])
+        self.assertEqual(document["placed"], [])
+
+    def test_names_dags_that_fit_nowhere(self):
+        file = self.write("clusters.yaml", CLUSTERS.replace("wcet: 3ms", "wcet: 11ms").replace("cluster: left, ", ""))
+        placed = self.folder / "placed.yaml"
+        text = self.expect(redag("assign", file, "-o", placed), 1).stdout
+        self.assertIn("no cluster can take c: with it, no cluster is shown to meet every deadline", text)
+        self.assertFalse(placed.exists())
+        self.expect(redag("assign", file, "--keep", "priorities"), 2, "--keep: 'assign' only chooses clusters")
+
     def test_workloads_of_the_repository(self):
         for file in sorted((SOURCE / "workloads").rglob("*.yaml")):
             tuned = self.folder / "tuned.yaml"
-            self.expect(redag("assign", file, "--preemption", "none", "--exhaustive", "50", "-o", tuned), 0)
+            fewer = [] if file.name == "clusters.yaml" else ["--exhaustive", "50"]
+            self.expect(redag("assign", file, "--preemption", "none", *fewer, "-o", tuned), 0)
             self.expect(redag("validate", tuned), 0)
         text = self.expect(redag("assign", SOURCE / "workloads" / "robot.yaml", "--preemption", "cooperative"), 0).stdout
         self.assertIn("nothing to compare: no method bounds any response time", text)

@@ -53,7 +53,8 @@ void commands_target(std::string_view input) {
   REDAG_CHECK(answers({"analyze", file, "--preemption", "none", "--explore=1000"}), "analyze --explore");
   constexpr std::size_t kMostTasks = 4;  // limit for the commands that analyse repeatedly
   if (loaded->workload.task_count() > kMostTasks) return;
-  REDAG_CHECK(answers({"sensitivity", file, "--json"}), "sensitivity");
+  const bool has_clusters = !loaded->workload.platform.clusters.empty();  // which sensitivity refuses
+  REDAG_CHECK(has_clusters || answers({"sensitivity", file, "--json"}), "sensitivity");
   REDAG_CHECK(answers({"assign", file, "--json"}), "assign");
 }
 
