@@ -69,7 +69,7 @@ constexpr std::array kCommands = {
           "  redag sensitivity workloads/robot.yaml\n"
           "  redag sensitivity workloads/robot.yaml --preemption none --task lidar\n"
           "  redag sensitivity workloads/robot.yaml --simulate --json\n"},
-    Entry{"assign", "Find better priorities and max_active by response-time analysis", add_assign,
+    Entry{"assign", "Choose priorities, max_active or clusters by response-time analysis", add_assign,
           "  redag assign workloads/robot.yaml\n"
           "  redag assign workloads/robot.yaml --objective slack -o tuned.yaml\n"
           "  redag assign workloads/robot.yaml --keep priorities --workers 4 --json\n"},
