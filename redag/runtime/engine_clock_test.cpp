@@ -118,11 +118,12 @@ TEST_P(EngineClock, NorDoShortJobsThatCloseThemselves) {
   static std::atomic<bool> lingers{false};
   charged = 0;
   lingers = false;
-  start({{.name = "t", .period = 1000}}, {[](const Job &) {
+  start({{.name = "t", .period = 1000}}, {[](const Job &job) {
           step_clock();
           RunningJob &running = *RunningJob::current();
           running.close();
-          EXPECT_EQ(running.charged, running.ended - running.begun);
+          // The first job begins on the real clock, and is not short on a busy machine.
+          if (job.number > 0) EXPECT_EQ(running.charged, running.ended - running.begun);
           charged = running.charged;
           if (lingers) clock_ahead += kLong;
           return Outcome::Finished;

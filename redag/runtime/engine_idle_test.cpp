@@ -43,11 +43,13 @@ class Leader : public ::testing::TestWithParam<PreemptionMode> {
     ASSERT_TRUE(engine->start());
     engine->set_origin(monotonic_now());
   }
-  void TearDown() override {
-    if (!engine) return;
+  void TearDown() override { end(); }
+  /// Ends all threads. They use variables of the test, which calls this before these are gone.
+  void end() {
     releases.stop();
     releases.join();
-    engine->join();
+    if (engine) engine->join();
+    engine.reset();
   }
   Time expire() {
     if (engine) on_expire();
@@ -88,7 +90,7 @@ TEST_P(Leader, RunsTheJobThatItReleases) {
     due = true;
     while (engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
     EXPECT_EQ(releaser.load(), runner.load());
-    engine.reset();
+    end();
   }
 }
 
@@ -101,6 +103,7 @@ TEST_P(Leader, TakesOtherJobsMeanwhile) {
   while (!leads) std::this_thread::yield();
   run_one_job();
   run_one_job();
+  end();
 }
 
 TEST_P(Leader, LeavesReleasesToTheThreadWhileItHasAJob) {
@@ -122,6 +125,7 @@ TEST_P(Leader, LeavesReleasesToTheThreadWhileItHasAJob) {
   run_one_job();
   engine->release(TaskId(0), engine->now());
   while (engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+  end();
 }
 
 TEST_P(Leader, WaitsAboveAllJobsAndRunsItsOwnAtTheirLevel) {
@@ -147,6 +151,7 @@ TEST_P(Leader, WaitsAboveAllJobsAndRunsItsOwnAtTheirLevel) {
     EXPECT_GT(runs_at, 0);
     EXPECT_LE(runs_at, band.top_job);
   }
+  end();
 }
 
 TEST_P(Leader, RealTimeThreadsOfOtherModesHaveNone) {
@@ -159,6 +164,7 @@ TEST_P(Leader, RealTimeThreadsOfOtherModesHaveNone) {
   run_one_job();
   run_one_job();
   EXPECT_FALSE(called);
+  end();
 }
 
 }  // namespace
