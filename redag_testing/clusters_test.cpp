@@ -22,6 +22,7 @@
 #include "redag_analysis/executors/clustered.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_lab/search/analysed.hpp"
@@ -156,6 +157,30 @@ TEST(Clustered, PassesTheTraceChecker) {
     const metrics::CheckReport report = metrics::check_trace(simulated(workload, seed));
     ASSERT_TRUE(report.ok()) << report.to_string() << replay(seed);
   });
+}
+
+// Inversions of several clusters at one time count as one. Where only one cluster has any, they are the whole's.
+TEST(Clustered, JobsOfOtherClustersAreNoInversion) {
+  std::uint64_t compared = 0;
+  for_each_workload(300, [&](const Workload &workload, std::uint64_t seed) {
+    const std::vector<ClusterPart> parts = parts_of(workload);
+    const std::vector<TaskPlace> places = places_in(parts);
+    const trace::Trace whole = simulated(workload, seed);
+    std::vector<metrics::Inversions> inverted;
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      trace::Trace own = whole;
+      own.info.workload = parts[p].workload;
+      own.info.config = sched::config_of(parts[p].workload);
+      own.events = part_of(whole.events, places, parts[p], p);
+      const metrics::Inversions inversions = metrics::summarize(own).inversions;
+      if (inversions.count > 0) inverted.push_back(inversions);
+    }
+    if (inverted.size() > 1) return;
+    ASSERT_EQ(metrics::summarize(whole).inversions, inverted.empty() ? metrics::Inversions{} : inverted[0])
+        << replay(seed);
+    ++compared;
+  });
+  EXPECT_GT(compared, 30U);
 }
 
 TEST(Clustered, TheCheckerNoticesAJobOnAWorkerOfAnotherCluster) {

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "redag/model/clusters.hpp"
+
 namespace redag::metrics {
 
 Activity::Activity(const Workload &workload, const sched::Config &config, Time begin)
@@ -12,7 +14,10 @@ Activity::Activity(const Workload &workload, const sched::Config &config, Time b
       begin_(begin),
       peaks_(workload.dags.size(), 0),
       busy_(config.workers, 0),
-      busy_since_(config.workers, kNever) {}
+      busy_since_(config.workers, kNever) {
+  for (const Dag &dag : workload.dags) clusters_.push_back(cluster_of(workload.platform, dag).value_or(0));
+  least_.resize(std::max<std::size_t>(1, workload.platform.clusters.size()));
+}
 
 void Activity::add(std::span<const JobEvent> events) {
   for (const JobEvent &event : events) add(event);
@@ -50,18 +55,27 @@ void Activity::end_of_instant() {
   if (!inverted) close_inversion(time_);
 }
 
-bool Activity::is_inverted() const {
-  const Urgency *least = nullptr;
+// No job waits for one of another cluster.
+bool Activity::is_inverted() {
+  const auto cluster = [this](TaskId task) { return clusters_[replay_.dag_of(task).value]; };
+  std::fill(least_.begin(), least_.end(), nullptr);
   for (std::uint32_t w = 0; w < replay_.worker_count(); ++w) {
     const LiveJob *job = replay_.running(w);
-    if (job != nullptr && (least == nullptr || *least < job->own)) least = &job->own;
+    if (job == nullptr) continue;
+    const Urgency *&least = least_[cluster(job->task)];
+    if (least == nullptr || *least < job->own) least = &job->own;
   }
-  if (least == nullptr) return false;
+  const auto is_above_least = [&](TaskId task, const Urgency &urgency) {
+    const Urgency *least = least_[cluster(task)];
+    return least != nullptr && urgency.key < least->key;
+  };
   // A job that lacks only a thread also waits for a less urgent one.
-  const auto &waiting = replay_.eligible_but_for_threads();
-  if (!waiting.empty() && waiting.begin()->urgency.key < least->key) return true;
+  for (const Replay::Waiter &waiter : replay_.eligible_but_for_threads()) {
+    if (is_above_least(waiter.task, waiter.urgency)) return true;
+    if (least_.size() == 1) break;  // it is the most urgent one
+  }
   return std::any_of(replay_.suspended().begin(), replay_.suspended().end(), [&](const Replay::JobRef &ref) {
-    return replay_.find(ref.task, ref.number)->own.key < least->key;
+    return is_above_least(ref.task, replay_.find(ref.task, ref.number)->own);
   });
 }
 

@@ -55,12 +55,14 @@ class Activity {
  private:
   void add(const JobEvent &event);
   void end_of_instant();
-  [[nodiscard]] bool is_inverted() const;
+  [[nodiscard]] bool is_inverted();
   [[nodiscard]] Duration measured(Time from, Time to) const;
   void close_inversion(Time at);
   void close_high_mode(Time at);
 
   Replay replay_;
+  std::vector<std::size_t> clusters_;   // by DagId: the index of its cluster; 0 without clusters
+  std::vector<const Urgency *> least_;  // by cluster: the least urgent running job; null: none
   Time begin_;
   Time time_ = 0;
   bool any_ = false;
