@@ -5,18 +5,15 @@
 
 #include <algorithm>
 
-#include "redag/model/clusters.hpp"
+#include "redag/sched/cluster_config.hpp"
 
 namespace redag::metrics {
 
 Activity::Activity(const Workload &workload, const sched::Config &config, Time begin)
-    : replay_(workload, config),
-      begin_(begin),
-      peaks_(workload.dags.size(), 0),
-      busy_(config.workers, 0),
-      busy_since_(config.workers, kNever) {
-  for (const Dag &dag : workload.dags) clusters_.push_back(cluster_of(workload.platform, dag).value_or(0));
-  least_.resize(std::max<std::size_t>(1, workload.platform.clusters.size()));
+    : begin_(begin), peaks_(workload.dags.size(), 0), busy_(config.workers, 0), busy_since_(config.workers, kNever) {
+  const std::vector<ClusterPart> parts = parts_of(workload);
+  for (const ClusterPart &part : parts) parts_.emplace_back(part, sched::config_of(config, part));
+  places_ = places_in(parts);
 }
 
 void Activity::add(std::span<const JobEvent> events) {
@@ -24,23 +21,29 @@ void Activity::add(std::span<const JobEvent> events) {
 }
 
 void Activity::add(const JobEvent &event) {
-  if (event.task.value >= replay_.task_count() || is_of_body(event.kind)) return;
+  if (event.task.value >= places_.size() || is_of_body(event.kind)) return;
   if (any_ && event.time > time_) end_of_instant();
   any_ = true;
   time_ = std::max(time_, event.time);
-  replay_.apply(event);
-  if (event.kind == JobEventKind::HighMode) high_since_ = event.time;
-  if (event.kind == JobEventKind::LowMode) close_high_mode(event.time);
+  Part &part = parts_[places_[event.task.value].part];
+  Replay &replay = part.replay;
+  JobEvent own = event;  // in the cluster's numbers
+  own.task = places_[event.task.value].task;
+  if (event.worker != WorkerId::kNoneValue) own.worker -= part.cluster.first_worker;
+  replay.apply(own);
+  if (event.kind == JobEventKind::HighMode) part.high_since = event.time;
+  if (event.kind == JobEventKind::LowMode) close_high_mode(part, event.time);
 
   if (event.kind == JobEventKind::Dispatched) {
-    std::uint32_t &peak = peaks_[replay_.dag_of(event.task).value];
-    peak = std::max(peak, replay_.active(replay_.dag_of(event.task)));
-    const std::uint32_t group = replay_.group_of(event.task);
-    if (group != Replay::kNoGroup && replay_.group_active(group) > 1) ++group_overlaps_;
+    const DagId dag = replay.dag_of(own.task);
+    std::uint32_t &peak = peaks_[part.cluster.dags[dag.value].value];
+    peak = std::max(peak, replay.active(dag));
+    const std::uint32_t group = replay.group_of(own.task);
+    if (group != Replay::kNoGroup && replay.group_active(group) > 1) ++group_overlaps_;
   }
-  if (event.worker >= busy_.size()) return;
+  if (event.worker >= busy_.size() || own.worker >= replay.worker_count()) return;
   Time &since = busy_since_[event.worker];
-  const bool is_busy = !replay_.stack(event.worker).empty();
+  const bool is_busy = !replay.stack(own.worker).empty();
   if (is_busy && since == kNever) since = event.time;
   if (!is_busy && since != kNever) {
     busy_[event.worker] += measured(since, event.time);
@@ -50,32 +53,24 @@ void Activity::add(const JobEvent &event) {
 
 // Decisions of one instant belong together. Only an inversion that remains when time moves on has a length.
 void Activity::end_of_instant() {
-  const bool inverted = is_inverted();
+  const bool inverted =
+      std::any_of(parts_.begin(), parts_.end(), [](const Part &part) { return is_inverted(part.replay); });
   if (inverted && inverted_since_ == kNever) inverted_since_ = time_;
   if (!inverted) close_inversion(time_);
 }
 
-// No job waits for one of another cluster.
-bool Activity::is_inverted() {
-  const auto cluster = [this](TaskId task) { return clusters_[replay_.dag_of(task).value]; };
-  std::fill(least_.begin(), least_.end(), nullptr);
-  for (std::uint32_t w = 0; w < replay_.worker_count(); ++w) {
-    const LiveJob *job = replay_.running(w);
-    if (job == nullptr) continue;
-    const Urgency *&least = least_[cluster(job->task)];
-    if (least == nullptr || *least < job->own) least = &job->own;
+bool Activity::is_inverted(const Replay &replay) {
+  const Urgency *least = nullptr;
+  for (std::uint32_t w = 0; w < replay.worker_count(); ++w) {
+    const LiveJob *job = replay.running(w);
+    if (job != nullptr && (least == nullptr || *least < job->own)) least = &job->own;
   }
-  const auto is_above_least = [&](TaskId task, const Urgency &urgency) {
-    const Urgency *least = least_[cluster(task)];
-    return least != nullptr && urgency.key < least->key;
-  };
+  if (least == nullptr) return false;
   // A job that lacks only a thread also waits for a less urgent one.
-  for (const Replay::Waiter &waiter : replay_.eligible_but_for_threads()) {
-    if (is_above_least(waiter.task, waiter.urgency)) return true;
-    if (least_.size() == 1) break;  // it is the most urgent one
-  }
-  return std::any_of(replay_.suspended().begin(), replay_.suspended().end(), [&](const Replay::JobRef &ref) {
-    return is_above_least(ref.task, replay_.find(ref.task, ref.number)->own);
+  const auto &waiting = replay.eligible_but_for_threads();
+  if (!waiting.empty() && waiting.begin()->urgency.key < least->key) return true;
+  return std::any_of(replay.suspended().begin(), replay.suspended().end(), [&](const Replay::JobRef &ref) {
+    return replay.find(ref.task, ref.number)->own.key < least->key;
   });
 }
 
@@ -91,17 +86,17 @@ void Activity::close_inversion(Time at) {
   inversions_.longest = std::max(inversions_.longest, length);
 }
 
-void Activity::close_high_mode(Time at) {
-  if (high_since_ != kNever && at >= begin_) {
+void Activity::close_high_mode(Part &part, Time at) {
+  if (part.high_since != kNever && at >= begin_) {
     ++high_mode_.count;
-    high_mode_.total += measured(high_since_, at);
+    high_mode_.total += measured(part.high_since, at);
   }
-  high_since_ = kNever;
+  part.high_since = kNever;
 }
 
 void Activity::finish(Time end) {
   if (any_) end_of_instant();
-  close_high_mode(end);
+  for (Part &part : parts_) close_high_mode(part, end);
   close_inversion(end);
   for (std::size_t w = 0; w < busy_.size(); ++w) {
     if (busy_since_[w] != kNever) busy_[w] += measured(busy_since_[w], end);

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <span>
 #include <vector>
 
@@ -34,8 +35,7 @@ struct HighModeTime {
 
 class Activity {
  public:
-  /// Measures workers and inversions from `begin` on, and peaks from the first event. `workload` must outlive this
-  /// object.
+  /// Measures workers and inversions from `begin` on, and peaks from the first event.
   Activity(const Workload &workload, const sched::Config &config, Time begin);
 
   void add(std::span<const JobEvent> events);
@@ -53,22 +53,30 @@ class Activity {
   [[nodiscard]] const HighModeTime &high_mode() const { return high_mode_; }
 
  private:
+  /// What one cluster does: no job waits for one of another.
+  struct Part {
+    Part(const ClusterPart &its_part, const sched::Config &config)
+        : cluster(its_part), replay(cluster.workload, config) {}
+
+    const ClusterPart cluster;
+    Replay replay;
+    Time high_since = kNever;
+  };
+
   void add(const JobEvent &event);
   void end_of_instant();
-  [[nodiscard]] bool is_inverted();
+  [[nodiscard]] static bool is_inverted(const Replay &replay);
   [[nodiscard]] Duration measured(Time from, Time to) const;
   void close_inversion(Time at);
-  void close_high_mode(Time at);
+  void close_high_mode(Part &part, Time at);
 
-  Replay replay_;
-  std::vector<std::size_t> clusters_;   // by DagId: the index of its cluster; 0 without clusters
-  std::vector<const Urgency *> least_;  // by cluster: the least urgent running job; null: none
+  std::deque<Part> parts_;         // keeps its elements where they are
+  std::vector<TaskPlace> places_;  // by TaskId
   Time begin_;
   Time time_ = 0;
   bool any_ = false;
   Time inverted_since_ = kNever;
   Inversions inversions_;
-  Time high_since_ = kNever;
   HighModeTime high_mode_;
   std::vector<std::uint32_t> peaks_;
   std::uint64_t group_overlaps_ = 0;
