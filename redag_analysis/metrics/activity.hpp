@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "redag/model/clusters.hpp"
 #include "redag_analysis/metrics/replay.hpp"
 
 namespace redag::metrics {
