@@ -123,7 +123,9 @@ TEST_P(EngineClock, NorDoShortJobsThatCloseThemselves) {
           RunningJob &running = *RunningJob::current();
           running.close();
           // The first job begins on the real clock, and is not short on a busy machine.
-          if (job.number > 0) EXPECT_EQ(running.charged, running.ended - running.begun);
+          if (job.number > 0) {
+            EXPECT_EQ(running.charged, running.ended - running.begun);
+          }
           charged = running.charged;
           if (lingers) clock_ahead += kLong;
           return Outcome::Finished;
