@@ -208,6 +208,7 @@ class GroupWriter {
                 {"run", Json::parse(trace::run_info_to_json(group_.info()))},
                 {"verdict", std::move(verdict)},
                 {"total", to_json(group_.total())},
+                {"clusters", clusters()},
                 {"dags", dags()},
                 {"tasks", tasks()},
                 {"bounds",
@@ -225,6 +226,14 @@ class GroupWriter {
     const bool known = at < bounds.size();
     row["bound_ns"] = known ? optional_time(bounds[at].response) : Json(nullptr);
     row["method"] = known ? bounds[at].method : std::string();
+  }
+
+  Json clusters() const {
+    Json rows = Json::array();
+    for (const Cluster &cluster : group_.workload().platform.clusters) {
+      rows.push_back(Json{{"name", cluster.name}, {"workers", cluster.workers}});
+    }
+    return rows;
   }
 
   Json dags() const {

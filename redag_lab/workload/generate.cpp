@@ -92,6 +92,7 @@ class Generator {
       draw_demands(workload_.dags[d], std::span<const double>(*utilizations).subspan(next));
       next += workload_.dags[d].tasks.size();
     }
+    if (o_.clusters > 0) place_in_clusters();
     REDAG_CHECK(!has_errors(validate(workload_)), "a generated workload is valid");
     return std::move(workload_);
   }
@@ -260,6 +261,26 @@ class Generator {
     }
   }
 
+  // One DAG after the other goes where the utilization per worker is lowest. An exclusive group is one of its cluster.
+  void place_in_clusters() {
+    std::vector<Cluster> &clusters = workload_.platform.clusters;
+    for (std::uint32_t c = 0; c < o_.clusters; ++c) {
+      clusters.push_back(
+          {fmt::format("cluster{}", c), o_.workers / o_.clusters + (c < o_.workers % o_.clusters ? 1U : 0U)});
+    }
+    std::vector<double> loads(clusters.size());
+    for (Dag &dag : workload_.dags) {
+      const auto place = std::min_element(loads.begin(), loads.end()) - loads.begin();
+      const Cluster &cluster = clusters[static_cast<std::size_t>(place)];
+      dag.cluster = cluster.name;
+      for (Task &task : dag.tasks) {
+        if (!task.group.empty()) task.group = fmt::format("{}_{}", cluster.name, task.group);
+        loads[static_cast<std::size_t>(place)] +=
+            static_cast<double>(task.wcet) / static_cast<double>(task.period) / cluster.workers;
+      }
+    }
+  }
+
   const GenerateOptions &o_;
   std::uint64_t seed_;
   std::uint32_t dag_ = 0;
@@ -282,6 +303,9 @@ Diagnostics find_mistakes(const GenerateOptions &o) {
   require(std::uint64_t{o.dags} * o.max_tasks <= kMaxTasks,
           fmt::format("dags * max_tasks must be at most {}", kMaxTasks));
   require(o.workers >= 1 && o.workers <= kMaxWorkers, fmt::format("workers must be from 1 to {}", kMaxWorkers));
+  require(o.clusters <= o.workers,
+          fmt::format("{} clusters need at least as many workers, not {}", o.clusters, o.workers));
+  require(o.clusters <= kMaxClusters, fmt::format("clusters must be at most {}", kMaxClusters));
   require(o.preemption != PreemptionMode::Os || is_static(o.policy), "preemption 'os' needs a static policy");
   require(o.utilization > 0 && std::isfinite(o.utilization), "utilization must be greater than zero");
   require(o.max_task_utilization > 0 && o.max_task_utilization <= 1, "max_task_utilization must be in (0, 1]");

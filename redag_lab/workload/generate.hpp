@@ -55,6 +55,7 @@ struct GenerateOptions {
   std::uint32_t min_tasks = 3;  // per DAG
   std::uint32_t max_tasks = 8;
   std::uint32_t workers = 2;
+  std::uint32_t clusters = 0;  // that share the workers evenly; 0: all workers serve all DAGs
   PreemptionMode preemption = PreemptionMode::Auto;
   PolicyKind policy = PolicyKind::RateMonotonic;
 

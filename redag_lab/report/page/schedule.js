@@ -23,7 +23,7 @@ function scheduleFigure(groups, state) {
     const from = seen.begin_ns - start;
     const used = state.rows === 'workers' ? [] : tasksOf(jobs, slices, view.task);
     const rows = state.rows === 'workers'
-      ? Array.from({length: Math.min(group.run.config.workers, MOST_ROWS)}, (_, w) => `worker ${w}`)
+      ? Array.from({length: Math.min(group.run.config.workers, MOST_ROWS)}, (_, w) => workerName(group, w))
       : used.map((task) => taskName(group, task));
     const rowOf = new Map(used.map((task, i) => [task, i]));
     const row = (task, worker) => (state.rows === 'workers' ? worker : rowOf.get(task));
@@ -33,6 +33,13 @@ function scheduleFigure(groups, state) {
     const marks = state.rows === 'workers' ? [] : jobs.task.map((task, i) => [
       rowOf.get(task), from + jobs.release[i], from + jobs.release[i] + jobs.deadline[i], i]).filter(shown);
     return {group, view, jobs, slices, rows, bars, marks, from, to: seen.end_ns - start, start};
+  }
+
+  // Workers are numbered through all clusters.
+  function workerName(group, worker) {
+    let first = 0;
+    const cluster = group.clusters.find(({workers}) => worker < (first += workers));
+    return cluster ? `worker ${worker} (${cluster.name})` : `worker ${worker}`;
   }
 
   // Returns the tasks with a row. If not all fit, tasks that missed deadlines precede the first ones.
@@ -78,7 +85,7 @@ function scheduleFigure(groups, state) {
             if (item.seriesName === 'jobs') return tip(describeJob(c, i));
             const j = c.slices.job[i];
             const job = j === null ? [taskName(c.group, c.slices.task[i])] : describeJob(c, j);
-            return tip([...job, `worker ${c.slices.worker[i]}: ${formatTime(c.slices.length[i])} from ${formatTime(item.value[1])}`,
+            return tip([...job, `${workerName(c.group, c.slices.worker[i])}: ${formatTime(c.slices.length[i])} from ${formatTime(item.value[1])}`,
               ['finished here', 'aborted here', 'preempted here', 'continues'][c.slices.how[i]]]);
           },
         },
