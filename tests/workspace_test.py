@@ -2,14 +2,19 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Checks that `rosdep install --from-paths` can resolve the dependencies in the package.xml files.
+"""Checks that a ROS workspace with this repository in it works: rosdep knows every dependency in the package.xml files,
+and colcon finds the packages.
 
-Usage: rosdep_test.py SOURCE_DIR. Uses the standard library only. A key that rosdep does not know stops the whole
-installation. A new dependency therefore gets its line here, copied from ros/rosdistro (rosdep/base.yaml).
+Usage: workspace_test.py SOURCE_DIR. Uses the standard library only, and colcon where it is installed. A key that rosdep
+does not know stops the whole installation. A new dependency therefore gets its line here, copied from ros/rosdistro
+(rosdep/base.yaml).
 """
 import pathlib
 import re
+import shutil
+import subprocess
 import sys
+import tempfile
 import unittest
 import xml.etree.ElementTree
 
@@ -39,6 +44,26 @@ PACKAGES = ("redag", "redag_analysis", "redag_lab", *ROS_PACKAGES)
 def keys_of(package):
     root = xml.etree.ElementTree.parse(SOURCE / package / "package.xml").getroot()
     return {element.text.strip() for element in root if element.tag.endswith("depend")}
+
+
+def colcon_list(*arguments):
+    """Returns the names of the packages that colcon finds in a workspace with a clone of this repository."""
+    with tempfile.TemporaryDirectory() as workspace:
+        source = pathlib.Path(workspace, "src")
+        source.mkdir()
+        (source / "redag-rt").symlink_to(SOURCE)
+        # colcon imports modules of the system's Python.
+        command = ["/usr/bin/env", "PATH=/usr/bin:/bin", "colcon", "--log-base", "/dev/null", "list", "--names-only", *arguments]
+        return subprocess.run(command, cwd=workspace, capture_output=True, text=True, check=True).stdout.split()
+
+
+@unittest.skipUnless(shutil.which("colcon", path="/usr/bin:/bin"), "no colcon (Debian: colcon)")
+class Colcon(unittest.TestCase):
+    def test_the_packages_are_found_and_nothing_else(self):
+        self.assertEqual(sorted(colcon_list()), sorted(PACKAGES))
+
+    def test_what_the_executor_needs(self):
+        self.assertEqual(colcon_list("--packages-up-to", "redag_rclcpp"), ["redag", "redag_analysis", "redag_rclcpp"])
 
 
 class Rosdep(unittest.TestCase):
