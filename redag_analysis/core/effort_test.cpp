@@ -63,7 +63,7 @@ std::uint64_t steps_of(const Method &method, const TaskSet &task_set) {
 }
 
 TEST(Effort, AMethodGivesUpAtItsLimitAndTheOthersAnswer) {
-  const TaskSet task_set = many_tasks(3000, 2);
+  const TaskSet task_set = many_tasks(1500, 2);
   AnalyzeOptions options;
   options.effort = 1'000'000;
   const Report report = analyze(task_set, options);
@@ -78,7 +78,7 @@ TEST(Effort, AMethodGivesUpAtItsLimitAndTheOthersAnswer) {
 }
 
 TEST(Effort, TheCallerEndsAMethodForAReason) {
-  const TaskSet task_set = many_tasks(3000, 2, Ties::Fixed);
+  const TaskSet task_set = many_tasks(1500, 2, Ties::Fixed);
   std::map<std::string, int> asked;
   AnalyzeOptions options;
   options.stop = [&](const AnalysisProgress &progress) {
@@ -97,7 +97,7 @@ TEST(Effort, TheCallerEndsAMethodForAReason) {
 }
 
 TEST(Effort, AScopeOfTheCallerEndsWhatIsInside) {
-  const TaskSet task_set = many_tasks(3000, 2);
+  const TaskSet task_set = many_tasks(1500, 2);
   Effort::Limits limits;
   limits.steps = 1'000'000;
   const Effort effort(limits);
@@ -148,7 +148,7 @@ TEST(Effort, ABoundItemisedAloneIsTheSameAsAmongAll) {
 // On one worker the tasks of one period are evaluated together. With few periods the steps are linear in the tasks.
 TEST(Effort, OneWorkerTakesLinearStepsInTasksOfFewPeriods) {
   const std::uint64_t few = steps_of(rta_preemptive(), many_tasks(300, 1));
-  const std::uint64_t many = steps_of(rta_preemptive(), many_tasks(3000, 1));
+  const std::uint64_t many = steps_of(rta_preemptive(), many_tasks(1500, 1));
   EXPECT_GT(few, 300U);
   EXPECT_LE(many, 20 * few);
 }
@@ -156,7 +156,7 @@ TEST(Effort, OneWorkerTakesLinearStepsInTasksOfFewPeriods) {
 // On several workers each task looks at all more urgent ones, in each of a few evaluations.
 TEST(Effort, SeveralWorkersTakeQuadraticStepsAtMost) {
   const std::uint64_t few = steps_of(bertogna_cirinei(), many_tasks(300, 2));
-  const std::uint64_t many = steps_of(bertogna_cirinei(), many_tasks(3000, 2));
+  const std::uint64_t many = steps_of(bertogna_cirinei(), many_tasks(1500, 2));
   EXPECT_LE(many, 200 * few);
 }
 

@@ -16,6 +16,7 @@ import unittest
 from program import PROGRAM, SANITIZED, Case, interrupt, main, redag
 
 MIB = 1 << 20
+MANY = 1500 if SANITIZED else 3000
 
 
 def independent(count, workers=1):
@@ -72,7 +73,7 @@ class Memory(Case):
 
 class Limits(Case):
     def test_a_method_gives_up_and_the_others_answer(self):
-        many = self.write("many.yaml", independent(3000, 2))
+        many = self.write("many.yaml", independent(MANY, 2))
         text = self.expect(redag("analyze", many, "--effort", 1), 0).stdout
         self.assertIn("schedulable: every deadline is met, by global_rm_light", text)
         self.assertIn("gave up on bertogna_cirinei: more than 1 million steps\n", text)
@@ -84,7 +85,7 @@ class Limits(Case):
         self.assertTrue(document["schedulable"])
 
     def test_a_time_limit(self):
-        many = self.write("many.yaml", independent(3000, 2))
+        many = self.write("many.yaml", independent(MANY, 2))
         text = self.expect(redag("analyze", many, "--time-limit", "1ns"), 0).stdout
         self.assertIn("gave up on bertogna_cirinei: the time limit of 1ns has passed\n", text)
         result = self.expect(redag("sensitivity", many, "--time-limit", "1ns", "--json"), 0,
@@ -105,7 +106,7 @@ class Limits(Case):
             self.assertEqual(sum(term["amount_ns"] for term in task["terms"]), task["bound_ns"])
 
     def test_interrupt_keeps_what_was_found(self):
-        many = self.write("many.yaml", independent(20_000, 2))
+        many = self.write("many.yaml", independent(6_000 if SANITIZED else 20_000, 2))
         process = subprocess.Popen([PROGRAM, "analyze", many, "--effort", "0", "--json"], stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True)
         interrupt(process, 4)
