@@ -14,7 +14,7 @@
 namespace {
 
 constexpr std::int64_t kStep = 100;  // ns; a job of the engine reads two clocks
-constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
 constexpr clockid_t kClocks = CLOCK_BOOTTIME + 1;
 
 std::atomic<bool> everywhere{false};
@@ -28,7 +28,7 @@ void set_origins() {
   for (clockid_t clock = 0; clock < kClocks; ++clock) {
     timespec time{};
     read_real(clock, &time);
-    origins[static_cast<std::size_t>(clock)] = time.tv_sec * kSecond + time.tv_nsec - readings * kStep;
+    origins[static_cast<std::size_t>(clock)] = time.tv_sec * kNanosecondsPerSecond + time.tv_nsec - readings * kStep;
   }
 }
 
@@ -41,8 +41,8 @@ extern "C" int clock_gettime(clockid_t clock, timespec *time) noexcept {
   }
   const std::int64_t now = origins[static_cast<std::size_t>(clock)].load(std::memory_order_relaxed) +
                            (readings.fetch_add(1, std::memory_order_relaxed) + 1) * kStep;
-  time->tv_sec = now / kSecond;
-  time->tv_nsec = now % kSecond;
+  time->tv_sec = now / kNanosecondsPerSecond;
+  time->tv_nsec = now % kNanosecondsPerSecond;
   return 0;
 }
 

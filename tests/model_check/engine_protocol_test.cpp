@@ -13,7 +13,7 @@
 namespace redag::model_check {
 namespace {
 
-std::uint32_t thread(std::function<void()> body) { return explored::spawn(std::move(body)); }
+using explored::spawn;
 
 std::string name_of(Preemption preemption) {
   if (preemption == Preemption::None) return "none";
@@ -37,7 +37,7 @@ void what_is_released_runs_once(const Platform &platform) {
   };
   Machine machine(ladder(3), platform, {work, work, work});
   machine.start_calmly();
-  const std::uint32_t source = thread([&] { machine.release(0); });
+  const std::uint32_t source = spawn([&] { machine.release(0); });
   machine.release(1);
   machine.release(2);
   all.wait();
@@ -89,7 +89,7 @@ TEST_P(EngineProtocol, AReleaseDuringTheStartIsNotLost) {
                       all.count();
                       return Outcome::Finished;
                     }});
-    const std::uint32_t source = thread([&] { machine.release(0); });
+    const std::uint32_t source = spawn([&] { machine.release(0); });
     machine.start();
     all.wait();
     explored::join(source);
@@ -102,7 +102,7 @@ TEST_P(EngineProtocol, NothingRunsOnceItIsIdleAfterAHalt) {
   expect_holds([] {
     Machine machine(ladder(2), platform(1), {nullptr, nullptr});
     machine.start_calmly();
-    const std::uint32_t source = thread([&] { machine.release(0); });
+    const std::uint32_t source = spawn([&] { machine.release(0); });
     machine.release(1);
     machine.finish();
     explored::join(source);
@@ -125,7 +125,7 @@ TEST_P(EngineProtocol, JoinWaitsForWhatHasStarted) {
   expect_holds([] {
     Machine machine(ladder(2), platform(1), {nullptr, nullptr});
     machine.start_calmly();
-    const std::uint32_t source = thread([&] { machine.release(0); });
+    const std::uint32_t source = spawn([&] { machine.release(0); });
     machine.release(1);
     explored::join(source);
     machine.engine->halt();
@@ -154,7 +154,7 @@ TEST_P(EngineProtocol, JoinWaitsForADecisionUnderWay) {
   expect_holds([] {
     Machine machine(ladder(1), platform(1), {nullptr});
     machine.start_calmly();
-    const std::uint32_t source = thread([&] { machine.release(0); });
+    const std::uint32_t source = spawn([&] { machine.release(0); });
     machine.engine->halt();
     machine.engine->join();
     machine.quiet.begin();
@@ -181,7 +181,7 @@ TEST_P(EngineProtocol, AHaltFromABodyEndsTheRun) {
       return Outcome::Finished;
     };
     machine.start_calmly();
-    const std::uint32_t source = thread([&] {
+    const std::uint32_t source = spawn([&] {
       machine.release(1);
       machine.release(2);
     });
@@ -220,7 +220,7 @@ TEST_P(EngineProtocol, BoundsAndGroupsHold) {
     };
     Machine machine(workload, platform(2), {in(true, false), in(true, true), in(false, true)});
     machine.start_calmly();
-    const std::uint32_t source = thread([&] { machine.release(1); });
+    const std::uint32_t source = spawn([&] { machine.release(1); });
     machine.release(2);
     machine.release(0);
     all.wait();
@@ -248,7 +248,7 @@ TEST_P(EngineProtocol, PreemptedJobsResume) {
     Machine machine(ladder(3), Platform{GetParam(), 1, 3, false, 0}, {work(0), work(1), work(2)});
     machine.start_calmly();
     machine.release(0);
-    const std::uint32_t source = thread([&] { machine.release(2); });
+    const std::uint32_t source = spawn([&] { machine.release(2); });
     machine.release(1);
     all.wait();
     explored::join(source);
@@ -280,7 +280,7 @@ TEST_P(EngineProtocol, ChainsRunInTheirOrder) {
                      }});
     machine.start_calmly();
     machine.release(0);
-    const std::uint32_t source = thread([&] { machine.release(0); });
+    const std::uint32_t source = spawn([&] { machine.release(0); });
     machine.engine->miss(TaskId(0), 0, Reason::Overrun);
     ends.wait();
     explored::join(source);
@@ -309,7 +309,7 @@ TEST_P(EngineProtocol, AJobIsBegunByItsThreadOrByOneThatIsFreeBefore) {
       return note(job);
     };
     machine.start_calmly();
-    const std::uint32_t source = thread([&] { machine.release(0); });
+    const std::uint32_t source = spawn([&] { machine.release(0); });
     machine.release(2);
     all.wait();
     explored::join(source);
@@ -334,7 +334,7 @@ TEST_P(EngineProtocol, AnExceptionEndsItsJobAlone) {
                        throw std::runtime_error("on purpose");
                      }});
     machine.start_calmly();
-    const std::uint32_t source = thread([&] { machine.release(1); });
+    const std::uint32_t source = spawn([&] { machine.release(1); });
     machine.release(0);
     all.wait();
     explored::join(source);
@@ -399,7 +399,7 @@ TEST(EngineStart, AThreadThatCannotBeHadEndsTheOthers) {
   expect_holds([] {
     runtime::thread_that_fails = "redag-1";
     Machine machine(ladder(1), Platform{Preemption::None, 2, 0, false, 0}, {nullptr});
-    const std::uint32_t source = thread([&] { machine.release(0); });
+    const std::uint32_t source = spawn([&] { machine.release(0); });
     explored::check(!machine.engine->start().has_value(), "a thread failed, and nobody says so");
     explored::join(source);
     explored::check(!machine.engine->halting(), "halted");
@@ -446,7 +446,7 @@ TEST(EngineShare, OnlyJobsOfLowerCriticalityAreOrdinaryThreads) {
                        return Outcome::Finished;
                      }});
     machine.start_calmly();
-    const std::uint32_t source = thread([&] { machine.release(1); });
+    const std::uint32_t source = spawn([&] { machine.release(1); });
     machine.release(0);
     explored::join(source);
     all.wait();
@@ -479,7 +479,7 @@ TEST_P(EngineProtocol, AWatchdogSeesOnlyJobsInProgress) {
     with_events.trace_capacity = 32;
     Machine machine(workload, with_events, {work, work});
     machine.start_calmly();
-    const std::uint32_t watcher = thread([&] {
+    const std::uint32_t watcher = spawn([&] {
       std::vector<runtime::OverdueJob> named;
       for (int look = 0; look < 2; ++look) machine.engine->watch({1, 0}, kSecond, named);
       for (const runtime::OverdueJob &job : named) {

@@ -13,7 +13,7 @@ namespace {
 
 using runtime::InProgress;
 
-std::uint32_t thread(std::function<void()> body) { return explored::spawn(std::move(body)); }
+using explored::spawn;
 
 /// Counts calls in progress, and takes work that is left to them.
 class Calls {
@@ -67,8 +67,8 @@ TEST(InProgressProtocol, NoCallIsInProgressAfterTheWait) {
     expect_holds(
         [] {
           Calls calls;
-          const std::uint32_t a = thread([&] { calls.call(); });
-          const std::uint32_t b = thread([&] { calls.call(); });
+          const std::uint32_t a = spawn([&] { calls.call(); });
+          const std::uint32_t b = spawn([&] { calls.call(); });
           calls.close();
           calls.quiet.begin();
           explored::check(!calls.call(), "a call begins after the end");
@@ -82,8 +82,8 @@ TEST(InProgressProtocol, NoCallIsInProgressAfterTheWait) {
 TEST(InProgressProtocol, TwoThreadsCanWait) {
   expect_holds([] {
     Calls calls;
-    const std::uint32_t a = thread([&] { calls.call(); });
-    const std::uint32_t b = thread([&] { calls.close(); });
+    const std::uint32_t a = spawn([&] { calls.call(); });
+    const std::uint32_t b = spawn([&] { calls.close(); });
     calls.close();
     calls.quiet.begin();
     explored::join(a);
@@ -94,8 +94,8 @@ TEST(InProgressProtocol, TwoThreadsCanWait) {
 TEST(InProgressProtocol, WorkThatIsLeftToCallsIsDone) {
   expect_holds([] {
     Calls calls;
-    const std::uint32_t a = thread([&] { calls.call(); });
-    const std::uint32_t b = thread([&] { calls.call(); });
+    const std::uint32_t a = spawn([&] { calls.call(); });
+    const std::uint32_t b = spawn([&] { calls.call(); });
     calls.leave_work();
     calls.leave_work();
     explored::join(a);

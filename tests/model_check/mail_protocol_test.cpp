@@ -7,7 +7,7 @@
 namespace redag::model_check {
 namespace {
 
-std::uint32_t thread(std::function<void()> body) { return explored::spawn(std::move(body)); }
+using explored::spawn;
 
 // Two workers and two tasks whose jobs are expected to be tiny.
 class MailProtocol : public ::testing::TestWithParam<Preemption> {
@@ -96,7 +96,7 @@ TEST_P(MailProtocol, TinyJobsThatCompeteAllRun) {
         return Outcome::Finished;
       };
     }
-    const std::uint32_t source = thread([&] { machine.release(1); });
+    const std::uint32_t source = spawn([&] { machine.release(1); });
     machine.release(0);
     all.wait();
     explored::join(source);

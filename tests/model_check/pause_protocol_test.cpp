@@ -9,7 +9,7 @@
 namespace redag::model_check {
 namespace {
 
-std::uint32_t thread(std::function<void()> body) { return explored::spawn(std::move(body)); }
+using explored::spawn;
 
 constexpr Preemption kModes[] = {Preemption::None, Preemption::Cooperative, Preemption::Full};
 
@@ -27,7 +27,7 @@ TEST(PauseProtocol, PausedNothingRunsAndAfterwardsEverythingDoes) {
       };
       Machine machine(ladder(2), platform(preemption, 1), {work, work});
       machine.start_calmly();
-      const std::uint32_t source = thread([&] { machine.release(1); });
+      const std::uint32_t source = spawn([&] { machine.release(1); });
       machine.release(0);
       machine.engine->pause();
       explored::check(machine.engine->wait_paused(kNever), "nobody resumed, and it did not wait");
@@ -49,7 +49,7 @@ TEST(PauseProtocol, WaitPausedEndsWhenItIsResumedOrInTime) {
           machine.start_calmly();
           machine.release(0);
           machine.engine->pause();
-          const std::uint32_t resumer = thread([&] { machine.engine->resume(); });
+          const std::uint32_t resumer = spawn([&] { machine.engine->resume(); });
           static_cast<void>(machine.engine->wait_paused(kNever));
           explored::join(resumer);
           machine.engine->pause();
@@ -79,7 +79,7 @@ TEST(PauseProtocol, ResumeEndsAWaitThoughAJobGoesOn) {
       machine.release(0);
       begun.wait();
       machine.engine->pause();
-      const std::uint32_t resumer = thread([&] { machine.engine->resume(); });
+      const std::uint32_t resumer = spawn([&] { machine.engine->resume(); });
       explored::check(!machine.engine->wait_paused(kNever), "a job goes on, and it is said to be paused");
       waited.count();
       explored::join(resumer);
@@ -102,7 +102,7 @@ TEST(PauseProtocol, RunOneTakesOneJobThatNobodyElseRuns) {
       machine.start_calmly();
       machine.engine->pause();
       machine.release(0);
-      const std::uint32_t source = thread([&] { machine.release(1); });
+      const std::uint32_t source = spawn([&] { machine.release(1); });
       machine.release(2);
       explored::check(machine.engine->run_one(), "there was a job to run");
       explored::check(machine.ran(2) == 1, "it was not the most urgent one");
@@ -121,7 +121,7 @@ TEST(PauseProtocol, AHaltEndsAPause) {
     expect_holds([&] {
       Machine machine(ladder(2), platform(preemption, 1), {nullptr, nullptr});
       machine.start_calmly();
-      const std::uint32_t source = thread([&] {
+      const std::uint32_t source = spawn([&] {
         machine.release(0);
         machine.engine->halt();
       });
@@ -182,7 +182,7 @@ TEST(TaskProtocol, ATaskThatIsRemovedEndsItsJobsAndThenItsBody) {
           });
         };
         const TaskId steady = add();
-        const std::uint32_t source = thread([&] { engine.release(steady, 0); });
+        const std::uint32_t source = spawn([&] { engine.release(steady, 0); });
         const TaskId first = add();
         engine.release(first, 0);
         engine.remove_task(first);
@@ -215,7 +215,7 @@ TEST(TaskProtocol, ADagThatIsRemovedFromItsOwnBody) {
         return Outcome::Finished;
       };
       machine.start_calmly();
-      const std::uint32_t source = thread([&] {
+      const std::uint32_t source = spawn([&] {
         machine.release(0);
         const runtime::AddedDag added =
             machine.engine->add_dag(ladder(1).dags[0], {[](const Job &) { return Outcome::Finished; }});

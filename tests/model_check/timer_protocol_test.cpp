@@ -16,7 +16,7 @@ namespace {
 using runtime::Event;
 using runtime::Parker;
 
-std::uint32_t thread(std::function<void()> body) { return explored::spawn(std::move(body)); }
+using explored::spawn;
 
 constexpr ExploreOptions kTimed{true, 50'000'000, 0, true};
 
@@ -31,8 +31,8 @@ TEST(ParkerProtocol, NoTokenIsLost) {
             sent.fetch_add(1);
             parker.unpark();
           };
-          const std::uint32_t a = thread(send);
-          const std::uint32_t b = thread([&] {
+          const std::uint32_t a = spawn(send);
+          const std::uint32_t b = spawn([&] {
             send();
             send();
           });
@@ -49,7 +49,7 @@ TEST(ParkerProtocol, NoTokenIsLostByLookingBeforeSleeping) {
   expect_holds([] {
     Parker parker;
     Atomic<int> sent{0};
-    const std::uint32_t a = thread([&] {
+    const std::uint32_t a = spawn([&] {
       for (int i = 0; i < 2; ++i) {
         sent.fetch_add(1);
         parker.unpark();
@@ -64,7 +64,7 @@ TEST(ParkerProtocol, ATokenThatIsNotTakenInTimeIsTakenLater) {
   expect_holds(
       [] {
         Parker parker;
-        const std::uint32_t a = thread([&] { parker.unpark(); });
+        const std::uint32_t a = spawn([&] { parker.unpark(); });
         int taken = parker.park_until(3) ? 1 : 0;
         taken += parker.park_until(5) ? 1 : 0;
         explored::join(a);
@@ -81,7 +81,7 @@ TEST(ParkerProtocol, ParkingForATimeOnlySleepsThatLong) {
       [] {
         Parker parker;
         bool sent = false;
-        const std::uint32_t a = thread([&] {
+        const std::uint32_t a = spawn([&] {
           explored::tick(2);
           sent = true;
           parker.unpark();
@@ -98,11 +98,11 @@ TEST(EventProtocol, EveryWaiterSeesIt) {
   expect_holds(
       [] {
         Event event;
-        const std::uint32_t a = thread([&] { event.wait(); });
-        const std::uint32_t b = thread([&] {
+        const std::uint32_t a = spawn([&] { event.wait(); });
+        const std::uint32_t b = spawn([&] {
           if (!event.wait_until(3)) explored::check(explored::now() >= 3, "timed out early");
         });
-        const std::uint32_t c = thread([&] { event.set(); });
+        const std::uint32_t c = spawn([&] { event.set(); });
         event.set();
         event.wait();
         explored::check(event.is_set(), "set, and not set");
@@ -163,7 +163,7 @@ TEST(TimerProtocol, AnIdleThreadReleasesOnTheSameGrid) {
             0);
         timer.add(one_timer_task(10), std::array{TaskId(0)}, 0);
         explored::check(timer.start(0, 15, {}).has_value(), "the timer does not start");
-        const std::uint32_t idle = thread([&] {
+        const std::uint32_t idle = spawn([&] {
           const Time next = timer.release_due();
           explored::check(next == kNever || next == 10, "the next release is off the grid");
         });
@@ -198,7 +198,7 @@ TEST(TimerProtocol, LeaderAndThreadMakeEachReleaseOnce) {
           });
           explored::check(releases.start({}).has_value(), "the thread does not start");
           runtime::Parker parker;
-          const std::uint32_t leader = thread([&] {
+          const std::uint32_t leader = spawn([&] {
             for (bool has_job = false; !has_job;) {
               const Time next = releases.lead(patience);
               if (next == kNever) parker.park();
@@ -225,7 +225,7 @@ TEST(TimerProtocol, AnAdditionIsNotSleptThrough) {
         },
         0);
     explored::check(timer.start(0, 5, {}).has_value(), "the timer does not start");
-    const std::uint32_t other = thread([&] { timer.add(one_timer_task(100), std::array{TaskId(1)}, 0); });
+    const std::uint32_t other = spawn([&] { timer.add(one_timer_task(100), std::array{TaskId(1)}, 0); });
     timer.add(one_timer_task(100), std::array{TaskId(0)}, 0);
     seen.wait();
     explored::join(other);
@@ -245,7 +245,7 @@ TEST(TimerProtocol, WhatWasRemovedIsNotReported) {
         0);
     timer.add(one_timer_task(100), std::array{TaskId(0)}, 0);
     explored::check(timer.start(0, 5, {}).has_value(), "the timer does not start");
-    const std::uint32_t other = thread([&] {
+    const std::uint32_t other = spawn([&] {
       timer.remove(std::array{TaskId(0)});
       removed.begin();
     });
@@ -279,7 +279,7 @@ TEST(ExecutorProtocol, NothingRunsAfterStop) {
           if (from_body) {
             executor.wait();
           } else {
-            const std::uint32_t other = thread([&] { executor.stop(); });
+            const std::uint32_t other = spawn([&] { executor.stop(); });
             executor.wait();
             explored::join(other);
           }
