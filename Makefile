@@ -24,15 +24,15 @@ demo: ## build the program, compare the executors on one workload, and make resu
 
 test: ## build everything and run all tests
 	@tools/bootstrap test
-	cmake --preset dev
-	cmake --build --preset dev
-	ctest --preset dev
+	cmake --preset test
+	cmake --build --preset test
+	ctest --preset test
 
 SEEDS ?= 10
 seeds: test ## run the tests of random cases SEEDS (10) times, each time with a new seed; make test always has the same one
 	@for i in $$(seq $(SEEDS)); do \
 	  seed=$$(od -An -N4 -tu4 /dev/urandom | tr -d ' '); echo "$$i of $(SEEDS): RC_PARAMS=seed=$$seed"; \
-	  RC_PARAMS="seed=$$seed" ctest --preset dev --progress -L '^(base|executors|metrics|model|runtime|testing|workload|model_check)$$' || exit; \
+	  RC_PARAMS="seed=$$seed" ctest --preset test --progress -L '^(base|executors|metrics|model|runtime|testing|workload|model_check)$$' || exit; \
 	done
 
 BENCH_ROUNDS ?= 7
@@ -120,5 +120,5 @@ install: ## install libraries, headers and program to PREFIX (default /usr/local
 	cmake --install build/release --prefix $(PREFIX)
 
 clean: ## remove what the targets above built; results/ stays
-	rm -rf build/dev build/release build/bench build/asan-ubsan build/tsan build/coverage build/mutate build/fuzz build/colcon
+	rm -rf build/dev build/test build/release build/bench build/asan-ubsan build/tsan build/coverage build/mutate build/fuzz build/colcon
 	git worktree prune

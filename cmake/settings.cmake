@@ -19,15 +19,16 @@ if((CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_
     "${CMAKE_CXX_COMPILER_VERSION}. Choose another with -DCMAKE_CXX_COMPILER=...")
 endif()
 
+# Messages and debuggers name files by their paths in the repository, on every machine.
+cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH repository)
+add_compile_options(-ffile-prefix-map=${repository}/=)
+
+# What ccache has compiled for one checkout serves every other one.
 find_program(CCACHE ccache)
 mark_as_advanced(CCACHE)
 if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_BASEDIR=${repository} ${CCACHE})
 endif()
-
-# Messages name files by their paths in the repository, on every machine.
-cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH repository)
-add_compile_options(-fmacro-prefix-map=${repository}/=)
 
 include(GNUInstallDirs)
 include(${CMAKE_CURRENT_LIST_DIR}/package.cmake)

@@ -28,8 +28,9 @@ add_library(redag_testing STATIC ${testing_sources})
 target_link_libraries(redag_testing
   PUBLIC redag_lab fmt::fmt LibYAML::LibYAML nlohmann_json::nlohmann_json GTest::gtest GTest::gmock rapidcheck
   PRIVATE redag_warnings)
-target_compile_definitions(redag_testing PUBLIC
-  REDAG_SOURCE_DIR="${PROJECT_SOURCE_DIR}" REDAG_BINARY_DIR="${CMAKE_BINARY_DIR}")
+# Only this source depends on where the sources lie: ccache finds the others again for another checkout.
+set_source_files_properties(redag_testing/repository.cpp PROPERTIES
+  COMPILE_DEFINITIONS REDAG_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 
 # redag_add_test_program(<group> <source>...)
 function(redag_add_test_program group)

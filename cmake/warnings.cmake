@@ -9,6 +9,10 @@ target_compile_options(redag_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshado
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   target_compile_options(redag_warnings INTERFACE -Wno-restrict)
 endif()
+# Takes sources that are compiled as one for headers with anonymous namespaces.
+if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(redag_warnings INTERFACE -Wno-subobject-linkage)
+endif()
 option(REDAG_WERROR "Treat warnings as errors" OFF)
 if(REDAG_WERROR)
   target_compile_options(redag_warnings INTERFACE -Werror)

@@ -8,12 +8,13 @@
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/sim/simulator.hpp"
+#include "redag_testing/repository.hpp"
 
 namespace redag {
 namespace {
 
 metrics::Summary simulate(PreemptionMode mode, PolicyKind policy) {
-  Workload workload = load_workload(REDAG_SOURCE_DIR "/workloads/contention.yaml").value().workload;
+  Workload workload = load_workload((testing::repository() / "workloads/contention.yaml").string()).value().workload;
   workload.platform.preemption = mode;
   workload.policy = policy;
   trace::RunInfo info;

@@ -15,6 +15,7 @@
 
 #include "redag/model/validate.hpp"
 #include "redag_lab/workload/generate.hpp"
+#include "redag_testing/repository.hpp"
 
 namespace redag {
 namespace {
@@ -230,7 +231,7 @@ TEST(ParseWorkload, AcceptsAByteOrderMarkAndWindowsLineEnds) {
 
 class TemporaryFile {
  public:
-  explicit TemporaryFile(const char *name) : path_(std::filesystem::path(testing::TempDir()) / name) {}
+  explicit TemporaryFile(const char *name) : path_(std::filesystem::path(::testing::TempDir()) / name) {}
   ~TemporaryFile() { std::filesystem::remove(path_); }
   TemporaryFile(const TemporaryFile &) = delete;
   TemporaryFile &operator=(const TemporaryFile &) = delete;
@@ -244,7 +245,7 @@ TEST(LoadWorkload, SaysWhyAFileCannotBeRead) {
   const auto missing = load_workload("/nonexistent/w.yaml");
   ASSERT_FALSE(missing);
   EXPECT_EQ(to_string(missing.error()), "/nonexistent/w.yaml: error: cannot open: No such file or directory");
-  const auto directory = load_workload(testing::TempDir());
+  const auto directory = load_workload(::testing::TempDir());
   ASSERT_FALSE(directory);
   EXPECT_NE(to_string(directory.error()).find("is a directory"), std::string::npos);
 }
@@ -288,8 +289,7 @@ TEST(ParseWorkload, ReadsAHundredThousandTasksInOneDag) {
 
 std::vector<std::filesystem::path> shipped_workloads() {
   std::vector<std::filesystem::path> paths;
-  for (const auto &entry :
-       std::filesystem::recursive_directory_iterator(std::filesystem::path(REDAG_SOURCE_DIR) / "workloads")) {
+  for (const auto &entry : std::filesystem::recursive_directory_iterator(testing::repository() / "workloads")) {
     if (entry.path().extension() == ".yaml") paths.push_back(entry.path());
   }
   std::sort(paths.begin(), paths.end());
@@ -309,7 +309,7 @@ TEST(ShippedWorkloads, LoadWithoutAWarning) {
 TEST(ShippedWorkloads, ThePaperOnesHaveTheirUtilizationAndShape) {
   for (const auto &[file, expected] : {std::pair{"harmonic_u06", 0.6}, std::pair{"harmonic_u08", 0.8},
                                        std::pair{"nonharmonic_u06", 0.6}, std::pair{"nonharmonic_u08", 0.8}}) {
-    const auto path = std::filesystem::path(REDAG_SOURCE_DIR) / "workloads/paper" / (std::string(file) + ".yaml");
+    const auto path = testing::repository() / "workloads/paper" / (std::string(file) + ".yaml");
     const Workload workload = load_workload(path).value().workload;
     ASSERT_EQ(workload.dags.size(), 2U);
     EXPECT_EQ(workload.dags[0].tasks.size(), 6U);
@@ -334,7 +334,7 @@ void expect_same_keys(const nlohmann::json &properties, const std::string &unkno
 }
 
 TEST(Schema, HasTheKeysOfTheReader) {
-  std::ifstream file(std::string(REDAG_SOURCE_DIR) + "/docs/workload.schema.json");
+  std::ifstream file(testing::repository() / "docs/workload.schema.json");
   const nlohmann::json schema = nlohmann::json::parse(file);
   const auto hint_of = [](const std::string &text) {
     const auto loaded = parse_workload(text, "x");

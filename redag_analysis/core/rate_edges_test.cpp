@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <string>
 #include <string_view>
 
 #include "redag/model/workload_yaml.hpp"
@@ -17,6 +18,7 @@
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_testing/bound_property.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/repository.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -243,7 +245,7 @@ TEST(RateEdges, OtherMethodsRefuseThem) {
 TEST(RateEdges, TheProjectsOwnWorkloadsAreSchedulable) {
   for (const char *name :
        {"contention", "paper/harmonic_u06", "paper/harmonic_u08", "paper/nonharmonic_u06", "paper/nonharmonic_u08"}) {
-    const auto loaded = load_workload(std::string(REDAG_SOURCE_DIR) + "/workloads/" + name + ".yaml");
+    const auto loaded = load_workload((testing::repository() / "workloads" / (std::string(name) + ".yaml")).string());
     ASSERT_TRUE(loaded) << name;
     const auto task_set = compile(loaded->workload, platform_of(loaded->workload));
     ASSERT_TRUE(task_set) << name;

@@ -8,6 +8,8 @@
 
 #include <filesystem>
 
+#include "redag_testing/repository.hpp"
+
 namespace redag::experiment {
 namespace {
 
@@ -127,7 +129,7 @@ TEST(AcceptancePlan, OrderOfPoints) {
 
 TEST(AcceptancePlan, ThoseOfTheRepository) {
   int seen = 0;
-  for (const auto &entry : std::filesystem::directory_iterator(std::string(REDAG_SOURCE_DIR) + "/experiments")) {
+  for (const auto &entry : std::filesystem::directory_iterator(testing::repository() / "experiments")) {
     if (entry.path().extension() != ".yaml") continue;
     const Result<AcceptancePlan> plan = load_acceptance_plan(entry.path());
     EXPECT_TRUE(plan) << to_string(plan.error());
