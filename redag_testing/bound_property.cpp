@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -17,6 +16,7 @@
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"
 #include "redag_analysis/sim/simulator.hpp"
+#include "redag_testing/environment.hpp"
 
 namespace redag::testing {
 namespace {
@@ -278,24 +278,18 @@ void check_one(const analysis::Method &method, const BoundGenerator &generator, 
   }
 }
 
-std::optional<std::uint64_t> environment(const char *name) {
-  const char *text = std::getenv(name);
-  if (text == nullptr) return std::nullopt;
-  return std::strtoull(text, nullptr, 10);
-}
-
 }  // namespace
 
 std::uint64_t how_many(std::uint64_t usual) {
-  const std::uint64_t wanted = environment("REDAG_BOUND_WORKLOADS").value_or(usual);
-  return std::min(wanted, environment("REDAG_BOUND_AT_MOST").value_or(wanted));
+  const std::uint64_t wanted = from_environment("REDAG_BOUND_WORKLOADS").value_or(usual);
+  return std::min(wanted, from_environment("REDAG_BOUND_AT_MOST").value_or(wanted));
 }
 
 BoundPropertyResult check_bound(const analysis::Method &method, const BoundGenerator &generator,
                                 const BoundPropertyOptions &options) {
   BoundPropertyResult result;
   std::vector<double> ratios;
-  if (const auto seed = environment("REDAG_BOUND_SEED")) {
+  if (const auto seed = from_environment("REDAG_BOUND_SEED")) {
     check_one(method, generator, options, *seed, result, ratios);
   } else {
     const std::uint64_t wanted = how_many(options.workloads);

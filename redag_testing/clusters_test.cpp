@@ -3,7 +3,6 @@
 
 // Clusters on one time line: each behaves as the only one would, and the trace checker notices a job in a wrong one.
 #include <algorithm>
-#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,6 +25,7 @@
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_lab/search/analysed.hpp"
+#include "redag_testing/environment.hpp"
 #include "redag_testing/random_workloads.hpp"
 #include "redag_testing/reference_scheduler.hpp"
 
@@ -35,17 +35,12 @@ namespace {
 constexpr Duration kHorizon = 100 * kMillisecond;
 
 // REDAG_SEED=<n> is the first seed, to replay a failure. REDAG_WORKLOADS=<n> is the number of workloads.
-std::uint64_t from_environment(const char *name, std::uint64_t otherwise) {
-  const char *text = std::getenv(name);
-  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
-}
-
 std::string replay(std::uint64_t seed) { return fmt::format("replay with REDAG_SEED={} REDAG_WORKLOADS=1", seed); }
 
 template <class Test>
 void for_each_workload(std::uint64_t usual, Test test, bool overload = true) {
-  const std::uint64_t first = from_environment("REDAG_SEED", 1);
-  const std::uint64_t count = from_environment("REDAG_WORKLOADS", usual);
+  const std::uint64_t first = from_environment("REDAG_SEED").value_or(1);
+  const std::uint64_t count = from_environment("REDAG_WORKLOADS").value_or(usual);
   for (std::uint64_t seed = first; seed < first + count && !::testing::Test::HasFatalFailure(); ++seed) {
     Rng rng(seed);
     Workload workload = contended(rng, overload);

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The requirement on every driver: for every workload, policy and preemption mode the trace passes the checker.
-#include <cstdlib>
 
 #include <gtest/gtest.h>
 
@@ -11,6 +10,7 @@
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_testing/drivers.hpp"
+#include "redag_testing/environment.hpp"
 #include "redag_testing/random_workloads.hpp"
 
 namespace redag::testing {
@@ -18,11 +18,6 @@ namespace {
 
 // REDAG_SEED=<n> is the first seed, to replay a failure. REDAG_WORKLOADS=<n> is the number for each test, for a long
 // run.
-std::uint64_t from_environment(const char *name, std::uint64_t otherwise) {
-  const char *text = std::getenv(name);
-  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
-}
-
 struct Combination {
   PolicyKind policy;
   sched::Preemption preemption;
@@ -32,8 +27,8 @@ class Conformance : public ::testing::TestWithParam<Combination> {
  protected:
   template <class Driver>
   void check(std::uint64_t workloads) {
-    const std::uint64_t first = from_environment("REDAG_SEED", 1);
-    const std::uint64_t count = from_environment("REDAG_WORKLOADS", workloads);
+    const std::uint64_t first = from_environment("REDAG_SEED").value_or(1);
+    const std::uint64_t count = from_environment("REDAG_WORKLOADS").value_or(workloads);
     for (std::uint64_t seed = first; seed < first + count; ++seed) {
       RunSpec spec;
       Rng rng(seed);

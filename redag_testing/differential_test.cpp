@@ -3,7 +3,6 @@
 
 // PriorityScheduler against ReferenceScheduler: the same events must give the same decisions.
 #include <algorithm>
-#include <cstdlib>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -14,6 +13,7 @@
 
 #include "redag/sched/policy.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_testing/environment.hpp"
 #include "redag_testing/random_workloads.hpp"
 #include "redag_testing/reference_scheduler.hpp"
 #include "redag_testing/schedule_script.hpp"
@@ -68,18 +68,13 @@ std::string report_difference(Case c, const std::string &replay) {
   return fmt::format("{}{}\n{}\n{}", describe(c.workload, c.config), describe(c.script), *find_difference(c), replay);
 }
 
-std::uint64_t from_environment(const char *name, std::uint64_t fallback) {
-  const char *text = std::getenv(name);
-  return text == nullptr ? fallback : std::strtoull(text, nullptr, 10);
-}
-
 class Differential : public ::testing::TestWithParam<std::tuple<PolicyKind, Preemption>> {};
 
 // REDAG_DIFFERENTIAL_SEED and REDAG_DIFFERENTIAL_COUNT choose other workloads than the default ones.
 TEST_P(Differential, DecidesAsTheReferenceDoes) {
   const auto [policy, preemption] = GetParam();
-  const std::uint64_t first = from_environment("REDAG_DIFFERENTIAL_SEED", 1);
-  const std::uint64_t count = from_environment("REDAG_DIFFERENTIAL_COUNT", 400);
+  const std::uint64_t first = from_environment("REDAG_DIFFERENTIAL_SEED").value_or(1);
+  const std::uint64_t count = from_environment("REDAG_DIFFERENTIAL_COUNT").value_or(400);
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
     const std::string &test = ::testing::UnitTest::GetInstance()->current_test_info()->name();
     const std::string replay = fmt::format(

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <optional>
 #include <span>
 #include <vector>
@@ -22,6 +21,7 @@
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_lab/workload/generate.hpp"
 #include "redag_testing/allocation_counter.hpp"
+#include "redag_testing/environment.hpp"
 
 namespace redag::testing {
 namespace {
@@ -166,17 +166,11 @@ void run_a_day(std::uint64_t seed, Duration length, Figures &figures) {
   ++figures.task_sets;
 }
 
-std::optional<std::uint64_t> environment(const char *name) {
-  const char *text = std::getenv(name);
-  if (text == nullptr) return std::nullopt;
-  return std::strtoull(text, nullptr, 10);
-}
-
 TEST(LongRun, NothingWearsOut) {
-  const std::optional<std::uint64_t> many = environment("REDAG_LONG_RUN");
+  const std::optional<std::uint64_t> many = from_environment("REDAG_LONG_RUN");
   const std::uint64_t wanted = many.value_or(24);
   const Duration length = many ? 24 * kHour : 2 * kHour;
-  const std::uint64_t first = environment("REDAG_LONG_RUN_SEED").value_or(1);
+  const std::uint64_t first = from_environment("REDAG_LONG_RUN_SEED").value_or(1);
   Figures figures;
   std::uint64_t seed = first;
   for (; figures.task_sets < wanted; ++seed) {

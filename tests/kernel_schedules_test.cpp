@@ -15,7 +15,6 @@
 #include <array>
 #include <atomic>
 #include <cstdio>
-#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
@@ -35,6 +34,7 @@
 #include "redag_lab/run/run_workload.hpp"
 #include "redag_lab/run/synthetic.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/environment.hpp"
 #include "redag_testing/kernel_judge.hpp"
 #include "redag_testing/reference_scheduler.hpp"
 
@@ -394,13 +394,8 @@ void KernelSchedules::run_reconfigured(std::uint64_t seed, bool throttled, const
   judge_run(*std::move(recorder), bodies, *log, workload, options.config, std::move(judged), replay);
 }
 
-std::uint64_t from_environment(const char *name, std::uint64_t fallback) {
-  const char *text = std::getenv(name);
-  return text == nullptr ? fallback : std::strtoull(text, nullptr, 10);
-}
-
 TEST_F(KernelSchedules, TheMostUrgentStartedJobsHaveTheProcessors) {
-  run_many(from_environment("REDAG_KERNEL_SEED", 1), from_environment("REDAG_KERNEL_SCHEDULES", 36));
+  run_many(from_environment("REDAG_KERNEL_SEED").value_or(1), from_environment("REDAG_KERNEL_SCHEDULES").value_or(36));
   std::printf(
       "schedules judged: %lu (%lu more had a record with holes); %lu jobs, %lu events of the kernel; "
       "instants judged: %lu, %lu of them with a job that waited\n",
