@@ -216,7 +216,7 @@ TEST(Clustered, NoResponseExceedsTheBoundOfItsCluster) {
   std::uint64_t judged = 0;
   for_each_workload(
       400,
-      [&](Workload workload, std::uint64_t seed) {
+      [&](const Workload &workload, std::uint64_t seed) {
         const auto analysed = lab::analyse_parts(workload, analysis::platform_of(workload));
         ASSERT_TRUE(analysed) << to_string(analysed.error()) << replay(seed);
         std::vector<std::optional<Duration>> bounds(workload.task_count());
