@@ -67,6 +67,7 @@ const Node *find(const Part &part, Field field) { return yaml::find(*part.node, 
 template <std::size_t N>
 std::vector<std::string_view> names_of(const std::array<Field, N> &fields) {
   std::vector<std::string_view> names;
+  names.reserve(N);
   for (const Field field : fields) names.emplace_back(to_string(field));
   return names;
 }

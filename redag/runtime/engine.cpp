@@ -17,8 +17,6 @@
 
 namespace redag::runtime {
 
-using sched::Outcome;
-
 namespace {
 
 // How long the release thread leaves a release to the leader with `os`. A leader that sleeps is in time: it has the

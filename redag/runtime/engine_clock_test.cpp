@@ -35,7 +35,7 @@ extern "C" long syscall(long number, ...) noexcept {
   long arguments[6];
   for (long &argument : arguments) argument = va_arg(list, long);
   va_end(list);
-  static auto *const real = [] {
+  static auto *const kReal = [] {
     void *const found = dlsym(RTLD_NEXT, "syscall");
     long (*function)(long, ...) = nullptr;
     std::memcpy(&function, &found, sizeof function);
@@ -44,7 +44,7 @@ extern "C" long syscall(long number, ...) noexcept {
   if (number == SYS_futex && (arguments[1] & FUTEX_CMD_MASK) == FUTEX_WAKE && redag::testing::detail::steps.step != 0) {
     redag::testing::detail::steps.now += wake_takes;
   }
-  return real(number, arguments[0], arguments[1], arguments[2], arguments[3], arguments[4], arguments[5]);
+  return kReal(number, arguments[0], arguments[1], arguments[2], arguments[3], arguments[4], arguments[5]);
 }
 
 namespace redag::runtime {
@@ -82,9 +82,10 @@ class EngineClock : public ::testing::TestWithParam<PreemptionMode> {
     engine_->set_origin(monotonic_now());
   }
   /// Releases `task`, and waits until all of `last` has finished once more.
-  void run(std::size_t task, std::vector<std::size_t> last, int times = 1) {
+  void run(std::size_t task, const std::vector<std::size_t> &last, int times = 1) {
     for (int i = 0; i < times; ++i) {
       std::vector<std::uint64_t> before;
+      before.reserve(last.size());
       for (const std::size_t each : last) before.push_back(finished(each));
       engine_->release(TaskId(task), engine_->now());
       for (std::size_t each = 0; each < last.size(); ++each) {
@@ -172,7 +173,7 @@ TEST_P(EngineClock, JobsWithABudgetAreMeasuredThoughTheyCloseThemselves) {
   run(0, {0}, kEnoughToBeExpectedShort);
   const std::uint64_t before = asked();
   run(0, {0}, kMore);
-  EXPECT_GE(asked(), before + 2 * kMore);  // at the begin and at the end
+  EXPECT_GE(asked(), before + 2 * std::uint64_t{kMore});  // at the begin and at the end
 }
 
 // After a long job, the thread asks until short jobs are expected again. If the time that this takes were the next

@@ -22,49 +22,49 @@ namespace {
 
 using sched::Outcome;
 
-// An engine for some tasks. The release thread calls `on_expire` and is called again each millisecond.
+// An engine for some tasks. The release thread calls `on_expire_` and is called again each millisecond.
 class Leader : public ::testing::TestWithParam<PreemptionMode> {
  protected:
   void SetUp() override {
-    if (mode() == PreemptionMode::Os && band.top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
+    if (mode() == PreemptionMode::Os && band_.top_job == 0) GTEST_SKIP() << "this process may not use SCHED_FIFO";
   }
   static PreemptionMode mode() { return GetParam(); }
 
-  void start(std::uint32_t workers, Body body, bool realtime = false) {
+  void start(std::uint32_t workers, const Body &body, bool realtime = false) {
     const Workload workload = testing::ladder(2);
     EngineOptions options;
-    options.config = make_config(Mode{mode(), {}}, workers, workload.policy, band, workers);
-    options.band = band;
+    options.config = make_config(Mode{mode(), {}}, workers, workload.policy, band_, workers);
+    options.band = band_;
     options.realtime_threads = realtime;
-    engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
-    engine->bind(workload, {2, std::move(body)});
-    engine->share_releases(releases);
-    releases.release_due();  // a release is expected from here on
-    ASSERT_TRUE(engine->start());
-    engine->set_origin(monotonic_now());
+    engine_ = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+    engine_->bind(workload, std::vector<Body>(2, body));
+    engine_->share_releases(releases_);
+    releases_.release_due();  // a release is expected from here on
+    ASSERT_TRUE(engine_->start());
+    engine_->set_origin(monotonic_now());
   }
   void TearDown() override { end(); }
   /// Ends all threads. They use variables of the test, which calls this before these are gone.
   void end() {
-    releases.stop();
-    releases.join();
-    if (engine) engine->join();
-    engine.reset();
+    releases_.stop();
+    releases_.join();
+    if (engine_) engine_->join();
+    engine_.reset();
   }
   Time expire() {
-    if (engine) on_expire();
+    if (engine_) on_expire_();
     return monotonic_now() + kMillisecond;
   }
   void run_one_job() {
-    const std::uint64_t before = engine->accounting(TaskId(1)).finished;
-    engine->release(TaskId(1), engine->now());
-    while (engine->accounting(TaskId(1)).finished == before) std::this_thread::yield();
+    const std::uint64_t before = engine_->accounting(TaskId(1)).finished;
+    engine_->release(TaskId(1), engine_->now());
+    while (engine_->accounting(TaskId(1)).finished == before) std::this_thread::yield();
   }
 
-  const PriorityBand band = probe_priority_band();
-  std::function<void()> on_expire = [] {};
-  std::unique_ptr<Engine> engine;
-  ReleaseThread releases{[this] { return expire(); }};
+  const PriorityBand band_ = probe_priority_band();
+  std::function<void()> on_expire_ = [] {};
+  std::unique_ptr<Engine> engine_;
+  ReleaseThread releases_{[this] { return expire(); }};
 };
 
 INSTANTIATE_TEST_SUITE_P(Modes, Leader,
@@ -77,10 +77,10 @@ TEST_P(Leader, RunsTheJobThatItReleases) {
     std::atomic<bool> due{false};
     std::atomic<std::thread::id> releaser;
     std::atomic<std::thread::id> runner;
-    on_expire = [&] {
+    on_expire_ = [&] {
       if (!due.exchange(false)) return;
       releaser = std::this_thread::get_id();
-      engine->release(TaskId(0), engine->now());
+      engine_->release(TaskId(0), engine_->now());
     };
     start(workers, [&](const Job &job) {
       if (job.task == TaskId(0)) runner = std::this_thread::get_id();
@@ -88,7 +88,7 @@ TEST_P(Leader, RunsTheJobThatItReleases) {
     });
     run_one_job();
     due = true;
-    while (engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+    while (engine_->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
     EXPECT_EQ(releaser.load(), runner.load());
     end();
   }
@@ -97,7 +97,7 @@ TEST_P(Leader, RunsTheJobThatItReleases) {
 // Jobs that others release wake a leader that waits for a time.
 TEST_P(Leader, TakesOtherJobsMeanwhile) {
   std::atomic<bool> leads{false};
-  on_expire = [&] { leads = true; };
+  on_expire_ = [&] { leads = true; };
   start(1, [](const Job &) { return Outcome::Finished; });
   run_one_job();
   while (!leads) std::this_thread::yield();
@@ -109,9 +109,9 @@ TEST_P(Leader, TakesOtherJobsMeanwhile) {
 TEST_P(Leader, LeavesReleasesToTheThreadWhileItHasAJob) {
   std::atomic<bool> due{false};
   std::atomic<bool> released{false};
-  on_expire = [&] {
+  on_expire_ = [&] {
     if (!due.exchange(false)) return;
-    EXPECT_FALSE(engine->in_body());
+    EXPECT_FALSE(engine_->in_body());
     released = true;
   };
   start(1, [&](const Job &job) {
@@ -121,10 +121,10 @@ TEST_P(Leader, LeavesReleasesToTheThreadWhileItHasAJob) {
     }
     return Outcome::Finished;
   });
-  ASSERT_TRUE(releases.start({"timer", mode() == PreemptionMode::Os ? band.timer : 0, {}}));
+  ASSERT_TRUE(releases_.start({"timer", mode() == PreemptionMode::Os ? band_.timer : 0, {}}));
   run_one_job();
-  engine->release(TaskId(0), engine->now());
-  while (engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+  engine_->release(TaskId(0), engine_->now());
+  while (engine_->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
   end();
 }
 
@@ -133,11 +133,11 @@ TEST_P(Leader, WaitsAboveAllJobsAndRunsItsOwnAtTheirLevel) {
   std::atomic<int> waits_at{-1};
   std::atomic<int> runs_at{-1};
   std::atomic<bool> due{false};
-  on_expire = [&] {
+  on_expire_ = [&] {
     if (!due) return;
     waits_at = fifo_priority(pthread_self());
     due = false;
-    engine->release(TaskId(0), engine->now());
+    engine_->release(TaskId(0), engine_->now());
   };
   start(1, [&](const Job &job) {
     if (job.task == TaskId(0)) runs_at = fifo_priority(pthread_self());
@@ -146,18 +146,18 @@ TEST_P(Leader, WaitsAboveAllJobsAndRunsItsOwnAtTheirLevel) {
   for (int i = 0; i < 20; ++i) run_one_job();  // short jobs: their threads may keep a priority of jobs
   for (std::uint64_t i = 0; i < 20; ++i) {
     due = true;
-    while (engine->accounting(TaskId(0)).finished == i) std::this_thread::yield();
-    EXPECT_EQ(waits_at, band.timer);
+    while (engine_->accounting(TaskId(0)).finished == i) std::this_thread::yield();
+    EXPECT_EQ(waits_at, band_.timer);
     EXPECT_GT(runs_at, 0);
-    EXPECT_LE(runs_at, band.top_job);
+    EXPECT_LE(runs_at, band_.top_job);
   }
   end();
 }
 
 TEST_P(Leader, RealTimeThreadsOfOtherModesHaveNone) {
-  if (band.top_job == 0 || mode() == PreemptionMode::Os) GTEST_SKIP() << "needs SCHED_FIFO, and a mode without it";
+  if (band_.top_job == 0 || mode() == PreemptionMode::Os) GTEST_SKIP() << "needs SCHED_FIFO, and a mode without it";
   std::atomic<bool> called{false};
-  on_expire = [&] { called = true; };
+  on_expire_ = [&] { called = true; };
   start(
       2, [](const Job &) { return Outcome::Finished; }, true);
   called = false;

@@ -361,12 +361,11 @@ class Run {
 
   void finish() {
     end_ = result_.stopped ? std::clamp<Time>(time_now(), 0, options_.duration) : options_.duration;
-    // The timers report releases that were due until now.
+    // The timers report releases that were due until now. The trace ends where the first engine halts, which must be
+    // after the last report.
     for (const auto &instance : instances_) instance->timer->stop();
-    for (const auto &instance : instances_) {
-      instance->timer->join();
-      instance->engine->halt();
-    }
+    for (const auto &instance : instances_) instance->timer->join();
+    for (const auto &instance : instances_) instance->engine->halt();
     if (!wait_idle()) {
       for (const auto &instance : instances_) {
         for (const runtime::Job &job : instance->engine->started()) {
