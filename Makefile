@@ -101,13 +101,13 @@ fuzz: ## look for input that breaks a reader: FUZZ_SECONDS (600) of processor ti
 CHAOS_RUNS ?= 2000
 chaos: ## faults by the thousand: CHAOS_RUNS (2000) runs of executor and simulator, a hundredth of it of each fault from outside
 	@tools/bootstrap test
-	cmake --preset dev
-	cmake --build --preset dev --target redag_chaos redag_cli redag_allocation_failures redag_jumping_clock
-	build/dev/tests/chaos/redag_chaos simulator $(CHAOS_RUNS)
-	build/dev/tests/chaos/redag_chaos executor $(CHAOS_RUNS)
-	build/dev/tests/chaos/redag_allocation_failures workloads
-	tests/chaos/process.py build/dev/bin/redag . --runs $$(($(CHAOS_RUNS) / 100)) \
-	  --clock build/dev/tests/chaos/libredag_jumping_clock.so
+	cmake --preset test
+	cmake --build --preset test --target redag_chaos redag_cli redag_allocation_failures redag_jumping_clock
+	build/test/tests/chaos/redag_chaos simulator $(CHAOS_RUNS)
+	build/test/tests/chaos/redag_chaos executor $(CHAOS_RUNS)
+	build/test/tests/chaos/redag_allocation_failures workloads
+	tests/chaos/process.py build/test/bin/redag . --runs $$(($(CHAOS_RUNS) / 100)) \
+	  --clock build/test/tests/chaos/libredag_jumping_clock.so
 
 ros: ## build the ROS packages with colcon and run their tests, for each ROS 2 under /opt/ros
 	@tools/bootstrap test

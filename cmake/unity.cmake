@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-# Builds for one run of the tests compile a dozen sources as one (CMAKE_UNITY_BUILD). It takes a third of the time,
-# most of which goes to templates that the sources share. The other builds compile each source alone, which shows
+# Builds for one run of the tests compile a dozen sources as one (CMAKE_UNITY_BUILD). It takes about a third of the
+# time, most of which goes to templates that the sources share. The other builds compile each source alone, which shows
 # missing includes and keeps rebuilds short. Included last, when all targets are defined.
 
 # These are compiled alone: another source of their target has an anonymous namespace with the same name in it.
@@ -69,6 +69,9 @@ set(alone
   redag_testing/overload_test.cpp
   redag_testing/schedule_script.cpp)
 foreach(source IN LISTS alone)
+  if(NOT EXISTS ${PROJECT_SOURCE_DIR}/${source})
+    message(FATAL_ERROR "cmake/unity.cmake lists ${source}, which is not there")
+  endif()
   set_source_files_properties(${PROJECT_SOURCE_DIR}/${source} DIRECTORY
     ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/redag ${PROJECT_SOURCE_DIR}/redag_analysis ${PROJECT_SOURCE_DIR}/redag_lab
     PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
