@@ -270,13 +270,12 @@ class Generator {
     }
     std::vector<double> loads(clusters.size());
     for (Dag &dag : workload_.dags) {
-      const auto place = std::min_element(loads.begin(), loads.end()) - loads.begin();
-      const Cluster &cluster = clusters[static_cast<std::size_t>(place)];
+      const auto load = std::min_element(loads.begin(), loads.end());
+      const Cluster &cluster = clusters[static_cast<std::size_t>(load - loads.begin())];
       dag.cluster = cluster.name;
       for (Task &task : dag.tasks) {
         if (!task.group.empty()) task.group = fmt::format("{}_{}", cluster.name, task.group);
-        loads[static_cast<std::size_t>(place)] +=
-            static_cast<double>(task.wcet) / static_cast<double>(task.period) / cluster.workers;
+        *load += static_cast<double>(task.wcet) / static_cast<double>(task.period) / cluster.workers;
       }
     }
   }
@@ -303,8 +302,7 @@ Diagnostics find_mistakes(const GenerateOptions &o) {
   require(std::uint64_t{o.dags} * o.max_tasks <= kMaxTasks,
           fmt::format("dags * max_tasks must be at most {}", kMaxTasks));
   require(o.workers >= 1 && o.workers <= kMaxWorkers, fmt::format("workers must be from 1 to {}", kMaxWorkers));
-  require(o.clusters <= o.workers,
-          fmt::format("{} clusters need at least as many workers, not {}", o.clusters, o.workers));
+  require(o.clusters <= o.workers, fmt::format("clusters must be at most workers ({}), not {}", o.workers, o.clusters));
   require(o.clusters <= kMaxClusters, fmt::format("clusters must be at most {}", kMaxClusters));
   require(o.preemption != PreemptionMode::Os || is_static(o.policy), "preemption 'os' needs a static policy");
   require(o.utilization > 0 && std::isfinite(o.utilization), "utilization must be greater than zero");

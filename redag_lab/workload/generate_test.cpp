@@ -179,7 +179,7 @@ TEST(Generate, RefusesOptionsWithAllReasons) {
   ASSERT_FALSE(refused);
   const std::string found = to_string(refused.error());
   EXPECT_NE(found.find("dags must be at least 1"), std::string::npos) << found;
-  EXPECT_NE(found.find("3 clusters need at least as many workers, not 2"), std::string::npos) << found;
+  EXPECT_NE(found.find("clusters must be at most workers (2), not 3"), std::string::npos) << found;
   EXPECT_NE(found.find("jitter must be from 0 to 1, not 2"), std::string::npos) << found;
   EXPECT_NE(found.find("period_min is below period_granularity"), std::string::npos) << found;
 }
