@@ -99,10 +99,10 @@ std::map<Duration, int> period_counts(PeriodModel model) {
 TEST(Generate, AutomotivePeriodsHaveTheirShares) {
   auto counts = period_counts(PeriodModel::Automotive);
   EXPECT_EQ(counts.size(), 9U);
-  EXPECT_NEAR(counts[10 * kMillisecond], 2000 * 25 / 85, 75);
-  EXPECT_NEAR(counts[20 * kMillisecond], 2000 * 25 / 85, 75);
-  EXPECT_NEAR(counts[100 * kMillisecond], 2000 * 20 / 85, 75);
-  EXPECT_NEAR(counts[1000 * kMillisecond], 2000 * 4 / 85, 40);
+  EXPECT_NEAR(counts[10 * kMillisecond], 2000.0 * 25 / 85, 75);
+  EXPECT_NEAR(counts[20 * kMillisecond], 2000.0 * 25 / 85, 75);
+  EXPECT_NEAR(counts[100 * kMillisecond], 2000.0 * 20 / 85, 75);
+  EXPECT_NEAR(counts[1000 * kMillisecond], 2000.0 * 4 / 85, 40);
 }
 
 TEST(Generate, HarmonicPeriodsDivideEachOther) {
