@@ -1,19 +1,18 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-# Finds all packages. The top CMakeLists.txt includes this file, because imported targets are visible only in its folder
-# and below. tools/bootstrap installs the packages.
-list(APPEND CMAKE_MODULE_PATH ${CMAKE_CURRENT_LIST_DIR})
+# Finds what any part of the repository needs. The top CMakeLists.txt includes this file, because imported targets are
+# visible only in its folder and below. A package that is built alone finds what it needs in its own CMakeLists.txt.
+# tools/bootstrap installs the packages.
+find_package(CLI11 REQUIRED)
 find_package(fmt REQUIRED)
 find_package(LibYAML REQUIRED)
 find_package(nlohmann_json REQUIRED)
-find_package(tl-expected REQUIRED)
+find_package(SQLite3 REQUIRED)
+find_package(TBB REQUIRED)
 find_package(Threads REQUIRED)
+find_package(tl-expected REQUIRED)
 find_package(ZLIB REQUIRED)
-if(NOT redag_parts STREQUAL "executor")  # the workbench as well
-  find_package(CLI11 REQUIRED)
-  find_package(TBB REQUIRED)
-endif()
 
 if(REDAG_BUILD_TESTS)
   find_package(GTest REQUIRED)

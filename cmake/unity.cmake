@@ -58,6 +58,7 @@ set(alone
   redag_lab/experiment/factorial_plan_test.cpp
   redag_lab/experiment/factorial_plan_yaml.cpp
   redag_lab/experiment/factorial_test.cpp
+  redag_lab/experiment/observation.cpp
   redag_lab/report/schedule_test.cpp
   redag_lab/run/difference_test.cpp
   redag_lab/search/remedy.cpp

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The three futex operations that this project uses (man 2 futex), for words that are private to the process. All waits
-// can wake spuriously; callers loop. Any thread; futex_wake is async-signal-safe.
+// The futex operations that this project uses (man 2 futex), for words that are private to the process. Waits can wake
+// spuriously; callers loop. Any thread; futex_wake is async-signal-safe.
 #pragma once
 
 #include <linux/futex.h>
@@ -41,6 +41,24 @@ inline bool futex_wait_until(FutexWord &word, std::uint32_t expected, Time deadl
 /// Wakes up to `count` threads that sleep on `word`, the most urgent real-time threads first.
 inline void futex_wake(FutexWord &word, int count) noexcept {
   syscall(SYS_futex, &word, FUTEX_WAKE_PRIVATE, count, nullptr, nullptr, 0);
+}
+
+/// Sleeps until the calling thread owns the lock `word`. It is 0 while the lock is free, and else the owner's thread
+/// id, with FUTEX_WAITERS while others wait. They lend the owner their priority. Returns false if the kernel refuses.
+[[nodiscard]] inline bool futex_lock_pi(FutexWord &word) noexcept {
+  for (;;) {
+    if (syscall(SYS_futex, &word, FUTEX_LOCK_PI_PRIVATE, 0, nullptr, nullptr, 0) == 0) return true;
+    if (errno != EINTR && errno != EAGAIN) return false;
+  }
+}
+
+/// Gives the lock to the most urgent thread that waits for it, or frees it. Returns false if the kernel refuses: the
+/// calling thread does not own the lock.
+[[nodiscard]] inline bool futex_unlock_pi(FutexWord &word) noexcept {
+  for (;;) {
+    if (syscall(SYS_futex, &word, FUTEX_UNLOCK_PI_PRIVATE, 0, nullptr, nullptr, 0) == 0) return true;
+    if (errno != EINTR && errno != EAGAIN) return false;
+  }
 }
 
 }  // namespace redag

@@ -1,17 +1,15 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A mutex whose owner inherits the priority of the most urgent thread that waits for it (PTHREAD_PRIO_INHERIT). A
-// preempted low-priority owner delays a high-priority waiter by short critical sections only. BasicLockable and
-// Lockable, for LockGuard, std::lock_guard and std::unique_lock. Use it for data that callbacks of different rates
-// share. It may be destroyed once every unlock() has returned.
+// A mutex whose owner inherits the priority of the most urgent thread that waits for it (a PI-futex). A preempted
+// low-priority owner delays a high-priority waiter by short critical sections only. BasicLockable and Lockable, for
+// LockGuard, std::lock_guard and std::unique_lock. Use it for data that callbacks of different rates share. It may be
+// destroyed once every unlock() has returned.
 #pragma once
-
-#include <pthread.h>
 
 #include <thread>
 
-#include "redag/base/check.hpp"
+#include "redag/base/futex_lock.hpp"
 #include "redag/base/relax.hpp"
 #include "redag/base/thread_annotations.hpp"
 
@@ -27,14 +25,7 @@ namespace redag {
 class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
  public:
   /// `inherits` can be false if all threads that take the mutex have the same priority.
-  explicit PiMutex(bool inherits = true) : inherits_(inherits) {
-    initialize(mutex_, inherits);
-    initialize(queue_, inherits);
-  }
-  ~PiMutex() {
-    pthread_mutex_destroy(&queue_);
-    pthread_mutex_destroy(&mutex_);
-  }
+  explicit PiMutex(bool inherits = true) : mutex_(inherits), inherits_(inherits), queue_(inherits) {}
 
   PiMutex(const PiMutex &) = delete;
   PiMutex &operator=(const PiMutex &) = delete;
@@ -45,57 +36,41 @@ class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
     wait();
     return false;
   }
-  [[nodiscard]] bool try_lock() noexcept REDAG_TRY_ACQUIRE(true) { return pthread_mutex_trylock(&mutex_) == 0; }
-  void unlock() noexcept REDAG_RELEASE() {
+  [[nodiscard]] bool try_lock() noexcept REDAG_TRY_ACQUIRE(true) { return mutex_.try_lock(); }
+  /// Returns true if it woke a thread, which is a system call.
+  bool unlock() noexcept REDAG_RELEASE() {
     const bool queued = queued_;
     queued_ = false;
-    release(mutex_);
-    if (queued) release(queue_);
+    const bool woke = mutex_.unlock();
+    return (queued && queue_.unlock()) || woke;
   }
 
  private:
   void wait() noexcept {
     if (spin()) return;
-    if (!inherits_) return acquire(mutex_);
-    acquire(queue_);
-    if (!spin()) acquire(mutex_);
+    if (!inherits_) return mutex_.lock();
+    queue_.lock();
+    if (!spin()) mutex_.lock();
     queued_ = true;
   }
 
   // The longest pause between two tries, in calls of relax(). All pauses together take less than 2 us.
   static constexpr int kPauses = 32;
 
-  static void initialize(pthread_mutex_t &mutex, bool inherits) {
-    pthread_mutexattr_t attributes;
-    REDAG_CHECK(pthread_mutexattr_init(&attributes) == 0, "cannot initialise mutex attributes");
-    const int protocol = inherits ? PTHREAD_PRIO_INHERIT : PTHREAD_PRIO_NONE;
-    REDAG_CHECK(pthread_mutexattr_setprotocol(&attributes, protocol) == 0,
-                "mutexes with priority inheritance are not available");
-    REDAG_CHECK(pthread_mutex_init(&mutex, &attributes) == 0, "the kernel has no priority-inheriting futexes");
-    pthread_mutexattr_destroy(&attributes);
-  }
-
-  static void acquire(pthread_mutex_t &mutex) noexcept {
-    REDAG_CHECK(pthread_mutex_lock(&mutex) == 0, "a mutex cannot be locked");
-  }
-  static void release(pthread_mutex_t &mutex) noexcept {
-    REDAG_CHECK(pthread_mutex_unlock(&mutex) == 0, "a mutex is unlocked by a thread that does not own it");
-  }
-
   /// Tries for longer than a short critical section takes on another processor, with growing pauses.
   bool spin() noexcept {
     static const int kLongest = std::thread::hardware_concurrency() > 1 ? kPauses : 0;
     for (int pauses = 1;; pauses *= 2) {
-      if (pthread_mutex_trylock(&mutex_) == 0) return true;
+      if (mutex_.try_lock()) return true;
       if (pauses > kLongest) return false;
       for (int i = 0; i < pauses; ++i) relax();
     }
   }
 
-  pthread_mutex_t mutex_;
-  pthread_mutex_t queue_;  // its owner is the only thread that sleeps for `mutex_`
+  FutexLock mutex_;
   const bool inherits_;
   bool queued_ = false;  // the owner of `mutex_` also owns `queue_`
+  FutexLock queue_;      // its owner is the only thread that sleeps for `mutex_`
 };
 
 }  // namespace redag

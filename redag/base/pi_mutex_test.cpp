@@ -5,8 +5,10 @@
 
 #include <gtest/gtest.h>
 #include <sys/syscall.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <fstream>
 #include <mutex>
@@ -20,17 +22,38 @@
 namespace redag {
 namespace {
 
+// A field of /proc/self/task/<thread>/stat, from 3 on.
+std::string stat_field(long thread, int field) {
+  std::ifstream file("/proc/self/task/" + std::to_string(thread) + "/stat");
+  std::string text;
+  std::getline(file, text);
+  text = text.substr(text.rfind(')') + 2);
+  for (; field > 3; --field) text = text.substr(text.find(' ') + 1);
+  return text.substr(0, text.find(' '));
+}
+
+bool sleeps(long thread) { return stat_field(thread, 3) == "S"; }
+
+// For real-time threads the kernel says minus (priority + 1), with inherited priority.
+int kernel_priority(long thread) { return -std::stoi(stat_field(thread, 18)) - 1; }
+
 TEST(PiMutex, ExcludesOthers) {
-  PiMutex mutex;
-  const std::lock_guard guard(mutex);
-  bool taken = true;
-  std::thread([&] { taken = mutex.try_lock(); }).join();
-  EXPECT_FALSE(taken);
+  for (const bool inherits : {false, true}) {
+    PiMutex mutex(inherits);
+    const std::lock_guard guard(mutex);
+    bool taken = true;
+    std::thread([&] { taken = mutex.try_lock(); }).join();
+    EXPECT_FALSE(taken);
+  }
 }
 
 // There are more threads than processors: some are preempted as owners, and others queue.
-TEST(PiMutex, CountsRightUnderContention) {
-  PiMutex mutex;
+class PiMutexUnderContention : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(, PiMutexUnderContention, testing::Bool(),
+                         [](const auto &instance) { return instance.param ? "Inherits" : "DoesNotInherit"; });
+
+TEST_P(PiMutexUnderContention, CountsRight) {
+  PiMutex mutex(GetParam());
   int count = 0;
   const auto add = [&] {
     for (int i = 0; i < 10'000; ++i) {
@@ -45,14 +68,48 @@ TEST(PiMutex, CountsRightUnderContention) {
   EXPECT_EQ(count, 80'000);
 }
 
-// Field 18 of /proc/<pid>/stat: for real-time threads minus (priority + 1), with inherited priority.
-int kernel_priority(long thread) {
-  std::ifstream file("/proc/self/task/" + std::to_string(thread) + "/stat");
-  std::string text;
-  std::getline(file, text);
-  text = text.substr(text.rfind(')') + 2);
-  for (int field = 3; field < 18; ++field) text = text.substr(text.find(' ') + 1);
-  return -std::stoi(text) - 1;
+// A thread that sleeps for the mutex gets it, however long the owner keeps it.
+TEST_P(PiMutexUnderContention, WhoeverSleepsGetsItInTheEnd) {
+  PiMutex mutex(GetParam());
+  mutex.lock();
+  std::atomic<int> served{0};
+  std::array<std::atomic<long>, 3> ids{};
+  std::vector<std::thread> sleepers;
+  sleepers.reserve(ids.size());
+  for (std::atomic<long> &id : ids) {
+    sleepers.emplace_back([&] {
+      id = syscall(SYS_gettid);
+      EXPECT_FALSE(mutex.lock());
+      ++served;
+      mutex.unlock();
+    });
+  }
+  for (const std::atomic<long> &id : ids) {
+    while (id == 0 || !sleeps(id)) std::this_thread::yield();
+  }
+  EXPECT_EQ(served, 0);
+  EXPECT_TRUE(mutex.unlock()) << "it woke a thread";
+  for (std::thread &sleeper : sleepers) sleeper.join();
+  EXPECT_EQ(served, 3);
+  EXPECT_TRUE(mutex.try_lock());
+  EXPECT_FALSE(mutex.unlock()) << "nobody slept";
+}
+
+// The kernel's id of the only thread of a child process is a new one.
+TEST(PiMutex, WorksInAChildProcess) {
+  PiMutex mutex;
+  mutex.lock();
+  mutex.unlock();
+  const pid_t child = fork();
+  if (child == 0) {
+    mutex.lock();
+    const bool is_mine = this_thread_id() == static_cast<std::uint32_t>(syscall(SYS_gettid));
+    mutex.unlock();
+    _exit(is_mine ? 0 : 1);
+  }
+  int status = 1;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
 }
 
 // The first waiter sleeps for the mutex, the second one in the queue behind it.

@@ -42,6 +42,7 @@ struct Frame {
   Duration window = 0;
   Duration publisher_cpu = 0;
   std::uint64_t left_out = 0;
+  std::string alert;  // what stops the executor now, such as a deadlock; empty: nothing
   std::vector<DagFrame> dags;
   std::vector<TaskFrame> tasks;  // ordered by DAG
 };

@@ -57,6 +57,7 @@ void FrameBuilder::build(const Sample &sample, Time now, Frame &frame) {
   frame.began = began_;
   frame.published = now;
   frame.window = now - base_at_;
+  frame.alert = sample.alert;
   frame.dags.clear();
   frame.tasks.clear();
   for (const DagSample &dag : sample.dags) frame.dags.push_back(DagFrame{dag.name, dag.max_active, {}});

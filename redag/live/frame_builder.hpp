@@ -46,6 +46,7 @@ struct TaskSample {
 struct Sample {
   std::vector<DagSample> dags;
   std::vector<TaskSample> tasks;  // in any order; `dag` must be among the DAGs
+  std::string alert{};            // see Frame
 };
 
 class FrameBuilder {

@@ -18,6 +18,7 @@ namespace redag::live::page {
 inline constexpr char kMagic[8] = {'r', 'e', 'd', 'a', 'g', 't', 'o', 'p'};
 inline constexpr std::uint32_t kVersion = 1;
 inline constexpr std::size_t kNameSize = 96;  // UTF-8, cut to this size, padded with zeros
+inline constexpr std::size_t kAlertSize = 256;
 
 /// At offset 0. Written once, magic last; only `sequence` changes later.
 struct Header {
@@ -102,7 +103,12 @@ struct FrameHeader {
   char driver[16];       // "threads", "ros"
   char preemption[16];   // "os", ...
   char policy[32];
+  char alert[kAlertSize];  // what stops the executor now, such as a deadlock; empty: nothing. Pages of early programs
+                           // end before it, see kLeastFrameHeader.
 };
+
+/// Size of a FrameHeader without the fields that were appended to version 1. A reader takes those as zero.
+inline constexpr std::size_t kLeastFrameHeader = 272;
 
 template <class Row>
 inline constexpr bool kIsPlain = std::is_trivially_copyable_v<Row>&& std::is_standard_layout_v<Row> &&
@@ -115,7 +121,8 @@ static_assert(offsetof(Header, sequence) == 80);
 static_assert(sizeof(Figures) == 160 && offsetof(Figures, response_p50) == 64 && offsetof(Figures, active) == 144);
 static_assert(sizeof(DagRow) == 264 && offsetof(DagRow, figures) == 104);
 static_assert(sizeof(TaskRow) == 288 && offsetof(TaskRow, period) == 104 && offsetof(TaskRow, figures) == 128);
-static_assert(sizeof(FrameHeader) == 272 && offsetof(FrameHeader, name) == 80);
+static_assert(sizeof(FrameHeader) == 528 && offsetof(FrameHeader, name) == 80);
+static_assert(offsetof(FrameHeader, alert) == kLeastFrameHeader);
 
 /// FNV-1a over the 8-byte words of `bytes`, whose size is a multiple of 8.
 [[nodiscard]] inline std::uint64_t checksum(std::span<const std::byte> bytes) noexcept {

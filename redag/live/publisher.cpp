@@ -68,6 +68,7 @@ void Publisher::main() {
 }
 
 void Publisher::publish(Time now) {
+  sample_.alert.clear();
   sample_.dags.clear();
   sample_.tasks.clear();
   sampler_(sample_);

@@ -149,12 +149,12 @@ Result<Header> read_header(const File &file, const std::string &path, std::uint6
   const auto is_row = [](std::uint32_t size, std::size_t least) {
     return size >= least && size <= kMostRow && size % 8 == 0;
   };
-  const bool sound = header.page_size <= kMostBytes && header.page_size <= file_size &&
-                     header.header_size >= sizeof(Header) && is_row(header.frame_header_size, sizeof(FrameHeader)) &&
-                     is_row(header.dag_row_size, sizeof(DagRow)) && is_row(header.task_row_size, sizeof(TaskRow)) &&
-                     header.slot_offset <= header.page_size && header.slot_size % 8 == 0 &&
-                     header.slot_size >= header.frame_header_size &&
-                     header.slot_size <= (header.page_size - header.slot_offset) / 2;
+  const bool sound =
+      header.page_size <= kMostBytes && header.page_size <= file_size && header.header_size >= sizeof(Header) &&
+      is_row(header.frame_header_size, page::kLeastFrameHeader) && is_row(header.dag_row_size, sizeof(DagRow)) &&
+      is_row(header.task_row_size, sizeof(TaskRow)) && header.slot_offset <= header.page_size &&
+      header.slot_size % 8 == 0 && header.slot_size >= header.frame_header_size &&
+      header.slot_size <= (header.page_size - header.slot_offset) / 2;
   if (!sound) return damaged(path, "its sizes do not match");
   return header;
 }
@@ -162,13 +162,14 @@ Result<Header> read_header(const File &file, const std::string &path, std::uint6
 /// Returns the frame's bytes, checked; empty while it is being overwritten, or if it is damaged.
 std::vector<std::byte> read_slot(const File &file, const Header &header, FrameHeader &frame) {
   const std::uint64_t offset = header.slot_offset + header.sequence % 2 * header.slot_size;
-  if (!file.read(&frame, sizeof(frame), offset)) return {};
+  const std::size_t known = std::min<std::size_t>(sizeof(frame), header.frame_header_size);
+  if (!file.read(&frame, known, offset)) return {};
   const std::uint64_t size = header.frame_header_size + std::uint64_t{frame.dags} * header.dag_row_size +
                              std::uint64_t{frame.tasks} * header.task_row_size;
   if (size > header.slot_size) return {};
   std::vector<std::byte> bytes(size);
   if (!file.read(bytes.data(), size, offset)) return {};
-  std::memcpy(&frame, bytes.data(), sizeof(frame));
+  std::memcpy(&frame, bytes.data(), known);
   const std::uint64_t again = header.frame_header_size + std::uint64_t{frame.dags} * header.dag_row_size +
                               std::uint64_t{frame.tasks} * header.task_row_size;
   if (again != size) return {};
@@ -193,6 +194,7 @@ Result<Frame> decode(const std::string &path, const Header &header, const FrameH
   frame.window = head.window;
   frame.publisher_cpu = head.publisher_cpu;
   frame.left_out = head.left_out;
+  frame.alert = get_name(head.alert);
   bool plausible = is_duration(head.began) && is_duration(head.published) && is_duration(head.interval) &&
                    is_duration(head.window) && is_duration(head.publisher_cpu);
   const std::byte *at = bytes.data() + header.frame_header_size;

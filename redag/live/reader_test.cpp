@@ -16,7 +16,9 @@
 #include <filesystem>
 #include <fstream>
 #include <random>
+#include <span>
 #include <thread>
+#include <vector>
 
 #include "redag/live/writer.hpp"
 
@@ -101,11 +103,13 @@ Frame make_frame(std::size_t dags = 2, std::size_t tasks_each = 3, std::uint64_t
 TEST_F(LivePage, IsReadAsItWasWritten) {
   const auto writer = make_writer();
   EXPECT_EQ(writer->path(), page_path(folder_, ::getpid(), 0));
-  const Frame written = make_frame();
+  Frame written = make_frame();
+  written.alert = "deadlock: a waits for b";
   writer->publish(written);
   const Result<Page> page = read_page(writer->path());
   ASSERT_TRUE(page) << to_string(page.error());
   EXPECT_EQ(page->process, this_process());
+  EXPECT_EQ(page->frame.alert, written.alert);
   const Frame &read = page->frame;
   EXPECT_EQ(read.sequence, 1U);
   EXPECT_EQ(read.name, "cart");
@@ -131,6 +135,31 @@ TEST_F(LivePage, IsReadAsItWasWritten) {
     EXPECT_EQ(read.tasks[i].bound, written.tasks[i].bound);
     EXPECT_EQ(std::memcmp(&read.tasks[i].figures, &written.tasks[i].figures, sizeof(page::Figures)), 0);
   }
+}
+
+// As programs write it that know no alert: the rows follow earlier. Here there are none.
+TEST_F(LivePage, AnEarlierFrameHasNoAlert) {
+  const auto writer = make_writer();
+  Frame frame = make_frame(0, 0);
+  frame.alert = "deadlock";
+  writer->publish(frame);
+  const std::string path = copy(*writer);
+  const std::size_t slot = 4096 + kSlotSize;  // of frame 1
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  const std::uint32_t size = page::kLeastFrameHeader;
+  file.seekp(offsetof(page::Header, frame_header_size));
+  file.write(reinterpret_cast<const char *>(&size), sizeof(size));
+  std::vector<char> head(size);
+  file.seekg(static_cast<std::streamoff>(slot));
+  file.read(head.data(), size);
+  const std::uint64_t sum = page::checksum(std::as_bytes(std::span(head)).subspan(sizeof(std::uint64_t)));
+  file.seekp(static_cast<std::streamoff>(slot));
+  file.write(reinterpret_cast<const char *>(&sum), sizeof(sum));
+  file.close();
+  const Result<Page> page = read_page(path);
+  ASSERT_TRUE(page) << to_string(page.error());
+  EXPECT_EQ(page->frame.name, "cart");
+  EXPECT_EQ(page->frame.alert, "");
 }
 
 TEST_F(LivePage, GrowsAndShrinksFromFrameToFrame) {

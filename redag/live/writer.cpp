@@ -162,6 +162,7 @@ void PageWriter::publish(const Frame &frame) {
   put_name(header.driver, frame.driver);
   put_name(header.preemption, frame.preemption);
   put_name(header.policy, frame.policy);
+  put_name(header.alert, frame.alert);
   put(header);
   for (std::size_t d = 0; d < dags; ++d) {
     const DagFrame &dag = frame.dags[d];

@@ -106,6 +106,7 @@ bool is_ros_internal(const CallbackId &id) {
       // Component containers.
       "_container/list_nodes", "_container/load_node", "_container/unload_node"};
   if (id.kind == Kind::Subscription) return std::find(kTopics.begin(), kTopics.end(), id.name) != kTopics.end();
+  if (id.kind == Kind::Waitable) return !id.name.empty();
   if (id.kind != Kind::Service) return false;
   // The service must be the node's own: an application may offer "/map/get_state" in a node of another name.
   const std::size_t length = id.node.size();

@@ -21,8 +21,8 @@ namespace redag {
 struct CallbackId {
   Callback::Kind kind = Callback::Kind::Timer;
   std::string node;
-  std::string name;         // of the topic, service or action; empty for timers and waitables
-  Duration period = 0;      // of a timer
+  std::string name;     // of the topic, service or action; empty for timers and waitables, not for a waitable's timer
+  Duration period = 0;  // of a timer
   std::uint32_t index = 0;  // n-th timer (waitable) of its node by creation, from 0
 
   friend bool operator==(const CallbackId &, const CallbackId &) = default;
@@ -45,7 +45,8 @@ struct CallbackId {
 /// The same for a pattern: "/lidar_* timer", "/imu_driver timer 2 ms", "/imu_driver timer (0)".
 [[nodiscard]] std::string to_string(const Callback &pattern);
 
-/// Returns true if ROS itself creates this callback in every such node: parameters, clock, log levels, life cycle.
+/// Returns true if ROS itself creates this callback in every such node: parameters, clock, log levels, life cycle. Also
+/// for the timer of a waitable, which ROS creates to expire the goals of an action server.
 [[nodiscard]] bool is_ros_internal(const CallbackId &id);
 
 /// Assigns tasks to callbacks, and keeps account of both sides. The workload must outlive it and stay unchanged.

@@ -149,6 +149,8 @@ TEST(IsRosInternal, KnowsWhatEveryNodeHas) {
   EXPECT_FALSE(is_ros_internal(service("/ekf", "/ekf")));
   EXPECT_FALSE(is_ros_internal(of(Kind::Client, "/gui", "/gui/get_parameters")));
   EXPECT_FALSE(is_ros_internal(timer("/clock", 5, 0)));
+  EXPECT_FALSE(is_ros_internal(of(Kind::Waitable, "/arm")));
+  EXPECT_TRUE(is_ros_internal(of(Kind::Waitable, "/arm", "timer")));  // expires the goals of an action server
 }
 
 // --- the matcher ---

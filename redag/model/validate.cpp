@@ -484,9 +484,7 @@ class Checker {
   void check_load() {
     const Platform &platform = workload_.platform;
     if (platform.clusters.empty()) {
-      double utilization = 0;
-      for (const Dag &dag : workload_.dags) utilization += utilization_of(dag);
-      check_load(utilization, platform.workers, "", Finding::kNone);
+      check_load(workload_.utilization(), platform.workers, "", Finding::kNone);
       return;
     }
     std::vector<double> loads(platform.clusters.size(), 0);
@@ -494,7 +492,7 @@ class Checker {
     for (const Dag &dag : workload_.dags) {
       const std::optional<std::size_t> cluster = cluster_of(platform, dag);
       if (!cluster) continue;
-      loads[*cluster] += utilization_of(dag);
+      loads[*cluster] += dag.utilization();
       serves[*cluster] = true;
     }
     for (std::uint32_t c = 0; c < platform.clusters.size(); ++c) {
@@ -518,15 +516,6 @@ class Checker {
                              workers == 1 ? "" : "s"),
                  "no schedule meets every deadline if jobs execute for their wcet")
         .item = cluster;
-  }
-
-  // Periods can still be wrong here.
-  static double utilization_of(const Dag &dag) {
-    double sum = 0;
-    for (const Task &task : dag.tasks) {
-      if (task.period > 0) sum += static_cast<double>(task.wcet) / static_cast<double>(task.period);
-    }
-    return sum;
   }
 
   const Workload &workload_;

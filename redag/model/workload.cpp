@@ -20,8 +20,14 @@ std::size_t Workload::task_count() const {
 
 double Workload::utilization() const {
   double sum = 0;
-  for (const Dag &dag : dags) {
-    for (const Task &task : dag.tasks) sum += static_cast<double>(task.wcet) / static_cast<double>(task.period);
+  for (const Dag &dag : dags) sum += dag.utilization();
+  return sum;
+}
+
+double Dag::utilization() const {
+  double sum = 0;
+  for (const Task &task : tasks) {
+    if (task.period > 0) sum += static_cast<double>(task.wcet) / static_cast<double>(task.period);
   }
   return sum;
 }

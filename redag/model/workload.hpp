@@ -119,6 +119,9 @@ struct Dag {
   Degrade degrade;           // only used if the DAG is not of high criticality
   std::string cluster = {};  // name of the cluster that serves it; empty: the only one, or the whole platform
 
+  /// Its share of U (eq. utilization). Tasks without a period have none.
+  [[nodiscard]] double utilization() const;
+
   friend bool operator==(const Dag &, const Dag &) = default;
 };
 

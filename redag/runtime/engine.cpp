@@ -53,11 +53,6 @@ Engine::~Engine() {
   join();
 }
 
-Time Engine::now() const noexcept {
-  const Time origin = origin_.load(std::memory_order_relaxed);
-  return origin == kNever ? 0 : monotonic_now() - origin;
-}
-
 // ---- threads ----
 
 Result<void> Engine::start() {
@@ -119,14 +114,13 @@ void Engine::main(WorkerThread &self) noexcept {
     // Read before the mail: all mail was posted before this was set.
     const bool ending = pool_.ending();
     if (self.take_mail()) {
-      const Assignment first = self.mail;
-      // A job that was dispatched to this very thread when the last one ended needs no wake-up.
-      Next next{Next::Kind::Start, first};
+      Taker taker{self, JobSlot(), {Next::Kind::Start, self.mail}};
       self.meter.pass();
       Time at = now();
-      while (next.kind == Next::Kind::Start) {
-        if (self.led && !next.assignment.expected_short) follow(self);
-        next = run(self, next.assignment, JobSlot(), at);
+      // A job that was dispatched to this very thread when the last one ended needs no wake-up.
+      while (taker.next.kind == Next::Kind::Start) {
+        if (self.led && !taker.next.assignment.expected_short) follow(self);
+        run(taker, at);
       }
     } else if (ending) {
       return;
@@ -216,36 +210,34 @@ void Engine::look_out() noexcept {
 
 // ---- decisions ----
 
-// `self` is the calling thread if it has just lost its job and can take another. `below` is the job suspended on it.
-Next Engine::decide(Locked &locked, Time now, WorkerThread *self, JobSlot below) {
+// `taker` is the calling thread, or null if it cannot take a job.
+void Engine::decide(Locked &locked, Time now, Taker *taker) {
   // While paused, only run_one() starts a job, on the caller's thread.
-  const std::uint32_t for_caller = self == &pool_.caller() ? 1 : 0;
+  const std::uint32_t for_caller = taker != nullptr && &taker->thread == &pool_.caller() ? 1 : 0;
   const sched::Step step = scheduler_->dispatch(now, may_start() ? sched::kNoLimit : for_caller);
-  if (options_.trace_capacity > 0) {
-    for (const JobEvent &event : step.events) decisions_.push(event);
-  }
-  if (options_.measure) {
-    for (const JobEvent &event : step.events) {
-      if (event.kind == JobEventKind::Preempted) ++tasks_[event.task].preemptions;
-    }
-  }
-  if (has_listeners_.load(std::memory_order_relaxed)) {
-    for (const JobEvent &event : step.events) {
-      const auto &listener = tasks_[event.task].listener;
-      if (event.kind == JobEventKind::Skipped && listener) locked.tell(listener, event.reason);
-    }
-  }
+  if (!step.events.empty()) report(locked, step.events);
   const bool guards = guard_ && tasks_.can_give_way();
   // Wakes the throttling guard before any job: a job above the calling thread may delay everything that follows. The
   // guard is above all jobs and waits for the lock. Its owner is raised meanwhile, and no job preempts it.
   const bool has_jobs = placement_.unfinished() > 0 || !step.dispatches.empty();
   if (guards && has_jobs && guard_->must_wake()) locked.wake_ups().wake_helper(guard_thread_->parker);
-  const bool may_lead = releases_ != nullptr && releases_->expects();
-  const Next next =
-      placement_.place(step, now, Taker{self, below, locked.waited(), may_lead}, tasks_, locked.wake_ups());
+  if (taker != nullptr || !step.dispatches.empty()) {
+    const bool may_lead = releases_ != nullptr && releases_->expects();
+    placement_.place(step, Situation{now, locked.waited(), may_lead}, taker, tasks_, locked.wake_ups());
+  }
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
   if (guards) guard_->note(now);
-  return next;
+}
+
+void Engine::report(Locked &locked, std::span<const JobEvent> events) {
+  const bool has_listeners = has_listeners_.load(std::memory_order_relaxed);
+  for (const JobEvent &event : events) {
+    if (options_.trace_capacity > 0) decisions_.push(event);
+    if (options_.measure && event.kind == JobEventKind::Preempted) ++tasks_[event.task].preemptions;
+    if (!has_listeners || event.kind != JobEventKind::Skipped) continue;
+    const auto &listener = tasks_[event.task].listener;
+    if (listener) locked.tell(listener, event.reason);
+  }
 }
 
 // Updates the flags that let a preemption point cost one load while no job is more urgent.
@@ -324,19 +316,19 @@ void Engine::wake_pause_waiters() {
 }
 
 bool Engine::run_one() {
-  Next next;
+  Taker taker{pool_.caller(), JobSlot(), Next()};
   {
     const Time at = now();
     Locked locked(*this);
     withdraw_if_halting();
     REDAG_CHECK(paused_, "run_one() is for a paused engine");
     REDAG_CHECK(pool_.caller().stack.empty(), "one run_one() at a time");
-    next = decide(locked, at, &pool_.caller());
+    decide(locked, at, &taker);
   }
-  if (next.kind != Next::Kind::Start) return false;
+  if (taker.next.kind != Next::Kind::Start) return false;
   pool_.caller().meter.forget();
   Time at = now();
-  run(pool_.caller(), next.assignment, JobSlot(), at);
+  run(taker, at);
   return true;
 }
 
@@ -344,8 +336,7 @@ bool Engine::run_one() {
 
 // The first thread to take the lock after halt() skips the jobs that have not started. These skips are the engine's,
 // not the model's: they are not recorded, and the jobs count as in flight.
-void Engine::withdraw_if_halting() {
-  if (halted_at_ != kNever || !halting_.load(std::memory_order_acquire)) return;
+void Engine::withdraw() {
   halted_at_ = now();
   scheduler_->close(halted_at_);
   const sched::Step step = scheduler_->dispatch(halted_at_);

@@ -24,6 +24,7 @@
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/result.hpp"
 #include "redag/base/thread_annotations.hpp"
+#include "redag/runtime/clock.hpp"
 #include "redag/runtime/event_merge.hpp"
 #include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/job_body.hpp"
@@ -70,6 +71,17 @@ struct OverdueJob {
   Duration used = 0;     // processor time; small if the job blocks or more urgent jobs leave it none
 };
 
+/// A job that has started and not ended, and the thread that it is on.
+struct StartedJob {
+  Job job;
+  std::uint32_t thread = 0;  // index among the engine's threads
+  bool on_top = false;       // of its thread: the others there wait until it ends
+  // Of the topmost job whose body the thread is in; otherwise kNever and 0:
+  Time begun = kNever;      // on the engine's clock
+  Duration thread_cpu = 0;  // processor time of the thread since it was created
+  int thread_id = 0;        // the kernel's number of the thread
+};
+
 /// The figures of one task for a live view.
 struct TaskFigures {
   sched::Accounting jobs;
@@ -109,7 +121,10 @@ class Engine {
   /// Sets the origin (CLOCK_MONOTONIC) of all times that the scheduler sees. Until then now() is 0. Call it before any
   /// release.
   void set_origin(Time monotonic) noexcept { origin_.store(monotonic, std::memory_order_relaxed); }
-  [[nodiscard]] Time now() const noexcept;
+  [[nodiscard]] Time now() const noexcept {
+    const Time origin = origin_.load(std::memory_order_relaxed);
+    return origin == kNever ? 0 : monotonic_now() - origin;
+  }
 
   /// Releases jobs of timer tasks, all at this instant. More than sched::kMostReleasesAtOnce are split into lots, one
   /// after the other. Decisions are carried out before it returns. Nothing allocates under the lock.
@@ -153,6 +168,9 @@ class Engine {
   [[nodiscard]] Time halted_at() const;  // relative to the origin; kNever before halt()
   /// Jobs that have started and not ended.
   [[nodiscard]] std::vector<Job> started() const;
+  /// Between start() and join(): replaces `out` by the jobs on the threads, by thread, the topmost one last. For
+  /// observers that look from time to time; leaves out the job of run_one().
+  void started(std::vector<StartedJob> &out) const;
   /// Calls halt(), and ends the threads once all started jobs have ended. Not from a body.
   void join();
 
@@ -201,21 +219,24 @@ class Engine {
   void follow(WorkerThread &self) noexcept;
   void guard_throttling() noexcept;
   void look_out() noexcept;
-  Next run(WorkerThread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept;
+  void run(Taker &taker, Time &at) noexcept;
   sched::Outcome call(const Assignment &assignment);
-  Next finish(WorkerThread &self, const Assignment &assignment, RunningJob &running, sched::Outcome outcome,
-              JobSlot below, Time &next_begins);
+  void finish(Taker &taker, RunningJob &running, sched::Outcome outcome, Time &next_begins);
   void preemption_point(RunningJob &job);
   void reach_limit(RunningJob &job, Duration used);
 
   void report_limits(RunningJob &job, Duration used, Time now) REDAG_REQUIRES(lock_);
   bool tell_limits(RunningJob &job, Duration used, Time now, bool from_outside) REDAG_REQUIRES(lock_);
-  Next decide(Locked &locked, Time now, WorkerThread *self = nullptr, JobSlot below = JobSlot()) REDAG_REQUIRES(lock_);
+  void decide(Locked &locked, Time now, Taker *taker = nullptr) REDAG_REQUIRES(lock_);
+  void report(Locked &locked, std::span<const JobEvent> events) REDAG_REQUIRES(lock_);
   Duration look_at_throttling() REDAG_EXCLUDES(lock_);
   void refresh_outranked() REDAG_REQUIRES(lock_);
   void register_task(TaskId id, const Task &task, DagId dag, Body &body,
                      std::shared_ptr<SkipListener> listener = nullptr) REDAG_REQUIRES(lock_);
-  void withdraw_if_halting() REDAG_REQUIRES(lock_);
+  void withdraw_if_halting() REDAG_REQUIRES(lock_) {
+    if (halted_at_ == kNever && halting()) withdraw();
+  }
+  void withdraw() REDAG_REQUIRES(lock_);
   void wake_pause_waiters() REDAG_REQUIRES(lock_);
   [[nodiscard]] bool may_start() const REDAG_REQUIRES(lock_) { return running_ && !paused_; }
 

@@ -22,11 +22,13 @@ const RunningJob *Engine::current_job() const noexcept {
   return job;
 }
 
-// Runs a job to its end, on top of `below` if that is valid. `at` is when it begins, and is set to when the thread's
-// next job does. A job that follows another on its thread is charged for the decision between the two, which saves
-// reading clocks. On the clock, it does not take the time for which that decision was delayed, nor the time to ask for
-// the thread's processor time. Returns the thread's next action.
-Next Engine::run(WorkerThread &self, const Assignment &assignment, JobSlot below, Time &at) noexcept {
+// Runs the taker's next job to its end, and decides what it does then. `at` is when the job begins, and is set to when
+// the thread's next job does. A job that follows another on its thread is charged for the decision between the two,
+// which saves reading clocks. On the clock, it does not take the time for which that decision was delayed, nor the time
+// to ask for the thread's processor time.
+void Engine::run(Taker &taker, Time &at) noexcept {
+  WorkerThread &self = taker.thread;
+  const Assignment &assignment = taker.next.assignment;
   const Job &job = assignment.job;
   if (options_.trace_capacity > 0) {
     const Time begun = now();
@@ -64,7 +66,7 @@ Next Engine::run(WorkerThread &self, const Assignment &assignment, JobSlot below
     self.events.push(JobEvent{running.ended, running.charged, job.task, job.number, job.worker.value,
                               JobEventKind::Executed, Reason::None, 0});
   }
-  return finish(self, assignment, running, outcome, below, at);
+  finish(taker, running, outcome, at);
 }
 
 Outcome Engine::call(const Assignment &assignment) {
@@ -79,36 +81,32 @@ Outcome Engine::call(const Assignment &assignment) {
 }
 
 // Sets `next_begins` to when the thread's next job begins.
-Next Engine::finish(WorkerThread &self, const Assignment &assignment, RunningJob &running, Outcome outcome,
-                    JobSlot below, Time &next_begins) {
+void Engine::finish(Taker &taker, RunningJob &running, Outcome outcome, Time &next_begins) {
   Body doomed;  // of a removed task; destroyed without the lock
-  TaskEntry &entry = *assignment.entry;
+  TaskEntry &entry = *taker.next.assignment.entry;
   const Time at = running.ended;
   const bool measured = entry.response && outcome == Outcome::Finished;
-  const Duration response = at - assignment.job.release;
+  const Duration response = at - taker.next.assignment.job.release;
   if (measured) entry.response->add(response);
-  Next next;
   bool delayed = false;
   {
-    Locked locked(*this);
+    Locked locked(*this, &delayed);
     withdraw_if_halting();
     entry.count(running.charged, at - running.begun);
     if (measured && response > entry.deadline) ++entry.late;
     --entry.busy;
     if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
-    placement_.end(self);
+    placement_.end(taker.thread);
     if (running.charged > running.limit) {
       running.used_budget = running.used_budget || outcome == Outcome::BudgetExceeded;
       report_limits(running, running.charged, at);
     }
-    scheduler_->complete(assignment.job.slot, at, outcome);
-    next = decide(locked, at, &self == &pool_.caller() ? nullptr : &self, below);
+    scheduler_->complete(running.slot, at, outcome);
+    decide(locked, at, &taker.thread == &pool_.caller() ? nullptr : &taker);
     if (placement_.unfinished() == 0 && halted_at_ != kNever) idle_event_.set();
     if (placement_.unfinished() == 0 && pause_waiters_ > 0) wake_pause_waiters();
-    delayed = locked.delayed();
   }
   next_begins = delayed || !running.on_trust ? now() : at;
-  return next;
 }
 
 void RunningJob::close() noexcept {
@@ -194,21 +192,20 @@ void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob
 }
 
 void Engine::preemption_point(RunningJob &job) {
-  WorkerThread &self = pool_[job.thread];
-  Next next;
+  Taker taker{pool_[job.thread], job.slot, Next()};
   Time at = now();
   {
     Locked locked(*this);
     withdraw_if_halting();
     if (!scheduler_->outranked(job.slot)) return;
     scheduler_->preemption_point(job.slot, at);
-    next = decide(locked, at, &self, job.slot);
+    decide(locked, at, &taker);
   }
-  if (next.kind != Next::Kind::Start) return;
+  if (taker.next.kind != Next::Kind::Start) return;
   const Duration used = job.cpu_time();
-  self.meter.pass();
-  while (next.kind == Next::Kind::Start) next = run(self, next.assignment, job.slot, at);
-  REDAG_CHECK(next.kind == Next::Kind::Resume, "a suspended job was not resumed");
+  taker.thread.meter.pass();
+  while (taker.next.kind == Next::Kind::Start) run(taker, at);
+  REDAG_CHECK(taker.next.kind == Next::Kind::Resume, "a suspended job was not resumed");
   job.start = CpuMeter::Start{thread_cpu_now() - used, true};
   job.enter();
 }

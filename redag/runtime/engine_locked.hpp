@@ -15,7 +15,10 @@ namespace redag::runtime {
 /// Holds the engine's lock. Wakes threads and reports skips after releasing it.
 class REDAG_SCOPED_CAPABILITY Engine::Locked {
  public:
-  explicit Locked(Engine &engine) REDAG_ACQUIRE(engine.lock_) : engine_(engine), wake_ups_(engine.realtime()) {
+  /// `delayed`, if not null, is set at the end: true if the thread slept for the lock, or woke others. Both can take
+  /// longer than a short job. A thread that has slept for the lock cannot know whether others do: its unlock() wakes.
+  explicit Locked(Engine &engine, bool *delayed = nullptr) REDAG_ACQUIRE(engine.lock_)
+      : engine_(engine), wake_ups_(engine.realtime()), delayed_(delayed) {
     at_once_ = engine_.lock_.lock();
   }
   /// For `releases` releases. Each can skip a ready job and one that waits for its predecessors. Allocates room for
@@ -28,8 +31,9 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
     at_once_ = engine_.lock_.lock();
   }
   ~Locked() REDAG_RELEASE() {
-    engine_.lock_.unlock();
+    const bool woke = engine_.lock_.unlock();
     wake_ups_.wake_late();
+    if (delayed_ != nullptr) *delayed_ = woke || wake_ups_.any();
     for (std::size_t i = 0; i < skip_count_; ++i) {
       few_skips_[i].listener->skipped(few_skips_[i].reason);
       std::destroy_at(&few_skips_[i]);
@@ -57,12 +61,11 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   [[nodiscard]] WakeUps &wake_ups() { return wake_ups_; }
 
   [[nodiscard]] bool waited() const { return !at_once_; }
-  /// Returns true if the thread waited for the lock, or wakes others. Both can take longer than a short job.
-  [[nodiscard]] bool delayed() const { return waited() || wake_ups_.any(); }
 
  private:
   Engine &engine_;
   WakeUps wake_ups_;
+  bool *delayed_ = nullptr;
   bool at_once_ = true;  // the lock was free
   struct Skip {
     std::shared_ptr<SkipListener> listener;

@@ -43,52 +43,61 @@ void JobPlacement::start(std::size_t processors) {
 // Threads are alike: any idle thread gets the job. A job that is suspended under others stays on its thread. In `os`
 // mode the kernel decides by priority which job really runs, and a preempted job needs no action. The taker takes the
 // most urgent job to start. Therefore none of the threads that it wakes preempts it under the lock.
-Next JobPlacement::place(const sched::Step &step, Time now, const Taker &taker, TaskTable &tasks, WakeUps &wake_ups) {
-  WorkerThread *self = taker.thread;
-  const bool is_caller = self == &pool_.caller();
-  const Dispatch *own = self == nullptr ? nullptr : choose_own(step, taker.below);
-  Next next;
-  if (self != nullptr && !taker.below.valid() && !is_caller) {
-    // In `os` mode a thread steals only if it would be idle: two threads that exchange jobs must exchange priorities.
-    const std::uint32_t above = own == nullptr ? sched::kNoLimit : (os_ ? 0 : own->level);
-    if (own != nullptr && mailboxes_.should_leave(tasks[own->task], taker.waited)) {
-      own = nullptr;
-      add_idle(*self, taker.may_lead);
-    } else if (WorkerThread *other = mailboxes_.steal(above)) {
-      next.kind = Next::Kind::Start;
-      next.assignment = move_job(*other, *self, taker.may_lead);
-      mailboxes_.begin(*self, *next.assignment.entry);
-      own = nullptr;
-    } else if (own == nullptr) {
-      add_idle(*self, taker.may_lead);
-    }
-  }
-  if (own != nullptr) {
-    TaskEntry &entry = tasks[own->task];
-    next.kind = Next::Kind::Start;
-    assign(*self, *own, entry, next.assignment);
-    if (!is_caller) set_priority_for_job(*self, next.assignment);
-    if (!is_caller && !taker.below.valid()) mailboxes_.begin(*self, entry);
-  }
+void JobPlacement::place(const sched::Step &step, const Situation &situation, Taker *taker, TaskTable &tasks,
+                         WakeUps &wake_ups) {
+  const Dispatch *own = taker == nullptr ? nullptr : serve(*taker, step, situation, tasks);
   for (const Dispatch &dispatch : step.dispatches) {
     if (&dispatch == own) continue;
     if (dispatch.kind != DispatchKind::Start) {
-      if (dispatch.kind == DispatchKind::Resume && dispatch.job == taker.below) next.kind = Next::Kind::Resume;
+      const bool resumes = taker != nullptr && dispatch.kind == DispatchKind::Resume && dispatch.job == taker->below;
+      if (resumes) taker->next.kind = Next::Kind::Resume;
       if (os_) change_level(dispatch, tasks);
       continue;
     }
     TaskEntry &entry = tasks[dispatch.task];
     // A thread that wakes up on the caller's processor, and preempts it, is there much sooner than one elsewhere. The
     // caller would have to wait for a longer job, although another processor may be idle.
-    const bool preempts = os_ && self == nullptr && entry.expected_short();
+    const bool preempts = os_ && taker == nullptr && entry.expected_short();
     const int here = preempts ? processor_of(this_threads_processor()) : -1;
-    mailboxes_.post(entry, now, here, wake_ups, [&](WorkerThread &thread) {
+    mailboxes_.post(entry, situation.now, here, wake_ups, [&](WorkerThread &thread) {
       assign(thread, dispatch, entry, thread.mail);
       set_priority_for_job(thread, thread.mail);
     });
   }
   mailboxes_.settle(wake_ups);
-  return next;
+}
+
+// Gives the taker its next job, or adds it to the idle threads. Returns the decision that it thereby carries out, or
+// null.
+const Dispatch *JobPlacement::serve(Taker &taker, const sched::Step &step, const Situation &situation,
+                                    TaskTable &tasks) {
+  WorkerThread &self = taker.thread;
+  const bool is_caller = &self == &pool_.caller();
+  taker.next.kind = Next::Kind::Nothing;
+  const Dispatch *own = choose_own(step, taker.below);
+  const bool is_free = !taker.below.valid() && !is_caller;
+  if (is_free && own != nullptr && mailboxes_.should_leave(tasks[own->task], situation.waited)) {
+    add_idle(self, situation.may_lead);
+    return nullptr;
+  }
+  if (is_free) {
+    // In `os` mode a thread steals only if it would be idle: two threads that exchange jobs must exchange priorities.
+    const std::uint32_t above = own == nullptr ? sched::kNoLimit : (os_ ? 0 : own->level);
+    if (WorkerThread *other = mailboxes_.steal(above)) {
+      move_job(*other, self, situation.may_lead, taker.next.assignment);
+      taker.next.kind = Next::Kind::Start;
+      mailboxes_.begin(self, *taker.next.assignment.entry);
+      return nullptr;
+    }
+    if (own == nullptr) add_idle(self, situation.may_lead);
+  }
+  if (own == nullptr) return nullptr;
+  TaskEntry &entry = tasks[own->task];
+  taker.next.kind = Next::Kind::Start;
+  assign(self, *own, entry, taker.next.assignment);
+  if (!is_caller) set_priority_for_job(self, taker.next.assignment);
+  if (is_free) mailboxes_.begin(self, entry);
+  return own;
 }
 
 void JobPlacement::end(WorkerThread &thread) {
@@ -104,8 +113,8 @@ void JobPlacement::add_idle(WorkerThread &thread, bool may_lead) {
   if (os_ && leads) apply(priorities_.wait(thread.index, band_.timer));
 }
 
-Assignment JobPlacement::move_job(WorkerThread &from, WorkerThread &to, bool may_lead) {
-  const Assignment assignment = from.mail;
+void JobPlacement::move_job(WorkerThread &from, WorkerThread &to, bool may_lead, Assignment &assignment) {
+  assignment = from.mail;
   to.stack.push_back(from.stack.back());
   from.stack.pop_back();
   to.level = from.level;
@@ -113,7 +122,6 @@ Assignment JobPlacement::move_job(WorkerThread &from, WorkerThread &to, bool may
   if (os_) priorities_.end(from.index);
   set_priority_for_job(to, assignment);
   add_idle(from, may_lead);
-  return assignment;
 }
 
 void JobPlacement::assign(WorkerThread &thread, const Dispatch &dispatch, TaskEntry &entry, Assignment &assignment) {

@@ -29,11 +29,17 @@ struct Next {
   Assignment assignment;
 };
 
-/// The calling thread, if it has just lost its job and can take another.
+/// A thread that has lost its job and can take another: which job that is suspended on it, and what it does next.
 struct Taker {
-  WorkerThread *thread = nullptr;
-  JobSlot below;          // the job suspended on it, if any
-  bool waited = false;    // for the engine's lock
+  WorkerThread &thread;
+  JobSlot below;
+  Next next;
+};
+
+/// What a decision is placed under.
+struct Situation {
+  Time now = 0;           // when it was taken
+  bool waited = false;    // the calling thread waited for the engine's lock
   bool may_lead = false;  // releases are expected: an idle thread can wait for them
 };
 
@@ -45,8 +51,8 @@ class JobPlacement {
   /// All threads wait for jobs, on that many processors.
   void start(std::size_t processors);
 
-  /// Carries out a step that was decided at `now`. Returns the taker's next action.
-  Next place(const sched::Step &step, Time now, const Taker &taker, TaskTable &tasks, WakeUps &wake_ups);
+  /// Carries out a step. `taker` is the calling thread, or null if it cannot take a job.
+  void place(const sched::Step &step, const Situation &situation, Taker *taker, TaskTable &tasks, WakeUps &wake_ups);
   /// The thread's topmost job has ended.
   void end(WorkerThread &thread);
 
@@ -67,9 +73,10 @@ class JobPlacement {
   }
 
  private:
+  const sched::Dispatch *serve(Taker &taker, const sched::Step &step, const Situation &situation, TaskTable &tasks);
   void add_idle(WorkerThread &thread, bool may_lead);
-  Assignment move_job(WorkerThread &from, WorkerThread &to, bool may_lead);
-  /// Fills `assignment`, which is the thread's mail or its next action.
+  // `assignment`, which these fill, is the thread's mail or its next action.
+  void move_job(WorkerThread &from, WorkerThread &to, bool may_lead, Assignment &assignment);
   void assign(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment);
   void change_level(const sched::Dispatch &dispatch, const TaskTable &tasks);
   void set_priority_for_job(WorkerThread &thread, const Assignment &assignment);

@@ -6,17 +6,11 @@
 #include "redag/runtime/running_job.hpp"
 
 namespace redag {
-namespace runtime {
-namespace {
+namespace runtime::detail {
 
 constinit thread_local RunningJob *current_job = nullptr;
 
-}  // namespace
-
-RunningJob *RunningJob::current() noexcept { return current_job; }
-void RunningJob::set_current(RunningJob *job) noexcept { current_job = job; }
-
-}  // namespace runtime
+}  // namespace runtime::detail
 
 void preemption_point() {
   runtime::RunningJob *job = runtime::RunningJob::current();

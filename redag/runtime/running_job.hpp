@@ -15,6 +15,14 @@
 namespace redag::runtime {
 
 class Engine;
+struct RunningJob;
+
+namespace detail {
+
+// Initial exec: see redag/base/thread_id.hpp.
+extern constinit thread_local RunningJob *current_job __attribute__((tls_model("initial-exec")));
+
+}  // namespace detail
 
 struct RunningJob {
   Engine *engine = nullptr;
@@ -50,8 +58,9 @@ struct RunningJob {
   void enter() noexcept { top->store(this, std::memory_order_release); }
   void leave() noexcept { top->store(nullptr, std::memory_order_release); }
 
-  static RunningJob *current() noexcept;
-  static void set_current(RunningJob *job) noexcept;
+  /// The job that the calling thread runs, in any engine.
+  static RunningJob *current() noexcept { return detail::current_job; }
+  static void set_current(RunningJob *job) noexcept { detail::current_job = job; }
 };
 
 }  // namespace redag::runtime

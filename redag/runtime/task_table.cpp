@@ -11,8 +11,8 @@ namespace redag::runtime {
 
 void TaskTable::add(TaskId id, const Task &task, bool is_high, Body &body, std::shared_ptr<SkipListener> listener) {
   REDAG_CHECK(id.value <= entries_.size(), "the scheduler numbers tasks differently");
-  if (id.value == entries_.size()) entries_.emplace_back();
-  TaskEntry &entry = entries_[id.value];
+  if (id.value == entries_.size()) entries_.push_back(std::make_unique<TaskEntry>());
+  TaskEntry &entry = *entries_[id.value];
   REDAG_CHECK(!entry.body && entry.busy == 0, "a task that is still there is replaced");
   most_started_ += task.concurrency;
   most_started_ -= entry.concurrency;
@@ -32,7 +32,7 @@ void TaskTable::add(TaskId id, const Task &task, bool is_high, Body &body, std::
 
 void TaskTable::remove(TaskId id, std::vector<Body> &doomed) {
   REDAG_CHECK(id.value < entries_.size(), "removal of a task that does not exist");
-  TaskEntry &entry = entries_[id.value];
+  TaskEntry &entry = *entries_[id.value];
   if (!entry.removed) --(entry.is_high ? high_ : others_);
   entry.removed = true;
   entry.listener.reset();

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <vector>
 
@@ -94,8 +93,8 @@ class TaskTable {
   /// lock.
   void remove(TaskId id, std::vector<Body> &doomed);
 
-  [[nodiscard]] TaskEntry &operator[](TaskId id) { return entries_[id.value]; }
-  [[nodiscard]] const TaskEntry &operator[](TaskId id) const { return entries_[id.value]; }
+  [[nodiscard]] TaskEntry &operator[](TaskId id) { return *entries_[id.value]; }
+  [[nodiscard]] const TaskEntry &operator[](TaskId id) const { return *entries_[id.value]; }
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   /// How many jobs all tasks together can have in progress.
   [[nodiscard]] std::size_t most_started() const { return most_started_; }
@@ -104,7 +103,7 @@ class TaskTable {
 
  private:
   bool measure_;
-  std::deque<TaskEntry> entries_;  // entries keep their addresses
+  std::vector<std::unique_ptr<TaskEntry>> entries_;  // entries keep their addresses
   std::size_t most_started_ = 0;
   std::size_t high_ = 0;    // not removed, of DAGs of high criticality
   std::size_t others_ = 0;  // not removed, of other DAGs

@@ -72,8 +72,11 @@ void Lifecycle<D>::complete(JobSlot job_slot, Time now, Outcome outcome) {
               "completion of a job that does not run");
   table_.step.begin(now);
   const std::uint32_t slot = job_slot.value;
-  const Job job = table_.jobs[slot];
-  TaskState &task = table_.tasks[job.task.value];
+  const Job &job = table_.jobs[slot];
+  const TaskId id = job.task;
+  const Time release = job.release;
+  const Time origin = job.origin;
+  TaskState &task = table_.tasks[id.value];
   if (outcome == Outcome::Finished) {
     ++task.finished;
     table_.step.emit(job, JobEventKind::Finished, now);
@@ -88,7 +91,7 @@ void Lifecycle<D>::complete(JobSlot job_slot, Time now, Outcome outcome) {
   table_.free_slot(slot);
   if (outcome != Outcome::Finished || !task.joined || !takes_releases(task)) return;
 
-  table_.precedence.on_complete(job.task, job.release, job.origin, now, [&](TaskId successor) {
+  table_.precedence.on_complete(id, release, origin, now, [&](TaskId successor) {
     const TaskState &next = table_.tasks[successor.value];
     if (next.life != TaskLife::Live) return;
     if (!next.timer) {

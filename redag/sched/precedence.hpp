@@ -46,8 +46,8 @@ class Precedence {
   /// on_fresh(successor) for each successor whose predecessors now all have fresh data.
   template <class OnFresh>
   void on_complete(TaskId task, Time release, Time origin, Time finish, OnFresh on_fresh) {
-    const Node node = nodes_[task.value];
-    for (std::uint32_t i = node.first_successor; i < node.last_successor; ++i) {
+    const std::uint32_t last = nodes_[task.value].last_successor;
+    for (std::uint32_t i = nodes_[task.value].first_successor; i < last; ++i) {
       Edge &edge = edges_[successors_[i]];
       Node &successor = nodes_[edge.to.value];
       if (serves(edge, successor)) --successor.fresh;

@@ -28,16 +28,19 @@ PriorityDispatcher::PriorityDispatcher(JobTable &table)
 
 inline void PriorityDispatcher::decide(std::uint32_t most) {
   for (std::uint32_t best = top(); best != kNil; best = top()) {
-    const bool starts = !table_.jobs[best].started();
+    Job &job = table_.jobs[best];
+    const bool starts = !job.started();
     if (starts && most == 0) {
       if (!set_aside(best)) break;
       continue;
     }
     Place place;
-    if (!find_place(table_.jobs[best], place)) break;
-    if (park_if_not_eligible(best)) continue;
-    if (starts) --most;
-    run(best, place);
+    if (!find_place(job, place)) break;
+    if (starts) {
+      if (park_if_not_eligible(best, job)) continue;
+      --most;
+    }
+    run(best, job, place);
   }
   if (!open_workers_.empty()) close_open_workers();
   if (held_back_ != kNil) put_back();
@@ -63,7 +66,7 @@ void PriorityDispatcher::put_back() {
 }
 
 // Finds where `job`, the first in the ready queue, could run now. Returns false if there is no place.
-inline bool PriorityDispatcher::find_place(const Job &job, Place &place) const {
+inline bool PriorityDispatcher::find_place(const Job &job, Place &place) {
   if (!free_workers_.empty()) {
     const bool last_is_free = job.worker.valid() && workers_[job.worker.value].stack == kNil;
     place = Place{last_is_free ? job.worker : WorkerId(free_workers_.first()), kNil};
@@ -78,13 +81,15 @@ inline bool PriorityDispatcher::find_place(const Job &job, Place &place) const {
 
 // Returns the job that would lose its worker first: of all running jobs (Full), or of those on top of an open worker
 // (Cooperative).
-std::uint32_t PriorityDispatcher::least_urgent_running() const {
+std::uint32_t PriorityDispatcher::least_urgent_running() {
+  if (least_urgent_ != kNil) return least_urgent_;
   std::uint32_t least = kNil;
   const auto consider = [&](std::uint32_t slot) {
     if (least == kNil || before(table_.jobs[least], table_.jobs[slot])) least = slot;
   };
   if (table_.config.preemption == Preemption::Full) {
     for (const Worker &worker : workers_) consider(worker.running);
+    least_urgent_ = least;
   } else {
     for (const std::uint32_t w : open_workers_) {
       if (workers_[w].open) consider(workers_[w].stack);
@@ -106,19 +111,20 @@ inline std::uint32_t PriorityDispatcher::level_of(const Job &job) const {
   return level_of_key_.empty() ? std::min(key, table_.tier_count()) : level_of_key_[key];
 }
 
-inline void PriorityDispatcher::run(std::uint32_t slot, const Place &place) {
-  const bool resumes = table_.jobs[slot].started();
+inline void PriorityDispatcher::run(std::uint32_t slot, Job &job, const Place &place) {
+  const bool resumes = job.started();
   remove(slot);
   if (!resumes) hold_gates(slot);
   make_way(place);
-  table_.jobs[slot].under = table_.config.preemption == Preemption::Cooperative ? place.victim : kNil;
-  const std::uint32_t level = level_of(table_.jobs[slot]);
+  job.under = table_.config.preemption == Preemption::Cooperative ? place.victim : kNil;
+  const std::uint32_t level = level_of(job);
   resumes ? table_.resume(slot, place.worker, place.victim, level)
           : table_.start(slot, place.worker, place.victim, level);
   Worker &worker = workers_[place.worker.value];
   worker.running = slot;
   worker.stack = slot;
   worker.open = false;
+  if (least_urgent_ != kNil && before(table_.jobs[least_urgent_], job)) least_urgent_ = slot;
 }
 
 inline void PriorityDispatcher::make_way(const Place &place) {
@@ -128,6 +134,7 @@ inline void PriorityDispatcher::make_way(const Place &place) {
   }
   // Cooperative: a job under one that has ended is already suspended.
   if (table_.jobs[place.victim].state == JobState::Running) table_.suspend(place.victim);
+  forget_least_urgent();
   if (table_.config.preemption == Preemption::Full) push(place.victim);
 }
 
@@ -154,9 +161,7 @@ bool PriorityDispatcher::is_idle() const {
 
 // A worker is available to the job. Parks the job if one of its gates is full. Tries the gates in the order task, DAG,
 // group, threads.
-inline bool PriorityDispatcher::park_if_not_eligible(std::uint32_t slot) {
-  Job &job = table_.jobs[slot];
-  if (job.started()) return false;
+inline bool PriorityDispatcher::park_if_not_eligible(std::uint32_t slot, Job &job) {
   TaskGates &to_pass = task_gates_[job.task.value];
   const auto is_full = [](const Gate &gate) { return gate.used >= gate.capacity; };
   GateKind kind = GateKind::Task;
@@ -189,6 +194,7 @@ void PriorityDispatcher::inherit(std::uint32_t holder_slot, const Job &waiter) {
   const bool is_queued = holder.state == JobState::Suspended && table_.config.preemption == Preemption::Full;
   if (is_queued) remove(holder_slot);
   const std::uint32_t old_level = level_of(holder);
+  forget_least_urgent();
   holder.key = waiter.key;
   holder.priority_of = waiter.priority_of;
   if (is_queued) push(holder_slot);
@@ -208,6 +214,7 @@ void PriorityDispatcher::on_lowered(std::uint32_t slot) {
   const bool is_queued = job.state == JobState::Suspended && table_.config.preemption == Preemption::Full;
   if (is_queued) remove(slot);
   const std::uint32_t old_level = level_of(job);
+  forget_least_urgent();
   job.key = table_.own_key(job);
   job.priority_of = job.task;
   if (is_queued) push(slot);
@@ -241,6 +248,7 @@ void PriorityDispatcher::on_withdrawn(std::uint32_t slot) {
 inline void PriorityDispatcher::on_end(std::uint32_t slot) {
   const Job &job = table_.jobs[slot];
   Worker &worker = workers_[job.worker.value];
+  if (slot == least_urgent_) forget_least_urgent();
   if (job.state == JobState::Suspended) {
     // On threads, the operating system ran the job although the scheduler counted it as preempted.
     REDAG_CHECK(table_.config.preemption == Preemption::Full, "a job ended that is suspended under another");
@@ -339,6 +347,7 @@ void PriorityDispatcher::on_reconfigured() {
   heap_ = HeapQueue();
   first_ = kNil;
   queued_started_ = 0;
+  forget_least_urgent();
 
   static_assert(sizeof(TaskGates) == 32, "two tasks' gates in a cache line");
   shared_gates_.clear();

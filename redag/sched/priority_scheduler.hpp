@@ -5,7 +5,8 @@
 // bounds, exclusive groups, and preemption. docs/model.md defines the semantics. A value without thread, clock or I/O.
 // Not thread-safe.
 //
-// A decision costs O(1) under static policies and O(log n) under edf and fifo, plus O(m) if it must find a victim.
+// A decision costs O(1) under static policies and O(log n) under edf and fifo. It costs O(m) more if it must find the
+// least urgent running job anew: the one known before has ended, lost its worker, or changed its priority.
 #pragma once
 
 #include <array>
@@ -63,14 +64,15 @@ class PriorityDispatcher {
     std::uint32_t victim = kNil;  // the job that loses the worker
   };
 
-  [[nodiscard]] bool find_place(const Job &job, Place &place) const;
-  [[nodiscard]] std::uint32_t least_urgent_running() const;
+  [[nodiscard]] bool find_place(const Job &job, Place &place);
+  [[nodiscard]] std::uint32_t least_urgent_running();
+  void forget_least_urgent() { least_urgent_ = kNil; }
   [[nodiscard]] bool outranks(const Job &a, const Job &b) const;
   [[nodiscard]] std::uint32_t level_of(const Job &job) const;
   void tell_level(std::uint32_t slot, std::uint32_t old_level);
-  void run(std::uint32_t slot, const Place &place);
+  void run(std::uint32_t slot, Job &job, const Place &place);
   void make_way(const Place &place);
-  bool park_if_not_eligible(std::uint32_t slot);
+  bool park_if_not_eligible(std::uint32_t slot, Job &job);
   void inherit(std::uint32_t holder, const Job &waiter);
   void close_open_workers();
   bool set_aside(std::uint32_t slot);
@@ -121,7 +123,8 @@ class PriorityDispatcher {
   std::vector<Worker> workers_;
   LevelBitmap free_workers_;
   std::vector<std::uint32_t> open_workers_;
-  std::uint32_t held_back_ = kNil;  // during decide(): held-back jobs, linked by Job::next; they may not start
+  std::uint32_t least_urgent_ = kNil;  // Full: the least urgent running job; kNil: not known
+  std::uint32_t held_back_ = kNil;     // during decide(): held-back jobs, linked by Job::next; they may not start
 };
 
 /// Limited levels require a static policy.

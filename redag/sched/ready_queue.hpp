@@ -17,48 +17,54 @@
 
 namespace redag::sched {
 
-/// A set of small integers with an O(1) minimum: a 64-ary tree of words. Three levels hold 262,144 members.
+/// A set of small integers with an O(1) minimum: a 64-ary tree of words. Three levels hold 262,144 members. Sets of up
+/// to 64 need the root alone.
 class LevelBitmap {
  public:
   explicit LevelBitmap(std::size_t size = 0) {
-    do {
+    while (size > 64) {
       size = (size + 63) / 64;
-      words_.emplace_back(size == 0 ? 1 : size, 0);
-    } while (size > 1);
+      layers_.emplace_back(size, 0);
+    }
   }
 
   void set(std::uint32_t index) {
-    for (auto &layer : words_) {
+    for (auto &layer : layers_) {
       std::uint64_t &word = layer[index >> 6U];
       const bool was_empty = word == 0;
-      word |= std::uint64_t{1} << (index & 63U);
+      word |= bit(index);
       if (!was_empty) return;
       index >>= 6U;
     }
+    root_ |= bit(index);
   }
 
   void clear(std::uint32_t index) {
-    for (auto &layer : words_) {
+    for (auto &layer : layers_) {
       std::uint64_t &word = layer[index >> 6U];
-      word &= ~(std::uint64_t{1} << (index & 63U));
+      word &= ~bit(index);
       if (word != 0) return;
       index >>= 6U;
     }
+    root_ &= ~bit(index);
   }
 
-  [[nodiscard]] bool empty() const { return words_.back()[0] == 0; }
+  [[nodiscard]] bool empty() const { return root_ == 0; }
 
   /// The smallest member. Requires !empty().
   [[nodiscard]] std::uint32_t first() const {
-    std::uint32_t index = 0;
-    for (auto layer = words_.rbegin(); layer != words_.rend(); ++layer) {
+    auto index = static_cast<std::uint32_t>(std::countr_zero(root_));
+    for (auto layer = layers_.rbegin(); layer != layers_.rend(); ++layer) {
       index = (index << 6U) | static_cast<std::uint32_t>(std::countr_zero((*layer)[index]));
     }
     return index;
   }
 
  private:
-  std::vector<std::vector<std::uint64_t>> words_;  // [0]: the leaves; the last one: the root
+  [[nodiscard]] static std::uint64_t bit(std::uint32_t index) { return std::uint64_t{1} << (index & 63U); }
+
+  std::uint64_t root_ = 0;
+  std::vector<std::vector<std::uint64_t>> layers_;  // below the root; [0]: the leaves
 };
 
 /// One list of jobs for each urgency, and a bitmap of the lists that are not empty.

@@ -48,9 +48,7 @@ class StepBuilder {
   }
   void emit(TaskId task, std::uint32_t number, WorkerId worker, JobEventKind kind, std::int64_t value,
             Reason reason = Reason::None) {
-    if (recorded_.contains(kind)) {
-      events_.push_back(JobEvent{now_, value, task, number, worker.value, kind, reason, 0});
-    }
+    if (recorded_.contains(kind)) record(JobEvent{now_, value, task, number, worker.value, kind, reason, 0});
   }
 
   void tell(const Job &job, JobSlot slot, DispatchKind kind, JobSlot over, std::uint32_t level) {
@@ -78,6 +76,8 @@ class StepBuilder {
   }
 
  private:
+  void record(const JobEvent &event) { events_.push_back(event); }
+
   std::vector<JobEvent> events_;
   std::vector<Dispatch> dispatches_;
   EventKinds recorded_ = EventKinds::all();

@@ -21,6 +21,7 @@ constexpr Duration kAskAgain = 10 * redag::kMillisecond;  // between releases of
 // ---- connecting an entity ----
 
 bool ArrivalCallback::connect() {
+  if (!by_wait_set_ && is_hooked_by_user()) by_wait_set_ = true;
   if (!by_wait_set_) {
     try {
       hook();
@@ -29,6 +30,7 @@ bool ArrivalCallback::connect() {
       by_wait_set_ = true;
     }
   }
+  hook_intra_process();
   return by_wait_set_;
 }
 
@@ -47,6 +49,7 @@ void ArrivalCallback::detach() {
 
 void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool seen_only) {
   std::shared_ptr<ExecutorContext> to_wake;
+  std::shared_ptr<ExecutorContext> to_tell;
   Time now = 0;
   Release release;
   bool begins = false;
@@ -55,6 +58,7 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
     const redag::LockGuard guard(lock_);
     if (!context()) return;  // detached: the engine may no longer exist
     now = engine().now();
+    if (takes_part_) to_tell = context();
     // Messages of this process arrive on the publishing thread, within the job that is the task's predecessor.
     const redag::runtime::RunningJob *publisher = engine().current_job();
     if (context()->learning()) learn_from_arrival(now, count, source, publisher);
@@ -74,7 +78,12 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
         }
         if (whose == Overwritten::Started) continue;
       }
-      tokens_.push(Token{.arrival = now, .origin = origin, .source = source, .part = part, .seen_only = seen_only});
+      tokens_.push(Token{.arrival = now,
+                         .origin = origin,
+                         .source = source,
+                         .part = part,
+                         .seen_only = seen_only,
+                         .sender = publisher == nullptr ? redag::JobSlot() : publisher->slot});
       ++kept_[index_of(source)];
     }
     if (replaces) {
@@ -92,6 +101,7 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
   if (begins) engine().release(release, now);
   if (uses_engine) end_release();
   if (to_wake) to_wake->wake();
+  if (to_tell) to_tell->exchange_arrived();
 }
 
 // Removes the token of the oldest message, which the middleware has overwritten. Returns what became of its job.
@@ -234,6 +244,16 @@ void ArrivalCallback::learn_from_arrival(Time now, std::size_t count, Source sou
 std::vector<TaskId> ArrivalCallback::publishers() const {
   const redag::LockGuard guard(lock_);
   return publishers_;
+}
+
+std::vector<KeptInput> ArrivalCallback::kept() const {
+  constexpr std::size_t kMost = 64;  // the oldest are of interest
+  std::vector<KeptInput> kept;
+  const redag::LockGuard guard(lock_);
+  for (std::size_t i = 0; i < std::min(tokens_.size(), kMost); ++i) {
+    kept.push_back({.arrived = tokens_.at(i).arrival, .sender = tokens_.at(i).sender});
+  }
+  return kept;
 }
 
 Duration ArrivalCallback::mean_interval() const {

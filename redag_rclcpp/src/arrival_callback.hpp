@@ -30,6 +30,7 @@ class ArrivalCallback : public Callback, public Hooked {
   [[nodiscard]] bool has_rate() const override { return false; }
   [[nodiscard]] std::vector<TaskId> publishers() const override;
   [[nodiscard]] Duration mean_interval() const override;
+  [[nodiscard]] std::vector<KeptInput> kept() const override;
 
   void arrived_in_middleware(std::size_t count) noexcept override { arrived(count, Source::Middleware, 0); }
   Time expire(Time now, std::vector<redag::runtime::Release> &releases,
@@ -50,6 +51,7 @@ class ArrivalCallback : public Callback, public Hooked {
     int part = 0;                // number of the waitable's part
     bool seen_only = false;      // the wait set saw it, no hook
     bool after_skipped = false;  // set by take_token(): drop messages of skipped jobs first
+    redag::JobSlot sender;       // the job on whose thread it arrived, if any
   };
 
   // Taking guards the message that a started job is about to take. The middleware keeps this message until begin() and
@@ -81,6 +83,8 @@ class ArrivalCallback : public Callback, public Hooked {
     return std::static_pointer_cast<ArrivalCallback>(shared_from_this());
   }
   void arrived(std::size_t count, Source source, int part, bool seen_only = false);
+  /// For the constructors of callbacks that have an exchange(): the executor is told of what arrives.
+  void take_part_in_exchange() { takes_part_ = true; }
   /// There may be more messages of `source` than tokens: releases jobs until nothing is left.
   void release_leftovers(Source source);
   /// Drops the messages whose jobs were skipped, for drop_skipped(). `take` takes one message; false: there is none.
@@ -95,10 +99,14 @@ class ArrivalCallback : public Callback, public Hooked {
  private:
   // ---- what each kind of entity defines ----
 
-  /// Sets the hooks. Throws if the middleware, or a user's waitable, offers none.
+  /// Sets the middleware's hook. Throws if the middleware, or a user's waitable, offers none.
   virtual void hook() = 0;
+  /// Sets the hook that reports messages of this process, if there are any.
+  virtual void hook_intra_process() {}
   /// Clears the hooks, also where hook() had failed.
   virtual void unhook() = 0;
+  /// True if the user has set the middleware's hook. A wait set then watches the entity in its place.
+  [[nodiscard]] virtual bool is_hooked_by_user() const = 0;
   /// The entity; null once it is gone.
   [[nodiscard]] virtual std::shared_ptr<void> entity() const = 0;
   /// Takes what arrived and calls the user's function. False: there was nothing.
@@ -132,6 +140,7 @@ class ArrivalCallback : public Callback, public Hooked {
   [[nodiscard]] bool begin_drop(Source source) REDAG_EXCLUDES(lock_);
   void forget_dropped(Source source) REDAG_EXCLUDES(lock_);
 
+  bool takes_part_ = false;  // see take_part_in_exchange()
   const std::size_t depth_;
   std::atomic<bool> by_wait_set_;  // a wait set watches the entity
 

@@ -14,6 +14,7 @@
 #include <memory>
 #include <vector>
 
+#include "deadlock_detector.hpp"
 #include "executor_context.hpp"
 #include "redag/base/histogram.hpp"
 #include "redag/base/lock_guard.hpp"
@@ -33,8 +34,11 @@ class Callback : public TimerQueue::Timer,
   /// Connects the entity: later arrivals are released as jobs of `task`. True if a wait set must watch it.
   bool attach(TaskId task) {
     task_ = task;
-    return connect();
+    in_wait_set_ = connect();
+    return in_wait_set_;
   }
+  /// What attach() returned.
+  [[nodiscard]] bool in_wait_set() const { return in_wait_set_; }
   /// Disconnects the entity: hooks release nothing any more. The caller holds no lock of a callback.
   virtual void detach() = 0;
 
@@ -53,6 +57,11 @@ class Callback : public TimerQueue::Timer,
   /// mean time between arrivals that are handled; 0: fewer than three arrivals.
   [[nodiscard]] virtual std::vector<TaskId> publishers() const = 0;
   [[nodiscard]] virtual Duration mean_interval() const = 0;
+
+  /// For clients and servers of services and actions: which one, and the inputs that have arrived and were not taken,
+  /// the oldest first.
+  [[nodiscard]] virtual Exchange exchange() const { return {}; }
+  [[nodiscard]] virtual std::vector<KeptInput> kept() const { return {}; }
 
   [[nodiscard]] const redag::CallbackId &id() const { return id_; }
   [[nodiscard]] TaskId task() const { return task_; }
@@ -88,6 +97,7 @@ class Callback : public TimerQueue::Timer,
   const redag::CallbackId id_;
   redag::runtime::Engine &engine_;
   TaskId task_;
+  bool in_wait_set_ = false;
   std::shared_ptr<ExecutorContext> context_ REDAG_GUARDED_BY(lock_);
   std::shared_ptr<void> kept_until_done_;  // guarded by Registry::collect_lock_
 

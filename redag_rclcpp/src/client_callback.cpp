@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "arrival_callback.hpp"
+#include "compat.hpp"
 #include "entities.hpp"
 #include "rclcpp/client.hpp"
 #include "take.hpp"
@@ -18,9 +19,12 @@ class ClientCallback final : public ArrivalCallback {
  public:
   ClientCallback(std::shared_ptr<ExecutorContext> context, redag::CallbackId id,
                  const rclcpp::ClientBase::SharedPtr &client)
-      : ArrivalCallback(std::move(context), std::move(id), 0), client_(client) {}
+      : ArrivalCallback(std::move(context), std::move(id), 0), client_(client) {
+    take_part_in_exchange();
+  }
 
   [[nodiscard]] bool alive() const override { return !client_.expired(); }
+  [[nodiscard]] Exchange exchange() const override { return {.side = Exchange::Side::Client, .name = id().name}; }
 
   void count(const Held &, WaitSetSizes &sizes) const override { ++sizes.clients; }
   void add(Held &held, rcl_wait_set_t &set) const override {
@@ -45,6 +49,10 @@ class ClientCallback final : public ArrivalCallback {
         self());
   }
   void unhook() override { hook_.clear(); }
+  [[nodiscard]] bool is_hooked_by_user() const override {
+    const auto client = client_.lock();
+    return client && compat::is_hooked_by_user(*client);
+  }
 
   [[nodiscard]] bool handle(const Token &, Taking &taking) override {
     taking.begin();

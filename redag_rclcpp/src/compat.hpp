@@ -1,20 +1,30 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Hides differences between ROS 2 distributions behind one set of names. Humble has rclcpp 16, Jazzy 28.
+// Hides differences between ROS 2 distributions behind one set of names. Humble has rclcpp 16, Jazzy 28, Kilted 29,
+// Lyrical 32. Where a declaration of rclcpp tells what it can do, it is asked instead of the version: fixes of newer
+// distributions reach older ones. See also redag_rclcpp/distribution.hpp.
 #pragma once
 
 #include <tracetools/tracetools.h>
 
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "rclcpp/callback_group.hpp"
+#include "rclcpp/client.hpp"
 #include "rclcpp/clock.hpp"
 #include "rclcpp/context.hpp"
+#include "rclcpp/executor.hpp"
 #include "rclcpp/guard_condition.hpp"
+#include "rclcpp/node.hpp"
+#include "rclcpp/service.hpp"
+#include "rclcpp/subscription_base.hpp"
 #include "rclcpp/timer.hpp"
 #include "rclcpp/version.h"
 #include "rclcpp/waitable.hpp"
@@ -22,6 +32,8 @@
 #include "rclcpp_action/server.hpp"
 #if RCLCPP_VERSION_MAJOR < 21
 #include "rclcpp/qos_event.hpp"
+#else
+#include "rclcpp/event_handler.hpp"
 #endif
 
 #ifndef TRACETOOLS_TRACEPOINT  // its name before Jazzy
@@ -29,6 +41,8 @@
 #endif
 
 namespace redag_rclcpp::compat {
+
+// ---- waitables ----
 
 // Since Jazzy waitables take the wait set and the data by reference.
 #if RCLCPP_VERSION_MAJOR >= 28
@@ -41,6 +55,107 @@ inline bool is_ready(rclcpp::Waitable &waitable, rcl_wait_set_t &set) { return w
 inline void execute(rclcpp::Waitable &waitable, std::shared_ptr<void> &data) { waitable.execute(data); }
 #endif
 
+/// True if the waitable's on-ready hook is not reliable:
+/// - Before Lyrical action servers report expired goals to wait sets only (rclcpp issue 2661). Fixes for some versions
+///   of Jazzy and Kilted cannot be told from here. There the wait set costs nothing but the exact arrival times of
+///   goals.
+/// - Action clients and QoS events of Humble call the hook with too few arguments for arrivals before it was set.
+inline bool needs_wait_set(const rclcpp::Waitable &waitable) {
+#if RCLCPP_VERSION_MAJOR < 32
+  if (dynamic_cast<const rclcpp_action::ServerBase *>(&waitable) != nullptr) return true;
+#endif
+#if RCLCPP_VERSION_MAJOR < 21
+  return dynamic_cast<const rclcpp_action::ClientBase *>(&waitable) != nullptr ||
+         dynamic_cast<const rclcpp::QOSEventHandlerBase *>(&waitable) != nullptr;
+#else
+  (void)waitable;
+  return false;
+#endif
+}
+
+/// The timers of a waitable. An executor that waits for the waitable's hook has to call them when they are due. Since
+/// Kilted waitables have such timers. That of an action server expires goals.
+template <class Waitable>
+std::vector<rclcpp::TimerBase::SharedPtr> timers_of(const Waitable &waitable) {
+  if constexpr (requires { waitable.get_timers(); }) {
+    return waitable.get_timers();
+  } else {
+    return {};
+  }
+}
+
+// ---- hooks of users ----
+
+namespace detail {
+
+template <class Entity, class Function>
+bool is_set(Entity &entity, std::recursive_mutex Entity::*lock, Function Entity::*hook) {
+  const std::lock_guard<std::recursive_mutex> guard(entity.*lock);
+  return static_cast<bool>(entity.*hook);
+}
+
+#if RCLCPP_VERSION_MAJOR < 21
+// Humble's SubscriptionBase keeps these members private. The arguments of an explicit instantiation may name them.
+struct SubscriptionLock {
+  friend std::recursive_mutex rclcpp::SubscriptionBase::*member(SubscriptionLock);
+};
+struct SubscriptionHook {
+  friend std::function<void(std::size_t)> rclcpp::SubscriptionBase::*member(SubscriptionHook);
+};
+template <class Tag, auto kMember>
+struct Reveal {
+  friend decltype(kMember) member(Tag) { return kMember; }
+};
+template struct Reveal<SubscriptionLock, &rclcpp::SubscriptionBase::callback_mutex_>;
+template struct Reveal<SubscriptionHook, &rclcpp::SubscriptionBase::on_new_message_callback_>;
+#endif
+
+}  // namespace detail
+
+/// True if the user has set a callback of rclcpp's for new messages, requests, responses or events of the entity. The
+/// middleware has one place for such a callback, so that the executor must leave it alone.
+inline bool is_hooked_by_user(rclcpp::SubscriptionBase &subscription) {
+#if RCLCPP_VERSION_MAJOR < 21
+  return detail::is_set(subscription, member(detail::SubscriptionLock()), member(detail::SubscriptionHook()));
+#else
+  struct Opened : rclcpp::SubscriptionBase {
+    using SubscriptionBase::callback_mutex_;
+    using SubscriptionBase::on_new_message_callback_;
+  };
+  return detail::is_set(subscription, &Opened::callback_mutex_, &Opened::on_new_message_callback_);
+#endif
+}
+inline bool is_hooked_by_user(rclcpp::ServiceBase &service) {
+  struct Opened : rclcpp::ServiceBase {
+    using ServiceBase::callback_mutex_;
+    using ServiceBase::on_new_request_callback_;
+  };
+  return detail::is_set(service, &Opened::callback_mutex_, &Opened::on_new_request_callback_);
+}
+inline bool is_hooked_by_user(rclcpp::ClientBase &client) {
+  struct Opened : rclcpp::ClientBase {
+    using ClientBase::callback_mutex_;
+    using ClientBase::on_new_response_callback_;
+  };
+  return detail::is_set(client, &Opened::callback_mutex_, &Opened::on_new_response_callback_);
+}
+/// Of the waitables only QoS events offer users such a callback. The executor's own hook counts as well.
+inline bool is_hooked_by_user(rclcpp::Waitable &waitable) {
+#if RCLCPP_VERSION_MAJOR < 21
+  using EventHandler = rclcpp::QOSEventHandlerBase;
+#else
+  using EventHandler = rclcpp::EventHandlerBase;
+#endif
+  struct Opened : EventHandler {
+    using EventHandler::callback_mutex_;
+    using EventHandler::on_new_event_callback_;
+  };
+  auto *const event = dynamic_cast<EventHandler *>(&waitable);
+  return event != nullptr && detail::is_set(*event, &Opened::callback_mutex_, &Opened::on_new_event_callback_);
+}
+
+// ---- groups and services ----
+
 /// Null if the group has no guard condition yet and its context is gone.
 inline rclcpp::GuardCondition::SharedPtr notify_guard_condition(rclcpp::CallbackGroup &group,
                                                                 const rclcpp::Context::SharedPtr &context) {
@@ -51,6 +166,17 @@ inline rclcpp::GuardCondition::SharedPtr notify_guard_condition(rclcpp::Callback
   return group.get_notify_guard_condition(context);
 #endif
 }
+
+/// The default QoS of services, in the form that rclcpp::Node::create_service() takes.
+inline auto services_qos() {
+#if RCLCPP_VERSION_MAJOR >= 28
+  return rclcpp::ServicesQoS();
+#else
+  return rmw_qos_profile_services_default;
+#endif
+}
+
+// ---- timers ----
 
 /// A timer's call. The constructor consumes the expiry, which makes the next one known; execute() runs the callback.
 class TimerCall {
@@ -97,18 +223,70 @@ inline rclcpp::Clock::SharedPtr clock_of(rclcpp::TimerBase &timer) {
   return timer.*(&Opened::clock_);
 }
 
-/// True if the waitable's on-ready hook is not reliable:
-/// - Action servers, up to Jazzy at least, report expired goals to wait sets only (rclcpp issue 2661). On newer
-///   distributions the wait set costs nothing but the exact arrival times of goals.
-/// - Action clients and QoS events of Humble call the hook with too few arguments for arrivals before it was set.
-inline bool needs_wait_set(const rclcpp::Waitable &waitable) {
-  if (dynamic_cast<const rclcpp_action::ServerBase *>(&waitable) != nullptr) return true;
+// ---- the base class of the executor ----
+
+/// Address of a guard condition of rclcpp::Executor, which holds it by value or by pointer.
+inline const rclcpp::GuardCondition *address_of(const rclcpp::GuardCondition &condition) { return &condition; }
+inline const rclcpp::GuardCondition *address_of(const std::shared_ptr<rclcpp::GuardCondition> &condition) {
+  return condition.get();
+}
+
 #if RCLCPP_VERSION_MAJOR < 21
-  return dynamic_cast<const rclcpp_action::ClientBase *>(&waitable) != nullptr ||
-         dynamic_cast<const rclcpp::QOSEventHandlerBase *>(&waitable) != nullptr;
-#else
-  return false;
+/// Removes destroyed nodes and groups from the executor. Humble's rclcpp does this when it waits, and ReDAGExecutor
+/// never waits there.
+inline void forget_expired(rclcpp::Executor &executor) {
+  struct Opened : rclcpp::Executor {
+    using Executor::memory_strategy_;
+    using Executor::mutex_;
+    using Executor::weak_groups_associated_with_executor_to_nodes_;
+    using Executor::weak_groups_to_guard_conditions_;
+    using Executor::weak_groups_to_nodes_;
+    using Executor::weak_groups_to_nodes_associated_with_executor_;
+    using Executor::weak_nodes_;
+  };
+  const std::lock_guard<std::mutex> guard(executor.*(&Opened::mutex_));
+  const auto is_gone = [](const auto &entry) { return entry.first.expired() || entry.second.expired(); };
+  auto &conditions = executor.*(&Opened::weak_groups_to_guard_conditions_);
+  for (const auto &entry : executor.*(&Opened::weak_groups_to_nodes_)) {
+    if (!is_gone(entry)) continue;
+    const auto condition = conditions.find(entry.first);
+    if (condition == conditions.end()) continue;
+    (executor.*(&Opened::memory_strategy_))->remove_guard_condition(condition->second);
+    conditions.erase(condition);
+  }
+  std::erase_if(executor.*(&Opened::weak_groups_to_nodes_), is_gone);
+  std::erase_if(executor.*(&Opened::weak_groups_to_nodes_associated_with_executor_), is_gone);
+  std::erase_if(executor.*(&Opened::weak_groups_associated_with_executor_to_nodes_), is_gone);
+  (executor.*(&Opened::weak_nodes_)).remove_if([](const auto &node) { return node.expired(); });
+}
 #endif
+
+/// Makes get_all_callback_groups() of the executor complete: newer distributions do so in that function.
+inline void update_groups(rclcpp::Executor &executor) {
+#if RCLCPP_VERSION_MAJOR < 21
+  struct Opened : rclcpp::Executor {
+    using Executor::add_callback_groups_from_nodes_associated_to_executor;
+    using Executor::mutex_;
+  };
+  forget_expired(executor);
+  const std::lock_guard<std::mutex> guard(executor.*(&Opened::mutex_));
+  (executor.*(&Opened::add_callback_groups_from_nodes_associated_to_executor))();
+#else
+  (void)executor;
+#endif
+}
+
+/// What must stay alive while rclcpp removes a node. Humble's remove_node() throws half-way if one of the node's groups
+/// is gone.
+inline std::vector<rclcpp::CallbackGroup::SharedPtr> keep_groups(rclcpp::Executor &executor) {
+  std::vector<rclcpp::CallbackGroup::SharedPtr> kept;
+#if RCLCPP_VERSION_MAJOR < 21
+  for (const auto &group : executor.get_all_callback_groups()) kept.push_back(group.lock());
+  forget_expired(executor);
+#else
+  (void)executor;
+#endif
+  return kept;
 }
 
 }  // namespace redag_rclcpp::compat

@@ -110,7 +110,10 @@ void ReDAGExecutor::Core::go_live() {
   const std::string name = options_.workload ? options_.workload->name : "";
   auto publisher = redag::live::Publisher::start(
       redag::runtime::live_options(name.empty() ? "ros" : name, "ros", setup_.mode, setup_.config),
-      [this](redag::live::Sample &sample) { tasks_.sample(*engine_, notes_.live_bounds(), sample); });
+      [this](redag::live::Sample &sample) {
+        tasks_.sample(*engine_, notes_.live_bounds(), sample);
+        sample.alert = alert();
+      });
   if (publisher) {
     live_ = *std::move(publisher);
   } else {
@@ -157,6 +160,11 @@ void ReDAGExecutor::Core::timers_changed() {
   } else if (waiting_) {
     bridge_.wake();
   }
+}
+
+void ReDAGExecutor::Core::exchange_arrived() {
+  if (!options_.deadlocks || looks_for_deadlocks_.load(std::memory_order_relaxed)) return;
+  if (!looks_for_deadlocks_.exchange(true)) keeper_parker_.unpark();
 }
 
 void ReDAGExecutor::Core::wait_set_changed() {
@@ -295,13 +303,60 @@ void ReDAGExecutor::Core::keep_house() {
     const redag::Time now = engine_->now();
     if (learning_ && now >= learn_until_) stop_learning();
     if (now >= report_unmatched_at_) report_unmatched();
-    const redag::Time next = std::min(report_unmatched_at_, learning_ ? learn_until_ : kNever);
+    if (looks_for_deadlocks_ && look_for_deadlocks_at_ == kNever) {
+      look_for_deadlocks_at_ = now + DeadlockDetector::kInterval;
+    }
+    if (now >= look_for_deadlocks_at_) look_for_deadlocks();
+    const redag::Time next =
+        std::min({report_unmatched_at_, look_for_deadlocks_at_, learning_ ? learn_until_ : kNever});
     if (next == kNever) {
       keeper_parker_.park();
     } else if (next > now) {
       keeper_parker_.park_until(origin_ + next);
     }
   }
+}
+
+void ReDAGExecutor::Core::look_for_deadlocks() {
+  class View final : public DeadlockView {
+   public:
+    View(const TaskTable &tasks, std::uint32_t workers, const std::vector<Endpoint> &endpoints)
+        : tasks_(tasks), workers_(workers), endpoints_(endpoints) {}
+    [[nodiscard]] std::uint32_t workers() const override { return workers_; }
+    [[nodiscard]] CallbackPlace place_of(redag::TaskId task) const override { return tasks_.place_of(task); }
+    [[nodiscard]] std::vector<Endpoint> endpoints() const override { return endpoints_; }
+    [[nodiscard]] ThreadWait wait_of(int thread_id) const override { return wait_of_thread(thread_id); }
+
+   private:
+    const TaskTable &tasks_;
+    const std::uint32_t workers_;
+    const std::vector<Endpoint> &endpoints_;
+  };
+  looks_for_deadlocks_ = false;  // what arrives from here on sets it again
+  engine_->started(started_jobs_);
+  const std::vector<Endpoint> endpoints = tasks_.endpoints();
+  const redag::Time now = engine_->now();
+  std::vector<Deadlock> begun;
+  std::vector<Deadlock> ended;
+  deadlock_detector_.look(now, started_jobs_, View(tasks_, setup_.config.workers, endpoints), begun, ended);
+  for (const Deadlock &deadlock : begun) {
+    notes_.add(deadlock);
+    if (deadlock.certain) {
+      RCLCPP_ERROR(logger(), "deadlock: %s", deadlock.text.c_str());
+    } else {
+      RCLCPP_WARN(logger(), "possible deadlock: %s", deadlock.text.c_str());
+    }
+  }
+  for (const Deadlock &deadlock : ended) {
+    notes_.add(deadlock);
+    RCLCPP_INFO(logger(), "the deadlock of %s has ended after %s", deadlock.waiting.c_str(),
+                redag::humanize_duration(deadlock.ended - deadlock.begun).c_str());
+  }
+  const bool goes_on =
+      deadlock_detector_.has_reported() ||
+      std::any_of(endpoints.begin(), endpoints.end(), [](const Endpoint &e) { return !e.kept.empty(); });
+  if (goes_on) looks_for_deadlocks_ = true;
+  look_for_deadlocks_at_ = goes_on ? now + DeadlockDetector::kInterval : kNever;
 }
 
 // Runs on the thread redag-wait, with os above all jobs. While jobs use all processors, cancel() thus still takes
@@ -327,6 +382,7 @@ void ReDAGExecutor::Core::stop_workers() {
   engine_->pause();
   (void)engine_->wait_paused(kNever);
   direct_ = false;
+  if (look_for_deadlocks_at_ != kNever) look_for_deadlocks();  // those of the jobs that have ended are over
 }
 
 void ReDAGExecutor::Core::spin_ready(nanoseconds max_duration, bool exhaustive) {
@@ -399,6 +455,19 @@ std::vector<std::string> ReDAGExecutor::Core::warnings() const {
   return all;
 }
 
+// The deadlocks that last, in one line.
+std::string ReDAGExecutor::Core::alert() const {
+  std::vector<Deadlock> lasting = notes_.deadlocks();
+  std::erase_if(lasting, [](const Deadlock &deadlock) { return deadlock.ended != kNever; });
+  if (lasting.empty()) return {};
+  const Deadlock &first = lasting.front();
+  std::string text =
+      fmt::format("{}: {} waits for {}, which cannot get {}", first.certain ? "deadlock" : "possible deadlock",
+                  first.waiting, first.blocked, first.resource);
+  if (lasting.size() > 1) text = fmt::format("{} deadlocks; {}", lasting.size(), text);
+  return text;
+}
+
 redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &positions) const {
   redag::trace::RunInfo info;
   info.workload = tasks_.describe(positions);
@@ -412,6 +481,11 @@ redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &
   info.lost_events = engine_->lost_events();
   info.machine = redag::trace::this_machine();
   info.provenance = redag::current_provenance();
+  for (const Deadlock &deadlock : notes_.deadlocks()) {
+    info.remarks.push_back({.begun = deadlock.begun,
+                            .ended = deadlock.ended,
+                            .text = (deadlock.certain ? "deadlock: " : "possible deadlock: ") + deadlock.text});
+  }
   return info;
 }
 

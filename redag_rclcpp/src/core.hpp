@@ -19,6 +19,7 @@
 
 #include "bridge.hpp"
 #include "callback.hpp"
+#include "deadlock_detector.hpp"
 #include "middleware_threads.hpp"
 #include "notes.hpp"
 #include "redag/base/lock_guard.hpp"
@@ -67,6 +68,7 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   [[nodiscard]] const redag::runtime::Setup &setup() const { return setup_; }
   [[nodiscard]] const TaskTable &tasks() const { return tasks_; }
   [[nodiscard]] std::vector<std::string> warnings() const;
+  [[nodiscard]] std::vector<Deadlock> deadlocks() const { return notes_.deadlocks(); }
   [[nodiscard]] bool learning_done() const { return !learning_; }
   void set_live_bounds(std::map<std::string, redag::Duration> bounds) { notes_.set_live_bounds(std::move(bounds)); }
   [[nodiscard]] redag::trace::RunInfo run_info(std::vector<std::uint32_t> &positions) const;
@@ -79,6 +81,7 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   void wake() override;
   void timers_changed() override;
   void wait_set_changed() override;
+  void exchange_arrived() override;
   void entities_changed() override;
   [[nodiscard]] bool learning() const override { return learning_; }
 
@@ -90,6 +93,8 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   void watch_jobs();
   void report_unmatched();
   void keep_house();
+  void look_for_deadlocks();
+  [[nodiscard]] std::string alert() const;
   void watch_wait_set() noexcept;
   void stop_workers();
   void admit(bool look_around);
@@ -118,6 +123,11 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   std::atomic<bool> learning_{false};
   redag::Time learn_until_ = redag::kNever;
   redag::Time report_unmatched_at_ = redag::kNever;
+  // There may be requests or responses that were not taken, or deadlocks that last. Only then does anyone look.
+  std::atomic<bool> looks_for_deadlocks_{false};
+  redag::Time look_for_deadlocks_at_ = redag::kNever;  // kNever: not before looks_for_deadlocks_
+  DeadlockDetector deadlock_detector_;
+  std::vector<redag::runtime::StartedJob> started_jobs_;  // for look_for_deadlocks()
   bool started_ = false;
   std::string start_error_;  // why the engine could not start; stays set
 

@@ -5,6 +5,8 @@
 
 #include <set>
 
+#include "compat.hpp"
+
 namespace redag_rclcpp {
 
 void find_entities(const rclcpp::CallbackGroup::SharedPtr &group, std::vector<Entity> &found) {
@@ -15,7 +17,14 @@ void find_entities(const rclcpp::CallbackGroup::SharedPtr &group, std::vector<En
     all.back().group = group;
     if (all.back().part != nullptr) parts.insert(all.back().part);
   };
-  group->collect_all_ptrs(add, add, add, add, add);
+  const auto add_waitable = [&](const rclcpp::Waitable::SharedPtr &waitable) {
+    add(waitable);
+    for (const auto &timer : compat::timers_of(*waitable)) {
+      all.push_back(entity_of(waitable, timer));
+      all.back().group = group;
+    }
+  };
+  group->collect_all_ptrs(add, add, add, add, add_waitable);
   for (Entity &entity : all) {
     if (parts.count(entity.key) == 0) found.push_back(std::move(entity));
   }

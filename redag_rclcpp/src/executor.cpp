@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "compat.hpp"
 #include "core.hpp"
 
 namespace redag_rclcpp {
@@ -46,24 +47,12 @@ ReDAGExecutor::ReDAGExecutor(const rclcpp::ExecutorOptions &options, ReDAGOption
     : rclcpp::Executor(options), core_(std::make_shared<Core>(options.context, std::move(redag_options))) {
   ExecutorHooks hooks;
   hooks.groups = [this] {
-#if RCLCPP_VERSION_MAJOR < 21
-    forget_expired();
-    {
-      // Newer distributions do this in get_all_callback_groups().
-      const std::lock_guard<std::mutex> guard(mutex_);
-      add_callback_groups_from_nodes_associated_to_executor();
-    }
-#endif
+    compat::update_groups(*this);
     return get_all_callback_groups();
   };
   hooks.may_spin = [this] { return rclcpp::ok(context_) && spinning.load(); };
   hooks.stop = [this] { rclcpp::Executor::cancel(); };
-#if RCLCPP_VERSION_MAJOR >= 28
-  const rclcpp::GuardCondition *interrupt = interrupt_guard_condition_.get();
-#else
-  const rclcpp::GuardCondition *interrupt = &interrupt_guard_condition_;
-#endif
-  core_->open(std::move(hooks), {interrupt, shutdown_guard_condition_.get()});
+  core_->open(std::move(hooks), {compat::address_of(interrupt_guard_condition_), shutdown_guard_condition_.get()});
 }
 
 ReDAGExecutor::ReDAGExecutor(ReDAGOptions redag_options)
@@ -73,21 +62,17 @@ ReDAGExecutor::~ReDAGExecutor() { core_->close(); }
 
 // ---- nodes and groups ----
 
-void ReDAGExecutor::add_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
+void ReDAGExecutor::add_node(distribution::NodePointer node, bool notify) {
   core_->registry().change([&] {
     rclcpp::Executor::add_node(node, notify);
     core_->registry().add_node(node);
   });
 }
 
-void ReDAGExecutor::remove_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
-  std::vector<rclcpp::CallbackGroup::SharedPtr> kept;
+void ReDAGExecutor::remove_node(distribution::NodePointer node, bool notify) {
+  std::vector<rclcpp::CallbackGroup::SharedPtr> kept;  // destroyed without a lock
   core_->registry().change([&] {
-#if RCLCPP_VERSION_MAJOR < 21
-    // Keeps all groups alive: rclcpp's remove_node() throws half-way if one of the node's groups is gone.
-    for (const auto &group : get_all_callback_groups()) kept.push_back(group.lock());
-    forget_expired();
-#endif
+    kept = compat::keep_groups(*this);
     rclcpp::Executor::remove_node(node, notify);
     core_->registry().remove_node(node);
   });
@@ -100,39 +85,19 @@ void ReDAGExecutor::retire_node(const rclcpp::node_interfaces::NodeBaseInterface
   remove_node(node);
 }
 
-void ReDAGExecutor::add_callback_group(rclcpp::CallbackGroup::SharedPtr group,
-                                       rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify) {
+void ReDAGExecutor::add_callback_group(distribution::GroupPointer group, distribution::NodePointer node, bool notify) {
   core_->registry().change([&] {
     rclcpp::Executor::add_callback_group(group, node, notify);
     core_->registry().add_group(group, node);
   });
 }
 
-void ReDAGExecutor::remove_callback_group(rclcpp::CallbackGroup::SharedPtr group, bool notify) {
+void ReDAGExecutor::remove_callback_group(distribution::GroupPointer group, bool notify) {
   core_->registry().change([&] {
     rclcpp::Executor::remove_callback_group(group, notify);
     core_->registry().remove_group(group);
   });
 }
-
-#if RCLCPP_VERSION_MAJOR < 21
-// Removes destroyed nodes and groups. rclcpp does this when it waits, and this executor never waits there.
-void ReDAGExecutor::forget_expired() {
-  const std::lock_guard<std::mutex> guard(mutex_);
-  const auto is_gone = [](const auto &entry) { return entry.first.expired() || entry.second.expired(); };
-  for (const auto &entry : weak_groups_to_nodes_) {
-    if (!is_gone(entry)) continue;
-    const auto condition = weak_groups_to_guard_conditions_.find(entry.first);
-    if (condition == weak_groups_to_guard_conditions_.end()) continue;
-    memory_strategy_->remove_guard_condition(condition->second);
-    weak_groups_to_guard_conditions_.erase(condition);
-  }
-  std::erase_if(weak_groups_to_nodes_, is_gone);
-  std::erase_if(weak_groups_to_nodes_associated_with_executor_, is_gone);
-  std::erase_if(weak_groups_associated_with_executor_to_nodes_, is_gone);
-  weak_nodes_.remove_if([](const auto &node) { return node.expired(); });
-}
-#endif
 
 // ---- spinning ----
 
@@ -183,7 +148,7 @@ void ReDAGExecutor::spin_once_impl(nanoseconds timeout) {
   }
 }
 
-#if RCLCPP_VERSION_MAJOR >= 21
+// On Humble rclcpp calls spin_once_impl() instead.
 rclcpp::FutureReturnCode ReDAGExecutor::spin_until_future_complete_impl(
     nanoseconds timeout, const std::function<std::future_status(nanoseconds)> &wait_for_future) {
   using rclcpp::FutureReturnCode;
@@ -203,7 +168,6 @@ rclcpp::FutureReturnCode ReDAGExecutor::spin_until_future_complete_impl(
   }
   return FutureReturnCode::INTERRUPTED;
 }
-#endif
 
 void ReDAGExecutor::cancel() {
   core_->cancel_first_spin();
@@ -215,6 +179,7 @@ void ReDAGExecutor::cancel() {
 const redag::runtime::Mode &ReDAGExecutor::mode() const { return core_->setup().mode; }
 std::uint32_t ReDAGExecutor::workers() const { return core_->setup().config.workers; }
 std::vector<std::string> ReDAGExecutor::warnings() const { return core_->warnings(); }
+std::vector<Deadlock> ReDAGExecutor::deadlocks() const { return core_->deadlocks(); }
 std::vector<CallbackStats> ReDAGExecutor::stats() const { return core_->tasks().stats(core_->engine()); }
 void ReDAGExecutor::set_live_bounds(std::map<std::string, redag::Duration> bounds) {
   core_->set_live_bounds(std::move(bounds));

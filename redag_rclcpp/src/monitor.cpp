@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "bounds.hpp"
+#include "compat.hpp"
 #include "rclcpp/exceptions.hpp"
 #include "rclcpp/logging.hpp"
 #include "redag/base/lock_guard.hpp"
@@ -136,11 +137,7 @@ void Monitor::Impl::create_entities() {
   metrics_ = node_->create_publisher<String>("~/metrics", rclcpp::QoS(1).transient_local());
 
   const auto create_service = [&](const char *name, auto callback) {
-#if RCLCPP_VERSION_MAJOR >= 28
-    return node_->create_service<Trigger>(name, callback, rclcpp::ServicesQoS(), group_);
-#else
-    return node_->create_service<Trigger>(name, callback, rmw_qos_profile_services_default, group_);
-#endif
+    return node_->create_service<Trigger>(name, callback, compat::services_qos(), group_);
   };
   metrics_service_ =
       create_service("~/metrics", [weak](Trigger::Request::ConstSharedPtr, Trigger::Response::SharedPtr response) {
@@ -168,6 +165,7 @@ Snapshot Monitor::Impl::snapshot() {
   result.policy = config_.policy;
   result.learning = !executor_.learning_done();
   result.warnings = executor_.warnings();
+  result.deadlocks = executor_.deadlocks();
   const std::vector<CallbackStats> stats = executor_.stats();
   const redag::LockGuard guard(bounds_lock_);
   result.has_bounds = has_bounds_;
@@ -268,7 +266,6 @@ void Monitor::Impl::look_at_callbacks() {
 void Monitor::Impl::drain() {
   events_.clear();
   executor_.drain_trace(events_);
-  if (events_.empty()) return;
   if (!options_.trace.empty()) {
     if (const redag::Result<void> recorded = flight_.add(events_, executor_); !recorded) {
       RCLCPP_WARN(node_->get_logger(), "if this process is killed, its trace is lost: %s",
@@ -282,7 +279,7 @@ void Monitor::Impl::drain() {
                   keeper_.size());
     }
   }
-  if (!has_bounds_) return;
+  if (!has_bounds_ || events_.empty()) return;
   const redag::LockGuard guard(bounds_lock_);
   bounds_->count(
       events_, [this](redag::TaskId task) { return executor_.task_name(task); },

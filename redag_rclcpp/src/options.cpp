@@ -142,6 +142,23 @@ std::vector<int> read_cpus(Reader &reader) {
   return cpus;
 }
 
+/// rclcpp's containers name the number of their threads `thread_num`. The component manager declares it with a default
+/// of its own. Only a value that the user states counts.
+std::uint32_t read_thread_num(rclcpp::Node &node, std::uint32_t workers) {
+  const auto &given = node.get_node_parameters_interface()->get_parameter_overrides();
+  const auto thread_num = given.find("thread_num");
+  if (thread_num == given.end()) return workers;
+  const ParameterValue &value = thread_num->second;
+  const std::string allowed = fmt::format("a whole number from 1 to {}", kMostThreads);
+  if (value.get_type() != ParameterType::PARAMETER_INTEGER) refuse("thread_num", value, allowed);
+  const auto number = value.get<std::int64_t>();
+  if (number < 1 || number > kMostThreads) refuse("thread_num", value, allowed);
+  if (given.count("workers") != 0 && number != std::int64_t{workers}) {
+    refuse("thread_num", value, fmt::format("the same as 'workers' ({}), or left out", workers));
+  }
+  return static_cast<std::uint32_t>(number);
+}
+
 void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
   const Spec spec{"config", "Workload file that maps callbacks to the tasks of DAGs; empty: none",
                   "the path of a workload file (docs/workload_format.md)"};
@@ -215,6 +232,7 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
        "Number of workers: callbacks that execute at the same time; 0: the value in `config`, or one per processor",
        fmt::format("a whole number from 0 to {}", kMostThreads)},
       0, 0, kMostThreads));
+  options.workers = read_thread_num(node, options.workers);
   options.preemption = reader.one_of(
       {"preemption",
        "Preemption mode; auto: the mode in `config`, or os if the process has real-time rights, or else cooperative",
@@ -268,6 +286,11 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
        "Warn about callbacks that are in progress for longer than these seconds, while they still run; 0: no warnings",
        "a number of seconds of at least 0"},
       0.0, true);
+  options.deadlocks = reader.flag({"deadlocks",
+                                   "Name callbacks that wait for a response which cannot reach them, in the log and on "
+                                   "/diagnostics; costs eight looks a second",
+                                   "true or false"},
+                                  true);
   options.live = reader.flag(
       {"live", "Let `redag top` show the executor; costs a page of memory and two updates a second", "true or false"},
       true);

@@ -69,9 +69,14 @@ void Registry::keep_until_done(NodeBase &node, const std::shared_ptr<void> &inst
     const auto callback = callbacks_.find(entity.get());
     if (callback != callbacks_.end()) callback->second->keep_until_done(instance);
   };
+  const auto keep_waitable = [&](const rclcpp::Waitable::SharedPtr &waitable) {
+    keep(waitable);
+    for (const auto &timer : compat::timers_of(*waitable)) keep(timer);
+  };
   node.for_each_callback_group([&](const rclcpp::CallbackGroup::SharedPtr &group) {
     // Other groups were added to an executor on their own, and stay there.
-    if (group->automatically_add_to_executor_with_node()) group->collect_all_ptrs(keep, keep, keep, keep, keep);
+    if (group->automatically_add_to_executor_with_node())
+      group->collect_all_ptrs(keep, keep, keep, keep, keep_waitable);
   });
 }
 
@@ -126,11 +131,18 @@ void Registry::collect() {
   for (const auto &callback : gone) remove(callback);
   std::vector<std::shared_ptr<WaitSetMember>> added;
   for (const Entity &entity : found) {
-    if (callbacks_.count(entity.key) != 0) continue;
+    if (callbacks_.count(entity.key) != 0 || is_called_by_owner(entity)) continue;
     add(entity);
     added.push_back(callbacks_.at(entity.key));
   }
   if (!added.empty() && rclcpp::ok(context_)) find_leftovers(context_, added);
+}
+
+// True for the timer of a waitable that a wait set watches, or that is no callback of its own.
+bool Registry::is_called_by_owner(const Entity &entity) const {
+  if (entity.owner == nullptr) return false;
+  const auto owner = callbacks_.find(entity.owner);
+  return owner == callbacks_.end() || owner->second->in_wait_set();
 }
 
 std::vector<Entity> Registry::find_all() {
@@ -138,8 +150,10 @@ std::vector<Entity> Registry::find_all() {
   // node.
   const auto groups = groups_();
   std::map<const rclcpp::CallbackGroup *, std::string> nodes;
+  std::set<const rclcpp::CallbackGroup *> defaults;
   for (const auto &weak : nodes_) {
     if (const auto node = weak.lock()) {
+      defaults.insert(node->get_default_callback_group().get());
       node->for_each_callback_group([&](const rclcpp::CallbackGroup::SharedPtr &group) {
         nodes.emplace(group.get(), node->get_fully_qualified_name());
       });
@@ -148,6 +162,7 @@ std::vector<Entity> Registry::find_all() {
   for (const auto &[group, weak] : manual_groups_) {
     const auto node = weak.lock();
     if (const auto strong = group.lock(); strong && node) {
+      defaults.insert(node->get_default_callback_group().get());
       nodes.emplace(strong.get(), node->get_fully_qualified_name());
     }
   }
@@ -159,7 +174,10 @@ std::vector<Entity> Registry::find_all() {
     (void)group_name(group);  // Watches empty groups, too, because an entity may be created in them.
     const std::size_t first = result.size();
     find_entities(group, result);
-    for (std::size_t i = first; i < result.size(); ++i) result[i].id.node = nodes[group.get()];
+    for (std::size_t i = first; i < result.size(); ++i) {
+      result[i].id.node = nodes[group.get()];
+      result[i].in_default_group = defaults.count(group.get()) > 0;
+    }
   }
   return result;
 }
@@ -184,7 +202,11 @@ void Registry::watch_group(rclcpp::CallbackGroup &group, const std::function<voi
 void Registry::add(const Entity &found) {
   TaskTable::Entry entry;
   entry.id = found.id;
-  if (entry.id.name.empty()) entry.id.index = next_index_[{entry.id.node, static_cast<int>(entry.id.kind)}]++;
+  // The timers of waitables are numbered on their own. Otherwise the numbers that a workload states would depend on the
+  // distribution.
+  const int kind = found.owner == nullptr ? static_cast<int>(entry.id.kind) : -1;
+  if (entry.id.name.empty() || found.owner != nullptr) entry.id.index = next_index_[{entry.id.node, kind}]++;
+  entry.in_default_group = found.in_default_group;
   place(entry, found);
 
   const std::shared_ptr<Callback> callback = found.make(executor_.lock(), entry.id);

@@ -82,6 +82,7 @@ class Registry {
   void watch_group(rclcpp::CallbackGroup &group, const std::function<void(std::size_t)> &callback);
   [[nodiscard]] std::function<void(std::size_t)> entities_changed() const;
   [[nodiscard]] std::vector<Entity> find_all() REDAG_REQUIRES(collect_lock_);
+  [[nodiscard]] bool is_called_by_owner(const Entity &entity) const REDAG_REQUIRES(collect_lock_);
   [[nodiscard]] std::string group_name(const rclcpp::CallbackGroup::SharedPtr &group) REDAG_REQUIRES(collect_lock_);
 
   const rclcpp::Context::SharedPtr context_;
@@ -102,7 +103,7 @@ class Registry {
   std::map<const void *, std::shared_ptr<Callback>> callbacks_ REDAG_GUARDED_BY(collect_lock_);  // by entity
   ByGroup<std::string> group_names_ REDAG_GUARDED_BY(collect_lock_);
   ByGroup<NodeBase::WeakPtr> manual_groups_ REDAG_GUARDED_BY(collect_lock_);
-  // Next index of a nameless entity, by node and kind.
+  // Next index of a nameless entity, by node and kind; -1: timers of waitables.
   std::map<std::pair<std::string, int>, std::uint32_t> next_index_ REDAG_GUARDED_BY(collect_lock_);
   std::uint64_t next_group_ REDAG_GUARDED_BY(collect_lock_) = 0;
   bool closed_ REDAG_GUARDED_BY(collect_lock_) = false;

@@ -53,6 +53,16 @@ Json task_json(const TaskFigures &task) {
   return json;
 }
 
+Json deadlock_json(const Deadlock &deadlock) {
+  return Json{{"waiting", deadlock.waiting},
+              {"blocked", deadlock.blocked},
+              {"resource", deadlock.resource},
+              {"text", deadlock.text},
+              {"certain", deadlock.certain},
+              {"begun_ns", deadlock.begun},
+              {"ended_ns", deadlock.ended == redag::kNever ? Json() : Json(deadlock.ended)}};
+}
+
 KeyValue pair(std::string key, std::string value) {
   KeyValue pair;
   pair.key = std::move(key);
@@ -90,6 +100,17 @@ DiagnosticStatus executor_status(const Snapshot &snapshot) {
     status.values.push_back(pair(fmt::format("warning {}", i + 1), snapshot.warnings[i]));
   }
   if (!snapshot.warnings.empty()) warn(status, fmt::format("{} warnings", snapshot.warnings.size()));
+  std::size_t count = 0;
+  bool is_locked = false;
+  for (const Deadlock &deadlock : snapshot.deadlocks) {
+    if (deadlock.ended != redag::kNever) continue;
+    warn(status, fmt::format("{}: {} waits for {}", deadlock.certain ? "deadlock" : "possible deadlock",
+                             deadlock.waiting, deadlock.blocked));
+    status.values.push_back(pair(fmt::format("deadlock {}", ++count), deadlock.text));
+    is_locked = is_locked || deadlock.certain;
+  }
+  if (is_locked) status.level = DiagnosticStatus::ERROR;
+  status.values.push_back(pair("deadlocks that ended", std::to_string(snapshot.deadlocks.size() - count)));
   return status;
 }
 
@@ -98,6 +119,8 @@ DiagnosticStatus executor_status(const Snapshot &snapshot) {
 std::string to_json(const Snapshot &snapshot) {
   Json tasks = Json::array();
   for (const TaskFigures &task : snapshot.tasks) tasks.push_back(task_json(task));
+  Json deadlocks = Json::array();
+  for (const Deadlock &deadlock : snapshot.deadlocks) deadlocks.push_back(deadlock_json(deadlock));
   const Json json{{"format", "redag.metrics/1"},
                   {"stamp_ns", snapshot.stamp},
                   {"preemption", to_string(snapshot.mode.mode)},
@@ -106,6 +129,7 @@ std::string to_json(const Snapshot &snapshot) {
                   {"policy", to_string(snapshot.policy)},
                   {"learning", snapshot.learning},
                   {"warnings", snapshot.warnings},
+                  {"deadlocks", deadlocks},
                   {"bounds_absent", snapshot.has_bounds ? Json(snapshot.bounds_absent) : Json("not asked for")},
                   {"tasks", tasks}};
   // Names from outside may not be UTF-8. A replaced character is better than no snapshot.

@@ -67,19 +67,23 @@ std::optional<std::string> FlightLog::prepare(const std::string &folder) {
 }
 
 redag::Result<void> FlightLog::add(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor) {
-  if (broken_ || events.empty()) return {};
+  if (broken_ || (events.empty() && !recorder_)) return {};
   redag::Result<void> kept =
       describe(events, executor).and_then([&] { return recorder_->append(events, executor.lost_events()); });
   broken_ = !kept;
   return kept;
 }
 
-// Describes the tasks again when new ones have appeared, or when their rates were learned.
+// Describes the run again when new tasks have appeared, their rates were learned, or a deadlock has begun or ended.
 redag::Result<void> FlightLog::describe(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor) {
   const bool is_known = std::all_of(events.begin(), events.end(),
                                     [this](const auto &event) { return event.task.value < positions_.size(); });
   const bool was_learning = std::exchange(learning_, !executor.learning_done());
-  if (is_known && was_learning == learning_) return {};
+  const redag::Time before = deadlocks_;
+  for (const Deadlock &deadlock : executor.deadlocks()) {
+    deadlocks_ = std::max({deadlocks_, deadlock.begun, deadlock.ended == redag::kNever ? 0 : deadlock.ended});
+  }
+  if (is_known && was_learning == learning_ && before == deadlocks_) return {};
   const redag::trace::RunInfo info = executor.run_info(positions_);
   if (recorder_) return recorder_->describe(info, positions_);
   auto created = redag::trace::FlightRecorder::create(folder_, info, {}, positions_);

@@ -46,7 +46,8 @@ class FlightLog {
  public:
   /// Moves the record of an earlier process aside, to flight.1 and so on. Returns the new path, or nothing.
   [[nodiscard]] std::optional<std::string> prepare(const std::string &folder);
-  /// Appends events. An error is returned only once; afterwards nothing is recorded.
+  /// Appends events, and describes the run again if its tasks or its deadlocks have changed. An error is returned only
+  /// once; afterwards nothing is recorded.
   [[nodiscard]] redag::Result<void> add(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor);
   /// Removes the record. Call it when the results are written.
   [[nodiscard]] redag::Result<void> remove();
@@ -58,6 +59,7 @@ class FlightLog {
   std::optional<redag::trace::FlightRecorder> recorder_;
   std::vector<std::uint32_t> positions_;  // positions of the tasks that the record describes
   bool learning_ = true;
+  redag::Time deadlocks_ = 0;  // when the deadlocks in the description have changed last
   bool broken_ = false;
 };
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "arrival_callback.hpp"
+#include "compat.hpp"
 #include "entities.hpp"
 #include "rclcpp/service.hpp"
 #include "take.hpp"
@@ -18,9 +19,12 @@ class ServiceCallback final : public ArrivalCallback {
  public:
   ServiceCallback(std::shared_ptr<ExecutorContext> context, redag::CallbackId id,
                   const rclcpp::ServiceBase::SharedPtr &service)
-      : ArrivalCallback(std::move(context), std::move(id), 0), service_(service) {}
+      : ArrivalCallback(std::move(context), std::move(id), 0), service_(service) {
+    take_part_in_exchange();
+  }
 
   [[nodiscard]] bool alive() const override { return !service_.expired(); }
+  [[nodiscard]] Exchange exchange() const override { return {.side = Exchange::Side::Server, .name = id().name}; }
 
   void count(const Held &, WaitSetSizes &sizes) const override { ++sizes.services; }
   void add(Held &held, rcl_wait_set_t &set) const override {
@@ -46,6 +50,10 @@ class ServiceCallback final : public ArrivalCallback {
         self());
   }
   void unhook() override { hook_.clear(); }
+  [[nodiscard]] bool is_hooked_by_user() const override {
+    const auto service = service_.lock();
+    return service && compat::is_hooked_by_user(*service);
+  }
 
   [[nodiscard]] bool handle(const Token &, Taking &taking) override {
     taking.begin();

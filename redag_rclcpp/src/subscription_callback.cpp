@@ -69,7 +69,12 @@ class SubscriptionCallback final : public ArrivalCallback {
 
   [[nodiscard]] std::shared_ptr<void> entity() const override { return subscription_.lock(); }
   void hook() override;
+  void hook_intra_process() override;
   void unhook() override;
+  [[nodiscard]] bool is_hooked_by_user() const override {
+    const auto subscription = subscription_.lock();
+    return subscription && compat::is_hooked_by_user(*subscription);
+  }
   [[nodiscard]] bool handle(const Token &token, Taking &taking) override;
   [[nodiscard]] bool handle_intra_process(const Token &token);
   // Later messages replace earlier ones.
@@ -85,18 +90,19 @@ class SubscriptionCallback final : public ArrivalCallback {
 void SubscriptionCallback::hook() {
   const auto subscription = subscription_.lock();
   if (!subscription) return;
-  if (const auto intra_process = intra_process_.lock()) {
-    intra_process->set_on_ready_callback(
-        [self = std::static_pointer_cast<SubscriptionCallback>(shared_from_this())](std::size_t count, int) {
-          self->arrived(count, Source::IntraProcess, 0);
-        });
-  }
   hook_.set<rclcpp::SubscriptionBase>(
       subscription,
       [](rclcpp::SubscriptionBase &entity, rcl_event_callback_t call, const void *ticket) {
         return rcl_subscription_set_on_new_message_callback(entity.get_subscription_handle().get(), call, ticket);
       },
       self());
+}
+
+void SubscriptionCallback::hook_intra_process() {
+  const auto intra_process = intra_process_.lock();
+  if (!intra_process) return;
+  intra_process->set_on_ready_callback([self = std::static_pointer_cast<SubscriptionCallback>(shared_from_this())](
+                                           std::size_t count, int) { self->arrived(count, Source::IntraProcess, 0); });
 }
 
 void SubscriptionCallback::unhook() {

@@ -84,6 +84,54 @@ std::string TaskTable::name(const Entry &entry) const {
   return to_string(entry.id);
 }
 
+CallbackPlace TaskTable::place_of(TaskId task) const {
+  const redag::LockGuard guard(lock_);
+  return place(entries_.at(task.value));
+}
+
+CallbackPlace TaskTable::place(const Entry &entry) const {
+  CallbackPlace place;
+  place.name = name(entry);
+  place.node = entry.id.node;
+  place.group = entry.task.group;
+  place.group_text = entry.in_default_group ? "the default callback group of " + entry.id.node
+                                            : fmt::format("callback group {} of {}", entry.task.group, entry.id.node);
+  place.dag = entry.dag;
+  place.dag_name = dags_[entry.dag].name;
+  place.max_active = dags_[entry.dag].max_active;
+  return place;
+}
+
+std::vector<Endpoint> TaskTable::endpoints() const {
+  struct Row {
+    std::size_t task;
+    std::shared_ptr<Callback> callback;
+    Exchange exchange;
+    std::vector<KeptInput> kept;
+  };
+  std::vector<Row> rows;
+  {
+    const redag::LockGuard guard(lock_);
+    for (std::size_t i = 0; i < entries_.size(); ++i) {
+      const std::shared_ptr<Callback> &callback = entries_[i].callback;
+      if (!callback) continue;
+      Exchange exchange = callback->exchange();
+      if (exchange.side != Exchange::Side::None) rows.push_back({i, callback, std::move(exchange), {}});
+    }
+  }
+  for (Row &row : rows) row.kept = row.callback->kept();
+  std::vector<Endpoint> result;
+  // As in stats(): skips callbacks that have gone meanwhile.
+  const redag::LockGuard guard(lock_);
+  for (Row &row : rows) {
+    const Entry &entry = entries_[row.task];
+    if (entry.callback != row.callback) continue;
+    if (row.exchange.side == Exchange::Side::Server && row.kept.empty()) continue;
+    result.push_back({.place = place(entry), .exchange = std::move(row.exchange), .kept = std::move(row.kept)});
+  }
+  return result;
+}
+
 std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine) const {
   struct Row {
     TaskId task;

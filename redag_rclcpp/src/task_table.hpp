@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "callback.hpp"
+#include "deadlock_detector.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/live/frame_builder.hpp"
@@ -31,9 +32,10 @@ class TaskTable {
     std::shared_ptr<Callback> callback;  // null once dropped
     redag::CallbackId id;
     redag::Task task;
-    std::uint32_t dag = 0;    // position in dags()
-    std::uint32_t rank = 0;   // topological rank within its DAG
-    bool configured = false;  // named by the workload
+    std::uint32_t dag = 0;          // position in dags()
+    std::uint32_t rank = 0;         // topological rank within its DAG
+    bool configured = false;        // named by the workload
+    bool in_default_group = false;  // of its node
   };
 
   /// `platform`, `policy` and `ties` are the executor's. `configured` is the user's workload, or null.
@@ -48,6 +50,10 @@ class TaskTable {
 
   /// Returns "control.ekf", or to_string(CallbackId).
   [[nodiscard]] std::string name_of(redag::TaskId task) const;
+
+  [[nodiscard]] CallbackPlace place_of(redag::TaskId task) const;
+  /// The clients, and the servers with inputs that were not taken.
+  [[nodiscard]] std::vector<Endpoint> endpoints() const;
 
   /// Figures of all callbacks, shortest period first.
   [[nodiscard]] std::vector<CallbackStats> stats(const redag::runtime::Engine &engine) const;
@@ -71,6 +77,7 @@ class TaskTable {
   using Ids = std::vector<std::vector<std::uint32_t>>;
 
   [[nodiscard]] std::string name(const Entry &entry) const;
+  [[nodiscard]] CallbackPlace place(const Entry &entry) const;
   [[nodiscard]] redag::Duration seen_period(const Entry &entry, int depth) const REDAG_REQUIRES(lock_);
   [[nodiscard]] redag::Workload as_workload(Ids &ids, bool live) const REDAG_REQUIRES(lock_);
   void add_seen_edges(redag::Workload &workload, const Ids &ids) const REDAG_REQUIRES(lock_);

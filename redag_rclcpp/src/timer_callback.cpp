@@ -61,13 +61,18 @@ Duration period_of(const rcl_timer_t &timer) {
 
 class TimerCallback final : public Callback {
  public:
+  /// `owner`: the waitable whose timer it is; null for a timer of a group.
   TimerCallback(std::shared_ptr<ExecutorContext> context, redag::CallbackId id,
-                const rclcpp::TimerBase::SharedPtr &timer)
-      : Callback(std::move(context), std::move(id)), timer_(timer), handle_(timer->get_timer_handle()) {}
+                const rclcpp::TimerBase::SharedPtr &timer, const rclcpp::Waitable::SharedPtr &owner)
+      : Callback(std::move(context), std::move(id)),
+        timer_(timer),
+        owner_(owner),
+        is_owned_(owner != nullptr),
+        handle_(timer->get_timer_handle()) {}
 
   void detach() override;
   void admit() override {}
-  [[nodiscard]] bool alive() const override { return !timer_.expired(); }
+  [[nodiscard]] bool alive() const override { return !timer_.expired() && (!is_owned_ || !owner_.expired()); }
   [[nodiscard]] bool has_rate() const override { return true; }
   [[nodiscard]] std::vector<TaskId> publishers() const override { return {}; }
   [[nodiscard]] Duration mean_interval() const override { return 0; }
@@ -104,6 +109,8 @@ class TimerCallback final : public Callback {
   }
 
   const std::weak_ptr<rclcpp::TimerBase> timer_;
+  const std::weak_ptr<rclcpp::Waitable> owner_;
+  const bool is_owned_;
   const std::shared_ptr<const rcl_timer_t> handle_;  // the handle alone: the last owner of a timer cancels it
   rclcpp::JumpHandler::SharedPtr clock_watch_;       // reports that simulated time begins or ends
   Time last_release_ = kNever;                       // guarded by the timer queue's lock
@@ -217,7 +224,8 @@ void TimerCallback::drop_expiry() {
 
 bool TimerCallback::run() {
   const auto timer = timer_.lock();
-  if (!timer) return false;
+  const auto owner = owner_.lock();  // the timer's function may use it
+  if (!timer || (is_owned_ && !owner)) return false;
   bool due = false;
   if (rcl_timer_is_ready(handle_.get(), &due) != RCL_RET_OK) rcl_reset_error();
   uncalled_ = false;
@@ -247,7 +255,19 @@ Entity entity_of(const rclcpp::TimerBase::SharedPtr &timer) {
                  .name = {},
                  .period = period_of(*timer->get_timer_handle())},
           .make = [timer](std::shared_ptr<ExecutorContext> context, redag::CallbackId id) {
-            return std::make_shared<TimerCallback>(std::move(context), std::move(id), timer);
+            return std::make_shared<TimerCallback>(std::move(context), std::move(id), timer, nullptr);
+          }};
+}
+
+Entity entity_of(const rclcpp::Waitable::SharedPtr &waitable, const rclcpp::TimerBase::SharedPtr &timer) {
+  return {.key = timer.get(),
+          .owner = waitable.get(),
+          .id = {.kind = redag::Callback::Kind::Waitable,
+                 .node = {},
+                 .name = "timer",
+                 .period = period_of(*timer->get_timer_handle())},
+          .make = [waitable, timer](std::shared_ptr<ExecutorContext> context, redag::CallbackId id) {
+            return std::make_shared<TimerCallback>(std::move(context), std::move(id), timer, waitable);
           }};
 }
 

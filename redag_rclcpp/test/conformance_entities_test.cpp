@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Conformance: subscriptions, services, actions, parameters, waitables and QoS events.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <functional>
@@ -16,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "any_waitable.hpp"
 #include "conformance.hpp"
 #include "rclcpp/detail/add_guard_condition_to_rcl_wait_set.hpp"
 #include "rclcpp/rclcpp.hpp"
@@ -33,6 +36,8 @@ namespace {
 using namespace std::chrono_literals;
 using test_msgs::msg::Empty;
 using test_msgs::msg::Strings;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 TYPED_TEST(Conformance, EveryMessageArrivesInOrder) {
   for (const bool intra_process : {false, true}) {
@@ -216,7 +221,7 @@ TYPED_TEST(Conformance, ParametersAndLifecycle) {
 
 /// Ready from a trigger until data is taken, like rclcpp's own waitables. An executor may ask and then not take it,
 /// because the group is busy. The constructor says whether it has a hook.
-class TriggeredWaitable : public rclcpp::Waitable {
+class TriggeredWaitable : public AnyWaitable {
  public:
   explicit TriggeredWaitable(bool has_hook) : has_hook_(has_hook) {}
 
@@ -229,20 +234,9 @@ class TriggeredWaitable : public rclcpp::Waitable {
     pending_ = false;
     return nullptr;
   }
-  std::shared_ptr<void> take_data_by_entity_id(std::size_t) override { return take_data(); }
-#if RCLCPP_VERSION_MAJOR >= 28
-  void add_to_wait_set(rcl_wait_set_t &set) override {
-    rclcpp::detail::add_guard_condition_to_rcl_wait_set(set, condition_);
-  }
-  bool is_ready(const rcl_wait_set_t &) override { return pending_; }
-  void execute(const std::shared_ptr<void> &) override { ++count; }
-#else
-  void add_to_wait_set(rcl_wait_set_t *set) override {
-    rclcpp::detail::add_guard_condition_to_rcl_wait_set(*set, condition_);
-  }
-  bool is_ready(rcl_wait_set_t *) override { return pending_; }
-  void execute(std::shared_ptr<void> &) override { ++count; }
-#endif
+  void fill(rcl_wait_set_t &set) override { rclcpp::detail::add_guard_condition_to_rcl_wait_set(set, condition_); }
+  bool is_ready_in(const rcl_wait_set_t &) override { return pending_; }
+  void run(const std::shared_ptr<void> &) override { ++count; }
   void set_on_ready_callback(std::function<void(std::size_t, int)> callback) override {
     if (!has_hook_) throw std::runtime_error("this waitable has no hook");
     condition_.set_on_trigger_callback([callback](std::size_t n) { callback(n, 0); });
@@ -288,6 +282,52 @@ TYPED_TEST(Conformance, WaitablesWithAndWithoutHooks) {
   }
 }
 
+/// A waitable that its own timer triggers.
+class TimedWaitable final : public TriggeredWaitable {
+ public:
+  explicit TimedWaitable(rclcpp::Node &node)
+      : TriggeredWaitable(true),
+        timer_(std::make_shared<rclcpp::GenericTimer<std::function<void()>>>(
+            node.get_clock(), 20ms, [this] { trigger(); }, node.get_node_base_interface()->get_context())) {}
+  [[nodiscard]] std::vector<rclcpp::TimerBase::SharedPtr> own_timers() const override { return {timer_}; }
+
+ private:
+  rclcpp::TimerBase::SharedPtr timer_;
+};
+
+TYPED_TEST(Conformance, TimersOfWaitablesAreCalled) {
+  if (!kWaitablesHaveTimers) GTEST_SKIP() << "waitables have timers since Kilted";
+  if (kCbg<TypeParam>) GTEST_SKIP() << "the EventsCBGExecutor does not execute these";
+  if (!kOurs<TypeParam> && !kEvents<TypeParam>) GTEST_SKIP() << "wait sets take the place of the hook";
+  auto waitable = std::make_shared<TimedWaitable>(*this->node);
+  this->node->get_node_waitables_interface()->add_waitable(waitable, nullptr);
+  this->executor->add_node(this->node);
+  {
+    Spinner spinner(*this->executor);
+    EXPECT_TRUE(eventually([&] { return waitable->count >= 5; }));
+  }
+  if constexpr (kOurs<TypeParam>) {
+    // The timer is a callback of its own that no workload names.
+    const auto timers = [&] {
+      std::vector<std::string> names;
+      for (const auto &callback : this->executor->stats()) {
+        if (callback.task.find("waitable timer") != std::string::npos) names.push_back(callback.task);
+      }
+      return names;
+    };
+    EXPECT_EQ(timers(), std::vector<std::string>{"/node waitable timer 20 ms (0)"});
+    for (const redag::Dag &dag : this->executor->learned().dags) {
+      for (const redag::Task &task : dag.tasks) EXPECT_THAT(task.name, Not(HasSubstr("waitable timer")));
+    }
+    // It goes with the waitable.
+    this->node->get_node_waitables_interface()->remove_waitable(waitable, nullptr);
+    waitable.reset();
+    Spinner spinner(*this->executor);
+    this->node->create_callback_group(rclcpp::CallbackGroupType::Reentrant);  // lets the executor look
+    EXPECT_TRUE(eventually([&] { return timers().empty(); }));
+  }
+}
+
 TYPED_TEST(Conformance, QosEventsAreDelivered) {
   std::atomic<int> matched{0};
   rclcpp::SubscriptionOptions options;
@@ -301,6 +341,51 @@ TYPED_TEST(Conformance, QosEventsAreDelivered) {
   ASSERT_TRUE(eventually([&] { return publisher->get_subscription_count() > 0; }));
   publisher->publish(Empty());
   EXPECT_TRUE(eventually([&] { return matched > 0; }));
+}
+
+// Users may ask to be called when something arrives, and have an executor run the callbacks.
+TYPED_TEST(Conformance, HooksOfUsersAreCalledAsWell) {
+  if (kEvents<TypeParam> || kCbg<TypeParam>) GTEST_SKIP() << "this executor replaces them by its own";
+  using test_msgs::srv::Empty;
+  using Message = test_msgs::msg::Empty;
+  std::atomic<std::size_t> messages{0};
+  std::atomic<std::size_t> message_hooks{0};
+  std::atomic<std::size_t> request_hooks{0};
+  std::atomic<std::size_t> response_hooks{0};
+  std::atomic<std::size_t> event_hooks{0};
+  const auto counts = [](std::atomic<std::size_t> &hooks) { return [&hooks](std::size_t count) { hooks += count; }; };
+  rclcpp::SubscriptionOptions options;
+  options.event_callbacks.deadline_callback = [](rclcpp::QOSDeadlineRequestedInfo &) {};
+  const rclcpp::QoS qos = rclcpp::QoS(10).deadline(20ms);
+  auto subscription = this->node->template create_subscription<Message>(
+      "topic", qos, [&](Message::ConstSharedPtr) { ++messages; }, options);
+  subscription->set_on_new_message_callback(counts(message_hooks));
+  subscription->set_on_new_qos_event_callback(counts(event_hooks), RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED);
+  auto publisher = this->node->template create_publisher<Message>("topic", qos);
+  auto service = this->node->template create_service<Empty>(
+      "service", [](Empty::Request::ConstSharedPtr, Empty::Response::SharedPtr) {});
+  service->set_on_new_request_callback(counts(request_hooks));
+  auto client = this->node->template create_client<Empty>("service");
+  client->set_on_new_response_callback(counts(response_hooks));
+
+  this->executor->add_node(this->node);
+  {
+    Spinner spinner(*this->executor);
+    ASSERT_TRUE(eventually([&] { return publisher->get_subscription_count() > 0 && client->service_is_ready(); }));
+    for (std::size_t i = 1; i <= 5; ++i) {
+      publisher->publish(Message());
+      EXPECT_TRUE(eventually([&] { return messages == i && message_hooks >= i; })) << messages << " " << message_hooks;
+    }
+    auto response = client->async_send_request(std::make_shared<Empty::Request>());
+    EXPECT_EQ(response.wait_for(kLimit), std::future_status::ready);
+    EXPECT_TRUE(eventually([&] { return request_hooks == 1 && response_hooks == 1 && event_hooks > 0; }));
+  }
+  // They outlive the executor's use of the entities.
+  this->executor->remove_node(this->node);
+  const std::size_t before = message_hooks;
+  const std::size_t events_before = event_hooks;
+  publisher->publish(Message());
+  EXPECT_TRUE(eventually([&] { return message_hooks > before && event_hooks > events_before; }));
 }
 
 }  // namespace

@@ -39,6 +39,7 @@ using std_msgs::msg::Float64;
 using std_srvs::srv::Trigger;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using Json = nlohmann::json;
 
 constexpr const char *kWorkload = R"(name: test
@@ -175,6 +176,34 @@ TEST_F(ContainerTest, BadParametersEndItWithTwo) {
   EXPECT_THAT(text(), HasSubstr("/proc/nowhere"));
 
   EXPECT_EQ(run({"--ros-args", "-p", "workers"}), 2);
+}
+
+TEST_F(ContainerTest, ArgumentsOfRclcppsContainerAreChecked) {
+  EXPECT_EQ(run({"--executor-type", "fastest"}), 2);
+  EXPECT_THAT(text(), AllOf(HasSubstr("'fastest'"), HasSubstr("single-threaded, multi-threaded, events-cbg")));
+  EXPECT_EQ(run({"--executor-type"}), 2);
+  EXPECT_THAT(text(), HasSubstr("needs a value"));
+  EXPECT_EQ(run({"--executor-type", "single-threaded", "--ros-args", "-p", "workers:=2"}), 2);
+  EXPECT_THAT(text(), AllOf(HasSubstr("'workers' is 2"), HasSubstr("one worker")));
+  EXPECT_EQ(run({"--ros-args", "-p", "thread_num:=1", "-p", "workers:=2"}), 2);
+  EXPECT_THAT(text(), AllOf(HasSubstr("'thread_num' is 1"), HasSubstr("'workers' (2)")));
+  EXPECT_EQ(run({"--ros-args", "-p", "thread_num:=0"}), 2);
+  EXPECT_THAT(text(), HasSubstr("thread_num"));
+}
+
+TEST_F(ContainerTest, ArgumentsOfRclcppsContainerAreAccepted) {
+  const auto workers_with = [&](const std::vector<std::string> &arguments) {
+    Process container = start(arguments);
+    const auto metrics = call<Trigger>("/ComponentManager/metrics", Trigger::Request());
+    container.interrupt();
+    EXPECT_EQ(container.wait(), 0);
+    return metrics ? Json::parse(metrics->message)["workers"].get<int>() : -1;
+  };
+  EXPECT_EQ(workers_with({"--executor-type", "single-threaded", "--isolated", "--nonsense"}), 1);
+  EXPECT_THAT(text(), AllOf(HasSubstr("--isolated has no effect"), HasSubstr("'--nonsense' is not known")));
+  EXPECT_EQ(workers_with({"--executor-type", "multi-threaded", "--ros-args", "-p", "thread_num:=1"}), 1);
+  EXPECT_EQ(workers_with({"--executor-type", "events-cbg", "--ros-args", "-p", "workers:=3"}), 3);
+  EXPECT_THAT(text(), Not(HasSubstr("not known")));
 }
 
 TEST_F(ContainerTest, ComponentsRunAndResultsAreWrittenAtTheEnd) {

@@ -1,18 +1,16 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a short callback costs in system calls, locks of this project, and clock readings. The callback publishes to
-// itself, so that the executor is never idle. From some callback on, its thread has a stepped clock: all callbacks are
-// short, whatever the machine does.
+// What a short callback costs in system calls and clock readings. The callback publishes to itself, so that the
+// executor is never idle. From some callback on, its thread has a stepped clock: all callbacks are short, whatever the
+// machine does.
 #include <gtest/gtest.h>
-#include <pthread.h>
 
 #include <atomic>
 #include <memory>
 #include <thread>
 
 #include "mode_test.hpp"
-#include "redag/base/pi_mutex.hpp"
 #include "spinning.hpp"
 #include "stepped_clock.hpp"
 #include "system_calls.hpp"
@@ -21,25 +19,6 @@
 #define REDAG_SANITIZED 1
 #else
 #define REDAG_SANITIZED 0
-#endif
-
-namespace {
-std::atomic<std::uint64_t> locks_taken{0};
-}  // namespace
-
-#if !REDAG_SANITIZED
-// PiMutex alone takes mutexes by this function; it falls back to others where the mutex is not free.
-extern "C" int pthread_mutex_trylock(pthread_mutex_t *mutex) noexcept {
-  static auto *const real = [] {
-    void *const found = dlsym(RTLD_NEXT, "pthread_mutex_trylock");
-    int (*function)(pthread_mutex_t *) = nullptr;
-    std::memcpy(&function, &found, sizeof function);
-    return function;
-  }();
-  const int result = real(mutex);
-  if (result == 0 && redag::testing::detail::steps.step != 0) locks_taken.fetch_add(1);
-  return result;
-}
 #endif
 
 namespace redag_rclcpp {
@@ -51,7 +30,6 @@ struct Cost {
   std::uint64_t calls = 0;
   std::uint64_t asked = 0;  // for the thread's processor time
   std::uint64_t clocks = 0;
-  std::uint64_t locks = 0;
 };
 
 class CostTest : public ModeTest {
@@ -60,7 +38,7 @@ class CostTest : public ModeTest {
   static constexpr int kCount = 1000;
 
   static Cost now(const redag::testing::SystemCalls &calls) {
-    return {calls.count(), clock_readings.processor, clock_readings.monotonic, locks_taken};
+    return {calls.count(), clock_readings.processor, clock_readings.monotonic};
   }
 
   /// Runs the callback, and returns what kCount calls of it cost. `count_calls`: system calls, too.
@@ -92,8 +70,7 @@ class CostTest : public ModeTest {
       out->publish(std::make_unique<Empty>());
       EXPECT_TRUE(eventually([&] { return done.load(); }));
     }
-    return {after.calls - before.calls, after.asked - before.asked, after.clocks - before.clocks,
-            after.locks - before.locks};
+    return {after.calls - before.calls, after.asked - before.asked, after.clocks - before.clocks};
   }
 };
 INSTANTIATE_TEST_SUITE_P(Modes, CostTest,
@@ -116,14 +93,10 @@ TEST_P(CostTest, AShortCallbackAsksForNoProcessorTime) {
   EXPECT_EQ(cost.asked, 0u);
 }
 
-// The callback's own lock and the engine's, once when the message arrives and once when it is handled. One reading of
-// the clock when it arrives, and one when the callback ends.
-TEST_P(CostTest, AShortCallbackTakesFourLocksAndReadsTheClockTwice) {
-  if (REDAG_SANITIZED) GTEST_SKIP() << "sanitizers count locks themselves";
+// One reading of the clock when the message arrives, and one when the callback ends.
+TEST_P(CostTest, AShortCallbackReadsTheClockTwice) {
   redag::testing::SystemCalls calls;
   const Cost cost = measure(calls, false);
-  EXPECT_GE(cost.locks, 4u * kCount - kCount / 100);
-  EXPECT_LE(cost.locks, 4u * kCount + kCount / 100);
   EXPECT_LE(cost.clocks, 2u * kCount + kCount / 100);
 }
 

@@ -8,16 +8,8 @@
 
 #include <string>
 
-#include "rclcpp/executors.hpp"
-#include "rclcpp/version.h"
 #include "redag_rclcpp/executor.hpp"
-#define REDAG_HAS_EVENTS (RCLCPP_VERSION_MAJOR >= 21)
-#if REDAG_HAS_EVENTS
-#include "rclcpp/experimental/executors/events_executor/events_executor.hpp"
-#endif
-#ifdef REDAG_HAS_CM_EXECUTORS
-#include "cm_executors/events_cbg_executor.hpp"
-#endif
+#include "redag_rclcpp/rclcpp_executors.hpp"
 
 namespace redag_rclcpp {
 
@@ -38,20 +30,27 @@ using ReDAGNone = ReDAGWith<redag::PreemptionMode::None>;
 using ReDAGCooperative = ReDAGWith<redag::PreemptionMode::Cooperative>;
 using ReDAGOs = ReDAGWith<redag::PreemptionMode::Os>;
 
+#if REDAG_HAS_EVENTS
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wdeprecated-declarations"  // on newer distributions
+using EventsExecutor = rclcpp::experimental::executors::EventsExecutor;
+#pragma GCC diagnostic pop
+#endif
+
 using OurTypes = ::testing::Types<ReDAGNone, ReDAGCooperative, ReDAGOs>;
 using AllTypes = ::testing::Types<ReDAGNone, ReDAGCooperative, ReDAGOs, rclcpp::executors::SingleThreadedExecutor,
                                   rclcpp::executors::MultiThreadedExecutor
 #if REDAG_HAS_EVENTS
                                   ,
-                                  rclcpp::experimental::executors::EventsExecutor
+                                  EventsExecutor
 #endif
-#ifdef REDAG_HAS_CM_EXECUTORS
+#if REDAG_HAS_CBG
                                   ,
                                   rclcpp::executors::EventsCBGExecutor
 #endif
                                   >;
 
-#ifdef REDAG_HAS_CM_EXECUTORS
+#if REDAG_HAS_CBG
 template <class T>
 inline constexpr bool kCbg = std::is_same_v<T, rclcpp::executors::EventsCBGExecutor>;
 #else
@@ -81,7 +80,7 @@ inline constexpr bool kOurs = std::is_base_of_v<ReDAGExecutor, T>;
 
 #if REDAG_HAS_EVENTS
 template <class T>
-inline constexpr bool kEvents = std::is_same_v<T, rclcpp::experimental::executors::EventsExecutor>;
+inline constexpr bool kEvents = std::is_same_v<T, EventsExecutor>;
 #else
 template <class T>
 inline constexpr bool kEvents = false;

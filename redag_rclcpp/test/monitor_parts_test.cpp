@@ -205,6 +205,30 @@ TEST(Diagnoser, MissesAreNewOnce) {
   EXPECT_EQ(level_with(7), DiagnosticStatus::OK) << "nobody stated that deadline";
 }
 
+TEST(Diagnoser, DeadlocksAreErrorsWhileTheyLast) {
+  Snapshot snapshot = snapshot_of({});
+  Diagnoser diagnoser;
+  const auto status = [&] { return diagnoser.diagnose(snapshot).at(0); };
+  EXPECT_EQ(status().level, DiagnosticStatus::OK);
+  EXPECT_EQ(value_of(status(), "deadlocks that ended"), "0");
+  Deadlock deadlock;
+  deadlock.waiting = "/n timer";
+  deadlock.blocked = "/n client /map";
+  deadlock.text = "/n timer waits";
+  deadlock.certain = false;
+  snapshot.deadlocks = {deadlock};
+  EXPECT_EQ(status().level, DiagnosticStatus::WARN);
+  EXPECT_THAT(status().message, HasSubstr("possible deadlock: /n timer waits for /n client /map"));
+  deadlock.certain = true;
+  snapshot.deadlocks.push_back(deadlock);
+  EXPECT_EQ(status().level, DiagnosticStatus::ERROR);
+  EXPECT_THAT(status().message, HasSubstr("; deadlock: /n timer waits for /n client /map"));
+  EXPECT_EQ(value_of(status(), "deadlock 2"), "/n timer waits");
+  for (Deadlock &each : snapshot.deadlocks) each.ended = redag::kSecond;
+  EXPECT_EQ(status().level, DiagnosticStatus::OK);
+  EXPECT_EQ(value_of(status(), "deadlocks that ended"), "2");
+}
+
 TEST(Diagnoser, WarnsOfExecutionsThatAreAllSomewhatLongerThanTheWcet) {
   TaskFigures task;
   task.stats = stats_of("control.loop", 10 * kMillisecond);

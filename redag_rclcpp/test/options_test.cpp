@@ -89,6 +89,7 @@ TEST_F(OptionsTest, Defaults) {
   EXPECT_FALSE(options.lock_memory);
   EXPECT_EQ(options.spin, 0ns);
   EXPECT_EQ(options.watchdog, 0ns);
+  EXPECT_TRUE(options.deadlocks);
   EXPECT_TRUE(options.live);
   EXPECT_EQ(options.trace_capacity, 0U);
 
@@ -113,6 +114,7 @@ TEST_F(OptionsTest, ValuesAreRead) {
                                {"lock_memory", true},
                                {"spin", 0.00005},
                                {"watchdog", 2},
+                               {"deadlocks", false},
                                {"live", false},
                                {"trace", "results"},
                                {"metrics_period", 0.25},
@@ -132,6 +134,7 @@ TEST_F(OptionsTest, ValuesAreRead) {
   EXPECT_TRUE(options.lock_memory);
   EXPECT_EQ(options.spin, 50us);
   EXPECT_EQ(options.watchdog, 2s);
+  EXPECT_FALSE(options.deadlocks);
   EXPECT_FALSE(options.live);
   EXPECT_GT(options.trace_capacity, 0U);
 
@@ -274,10 +277,10 @@ rclcpp::ParameterValue any_value(std::mt19937_64 &random, const std::string &wor
 
 // REDAG_SEED chooses the values, REDAG_OPTION_ROUNDS the number of rounds.
 TEST_F(OptionsTest, AnyValuesAreReadOrRefused) {
-  const std::vector<std::string> names{"workers",      "preemption",     "policy",         "ties",   "threads",
-                                       "cpu_affinity", "config",         "default_period", "learn",  "raise_middleware",
-                                       "live",         "metrics_period", "trace",          "bounds", "trace_events",
-                                       "metrics_file", "save_path",      "overheads"};
+  const std::vector<std::string> names{
+      "workers",        "preemption",   "policy",           "ties",      "threads",        "cpu_affinity", "config",
+      "default_period", "learn",        "raise_middleware", "live",      "metrics_period", "trace",        "bounds",
+      "trace_events",   "metrics_file", "save_path",        "overheads", "deadlocks"};
   const std::string workload = file_with(kWorkload);
   const std::uint64_t seed = from_environment("REDAG_SEED", 1);
   const std::uint64_t rounds = from_environment("REDAG_OPTION_ROUNDS", 400);

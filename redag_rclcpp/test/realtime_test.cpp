@@ -27,6 +27,7 @@
 #include <utility>
 #include <vector>
 
+#include "any_waitable.hpp"
 #include "middleware_threads.hpp"
 #include "mode_test.hpp"
 #include "rclcpp/waitable.hpp"
@@ -185,19 +186,11 @@ class RealtimeTest : public ModeTest {
 };
 
 /// A waitable that records the priority of the thread that attaches it.
-class NotingWaitable final : public rclcpp::Waitable {
+class NotingWaitable final : public AnyWaitable {
  public:
-#if RCLCPP_VERSION_MAJOR >= 28
-  void add_to_wait_set(rcl_wait_set_t &) override {}
-  bool is_ready(const rcl_wait_set_t &) override { return false; }
-  void execute(const std::shared_ptr<void> &) override {}
-#else
-  void add_to_wait_set(rcl_wait_set_t *) override {}
-  bool is_ready(rcl_wait_set_t *) override { return false; }
-  void execute(std::shared_ptr<void> &) override {}
-#endif
-  std::shared_ptr<void> take_data() override { return nullptr; }
-  std::shared_ptr<void> take_data_by_entity_id(std::size_t) override { return nullptr; }
+  void fill(rcl_wait_set_t &) override {}
+  bool is_ready_in(const rcl_wait_set_t &) override { return false; }
+  void run(const std::shared_ptr<void> &) override {}
   void set_on_ready_callback(std::function<void(std::size_t, int)>) override {
     priority = redag::runtime::fifo_priority(pthread_self());
   }

@@ -3,8 +3,6 @@
 
 #include "peers.hpp"
 
-#include <fmt/format.h>
-
 #include "redag/base/check.hpp"
 
 namespace redag_rclcpp::lab {
@@ -17,15 +15,18 @@ const std::vector<std::string> &peer_names() {
 bool has_one_thread(const std::string &peer) { return peer == "ste" || peer == "static" || peer == "events"; }
 
 redag::Result<void> check_peer(const std::string &name) {
-  if (name == "events" && !REDAG_HAS_EVENTS) {
-    return redag::make_error(
-        "this version of ROS 2 has no executor 'events'",
-        fmt::format("it needs rclcpp 21 (Iron) or newer; this is rclcpp {}", RCLCPP_VERSION_MAJOR));
+  if (name == "static" && !kHasStatic) {
+    return redag::make_error("this version of ROS 2 has no executor 'static'",
+                             "rclcpp's StaticSingleThreadedExecutor exists up to Kilted; 'ste' is the nearest");
+  }
+  if (name == "events" && !kHasEvents) {
+    return redag::make_error("this version of ROS 2 has no executor 'events'",
+                             "rclcpp's EventsExecutor came with Iron; take that or a newer distribution");
   }
   if (name == "cbg" && !kHasCbg) {
     return redag::make_error("redag_rclcpp_lab was built without the executor 'cbg'",
-                             "it is the EventsCBGExecutor of the package cm_executors (Jazzy and newer): build that "
-                             "package in the workspace, then redag_rclcpp_lab again");
+                             "rclcpp has its EventsCBGExecutor since Lyrical; for Jazzy and Kilted build the package "
+                             "cm_executors in the workspace, then redag_rclcpp_lab again");
   }
   return {};
 }
@@ -34,11 +35,17 @@ std::unique_ptr<rclcpp::Executor> make_peer(const std::string &name, std::size_t
   if (name == "mte") {
     return std::make_unique<rclcpp::executors::MultiThreadedExecutor>(rclcpp::ExecutorOptions(), threads);
   }
+// Newer distributions declare these two as deprecated.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wdeprecated-declarations"
+#if REDAG_HAS_STATIC
   if (name == "static") return std::make_unique<rclcpp::executors::StaticSingleThreadedExecutor>();
+#endif
 #if REDAG_HAS_EVENTS
   if (name == "events") return std::make_unique<rclcpp::experimental::executors::EventsExecutor>();
 #endif
-#ifdef REDAG_HAS_CM_EXECUTORS
+#pragma GCC diagnostic pop
+#if REDAG_HAS_CBG
   if (name == "cbg") {
     return std::make_unique<rclcpp::executors::EventsCBGExecutor>(rclcpp::ExecutorOptions(), threads);
   }

@@ -10,24 +10,15 @@
 #include <string>
 #include <vector>
 
-#include "rclcpp/executors.hpp"
-#include "rclcpp/version.h"
 #include "redag/base/result.hpp"
-#define REDAG_HAS_EVENTS (RCLCPP_VERSION_MAJOR >= 21)
-#if REDAG_HAS_EVENTS
-#include "rclcpp/experimental/executors/events_executor/events_executor.hpp"
-#endif
-#ifdef REDAG_HAS_CM_EXECUTORS
-#include "cm_executors/events_cbg_executor.hpp"
-#endif
+#include "redag_rclcpp/rclcpp_executors.hpp"
 
 namespace redag_rclcpp::lab {
 
-#ifdef REDAG_HAS_CM_EXECUTORS
-inline constexpr bool kHasCbg = true;
-#else
-inline constexpr bool kHasCbg = false;
-#endif
+// Which executors this build has; the other peers exist everywhere.
+inline constexpr bool kHasStatic = REDAG_HAS_STATIC;
+inline constexpr bool kHasEvents = REDAG_HAS_EVENTS;
+inline constexpr bool kHasCbg = REDAG_HAS_CBG;
 
 /// mte, ste, static, events, cbg: also those that this build lacks.
 [[nodiscard]] const std::vector<std::string> &peer_names();

@@ -12,7 +12,7 @@
 #include <memory>
 #include <utility>
 
-#include "rclcpp/version.h"
+#include "redag_rclcpp/distribution.hpp"
 
 namespace redag_rclcpp::lab {
 
@@ -43,7 +43,7 @@ Time timer_clock_now() noexcept {
 PhasedTimer::PhasedTimer(rclcpp::Node &node, const rclcpp::CallbackGroup::SharedPtr &group, Time first, Duration period,
                          std::function<void(std::int64_t)> call)
     : period_(period), call_(std::move(call)) {
-#if RCLCPP_VERSION_MAJOR >= 28
+#if REDAG_RCLCPP_HAS_TIMER_INFO
   const auto callback = [this](const rclcpp::TimerInfo &info) {
     call_((info.actual_call_time.nanoseconds() - first_expiry_) / period_);
   };
@@ -86,7 +86,7 @@ std::int64_t PhasedTimer::expired() const {
 }
 
 void PhasedTimer::repeat_numbering() const {
-#if RCLCPP_VERSION_MAJOR < 28
+#if !REDAG_RCLCPP_HAS_TIMER_INFO
   (void)expired();
 #endif
 }

@@ -16,7 +16,6 @@
 
 #include "node_events.hpp"
 #include "peers.hpp"
-#include "rclcpp/version.h"
 #include "redag/model/callback_match.hpp"
 #include "redag/model/demand.hpp"
 #include "redag/model/workload_yaml.hpp"
@@ -530,7 +529,12 @@ TEST(RosLimits, WhatRosTimersCannotDoIsRefused) {
 TEST(Executors, OnlyThoseOfThisDistributionAreAccepted) {
   EXPECT_TRUE(check_executor("mte").has_value());
   EXPECT_FALSE(check_executor("mtf").has_value());
-  EXPECT_EQ(check_executor("events").has_value(), RCLCPP_VERSION_MAJOR >= 21);
+  EXPECT_EQ(check_executor("events").has_value(), kHasEvents);
+  const auto fixed = check_executor("static");
+  ASSERT_EQ(fixed.has_value(), kHasStatic);
+  if (!fixed) {
+    EXPECT_THAT(fixed.error().front().hint, HasSubstr("'ste'"));
+  }
   const auto cbg = check_executor("cbg");
   ASSERT_EQ(cbg.has_value(), kHasCbg);
   if (!cbg) {

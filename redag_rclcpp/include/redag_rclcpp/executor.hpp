@@ -22,12 +22,12 @@
 #include <vector>
 
 #include "rclcpp/executor.hpp"
-#include "rclcpp/version.h"
 #include "redag/model/callback_match.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/setup.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_rclcpp/distribution.hpp"
 
 namespace redag_rclcpp {
 
@@ -70,6 +70,10 @@ struct ReDAGOptions {
   /// Logs a warning about each callback that is in progress for longer than this, while it runs; 0: no watchdog. With a
   /// watchdog, `on_budget` and HI mode also take effect in callbacks without preemption points.
   std::chrono::nanoseconds watchdog{};
+  /// While spin() runs, logs each callback that waits for a response which cannot reach it, because the callback itself
+  /// or others that wait like it keep the response's callback from starting (docs/ros2.md, "A call that waits for
+  /// itself"). deadlocks() returns them.
+  bool deadlocks = true;
   std::size_t trace_capacity = 0;  // events that the rings hold between two drain_trace(); 0: no events
   bool live = false;  // shows the executor in `redag top`: a page of shared memory, and a thread that updates it
   /// Called on the thread that executed the callback; must not throw. Empty: Stop.
@@ -94,6 +98,17 @@ struct CallbackStats {
   redag::Duration execution_max = 0;
 };
 
+/// A callback that waited for a response which could not reach it.
+struct Deadlock {
+  std::string waiting;    // the callback that waited: "control.ekf", or to_string() of its id
+  std::string blocked;    // the callback that could not start: the client's, the service's, the action's
+  std::string resource;   // what it could not get: "the default callback group of /planner", "any of the 2 workers"
+  std::string text;       // all of this in sentences, with the remedies
+  bool certain = true;    // false: the callback may also wait for something else
+  redag::Time begun = 0;  // when it was noticed, on the clock of the trace
+  redag::Time ended = redag::kNever;  // kNever: it lasts
+};
+
 class ReDAGExecutor : public rclcpp::Executor {
  public:
   RCLCPP_SMART_PTR_DEFINITIONS(ReDAGExecutor)
@@ -114,23 +129,19 @@ class ReDAGExecutor : public rclcpp::Executor {
   void spin_once(std::chrono::nanoseconds timeout = std::chrono::nanoseconds(-1)) override;
 
   /// As rclcpp's. A call before the very first spin makes that spin return at once; rclcpp forgets such a call.
-#if RCLCPP_VERSION_MAJOR >= 28
-  void cancel() override;
-#else
-  void cancel();
-#endif
+  void cancel() REDAG_RCLCPP_OVERRIDES_CANCEL;
 
   using rclcpp::Executor::add_node;
   using rclcpp::Executor::remove_node;
-  void add_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify = true) override;
-  void remove_node(rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify = true) override;
+  void add_node(distribution::NodePointer node, bool notify = true) override;
+  void remove_node(distribution::NodePointer node, bool notify = true) override;
   /// Removes the node, and holds `instance` until the node's callbacks in progress have ended. `instance` is the object
   /// whose members these callbacks use. Then releases it, which destroys it unless it has other owners. remove_node(),
   /// in contrast, waits for no callback.
   void retire_node(const rclcpp::node_interfaces::NodeBaseInterface::SharedPtr &node, std::shared_ptr<void> instance);
-  void add_callback_group(rclcpp::CallbackGroup::SharedPtr group,
-                          rclcpp::node_interfaces::NodeBaseInterface::SharedPtr node, bool notify = true) override;
-  void remove_callback_group(rclcpp::CallbackGroup::SharedPtr group, bool notify = true) override;
+  void add_callback_group(distribution::GroupPointer group, distribution::NodePointer node,
+                          bool notify = true) override;
+  void remove_callback_group(distribution::GroupPointer group, bool notify = true) override;
 
   /// The preemption mode that was taken, and the reason.
   [[nodiscard]] const redag::runtime::Mode &mode() const;
@@ -138,6 +149,9 @@ class ReDAGExecutor : public rclcpp::Executor {
   /// Warnings for the user: for instance too few processors, tasks of the workload that no callback matches, or
   /// middleware threads that could not be raised.
   [[nodiscard]] std::vector<std::string> warnings() const;
+
+  /// The deadlocks that were noticed, in the order of their beginning; the last 100. See ReDAGOptions::deadlocks.
+  [[nodiscard]] std::vector<Deadlock> deadlocks() const;
 
   /// Live figures of all callbacks, shortest period first. Cheap enough to call once a second.
   [[nodiscard]] std::vector<CallbackStats> stats() const;
@@ -166,17 +180,13 @@ class ReDAGExecutor : public rclcpp::Executor {
 
  protected:
   void spin_once_impl(std::chrono::nanoseconds timeout) override;
-#if RCLCPP_VERSION_MAJOR >= 21
   rclcpp::FutureReturnCode spin_until_future_complete_impl(
       std::chrono::nanoseconds timeout,
-      const std::function<std::future_status(std::chrono::nanoseconds)> &wait_for_future) override;
-#endif
+      const std::function<std::future_status(std::chrono::nanoseconds)> &wait_for_future)
+      REDAG_RCLCPP_OVERRIDES_SPIN_UNTIL_FUTURE_COMPLETE;
 
  private:
   RCLCPP_DISABLE_COPY(ReDAGExecutor)
-#if RCLCPP_VERSION_MAJOR < 21
-  void forget_expired();
-#endif
   void spin_for_future(std::chrono::nanoseconds timeout);
 
   class Core;

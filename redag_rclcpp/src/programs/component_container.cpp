@@ -5,10 +5,13 @@
 // orders their callbacks, and the monitor reports on them (docs/ros2.md).
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdio>
-#include <cstring>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp_components/component_manager.hpp"
@@ -30,10 +33,17 @@ constexpr const char *kHelp = R"(A component container that executes callbacks b
 
   ros2 run redag_rclcpp component_container [--ros-args -p NAME:=VALUE ...]
 
+Arguments of rclcpp's container, for launch files that have them:
+  --executor-type TYPE   single-threaded: one worker; multi-threaded and
+                         events-cbg: as many as 'workers' says. The order of
+                         callbacks is the same for each.
+  --isolated             has no effect: components share one executor
+
 Parameters, with their defaults:
   config ""              workload file: maps callbacks to the tasks of DAGs
   workers 0              callbacks that execute at the same time;
                          0: one per processor
+  thread_num             the same under rclcpp's name
   preemption auto        auto, os, cooperative or none
   policy rate_monotonic  rate_monotonic, deadline_monotonic, fixed, edf, fifo
                          or chain_aware
@@ -86,14 +96,72 @@ class Manager : public rclcpp_components::ComponentManager {
   }
 };
 
-int run() {
-  const auto manager = std::make_shared<Manager>(std::weak_ptr<rclcpp::Executor>(), "ComponentManager",
-                                                 rclcpp::NodeOptions().start_parameter_event_publisher(false));
-  const rclcpp::Logger logger = manager->get_logger();
+/// The arguments of rclcpp's component_container.
+struct Arguments {
+  bool single_threaded = false;
+  bool isolated = false;
+  std::vector<std::string> unknown{};
+  std::string error{};  // empty: none
+};
+
+constexpr std::array kExecutorTypes = {"single-threaded", "multi-threaded", "events-cbg"};
+
+/// `arguments`: without the program's name, and without those for ROS.
+Arguments parse(const std::vector<std::string> &arguments) {
+  Arguments parsed;
+  for (auto argument = arguments.begin(); argument != arguments.end(); ++argument) {
+    if (*argument == "--isolated") {
+      parsed.isolated = true;
+    } else if (*argument != "--executor-type") {
+      parsed.unknown.push_back(*argument);
+    } else if (++argument == arguments.end()) {
+      parsed.error = fmt::format("--executor-type needs a value: {}", fmt::join(kExecutorTypes, ", "));
+      break;
+    } else if (std::find(kExecutorTypes.begin(), kExecutorTypes.end(), *argument) == kExecutorTypes.end()) {
+      parsed.error =
+          fmt::format("--executor-type is '{}', but must be one of {}", *argument, fmt::join(kExecutorTypes, ", "));
+    } else {
+      parsed.single_threaded = *argument == "single-threaded";
+    }
+  }
+  return parsed;
+}
+
+/// Applies the arguments to the options that the parameters state. Throws if they contradict each other.
+void apply(const Arguments &arguments, Manager &manager, redag_rclcpp::ReDAGOptions &options) {
+  const rclcpp::Logger logger = manager.get_logger();
+  for (const std::string &argument : arguments.unknown) {
+    RCLCPP_WARN(logger, "the argument '%s' is not known and ignored; --help lists arguments and parameters",
+                argument.c_str());
+  }
+  if (arguments.isolated) {
+    RCLCPP_WARN(logger, "--isolated has no effect: all components share one executor and its workers");
+  }
+  if (!arguments.single_threaded) return;
+  const auto &given = manager.get_node_parameters_interface()->get_parameter_overrides();
+  if (given.count("workers") != 0 && options.workers != 1) {
+    throw rclcpp::exceptions::InvalidParameterValueException(fmt::format(
+        "parameter 'workers' is {}, but --executor-type single-threaded means one worker; leave one of them "
+        "out",
+        options.workers));
+  }
+  if (given.count("thread_num") != 0 && options.workers != 1) {
+    RCLCPP_WARN(logger, "'thread_num' is ignored: --executor-type single-threaded means one worker");
+  }
+  options.workers = 1;
+}
+
+int run(const Arguments &arguments) {
+  std::shared_ptr<Manager> manager;
   std::shared_ptr<redag_rclcpp::ReDAGExecutor> executor;
   std::unique_ptr<redag_rclcpp::Monitor> monitor;
+  const rclcpp::Logger logger = rclcpp::get_logger("ComponentManager");
   try {
+    // rclcpp's container refuses a 'thread_num' that is out of range here.
+    manager = std::make_shared<Manager>(std::weak_ptr<rclcpp::Executor>(), "ComponentManager",
+                                        rclcpp::NodeOptions().start_parameter_event_publisher(false));
     redag_rclcpp::ReDAGOptions options = redag_rclcpp::declare_options(*manager);
+    apply(arguments, *manager, options);
     redag_rclcpp::MonitorOptions monitored = redag_rclcpp::declare_monitor_options(*manager, options);
     executor = std::make_shared<redag_rclcpp::ReDAGExecutor>(std::move(options));
     manager->set_executor(executor);
@@ -121,23 +189,28 @@ int run() {
 }  // namespace
 
 int main(int argc, char **argv) {
-  for (int i = 1; i < argc && std::strcmp(argv[i], "--ros-args") != 0; ++i) {
-    if (std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0) {
-      fmt::print("{}", kHelp);
-      return kExitOk;
-    }
-  }
 #ifdef REDAG_INHERITS
   // Without real-time priorities there is nothing to inherit.
   if (redag::runtime::probe_priority_band().top_job == 0) redag_pi_disable();
 #endif
+  Arguments arguments;
   try {
+    const std::vector<std::string> own = rclcpp::remove_ros_arguments(argc, argv);
+    if (std::any_of(own.begin(), own.end(), [](const std::string &a) { return a == "--help" || a == "-h"; })) {
+      fmt::print("{}", kHelp);
+      return kExitOk;
+    }
+    arguments = parse({own.begin() + 1, own.end()});
+    if (!arguments.error.empty()) {
+      fmt::print(stderr, "component_container: {}\n", arguments.error);
+      return kExitBadInput;
+    }
     rclcpp::init(argc, argv);
   } catch (const std::exception &error) {
     fmt::print(stderr, "component_container: {}\n", error.what());
     return kExitBadInput;
   }
-  const int status = run();
+  const int status = run(arguments);
   rclcpp::shutdown();
   return status;
 }

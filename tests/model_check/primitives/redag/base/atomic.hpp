@@ -39,6 +39,10 @@ class Atomic {
     testing::explored::write(id_, "fetch_sub");
     return std::exchange(value_, static_cast<T>(value_ - by));
   }
+  T fetch_or(T bits, std::memory_order = std::memory_order_seq_cst) noexcept {
+    testing::explored::write(id_, "fetch_or");
+    return std::exchange(value_, static_cast<T>(value_ | bits));
+  }
   bool compare_exchange_strong(T &expected, T desired, std::memory_order = std::memory_order_seq_cst,
                                std::memory_order = std::memory_order_seq_cst) noexcept {
     testing::explored::write(id_, "compare_exchange");

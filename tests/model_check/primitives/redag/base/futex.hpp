@@ -1,8 +1,11 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Replaces redag/base/futex.hpp: the same operations on the explorer's threads.
+// Replaces redag/base/futex.hpp: the same operations on the explorer's threads. It knows no priorities, and therefore
+// no locks that inherit them.
 #pragma once
+
+#include <linux/futex.h>
 
 #include <cstdint>
 
@@ -22,5 +25,7 @@ inline void futex_wait(FutexWord &word, std::uint32_t expected) noexcept {
   static_cast<void>(futex_wait_until(word, expected, kNever));
 }
 inline void futex_wake(FutexWord &word, int count) noexcept { testing::explored::wake(word.id(), count); }
+[[nodiscard]] inline bool futex_lock_pi(FutexWord &) noexcept { return false; }
+[[nodiscard]] inline bool futex_unlock_pi(FutexWord &) noexcept { return false; }
 
 }  // namespace redag

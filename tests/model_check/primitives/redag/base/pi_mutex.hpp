@@ -15,12 +15,15 @@ class REDAG_CAPABILITY("mutex") PiMutex {
   PiMutex(const PiMutex &) = delete;
   PiMutex &operator=(const PiMutex &) = delete;
 
-  /// The explorer does not tell whether the mutex was free.
+  /// The explorer does not tell whether the mutex was free, and unlock() not whether it woke a thread.
   bool lock() noexcept REDAG_ACQUIRE() {
     testing::explored::lock(id_);
     return true;
   }
-  void unlock() noexcept REDAG_RELEASE() { testing::explored::unlock(id_); }
+  bool unlock() noexcept REDAG_RELEASE() {
+    testing::explored::unlock(id_);
+    return false;
+  }
 
  private:
   testing::ObjectId id_ = testing::explored::new_object();

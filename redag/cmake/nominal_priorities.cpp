@@ -31,6 +31,6 @@ extern "C" [[gnu::constructor]] void redag_nominal_priorities() {
   };
   const sock_fprog program{filter.size(), filter.data()};
   if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) == 0) return;
-  std::perror("a program with sanitizers needs seccomp filters (cmake/nominal_priorities.cpp)");
+  std::perror("a program with sanitizers needs seccomp filters (redag/cmake/nominal_priorities.cpp)");
   std::abort();
 }

@@ -3,16 +3,18 @@
 
 # Functions shared by the packages redag/, redag_analysis/ and redag_lab/. Included by settings.cmake.
 include(CMakePackageConfigHelpers)
-cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH redag_repository)
 
-# Stops if package.xml and the project state different versions.
-function(redag_check_version)
-  file(STRINGS ${PROJECT_SOURCE_DIR}/package.xml stated REGEX "<version>")
-  if(NOT stated MATCHES "<version>${PROJECT_VERSION}</version>")
-    message(FATAL_ERROR "${PROJECT_NAME}/package.xml says '${stated}', its CMakeLists.txt says '${PROJECT_VERSION}'")
-  endif()
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/package.xml)
-endfunction()
+# Headers are included by their paths from redag_include_root, "<package>/<folder>/<file>.hpp". In the repository this is
+# its root. A package that is built alone may lie in a folder of any name: its build holds a folder with a link to it.
+if(EXISTS ${PROJECT_SOURCE_DIR}/package.xml)
+  set(REDAG_STANDALONE ON)
+  set(redag_include_root ${PROJECT_BINARY_DIR}/sources)
+  file(MAKE_DIRECTORY ${redag_include_root})
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR} ${redag_include_root}/${PROJECT_NAME} SYMBOLIC)
+else()
+  set(REDAG_STANDALONE OFF)
+  set(redag_include_root ${PROJECT_SOURCE_DIR})
+endif()
 
 # redag_sources(<variable> <folder>...) lists the sources of these folders without their tests. A new file needs no
 # edit.
@@ -26,15 +28,14 @@ function(redag_sources variable)
   set(${variable} ${sources} PARENT_SCOPE)
 endfunction()
 
-# redag_add_library(<target> <folder>...) adds the library of this project. Headers are included by their path from the
-# repository's root, in the build and after installation.
+# redag_add_library(<target> <folder>...) adds the library of this project.
 function(redag_add_library target)
   redag_sources(sources ${ARGN})
   add_library(${target} ${sources})
   set_target_properties(${target} PROPERTIES
     VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
   target_include_directories(${target} PUBLIC
-    $<BUILD_INTERFACE:${redag_repository}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+    $<BUILD_INTERFACE:${redag_include_root}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(${target} PUBLIC cxx_std_20)
   # A shared library names all that it needs; otherwise a use of what lies above it would show only in a program.
   if(NOT REDAG_SANITIZE)
@@ -55,9 +56,10 @@ function(redag_install_library)
   get_target_property(library_type ${library} TYPE)
   configure_package_config_file(${PROJECT_SOURCE_DIR}/${PROJECT_NAME}-config.cmake.in
     ${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config.cmake INSTALL_DESTINATION ${package_dir})
-  # Before 1.0 a new minor version may break users of the old one.
+  # A program that was written for an older minor version compiles with a newer one, but is to be linked anew: the
+  # library's SOVERSION has the minor version, too.
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config-version.cmake
-    COMPATIBILITY SameMinorVersion)
+    COMPATIBILITY SameMajorVersion)
   install(FILES ${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config.cmake
     ${PROJECT_BINARY_DIR}/${PROJECT_NAME}-config-version.cmake DESTINATION ${package_dir})
   # colcon and ros2 look for packages here.

@@ -24,7 +24,7 @@ if(NOT REVISION MATCHES "^[A-Za-z0-9._+~-]+$")
   message(FATAL_ERROR "REDAG_REVISION '${REVISION}' has other characters than letters, digits and . _ + ~ -")
 endif()
 
-file(WRITE ${OUTPUT}.new "// Made by cmake/revision.cmake.
+file(WRITE ${OUTPUT}.new "// Made by redag/cmake/revision.cmake.
 #include \"redag/base/provenance.hpp\"
 
 const char *redag::build_revision() { return \"${REVISION}\"; }

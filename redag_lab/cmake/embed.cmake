@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Writes page_assets.cpp, which holds the report page's files as text. Runs during the build, in script mode:
-#   cmake -DOUTPUT=page_assets.cpp -DPAGE=redag_lab/report/page -DECHARTS=third_party/echarts -P embed.cmake
+#   cmake -DOUTPUT=page_assets.cpp -DPAGE=redag_lab/report/page -DECHARTS=redag_lab/third_party/echarts -P embed.cmake
 cmake_minimum_required(VERSION 3.22)
 
 # Raw strings, in pieces that every compiler accepts. None of the files contains the delimiter.
@@ -26,7 +26,7 @@ function(add_text name)
   file(APPEND ${OUTPUT}.new "const std::string_view ${name} =\n${pieces};\n")
 endfunction()
 
-file(WRITE ${OUTPUT}.new "// Made by cmake/embed.cmake out of redag_lab/report/page and third_party/echarts.
+file(WRITE ${OUTPUT}.new "// Made by redag_lab/cmake/embed.cmake out of redag_lab/report/page and redag_lab/third_party/echarts.
 #include \"redag_lab/report/page_assets.hpp\"
 
 #pragma GCC diagnostic ignored \"-Woverlength-strings\"
@@ -36,7 +36,8 @@ add_text(kTemplate ${PAGE}/page.html)
 add_text(kStyle ${PAGE}/page.css)
 add_text(kEcharts ${ECHARTS}/echarts.min.js)
 set(frame ${PAGE}/format.js ${PAGE}/elements.js ${PAGE}/charts.js ${PAGE}/frame.js)
-add_text(kScript ${frame} ${PAGE}/figures.js ${PAGE}/schedule.js ${PAGE}/tables.js ${PAGE}/page.js)
+add_text(kScript ${frame} ${PAGE}/figures.js ${PAGE}/schedule.js ${PAGE}/tables.js
+  ${PAGE}/why.js ${PAGE}/page.js)
 add_text(kExperimentScript ${frame} ${PAGE}/experiment.js)
 file(APPEND ${OUTPUT}.new "}  // namespace redag::report::assets\n")
 file(RENAME ${OUTPUT}.new ${OUTPUT})
