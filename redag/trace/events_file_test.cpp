@@ -3,6 +3,7 @@
 
 #include "redag/trace/events_file.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -14,6 +15,8 @@
 
 namespace redag::trace {
 namespace {
+
+using ::testing::HasSubstr;
 
 namespace fs = std::filesystem;
 
@@ -200,6 +203,30 @@ TEST(ThisMachine, IsDescribed) {
   const Machine machine = this_machine();
   EXPECT_GT(machine.cpus, 0U);
   EXPECT_NE(machine.kernel, "");
+}
+
+TEST_F(EventsFile, RemarksAreKept) {
+  Trace trace = example();
+  trace.info.remarks = {{.begun = 5, .ended = 9, .text = "deadlock: a"}, {.begun = 7, .text = "deadlock: b"}};
+  written(trace);
+  EXPECT_EQ(read_trace(path_).value().info.remarks, trace.info.remarks);
+}
+
+TEST_F(EventsFile, MistakesInRemarksAreSaid) {
+  RunInfo info = example().info;
+  info.remarks = {{.begun = 5, .ended = 9, .text = "deadlock: a"}};
+  const std::string text = run_info_to_json(info);
+  const auto error_with = [&](const std::string &old, const std::string &changed) {
+    std::string bad = text;
+    bad.replace(bad.find(old), old.size(), changed);
+    const Result<RunInfo> read = run_info_from_json(bad, "x", 1);
+    return read ? "" : to_string(read.error());
+  };
+  EXPECT_EQ(error_with("\"begun_ns\":5", "\"begun_ns\":6"), "");
+  EXPECT_THAT(error_with("\"begun_ns\":5", "\"begun_ns\":\"5\""), HasSubstr("'begun_ns' must be a whole number"));
+  EXPECT_THAT(error_with("\"text\":\"deadlock: a\"", "\"text\":1"), HasSubstr("'text' must be a string"));
+  EXPECT_THAT(error_with("\"remarks\":[", "\"remarks\":7,\"others\":["), HasSubstr("'remarks' must be a list"));
+  EXPECT_THAT(error_with("\"remarks\":[", "\"remarks\":[7,"), HasSubstr("x:1"));
 }
 
 // Files from before equals took turns were recorded in a fixed order.

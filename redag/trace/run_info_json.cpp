@@ -99,6 +99,24 @@ Machine machine_from(const Json &json) {
   return machine;
 }
 
+// Files of runs without remarks, and those from before remarks existed, do not have the key.
+std::vector<Remark> remarks_from(const Json &json) {
+  std::vector<Remark> remarks;
+  const auto rows = json.find("remarks");
+  if (rows == json.end()) return remarks;
+  if (!rows->is_array()) throw BadValue("'remarks' must be a list");
+  for (const Json &row : *rows) {
+    Remark remark;
+    remark.begun = integer_of(row, "begun_ns", -kMaxTraceTime, kMaxTraceTime);
+    if (!member(row, "ended_ns").is_null()) {
+      remark.ended = integer_of(row, "ended_ns", -kMaxTraceTime, kMaxTraceTime);
+    }
+    remark.text = text_of(row, "text");
+    remarks.push_back(std::move(remark));
+  }
+  return remarks;
+}
+
 RunInfo info_from(const Json &json) {
   RunInfo info;
   info.executor = text_of(json, "executor");
@@ -115,6 +133,7 @@ RunInfo info_from(const Json &json) {
   info.lost_events = unsigned_of(json, "lost_events");
   info.overheads = text_of(json, "overheads");
   info.machine = machine_from(member(json, "machine"));
+  info.remarks = remarks_from(json);
   return info;
 }
 
@@ -143,6 +162,11 @@ std::string run_info_to_json(const RunInfo &info) {
       {"machine", {{"cpus", info.machine.cpus}, {"kernel", info.machine.kernel}, {"model", info.machine.model}}},
       {"workload", to_yaml(info.workload)}};
   if (info.stepped) json["stepped"] = true;
+  for (const Remark &remark : info.remarks) {
+    json["remarks"].push_back({{"begun_ns", remark.begun},
+                               {"ended_ns", remark.ended == kNever ? Json() : Json(remark.ended)},
+                               {"text", remark.text}});
+  }
   // Texts from outside may not be UTF-8; a replaced character is better than no file.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -39,6 +39,15 @@ struct Machine {
 /// deadline, overflows.
 inline constexpr Time kMaxTraceTime = kMaxDuration / 2;
 
+/// What an observer of the run noticed and its events do not show, for instance a deadlock.
+struct Remark {
+  Time begun = 0;
+  Time ended = kNever;  // kNever: it lasted until the end of the run
+  std::string text;
+
+  friend bool operator==(const Remark &, const Remark &) = default;
+};
+
 struct RunInfo {
   Workload workload;           // task ids of the events are indices in it
   std::string executor;        // "redag", "mte", "ste", ...
@@ -55,6 +64,7 @@ struct RunInfo {
   std::string overheads;  // overheads that the driver added to execution; empty: none (the model's ideal machine)
   Machine machine;
   Provenance provenance;  // of the program that ran it; unknown in files from before this block existed
+  std::vector<Remark> remarks;
 };
 
 struct Trace {

@@ -35,11 +35,14 @@ bool Group::fits(const trace::RunInfo &run) const {
          trace::worker_count(run) == trace::worker_count(info()) && same_tasks(run.workload, workload());
 }
 
-void Group::add(const std::string &path, const trace::Trace &trace) {
+void Group::add(const std::string &path, const trace::Trace &trace, const metrics::KernelRecord *kernel) {
   REDAG_CHECK(fits(trace.info), "jobs of different runs counted together");
   const std::vector<JobRecord> jobs = metrics::fold_jobs(trace.info.workload, trace.events);
   const bool is_first = runs_.empty();
-  if (is_first) take_first(trace, jobs);
+  if (is_first) {
+    take_first(trace, jobs);
+    why_ = why_of(trace, kernel, schedule_);
+  }
   const auto bound_of = [this](TaskId task) {
     return task.value < bounds_.tasks.size() ? bounds_.tasks[task.value].response.value_or(0) : Duration{0};
   };

@@ -21,6 +21,7 @@
 #include "redag_lab/report/curves.hpp"
 #include "redag_lab/report/schedule.hpp"
 #include "redag_lab/report/timeline.hpp"
+#include "redag_lab/report/why.hpp"
 
 namespace redag::report {
 
@@ -56,8 +57,9 @@ class Group {
   /// Starts without runs. Call add() before any other function.
   Group(std::string label, const DigestOptions &options) : label_(std::move(label)), options_(options) {}
 
-  /// Adds a run. The first run provides the schedule and the timeline. Requires fits(trace.info).
-  void add(const std::string &path, const trace::Trace &trace);
+  /// Adds a run. The first run provides the schedule, the timeline and the explanations, for which `kernel` is the
+  /// kernel's record of it, if there is one. Requires fits(trace.info).
+  void add(const std::string &path, const trace::Trace &trace, const metrics::KernelRecord *kernel = nullptr);
   /// True if executor, mode and tasks are those of the group, whose jobs can then be counted together.
   [[nodiscard]] bool fits(const trace::RunInfo &info) const;
   /// Sorts, and computes the figures of all runs together. Call it after the last add().
@@ -70,6 +72,7 @@ class Group {
   [[nodiscard]] const Workload &workload() const { return info().workload; }
   [[nodiscard]] const RunBounds &bounds() const { return bounds_; }
   [[nodiscard]] const Schedule &schedule() const { return schedule_; }
+  [[nodiscard]] const WhyDigest &why() const { return why_; }
   [[nodiscard]] const Timeline &timeline() const { return timeline_; }
   [[nodiscard]] const std::optional<LatestJob> &latest() const { return latest_; }
 
@@ -98,6 +101,7 @@ class Group {
   std::optional<LatestJob> latest_;
   RunBounds bounds_;
   Schedule schedule_;
+  WhyDigest why_;
   Timeline timeline_;
   std::vector<metrics::JobStats> task_stats_;
   std::vector<metrics::DagSummary> dags_;

@@ -193,8 +193,9 @@ class GroupWriter {
                       group.label(), format_count(schedule.slices_shown), format_count(schedule.slices_in_all)));
     }
     if (group.runs().size() > 1) {
-      cuts.push_back(fmt::format("{}: the schedule is that of the first of {} runs; all other figures cover all runs",
-                                 group.label(), group.runs().size()));
+      cuts.push_back(fmt::format(
+          "{}: the schedule and the explanations are of the first of {} runs; all other figures cover all runs",
+          group.label(), group.runs().size()));
     }
   }
 
@@ -218,7 +219,8 @@ class GroupWriter {
                   {"assumes", bounds.assumes}}},
                 {"runs", std::move(runs)},
                 {"timeline", to_json(group_.timeline())},
-                {"schedule", to_json(group_.schedule(), group_.info())}};
+                {"schedule", to_json(group_.schedule(), group_.info())},
+                {"why", Json::parse(report::to_json(group_.why(), group_.workload()))}};
   }
 
  private:

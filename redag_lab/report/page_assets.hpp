@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The files of redag_lab/report/page and third_party/echarts, embedded into the library by the build
-// (cmake/embed.cmake).
+// The files of redag_lab/report/page and redag_lab/third_party/echarts, embedded into the library by the build
+// (redag_lab/cmake/embed.cmake).
 #pragma once
 
 #include <string_view>

@@ -94,6 +94,19 @@ TEST(Verdict, ACleanRunIsGoodAndProven) {
   EXPECT_EQ(sentences[2].tone, Tone::Good) << "the trace checker: " << sentences[2].text;
 }
 
+TEST(Verdict, WhatWasNoticedIsSaid) {
+  trace::Trace trace = simulated(hi_and_lo(PreemptionMode::Os), kSecond);
+  trace.info.remarks = {{.begun = kMillisecond, .ended = 3 * kMillisecond, .text = "deadlock: a"},
+                        {.begun = 2 * kMillisecond, .text = "deadlock: b"}};
+  const std::vector<Sentence> sentences = verdict_of(group_of("redag", {trace}));
+  ASSERT_EQ(sentences.size(), 5U);
+  EXPECT_EQ(sentences[3].tone, Tone::Bad);
+  EXPECT_EQ(sentences[3].text, "Noticed 1ms after the start, for 2ms: deadlock: a");
+  EXPECT_EQ(sentences[4].text, "Noticed 2ms after the start, until the end: deadlock: b");
+  trace.info.remarks.resize(8);
+  EXPECT_EQ(verdict_of(group_of("redag", {trace})).back().text, "3 more were noticed.");
+}
+
 TEST(Verdict, MissesAreCountedNamedAndNotProvenAway) {
   const Group group = group_of("none", {simulated(hi_and_lo(PreemptionMode::None), kSecond)});
   const std::vector<Sentence> sentences = verdict_of(group);

@@ -109,6 +109,23 @@ void add_assumptions(const Group &group, std::vector<Sentence> &sentences) {
   }
 }
 
+// What observers noticed during the runs.
+void add_noticed(const Group &group, std::vector<Sentence> &sentences) {
+  constexpr std::size_t kMost = 5;
+  std::size_t count = 0;
+  for (const RunDigest &run : group.runs()) {
+    for (const trace::Remark &remark : run.info.remarks) {
+      if (++count > kMost) continue;
+      const std::string length =
+          remark.ended == kNever ? "until the end" : "for " + humanize_duration(remark.ended - remark.begun);
+      sentences.push_back(
+          {Tone::Bad, fmt::format("Noticed {} after the start, {}: {}",
+                                  humanize_duration(remark.begun - run.info.start), length, remark.text)});
+    }
+  }
+  if (count > kMost) sentences.push_back({Tone::Bad, fmt::format("{} more were noticed.", count - kMost)});
+}
+
 void add_remarks(const Group &group, std::vector<Sentence> &sentences) {
   if (group.info().driver != trace::Driver::Simulator) add_assumptions(group, sentences);
   std::uint64_t violations = 0;
@@ -130,6 +147,7 @@ void add_remarks(const Group &group, std::vector<Sentence> &sentences) {
     sentences.push_back(
         {Tone::Good, fmt::format("The trace checker found no violation of the model in {}.", plural(checks, "check"))});
   }
+  add_noticed(group, sentences);
   if (!enforced) sentences.push_back({Tone::Bad, "A bound on jobs in progress or an exclusive group was violated."});
   if (lost > 0) {
     sentences.push_back({Tone::Caution, fmt::format("{} lost: the figures are incomplete.", plural(lost, "event"))});

@@ -234,7 +234,7 @@ class Run {
     for (const auto &instance : instances_) {
       if (Result<void> started = instance->engine->start(); !started) return started;
     }
-    origin_ = runtime::monotonic_now() + kStartMargin;
+    result_.origin = origin_ = runtime::monotonic_now() + kStartMargin;
     for (const auto &instance : instances_) {
       if (Result<void> started = start(*instance); !started) return started;
     }

@@ -75,6 +75,7 @@ struct RunResult {
   std::vector<std::string> overdue;     // the watchdog's reports
   std::vector<std::string> warnings;    // caveats for a reader of the figures
   bool stopped = false;                 // ended by `stop`
+  Time origin = 0;                      // CLOCK_MONOTONIC at time 0 of the trace
 };
 
 /// Runs a workload, which must be valid (validate()). Error: `os` or realtime_threads without the rights, or threads

@@ -18,6 +18,7 @@
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_lab/run/kernel_recorder.hpp"
 #include "redag_lab/run/run_workload.hpp"
 
 namespace redag::lab {
@@ -171,6 +172,18 @@ std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant
   return bounds;
 }
 
+/// Returns the bodies with a note of the thread that begins each job.
+std::vector<runtime::Body> logged(std::vector<runtime::Body> &bodies, KernelRecorder &kernel) {
+  std::vector<runtime::Body> out;
+  for (std::size_t t = 0; t < bodies.size(); ++t) {
+    out.push_back([t, &kernel, body = std::move(bodies[t])](const runtime::Job &job) {
+      kernel.log(TaskId(t), job.number);
+      return body(job);
+    });
+  }
+  return out;
+}
+
 void check(Session &session) {
   session.check = metrics::check_trace(session.trace, metrics::rules_for(session.trace.info));
 }
@@ -197,9 +210,17 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   run.scheduler = [&](const Workload &w, const sched::Config &config) {
     return executors::make_scheduler(variant.executor, w, config);
   };
+  std::unique_ptr<KernelRecorder> kernel;
+  if (options.kernel) {
+    Result<std::unique_ptr<KernelRecorder>> started = KernelRecorder::start(runtime::usable_cpus());
+    if (!started) return tl::unexpected<Diagnostics>(std::move(started.error()));
+    kernel = *std::move(started);
+    run.bodies = [&kernel](std::vector<runtime::Body> bodies, const Now &) { return logged(bodies, *kernel); };
+  }
   Session session;
   std::optional<Evaluation> evaluation;
   run.sink = [&](const trace::RunInfo &info, std::span<const JobEvent> events) {
+    if (kernel) kernel->collect();
     if (!evaluation) evaluation.emplace(session, info, options.max_events);
     evaluation->add(events);
   };
@@ -217,6 +238,10 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
     }
   }
   evaluation->finish(std::move(result->trace.info));
+  if (kernel) {
+    session.kernel = kernel->stop(result->origin);
+    session.kernel->run = session.info.provenance;
+  }
   session.realtime_threads = realtime_threads;
   session.stopped = result->stopped;
   session.warnings = std::move(result->warnings);

@@ -18,6 +18,7 @@
 #include "redag/trace/flight_recorder.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/check_report.hpp"
+#include "redag_analysis/metrics/kernel_record.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_lab/run/variant.hpp"
@@ -42,6 +43,7 @@ struct SessionOptions {
   bool live = false;   // publishes a live page for `redag top`
   std::string flight;  // folder for a record of the run that outlives the process; empty: none
   std::uint64_t flight_bytes = trace::FlightOptions{}.most_bytes;
+  bool kernel = false;    // records the kernel's switches and interrupts; an error if it refuses
   Duration watchdog = 0;  // reports jobs that run for longer to `on_overdue` at once; 0: off
   std::function<void(const std::string &text)> on_overdue;
 };
@@ -51,15 +53,16 @@ using ProgressHook = std::function<void(Time now, const std::vector<std::uint64_
 
 struct Session {
   trace::RunInfo info;
-  metrics::Summary summary;           // of the whole run
-  trace::Trace trace;                 // its first events; all of them unless cut_at
-  std::optional<Time> cut_at;         // `max_events` was reached: `trace` is that of a run that ended here
-  metrics::CheckReport check;         // of `trace`
-  bool realtime_threads = false;      // the jobs ran on SCHED_FIFO threads
-  std::uint64_t events = 0;           // of the whole run
-  Duration elapsed = 0;               // wall-clock time of the run and its evaluation
-  bool stopped = false;               // ended by `stop`
-  std::vector<std::string> warnings;  // caveats for a reader of the figures
+  metrics::Summary summary;                     // of the whole run
+  trace::Trace trace;                           // its first events; all of them unless cut_at
+  std::optional<Time> cut_at;                   // `max_events` was reached: `trace` is that of a run that ended here
+  metrics::CheckReport check;                   // of `trace`
+  std::optional<metrics::KernelRecord> kernel;  // of SessionOptions::kernel
+  bool realtime_threads = false;                // the jobs ran on SCHED_FIFO threads
+  std::uint64_t events = 0;                     // of the whole run
+  Duration elapsed = 0;                         // wall-clock time of the run and its evaluation
+  bool stopped = false;                         // ended by `stop`
+  std::vector<std::string> warnings;            // caveats for a reader of the figures
 };
 
 /// Runs a session. `workload` must be valid. Error: resources that the machine refused.

@@ -158,6 +158,43 @@ await test('controls: each changes what it says', async () => {
   await close();
 });
 
+await test('why: the parts of a job sum to its time, and a click in the schedule explains that job', async () => {
+  for (const [name, options] of [['comparison', {}], ['comparison', {colorScheme: 'dark'}], ['comparison', {viewport: {width: 390, height: 844}}]]) {
+    const {page, problems, close} = await open(name, options);
+    if (name === 'comparison') await page.getByRole('button', {name: 'ste', exact: true}).click();
+    const panel = page.locator('p.job');
+    const numbers = async () => (await page.locator('p.job ~ .why tbody tr').evaluateAll((rows) => rows.map((row) => Number(row.cells[1].textContent.replace(/\D/g, '')))));
+    const parts = await numbers();
+    assert.ok(parts.length > 1);
+    assert.equal(parts.slice(0, -1).reduce((a, b) => a + b), parts.at(-1));
+    assert.match(await panel.innerText(), /missed|skipped|aborted/);
+    await page.locator('h2#why ~ div .table').first().scrollIntoViewIfNeeded();
+    const view = options.colorScheme || (options.viewport ? 'phone' : 'light');
+    await page.locator('h2#why').evaluate((node) => node.scrollIntoView());
+    await page.screenshot({path: shot(`why-${view}`)});
+    if (view !== 'phone') {
+      // Somewhere in the schedule there is a job, whose name the panel or the note then states.
+      await page.getByLabel('show', {exact: true}).selectOption({index: 1});
+      const figure = page.locator('figure[data-figure=schedule] .chart');
+      const {width} = await figure.boundingBox();
+      let named = '';
+      for (let x = 0.2; x < 0.95 && named === ''; x += 0.02) {
+        await figure.hover({position: {x: width * x, y: 55}});
+        await page.waitForTimeout(20);
+        const tips = await page.locator('.tip:visible b').allInnerTexts();
+        if (tips.length === 0) continue;
+        await figure.click({position: {x: width * x, y: 55}});
+        named = tips[0].replace(' ', '');
+      }
+      assert.notEqual(named, '', 'a job is under the pointer');
+      const said = await page.locator('h2#why ~ div').allInnerTexts();
+      assert.ok(said.some((text) => text.includes(named)), named);
+    }
+    none(problems);
+    await close();
+  }
+});
+
 await test('experiment: each choice changes its figures', async () => {
   const {page, problems, close} = await open('experiment');
   const markup = (name) => drawing(page, name);

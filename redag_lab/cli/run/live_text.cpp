@@ -198,6 +198,7 @@ std::vector<std::string> head_of(const live::Listed &listed, const Frame &frame,
                          : total.misses > 0      ? Tint::Caution
                                                  : Tint::Good,
                          terminal.colour));
+  if (!frame.alert.empty()) lines.push_back(tinted(fitting(frame.alert), Tint::Bad, terminal.colour));
   if (const auto late = overdue(frame, now)) {
     lines.push_back(tinted(fitting(fmt::format("no update for {}: the process is stopped, or gets no processor",
                                                humanize_duration(*late))),
@@ -298,6 +299,7 @@ Json to_json(const live::Listed &listed, const live::Page &page, Time now) {
                    {"window_ns", frame.window},
                    {"page_cpu_ns", frame.publisher_cpu},
                    {"left_out", frame.left_out},
+                   {"alert", frame.alert.empty() ? Json(nullptr) : Json(frame.alert)},
                    {"dags", Json::array()},
                    {"tasks", Json::array()}};
   for (const DagFrame &dag : frame.dags) {

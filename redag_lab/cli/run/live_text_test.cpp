@@ -13,6 +13,7 @@
 namespace redag::cli {
 namespace {
 
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
@@ -123,6 +124,17 @@ TEST(LiveText, Tints) {
   EXPECT_THAT(text.rows[4], HasSubstr("\033[31m  plan"));
   EXPECT_THAT(text.rows[1], HasSubstr("\033[31m"));  // 3 ms and 4 ms, above the bound of 2 ms
   EXPECT_THAT(text.rows[1], Not(HasSubstr("\033[31m  sense")));
+}
+
+TEST(LiveText, ShowsWhatStopsTheExecutor) {
+  live::Listed listed = make_listed();
+  const std::string alert = "deadlock: /planner timer waits for /planner client /map";
+  EXPECT_THAT(text_of(listed, {}).head, Not(Contains(HasSubstr("deadlock"))));
+  EXPECT_EQ(to_json(listed, *listed.page, 21 * kSecond)["alert"], nullptr);
+  listed.page->frame.alert = alert;
+  EXPECT_THAT(text_of(listed, {}).head, Contains(alert));
+  EXPECT_THAT(text_of(listed, {}, StreamTraits{true, true, 0}).head, Contains(HasSubstr("\033[31m" + alert)));
+  EXPECT_EQ(to_json(listed, *listed.page, 21 * kSecond)["alert"], alert);
 }
 
 TEST(LiveText, SaysThatNobodyWrites) {

@@ -42,6 +42,7 @@ struct RunArguments {
   bool live = false;
   bool json = false;
   std::string folder;
+  bool kernel = false;
   bool flight = false;  // records the run in `folder` while it runs
   std::uint32_t flight_mib = static_cast<std::uint32_t>(trace::FlightOptions{}.most_bytes >> 20U);
   bool force = false;

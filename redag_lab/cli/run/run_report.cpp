@@ -253,6 +253,7 @@ Diagnostics write_session(const lab::Session &session, const std::string &folder
                                metrics::fold_jobs(trace.info.workload, trace.events)));
   keep(metrics::write_perfetto(folder + "/trace.json", trace));
   keep(trace::write_trace(folder + "/events.jsonl", trace));
+  if (session.kernel) keep(metrics::write_kernel_record(folder + "/kernel.jsonl", *session.kernel));
   return problems;
 }
 

@@ -75,9 +75,9 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
     console.note(problems);
     written = problems.empty();
     const std::string message = fmt::format(
-        "wrote {}/: summary.json, jobs.csv, events.jsonl, trace.json\n"
+        "wrote {}/: summary.json, jobs.csv, events.jsonl, trace.json{}\n"
         "(open trace.json in https://ui.perfetto.dev)\n",
-        arguments.folder);
+        arguments.folder, session->kernel ? ", kernel.jsonl" : "");
     if (written && arguments.json) console.note(message);
     if (written && !arguments.json) console.print(message);
   }

@@ -5,7 +5,7 @@
 
 const report = JSON.parse(document.getElementById('data').textContent);
 const {groups} = report;
-const state = {executor: 0, task: null, tail: false, log: false, view: 0, rows: 'tasks', unfolded: false};
+const state = {executor: 0, task: null, tail: false, log: false, view: 0, rows: 'tasks', unfolded: false, why: 0, unexplained: null};
 const several = groups.length > 1;
 
 function header() {
@@ -61,7 +61,8 @@ function detailSections() {
   const responses = responseFigure(groups, state);
   const lateness = latenessFigure(groups, state);
   const timeline = timelineFigure(groups, state);
-  const schedule = scheduleFigure(groups, state);
+  const why = whySection(groups, state);
+  const schedule = scheduleFigure(groups, state, why.show);
   const redraw = () => { responses.draw(); lateness.draw(); };
 
   const pick = several ? [element('div.row.executors', {}, element('span.soft', {}, 'Details of'),
@@ -76,6 +77,7 @@ function detailSections() {
       redraw();
       timeline.draw();
       schedule.look();
+      why.refill();
     }))] : [];
 
   return [
@@ -98,6 +100,7 @@ function detailSections() {
       choice(['linear time', 'logarithmic'], 0, (i) => { state.log = i === 1; responses.draw(); })),
     responses.box,
     element('h3', {}, 'Lateness'), lateness.box,
+    ...why.nodes,
     element('h2', {id: 'schedule'}, 'Schedule'), timeline.box,
     element('h3', {}, 'Schedule in detail'),
     element('div.row.controls', {},

@@ -10,7 +10,8 @@ const ROW_HEIGHT = 30;
 const MOST_ROWS = 64;
 const ROOM_FOR_ARROWS = 9;  // pixels from release to deadline; with fewer, only misses are marked
 
-function scheduleFigure(groups, state) {
+/** `explain(task, number, missed)` is called for a job that the reader clicks on. */
+function scheduleFigure(groups, state, explain) {
   let zoom = null;   // the visible range, kept when the theme changes
 
   // Returns the jobs and slices of the chosen window as rows for ECharts. Times are in ns since the start of the run.
@@ -68,7 +69,7 @@ function scheduleFigure(groups, state) {
   const fig = figure({
     name: 'schedule', height: 300, canvas: true, label: 'Schedule',
     caption: 'Drag to move; zoom with Ctrl and the wheel, or with two fingers. Colour: DAG; \u2191 release; \u2193 deadline; red: missed deadline; '
-      + `\u00d7 lost job. A slice that ends with a notch was preempted. At most ${MOST_ROWS} rows are shown, those with misses first.`,
+      + `\u00d7 lost job. A slice that ends with a notch was preempted. A click explains a job. At most ${MOST_ROWS} rows are shown, those with misses first.`,
     build(t) {
       const c = contents();
       const inTasks = state.rows === 'tasks';
@@ -166,6 +167,11 @@ function scheduleFigure(groups, state) {
       };
     },
     onready(chart) {
+      chart.on('click', ({value, seriesName}) => {
+        const {jobs, slices} = contents();
+        const j = seriesName === 'jobs' ? value[3] : slices.job[value[3]];
+        if (j !== null && j !== undefined) explain(jobs.task[j], jobs.number[j], jobs.missed[j] === 1);
+      });
       chart.on('datazoom', () => {
         const {startValue, endValue} = chart.getOption().dataZoom[0];
         zoom = [startValue, endValue];

@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Why time passed for a job: the vocabulary of explanations (why.hpp). Plain values.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "redag/base/ids.hpp"
+#include "redag/base/time.hpp"
+
+namespace redag::metrics {
+
+enum class Cause : std::uint8_t {
+  // Before it was ready
+  ReleaseLate,  // its release was seen after the nominal instant
+  HandOver,     // its data was there, and the executor had not passed it on
+  Sampling,     // its data was there, and its next release had not come
+  Unreleased,   // a predecessor's job that it needs was not released yet
+  Predecessor,  // it waited for a predecessor's job, which executed
+  // Ready, and not started
+  OwnTask,    // an earlier job of its task was not over
+  MaxActive,  // its DAG had max_active jobs in progress
+  Group,      // another job held its exclusive group
+  NoThread,   // all threads had jobs in progress
+  Queued,     // the workers ran jobs that are not less urgent
+  Blocked,    // a worker ran a less urgent job
+  Demoted,    // it was demoted, and a job ran that it would outrank otherwise
+  // Started
+  Wakeup,        // its body had not begun
+  Execution,     // it executed, within its wcet
+  Overrun,       // it executed beyond its wcet
+  Overhead,      // simulated overheads
+  Preempted,     // it had lost its worker to another job
+  OffProcessor,  // it had a worker and did not execute; the trace does not tell why
+  OnWorker,      // it had a worker; the trace does not tell whether it executed
+  // With the kernel's record
+  OtherProgram,  // another program had the processor
+  OwnThread,     // another thread of its own process had it
+  Interrupt,     // the kernel served an interrupt there
+  Throttled,     // its thread is a real-time one, and the kernel gave the processor to an ordinary one
+  Slept,         // its body waited in the kernel
+  Unknown,
+};
+
+inline constexpr auto kLastCause = Cause::Unknown;
+
+struct JobId {
+  TaskId task;
+  std::uint32_t number = 0;
+
+  [[nodiscard]] bool valid() const { return task.valid(); }
+  friend auto operator<=>(const JobId &, const JobId &) = default;  // NOLINT(modernize-use-nullptr): a false alarm
+};
+
+/// A stretch of time and its cause.
+struct Part {
+  Cause cause = Cause::Unknown;
+  JobId job;            // that did not end: the explained job, or one whose data it waited for
+  JobId by;             // the job that caused it; invalid: none
+  std::string program;  // the thread or interrupt that caused it, of causes that the kernel recorded
+  Time begin = 0;       // kNever: only the length is known
+  Duration length = 0;
+
+  friend bool operator==(const Part &, const Part &) = default;
+};
+
+/// For example "queued".
+[[nodiscard]] const char *to_string(Cause cause);
+
+/// True for time in which the job, or on the way of its data a predecessor, did what the workload asks for.
+[[nodiscard]] constexpr bool is_work(Cause cause) { return cause == Cause::Execution; }
+
+}  // namespace redag::metrics

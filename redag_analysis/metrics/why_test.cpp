@@ -1,0 +1,308 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_analysis/metrics/why.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <map>
+#include <numeric>
+
+#include "redag/base/rng.hpp"
+#include "redag/model/demand.hpp"
+#include "redag_analysis/executors/executors.hpp"
+#include "redag_analysis/metrics/why_text.hpp"
+#include "redag_testing/builders.hpp"
+#include "redag_testing/random_workloads.hpp"
+#include "redag_testing/timeline.hpp"
+#include "redag_testing/trace_builder.hpp"
+
+namespace redag::metrics {
+namespace {
+
+using testing::between;
+using testing::chance;
+using testing::make_dag;
+using testing::make_workload;
+using testing::simulated;
+using testing::TraceBuilder;
+
+Duration sum_of(const Explanation &explanation) {
+  return std::accumulate(explanation.parts.begin(), explanation.parts.end(), Duration{0},
+                         [](Duration sum, const Part &part) { return sum + part.length; });
+}
+
+Duration time_of(const Explanation &explanation, std::initializer_list<Cause> causes, std::optional<JobId> job = {}) {
+  Duration sum = 0;
+  for (const Part &part : explanation.parts) {
+    const bool counts = std::find(causes.begin(), causes.end(), part.cause) != causes.end();
+    if (counts && (!job || part.job == *job)) sum += part.length;
+  }
+  return sum;
+}
+
+std::vector<Explanation> explain_all(const trace::Trace &trace, bool end_to_end = false) {
+  const Investigation investigation(trace);
+  std::vector<Subject> subjects;
+  for (std::size_t i = 0; i < investigation.jobs().size(); ++i) subjects.push_back({i, end_to_end});
+  return investigation.explain(subjects);
+}
+
+std::vector<Explanation> explain_misses(const trace::Trace &trace) {
+  const Investigation investigation(trace);
+  return investigation.explain(investigation.misses());
+}
+
+std::string to_text(const trace::Trace &trace, const Explanation &explanation) {
+  const Workload &workload = trace.info.workload;
+  const JobId job{explanation.job.task, explanation.job.number};
+  std::string text = headline(explanation, workload) + "\n";
+  for (const Part &part : explanation.parts) {
+    text += std::to_string(part.length) + " " + describe(part, workload, job) + "\n";
+  }
+  return text;
+}
+
+trace::RunInfo drawn(Rng &rng, std::uint64_t seed) {
+  trace::RunInfo info = testing::run_info(testing::contended(rng), "redag", seed);
+  if (info.config.preemption == sched::Preemption::Full) {
+    if (is_static(info.config.policy) && chance(rng, 0.5)) info.config.levels = between(rng, 1, 5);
+    if (chance(rng, 0.5)) info.config.max_started = info.config.workers + between(rng, 0, 2);
+  }
+  return info;
+}
+
+// The end of each job, read from the events themselves.
+std::map<JobId, Time> ends_in(const trace::Trace &trace) {
+  std::map<JobId, Time> ends;
+  for (const JobEvent &event : trace.events) {
+    if (event.kind == JobEventKind::Skipped) ends[{event.task, event.job}] = event.time;
+    if (event.kind == JobEventKind::Finished || event.kind == JobEventKind::Aborted)
+      ends[{event.task, event.job}] = event.value;
+  }
+  return ends;
+}
+
+// Of each job, the time of which decisions took its worker away.
+std::map<JobId, Duration> suspended_in(const trace::Trace &trace) {
+  std::map<JobId, Time> since;
+  std::map<JobId, Duration> total;
+  for (const JobEvent &event : trace.events) {
+    const JobId job{event.task, event.job};
+    if (event.kind == JobEventKind::Preempted) since[job] = event.time;
+    if (event.kind == JobEventKind::Resumed) total[job] += event.time - since[job];
+  }
+  return total;
+}
+
+void expect_sums(const trace::Trace &trace) {
+  const std::map<JobId, Time> ends = ends_in(trace);
+  for (const bool end_to_end : {false, true}) {
+    for (const Explanation &one : explain_all(trace, end_to_end)) {
+      const auto end = ends.find({one.job.task, one.job.number});
+      RC_ASSERT(one.end == (end == ends.end() ? std::max(trace.info.end, one.begin) : end->second));
+      RC_ASSERT(one.begin == (one.end_to_end ? one.job.origin : one.job.release));
+      RC_ASSERT(sum_of(one) == one.end - one.begin);
+      Time at = one.begin;
+      for (const Part &part : one.parts) {
+        RC_ASSERT(part.length > 0);
+        RC_ASSERT(part.begin == at);
+        at += part.length;
+      }
+    }
+  }
+}
+
+// Twenty schedules a seed: 2,000 schedules with the hundred seeds of a test run.
+constexpr std::uint64_t kSchedules = 20;
+
+RC_GTEST_PROP(Why, PartsSumExactlyToTheResponseAndTheEndToEndTime, ()) {
+  const auto seed = *rc::gen::arbitrary<std::uint64_t>();
+  for (std::uint64_t i = 0; i < kSchedules; ++i) {
+    Rng rng(kSchedules * seed + i);
+    expect_sums(simulated(drawn(rng, kSchedules * seed + i), 20 * kMillisecond));
+  }
+}
+
+RC_GTEST_PROP(Why, PartsSumExactlyForOtherExecutors, ()) {
+  const auto seed = *rc::gen::arbitrary<std::uint64_t>();
+  Rng rng(seed);
+  for (const executors::ExecutorKind &kind : executors::all()) {
+    trace::RunInfo info = testing::run_info(testing::contended(rng), std::string(kind.name), seed);
+    expect_sums(simulated(std::move(info), 20 * kMillisecond));
+  }
+}
+
+// Execution is compared with the demand that the simulator was given, and waiting with the events.
+RC_GTEST_PROP(Why, OfASimulationNothingIsUnknownAndExecutionIsTheDemand, ()) {
+  const auto seed = *rc::gen::arbitrary<std::uint64_t>();
+  for (std::uint64_t i = 0; i < kSchedules; ++i) {
+    Rng rng(kSchedules * seed + i);
+    const trace::Trace trace = simulated(drawn(rng, kSchedules * seed + i), 20 * kMillisecond);
+    for (const Explanation &one : explain_all(trace, true)) RC_ASSERT(time_of(one, {Cause::Unknown}) == 0);
+    const std::vector<TaskRef> tasks = flatten(trace.info.workload);
+    const std::map<JobId, Duration> suspended = suspended_in(trace);
+    for (const Explanation &one : explain_all(trace)) {
+      const JobId job{one.job.task, one.job.number};
+      RC_LOG() << to_text(trace, one);
+      RC_ASSERT(time_of(one, {Cause::Unknown, Cause::HandOver, Cause::Wakeup, Cause::OffProcessor, Cause::OnWorker}) ==
+                0);
+      if (one.job.outcome != JobOutcome::Finished) continue;
+      const Duration demand = execution_time(*tasks[job.task.value].task, job.task, job.number, trace.info.seed);
+      RC_ASSERT(time_of(one, {Cause::Execution}, job) == demand);
+      const Duration waiting = suspended.contains(job) ? suspended.at(job) : 0;
+      RC_ASSERT(one.length() - demand >= waiting);
+      RC_ASSERT(time_of(one, {Cause::Preempted}, job) <= waiting);
+    }
+  }
+}
+
+// A trace of any driver, with events missing, must not break the sums.
+RC_GTEST_PROP(Why, PartsSumExactlyForDamagedTraces, ()) {
+  const auto seed = *rc::gen::arbitrary<std::uint64_t>();
+  Rng rng(seed);
+  trace::Trace trace = simulated(drawn(rng, seed), 20 * kMillisecond);
+  std::erase_if(trace.events, [&](const JobEvent &) { return chance(rng, 0.1); });
+  trace.info.driver = static_cast<trace::Driver>(between(rng, 0, 3));
+  for (const bool end_to_end : {false, true}) {
+    for (const Explanation &one : explain_all(trace, end_to_end)) RC_ASSERT(sum_of(one) == one.length());
+  }
+}
+
+TEST(Why, FollowsTheDataBackToTheSource) {
+  // Two workers. "b" waits for "a", which is preempted by nothing but queued behind "urgent".
+  Workload workload = make_workload({make_dag("u", {{"urgent", 20, 3}, {"urgent2", 20, 3}}),
+                                     make_dag("d", {{"a", 100, 2}, {"b", 0, 1, {0}}, {"c", 0, 4, {1}}})},
+                                    2);
+  workload.dags[1].deadline = 5 * kMillisecond;
+  const trace::Trace trace = simulated(testing::run_info(workload), 90 * kMillisecond);
+  const std::vector<Explanation> all = explain_misses(trace);
+  ASSERT_EQ(all.size(), 1U);
+  EXPECT_EQ(to_text(trace, all[0]),
+            "d.c#0 missed the end-to-end deadline of 5ms by 5ms\n"
+            "3000000 d.a#0: queued behind u.urgent2#0 (50 Hz)\n"
+            "2000000 d.a#0: executed\n"
+            "1000000 d.b#0: executed\n"
+            "4000000 executed\n");
+}
+
+TEST(Why, OfAnAndJoinTheWayFollowsTheOldestDataAndTheWaitTheLastOne) {
+  Workload workload =
+      make_workload({make_dag("d", {{"old", 100, 1}, {"slow", 100, 8, {}, "", 2}, {"join", 0, 1, {0, 1}}})}, 2);
+  workload.dags[0].deadline = 5 * kMillisecond;
+  const trace::Trace trace = simulated(testing::run_info(workload), 90 * kMillisecond);
+  const std::vector<Explanation> all = explain_misses(trace);
+  ASSERT_EQ(all.size(), 1U);
+  EXPECT_EQ(to_text(trace, all[0]),
+            "d.join#0 missed the end-to-end deadline of 5ms by 6ms\n"
+            "1000000 d.old#0: executed\n"
+            "1000000 d.slow#0: was not released yet\n"
+            "8000000 waited for predecessor d.slow#0 (10 Hz)\n"
+            "1000000 executed\n");
+}
+
+TEST(Why, WithoutAMissThereAreTheJobsClosestToTheirDeadlines) {
+  const trace::Trace trace =
+      simulated(testing::run_info(make_workload({make_dag("d", {{"a", 10, 1}, {"b", 10, 2}})}, 1)), 50 * kMillisecond);
+  const Investigation investigation(trace);
+  EXPECT_TRUE(investigation.misses().empty());
+  const std::vector<Subject> closest = investigation.closest(3);
+  ASSERT_EQ(closest.size(), 2U);
+  EXPECT_EQ(to_text(trace, investigation.explain(closest)[0]),
+            "d.b#0 met its deadline of 10ms with 7ms to spare\n"
+            "1000000 queued behind d.a#0 (100 Hz)\n"
+            "2000000 executed\n");
+}
+
+// ---- what only threads show: a record of events by hand ----
+
+TraceBuilder on_threads() {
+  TraceBuilder builder(make_workload({make_dag("d", {{"a", 100, 2}, {"b", 0, 1, {0}}})}, 1));
+  builder.at(1).released_for("a", 0, 0).ready("a", 0, 0);
+  builder.at(2).dispatched("a", 0, 0, 100).at(3).started("a", 0, 0);
+  return builder;
+}
+
+trace::Trace threads_trace(TraceBuilder builder) {
+  trace::Trace trace = builder.until(90);
+  trace.info.driver = trace::Driver::Threads;
+  return trace;
+}
+
+TEST(Why, ThreadsShowLateReleasesWakeupsAndTimeWithoutExecution) {
+  const trace::Trace trace = threads_trace(
+      on_threads().at(13).executed("a", 0, 0, 5).finished("a", 0, 0).at(14).released_for("b", 0, 13).ready("b", 0, 0));
+  EXPECT_EQ(to_text(trace, explain_all(trace)[0]),
+            "d.a#0 met its deadline of 100ms with 87ms to spare\n"
+            "1000000 its release was seen late\n"
+            "1000000 unknown\n"
+            "1000000 its thread had not begun the body yet\n"
+            "2000000 executed\n"
+            "3000000 executed beyond its wcet of 2ms\n"
+            "5000000 had a worker and did not execute (the trace does not tell why)\n");
+  EXPECT_EQ(explain_all(trace)[1].parts.front().cause, Cause::HandOver);
+}
+
+TEST(Why, WithoutProcessorTimeItIsUnknownWhetherAJobExecuted) {
+  const trace::Trace trace = threads_trace(on_threads().at(13).finished("a", 0, 0));
+  EXPECT_EQ(time_of(explain_all(trace)[0], {Cause::OnWorker}), 10 * kMillisecond);
+}
+
+// The record of job d.a#0 on thread 10: preempted by thread 77 from 5 to 7 ms, an interrupt at 8 ms, asleep from 10
+// to 11.
+KernelRecord kernel_record(int priority = 50) {
+  KernelRecord record;
+  const auto at = [](Time ms) { return ms * kMillisecond; };
+  record.jobs = {{TaskId(0), 0, 10}};
+  record.names = {{10, "redag-0"}, {11, "redag-timer"}, {77, "stress-77"}};
+  record.own = {10, 11};
+  record.switches = {{at(-5), 0, 0, false, 77, 120}, {at(1) - 500'000, 0, 77, true, 11, 48},
+                     {at(1), 0, 11, false, 77, 120}, {at(2) + 500'000, 0, 77, true, 10, priority},
+                     {at(5), 0, 10, true, 77, 120},  {at(7), 0, 77, true, 10, priority},
+                     {at(10), 0, 10, false, 0, 120}, {at(11), 0, 0, false, 10, priority},
+                     {at(20), 0, 10, false, 0, 120}};
+  record.interrupts = {{at(8), at(8) + 1000, 0, "eth0"}};
+  return record;
+}
+
+TEST(Why, TheKernelsRecordNamesTheOtherProgram) {
+  const trace::Trace trace = threads_trace(on_threads().at(13).executed("a", 0, 0, 5).finished("a", 0, 0));
+  const auto text = [&](const KernelRecord &record) {
+    const Investigation investigation(trace, &record);
+    const Explanation one = investigation.explain(std::vector<Subject>{{0, false}})[0];
+    EXPECT_EQ(sum_of(one), 13 * kMillisecond);
+    return to_text(trace, one);
+  };
+  EXPECT_EQ(text(kernel_record(120)),
+            "d.a#0 met its deadline of 100ms with 87ms to spare\n"
+            "1000000 its release was seen late\n"
+            "1000000 unknown\n"
+            "500000 another program had the processor: stress-77\n"
+            "500000 its thread had not begun the body yet\n"
+            "2000000 executed\n"
+            "2000000 another program had the processor: stress-77\n"
+            "1000000 executed beyond its wcet of 2ms\n"
+            "1000 the kernel served an interrupt: eth0\n"
+            "1999000 executed beyond its wcet of 2ms\n"
+            "1000000 its body waited in the kernel\n"
+            "2000000 executed beyond its wcet of 2ms\n");
+  EXPECT_NE(text(kernel_record(50)).find("2000000 real-time threads were throttled; stress-77 had the processor\n"),
+            std::string::npos);
+}
+
+TEST(Why, SumsHoldWithAnyRecordOfTheKernel) {
+  const trace::Trace trace = threads_trace(on_threads().at(13).executed("a", 0, 0, 5).finished("a", 0, 0));
+  Rng rng(7);
+  for (int i = 0; i < 1000; ++i) {
+    KernelRecord record = kernel_record();
+    std::erase_if(record.switches, [&](const KernelSwitch &) { return chance(rng, 0.4); });
+    for (KernelSwitch &one : record.switches) one.runnable = chance(rng, 0.5);
+    const Investigation investigation(trace, &record);
+    const Explanation one = investigation.explain(std::vector<Subject>{{0, false}})[0];
+    ASSERT_EQ(sum_of(one), 13 * kMillisecond) << to_text(trace, one);
+  }
+}
+
+}  // namespace
+}  // namespace redag::metrics

@@ -1,0 +1,122 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_analysis/metrics/why_text.hpp"
+
+#include <fmt/format.h>
+
+#include "redag/trace/trace.hpp"
+
+namespace redag::metrics {
+namespace {
+
+// Returns " (10 Hz)", or an empty text for a task without a period.
+std::string rate_of(const Workload &workload, TaskId task) {
+  const std::vector<TaskRef> refs = flatten(workload);
+  if (task.value >= refs.size() || refs[task.value].task->period == 0) return {};
+  return fmt::format(" ({:.4g} Hz)", static_cast<double>(kSecond) / static_cast<double>(refs[task.value].task->period));
+}
+
+const Task *task_of(const Workload &workload, TaskId task) {
+  const std::vector<TaskRef> refs = flatten(workload);
+  return task.value < refs.size() ? refs[task.value].task : nullptr;
+}
+
+// `by` is the culprit with its rate, `own` the job that did not end, with its name only if it is not the explained one.
+std::string words(Cause cause, const std::string &by, const std::string &program) {
+  switch (cause) {
+    case Cause::ReleaseLate: return "its release was seen late";
+    case Cause::HandOver: return "its data was there and not yet passed on";
+    case Cause::Sampling: return "its data waited for its next release";
+    case Cause::Unreleased: return "was not released yet";
+    case Cause::Predecessor:
+      return by.empty() ? "waited for data of its predecessors" : fmt::format("waited for predecessor {}", by);
+    case Cause::OwnTask: return fmt::format("waited for an earlier job of its task, {}", by);
+    case Cause::MaxActive: return fmt::format("max_active used by {}", by);
+    case Cause::Group: return fmt::format("group held by {}", by);
+    case Cause::NoThread: return fmt::format("no thread was free; {} held one", by);
+    case Cause::Queued: return fmt::format("queued behind {}", by);
+    case Cause::Blocked: return fmt::format("blocked by {}, less urgent", by);
+    case Cause::Demoted: return fmt::format("demoted, behind {}", by);
+    case Cause::Wakeup: return "its thread had not begun the body yet";
+    case Cause::Execution: return "executed";
+    case Cause::Overrun: return "executed beyond its wcet";
+    case Cause::Overhead: return "simulated overheads";
+    case Cause::Preempted: return fmt::format("preempted; {} ran", by);
+    case Cause::OffProcessor: return "had a worker and did not execute (the trace does not tell why)";
+    case Cause::OnWorker: return "had a worker (the trace does not tell whether it executed)";
+    case Cause::OtherProgram: return fmt::format("another program had the processor: {}", program);
+    case Cause::OwnThread: return fmt::format("another thread of this program had the processor: {}", program);
+    case Cause::Interrupt: return fmt::format("the kernel served an interrupt: {}", program);
+    case Cause::Throttled: return fmt::format("real-time threads were throttled; {} had the processor", program);
+    case Cause::Slept: return "its body waited in the kernel";
+    case Cause::Unknown: break;
+  }
+  return "unknown";
+}
+
+}  // namespace
+
+std::string job_name(const Workload &workload, const JobId &job) {
+  return fmt::format("{}#{}", trace::task_name(workload, job.task), job.number);
+}
+
+std::string describe(const Part &part, const Workload &workload, const JobId &explained) {
+  const std::string by = part.by.valid() ? job_name(workload, part.by) + rate_of(workload, part.by.task) : "";
+  std::string text = words(part.cause, by, part.program);
+  if (part.cause == Cause::Overrun) {
+    if (const Task *task = task_of(workload, part.job.task)) {
+      text += fmt::format(" of {}", format_duration(task->wcet));
+    }
+  }
+  const bool names_it = part.cause == Cause::Predecessor && part.by == part.job;
+  if (part.job == explained || names_it) return text;
+  return fmt::format("{}: {}", job_name(workload, part.job), text);
+}
+
+std::string describe(const Culprit &culprit, const Workload &workload) {
+  const std::string name = culprit.task.valid() ? trace::task_name(workload, culprit.task) : "";
+  const std::string text = words(culprit.cause, name, culprit.program);
+  switch (culprit.cause) {
+    case Cause::Unreleased:
+    case Cause::Execution:
+    case Cause::Overrun:
+    case Cause::Overhead:
+    case Cause::OffProcessor:
+    case Cause::OnWorker:
+    case Cause::Slept:
+    case Cause::Wakeup: return name + ": " + text;
+    default: return text;
+  }
+}
+
+std::string headline(const Explanation &explanation, const Workload &workload) {
+  const JobRecord &job = explanation.job;
+  const std::string name = job_name(workload, {job.task, job.number});
+  const Duration deadline = job.deadline - job.release;
+  const Duration end_to_end = workload.dags[flatten(workload)[job.task.value].dag.value].deadline;
+  if (job.outcome == JobOutcome::Skipped || job.outcome == JobOutcome::Aborted) {
+    return fmt::format("{} was {} ({}) {} after its release", name, to_string(job.outcome), to_string(job.reason),
+                       humanize_duration(explanation.end - job.release));
+  }
+  const char *progress = job.outcome == JobOutcome::InFlight ? ", still in flight at the end of the run" : "";
+  if (explanation.end_to_end) {
+    if (end_to_end == 0) {
+      return fmt::format("{} answered {} after its data began{}", name, humanize_duration(explanation.length()),
+                         progress);
+    }
+    const Duration late = explanation.length() - end_to_end;
+    return fmt::format("{} {} the end-to-end deadline of {} {} {}{}", name, late > 0 ? "missed" : "met",
+                       humanize_duration(end_to_end), late > 0 ? "by" : "with",
+                       humanize_duration(late > 0 ? late : -late) + (late > 0 ? "" : " to spare"), progress);
+  }
+  const Duration late = explanation.length() - deadline;
+  if (late > 0) {
+    return fmt::format("{} missed its deadline of {} by {}{}", name, humanize_duration(deadline),
+                       humanize_duration(late), progress);
+  }
+  return fmt::format("{} met its deadline of {} with {} to spare{}", name, humanize_duration(deadline),
+                     humanize_duration(-late), progress);
+}
+
+}  // namespace redag::metrics

@@ -1,0 +1,26 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Explanations (why.hpp) in words, for the terminal and the report. Pure functions.
+#pragma once
+
+#include <string>
+
+#include "redag/model/workload.hpp"
+#include "redag_analysis/metrics/why.hpp"
+
+namespace redag::metrics {
+
+/// For example "control.ekf#12".
+[[nodiscard]] std::string job_name(const Workload &workload, const JobId &job);
+
+/// For example "queued behind perception.detect#3 (10 Hz)". Says whose time it was if not that of `explained`.
+[[nodiscard]] std::string describe(const Part &part, const Workload &workload, const JobId &explained);
+
+/// For example "queued behind perception.detect".
+[[nodiscard]] std::string describe(const Culprit &culprit, const Workload &workload);
+
+/// For example "control.ekf#12 missed its deadline of 5ms by 1.2ms".
+[[nodiscard]] std::string headline(const Explanation &explanation, const Workload &workload);
+
+}  // namespace redag::metrics

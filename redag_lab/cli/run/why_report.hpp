@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Presents explanations (redag_analysis/metrics/why.hpp) on the terminal and as JSON. Pure.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "redag_analysis/metrics/why.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
+
+namespace redag::cli {
+
+/// The explanations of a whole run: of its misses, or without any of the jobs closest to their deadlines.
+struct WhyOverview {
+  std::vector<metrics::Explanation> explanations;  // the worst first
+  std::size_t misses = 0;                          // in all; not all need to be explained
+  std::size_t jobs = 0;                            // released, those of the warm-up left out
+};
+
+/// Returns one job's parts, a line each, and what they sum to.
+[[nodiscard]] std::string describe(const metrics::Explanation &explanation, const trace::RunInfo &run,
+                                   const StreamTraits &terminal);
+
+/// Returns the causes of a whole run and a table of its misses, of which `most` rows are shown (0: all).
+[[nodiscard]] std::string describe(const WhyOverview &overview, const trace::RunInfo &run, const StreamTraits &terminal,
+                                   std::size_t most);
+
+/// Returns the document "redag.why/1" (docs/results_format.md).
+[[nodiscard]] Json to_json(const WhyOverview &overview, const trace::RunInfo &run);
+
+}  // namespace redag::cli

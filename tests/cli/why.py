@@ -1,0 +1,145 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tests `redag why`: its screens and JSON, mistakes, and with `run --kernel` a real program that takes the processor.
+
+Usage: why.py PROGRAM SOURCE_DIR. Uses the standard library only.
+"""
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+from program import SOURCE, Case, in_terminal, main, redag
+
+# Takes processor CPU at a high real-time priority for 6 ms of every 50 ms, until it is killed.
+HOG = """\
+import ctypes, os, sys, time
+os.sched_setaffinity(0, {int(sys.argv[1])})
+os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(90))
+ctypes.CDLL(None).prctl(15, b"the-hog", 0, 0, 0)
+print("ready", flush=True)
+while True:
+    end = time.monotonic() + 0.006
+    while time.monotonic() < end:
+        pass
+    time.sleep(0.044)
+"""
+PID = """\
+name: pid
+platform: {workers: 1, preemption: none}
+dags:
+  - name: control
+    tasks: [{name: pid, wcet: 1ms, period: 10ms, deadline: 5ms}]
+"""
+
+
+class Why(Case):
+    def simulated(self, *arguments, file="robot.yaml"):
+        folder = self.folder / "result"
+        self.expect(redag("simulate", SOURCE / "workloads" / file, "--duration", "2s", "--out", folder, *arguments), 0)
+        return folder
+
+    def test_the_page_shows_what_the_program_says(self):
+        """Each block of docs/why.md that follows a command is the output of this command."""
+        page = (SOURCE / "docs" / "why.md").read_text(encoding="utf-8")
+        (self.folder / "workloads").symlink_to(SOURCE / "workloads")
+        ran = 0
+        for block in re.findall(r"(?s)```console\n(.*?)```", page):
+            command, _, shown = block.partition("\n")
+            words = command.removeprefix("$ redag ").split()
+            if "run" in words:
+                continue  # other on every machine
+            result = self.expect(redag(*words, cwd=self.folder), 0)
+            if words[0] == "why":
+                self.assertEqual(result.stdout, shown)
+                ran += 1
+        self.assertGreaterEqual(ran, 2)
+
+    def test_parts_sum_to_the_response(self):
+        folder = self.simulated("--preemption", "none")
+        document = self.document(redag("why", folder, "--json"), "redag.why/1")
+        self.assertGreater(document["misses"], 5)
+        self.assertEqual(len(document["jobs"]), document["misses"])
+        rows = {(row["dag"] + "." + row["task"] + "#" + row["job"]): row for row in self.jobs(folder)}
+        for job in document["jobs"]:
+            self.assertEqual(sum(part["length_ns"] for part in job["parts"]), job["length_ns"])
+            row = rows[job["job"]]
+            begin = row["origin_ns"] if job["end_to_end"] else row["release_ns"]
+            self.assertEqual(job["length_ns"], int(row["finish_ns"]) - int(begin))
+        self.assertEqual(sum(cause["main"] for cause in document["causes"]),
+                         sum(1 for job in document["jobs"] if job["parts"]))
+
+    @staticmethod
+    def jobs(folder):
+        head, *lines = (folder / "jobs.csv").read_text().splitlines()
+        return [dict(zip(head.split(","), line.split(","))) for line in lines]
+
+    def test_screens_fit_the_terminal(self):
+        folder = self.simulated("--preemption", "none")
+        for arguments in [[], ["control.controller"], ["control.imu", "--end-to-end"]]:
+            for columns in 80, 120:
+                status, text = in_terminal("why", folder, *arguments, columns=columns, NO_COLOR="1")
+                self.assertEqual(status, 0, text)
+                long = [line for line in text.splitlines() if len(line) > columns and str(folder) not in line]
+                self.assertEqual(long, [])
+
+    def test_without_a_miss(self):
+        folder = self.simulated(file="contention.yaml")
+        text = self.expect(redag("why", folder), 0).stdout
+        self.assertIn("no deadline was missed; the jobs that came closest", text)
+        self.assertIn("met its deadline", self.expect(redag("why", folder, "planning.plan"), 0).stdout)
+
+    def test_mistakes(self):
+        folder = self.simulated()
+        self.expect(redag("why", self.folder / "none"), 2, "no such file or folder")
+        self.expect(redag("why", folder, "control.contoller"), 2, "did you mean 'control.controller'?")
+        self.expect(redag("why", folder, "control.controller#9999"), 2, "its jobs are 0 to")
+        self.expect(redag("why", folder, "control.controller#x"), 2, "has no job 'x'")
+        self.expect(redag("why", folder, "control.controller", "--all"), 2, "--all")
+        (folder / "kernel.jsonl").write_text("nonsense\n")
+        self.expect(redag("why", folder), 2, "kernel.jsonl:1", "not a kernel's record")
+        (folder / "kernel.jsonl").unlink()
+        self.expect(redag("compare", SOURCE / "workloads" / "robot.yaml", "--simulate", "--duration", "1s", "--out",
+                          self.folder / "many"), 0)
+        self.expect(redag("why", self.folder / "many"), 2, "runs", "name one of them")
+
+    def test_the_kernels_record_names_the_other_program(self):
+        cpu = max(os.sched_getaffinity(0))
+        run = ["run", self.write("pid.yaml", PID), "--duration", "1s", "--affinity", str(cpu), "--kernel", "--out",
+               self.folder / "result"]
+        if not re.search(r" tracefs ", pathlib.Path("/proc/self/mounts").read_text()):
+            self.expect(redag(*run), 2, "there is no tracefs", "mount -t tracefs")
+            self.skipTest("no tracefs is mounted")
+        with subprocess.Popen([sys.executable, "-c", HOG, str(cpu)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as hog:
+            try:
+                if hog.stdout.readline() != b"ready\n":
+                    self.skipTest("this process may not use SCHED_FIFO")
+                result = redag(*run)
+            finally:
+                hog.kill()
+        if "does not record for this process" in result.stderr:
+            self.expect(result, 2, "run as root")
+            self.skipTest("this process may not use tracefs")
+        self.expect(result, 0)
+        document = self.document(redag("why", self.folder / "result", "--json"), "redag.why/1")
+        for job in document["jobs"]:
+            self.assertEqual(sum(part["length_ns"] for part in job["parts"]), job["length_ns"])
+        named = [cause for cause in document["causes"] if (cause["program"] or "").startswith("the-hog-")]
+        self.assertEqual([cause["cause"] for cause in named], ["other_program"], document["causes"])
+        self.assertGreater(named[0]["jobs"], 0)
+        # A record of another run is not used.
+        events = self.folder / "result" / "events.jsonl"
+        first, rest = events.read_text().split("\n", 1)
+        header = json.loads(first)
+        header["run" if "provenance" not in header else "provenance"]["command"] = "another"
+        events.write_text(json.dumps(header) + "\n" + rest)
+        text = self.expect(redag("why", self.folder / "result"), 0).stdout
+        self.assertNotIn("the-hog", text)
+
+
+if __name__ == "__main__":
+    main()
