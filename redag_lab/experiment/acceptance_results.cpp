@@ -79,8 +79,7 @@ AcceptanceCounter::AcceptanceCounter(const Acceptance &acceptance) : acceptance_
 
 Result<void> AcceptanceCounter::add(std::uint64_t unit, const std::string &result) {
   if (unit >= results_.units || !acceptance_.is_result(result)) {
-    return make_error(fmt::format("the plan has no unit {} with result '{}'", unit, result),
-                      "units.csv is damaged: delete this line, and the unit is run again");
+    return make_error(fmt::format("the plan has no unit {} with result '{}'", unit, result), kDamagedUnit);
   }
   AcceptanceRow &row = results_.rows[unit % results_.rows.size()];
   ++row.sets;
@@ -92,7 +91,10 @@ Result<void> AcceptanceCounter::add(std::uint64_t unit, const std::string &resul
     if (result[m] == kNotApplicable) ++cell.not_applicable;
   }
   if (std::vector<std::string> broken = acceptance_.broken_by(result); !broken.empty()) {
-    results_.violations.push_back(Violation{unit, result, std::move(broken)});
+    // In order of unit, whatever the order in which they arrive.
+    const auto at = std::lower_bound(results_.violations.begin(), results_.violations.end(), unit,
+                                     [](const Violation &there, std::uint64_t number) { return there.unit < number; });
+    results_.violations.insert(at, Violation{unit, result, std::move(broken)});
   }
   return {};
 }

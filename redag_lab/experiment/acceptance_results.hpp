@@ -11,8 +11,9 @@
 
 #include "redag/base/result.hpp"
 #include "redag_lab/experiment/acceptance.hpp"
-#include "redag_lab/experiment/journal.hpp"
+#include "redag_lab/experiment/finished_unit.hpp"
 #include "redag_lab/experiment/proportion.hpp"
+#include "redag_lab/experiment/unit_store.hpp"
 
 namespace redag::experiment {
 

@@ -30,13 +30,14 @@ Json levels_json(const Factorial &factorial, const FactorialPoint &point) {
 }
 
 Json row_json(const Factorial &factorial, const FactorialResults &results, const FactorialRow &row) {
-  Json json = {{"factors", levels_json(factorial, factorial.points()[row.point])}, {"repetitions", row.runs.size()}};
-  if (row.runs.empty()) return json;
+  Json json = {{"factors", levels_json(factorial, factorial.points()[row.point])},
+               {"repetitions", row.repetition.size()}};
+  if (row.repetition.empty()) return json;
   std::set<std::string> worlds;
   std::set<std::string> modes;
   std::uint64_t violations = 0;
   bool enforced = true;
-  for (const Observation &run : row.runs) {
+  for (const Observation &run : row.runs()) {
     worlds.insert(run.world);
     modes.insert(run.preemption);
     violations += run.violations;
@@ -47,8 +48,8 @@ Json row_json(const Factorial &factorial, const FactorialResults &results, const
   json["violations"] = violations;
   json["all_enforced"] = enforced;
   json["dags"] = Json::array();
-  for (std::size_t dag = 0; dag < row.runs.front().dags.size(); ++dag) {
-    Json metrics = {{"dag", row.runs.front().dags[dag].dag},
+  for (std::size_t dag = 0; dag < row.runs().front().dags.size(); ++dag) {
+    Json metrics = {{"dag", row.runs().front().dags[dag].dag},
                     {"released", sum_over_runs(row, dag, Measure::Released)},
                     {"missed", sum_over_runs(row, dag, Measure::Missed)}};
     for (std::size_t m = 0; m < kMetricCount; ++m) {
@@ -120,9 +121,11 @@ std::string to_json(const Factorial &factorial, const FactorialResults &results,
 }
 
 Result<void> write_results(const std::string &folder, const Factorial &factorial, const FactorialResults &results) {
-  std::vector<std::pair<std::string, std::string>> files = {
+  const auto create = [&folder](const char *name) {
+    return trace::OutputFile::create(fmt::format("{}/{}", folder, name));
+  };
+  std::vector<std::pair<const char *, std::string>> files = {
       {"factorial.csv", to_csv(factorial, results)},
-      {"observations.csv", observations_csv(factorial, results)},
       {"factorial.json", to_json(factorial, results, read_runs({folder}))},
       {"factorial.svg", to_svg(factorial, results)}};
   if (factorial.plan().quantiles) {
@@ -133,12 +136,15 @@ Result<void> write_results(const std::string &folder, const Factorial &factorial
     files.emplace_back("distance.svg", std::move(*distance));
   }
   for (const auto &[name, text] : files) {
-    Result<trace::OutputFile> file = trace::OutputFile::create(fmt::format("{}/{}", folder, name));
+    Result<trace::OutputFile> file = create(name);
     if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));
     file->write(text);
     if (Result<void> done = file->commit(); !done) return done;
   }
-  return {};
+  Result<trace::OutputFile> observations = create("observations.csv");
+  if (!observations) return tl::unexpected<Diagnostics>(std::move(observations.error()));
+  observations_csv(factorial, results, [&observations](std::string_view text) { observations->write(text); });
+  return observations->commit();
 }
 
 }  // namespace redag::experiment

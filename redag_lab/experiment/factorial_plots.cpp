@@ -64,8 +64,9 @@ LinePlot::Panel panel_of(const Factorial &factorial, const FactorialResults &res
         const FactorialPoint &point = factorial.points()[row.point];
         const std::uint32_t here = point.of(factor.kind);
         // A factor without effect on the executor gives a flat line.
-        if (point.of(FactorKind::Executor) != e || (here != level && here != kNoLevel) || row.runs.empty()) continue;
-        medians.push_back(*over_runs(factorial, results, row, row.runs.front().dags.size() - 1, Metric::MissRatio));
+        if (point.of(FactorKind::Executor) != e || (here != level && here != kNoLevel) || row.repetition.empty())
+          continue;
+        medians.push_back(*over_runs(factorial, results, row, row.runs().front().dags.size() - 1, Metric::MissRatio));
       }
       if (medians.empty()) continue;
       LinePlot::Value value = mean_at(medians);
@@ -95,7 +96,7 @@ std::vector<LinePlot::Value> answered(const FactorialRow &row, std::size_t dag) 
   for (std::size_t q = 0; q < kQuantiles.size(); ++q) {
     std::vector<double> times;
     std::vector<double> shares;
-    for (const Observation &run : row.runs) {
+    for (const Observation &run : row.runs()) {
       const DagObservation &seen = run.dags[dag];
       if (seen.quantiles.empty()) continue;
       times.push_back(static_cast<double>(seen.quantiles[q]) / kMillisecond);
@@ -157,8 +158,8 @@ std::optional<std::string> distance_svg(const Factorial &factorial, const Factor
                [](const std::string &executor) { return executor != kIdeal && executor != kUnlimited; });
   double largest = 0;
   for (const FactorialRow &row : results.rows) {
-    if (row.runs.empty()) continue;
-    const std::size_t total = row.runs.front().dags.size() - 1;
+    if (row.repetition.empty()) continue;
+    const std::size_t total = row.runs().front().dags.size() - 1;
     const std::optional<Median> distance = over_runs(factorial, results, row, total, Metric::ExcessMissRatio);
     if (!distance) continue;
     const FactorialPoint &point = factorial.points()[row.point];
@@ -192,12 +193,13 @@ std::string responses_svg(const Factorial &factorial, const FactorialResults &re
   plot.lines = plan.executors;
   for (const FactorialRow &row : results.rows) {
     const FactorialPoint &point = factorial.points()[row.point];
-    if (row.runs.empty()) continue;
+    if (row.repetition.empty()) continue;
     // Each DAG has a panel for each combination of the factors other than the executor.
     FactorialPoint place = point;
     place.level.back() = kNoLevel;
-    for (std::size_t dag = 0; dag + 1 < row.runs.front().dags.size(); ++dag) {
-      const std::string title = fmt::format("{}: {}", describe(plan, place).substr(9), row.runs.front().dags[dag].dag);
+    for (std::size_t dag = 0; dag + 1 < row.runs().front().dags.size(); ++dag) {
+      const std::string title =
+          fmt::format("{}: {}", describe(plan, place).substr(9), row.runs().front().dags[dag].dag);
       if (LinePlot::Panel *panel = panel_named(plot, title); panel != nullptr) {
         panel->series[point.of(FactorKind::Executor)] = answered(row, dag);
       }

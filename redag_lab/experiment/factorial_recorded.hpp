@@ -11,8 +11,8 @@
 #include "redag/base/result.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_lab/experiment/factorial_plan.hpp"
-#include "redag_lab/experiment/journal.hpp"
 #include "redag_lab/experiment/observation.hpp"
+#include "redag_lab/experiment/unit_store.hpp"
 
 namespace redag::experiment {
 

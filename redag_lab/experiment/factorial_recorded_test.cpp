@@ -92,11 +92,11 @@ TEST(Recorded, RunsStandBesideTheSimulators) {
     const FactorialPoint &point = factorial.points()[row.point];
     const bool is_recorded = all->plan.executors[point.of(FactorKind::Executor)] == "ros2/mte";
     const bool is_double = point.of(FactorKind::DemandScale) == 1;
-    ASSERT_EQ(row.runs.size(), is_recorded && !is_double ? 0U : 2U);
-    if (row.runs.empty()) continue;
-    EXPECT_EQ(row.runs[0].world, is_recorded ? "ros_nodes" : "simulator");
+    ASSERT_EQ(row.repetition.size(), is_recorded && !is_double ? 0U : 2U);
+    if (row.repetition.empty()) continue;
+    EXPECT_EQ(row.runs()[0].world, is_recorded ? "ros_nodes" : "simulator");
     if (is_recorded) {
-      EXPECT_EQ(row.runs[0].workers, 3U) << "not the threads";
+      EXPECT_EQ(row.runs()[0].workers, 3U) << "not the threads";
     }
     EXPECT_TRUE(over_runs(factorial, counter.results(), row, 0, Metric::ExcessMissRatio).has_value());
   }
@@ -111,7 +111,7 @@ TEST(Recorded, RunsWithOtherJobsHaveNoDistanceToTheIdeal) {
   for (const FinishedUnit &unit : all->units) ASSERT_TRUE(counter.add(unit.unit, unit.result));
   bool found = false;
   for (const FactorialRow &row : counter.results().rows) {
-    if (row.runs.empty() || row.runs[0].world != "ros_nodes") continue;
+    if (row.repetition.empty() || row.runs()[0].world != "ros_nodes") continue;
     found = true;
     EXPECT_TRUE(over_runs(factorial, counter.results(), row, 0, Metric::MissRatio).has_value());
     EXPECT_FALSE(over_runs(factorial, counter.results(), row, 0, Metric::ExcessMissRatio).has_value());

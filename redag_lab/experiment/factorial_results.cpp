@@ -63,7 +63,7 @@ Duration counted_of(const Factorial &factorial) { return factorial.plan().durati
 const Observation *run_of(const FactorialRow &row, std::uint64_t repetition) {
   const auto at = std::lower_bound(row.repetition.begin(), row.repetition.end(), repetition);
   if (at == row.repetition.end() || *at != repetition) return nullptr;
-  return &row.runs[static_cast<std::size_t>(at - row.repetition.begin())];
+  return &row.runs()[static_cast<std::size_t>(at - row.repetition.begin())];
 }
 
 }  // namespace
@@ -94,25 +94,28 @@ bool is_maximum(Metric metric) {
 }
 
 FactorialCounter::FactorialCounter(const Factorial &factorial) : factorial_(factorial) {
-  for (std::size_t p = 0; p < factorial.points().size(); ++p) results_.rows.push_back(FactorialRow{p, {}, {}});
+  const auto log = std::make_shared<ObservationLog>();
+  for (std::size_t p = 0; p < factorial.points().size(); ++p) results_.rows.push_back(FactorialRow{p, {}, {}, log});
   results_.units = factorial.unit_count();
 }
 
 Result<void> FactorialCounter::add(std::uint64_t unit, const std::string &result) {
-  Result<Observation> seen =
+  const Result<Observation> seen =
       unit < results_.units ? parse_observation(result) : Result<Observation>(make_error("the plan has no such unit"));
   if (!seen) {
-    return make_error(fmt::format("unit {}: {}", unit, seen.error().front().message),
-                      "units.csv is damaged: delete this line, and the unit is run again");
+    return make_error(fmt::format("unit {}: {}", unit, seen.error().front().message), kDamagedUnit);
   }
   FactorialRow &row = results_.rows[factorial_.point_of(unit)];
+  const Result<ObservationLog::Place> place = row.log->add(result);
+  if (!place) return tl::unexpected<Diagnostics>(place.error());
+  row.log->forget(row.point);
   const std::uint64_t repetition = factorial_.repetition_of(unit);
   results_.violations += seen->violations;
   results_.checks += seen->check_count;
   if (!seen->enforced) ++results_.unenforced;
   ++results_.done;
   const auto at = std::lower_bound(row.repetition.begin(), row.repetition.end(), repetition);
-  row.runs.insert(row.runs.begin() + (at - row.repetition.begin()), std::move(*seen));
+  row.places.insert(row.places.begin() + (at - row.repetition.begin()), *place);
   row.repetition.insert(at, repetition);
   return {};
 }
@@ -120,17 +123,18 @@ Result<void> FactorialCounter::add(std::uint64_t unit, const std::string &result
 std::optional<Median> over_runs(const Factorial &factorial, const FactorialResults &results, const FactorialRow &row,
                                 std::size_t dag, Metric metric) {
   std::vector<double> values;
+  const std::vector<Observation> &runs = row.runs();
   const std::optional<std::size_t> ideal =
       metric == Metric::ExcessMissRatio ? factorial.ideal_of(row.point) : std::nullopt;
   if (metric == Metric::ExcessMissRatio && !ideal) return std::nullopt;
   const Duration counted = counted_of(factorial);
-  for (std::size_t r = 0; r < row.runs.size(); ++r) {
-    const std::optional<double> value = value_of(row.runs[r].dags[dag], metric, counted);
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const std::optional<double> value = value_of(runs[r].dags[dag], metric, counted);
     if (!value) continue;
     double above = 0;
     if (ideal) {
       const Observation *best = run_of(results.rows[*ideal], row.repetition[r]);
-      if (best == nullptr || best->seed != row.runs[r].seed) continue;  // recorded runs can have other jobs
+      if (best == nullptr || best->seed != runs[r].seed) continue;  // recorded runs can have other jobs
       above = *value_of(best->dags[dag], metric, counted);
     }
     values.push_back(*value - above);
@@ -143,7 +147,7 @@ std::optional<Median> over_runs(const Factorial &factorial, const FactorialResul
 
 std::uint64_t sum_over_runs(const FactorialRow &row, std::size_t dag, Measure measure) {
   std::uint64_t sum = 0;
-  for (const Observation &run : row.runs) sum += static_cast<std::uint64_t>(run.dags[dag].of(measure));
+  for (const Observation &run : row.runs()) sum += static_cast<std::uint64_t>(run.dags[dag].of(measure));
   return sum;
 }
 
@@ -176,7 +180,7 @@ std::vector<FactorialEffects> effects_of(const Factorial &factorial, const Facto
       for (const FactorialRow *row : rows) {
         EffectCell cell;
         for (const FactorKind kind : one.factors) cell.level.push_back(factorial.points()[row->point].of(kind));
-        for (const Observation &run : row->runs)
+        for (const Observation &run : row->runs())
           cell.results.push_back(*value_of(run.dags.back(), Metric::MissRatio, counted_of(factorial)));
         cells.push_back(std::move(cell));
       }
@@ -220,11 +224,11 @@ std::string to_csv(const Factorial &factorial, const FactorialResults &results) 
   }
   text += "\n";
   for (const FactorialRow &row : results.rows) {
-    if (row.runs.empty()) continue;
-    const Observation &first = row.runs.front();
+    if (row.repetition.empty()) continue;
+    const Observation &first = row.runs().front();
     for (std::size_t dag = 0; dag < first.dags.size(); ++dag) {
       text += fmt::format("{}{},{},{},{}", factor_cells(factorial, row.point), first.world, first.preemption,
-                          first.dags[dag].dag, row.runs.size());
+                          first.dags[dag].dag, row.repetition.size());
       const std::optional<Median> any = over_runs(factorial, results, row, dag, Metric::MissRatio);
       text += fmt::format(",{:.4g}", any->confidence);
       for (std::size_t m = 0; m < kMetricCount; ++m) {
@@ -243,13 +247,17 @@ std::string to_csv(const Factorial &factorial, const FactorialResults &results) 
   return text;
 }
 
-std::string observations_csv(const Factorial &factorial, const FactorialResults &results) {
+void observations_csv(const Factorial &factorial, const FactorialResults &results,
+                      const std::function<void(std::string_view)> &write) {
   std::string text = factor_columns() + "repetition,seed,world,preemption,worker_count,violations,enforced,dag";
   for (std::size_t m = 0; m < kMeasureCount; ++m) text += fmt::format(",{}", to_string(static_cast<Measure>(m)));
   text += "\n";
   for (const FactorialRow &row : results.rows) {
-    for (std::size_t r = 0; r < row.runs.size(); ++r) {
-      const Observation &run = row.runs[r];
+    write(text);
+    text.clear();
+    const std::vector<Observation> &runs = row.runs();
+    for (std::size_t r = 0; r < runs.size(); ++r) {
+      const Observation &run = runs[r];
       for (const DagObservation &dag : run.dags) {
         text +=
             fmt::format("{}{},{},{},{},{},{},{},{}", factor_cells(factorial, row.point), row.repetition[r], run.seed,
@@ -261,21 +269,21 @@ std::string observations_csv(const Factorial &factorial, const FactorialResults 
       }
     }
   }
-  return text;
+  write(text);
 }
 
 std::string quantiles_csv(const Factorial &factorial, const FactorialResults &results) {
   std::string text = factor_columns() + "dag,percent,response_ns\n";
   for (const FactorialRow &row : results.rows) {
-    if (row.runs.empty()) continue;
-    for (std::size_t dag = 0; dag < row.runs.front().dags.size(); ++dag) {
+    if (row.repetition.empty()) continue;
+    for (std::size_t dag = 0; dag < row.runs().front().dags.size(); ++dag) {
       for (std::size_t q = 0; q < kQuantiles.size(); ++q) {
         std::vector<double> values;
-        for (const Observation &run : row.runs) {
+        for (const Observation &run : row.runs()) {
           if (!run.dags[dag].quantiles.empty()) values.push_back(static_cast<double>(run.dags[dag].quantiles[q]));
         }
         if (values.empty()) continue;
-        text += fmt::format("{}{},{},{:.0f}\n", factor_cells(factorial, row.point), row.runs.front().dags[dag].dag,
+        text += fmt::format("{}{},{},{:.0f}\n", factor_cells(factorial, row.point), row.runs().front().dags[dag].dag,
                             kQuantiles[q], experiment::median_of(std::move(values)).median);
       }
     }

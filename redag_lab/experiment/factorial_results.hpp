@@ -6,15 +6,20 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "redag/base/result.hpp"
 #include "redag_lab/experiment/effects.hpp"
 #include "redag_lab/experiment/factorial.hpp"
+#include "redag_lab/experiment/finished_unit.hpp"
 #include "redag_lab/experiment/median.hpp"
 #include "redag_lab/experiment/observation.hpp"
+#include "redag_lab/experiment/observation_log.hpp"
 
 namespace redag::experiment {
 
@@ -48,8 +53,12 @@ inline constexpr std::size_t kMetricCount = 18;
 
 struct FactorialRow {
   std::size_t point = 0;
-  std::vector<Observation> runs;          // finished runs
-  std::vector<std::uint64_t> repetition;  // of each run
+  std::vector<std::uint64_t> repetition;      // of each finished run, in order
+  std::vector<ObservationLog::Place> places;  // of each
+  std::shared_ptr<ObservationLog> log;
+
+  /// Returns the finished runs. They stay valid until four other rows are read.
+  [[nodiscard]] const std::vector<Observation> &runs() const { return log->read(point, places); }
 };
 
 /// How the miss ratio of one executor on one workload depends on the factors.
@@ -96,10 +105,11 @@ class FactorialCounter {
 /// Returns the effects for every workload and executor with factors that vary; empty while runs are missing.
 [[nodiscard]] std::vector<FactorialEffects> effects_of(const Factorial &factorial, const FactorialResults &results);
 
-/// Each returns one CSV file: a row per point and DAG; a row per run and DAG; a row per point, DAG and quantile. The
-/// same units give the same bytes.
+/// Each gives one CSV file: a row per point and DAG; a row per run and DAG, in pieces; a row per point, DAG and
+/// quantile. The same units give the same bytes.
 [[nodiscard]] std::string to_csv(const Factorial &factorial, const FactorialResults &results);
-[[nodiscard]] std::string observations_csv(const Factorial &factorial, const FactorialResults &results);
+void observations_csv(const Factorial &factorial, const FactorialResults &results,
+                      const std::function<void(std::string_view)> &write);
 [[nodiscard]] std::string quantiles_csv(const Factorial &factorial, const FactorialResults &results);
 /// `runs` holds JSON texts (folder.hpp).
 [[nodiscard]] std::string to_json(const Factorial &factorial, const FactorialResults &results,

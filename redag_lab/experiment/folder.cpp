@@ -4,14 +4,19 @@
 #include "redag_lab/experiment/folder.hpp"
 
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <iterator>
+#include <memory>
+#include <optional>
+#include <queue>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -32,7 +37,7 @@ using Json = nlohmann::ordered_json;
 using trace::file_error;
 
 std::string plan_file(const std::string &folder) { return folder + "/plan.yaml"; }
-std::string units_file(const std::string &folder) { return folder + "/units.csv"; }
+std::string units_file(const std::string &folder) { return folder + "/units.db"; }
 std::string runs_file(const std::string &folder) { return folder + "/runs.jsonl"; }
 
 // Identifies the origin of the units: the plan, by its FNV-1a hash, and the version of the code.
@@ -74,17 +79,38 @@ Json stamp(const char *event) {
   return Json{{"event", event}, {"utc", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now))}};
 }
 
+// Returns the job as Slurm's commands name it, such as "17_3" for task 3 of an array; empty elsewhere.
+std::string slurm_job() {
+  const char *array = std::getenv("SLURM_ARRAY_JOB_ID");
+  const char *task = std::getenv("SLURM_ARRAY_TASK_ID");
+  if (array != nullptr && task != nullptr) return fmt::format("{}_{}", array, task);
+  const char *job = std::getenv("SLURM_JOB_ID");
+  return job == nullptr ? "" : job;
+}
+
+// Raises the limit on open files, which is lower than some numbers of shards, as far as the system lets a process.
+void allow_open_files() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  ::setrlimit(RLIMIT_NOFILE, &limit);
+}
+
 }  // namespace
 
-Result<Journal> open_folder(const std::string &folder, const std::string &plan) {
+Result<void> expect_plan_of(const std::string &folder, const std::string &plan) {
   const std::string file = plan_file(folder);
-  if (std::filesystem::exists(file)) {
-    const Result<std::string> there = trace::read_file(file);
-    if (!there) return tl::unexpected<Diagnostics>(there.error());
-    if (Result<void> same = expect_plan(file, *there, plan); !same) {
-      return tl::unexpected<Diagnostics>(std::move(same.error()));
-    }
-  } else {
+  if (!std::filesystem::exists(file)) return {};
+  const Result<std::string> there = trace::read_file(file);
+  if (!there) return tl::unexpected<Diagnostics>(there.error());
+  return expect_plan(file, *there, plan);
+}
+
+Result<UnitStore> open_folder(const std::string &folder, const std::string &plan) {
+  if (Result<void> same = expect_plan_of(folder, plan); !same) {
+    return tl::unexpected<Diagnostics>(std::move(same.error()));
+  }
+  if (const std::string file = plan_file(folder); !std::filesystem::exists(file)) {
     Result<trace::OutputFile> output = trace::OutputFile::create(file);
     if (!output) return tl::unexpected<Diagnostics>(std::move(output.error()));
     output->write(plan);
@@ -92,9 +118,14 @@ Result<Journal> open_folder(const std::string &folder, const std::string &plan) 
       return tl::unexpected<Diagnostics>(std::move(written.error()));
     }
   }
-  Result<Journal> journal = Journal::open(units_file(folder), subject(plan));
-  if (journal) sync_folder(folder);
-  return journal;
+  const std::string units = units_file(folder);
+  const std::string former = folder + "/units.csv";
+  if (!std::filesystem::exists(units) && std::filesystem::exists(former)) {
+    return file_error(former, 0, "holds results of an earlier version of redag", "choose another folder");
+  }
+  Result<UnitStore> store = UnitStore::open(units, subject(plan));
+  if (store) sync_folder(folder);
+  return store;
 }
 
 Result<std::string> read_plan(const std::string &folder) {
@@ -103,22 +134,47 @@ Result<std::string> read_plan(const std::string &folder) {
   return plan;
 }
 
-Result<std::vector<FinishedUnit>> read_folders(const std::vector<std::string> &folders, const std::string &plan) {
-  std::vector<FinishedUnit> all;
-  for (const std::string &folder : folders) {
+Result<void> visit_units(const std::vector<std::string> &folders, const std::string &plan, const Accept &accept) {
+  struct Source {
+    std::string file;
+    UnitStore store;
+    UnitCursor cursor;
+  };
+  std::vector<std::unique_ptr<Source>> sources;
+  const auto later = [](const Source *a, const Source *b) { return a->cursor.unit().unit > b->cursor.unit().unit; };
+  std::priority_queue<Source *, std::vector<Source *>, decltype(later)> queue(later);
+  const auto advance = [&queue](Source *source) -> Result<void> {
+    const Result<bool> more = source->cursor.next();
+    if (!more) return tl::unexpected<Diagnostics>(more.error());
+    if (*more) queue.push(source);
+    return {};
+  };
+  allow_open_files();
+  for (const std::string &folder : std::set<std::string>(folders.begin(), folders.end())) {
     const Result<std::string> there = read_plan(folder);
     if (!there) return tl::unexpected<Diagnostics>(there.error());
-    if (Result<void> same = expect_plan(plan_file(folder), *there, plan); !same) {
-      return tl::unexpected<Diagnostics>(std::move(same.error()));
+    if (Result<void> same = expect_plan(plan_file(folder), *there, plan); !same) return same;
+    Result<UnitStore> store = UnitStore::read(units_file(folder), subject(plan));
+    if (!store) return tl::unexpected<Diagnostics>(std::move(store.error()));
+    Result<UnitCursor> cursor = store->units();
+    if (!cursor) return tl::unexpected<Diagnostics>(std::move(cursor.error()));
+    sources.push_back(std::make_unique<Source>(Source{units_file(folder), std::move(*store), std::move(*cursor)}));
+    if (Result<void> begun = advance(sources.back().get()); !begun) return begun;
+  }
+  std::optional<FinishedUnit> last;
+  while (!queue.empty()) {
+    Source *source = queue.top();
+    queue.pop();
+    const FinishedUnit &unit = source->cursor.unit();
+    if (last && last->unit == unit.unit) {
+      if (last->result != unit.result) return two_results(source->file, unit.unit, last->result, unit.result);
+    } else {
+      if (Result<void> accepted = accept(unit.unit, unit.result); !accepted) return accepted;
+      last = unit;
     }
-    Result<std::vector<FinishedUnit>> units = read_journal(units_file(folder), subject(plan));
-    if (!units) return units;
-    all.insert(all.end(), std::make_move_iterator(units->begin()), std::make_move_iterator(units->end()));
+    if (Result<void> moved = advance(source); !moved) return moved;
   }
-  if (Result<void> united = sort_and_unite(all, fmt::format("{}", fmt::join(folders, ", "))); !united) {
-    return tl::unexpected<Diagnostics>(std::move(united.error()));
-  }
-  return all;
+  return {};
 }
 
 Result<void> log_run(const std::string &folder, const RunBegin &run) {
@@ -127,8 +183,10 @@ Result<void> log_run(const std::string &folder, const RunBegin &run) {
   json["provenance"] = Json::parse(provenance_to_json(current_provenance()));
   json["version"] = kVersion;
   json["machine"] = {{"cpus", machine.cpus}, {"kernel", machine.kernel}, {"model", machine.model}};
+  if (const std::string job = slurm_job(); !job.empty()) json["slurm_job"] = job;
   json["shard"] = to_string(run.shard);
   json["jobs"] = run.jobs;
+  json["ranks"] = run.ranks;
   json["units"] = run.units;
   return add_runs(folder, {json.dump(-1, ' ', false, Json::error_handler_t::replace)});
 }

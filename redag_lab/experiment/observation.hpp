@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The figures kept of one run of the experiment "factorial", by DAG and in total. Plain values with a text form of one
-// line, for the journal.
+// line, for units.db.
 #pragma once
 
 #include <array>

@@ -24,22 +24,27 @@ constexpr std::size_t kItemsPerJob = 64;
 
 }  // namespace
 
-Result<std::uint64_t> run_units(std::span<const std::uint64_t> units, const RunnerOptions &options,
-                                const Evaluate &evaluate, const Accept &accept) {
+NextUnit units_of(std::vector<std::uint64_t> units) {
+  return [units = std::move(units), next = std::size_t{0}]() mutable -> std::optional<std::uint64_t> {
+    if (next == units.size()) return std::nullopt;
+    return units[next++];
+  };
+}
+
+Result<std::uint64_t> run_units(const NextUnit &next, const RunnerOptions &options, const Evaluate &evaluate,
+                                const Accept &accept) {
   namespace tbb = oneapi::tbb;
   const std::uint32_t jobs = std::max<std::uint32_t>(1, options.jobs);
-  std::size_t next = 0;             // used by the first stage only
   std::uint64_t accepted = 0;       // used by the last stage only
   Diagnostics failure;              // used by the last stage only
   std::atomic<bool> failed{false};  // tells the first stage to stop
 
   const auto feed = [&](tbb::flow_control &control) -> std::uint64_t {
     const bool stopped = options.stop != nullptr && options.stop->load(std::memory_order_relaxed);
-    if (next == units.size() || stopped || failed.load(std::memory_order_relaxed)) {
-      control.stop();
-      return 0;
-    }
-    return units[next++];
+    const bool ends = stopped || failed.load(std::memory_order_relaxed);
+    const std::optional<std::uint64_t> unit = ends ? std::nullopt : next();
+    if (!unit) control.stop();
+    return unit.value_or(0);
   };
   const auto work = [&](std::uint64_t unit) { return Item{unit, evaluate(unit)}; };
   const auto hand_over = [&](Item item) {

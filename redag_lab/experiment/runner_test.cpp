@@ -28,7 +28,7 @@ Result<std::string> slow_at_first(std::uint64_t unit) {
 TEST(Runner, HandsOverInOrderForAnyNumberOfJobs) {
   for (const std::uint32_t jobs : {1U, 2U, 5U}) {
     std::vector<std::uint64_t> seen;
-    const auto done = run_units(first(300), {jobs, nullptr}, slow_at_first,
+    const auto done = run_units(units_of(first(300)), {jobs, nullptr}, slow_at_first,
                                 [&](std::uint64_t unit, const std::string &result) -> Result<void> {
                                   EXPECT_EQ(result, std::to_string(unit * unit));
                                   seen.push_back(unit);
@@ -49,18 +49,19 @@ TEST(Runner, EvaluatesOnSeveralThreads) {
     if (inside >= 2) met = true;
     return "";
   };
-  EXPECT_TRUE(run_units(first(2), {2, nullptr}, meet, [](auto, const auto &) { return Result<void>{}; }));
+  EXPECT_TRUE(run_units(units_of(first(2)), {2, nullptr}, meet, [](auto, const auto &) { return Result<void>{}; }));
   EXPECT_TRUE(met);
 }
 
 TEST(Runner, StopKeepsAPrefix) {
   std::atomic<bool> stop{false};
   std::uint64_t accepted = 0;
-  const auto done = run_units(first(100'000), {2, &stop}, slow_at_first, [&](std::uint64_t unit, const std::string &) {
-    EXPECT_EQ(unit, accepted++);
-    if (unit == 10) stop = true;
-    return Result<void>{};
-  });
+  const auto done =
+      run_units(units_of(first(100'000)), {2, &stop}, slow_at_first, [&](std::uint64_t unit, const std::string &) {
+        EXPECT_EQ(unit, accepted++);
+        if (unit == 10) stop = true;
+        return Result<void>{};
+      });
   ASSERT_TRUE(done);
   EXPECT_EQ(*done, accepted);
   EXPECT_GT(*done, 10U);
@@ -70,7 +71,7 @@ TEST(Runner, StopKeepsAPrefix) {
 TEST(Runner, FirstErrorInOrderEndsIt) {
   std::uint64_t accepted = 0;
   const auto done = run_units(
-      first(1000), {3, nullptr},
+      units_of(first(1000)), {3, nullptr},
       [](std::uint64_t unit) -> Result<std::string> {
         if (unit >= 50 && unit % 2 == 0) return make_error("unit " + std::to_string(unit));
         return "";
@@ -85,7 +86,7 @@ TEST(Runner, FirstErrorInOrderEndsIt) {
 }
 
 TEST(Runner, WhatCannotBeKeptEndsIt) {
-  const auto done = run_units(first(1000), {2, nullptr}, slow_at_first,
+  const auto done = run_units(units_of(first(1000)), {2, nullptr}, slow_at_first,
                               [](std::uint64_t, const std::string &) -> Result<void> { return make_error("full"); });
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().size(), 1U);

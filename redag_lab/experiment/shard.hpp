@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -24,5 +25,11 @@ struct Shard {
 /// Parses "2/4". Error: another form, or not 1 <= i <= n.
 [[nodiscard]] Result<Shard> parse_shard(std::string_view text);
 [[nodiscard]] std::string to_string(const Shard &shard);
+
+/// Looks up a variable of the environment; null if it is not set, as std::getenv().
+using Variables = std::function<const char *(const char *name)>;
+/// Returns the share of this process among those that a scheduler started: a task of a Slurm array, a task of srun,
+/// both together, or a rank of mpirun. Error: none of them, or an array with gaps, whose tasks cannot tell their place.
+[[nodiscard]] Result<Shard> shard_of_environment(const Variables &variable);
 
 }  // namespace redag::experiment

@@ -6,16 +6,19 @@
 
 Usage: experiments.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
+import contextlib
 import csv
 import json
+import os
 import re
 import signal
+import sqlite3
 import subprocess
-import time
 import unittest
 import xml.etree.ElementTree
 
-from program import CART, PROGRAM, SANITIZED, SOURCE, Case, in_terminal, interrupt, main, redag
+from program import CART, PROGRAM, SANITIZED, SOURCE, Case, in_terminal, interrupt, main, redag, units,\
+    wait_for_units
 
 PLAN = """\
 experiment: factorial
@@ -31,17 +34,19 @@ executors: [ideal, redag, redag-none, mte, ste]
 
 
 def start(case, folder, *arguments):
-    """Starts an experiment that takes some seconds. Returns it once it has more units on file than before."""
-    units = folder / "units.csv"
-    lines = units.read_text().count("\n") if units.exists() else 2
+    """Starts an experiment that takes some seconds. Returns it once it has written units."""
+    runs = folder / "runs.jsonl"
+    begins = runs.read_text().count('"event":"begin"') if runs.exists() else 0
     process = subprocess.Popen([PROGRAM, "experiment", *map(str, arguments), "--out", folder],
                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 60
-    while not units.exists() or units.read_text().count("\n") <= lines:
-        case.assertIsNone(process.poll(), "it ended before it could be disturbed")
-        case.assertLess(time.monotonic(), deadline)
-        time.sleep(0.01)
+    wait_for_units(case, process, folder, begins + 1)
     return process
+
+
+def change_units(folder, statement, *values):
+    with contextlib.closing(sqlite3.connect(folder / "units.db")) as database:
+        database.execute(statement, values)
+        database.commit()
 
 
 class Acceptance(Case):
@@ -52,7 +57,8 @@ class Acceptance(Case):
         return self.expect(redag("experiment", "acceptance", *self.PLAN, "--out", self.folder / name, *arguments), status)
 
     def results(self, name):
-        return [(self.folder / name / file).read_text() for file in ("acceptance.csv", "units.csv", "acceptance.svg")]
+        texts = [(self.folder / name / file).read_text() for file in ("acceptance.csv", "acceptance.svg")]
+        return [texts[0], units(self.folder / name), texts[1]]
 
     def start(self, name, *arguments):
         return start(self, self.folder / name, "acceptance", *self.PLAN, *arguments)
@@ -98,8 +104,6 @@ class Acceptance(Case):
             process = self.start("killed", *size)
             process.kill()
             process.communicate()
-        with open(self.folder / "killed" / "units.csv", "a") as units:
-            units.write("319,0")  # the kill came in the middle of a line
         result = self.acceptance("killed", *size)
         self.assertRegex(result.stderr, r"\d+ of 320 workloads are done already")
         self.acceptance("whole", *size[:-1], "-j2")
@@ -120,8 +124,27 @@ class Acceptance(Case):
         self.assertIn("workloads are done", out)
         document = json.loads((self.folder / "stopped" / "acceptance.json").read_text())
         self.assertFalse(document["complete"])
-        self.assertEqual(document["done"], self.results("stopped")[1].count("\n") - 2)
+        self.assertEqual(document["done"], len(self.results("stopped")[1]))
         self.assertTrue(document["runs"][-1]["interrupted"])
+
+    def test_report(self):
+        """The page counts the units of the folder, also those of a run that was killed and wrote no results."""
+        self.acceptance("first", "--sets", "4", "--shard", "1/2")
+        self.acceptance("second", "--sets", "4", "--shard", "2/2")
+        self.expect(redag("experiment", "merge", self.folder / "first", self.folder / "second", "-o",
+                          self.folder / "merged"), 0)
+        for file in ("acceptance.csv", "acceptance.json"):
+            (self.folder / "merged" / file).unlink()
+        result = self.expect(redag("report", self.folder / "merged"), 0)
+        self.assertIn("acceptance: 32 of 32 workloads, 0 violations", result.stdout)
+        page = (self.folder / "merged" / "report.html").read_text()
+        for words in ("<title>acceptance - ReDAG-RT report</title>", "<svg", "<td>1/2</td>", "<td>2/2</td>"):
+            self.assertIn(words, page)
+        document = self.document(redag("report", self.folder / "merged", "--json"), "redag.experiment.acceptance/1")
+        self.assertEqual((document["done"], len(document["points"])), (32, 8))
+        self.expect(redag("report", self.folder / "merged", self.folder / "first"), 2, "name this folder alone")
+        (self.folder / "merged" / "units.db").write_text("")
+        self.expect(redag("report", self.folder / "merged"), 2, "units.db")
 
     def test_another_plan_is_refused(self):
         self.acceptance("done", "--sets", "2")
@@ -149,12 +172,8 @@ class Acceptance(Case):
     def test_violation_is_an_error_with_a_replay(self):
         """A miss is changed to look as if a bound had accepted the workload."""
         self.acceptance("forged", "--sets", "2")
-        units = self.folder / "forged" / "units.csv"
-        lines = units.read_text().splitlines()
-        forged = next(i for i, line in enumerate(lines) if i > 1 and line.split(",")[1][:2] == "00")
-        lines[forged] = lines[forged].replace(",00", ",10")
-        units.write_text("\n".join(lines) + "\n")
-        number = lines[forged].split(",")[0]
+        number, missed = next(row for row in units(self.folder / "forged") if row[1].startswith("00"))
+        change_units(self.folder / "forged", "UPDATE units SET result = ? WHERE unit = ?", "1" + missed[1:], number)
         result = self.acceptance("forged", "--sets", "2", status=1)
         self.assertIn(f"error: unit {number} (6 DAGs, 2 workers, ", result.stderr)
         self.assertIn("misses a deadline in simulation, although it is accepted by any", result.stderr)
@@ -166,6 +185,7 @@ class Acceptance(Case):
         bad = self.write("bad.yaml", "experiment: acceptance\nworkers: two\nmethods: [gaun]\n")
         self.expect(redag("experiment", "acceptance", bad), 2, "bad.yaml:2:10: error: workers must be a whole number")
         for arguments, words in [(["--methods", "gaun"], "did you mean 'guan'?"), (["--shard", "3/2"], "--shard: '3/2'"),
+                                 (["--shard", "auto"], "--shard: 'auto' is the share of a task of Slurm"),
                                  (["--utilization", "1:0:1"], "--utilization: '1:0:1'"), (["--sets", "0"], "--sets: '0' is not a whole number from 1"),
                                  (["--workers", "0"], "--workers: '0'"), (["--dags", "2"], "2 DAGs, 4 workers"),
                                  (["--preemption", "auto"], "choose none or os"), (["--set", "1"], "--sets"),
@@ -176,15 +196,68 @@ class Acceptance(Case):
         self.expect(redag("experiment", "acceptance", *self.PLAN, "--out", self.folder), 2, "is not a result of redag")
         damaged = self.folder / "damaged"
         self.acceptance("damaged", "--sets", "1")
-        with open(damaged / "units.csv", "a") as units:
-            units.write("x,110\n")
-        self.assertIn("units.csv:11:1: error: this line is not a finished unit", self.acceptance("damaged", "--sets", "1",
-                                                                                   status=2).stderr)
+        change_units(damaged, "UPDATE units SET result = 'x' WHERE unit = 2")
+        self.assertIn("the plan has no unit 2 with result 'x'", self.acceptance("damaged", "--sets", "1", status=2).stderr)
+        (damaged / "units.db").write_text("unit,result\n" * 50)
+        self.assertIn("units.db: error: is damaged or no database", self.acceptance("damaged", "--sets", "1",
+                                                                                    status=2).stderr)
+        (damaged / "units.db").rename(damaged / "units.csv")
+        self.assertIn("units.csv: error: holds results of an earlier version", self.acceptance(
+            "damaged", "--sets", "1", "--force", status=2).stderr)
 
     def test_progress_on_a_terminal(self):
         status, text = in_terminal("experiment", "acceptance", *self.PLAN, "--sets", "300", columns=100)
         self.assertEqual(status, 0, text)
         self.assertRegex(text, r"\d+ %  [\d ]+ of 2 400, \d+/s, \S+ left")
+
+
+class Jobs(Case):
+    """`redag experiment cost` and `submit`, with a substitute for sbatch. slurm.py has the real one."""
+    def setUp(self):
+        super().setUp()
+        self.plan = self.write("plan.yaml", "# What is asked.\nexperiment: acceptance\nname: small\nsets: 10\n"
+                               "utilization: [0.2, 0.5]\ndags: 4\nworkers: 2\npreemption: none\n")
+
+    def submit(self, plan, *options, status=0, sbatch="echo 17"):
+        script = self.write("sbatch", f"#!/bin/sh\necho \"$@\" >>{self.folder}/calls\n{sbatch}\n")
+        script.chmod(0o755)
+        environment = os.environ | {"PATH": f"{self.folder}:{os.environ['PATH']}"}
+        return self.expect(redag("experiment", "submit", plan, "--out", self.folder / "jobs", *options, env=environment),
+                           status)
+
+    def test_cost(self):
+        result = self.expect(redag("experiment", "cost", self.plan), 0)
+        self.assertRegex(result.stdout, r"^20 workloads, \S+ each \(\+- \S+; 20 of them measured\): \S+ hours of a processor")
+        self.expect(redag("experiment", "cost", "/no/such.yaml"), 2, "/no/such.yaml")
+        threads = self.write("threads.yaml", "experiment: factorial\nworld: threads\nexecutors: [redag]\n"
+                             "workloads: [cart.yaml]\n")
+        self.expect(redag("experiment", "cost", threads), 2, "only simulated experiments can be shared")
+
+    def test_submit(self):
+        result = self.submit(self.plan, "--slurm")
+        self.assertIn("1 shard, and a job that merges them", result.stdout)
+        self.assertIn("submit them with: sh ", result.stdout)
+        self.assertFalse((self.folder / "calls").exists())
+        # The same command goes on; --now submits.
+        result = self.submit(self.plan, "--slurm", "--now")
+        self.assertIn("go on where they ended", result.stdout)
+        self.assertIn("array job 17, merge job 17", result.stdout)
+        self.assertEqual((self.folder / "calls").read_text(),
+                         "--parsable shard.sbatch\n--parsable --dependency=afterany:17 merge.sbatch\n")
+        # The scripts work without Slurm, too.
+        for script, variables in (("shard.sbatch", {"SLURM_ARRAY_TASK_ID": "1"}), ("merge.sbatch", {})):
+            subprocess.run(["sh", script], cwd=self.folder / "jobs", env=os.environ | variables, check=True,
+                           capture_output=True)
+        self.assertEqual(len(units(self.folder / "jobs" / "merged")), 20)
+
+    def test_bad_input(self):
+        self.assertIn("add --slurm", self.submit(self.plan, status=2).stderr)
+        result = self.submit(self.plan, "--slurm", "--shards", "4", "--now", status=2, sbatch="echo no partition >&2; exit 1")
+        self.assertIn("no partition", result.stderr)
+        self.assertIn("Slurm did not take the jobs", result.stderr)
+        other = self.write("other.yaml", self.plan.read_text().replace("sets: 10", "sets: 11"))
+        self.assertIn("'sets: 10' there, 'sets: 11' now", self.submit(other, "--slurm", status=2).stderr)
+        self.expect(redag("experiment", "submit", self.plan, "--slurm", "--out", self.folder), 2, "not a result of redag")
 
 
 class Factorial(Case):
@@ -201,7 +274,7 @@ class Factorial(Case):
 
     def results(self, name):
         return [(self.folder / name / file).read_text()
-                for file in ("factorial.csv", "observations.csv", "units.csv", "factorial.svg")]
+                for file in ("factorial.csv", "observations.csv", "factorial.svg")] + [units(self.folder / name)]
 
     def start(self, plan, name):
         return start(self, self.folder / name, "factorial", plan, "-j1")
@@ -264,8 +337,6 @@ class Factorial(Case):
             process = self.start(plan, "killed")
             process.kill()
             process.communicate()
-        with open(self.folder / "killed" / "units.csv", "a") as units:
-            units.write("311,[1")  # the kill came in the middle of a line
         self.assertRegex(self.run_plan(plan, "killed").stderr, r"\d+ of 312 runs are done already")
         self.run_plan(plan, "whole")
         self.assertEqual(self.results("killed"), self.results("whole"))
@@ -279,7 +350,7 @@ class Factorial(Case):
         self.assertIn("of 5 200 runs are done", out)
         document = json.loads((self.folder / "stopped" / "factorial.json").read_text())
         self.assertFalse(document["complete"])
-        self.assertEqual(document["done"], self.results("stopped")[2].count("\n") - 2)
+        self.assertEqual(document["done"], len(self.results("stopped")[3]))
 
     def test_other_jobs_are_another_plan(self):
         plan = self.plan()
@@ -290,8 +361,7 @@ class Factorial(Case):
     def test_damaged_results(self):
         plan = self.plan()
         self.run_plan(plan, "damaged")
-        units = self.folder / "damaged" / "units.csv"
-        units.write_text(units.read_text() + "52,[]\n")
+        change_units(self.folder / "damaged", "INSERT INTO units VALUES(52, '[]')")
         self.assertIn("unit 52: the plan has no such unit", self.run_plan(plan, "damaged", status=2).stderr)
 
     def test_bad_input(self):

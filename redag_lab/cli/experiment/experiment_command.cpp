@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -24,12 +25,6 @@ struct MergeSettings {
   StudyOutput output;
 };
 
-// Makes a study of the kind that the plan's first line names. Its reader reports mistakes in the plan.
-std::unique_ptr<Study> make_study(const std::string &plan, const std::string &file, Console &console) {
-  if (plan.starts_with("experiment: factorial\n")) return make_factorial(plan, file, console);
-  return make_acceptance(plan, file, console);
-}
-
 // Merges recorded runs into their experiment's results.
 Result<MergedUnits> add_recorded(MergedUnits merged, const std::vector<std::string> &places) {
   Result<experiment::FactorialPlan> plan =
@@ -46,10 +41,21 @@ Result<MergedUnits> add_recorded(MergedUnits merged, const std::vector<std::stri
       runs.push_back(experiment::record(file, *trace, *plan));
     }
   }
-  Result<experiment::FactorialUnits> all = experiment::with_recorded({std::move(*plan), std::move(merged.units)}, runs);
+  std::vector<experiment::FinishedUnit> units;
+  const Result<void> read = merged.visit([&units](std::uint64_t unit, const std::string &result) -> Result<void> {
+    units.push_back({unit, result});
+    return {};
+  });
+  if (!read) return tl::unexpected<Diagnostics>(read.error());
+  Result<experiment::FactorialUnits> all = experiment::with_recorded({std::move(*plan), std::move(units)}, runs);
   if (!all) return tl::unexpected<Diagnostics>(std::move(all.error()));
   merged.plan = to_yaml(all->plan);
-  merged.units = std::move(all->units);
+  merged.visit = [units = std::move(all->units)](const experiment::Accept &accept) -> Result<void> {
+    for (const experiment::FinishedUnit &unit : units) {
+      if (Result<void> accepted = accept(unit.unit, unit.result); !accepted) return accepted;
+    }
+    return {};
+  };
   for (const experiment::RecordedRun &run : runs) {
     const trace::Machine &machine = run.info.machine;
     merged.runs.push_back(Json{
@@ -102,16 +108,30 @@ Action add_merge(CLI::App &app) {
 
 }  // namespace
 
+// A plan's key stands at the begin of a line. Its reader reports mistakes in the plan.
+std::unique_ptr<Study> make_study(const std::string &plan, const std::string &file, Console &console) {
+  const std::string lines = "\n" + plan;
+  return lines.find("\nexperiment: factorial") != std::string::npos ? make_factorial(plan, file, console)
+                                                                    : make_acceptance(plan, file, console);
+}
+
 Action add_experiment(CLI::App &app) {
   app.require_subcommand(1);
   CLI::App *acceptance =
       app.add_subcommand("acceptance", "Measure the share of random workloads that the bounds accept");
   CLI::App *factorial = app.add_subcommand("factorial", "Run every executor on every combination of factors");
   CLI::App *together = app.add_subcommand("merge", "Merge the shards of several machines");
-  return [acceptance, factorial, judge = add_acceptance(*acceptance), cross = add_factorial(*factorial),
-          join = add_merge(*together)](Console &console) {
-    if (acceptance->parsed()) return judge(console);
-    return (factorial->parsed() ? cross : join)(console);
+  CLI::App *price = app.add_subcommand("cost", "Measure what a plan costs in hours of a processor");
+  CLI::App *submit = app.add_subcommand("submit", "Write the jobs that run a plan on a cluster, and submit them");
+  const std::vector<std::pair<CLI::App *, Action>> actions = {{acceptance, add_acceptance(*acceptance)},
+                                                              {factorial, add_factorial(*factorial)},
+                                                              {together, add_merge(*together)},
+                                                              {price, add_cost(*price)},
+                                                              {submit, add_submit(*submit)}};
+  return [actions](Console &console) {
+    const auto chosen =
+        std::find_if(actions.begin(), actions.end(), [](const auto &action) { return action.first->parsed(); });
+    return chosen->second(console);
   };
 }
 

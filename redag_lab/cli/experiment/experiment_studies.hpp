@@ -25,4 +25,10 @@ namespace redag::cli {
 [[nodiscard]] std::vector<std::string> executors_of(experiment::World world);
 [[nodiscard]] std::unique_ptr<Study> make_factorial(const std::string &plan, const std::string &file, Console &console);
 
+/// Makes the study of a plan of any kind, which its key `experiment` names. Returns null after printing the mistakes.
+[[nodiscard]] std::unique_ptr<Study> make_study(const std::string &plan, const std::string &file, Console &console);
+
+[[nodiscard]] Action add_cost(CLI::App &app);
+[[nodiscard]] Action add_submit(CLI::App &app);
+
 }  // namespace redag::cli

@@ -28,7 +28,7 @@ using experiment::Metric;
 constexpr std::size_t kMostRows = 60;  // combinations; more are only in the file
 
 Median total(const Factorial &factorial, const FactorialResults &results, const FactorialRow &row, Metric metric) {
-  return *over_runs(factorial, results, row, row.runs.front().dags.size() - 1, metric);
+  return *over_runs(factorial, results, row, row.runs().front().dags.size() - 1, metric);
 }
 
 // Formats the median and its interval. If most runs missed nothing, adds the misses of all runs.
@@ -44,7 +44,7 @@ std::string with_interval(const Median &median, std::uint64_t missed, std::uint6
 
 // Returns the share over all jobs of all runs. Unlike a median, it shows a miss of a single run.
 double missed_share(const FactorialRow &row) {
-  const std::size_t all = row.runs.front().dags.size() - 1;
+  const std::size_t all = row.runs().front().dags.size() - 1;
   const auto released = static_cast<double>(sum_over_runs(row, all, experiment::Measure::Released));
   return static_cast<double>(sum_over_runs(row, all, experiment::Measure::Missed)) / std::max(1.0, released);
 }
@@ -63,14 +63,14 @@ std::string combination_table(const Factorial &factorial, const FactorialResults
   columns.push_back({"max lateness", true, 200});
   Table table(std::move(columns));
   for (const FactorialRow &row : results.rows) {
-    if (row.runs.empty()) continue;
+    if (row.repetition.empty()) continue;
     std::vector<Cell> cells;
     for (const FactorKind kind : shown) {
       const std::uint32_t level = factorial.points()[row.point].of(kind);
       cells.push_back({level == kNoLevel ? "-" : factorial.factors()[static_cast<std::size_t>(kind)].levels[level]});
     }
     const auto value = [&](Metric metric) { return total(factorial, results, row, metric); };
-    const std::size_t all = row.runs.front().dags.size() - 1;
+    const std::size_t all = row.runs().front().dags.size() - 1;
     cells.push_back({with_interval(value(Metric::MissRatio), sum_over_runs(row, all, experiment::Measure::Missed),
                                    sum_over_runs(row, all, experiment::Measure::Released))});
     cells.push_back({format_percent(value(Metric::DropRatio).median)});
@@ -98,7 +98,8 @@ std::string range_table(const Factorial &factorial, const FactorialResults &resu
       double sum = 0;
       for (const FactorialRow &row : results.rows) {
         const experiment::FactorialPoint &point = factorial.points()[row.point];
-        if (point.of(FactorKind::Workload) != w || point.of(FactorKind::Executor) != e || row.runs.empty()) continue;
+        if (point.of(FactorKind::Workload) != w || point.of(FactorKind::Executor) != e || row.repetition.empty())
+          continue;
         rows.emplace_back(missed_share(row), &row);
         sum += rows.back().first;
       }

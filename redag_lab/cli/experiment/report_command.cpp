@@ -7,13 +7,18 @@
 #include <memory>
 #include <system_error>
 
+#include "redag/base/text.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_analysis/metrics/kernel_record.hpp"
+#include "redag_lab/cli/experiment/acceptance_page.hpp"
 #include "redag_lab/cli/run/recorded_runs.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
+#include "redag_lab/experiment/acceptance_results.hpp"
+#include "redag_lab/experiment/folder.hpp"
 #include "redag_lab/report/document.hpp"
 #include "redag_lab/report/experiment.hpp"
 #include "redag_lab/report/page.hpp"
@@ -23,6 +28,7 @@ namespace redag::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using metrics::read_kernel_record_of;
 
 struct Options {
   std::vector<std::string> places;
@@ -83,7 +89,13 @@ class Reporting {
               "name folders that hold one kind of run each");
           return false;
         }
-        group.add(fs::path(file).parent_path().string(), *trace);
+        const Result<std::optional<metrics::KernelRecord>> kernel = read_kernel_record_of(file, trace->info);
+        if (!kernel) {
+          progress_.clear();
+          console_.note(kernel.error());
+          return false;
+        }
+        group.add(fs::path(file).parent_path().string(), *trace, *kernel ? &**kernel : nullptr);
         any = true;
         ++done;
       }
@@ -142,12 +154,28 @@ class Reporting {
   std::vector<std::string> notes_;
 };
 
-// Reports the folder of a factorial experiment, which becomes one page.
-int report_experiment(const Options &options, const fs::path &file, Console &console) {
-  if (options.places.size() > 1) {
-    console.error(fmt::format("{}: an experiment has a page of its own", file.string()), "name this folder alone");
+// Writes the page of an experiment's folder, and says what it shows.
+int write_page(const Options &options, const fs::path &folder, const std::string &summary, const std::string &html,
+               Console &console) {
+  const std::string path = options.output.empty() ? (folder / "report.html").string() : options.output;
+  if (const Result<void> written = write_text(path, html); !written) {
+    console.note(written.error());
     return kExitBad;
   }
+  const std::string words = fmt::format(
+      "{}\n"
+      "{}: {:.1f} MB, opens in any browser without a network\n",
+      summary, path, static_cast<double>(html.size()) / 1e6);
+  if (options.json) {
+    console.note(words);
+  } else {
+    console.print(words);
+  }
+  return kExitOk;
+}
+
+// Reports the folder of a factorial experiment, which becomes one page.
+int report_factorial(const Options &options, const fs::path &file, Console &console) {
   const Result<std::string> text = trace::read_file(file.string());
   if (!text) {
     console.note(text.error());
@@ -163,29 +191,46 @@ int report_experiment(const Options &options, const fs::path &file, Console &con
     console.print(document->json + "\n");
     if (options.output.empty()) return kExitOk;
   }
-  const std::string path = options.output.empty() ? (file.parent_path() / "report.html").string() : options.output;
-  const std::string html = report::page(document->json, document->title, report::PageKind::Experiment);
-  if (const Result<void> written = write_text(path, html); !written) {
-    console.note(written.error());
+  return write_page(options, file.parent_path(), document->summary,
+                    report::page(document->json, document->title, report::PageKind::Experiment), console);
+}
+
+// Reports the folder of an acceptance experiment. Counts its units one by one, also those of a run that was killed.
+int report_acceptance(const Options &options, const std::string &folder, Console &console) {
+  const auto refuse = [&console](const Diagnostics &mistakes) {
+    console.note(mistakes);
     return kExitBad;
-  }
-  const std::string words = fmt::format(
-      "{}\n"
-      "{}: {:.1f} MB, opens in any browser without a network\n",
-      document->summary, path, static_cast<double>(html.size()) / 1e6);
+  };
+  const Result<std::string> text = experiment::read_plan(folder);
+  if (!text) return refuse(text.error());
+  Result<experiment::AcceptancePlan> plan = experiment::parse_acceptance_plan(*text, folder + "/plan.yaml");
+  if (!plan) return refuse(plan.error());
+  const experiment::Acceptance acceptance(std::move(*plan));
+  experiment::AcceptanceCounter counter(acceptance);
+  const auto count = [&counter](std::uint64_t unit, const std::string &result) { return counter.add(unit, result); };
+  if (const Result<void> read = experiment::visit_units({folder}, *text, count); !read) return refuse(read.error());
+  const std::vector<std::string> runs = experiment::read_runs({folder});
   if (options.json) {
-    console.note(words);
-  } else {
-    console.print(words);
+    console.print(to_json(acceptance, counter.results(), runs));
+    if (options.output.empty()) return kExitOk;
   }
-  return kExitOk;
+  const std::string summary =
+      fmt::format("{}: {} of {} workloads, {} violations", acceptance.plan().name, format_count(counter.results().done),
+                  format_count(counter.results().units), counter.results().violations.size());
+  return write_page(options, folder, summary, acceptance_page(acceptance, counter.results(), runs), console);
 }
 
 int make_report(const Options &options, Console &console) {
   for (const std::string &place : options.places) {
     std::error_code ignored;
-    const fs::path file = fs::path(place) / "factorial.json";
-    if (fs::exists(file, ignored)) return report_experiment(options, file, console);
+    const fs::path factorial = fs::path(place) / "factorial.json";
+    const bool is_factorial = fs::exists(factorial, ignored);
+    if (!is_factorial && !fs::exists(fs::path(place) / "units.db", ignored)) continue;
+    if (options.places.size() > 1) {
+      console.error(fmt::format("{}: an experiment has a page of its own", place), "name this folder alone");
+      return kExitBad;
+    }
+    return is_factorial ? report_factorial(options, factorial, console) : report_acceptance(options, place, console);
   }
   return Reporting(options, console).run();
 }
@@ -196,7 +241,7 @@ Action add_report(CLI::App &app) {
   auto options = std::make_shared<Options>();
   app.add_option("DIR", options->places,
                  "Folders of recorded runs (--out of run, simulate, compare), at any depth; or one folder of 'redag "
-                 "experiment factorial'")
+                 "experiment'")
       ->required();
   app.add_option("-o,--output", options->output, "File for the page (default: report.html in the first DIR)")
       ->type_name("FILE");
