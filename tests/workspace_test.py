@@ -3,11 +3,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """Checks that a ROS workspace with this repository in it works: rosdep knows every dependency in the package.xml files,
-and colcon finds the packages.
+these name all that is used, colcon finds the packages, and each of them stands alone.
 
 Usage: workspace_test.py SOURCE_DIR. Uses the standard library only, and colcon where it is installed. A key that rosdep
 does not know stops the whole installation. A new dependency therefore gets its line here, copied from ros/rosdistro
-(rosdep/base.yaml).
+(rosdep/base.yaml). tools/test_documented_build builds the packages.
 """
 import pathlib
 import re
@@ -26,19 +26,50 @@ SYSTEM_KEYS = {
     "libexpected-dev": "libexpected-dev",
     "libgmock-dev": "libgmock-dev",
     "libgtest-dev": "libgtest-dev",
+    "libsqlite3-dev": "libsqlite3-dev",
     "libyaml-dev": "libyaml-dev",
     "nlohmann-json-dev": "nlohmann-json3-dev",
+    "python3-pytest": "python3-pytest",
     "tbb": "libtbb-dev",
     "zlib": "zlib1g-dev",
 }
 # Packages of the distributions themselves: ros-<distribution>-<name>.
-ROS_KEYS = {"ament_cmake", "diagnostic_msgs", "launch_ros", "rclcpp", "rclcpp_action", "rclcpp_components",
-            "rclcpp_lifecycle", "std_msgs", "std_srvs", "test_msgs"}
-# Names that find_package() looks for, with the rosdep key that installs them.
+ROS_KEYS = {"ament_cmake", "ament_index_python", "composition_interfaces", "diagnostic_msgs", "launch", "launch_ros", "rcl",
+            "rclcpp", "rclcpp_action", "rclcpp_components", "rclcpp_lifecycle", "rcutils", "rmw", "ros2cli", "rosgraph_msgs",
+            "std_msgs", "std_srvs", "test_msgs", "tracetools"}
+# Names that find_package() looks for, with the rosdep key that installs them. The C library has the threads,
+# and packages are built without MPI.
 CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "tl-expected": "libexpected-dev",
-                  "CLI11": "cli11", "TBB": "tbb", "GTest": "libgtest-dev"}
+                  "CLI11": "cli11", "TBB": "tbb", "GTest": "libgtest-dev", "LibYAML": "libyaml-dev", "ZLIB": "zlib",
+                  "SQLite3": "libsqlite3-dev", "MPI": None, "Threads": None}
+# Folders that headers are included from, with the rosdep key that installs them. Others have the name of their package.
+HEADER_FOLDERS = {"fmt": "fmt", "nlohmann": "nlohmann-json-dev", "tl": "libexpected-dev", "CLI": "cli11", "tbb": "tbb",
+                  "oneapi": "tbb", "gtest": "libgtest-dev", "gmock": "libgmock-dev", "sys": None, "linux": None, "bits": None}
+# Peers for comparisons, which are used where they are installed.
+OPTIONAL = {"autoware_reference_system", "cm_executors", "reference_interfaces", "reference_system"}
+# Folders of the repository that a package uses where they are there, and does without elsewhere.
+BESIDE = ("../benchmarks/counted", "../redag_testing")
 ROS_PACKAGES = ("redag_rclcpp", "redag_rclcpp_lab")
-PACKAGES = ("redag", "redag_analysis", "redag_lab", *ROS_PACKAGES)
+CMAKE_BUILT = ("redag", "redag_analysis", "redag_lab", *ROS_PACKAGES)
+PACKAGES = (*CMAKE_BUILT, "ros2redag")
+
+
+def version_of(package):
+    return xml.etree.ElementTree.parse(SOURCE / package / "package.xml").getroot().findtext("version")
+
+
+def files_of(package, *endings):
+    """Returns the files of a package with these endings, without what others wrote."""
+    return [file for file in sorted((SOURCE / package).rglob("*"))
+            if file.name.endswith(endings) and "third_party" not in file.parts]
+
+
+def looked_for(package):
+    """Returns the names of the packages that a CMakeLists.txt looks for, and cannot do without."""
+    text = re.sub(r"#.*", "", (SOURCE / package / "CMakeLists.txt").read_text())
+    in_lists = {name for items, _ in re.findall(
+        r"foreach\(package IN ITEMS ([^)]*)\)\s*find_package\((\$\{package\}) REQUIRED\)", text) for name in items.split()}
+    return in_lists | set(re.findall(r"find_package\((\w[\w-]*)[^)]*REQUIRED\)", text))
 
 
 def keys_of(package):
@@ -75,28 +106,102 @@ class Rosdep(unittest.TestCase):
     def test_every_key_is_installed_by_bootstrap(self):
         """The Debian names are correct: tools/bootstrap, which builds without ROS, lists the same."""
         words = set(re.findall(r"[\w.+-]+", (SOURCE / "tools/bootstrap").read_text()))
-        for package in PACKAGES:
+        for package in CMAKE_BUILT:
             for key in keys_of(package) & set(SYSTEM_KEYS):
                 self.assertIn(SYSTEM_KEYS[key], words, f"{package}/package.xml: {key}")
 
     def test_what_is_found_is_declared(self):
-        """The package.xml of a ROS package lists everything that its CMakeLists.txt needs, regardless of redag's
-        dependencies."""
-        for package in ROS_PACKAGES:
-            found = re.findall(r"^ *find_package\((\S+)[^)]*REQUIRED\)",
-                               (SOURCE / package / "CMakeLists.txt").read_text(), re.MULTILINE)
-            self.assertGreater(len(found), 5, package)
+        """A package.xml lists everything that the CMakeLists.txt looks for, regardless of what its dependencies need."""
+        for package in CMAKE_BUILT:
+            found = looked_for(package) - OPTIONAL
+            self.assertGreater(len(found), 2, package)
             keys = keys_of(package)
             for name in found:
-                # The packages reference_* belong to the optional Autoware reference system.
-                if "$" not in name and not name.startswith("reference_"):
-                    self.assertIn(CMAKE_PACKAGES.get(name, name), keys, f"{package}: find_package({name})")
+                key = CMAKE_PACKAGES.get(name, name)
+                self.assertTrue(key is None or key in keys, f"{package}: find_package({name}), but no <depend> on {key}")
+
+    def test_what_is_included_is_declared(self):
+        """Tests of redag, redag_analysis and redag_lab belong to the repository's build."""
+        for package in CMAKE_BUILT:
+            keys, folders = keys_of(package), set()
+            for file in files_of(package, ".hpp", ".cpp"):
+                if package in ROS_PACKAGES or not file.name.endswith("_test.cpp"):
+                    folders.update(re.findall(r'^\s*#\s*include\s*[<"](\w+)/', file.read_text(), re.MULTILINE))
+            self.assertGreater(len(folders), 2, package)
+            for folder in folders - OPTIONAL - {package}:
+                key = HEADER_FOLDERS.get(folder, folder)
+                self.assertTrue(key is None or key in keys, f"{package} includes {folder}/, but has no <depend> on {key}")
+
+    def test_what_python_imports_is_declared(self):
+        keys, imported = keys_of("ros2redag"), set()
+        for file in files_of("ros2redag", ".py"):
+            if file.parent.name != "test" and file.name != "setup.py":
+                imported.update(re.findall(r"^(?:from|import) (\w+)", file.read_text(), re.MULTILINE))
+        self.assertIn("ros2cli", imported)
+        self.assertEqual(imported - set(sys.stdlib_module_names) - keys, {"ros2redag"})
 
     def test_redag_needs_no_test_library(self):
         """colcon builds the libraries and the program. The repository's own build holds their tests."""
         for package in ("redag", "redag_analysis", "redag_lab"):
             self.assertFalse({"librapidcheck-dev", "rapidcheck"} & keys_of(package))
             self.assertNotIn("BUILD_TESTING", (SOURCE / package / "CMakeLists.txt").read_text())
+
+
+class Alone(unittest.TestCase):
+    """A release has one source tree for each package."""
+
+    def test_no_build_file_leaves_its_folder(self):
+        for package in CMAKE_BUILT:
+            files = files_of(package, "CMakeLists.txt", ".cmake", ".in")
+            self.assertGreater(len(files), 0, package)
+            for file in files:
+                text = file.read_text()
+                for place in BESIDE:
+                    if f"EXISTS ${{CMAKE_CURRENT_SOURCE_DIR}}/{place}" in text:
+                        text = text.replace(place, "")
+                for line in text.splitlines():
+                    self.assertNotIn("../", line, f"{file.relative_to(SOURCE)} uses what a release of {package} does not have")
+
+    def test_no_link_leaves_its_folder(self):
+        for package in PACKAGES:
+            for file in (SOURCE / package).rglob("*"):
+                if file.is_symlink():
+                    self.assertIn(SOURCE / package, file.resolve().parents, file)
+
+    def test_all_have_one_version(self):
+        self.assertEqual({version_of(package) for package in PACKAGES}, {version_of("redag")})
+        for package in CMAKE_BUILT:  # CMake reads it, and so does ros2redag/setup.py
+            text = (SOURCE / package / "CMakeLists.txt").read_text()
+            self.assertRegex(text, rf"project\({package} VERSION \$\{{version\}} ")
+
+
+class Release(unittest.TestCase):
+    """What docs/releasing.md asks for."""
+
+    def test_the_changelog_begins_with_the_version(self):
+        """bloom makes the changelog of the Debian package of the entry with the version of package.xml."""
+        for package in PACKAGES:
+            text = (SOURCE / package / "CHANGELOG.rst").read_text()
+            line, title, again, _, entry, under = text.splitlines()[:6]
+            self.assertEqual((line, title, again), ("^" * len(title), f"Changelog for package {package}", line))
+            if entry != "Forthcoming":
+                self.assertRegex(entry, rf"^{re.escape(version_of(package))} \(\d{{4}}-\d\d-\d\d\)$", package)
+            self.assertEqual(under, "-" * len(entry), package)
+
+    def test_each_package_has_its_pages(self):
+        for package in PACKAGES:
+            self.assertTrue((SOURCE / package / "rosdoc2.yaml").is_file(), package)
+            page = (SOURCE / package / "README.md").read_text()
+            self.assertTrue(page.startswith(f"# {package}\n"), package)
+            self.assertIn("](../QUALITY_DECLARATION.md)", page, package)
+
+    def test_licences_have_their_texts(self):
+        for package in PACKAGES:
+            root = xml.etree.ElementTree.parse(SOURCE / package / "package.xml").getroot()
+            self.assertEqual(root.findtext("license"), "Apache-2.0", package)
+            for licence in root.iter("license"):
+                if licence.get("file"):
+                    self.assertTrue((SOURCE / package / licence.get("file")).is_file(), package)
 
 
 if __name__ == "__main__":

@@ -49,9 +49,7 @@ std::vector<Bundle> bundles_of(const Workload &workload) {
     Bundle &bundle = bundles[position[root(d)]];
     bundle.dags.push_back(d);
     if (const auto cluster = cluster_of(workload.platform, dag)) bundle.cluster = cluster;
-    Workload alone;
-    alone.dags.push_back(dag);
-    bundle.utilization += alone.utilization();
+    bundle.utilization += dag.utilization();
   }
   return bundles;
 }

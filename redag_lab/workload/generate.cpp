@@ -273,9 +273,9 @@ class Generator {
       const auto load = std::min_element(loads.begin(), loads.end());
       const Cluster &cluster = clusters[static_cast<std::size_t>(load - loads.begin())];
       dag.cluster = cluster.name;
+      *load += dag.utilization() / cluster.workers;
       for (Task &task : dag.tasks) {
         if (!task.group.empty()) task.group = fmt::format("{}_{}", cluster.name, task.group);
-        *load += static_cast<double>(task.wcet) / static_cast<double>(task.period) / cluster.workers;
       }
     }
   }

@@ -5,12 +5,14 @@
 
 The first two arguments of the importing script are the program and the source tree.
 """
+import contextlib
 import fcntl
 import json
 import os
 import pathlib
 import pty
 import signal
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -67,6 +69,25 @@ def interrupt(process, after=0.0, by=signal.SIGINT):
         listens = sum(int(line.split()[1], 16) for line in status.splitlines() if line.startswith("SigCgt:"))
     time.sleep(after)
     process.send_signal(by)
+
+
+def units(folder):
+    """Returns the finished units of an experiment that does not run: [(unit, result)]."""
+    with contextlib.closing(sqlite3.connect(folder / "units.db")) as database:
+        return database.execute("SELECT unit, result FROM units ORDER BY unit").fetchall()
+
+
+def wait_for_units(case, process, folder, begins):
+    """Waits until a run, the one number `begins` in its folder, has written units."""
+    runs, log = folder / "runs.jsonl", folder / "units.db-wal"
+    deadline = time.monotonic() + 60
+    written = set()
+    while len(written) < 3:  # what the log was at the begin, and two commits
+        case.assertIsNone(process.poll(), "it ended before it could be disturbed")
+        case.assertLess(time.monotonic(), deadline)
+        time.sleep(0.01)
+        if runs.exists() and runs.read_text().count('"event":"begin"') == begins and log.exists():
+            written.add(log.stat().st_mtime_ns)
 
 
 def in_terminal(*arguments, columns=80, **environment):

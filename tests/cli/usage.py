@@ -14,8 +14,8 @@ import subprocess
 from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, main, redag
 
 COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["calibrate"], ["compare"], ["diff"], ["analyze"], ["sensitivity"], ["assign"], ["tune"],
-            ["check-trace"], ["top"], ["report"], ["experiment"], ["experiment", "acceptance"],
-            ["experiment", "factorial"], ["experiment", "merge"]]
+            ["check-trace"], ["why"], ["top"], ["report"], ["experiment"], ["experiment", "acceptance"],
+            ["experiment", "factorial"], ["experiment", "merge"], ["experiment", "cost"], ["experiment", "submit"]]
 
 
 class Usage(Case):
@@ -55,7 +55,7 @@ class Usage(Case):
             for example in redag(*command, "--help").stdout.split("Examples:")[1].strip().splitlines():
                 for file in re.findall(r"\b(?:workloads|experiments)/\w\S*\.yaml", example):
                     self.assertTrue((SOURCE / file).exists(), example)
-                if command[0] in ("run", "compare", "calibrate", "diff", "check-trace", "top", "report", "experiment"):
+                if command[0] in ("run", "compare", "calibrate", "diff", "check-trace", "why", "top", "report", "experiment"):
                     continue
                 if "sensitivity" in example and "--simulate" in example:
                     continue

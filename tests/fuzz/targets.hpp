@@ -17,11 +17,13 @@ void workload_target(std::string_view input);
 void plan_target(std::string_view input);
 /// Reads events.jsonl, and makes everything that is made of a trace: checks, summary, jobs.csv, Perfetto, report.
 void trace_target(std::string_view input);
+/// Reads kernel.jsonl.
+void kernel_record_target(std::string_view input);
 /// Reads jobs.csv.
 void jobs_csv_target(std::string_view input);
 /// Reads comparison.json beside recorded runs.
 void comparison_target(std::string_view input);
-/// Reads units.csv of an experiment.
+/// Reads units.db of an experiment.
 void units_target(std::string_view input);
 /// Reads the page of shared memory of `redag top`.
 void live_page_target(std::string_view input);
@@ -38,11 +40,17 @@ struct Target {
 };
 
 inline constexpr std::array kTargets = {
-    Target{"workload", workload_target},     Target{"plan", plan_target},
-    Target{"trace", trace_target},           Target{"jobs_csv", jobs_csv_target},
-    Target{"comparison", comparison_target}, Target{"units", units_target},
-    Target{"live_page", live_page_target},   Target{"values", values_target},
-    Target{"commands", commands_target},     Target{"flight", flight_target},
+    Target{"workload", workload_target},
+    Target{"plan", plan_target},
+    Target{"trace", trace_target},
+    Target{"jobs_csv", jobs_csv_target},
+    Target{"comparison", comparison_target},
+    Target{"units", units_target},
+    Target{"live_page", live_page_target},
+    Target{"values", values_target},
+    Target{"commands", commands_target},
+    Target{"flight", flight_target},
+    Target{"kernel_record", kernel_record_target},
 };
 
 }  // namespace redag::fuzz

@@ -11,6 +11,7 @@
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/why.hpp"
 #include "redag_lab/report/document.hpp"
 #include "redag_lab/report/page.hpp"
 #include "redag_lab/report/verdict.hpp"
@@ -28,6 +29,12 @@ void trace_target(std::string_view input) {
   (void)metrics::check_trace(*trace, metrics::rules_for(trace->info));
   (void)metrics::check_trace(*trace);
   (void)metrics::summary_to_json(metrics::summarize(*trace), trace->info);
+  const metrics::Investigation investigation(*trace);
+  for (const metrics::Explanation &one : investigation.explain(investigation.misses())) {
+    Duration sum = 0;
+    for (const metrics::Part &part : one.parts) sum += part.length;
+    REDAG_CHECK(sum == one.length(), "parts sum to the whole");
+  }
   const std::string &folder = scratch_folder();
   const auto jobs = metrics::fold_jobs(trace->info.workload, trace->events);
   REDAG_CHECK(metrics::write_jobs_csv(folder + "/jobs.csv", trace->info.workload, jobs).has_value(), "jobs.csv");

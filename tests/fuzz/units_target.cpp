@@ -4,7 +4,7 @@
 #include "redag/base/check.hpp"
 #include "redag_lab/experiment/acceptance.hpp"
 #include "redag_lab/experiment/acceptance_results.hpp"
-#include "redag_lab/experiment/journal.hpp"
+#include "redag_lab/experiment/unit_store.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 #include "tests/fuzz/targets.hpp"
 
@@ -19,23 +19,25 @@ void units_target(std::string_view input) {
     plan.sets = 2;
     return Acceptance(plan);
   }();
-  const std::string path = scratch_file("units.csv", input);
-  const auto read = read_journal(path, kSubject);
-  if (read) {
+  const std::string path = scratch_file("units.db", input);
+  if (const auto store = UnitStore::read(path, kSubject)) {
     AcceptanceCounter counter(acceptance);
-    for (const FinishedUnit &unit : *read) {
-      if (!counter.add(unit.unit, unit.result)) break;
+    Result<UnitCursor> cursor = store->units();
+    for (Result<bool> more = true; cursor && more && *more;) {
+      more = cursor->next();
+      if (more && *more && !counter.add(cursor->unit().unit, cursor->unit().result)) break;
     }
     (void)to_csv(acceptance, counter.results());
     (void)to_svg(acceptance, counter.results());
   }
-  // An accepted journal must be accepted again, with the same content, before it is continued.
-  Result<Journal> journal = Journal::open(path, kSubject);
-  if (!journal) {
-    REDAG_CHECK(!journal.error().empty(), "a refusal says why");
+  // What is there can be continued, or the refusal says why.
+  Result<UnitStore> store = UnitStore::open(path, kSubject);
+  if (!store) {
+    REDAG_CHECK(!store.error().empty(), "a refusal says why");
     return;
   }
-  if (read) REDAG_CHECK(journal->found() == *read, "both ways of reading find the same");
+  const Result<void> added = store->append(1, "00");
+  REDAG_CHECK(added || !added.error().empty(), "a refusal says why");
 }
 
 }  // namespace redag::fuzz

@@ -4,7 +4,7 @@
 
 """Checks the bundle of ECharts against its package files: version, notices, and no text that would end a <script>.
 
-Usage: echarts_test.py FOLDER. `third_party/echarts/build --check` compares every byte; it needs npm.
+Usage: echarts_test.py FOLDER. `redag_lab/third_party/echarts/build --check` compares every byte; it needs npm.
 """
 import json
 import pathlib
@@ -21,7 +21,7 @@ problems = []
 if wanted != locked:
     problems.append(f"package.json wants ECharts {wanted}, the lock file has {locked}")
 if not bundle.startswith(f"/*! Apache ECharts {locked} ") or f"with ZRender {zrender}," not in bundle:
-    problems.append(f"the bundle is not ECharts {locked} with ZRender {zrender}: run third_party/echarts/build")
+    problems.append(f"the bundle is not ECharts {locked} with ZRender {zrender}: run redag_lab/third_party/echarts/build")
 if f'"{locked}"' not in bundle:
     problems.append(f"the bundle's code does not know the version {locked}: the banner alone was changed")
 for name in ("NOTICE", "LICENSE.zrender", "LICENSE.d3"):

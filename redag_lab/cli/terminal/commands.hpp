@@ -35,5 +35,6 @@ Action add_check_trace(CLI::App &app);
 Action add_recover(CLI::App &app);
 Action add_report(CLI::App &app);
 Action add_top(CLI::App &app);
+Action add_why(CLI::App &app);
 
 }  // namespace redag::cli

@@ -119,14 +119,38 @@ bool is_result_name(std::string_view name) {
   if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
     name = name.substr(0, at);
   }
-  constexpr std::array<std::string_view, 23> kNames = {"jobs.csv",       "summary.json",     "trace.json",
-                                                       "events.jsonl",   "workload.yaml",    "comparison.json",
-                                                       "comparison.csv", "comparison.html",  "report.html",
-                                                       "check.json",     "plan.yaml",        "units.csv",
-                                                       "runs.jsonl",     "acceptance.csv",   "acceptance.json",
-                                                       "acceptance.svg", "factorial.csv",    "factorial.json",
-                                                       "factorial.svg",  "observations.csv", "response_quantiles.csv",
-                                                       "responses.svg",  "distance.svg"};
+  constexpr std::array<std::string_view, 32> kNames = {"jobs.csv",
+                                                       "summary.json",
+                                                       "trace.json",
+                                                       "events.jsonl",
+                                                       "workload.yaml",
+                                                       "comparison.json",
+                                                       "comparison.csv",
+                                                       "comparison.html",
+                                                       "report.html",
+                                                       "check.json",
+                                                       "plan.yaml",
+                                                       "units.db",
+                                                       "runs.jsonl",
+                                                       "acceptance.csv",
+                                                       "acceptance.json",
+                                                       "acceptance.svg",
+                                                       "factorial.csv",
+                                                       "factorial.json",
+                                                       "factorial.svg",
+                                                       "observations.csv",
+                                                       "response_quantiles.csv",
+                                                       "responses.svg",
+                                                       "distance.svg",
+                                                       "units.db-wal",
+                                                       "units.db-journal",
+                                                       "submit.sh",
+                                                       "shard.sbatch",
+                                                       "merge.sbatch",
+                                                       "shards",
+                                                       "merged",
+                                                       "logs",
+                                                       "kernel.jsonl"};
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
   // Folders of a comparison (executors, and repetitions below them), and the files of `generate`.
   const std::vector<std::string> &executors = lab::variant_names();

@@ -10,39 +10,20 @@
 #include <string_view>
 #include <vector>
 
+#include "redag_analysis/text/wrap.hpp"
+
 namespace redag::cli {
 namespace {
 
 constexpr std::size_t kWidth = 80;
 constexpr std::size_t kTextColumn = 28;  // where descriptions of options begin
 
-// Breaks `text` at spaces. Lines after the first are indented; the first one begins at that column, too.
-std::string wrapped(std::string_view text, std::size_t indent) {
-  std::string lines;
-  std::size_t column = indent;
-  while (!text.empty()) {
-    const std::string_view word = text.substr(0, text.find(' '));
-    text.remove_prefix(std::min(word.size() + 1, text.size()));
-    if (column > indent && column + 1 + word.size() > kWidth) {
-      lines += "\n" + std::string(indent, ' ');
-      column = indent;
-    }
-    if (column > indent) {
-      lines += " ";
-      ++column;
-    }
-    lines += word;
-    column += word.size();
-  }
-  return lines + "\n";
-}
-
 // Returns a row: a name, and its description beside or below it.
 std::string row(const std::string &name, const std::string &description) {
   std::string text = "  " + name;
   if (text.size() + 2 > kTextColumn) text += "\n";
   const std::size_t begin = text.back() == '\n' ? 0 : text.size();
-  return text + std::string(kTextColumn - begin, ' ') + wrapped(description, kTextColumn);
+  return text + std::string(kTextColumn - begin, ' ') + wrapped(description, kTextColumn, kWidth);
 }
 
 std::string names_of(const CLI::Option &option) {
@@ -93,7 +74,7 @@ std::string section(const std::string &title, const std::vector<const CLI::Optio
 }  // namespace
 
 std::string HelpFormatter::make_help(const CLI::App *app, std::string name, CLI::AppFormatMode /*mode*/) const {
-  std::string text = wrapped(app->get_description(), 0) + "\n" + make_usage(app, name);
+  std::string text = wrapped(app->get_description(), 0, kWidth) + "\n" + make_usage(app, name);
   text += section("Arguments", app->get_options([](const CLI::Option *option) { return option->get_positional(); }));
   for (const std::string &group : app->get_groups()) {
     if (group.empty()) continue;  // hidden options

@@ -87,6 +87,10 @@ constexpr std::array kCommands = {
     Entry{"recover", "Recover the results of a run that was killed", add_recover,
           "  redag recover results/os\n"
           "  redag recover results/os --out results/rescued --keep\n"},
+    Entry{"why", "Explain why deadlines of a recorded run were missed", add_why,
+          "  redag why results/demo\n"
+          "  redag why results/demo control.controller\n"
+          "  redag why results/demo control.controller#12 --json\n"},
     Entry{"report", "Write one HTML page about recorded runs", add_report,
           "  redag report results/demo\n"
           "  redag report results/none results/os -o report.html\n"
