@@ -43,12 +43,18 @@ TEST(Overrun, AFifthInEveryJobIsAnAlarm) {
   EXPECT_TRUE(check.tasks[0].execution.is_exceeded);
 }
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kEngineIsSlow = true;  // what the engine does after a body, and is charged to it, is instrumented
+#else
+constexpr bool kEngineIsSlow = false;
+#endif
+
 // A stalling machine can charge jobs more than they used. A body that itself takes longer does so in every job.
 TEST(Overrun, SyntheticBodiesKeepTheirWcet) {
   const metrics::AssumptionCheck check = run(0);
   for (const metrics::TaskCheck &task : check.tasks) {
     EXPECT_GE(task.execution.jobs, 5U);
-    EXPECT_LT(task.execution.above, task.execution.jobs) << task.task.value;
+    if (!kEngineIsSlow) EXPECT_LT(task.execution.above, task.execution.jobs) << task.task.value;
     EXPECT_GT(task.execution.longest, 1900 * kMicrosecond);
   }
 }
