@@ -99,6 +99,7 @@ class Run {
       case Kind::Release: release(step.choice, false); break;
       case Kind::Miss: release(step.choice, true); break;
       case Kind::Complete: complete(step.choice); break;
+      case Kind::Finish: return finish(step.choice);
       case Kind::PreemptionPoint: preemption_point(step.choice); break;
       case Kind::Exceed: exceed(step.choice); break;
       case Kind::Dispatch: return dispatch();
@@ -169,23 +170,40 @@ class Run {
     releases_[task.value] += periods_[task.value];
   }
 
-  // Completes a running job; with full preemption sometimes one that counts as preempted, because the operating system
-  // ran it.
-  void complete(std::uint8_t choice) {
+  // Returns a running job, which ends; with full preemption sometimes one that counts as preempted, because the
+  // operating system ran it.
+  [[nodiscard]] std::optional<JobKey> job_that_ends(std::uint8_t choice) const {
     const bool any = config_.preemption == Preemption::Full && choice >= 240;
     std::vector<JobKey> jobs;
     for (const auto &[key, state] : jobs_) {
       if (any || state == State::Running) jobs.push_back(key);
     }
-    if (jobs.empty()) return;
-    const JobKey key = jobs[choice / 8U % jobs.size()];
-    const Outcome outcome = choice % 8 == 0   ? Outcome::Threw
-                            : choice % 8 == 1 ? Outcome::BudgetExceeded
-                            : choice % 8 == 2 ? Outcome::NoData
-                                              : Outcome::Finished;
-    tested_->complete(tested_.slot(key), now_, outcome);
-    expected_->complete(expected_.slot(key), now_, outcome);
-    jobs_.erase(key);
+    if (jobs.empty()) return std::nullopt;
+    return jobs[choice / 8U % jobs.size()];
+  }
+  [[nodiscard]] static Outcome outcome_of(std::uint8_t choice) {
+    return choice % 8 == 0   ? Outcome::Threw
+           : choice % 8 == 1 ? Outcome::BudgetExceeded
+           : choice % 8 == 2 ? Outcome::NoData
+                             : Outcome::Finished;
+  }
+
+  void complete(std::uint8_t choice) {
+    const std::optional<JobKey> key = job_that_ends(choice);
+    if (!key) return;
+    tested_->complete(tested_.slot(*key), now_, outcome_of(choice));
+    expected_->complete(expected_.slot(*key), now_, outcome_of(choice));
+    jobs_.erase(*key);
+  }
+
+  std::optional<std::string> finish(std::uint8_t choice) {
+    const std::optional<JobKey> key = job_that_ends(choice);
+    if (!key) return std::nullopt;
+    jobs_.erase(*key);
+    const std::uint32_t most = choice % 5 == 0 ? choice % 3U : sched::kNoLimit;
+    const Step actual = tested_->finish(tested_.slot(*key), now_, outcome_of(choice), most);
+    expected_->complete(expected_.slot(*key), now_, outcome_of(choice));
+    return compare(actual, most);
   }
 
   void preemption_point(std::uint8_t choice) {
@@ -268,8 +286,11 @@ class Run {
     periods_[task.value] = period;
   }
 
-  std::optional<std::string> dispatch_once(std::uint32_t most) {
-    const std::vector<JobEvent> actual = tested_.take(tested_->dispatch(now_, most), uncounted_);
+  std::optional<std::string> dispatch_once(std::uint32_t most) { return compare(tested_->dispatch(now_, most), most); }
+
+  // Compares a step of the tested scheduler with the next one of the other.
+  std::optional<std::string> compare(const Step &step, std::uint32_t most) {
+    const std::vector<JobEvent> actual = tested_.take(step, uncounted_);
     const std::vector<JobEvent> wanted = expected_.take(expected_->dispatch(now_, most), uncounted_);
     if (actual != wanted) {
       return fmt::format("  decided:\n{}  expected:\n{}", describe(actual), describe(wanted));
@@ -332,6 +353,7 @@ const char *name_of(Kind kind) {
     case Kind::Release: return "release";
     case Kind::Miss: return "miss";
     case Kind::Complete: return "complete";
+    case Kind::Finish: return "finish";
     case Kind::PreemptionPoint: return "point";
     case Kind::Exceed: return "exceed";
     case Kind::Dispatch: return "dispatch";
@@ -376,7 +398,7 @@ Script random_script(std::uint64_t seed, std::size_t length, bool reconfigure) {
     } else if (rng.uniform01() < advance) {
       step = ScriptStep{Kind::Advance, static_cast<std::uint8_t>(rng.uniform(1, 60))};
     } else {
-      step.kind = Kind::Complete;
+      step.kind = rng.uniform01() < 0.5 ? Kind::Complete : Kind::Finish;
     }
     script.push_back(step);
   }

@@ -23,6 +23,7 @@ struct ScriptStep {
     Release,
     Miss,
     Complete,
+    Finish,  // completes a job and dispatches: the tested scheduler in one call, the expected one in two
     PreemptionPoint,
     Exceed,  // of a budget, or of a wcet_low
     Dispatch,

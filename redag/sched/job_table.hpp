@@ -93,7 +93,7 @@ class JobTable {
   // ---- slots ----
 
   /// Takes a free slot for a job of the task.
-  [[nodiscard]] std::uint32_t take_slot(TaskState &task) {
+  [[nodiscard, gnu::always_inline]] std::uint32_t take_slot(TaskState &task) {
     if (task.free_slot == kNil && task.queue_depth == kUnboundedQueue) return new_slot();
     const std::uint32_t slot = task.free_slot;
     REDAG_CHECK(slot != kNil, "a task has more jobs than its overrun rule allows");
@@ -109,7 +109,7 @@ class JobTable {
 
   // ---- decisions; the step records them ----
 
-  void start(std::uint32_t slot, WorkerId worker, std::uint32_t over, std::uint32_t level) {
+  [[gnu::always_inline]] void start(std::uint32_t slot, WorkerId worker, std::uint32_t over, std::uint32_t level) {
     Job &job = jobs[slot];
     TaskState &task = task_of(job);
     --task.ready_count;

@@ -33,6 +33,17 @@ concept Dispatcher = requires(D dispatcher, const D &decided, std::uint32_t slot
   { decided.is_idle() } -> std::same_as<bool>;  // no job is ready or started
 };
 
+/// A dispatcher that can put a new job in the place of one that ends, without a decision over all jobs.
+template <class D>
+concept HandsOver = requires(D dispatcher, const D &decided, const Job &job, std::uint32_t slot) {
+  // Returns true if nothing but the new job of the task depends on the end of `job`: no job waits for its gates, and
+  // none runs below it.
+  { decided.can_replace(job, TaskId()) } -> std::same_as<bool>;
+  // The first job ends, and the second, which is ready and not queued, starts in its place if it is the most urgent
+  // one. Takes all decisions of the step. The last argument is the most jobs that may start.
+  dispatcher.replace(slot, slot, std::uint32_t{});
+};
+
 template <Dispatcher D>
 class Lifecycle final : public Scheduler {
  public:
@@ -54,6 +65,7 @@ class Lifecycle final : public Scheduler {
   void preemption_point(JobSlot job, Time now) override;
   void exceed(JobSlot job, Limit limit, Time now) override;
   Step dispatch(Time now, std::uint32_t most = kNoLimit) override;
+  Step finish(JobSlot job, Time now, Outcome outcome, std::uint32_t most = kNoLimit) override;
   void record_only(EventKinds kinds) override { table_.step.record_only(kinds); }
   [[nodiscard]] bool outranked(JobSlot job) const override;
   [[nodiscard]] bool high_mode() const override { return table_.high_mode; }
@@ -96,6 +108,10 @@ class Lifecycle final : public Scheduler {
   static std::uint32_t count_release(TaskState &task);
   [[nodiscard]] Time turn_of(const TaskState &task, Time origin) const;
   inline void make_ready(std::uint32_t slot, Time origin);
+  [[nodiscard, gnu::always_inline]] inline std::uint32_t add_job(TaskId id, std::uint32_t number, Time nominal,
+                                                                 Time turn);
+  [[gnu::always_inline]] inline void prepare(std::uint32_t slot, Time origin);
+  [[gnu::always_inline]] inline bool hand_over(std::uint32_t slot, Time now, std::uint32_t most) requires HandsOver<D>;
   void skip(std::uint32_t slot, Reason reason);
   template <class Predicate>
   void skip_all(Reason reason, Predicate which);

@@ -12,16 +12,6 @@
 
 namespace redag::sched {
 
-[[nodiscard]] constexpr Reason reason_of(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::Threw: return Reason::Exception;
-    case Outcome::BudgetExceeded: return Reason::Budget;
-    case Outcome::NoData: return Reason::NoData;
-    case Outcome::Finished: break;
-  }
-  return Reason::None;
-}
-
 template <Dispatcher D>
 void Lifecycle<D>::release(TaskId task, Time nominal, Time now, Time origin) {
   REDAG_CHECK(task.value < table_.tasks.size(), "release of a task that does not exist");
@@ -121,6 +111,43 @@ Step Lifecycle<D>::dispatch(Time now, std::uint32_t most) {
 }
 
 template <Dispatcher D>
+Step Lifecycle<D>::finish(JobSlot job, Time now, Outcome outcome, std::uint32_t most) {
+  if constexpr (HandsOver<D>) {
+    if (outcome == Outcome::Finished && !restricted_ && hand_over(job.value, now, most)) return table_.step.read();
+  }
+  complete(job, now, outcome);
+  return dispatch(now, most);
+}
+
+// Direct hand-over: the job releases one data task and nothing else depends on its end, so that the new job takes its
+// place without a queue and without a search for a worker. The result is that of complete() and dispatch(). Returns
+// false, with nothing done, in all other cases.
+template <Dispatcher D>
+bool Lifecycle<D>::hand_over(std::uint32_t slot, Time now, std::uint32_t most) requires HandsOver<D> {
+  REDAG_CHECK(slot < table_.jobs.size() && table_.jobs[slot].started(), "completion of a job that does not run");
+  const Job &job = table_.jobs[slot];
+  const TaskId heir = table_.precedence.heir(job.task);
+  if (!heir.valid() || most == 0) return false;
+  TaskState &task = table_.tasks[job.task.value];
+  TaskState &next = table_.tasks[heir.value];
+  if (task.life != TaskLife::Live || next.life != TaskLife::Live || next.ready_count > 0) return false;
+  if (table_.dags[next.dag.value].max_pending > 0 || !table_.step.is_new()) return false;
+  if (!dispatcher_.can_replace(job, heir)) return false;
+
+  table_.step.begin(now);
+  ++task.finished;
+  table_.step.emit(job, JobEventKind::Finished, now);
+  const Precedence::Data data = table_.precedence.hand_on(job.task, job.release, job.origin, now);
+  const std::uint32_t number = count_release(next);
+  table_.step.emit(heir, number, WorkerId(), JobEventKind::Released, data.complete);
+  const std::uint32_t its_slot = add_job(heir, number, data.complete, takes_turns_ ? data.origin : 0);
+  prepare(its_slot, data.origin);
+  dispatcher_.replace(slot, its_slot, most);
+  table_.free_slot(slot);
+  return true;
+}
+
+template <Dispatcher D>
 bool Lifecycle<D>::outranked(JobSlot job) const {
   return table_.config.preemption == Preemption::Cooperative && dispatcher_.outranked(table_.jobs[job.value]);
 }
@@ -150,16 +177,24 @@ void Lifecycle<D>::admit(TaskId id, Time nominal, Time origin) {
     return;
   }
 
-  const std::uint32_t slot = table_.take_slot(task);
-  table_.jobs[slot] =
-      Job{.task = id, .number = number, .release = nominal, .deadline = nominal + task.deadline, .turn = turn};
-  ++dag.pending;
+  const std::uint32_t slot = add_job(id, number, nominal, turn);
   if (complete_set) {
     make_ready(slot, has_data ? table_.precedence.consume(id).origin : origin);
   } else {
     table_.jobs[slot].state = JobState::Waiting;
     task.waiting = slot;
   }
+}
+
+// Gives the new job a slot.
+template <Dispatcher D>
+std::uint32_t Lifecycle<D>::add_job(TaskId id, std::uint32_t number, Time nominal, Time turn) {
+  TaskState &task = table_.tasks[id.value];
+  const std::uint32_t slot = table_.take_slot(task);
+  table_.jobs[slot] =
+      Job{.task = id, .number = number, .release = nominal, .deadline = nominal + task.deadline, .turn = turn};
+  ++table_.dags[task.dag.value].pending;
+  return slot;
 }
 
 // Returns the turn of the task's next job (Ties::Share). A job that replaces another takes its turn: with its own,
@@ -175,9 +210,17 @@ Time Lifecycle<D>::turn_of(const TaskState &task, Time origin) const {
 
 template <Dispatcher D>
 void Lifecycle<D>::make_ready(std::uint32_t slot, Time origin) {
-  Job &job = table_.jobs[slot];
-  TaskState &task = table_.tasks[job.task.value];
+  TaskState &task = table_.task_of(table_.jobs[slot]);
   if (task.waiting == slot) task.waiting = kNil;
+  prepare(slot, origin);
+  dispatcher_.on_ready(slot);
+}
+
+// The job becomes ready, and gets its place in the order of jobs.
+template <Dispatcher D>
+void Lifecycle<D>::prepare(std::uint32_t slot, Time origin) {
+  Job &job = table_.jobs[slot];
+  TaskState &task = table_.task_of(job);
   ++task.ready_count;
   task.latest_ready = slot;
   job.state = JobState::Ready;
@@ -193,7 +236,6 @@ void Lifecycle<D>::make_ready(std::uint32_t slot, Time origin) {
     default: job.key = task.key; break;
   }
   table_.step.emit(job, JobEventKind::Ready, origin);
-  dispatcher_.on_ready(slot);
 }
 
 template <Dispatcher D>

@@ -42,6 +42,7 @@ void Precedence::add_dag(const Dag &dag, std::span<const TaskId> ids) {
     successors_.insert(successors_.end(), outgoing[i].begin(), outgoing[i].end());
     node.last_successor = static_cast<std::uint32_t>(successors_.size());
   }
+  find_heirs();
 }
 
 // Compacts the edge arrays so that removed tasks cost no storage.
@@ -73,6 +74,7 @@ void Precedence::forget(std::span<const TaskId> tasks) {
   }
   edges_ = std::move(edges);
   successors_ = std::move(successors);
+  find_heirs();
 }
 
 void Precedence::set_period(TaskId task, Duration period) {
@@ -93,22 +95,20 @@ bool Precedence::count_fresh(Node &node) {
   return node.fresh == node.last_edge - node.first_edge;
 }
 
+void Precedence::find_heirs() {
+  for (Node &node : nodes_) {
+    node.heir = TaskId();
+    if (node.last_successor - node.first_successor != 1) continue;
+    const TaskId to = edges_[successors_[node.first_successor]].to;
+    const Node &successor = nodes_[to.value];
+    if (!successor.timer && successor.last_edge - successor.first_edge == 1) node.heir = to;
+  }
+}
+
 bool Precedence::on_release(TaskId task, Time release) {
   Node &node = nodes_[task.value];
   node.last_release = release;
   return count_fresh(node);
-}
-
-Precedence::Data Precedence::consume(TaskId task) {
-  Node &node = nodes_[task.value];
-  Data data{kNever, std::numeric_limits<Time>::min()};
-  for (std::uint32_t i = node.first_edge; i < node.last_edge; ++i) {
-    edges_[i].fresh = false;
-    data.origin = std::min(data.origin, edges_[i].origin);
-    data.complete = std::max(data.complete, edges_[i].finish);
-  }
-  node.fresh = 0;
-  return data;
 }
 
 void Precedence::discard(TaskId task) {

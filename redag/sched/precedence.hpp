@@ -5,6 +5,7 @@
 // nothing of job states, workers or priorities. Not thread-safe.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -34,7 +35,26 @@ class Precedence {
     Time complete = 0;  // the latest finish of all predecessors; threads can report an earlier finish later
   };
   /// The waiting or newly released job of `task` consumes its predecessors' data. Requires at least one predecessor.
-  Data consume(TaskId task);
+  Data consume(TaskId task) {
+    Node &node = nodes_[task.value];
+    Data data{kNever, std::numeric_limits<Time>::min()};
+    for (std::uint32_t i = node.first_edge; i < node.last_edge; ++i) {
+      edges_[i].fresh = false;
+      data.origin = std::min(data.origin, edges_[i].origin);
+      data.complete = std::max(data.complete, edges_[i].finish);
+    }
+    node.fresh = 0;
+    return data;
+  }
+
+  /// The only successor of the task, if that is a data task without other predecessors. Otherwise no task.
+  [[nodiscard]] TaskId heir(TaskId task) const { return nodes_[task.value].heir; }
+  /// As on_complete(), and consume() for the heir of the task, which it must have.
+  Data hand_on(TaskId task, Time release, Time origin, Time finish) {
+    Edge &edge = edges_[successors_[nodes_[task.value].first_successor]];
+    edge.take(release, origin, finish);
+    return Data{edge.origin, finish};
+  }
 
   /// Makes the consumed data fresh again: the job that consumed it was skipped before it started.
   void give_back(TaskId task);
@@ -51,11 +71,7 @@ class Precedence {
       Edge &edge = edges_[successors_[i]];
       Node &successor = nodes_[edge.to.value];
       if (serves(edge, successor)) --successor.fresh;
-      edge.finish = finish;
-      if (release >= edge.release) {  // an older job that ends late does not replace newer data
-        edge.release = release;
-        edge.origin = origin;
-      }
+      edge.take(release, origin, finish);
       edge.fresh = true;
       if (serves(edge, successor)) ++successor.fresh;
       if (successor.fresh == successor.last_edge - successor.first_edge) on_fresh(edge.to);
@@ -74,6 +90,14 @@ class Precedence {
     Time release = std::numeric_limits<Time>::min();  // of the predecessor's newest completed job: its data
     Time origin = 0;                                  // of that data
     Time finish = 0;                                  // of the job whose end was reported last
+
+    /// A job of the predecessor has completed. An older job that ends late does not replace newer data.
+    void take(Time its_release, Time its_origin, Time its_finish) {
+      finish = its_finish;
+      if (its_release < release) return;
+      release = its_release;
+      origin = its_origin;
+    }
   };
   struct Node {
     std::uint32_t first_edge = 0;  // edges into the task: [first_edge, last_edge)
@@ -81,7 +105,8 @@ class Precedence {
     std::uint32_t first_successor = 0;  // edges out of it: successors_[first_successor .. last_successor)
     std::uint32_t last_successor = 0;
     std::uint32_t fresh = 0;  // number of incoming edges with fresh data for its last job
-    Time last_release = 0;    // of that job
+    TaskId heir;
+    Time last_release = 0;  // of that job
     Duration period = 0;
     Duration offset = 0;
     bool timer = true;
@@ -92,6 +117,7 @@ class Precedence {
     return edge.fresh && (!edge.aligned || edge.release == successor.last_release);
   }
   [[nodiscard]] bool count_fresh(Node &node);
+  void find_heirs();
   Node &add_node(const Task &task, TaskId id);
   [[nodiscard]] static bool is_aligned(const Node &from, const Node &to);
 

@@ -46,9 +46,49 @@ inline void PriorityDispatcher::decide(std::uint32_t most) {
   if (held_back_ != kNil) put_back();
 }
 
+// The new job holds the gates that both tasks share in the place of the ended one, which nobody waits for. A free
+// worker that comes before the ended job's own would be the first choice.
+[[gnu::always_inline]] inline bool PriorityDispatcher::can_replace(const Job &job, TaskId next) const {
+  if (job.state != JobState::Running || job.under != kNil || !open_workers_.empty()) return false;
+  if (!free_workers_.empty() && (free_workers_.first() < job.worker.value || top() != kNil)) return false;
+  const TaskGates &from = task_gates_[job.task.value];
+  const TaskGates &to = task_gates_[next.value];
+  if (from.own.parked.top() != kNil || is_full(to.own) || !to.shares_all_with(from)) return false;
+  for (std::uint32_t i = 0; i < from.count; ++i) {
+    if (shared_gates_[from.shared[i]].parked.top() != kNil) return false;
+  }
+  return true;
+}
+
+[[gnu::always_inline]] inline void PriorityDispatcher::replace(std::uint32_t ended, std::uint32_t slot,
+                                                               std::uint32_t most) {
+  Job &job = table_.jobs[slot];
+  const std::uint32_t top_slot = top();
+  if (top_slot != kNil) {
+    job.child = static_ ? list_of(job) : kNil;
+    if (!is_ahead(job, table_.jobs[top_slot])) {
+      on_end(ended);
+      push(slot);
+      return decide(most);
+    }
+  }
+  const WorkerId worker = table_.jobs[ended].worker;
+  --task_gates_[table_.jobs[ended].task.value].own.used;
+  TaskGates &gates = task_gates_[job.task.value];
+  ++gates.own.used;
+  gates.own.holder = slot;
+  for (std::uint32_t i = 0; i < gates.count; ++i) shared_gates_[gates.shared[i]].holder = slot;
+  table_.start(slot, worker, kNil, level_of(job));
+  workers_[worker.value].running = slot;
+  workers_[worker.value].stack = slot;
+  if (ended == least_urgent_) forget_least_urgent();
+  note_running(slot);
+  if (top_slot != kNil) decide(most - 1);
+}
+
 // No more jobs may start. Holds this job back and lets dispatch() look past it for started jobs, as long as there are
 // some in the ready queue. Only full preemption keeps them there.
-bool PriorityDispatcher::set_aside(std::uint32_t slot) {
+[[gnu::noinline]] bool PriorityDispatcher::set_aside(std::uint32_t slot) {
   if (queued_started_ == 0) return false;
   remove(slot);
   table_.jobs[slot].next = held_back_;
@@ -56,7 +96,7 @@ bool PriorityDispatcher::set_aside(std::uint32_t slot) {
   return true;
 }
 
-void PriorityDispatcher::put_back() {
+[[gnu::noinline]] void PriorityDispatcher::put_back() {
   while (held_back_ != kNil) {
     const std::uint32_t slot = held_back_;
     held_back_ = table_.jobs[slot].next;
@@ -105,7 +145,7 @@ inline bool PriorityDispatcher::outranks(const Job &a, const Job &b) const {
   return table_.config.ties == Ties::Share ? a.key < b.key : before(a, b) && !table_.is_demoted_key(a.key);
 }
 
-inline std::uint32_t PriorityDispatcher::level_of(const Job &job) const {
+[[gnu::always_inline]] inline std::uint32_t PriorityDispatcher::level_of(const Job &job) const {
   if (!static_) return 0;
   const auto key = static_cast<std::uint32_t>(job.key);
   return level_of_key_.empty() ? std::min(key, table_.tier_count()) : level_of_key_[key];
@@ -114,7 +154,10 @@ inline std::uint32_t PriorityDispatcher::level_of(const Job &job) const {
 inline void PriorityDispatcher::run(std::uint32_t slot, Job &job, const Place &place) {
   const bool resumes = job.started();
   remove(slot);
-  if (!resumes) hold_gates(slot);
+  if (!resumes) {
+    hold_gates(slot);
+    ++started_;
+  }
   make_way(place);
   job.under = table_.config.preemption == Preemption::Cooperative ? place.victim : kNil;
   const std::uint32_t level = level_of(job);
@@ -124,7 +167,11 @@ inline void PriorityDispatcher::run(std::uint32_t slot, Job &job, const Place &p
   worker.running = slot;
   worker.stack = slot;
   worker.open = false;
-  if (least_urgent_ != kNil && before(table_.jobs[least_urgent_], job)) least_urgent_ = slot;
+  note_running(slot);
+}
+
+inline void PriorityDispatcher::note_running(std::uint32_t slot) {
+  if (least_urgent_ != kNil && before(table_.jobs[least_urgent_], table_.jobs[slot])) least_urgent_ = slot;
 }
 
 inline void PriorityDispatcher::make_way(const Place &place) {
@@ -139,7 +186,7 @@ inline void PriorityDispatcher::make_way(const Place &place) {
 }
 
 // Resumes the suspended job on each open worker that no other job took.
-void PriorityDispatcher::close_open_workers() {
+[[gnu::noinline]] void PriorityDispatcher::close_open_workers() {
   for (const std::uint32_t w : open_workers_) {
     Worker &worker = workers_[w];
     if (!worker.open) continue;
@@ -152,28 +199,28 @@ void PriorityDispatcher::close_open_workers() {
 }
 
 // Parked jobs need no check: each waits for a job that has started.
-bool PriorityDispatcher::is_idle() const {
-  return top() == kNil &&
-         std::all_of(workers_.begin(), workers_.end(), [](const Worker &worker) { return worker.stack == kNil; });
-}
+bool PriorityDispatcher::is_idle() const { return top() == kNil && started_ == 0; }
 
 // ---- eligibility ----
 
 // A worker is available to the job. Parks the job if one of its gates is full. Tries the gates in the order task, DAG,
 // group, threads.
-inline bool PriorityDispatcher::park_if_not_eligible(std::uint32_t slot, Job &job) {
-  TaskGates &to_pass = task_gates_[job.task.value];
-  const auto is_full = [](const Gate &gate) { return gate.used >= gate.capacity; };
-  GateKind kind = GateKind::Task;
-  std::uint32_t position = job.task.value;
-  if (!is_full(to_pass.own)) {
-    std::uint32_t i = 0;
-    while (i < to_pass.count && !is_full(shared_gates_[to_pass.shared[i]])) ++i;
-    if (i == to_pass.count) return false;
-    kind = to_pass.kinds[i];
-    position = static_cast<std::uint32_t>(task_gates_.size()) + to_pass.shared[i];
+inline bool PriorityDispatcher::park_if_not_eligible(std::uint32_t slot, const Job &job) {
+  const TaskGates &to_pass = task_gates_[job.task.value];
+  if (is_full(to_pass.own)) {
+    park(slot, GateKind::Task, job.task.value);
+    return true;
   }
+  for (std::uint32_t i = 0; i < to_pass.count; ++i) {
+    if (!is_full(shared_gates_[to_pass.shared[i]])) continue;
+    park(slot, to_pass.kinds[i], static_cast<std::uint32_t>(task_gates_.size()) + to_pass.shared[i]);
+    return true;
+  }
+  return false;
+}
 
+[[gnu::noinline]] void PriorityDispatcher::park(std::uint32_t slot, GateKind kind, std::uint32_t position) {
+  Job &job = table_.jobs[slot];
   Gate &gate = gate_at(position);
   remove(slot);
   gate.parked.push(table_.jobs, slot);
@@ -183,7 +230,6 @@ inline bool PriorityDispatcher::park_if_not_eligible(std::uint32_t slot, Job &jo
   if (kind == GateKind::Group) inherit(gate.holder, job);
   // Other jobs may now use the places that this job would have used at its other gates.
   for_gates_of(job, [this](Gate &other) { promote_one(other); });
-  return true;
 }
 
 // Priority inheritance (Sha, Rajkumar, Lehoczky, IEEE TC 39(9), 1990). One step is enough, because a job that holds a
@@ -191,14 +237,22 @@ inline bool PriorityDispatcher::park_if_not_eligible(std::uint32_t slot, Job &jo
 void PriorityDispatcher::inherit(std::uint32_t holder_slot, const Job &waiter) {
   Job &holder = table_.jobs[holder_slot];
   if (table_.config.policy == PolicyKind::Fifo || waiter.key >= holder.key) return;
-  const bool is_queued = holder.state == JobState::Suspended && table_.config.preemption == Preemption::Full;
-  if (is_queued) remove(holder_slot);
-  const std::uint32_t old_level = level_of(holder);
+  rekey(holder_slot, [&] {
+    holder.key = waiter.key;
+    holder.priority_of = waiter.priority_of;
+  });
+}
+
+template <class Change>
+void PriorityDispatcher::rekey(std::uint32_t slot, Change change) {
+  const Job &job = table_.jobs[slot];
+  const bool is_queued = job.state == JobState::Suspended && table_.config.preemption == Preemption::Full;
+  if (is_queued) remove(slot);
+  const std::uint32_t old_level = level_of(job);
   forget_least_urgent();
-  holder.key = waiter.key;
-  holder.priority_of = waiter.priority_of;
-  if (is_queued) push(holder_slot);
-  tell_level(holder_slot, old_level);
+  change();
+  if (is_queued) push(slot);
+  tell_level(slot, old_level);
 }
 
 // Full: the operating system also schedules suspended jobs, by the last level that it was told. Cooperative: a
@@ -211,14 +265,10 @@ void PriorityDispatcher::tell_level(std::uint32_t slot, std::uint32_t old_level)
 
 void PriorityDispatcher::on_lowered(std::uint32_t slot) {
   Job &job = table_.jobs[slot];
-  const bool is_queued = job.state == JobState::Suspended && table_.config.preemption == Preemption::Full;
-  if (is_queued) remove(slot);
-  const std::uint32_t old_level = level_of(job);
-  forget_least_urgent();
-  job.key = table_.own_key(job);
-  job.priority_of = job.task;
-  if (is_queued) push(slot);
-  tell_level(slot, old_level);
+  rekey(slot, [&] {
+    job.key = table_.own_key(job);
+    job.priority_of = job.task;
+  });
   // Puts jobs that wait for the group back into the ready queue, so that the job can inherit from those that remain.
   // Some of them are parked for a thread: when tried again, they find the gate of their group first.
   if (table_.task_of(job).group == kNil) return;
@@ -248,6 +298,7 @@ void PriorityDispatcher::on_withdrawn(std::uint32_t slot) {
 inline void PriorityDispatcher::on_end(std::uint32_t slot) {
   const Job &job = table_.jobs[slot];
   Worker &worker = workers_[job.worker.value];
+  --started_;
   if (slot == least_urgent_) forget_least_urgent();
   if (job.state == JobState::Suspended) {
     // On threads, the operating system ran the job although the scheduler counted it as preempted.
@@ -278,8 +329,12 @@ void PriorityDispatcher::open(std::uint32_t worker) {
 // If the gate has room, its most urgent parked job goes back to the ready queue. Called once for each place that
 // becomes free, and for each queued job that is gone and could have used one.
 inline void PriorityDispatcher::promote_one(Gate &gate) {
+  if (gate.parked.top() == kNil || gate.used == gate.capacity) return;
+  promote(gate);
+}
+
+[[gnu::noinline]] void PriorityDispatcher::promote(Gate &gate) {
   const std::uint32_t slot = gate.parked.top();
-  if (slot == kNil || gate.used == gate.capacity) return;
   gate.parked.remove(table_.jobs, slot);
   table_.jobs[slot].parked_at = kNil;
   push(slot);
@@ -307,7 +362,7 @@ inline void PriorityDispatcher::push(std::uint32_t slot) {
   first_ = slot;
 }
 
-inline void PriorityDispatcher::enqueue(std::uint32_t slot) {
+[[gnu::noinline]] void PriorityDispatcher::enqueue(std::uint32_t slot) {
   static_ ? levels_.push(table_.jobs, slot, table_.jobs[slot].child) : heap_.push(table_.jobs, slot);
 }
 
@@ -320,8 +375,12 @@ inline void PriorityDispatcher::remove(std::uint32_t slot) {
   if (table_.jobs[slot].started()) --queued_started_;
   if (slot == first_) {
     first_ = kNil;
-    return;
+  } else {
+    dequeue(slot);
   }
+}
+
+[[gnu::noinline]] void PriorityDispatcher::dequeue(std::uint32_t slot) {
   static_ ? levels_.remove(table_.jobs, slot) : heap_.remove(table_.jobs, slot);
 }
 

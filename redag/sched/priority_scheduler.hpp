@@ -32,6 +32,8 @@ class PriorityDispatcher {
   void on_reconfigured();
   void on_preemption_point(std::uint32_t slot) { open(table_.jobs[slot].worker.value); }
   void decide(std::uint32_t most);
+  [[nodiscard]] bool can_replace(const Job &job, TaskId next) const;
+  void replace(std::uint32_t ended, std::uint32_t slot, std::uint32_t most);
   [[nodiscard]] bool outranked(const Job &job) const { return top() != kNil && outranks(table_.jobs[top()], job); }
   [[nodiscard]] bool is_idle() const;
 
@@ -53,6 +55,14 @@ class PriorityDispatcher {
     std::array<std::uint32_t, 3> shared{};  // positions in shared_gates_
     std::array<GateKind, 3> kinds{};
     std::uint8_t count = 0;  // number of shared gates
+
+    [[nodiscard]] bool shares_all_with(const TaskGates &other) const {
+      if (count != other.count) return false;
+      for (std::uint32_t i = 0; i < count; ++i) {
+        if (shared[i] != other.shared[i]) return false;
+      }
+      return true;
+    }
   };
   struct Worker {
     std::uint32_t running = kNil;  // the executing job; kNil while the worker is free or waits for a decision
@@ -71,9 +81,14 @@ class PriorityDispatcher {
   [[nodiscard]] std::uint32_t level_of(const Job &job) const;
   void tell_level(std::uint32_t slot, std::uint32_t old_level);
   void run(std::uint32_t slot, Job &job, const Place &place);
+  void note_running(std::uint32_t slot);
   void make_way(const Place &place);
-  bool park_if_not_eligible(std::uint32_t slot, Job &job);
+  bool park_if_not_eligible(std::uint32_t slot, const Job &job);
+  void park(std::uint32_t slot, GateKind kind, std::uint32_t position);
   void inherit(std::uint32_t holder, const Job &waiter);
+  /// `change` changes the key of a started job.
+  template <class Change>
+  void rekey(std::uint32_t slot, Change change);
   void close_open_workers();
   bool set_aside(std::uint32_t slot);
   void put_back();
@@ -83,10 +98,13 @@ class PriorityDispatcher {
   void push(std::uint32_t slot);
   void remove(std::uint32_t slot);
   void enqueue(std::uint32_t slot);
+  void dequeue(std::uint32_t slot);
   [[nodiscard]] bool is_ahead(const Job &a, const Job &b) const;
-  [[nodiscard]] std::uint32_t queue_top() const { return static_ ? levels_.top() : heap_.top(); }
-  [[nodiscard]] std::uint32_t top() const { return first_ != kNil ? first_ : queue_top(); }
+  [[nodiscard, gnu::always_inline]] std::uint32_t queue_top() const { return static_ ? levels_.top() : heap_.top(); }
+  [[nodiscard, gnu::always_inline]] std::uint32_t top() const { return first_ != kNil ? first_ : queue_top(); }
+  [[nodiscard]] static bool is_full(const Gate &gate) { return gate.used >= gate.capacity; }
   void promote_one(Gate &gate);
+  void promote(Gate &gate);
   /// Returns the gate of Job::parked_at. Positions below the number of tasks are the tasks' own gates; the shared ones
   /// follow.
   [[nodiscard]] Gate &gate_at(std::uint32_t position) {
@@ -115,6 +133,7 @@ class PriorityDispatcher {
   HeapQueue heap_;
   std::uint32_t first_ = kNil;
   std::uint32_t queued_started_ = 0;  // started jobs in the ready queue; only full preemption puts them there
+  std::uint32_t started_ = 0;         // jobs started and unfinished
   // Where levels are limited: the level of each key, and the first key of that level. Empty: each tier is a level.
   std::vector<std::uint32_t> level_of_key_;
   std::vector<std::uint32_t> first_of_level_;

@@ -17,34 +17,39 @@
 
 namespace redag::sched {
 
-/// A set of small integers with an O(1) minimum: a 64-ary tree of words. Three levels hold 262,144 members. Sets of up
-/// to 64 need the root alone.
+/// A set of small integers with an O(1) minimum: a 64-ary tree of words. Sets of up to 64 need the root alone, and
+/// those of up to 4,096 the root and its leaves. Three levels hold 262,144 members.
 class LevelBitmap {
  public:
   explicit LevelBitmap(std::size_t size = 0) {
+    if (size <= 64) return;
+    size = (size + 63) / 64;
+    leaves_.resize(size);
     while (size > 64) {
       size = (size + 63) / 64;
-      layers_.emplace_back(size, 0);
+      upper_.emplace_back(size, 0);
     }
   }
 
   void set(std::uint32_t index) {
-    for (auto &layer : layers_) {
-      std::uint64_t &word = layer[index >> 6U];
+    if (!leaves_.empty()) {
+      std::uint64_t &word = leaves_[index >> 6U];
       const bool was_empty = word == 0;
       word |= bit(index);
       if (!was_empty) return;
       index >>= 6U;
+      if (!upper_.empty()) return set_above(index);
     }
     root_ |= bit(index);
   }
 
   void clear(std::uint32_t index) {
-    for (auto &layer : layers_) {
-      std::uint64_t &word = layer[index >> 6U];
+    if (!leaves_.empty()) {
+      std::uint64_t &word = leaves_[index >> 6U];
       word &= ~bit(index);
       if (word != 0) return;
       index >>= 6U;
+      if (!upper_.empty()) return clear_above(index);
     }
     root_ &= ~bit(index);
   }
@@ -54,17 +59,44 @@ class LevelBitmap {
   /// The smallest member. Requires !empty().
   [[nodiscard]] std::uint32_t first() const {
     auto index = static_cast<std::uint32_t>(std::countr_zero(root_));
-    for (auto layer = layers_.rbegin(); layer != layers_.rend(); ++layer) {
+    if (leaves_.empty()) return index;
+    if (!upper_.empty()) index = first_above(index);
+    return (index << 6U) | static_cast<std::uint32_t>(std::countr_zero(leaves_[index]));
+  }
+
+ private:
+  // Not inlined, so that the users of small sets stay short.
+  [[gnu::noinline]] void set_above(std::uint32_t index) {
+    for (auto &layer : upper_) {
+      std::uint64_t &word = layer[index >> 6U];
+      const bool was_empty = word == 0;
+      word |= bit(index);
+      if (!was_empty) return;
+      index >>= 6U;
+    }
+    root_ |= bit(index);
+  }
+  [[gnu::noinline]] void clear_above(std::uint32_t index) {
+    for (auto &layer : upper_) {
+      std::uint64_t &word = layer[index >> 6U];
+      word &= ~bit(index);
+      if (word != 0) return;
+      index >>= 6U;
+    }
+    root_ &= ~bit(index);
+  }
+  [[nodiscard, gnu::noinline]] std::uint32_t first_above(std::uint32_t index) const {
+    for (auto layer = upper_.rbegin(); layer != upper_.rend(); ++layer) {
       index = (index << 6U) | static_cast<std::uint32_t>(std::countr_zero((*layer)[index]));
     }
     return index;
   }
 
- private:
   [[nodiscard]] static std::uint64_t bit(std::uint32_t index) { return std::uint64_t{1} << (index & 63U); }
 
   std::uint64_t root_ = 0;
-  std::vector<std::vector<std::uint64_t>> layers_;  // below the root; [0]: the leaves
+  std::vector<std::uint64_t> leaves_;              // empty: the root is the only word
+  std::vector<std::vector<std::uint64_t>> upper_;  // between leaves and root; [0]: next to the leaves
 };
 
 /// One list of jobs for each urgency, and a bitmap of the lists that are not empty.
@@ -108,15 +140,16 @@ class LevelQueue {
   std::vector<List> lists_;
 };
 
-/// A pairing heap ordered by before(). Fredman, Sedgewick, Sleator, Tarjan, Algorithmica 1 (1986).
+/// A pairing heap ordered by before(). Fredman, Sedgewick, Sleator, Tarjan, Algorithmica 1 (1986). Not inlined, so that
+/// those who mostly find it empty stay short.
 class HeapQueue {
  public:
-  void push(std::span<Job> jobs, std::uint32_t slot) {
+  [[gnu::noinline]] void push(std::span<Job> jobs, std::uint32_t slot) {
     jobs[slot].child = jobs[slot].next = jobs[slot].previous = kNil;
     root_ = root_ == kNil ? slot : meld(jobs, root_, slot);
   }
 
-  void remove(std::span<Job> jobs, std::uint32_t slot) {
+  [[gnu::noinline]] void remove(std::span<Job> jobs, std::uint32_t slot) {
     Job &job = jobs[slot];
     const std::uint32_t rest = merge_pairs(jobs, job.child);
     if (slot == root_) {

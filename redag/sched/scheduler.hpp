@@ -31,6 +31,17 @@ enum class Outcome : std::uint8_t {
   NoData,  // the job found nothing to do: its message was overwritten or its timer cancelled
 };
 
+/// Why a job with this outcome is aborted.
+[[nodiscard]] constexpr Reason reason_of(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::Threw: return Reason::Exception;
+    case Outcome::BudgetExceeded: return Reason::Budget;
+    case Outcome::NoData: return Reason::NoData;
+    case Outcome::Finished: break;
+  }
+  return Reason::None;
+}
+
 /// A set of kinds of events.
 class EventKinds {
  public:
@@ -111,6 +122,12 @@ class Scheduler {
   /// Takes the decisions. A second call without a new event yields nothing. At most `most` jobs are started. Once that
   /// many are, dispatch() ignores the other unstarted jobs, and started ones continue as if those did not exist.
   virtual Step dispatch(Time now, std::uint32_t most = kNoLimit) = 0;
+
+  /// As complete(), then dispatch(): for a thread that has ended a job and needs its next one.
+  virtual Step finish(JobSlot job, Time now, Outcome outcome, std::uint32_t most = kNoLimit) {
+    complete(job, now, outcome);
+    return dispatch(now, most);
+  }
 
   /// From now on, steps have only events of these kinds. By default they have all. Decisions do not depend on it.
   virtual void record_only(EventKinds kinds) = 0;

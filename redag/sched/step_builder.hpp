@@ -26,6 +26,9 @@ class StepBuilder {
     dispatches_.clear();
   }
 
+  /// Returns true if nothing was reported since the last read().
+  [[nodiscard]] bool is_new() const { return was_read_; }
+
   /// Returns the step: the result of dispatch().
   [[nodiscard]] Step read() {
     was_read_ = true;
@@ -43,15 +46,16 @@ class StepBuilder {
   /// From now on, only events of these kinds are kept.
   void record_only(EventKinds kinds) { recorded_ = kinds; }
 
-  void emit(const Job &job, JobEventKind kind, std::int64_t value, Reason reason = Reason::None) {
+  [[gnu::always_inline]] void emit(const Job &job, JobEventKind kind, std::int64_t value,
+                                   Reason reason = Reason::None) {
     emit(job.task, job.number, job.worker, kind, value, reason);
   }
-  void emit(TaskId task, std::uint32_t number, WorkerId worker, JobEventKind kind, std::int64_t value,
-            Reason reason = Reason::None) {
+  [[gnu::always_inline]] void emit(TaskId task, std::uint32_t number, WorkerId worker, JobEventKind kind,
+                                   std::int64_t value, Reason reason = Reason::None) {
     if (recorded_.contains(kind)) record(JobEvent{now_, value, task, number, worker.value, kind, reason, 0});
   }
 
-  void tell(const Job &job, JobSlot slot, DispatchKind kind, JobSlot over, std::uint32_t level) {
+  [[gnu::always_inline]] void tell(const Job &job, JobSlot slot, DispatchKind kind, JobSlot over, std::uint32_t level) {
     dispatches_.push_back(Dispatch{.job = slot,
                                    .task = job.task,
                                    .number = job.number,
@@ -71,12 +75,14 @@ class StepBuilder {
 
   /// Drops all decisions that the step has for this job.
   void drop(JobSlot slot) {
-    if (dispatches_.empty()) return;
-    std::erase_if(dispatches_, [slot](const Dispatch &d) { return d.job == slot; });
+    if (!dispatches_.empty()) drop_all(slot);
   }
 
  private:
   void record(const JobEvent &event) { events_.push_back(event); }
+  [[gnu::noinline]] void drop_all(JobSlot slot) {
+    std::erase_if(dispatches_, [slot](const Dispatch &d) { return d.job == slot; });
+  }
 
   std::vector<JobEvent> events_;
   std::vector<Dispatch> dispatches_;

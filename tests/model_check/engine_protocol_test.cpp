@@ -288,6 +288,23 @@ TEST_P(EngineProtocol, ChainsRunInTheirOrder) {
   });
 }
 
+// A thread goes from job to job of a chain without a look at its mail, while another thread releases and halts.
+TEST_P(EngineProtocol, AHaltMeetsAChainThatIsHandedOver) {
+  expect_holds([] {
+    Workload workload = ladder(3);
+    for (std::uint32_t t = 1; t < 3; ++t) {
+      workload.dags[0].tasks[t].activation = Activation::Data;
+      workload.dags[0].tasks[t].predecessors = {t - 1};
+    }
+    Machine machine(workload, platform(1), {nullptr, nullptr, nullptr});
+    machine.start_calmly();
+    const std::uint32_t source = spawn([&] { machine.release(0); });
+    machine.finish();
+    explored::join(source);
+    explored::check(machine.ran(1) <= machine.ran(0) && machine.ran(2) <= machine.ran(1), "a job has no data");
+  });
+}
+
 // The last task's body releases a job while one worker is free and its thread sleeps. The thread that is first free and
 // awake begins the job. A thread whose job was stolen may be given another one.
 TEST_P(EngineProtocol, AJobIsBegunByItsThreadOrByOneThatIsFreeBefore) {
